@@ -1,0 +1,185 @@
+"""Exact algebra of rotations: skew matrices, quaternions, Pauli matrices, on SymPy expressions.
+
+Vectors are 3 x 1 matrices. Quaternions are 4 x 1 matrices with the scalar **last**, as the Euler parameters.
+Everything is built from sums and products alone, so it also holds for polynomials and numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import sympy as sp
+
+
+def skew(v: sp.Matrix) -> sp.Matrix:
+    """Return the matrix of the cross product: ``skew(v) * u == v x u``.
+
+    Parameters
+    ----------
+    v : Matrix, 3 x 1
+
+    Returns
+    -------
+    Matrix, 3 x 3
+
+    Examples
+    --------
+    >>> skew(sp.Matrix(sp.symbols("x y z")))
+    Matrix([
+    [ 0, -z,  y],
+    [ z,  0, -x],
+    [-y,  x,  0]])
+    """
+    x, y, z = v
+    return sp.Matrix([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+
+
+def cross(u: sp.Matrix, v: sp.Matrix) -> sp.Matrix:
+    """Return the cross product of two 3-vectors."""
+    return skew(u) * v
+
+
+def dot(u: sp.Matrix, v: sp.Matrix) -> sp.Expr:
+    """Return the sum of products of the elements of two vectors of any length."""
+    return sp.Add(*(a * b for a, b in zip(u, v, strict=True)))
+
+
+def quaternion_product(p: sp.Matrix, q: sp.Matrix) -> sp.Matrix:
+    """Return the quaternion product p q, scalar last: the rotation q followed, in reference axes, by p.
+
+    Parameters
+    ----------
+    p, q : Matrix, 4 x 1
+
+    Returns
+    -------
+    Matrix, 4 x 1
+
+    Examples
+    --------
+    >>> i, j = sp.Matrix([1, 0, 0, 0]), sp.Matrix([0, 1, 0, 0])
+    >>> quaternion_product(i, j).T
+    Matrix([[0, 0, 1, 0]])
+    """
+    p_v, p_s, q_v, q_s = p[:3, :], p[3], q[:3, :], q[3]
+    return sp.Matrix([*(p_s * q_v + q_s * p_v + cross(p_v, q_v)), p_s * q_s - dot(p_v, q_v)])
+
+
+def quaternion_conjugate(q: sp.Matrix) -> sp.Matrix:
+    """Return the conjugate of a quaternion, scalar last."""
+    return sp.Matrix([-q[0], -q[1], -q[2], q[3]])
+
+
+def quaternion_matrix(q: sp.Matrix) -> sp.Matrix:
+    """Return the matrix of ``v -> q v q*``: |q|^2 times the direction cosine matrix of q.
+
+    Parameters
+    ----------
+    q : Matrix, 4 x 1
+        Quaternion, scalar last.
+
+    Returns
+    -------
+    Matrix, 3 x 3
+    """
+    columns = []
+    for axis in range(3):
+        unit = sp.Matrix([int(k == axis) for k in range(4)])
+        rotated = quaternion_product(quaternion_product(q, unit), quaternion_conjugate(q))
+        columns.append(rotated[:3, :])
+    return sp.Matrix.hstack(*columns)
+
+
+#: The Pauli matrices s1, s2, s3.
+PAULI = (
+    sp.Matrix([[0, 1], [1, 0]]),
+    sp.Matrix([[0, -sp.I], [sp.I, 0]]),
+    sp.Matrix([[1, 0], [0, -1]]),
+)
+
+
+def cayley_klein_matrix(a: sp.Matrix) -> sp.Matrix:
+    """Return U = a1 I + i (a2 s1 + a3 s2 + a4 s3), the complex 2 x 2 form of Cayley-Klein parameters.
+
+    Parameters
+    ----------
+    a : Matrix, 4 x 1
+        Cayley-Klein parameters, scalar **first**.
+    """
+    return a[0] * sp.eye(2) + sp.I * sum((a[k + 1] * PAULI[k] for k in range(3)), sp.zeros(2, 2))
+
+
+def cayley_klein_parameters(U: sp.Matrix) -> sp.Matrix:
+    """Return the real parameters of U, the inverse of `cayley_klein_matrix`."""
+    parts = [U.trace() / 2, *((U * s).trace() / (2 * sp.I) for s in PAULI)]
+    return sp.Matrix([sp.expand(part) for part in parts])
+
+
+def rotation(v: sp.Matrix) -> sp.Matrix:
+    """Return exp(skew(v)), the rotation by the rotation vector v, without a singularity at v = 0.
+
+    I + (sin x)/x skew(v) + (1 - cos x)/x^2 skew(v)^2 with x = |v|, where (1 - cos x)/x^2 is written as
+    half the square of sin(x/2)/(x/2).
+
+    Parameters
+    ----------
+    v : Matrix, 3 x 1
+        Rotation vector in rad.
+
+    Returns
+    -------
+    Matrix, 3 x 3
+    """
+    angle = sp.sqrt(dot(v, v))
+    K = skew(v)
+    return sp.eye(3) + sp.sinc(angle) * K + sp.sinc(angle / 2) ** 2 / 2 * K * K
+
+
+def adjugate(A: sp.Matrix) -> sp.Matrix:
+    """Return the adjugate of a 3 x 3 matrix, from cross products of its columns."""
+    a, b, c = A[:, 0], A[:, 1], A[:, 2]
+    return sp.Matrix.vstack(cross(b, c).T, cross(c, a).T, cross(a, b).T)
+
+
+def evaluate(expression: sp.Expr, values: Mapping[str, Any]) -> Any:
+    """Evaluate an expression with the given values for its symbols.
+
+    Unlike `subs` this never rearranges: sums and products are carried out with the values' own operators,
+    so polynomials stay polynomials and numbers stay exact.
+
+    Parameters
+    ----------
+    expression : Expr
+    values : mapping of str to number, polynomial or Expr
+
+    Returns
+    -------
+    number, polynomial or Expr
+
+    Raises
+    ------
+    KeyError
+        If a symbol has no value.
+
+    Examples
+    --------
+    >>> x, y = sp.symbols("x y")
+    >>> evaluate(x * (x + y), {"x": 2, "y": 3})
+    10
+    """
+    if expression.is_Symbol:
+        return values[expression.name]
+    if expression.is_Rational:
+        return expression
+    arguments = [evaluate(argument, values) for argument in expression.args]
+    if expression.is_Add or expression.is_Mul:
+        result = arguments[0]
+        for argument in arguments[1:]:
+            # The polynomial, if one of the two is, must be asked first: a SymPy number would take it for a symbol.
+            first, second = (argument, result) if isinstance(result, sp.Rational) else (result, argument)
+            result = first + second if expression.is_Add else first * second
+        return result
+    if expression.is_Pow and expression.exp.is_Integer and expression.exp > 0:
+        return arguments[0] ** int(expression.exp)
+    return expression.func(*(sp.sympify(argument) for argument in arguments))

@@ -1,0 +1,220 @@
+"""The protocol of back ends: all that simulator, truth models and tests see of generated code."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapgen import checks
+from strapgen.exceptions import InputError
+from strapgen.targets import Function, Sources
+
+Array = NDArray[Any]
+
+
+class Evaluator(ABC):
+    """A generated function, called with arrays of samples.
+
+    Parameters
+    ----------
+    function : Function
+        Its interface.
+    dtype : dtype
+        Type of the numbers that it computes with.
+    """
+
+    def __init__(self, function: Function, dtype: Any) -> None:
+        self.function = function
+        self.dtype = np.dtype(dtype)
+
+    def __call__(self, *values: Any) -> Any:
+        """Call the function.
+
+        Parameters
+        ----------
+        *values : array_like
+            The inputs in order, each (..., shape of the signal); leading axes broadcast.
+
+        Returns
+        -------
+        array or tuple of array
+            The outputs.
+
+        Raises
+        ------
+        InputError, InputTypeError
+            If the number of inputs, a shape, a dtype or a value does not fit.
+        """
+        signals = self.function.inputs
+        if len(values) != len(signals):
+            names = ", ".join(signal.name for signal in signals)
+            raise InputError(f"{self.function.name} got {len(values)} inputs; {len(signals)} are needed: {names}")
+        arrays = [
+            checks.real_array(signal.name, value, signal.shape, self.dtype)
+            for signal, value in zip(signals, values, strict=True)
+        ]
+        leading = [a.shape[: a.ndim - len(s.shape)] for a, s in zip(arrays, signals, strict=True)]
+        try:
+            batch = np.broadcast_shapes(*leading)
+        except ValueError:
+            shapes = ", ".join(f"{s.name} {a.shape}" for s, a in zip(signals, arrays, strict=True))
+            raise InputError(f"the leading axes of {shapes} do not broadcast together") from None
+        results = self._call(arrays, batch)
+        return results[0] if len(results) == 1 else results
+
+    @abstractmethod
+    def _call(self, arrays: list[Array], batch: tuple[int, ...]) -> tuple[Array, ...]:
+        """Evaluate on checked arrays whose leading axes broadcast to `batch`."""
+
+
+class Backend(ABC):
+    """An attitude algorithm, compiled and ready to run.
+
+    Parameters
+    ----------
+    sources : Sources
+        Sources of an attitude step.
+    evaluate : callable
+        Gives the `Evaluator` of a kernel by name, on the same target.
+    orthonormalization : str, optional
+        Kernel that orthonormalizes; by default the one that goes with the algorithm.
+
+    Attributes
+    ----------
+    name : str
+        Name of the back end.
+    kernel : str
+        Name of the kernel that it runs.
+    dtype : dtype
+        Type of the numbers that it computes with.
+    increments : int
+        Angle increments a step.
+    state_shape : tuple of int
+        Shape of the state.
+    identity : array
+        The state of zero rotation.
+    attitude : str or None
+        Kernel that turns a state into a direction cosine matrix; None where the state is one.
+    """
+
+    def __init__(
+        self,
+        sources: Sources,
+        evaluate: Callable[[str], Evaluator],
+        orthonormalization: str | None = None,
+    ) -> None:
+        companions = sources.companions
+        if companions is None:
+            raise InputError(f"kernel {sources.kernel} is no attitude step; back ends are built from steps")
+        state, increments = sources.function.inputs
+        self.name = sources.target
+        self.kernel = sources.kernel
+        self.increments = increments.shape[0]
+        self.state_shape = state.shape
+        self.attitude = companions.attitude
+        self._sources = sources
+        self._evaluate = evaluate
+        self._product = companions.product
+        self._orthonormalization = orthonormalization or companions.orthonormalize
+        self._step = evaluate(sources.kernel)
+        self.dtype = self._step.dtype
+        self.identity: Array = np.array([float(x) for x in companions.identity], self.dtype).reshape(state.shape)
+
+    def step(self, state: Any, increments: Any) -> Array:
+        """Advance the state by one step.
+
+        Parameters
+        ----------
+        state : array_like, (..., state shape)
+            Body-to-reference attitude.
+        increments : array_like, (..., K, 3)
+            Angle increments of the step in rad, body axes, oldest first.
+
+        Returns
+        -------
+        array, (..., state shape)
+
+        Raises
+        ------
+        InputError, InputTypeError
+            If a shape, a dtype or a value does not fit.
+        """
+        result: Array = self._step(state, increments)
+        return result
+
+    def orthonormalize(self, state: Any) -> Array:
+        """Restore the constraint of a state, (..., state shape)."""
+        result: Array = self._evaluate(self._orthonormalization)(state)
+        return result
+
+    def propagate(
+        self,
+        increments: Any,
+        record_every: int = 1,
+        orthonormalize_every: int | None = None,
+        initial: Any = None,
+    ) -> Array:
+        """Run the algorithm over a sequence of increments.
+
+        Parameters
+        ----------
+        increments : array_like, (..., N, K, 3)
+            Angle increments of N steps in rad, body axes; leading axes are independent runs.
+        record_every : int, optional
+            Steps from record to record.
+        orthonormalize_every : int, optional
+            Steps from orthonormalization to orthonormalization; never by default. A record of the same
+            step is taken after it.
+        initial : array_like, (..., state shape), optional
+            State at the start, by default zero rotation.
+
+        Returns
+        -------
+        array, (..., 1 + N // record_every, state shape)
+            The initial state and the records.
+
+        Raises
+        ------
+        InputError, InputTypeError
+            If a shape, a dtype or a value does not fit.
+
+        Examples
+        --------
+        >>> from strapgen import backend
+        >>> turn = np.tile([0.0, 0.0, np.pi / 64], (16, 2, 1))
+        >>> backend("euler", backend="numpy").propagate(turn)[-1].round(6)
+        array([0.      , 0.      , 0.707107, 0.707107])
+        """
+        d = checks.real_array("increments", increments, (self.increments, 3), self.dtype)
+        if d.ndim < 3:
+            raise InputError(f"increments has shape {d.shape}; (..., steps, {self.increments}, 3) is needed")
+        checks.count("record_every", record_every)
+        if orthonormalize_every is not None:
+            checks.count("orthonormalize_every", orthonormalize_every)
+        start = self.identity if initial is None else initial
+        start = checks.real_array("initial", start, self.state_shape, self.dtype)
+        batch, steps = d.shape[:-3], d.shape[-3]
+        try:
+            start = np.broadcast_to(start, batch + self.state_shape)
+        except ValueError:
+            raise InputError(
+                f"initial has shape {start.shape}; it must broadcast to {batch + self.state_shape}"
+            ) from None
+        runs = int(np.prod(batch, dtype=int))
+        history = self._propagate(
+            d.reshape(runs, steps, self.increments, 3),
+            record_every,
+            orthonormalize_every or 0,
+            np.ascontiguousarray(start).reshape(runs, *self.state_shape),
+        )
+        return history.reshape(*batch, 1 + steps // record_every, *self.state_shape)
+
+    @abstractmethod
+    def _propagate(
+        self, increments: Array, record_every: int, orthonormalize_every: int, initial: Array
+    ) -> Array:
+        """Propagate checked arrays (runs, N, K, 3) from (runs, state shape)."""

@@ -1,0 +1,83 @@
+"""The C back ends: generated C in double and in float, called through cffi. All loops are in C."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from strapgen import compilation
+from strapgen.backends.backend import Array, Backend, Evaluator
+from strapgen.targets import Sources
+
+_TYPES = {"c": ("double", np.float64), "c-float": ("float", np.float32)}
+
+
+class CEvaluator(Evaluator):
+    """A generated C function."""
+
+    def __init__(self, sources: Sources) -> None:
+        self.real, dtype = _TYPES[sources.target]
+        super().__init__(sources.function, dtype)
+        self.module = compilation.load(sources)
+        self._array = getattr(self.module.lib, f"{sources.function.name}_array")
+
+    def _call(self, arrays: list[Array], batch: tuple[int, ...]) -> tuple[Array, ...]:
+        inputs = [
+            np.ascontiguousarray(np.broadcast_to(array, batch + signal.shape))
+            for signal, array in zip(self.function.inputs, arrays, strict=True)
+        ]
+        outputs = tuple(np.empty(batch + signal.shape, self.dtype) for signal in self.function.outputs)
+        count = int(np.prod(batch, dtype=int))
+        self._array(count, *(self.pointer(array) for array in (*inputs, *outputs)))
+        return outputs
+
+    def pointer(self, array: Array) -> Any:
+        """Return the C pointer to a contiguous array's first element."""
+        return self.module.ffi.from_buffer(f"{self.real}[]", array)
+
+    def address(self) -> int:
+        """Return the address of the function on one sample."""
+        ffi = self.module.ffi
+        function = ffi.addressof(self.module.lib, self.function.name)
+        return int(ffi.cast("uintptr_t", function))
+
+
+class CBackend(Backend):
+    """Runs generated C."""
+
+    def __init__(
+        self,
+        sources: Sources,
+        evaluate: Callable[[str], Evaluator],
+        orthonormalization: str | None = None,
+    ) -> None:
+        super().__init__(sources, evaluate, orthonormalization)
+        step = self._step
+        assert isinstance(step, CEvaluator)
+        self._module, self._pointer = step.module, step.pointer
+        name = sources.function.name
+        self._generated_propagate = getattr(self._module.lib, f"{name}_propagate")
+        orthonormalizer = evaluate(self._orthonormalization)
+        assert isinstance(orthonormalizer, CEvaluator)
+        self._orthonormalizer = self._module.ffi.cast(f"{name}_orthonormalizer", orthonormalizer.address())
+
+    def _propagate(
+        self, increments: Array, record_every: int, orthonormalize_every: int, initial: Array
+    ) -> Array:
+        runs, steps = increments.shape[:2]
+        history = np.empty((runs, 1 + steps // record_every, *self.state_shape), self.dtype)
+        status = self._generated_propagate(
+            runs,
+            steps,
+            record_every,
+            orthonormalize_every,
+            self._orthonormalizer,
+            self._pointer(initial),
+            self._pointer(increments),
+            self._pointer(history),
+        )
+        if status:
+            raise RuntimeError(f"{self.kernel}: the generated loop refused its arguments with status {status}")
+        return history

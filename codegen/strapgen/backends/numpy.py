@@ -1,0 +1,196 @@
+"""The numpy back end: transitions of all steps at once, then their products as a blocked scan.
+
+The state after n steps is the product of n transitions, and the product is associative. So the steps are cut
+into blocks that are multiplied up side by side, as in a parallel prefix sum: Python loops over the places in
+a block, numpy over the blocks. Arrays are kept with the element first, (elements, ..., steps), so that every
+operation runs over contiguous memory.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from strapgen import compilation
+from strapgen.backends.backend import Array, Backend, Evaluator
+from strapgen.targets import Sources
+
+#: Steps times runs that are held at once: some megabytes, which stay in the cache.
+_SPAN = 1 << 18
+#: Width of a scan: wide enough to hide the cost of a numpy call.
+_WIDTH = 1024
+#: Steps in one elementwise pass: its temporaries stay in the nearest caches.
+_PASS = 1 << 13
+
+
+class NumpyEvaluator(Evaluator):
+    """A generated numpy function."""
+
+    def __init__(self, sources: Sources) -> None:
+        super().__init__(sources.function, np.float64)
+        self._generated = getattr(compilation.load(sources), sources.function.name)
+
+    def _call(self, arrays: list[Array], batch: tuple[int, ...]) -> tuple[Array, ...]:
+        result = self._generated(*arrays)
+        return result if isinstance(result, tuple) else (result,)
+
+
+class NumpyBackend(Backend):
+    """Runs generated numpy code; many runs and long runs alike without a loop over them."""
+
+    def __init__(
+        self,
+        sources: Sources,
+        evaluate: Callable[[str], Evaluator],
+        orthonormalization: str | None = None,
+    ) -> None:
+        super().__init__(sources, evaluate, orthonormalization)
+        name = f"{sources.function.name}_transition"
+        self._transition: Callable[..., Array] = getattr(compilation.load(sources), name)
+        product = evaluate(self._product)
+        assert isinstance(product, NumpyEvaluator)
+        self._generated_product: Callable[..., Array] = product._generated
+        orthonormalizer = evaluate(self._orthonormalization)
+        assert isinstance(orthonormalizer, NumpyEvaluator)
+        self._orthonormalize: Callable[..., Array] = orthonormalizer._generated
+        self._elements = self.identity.size
+
+    def _propagate(
+        self, increments: Array, record_every: int, orthonormalize_every: int, initial: Array
+    ) -> Array:
+        runs, steps = increments.shape[:2]
+        history = np.empty((runs, 1 + steps // record_every, *self.state_shape))
+        history[:, 0] = initial
+        state = initial
+        for first, length, segments in _spans(steps, orthonormalize_every, max(1, _SPAN // max(runs, 1))):
+            span = increments[:, first : first + length * segments]
+            complete = orthonormalize_every and (first + length) % orthonormalize_every == 0
+            states, state = self._run_span(span, length, segments, bool(complete), state)
+            # Records of this span: steps first + 1, ..., counted from 1.
+            offset = -first % record_every or record_every
+            recorded = states[:, offset - 1 :: record_every]
+            if recorded.shape[1]:
+                place = (first + offset) // record_every
+                history[:, place : place + recorded.shape[1]] = recorded
+        return history
+
+    def _run_span(
+        self, increments: Array, length: int, segments: int, orthonormalize: bool, state: Array
+    ) -> tuple[Array, Array]:
+        """Run segments of `length` steps, the last one perhaps shorter; return all states and the last.
+
+        Segments are scanned side by side from the identity; then a loop over them carries the state through
+        their totals and orthonormalizes between them.
+        """
+        runs, steps = increments.shape[:2]
+        width = runs * segments
+        blocks = max(1, min(round(_WIDTH / width), length // 16))
+        depth = -(-length // blocks)
+        local = self._transitions(increments, length, segments, blocks, depth)
+        for k in range(1, depth):
+            self._multiply(local[:, k - 1], local[:, k], local[:, k])
+        totals = self._scan(local[:, -1])  # (elements, blocks, width)
+        starts = np.empty((runs, segments, *self.state_shape))
+        ends = np.empty_like(starts)
+        segment_totals = np.moveaxis(self._open(totals[:, -1]).reshape(runs, segments, *self.state_shape), 1, 0)
+        full = steps // length
+        for segment, total in enumerate(segment_totals):
+            starts[:, segment] = state
+            state = self._generated_product(state, total)
+            if orthonormalize and segment < full:
+                state = self._orthonormalize(state)
+            ends[:, segment] = state
+        begin = self._close(starts.reshape(width, *self.state_shape))
+        heads = np.empty((self._elements, blocks, width))
+        heads[:, 0] = begin
+        if blocks > 1:
+            self._multiply(begin[:, None], totals[:, :-1], heads[:, 1:])
+        rows = max(1, _PASS // (blocks * width))
+        for k in range(0, depth, rows):
+            part = local[:, k : k + rows]
+            self._multiply(heads[:, None], part, part)
+        by_time = local.reshape(self._elements, depth, blocks, runs, segments).transpose(3, 4, 2, 1, 0)
+        states = by_time.reshape(runs, segments, blocks * depth, *self.state_shape)[:, :, :length]
+        if orthonormalize:
+            states[:, :full, -1] = ends[:, :full]
+        return states.reshape(runs, segments * length, *self.state_shape)[:, :steps], state
+
+    def _transitions(
+        self, increments: Array, length: int, segments: int, blocks: int, depth: int
+    ) -> Array:
+        """Return the transitions, (elements, depth, blocks, runs * segments).
+
+        Steps beyond the end have zero increments, so that their transition is the identity.
+        """
+        runs, steps = increments.shape[:2]
+        padded = np.zeros((runs, segments * length, self.increments * 3))
+        padded[:, :steps] = increments.reshape(runs, steps, -1)
+        padded = padded.reshape(runs, segments, length, -1)
+        if blocks * depth > length:
+            longer = np.zeros((runs, segments, blocks * depth, padded.shape[-1]))
+            longer[:, :, :length] = padded
+            padded = longer
+        split = padded.reshape(runs, segments, blocks, depth, -1).transpose(4, 3, 2, 0, 1)
+        split = np.ascontiguousarray(split).reshape(self.increments, 3, -1)
+        result = np.empty((self._elements, split.shape[-1]))
+        for k in range(0, split.shape[-1], _PASS):
+            part = np.moveaxis(split[:, :, k : k + _PASS], -1, 0)
+            self._transition(part, out=self._open(result[:, k : k + _PASS]))
+        return result.reshape(self._elements, depth, blocks, runs * segments)
+
+    def _scan(self, transitions: Array) -> Array:
+        """Return the products of all transitions up to each place, (elements, length, width)."""
+        elements, length, width = transitions.shape
+        blocks = max(1, min(round(_WIDTH / width), length // 16))
+        depth = -(-length // blocks)
+        padded = np.empty((elements, blocks * depth, width))
+        padded[:, :length] = transitions
+        padded[:, length:] = self._close(self.identity[None])[:, :, None]
+        local = np.ascontiguousarray(padded.reshape(elements, blocks, depth, width).transpose(0, 2, 1, 3))
+        for k in range(1, depth):
+            self._multiply(local[:, k - 1], local[:, k], local[:, k])
+        if blocks > 1:
+            totals = self._scan(local[:, -1])
+            self._multiply(totals[:, None, :-1], local[:, :, 1:], local[:, :, 1:])
+        return local.transpose(0, 2, 1, 3).reshape(elements, blocks * depth, width)[:, :length]
+
+    def _multiply(self, state: Array, transition: Array, out: Array) -> None:
+        """Advance states by transitions, all with the elements first."""
+        self._generated_product(self._open(state), self._open(transition), out=self._open(out))
+
+    def _open(self, elements_first: Array) -> Array:
+        """Return a view (..., state shape) of an array (elements, ...)."""
+        split = elements_first.reshape(self.state_shape + elements_first.shape[1:])
+        axes = tuple(range(len(self.state_shape)))
+        return np.moveaxis(split, axes, tuple(axis - len(axes) for axis in axes))
+
+    def _close(self, states: Array) -> Array:
+        """Return an array (elements, ...) of states (..., state shape)."""
+        flat = states.reshape(*states.shape[: states.ndim - len(self.state_shape)], -1)
+        return np.ascontiguousarray(np.moveaxis(flat, -1, 0))
+
+
+def _spans(steps: int, segment: int, most: int) -> list[tuple[int, int, int]]:
+    """Cut the steps into spans: first step, steps a segment, segments.
+
+    A span holds whole segments between orthonormalizations, or a part of one if they are long.
+    """
+    spans: list[tuple[int, int, int]] = []
+    first = 0
+    if segment and segment <= most:
+        together = most // segment
+        while first < steps:
+            segments = min(together, -(-(steps - first) // segment))
+            spans.append((first, segment, segments))
+            first += segment * segments
+        return spans
+    while first < steps:
+        until_end = segment - first % segment if segment else steps
+        length = min(most, until_end, steps - first)
+        spans.append((first, length, 1))
+        first += length
+    return spans
+
+

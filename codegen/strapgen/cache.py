@@ -1,0 +1,95 @@
+"""The cache: folders of generated and compiled files, addressed by the content that made them.
+
+An entry is filled in a folder of its own and then renamed into place, so that an entry is whole or absent:
+two processes may make the same one at once, and a killed or failed one leaves nothing that is ever read.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import shutil
+import tempfile
+import time
+from collections.abc import Callable, Iterable
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+
+from strapgen import resources
+from strapgen.exceptions import InputError
+
+_UNUSED_DAYS = 60
+
+
+def root() -> Path:
+    """Return the cache folder: $STRAPGEN_CACHE_DIR, or `strapgen` in the user's cache folder."""
+    chosen = os.environ.get("STRAPGEN_CACHE_DIR")
+    if chosen:
+        return Path(chosen)
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "strapgen"
+
+
+def digest(parts: Iterable[str | bytes]) -> str:
+    """Return a hash of a sequence of texts."""
+    total = hashlib.sha256()
+    for part in parts:
+        data = part.encode() if isinstance(part, str) else part
+        total.update(len(data).to_bytes(8, "big") + data)
+    return total.hexdigest()[:24]
+
+
+@cache
+def generator_digest() -> str:
+    """Return a hash of all that decides what is generated: this package, its templates, and SymPy."""
+    return digest([version("sympy"), *(path.read_bytes() for path in resources.package_files())])
+
+
+def entry(kind: str, key: str, fill: Callable[[Path], None]) -> Path:
+    """Return the folder of a cache entry, made by `fill` if it is not there yet.
+
+    Parameters
+    ----------
+    kind : str
+        Kind of entry, a folder of the cache.
+    key : str
+        Hash of everything that the content depends on.
+    fill : callable
+        Fills the empty folder that it is given.
+
+    Raises
+    ------
+    InputError
+        If the cache folder cannot be written.
+    """
+    place = root() / kind / key
+    if place.is_dir():
+        return place
+    try:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        draft = Path(tempfile.mkdtemp(prefix=".draft-", dir=place.parent))
+    except OSError as error:
+        raise InputError(
+            f"cache folder {root()} cannot be written ({error.strerror}); set STRAPGEN_CACHE_DIR to one that can"
+        ) from None
+    try:
+        fill(draft)
+        with contextlib.suppress(OSError):  # another process was first: its entry is the same
+            draft.rename(place)
+    except OSError as error:
+        raise InputError(f"cache folder {root()} cannot be written ({error.strerror})") from error
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
+    _prune(place.parent)
+    return place
+
+
+def _prune(folder: Path) -> None:
+    """Remove what was made long ago: entries of older versions, and drafts of killed processes."""
+    oldest = time.time() - _UNUSED_DAYS * 86400
+    for path in folder.iterdir():
+        with contextlib.suppress(OSError):
+            age_limit = time.time() - 3600 if path.name.startswith(".draft-") else oldest
+            if path.stat().st_mtime < age_limit:
+                shutil.rmtree(path, ignore_errors=True)

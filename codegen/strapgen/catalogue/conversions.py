@@ -1,0 +1,123 @@
+"""Conversions between direction cosine matrix, Euler parameters and Cayley-Klein parameters."""
+
+from __future__ import annotations
+
+import sympy as sp
+
+from strapgen import algebra
+from strapgen.catalogue.kinematics import CAYLEY_KLEIN, DCM, EULER, THESIS, Kinematics
+from strapgen.kernel import Kernel, KernelBuilder
+from strapgen.signal import Signal
+
+_CONVERTED = Signal.matrix("attitude", "C", meaning=DCM.state.meaning, bound=DCM.state.bound)
+
+
+def _result(kinematics: Kinematics) -> Signal:
+    """Return the state of an algorithm as the result of a conversion."""
+    state = kinematics.state
+    elements = tuple(f"next_{element.split('_')[1]}" for element in state.elements)
+    return Signal("converted", state.shape, elements, meaning=state.meaning, bound=state.bound)
+
+
+def dcm_from_euler() -> Kernel:
+    """Derive the direction cosine matrix from v -> e v e*."""
+    build = KernelBuilder()
+    e = build.input(EULER.state)
+    build.output(_CONVERTED, algebra.quaternion_matrix(e).applyfunc(sp.expand))
+    return build.kernel(
+        "dcm-from-euler",
+        "Direction cosine matrix from Euler parameters",
+        f"{THESIS}, chapter 2",
+        notes=("The result is |state|^2 times a rotation: a rotation for a state of length 1.",),
+    )
+
+
+def dcm_from_cayley_klein() -> Kernel:
+    """Derive the direction cosine matrix from C_jk = 1/2 tr(s_j U' s_k U), U' the conjugate transpose."""
+    build = KernelBuilder()
+    U = algebra.cayley_klein_matrix(build.input(CAYLEY_KLEIN.state))
+    build.output(
+        _CONVERTED,
+        [
+            sp.expand((algebra.PAULI[j] * U.H * algebra.PAULI[k] * U).trace() / 2)
+            for j in range(3)
+            for k in range(3)
+        ],
+    )
+    return build.kernel(
+        "dcm-from-cayley-klein",
+        "Direction cosine matrix from Cayley-Klein parameters",
+        f"{THESIS}, chapter 2",
+        notes=("The result is |state|^2 times a rotation: a rotation for a state of length 1.",),
+    )
+
+
+def _from_dcm(kinematics: Kinematics, name: str) -> Kernel:
+    """Derive a unit quaternion from the largest column of 4 e e', which is linear in the matrix."""
+    build = KernelBuilder()
+    C = build.input(DCM.state)
+    trace = build.value("trace", C.trace(), "trace of C")
+    diagonal = [build.value(f"four_{k}{k}", 1 + 2 * C[i, i] - trace) for i, k in enumerate("xyz")]
+    diagonal.append(build.value("four_ss", 1 + trace, "4 e_s^2; the others are 4 e_x^2, 4 e_y^2, 4 e_z^2"))
+    four = sp.zeros(4, 4)  # 4 e e', scalar last
+    for i, (j, k) in enumerate(((1, 2), (2, 0), (0, 1))):
+        label = "xyz"[j] + "xyz"[k]
+        four[j, k] = four[k, j] = build.value(f"four_{label}", C[j, k] + C[k, j])
+        label = "s" + "xyz"[i]
+        four[i, 3] = four[3, i] = build.value(f"four_{label}", C[k, j] - C[j, k])
+        four[i, i] = diagonal[i]
+    four[3, 3] = diagonal[3]
+    largest = build.value("largest", sp.Max(*diagonal), "4 times the square of the largest parameter")
+    order = (3, 0, 1)
+    column = build.stage(
+        Signal.labelled("column", "column", "xyzs", meaning="the column of 4 e e' through the largest"),
+        [
+            sp.Piecewise(*((four[i, k], diagonal[k] >= largest) for k in order), (four[i, 2], True))
+            for i in range(4)
+        ],
+    )
+    sign = sp.Piecewise((sp.Integer(1), column[3] >= 0), (sp.Integer(-1), True))
+    factor = build.value("factor", sign / (2 * sp.sqrt(largest)), "makes the scalar part positive")
+    converted = _result(kinematics)
+    by_label = dict(zip("xyzs", column, strict=True))
+    build.output(converted, [factor * by_label[element[-1]] for element in converted.elements])
+    return build.kernel(
+        name,
+        f"{kinematics.title} from a direction cosine matrix",
+        f"{THESIS}, chapter 2, inverted; largest element first as in S. W. Shepperd, J. Guidance and Control"
+        " 1 (1978) 223-224",
+        notes=("The scalar part of the result is not negative.",),
+    )
+
+
+def euler_from_dcm() -> Kernel:
+    """Return Euler parameters of a direction cosine matrix, accurate for every attitude."""
+    return _from_dcm(EULER, "euler-from-dcm")
+
+
+def cayley_klein_from_dcm() -> Kernel:
+    """Return Cayley-Klein parameters of a direction cosine matrix, accurate for every attitude."""
+    return _from_dcm(CAYLEY_KLEIN, "cayley-klein-from-dcm")
+
+
+def _reorder(source: Kinematics, target: Kinematics) -> Kernel:
+    build = KernelBuilder()
+    x = build.input(source.state)
+    by_label = {symbol.name[-1]: symbol for symbol in x}
+    converted = _result(target)
+    build.output(converted, [by_label[element[-1]] for element in converted.elements])
+    return build.kernel(
+        f"{target.name}-from-{source.name}",
+        f"{target.title} from {source.title}",
+        f"{THESIS}, chapter 2: a1 = e4, a2 = e1, a3 = e2, a4 = e3",
+    )
+
+
+def euler_from_cayley_klein() -> Kernel:
+    """Return Euler parameters from Cayley-Klein parameters: the scalar moves to the end."""
+    return _reorder(CAYLEY_KLEIN, EULER)
+
+
+def cayley_klein_from_euler() -> Kernel:
+    """Return Cayley-Klein parameters from Euler parameters: the scalar moves to the front."""
+    return _reorder(EULER, CAYLEY_KLEIN)

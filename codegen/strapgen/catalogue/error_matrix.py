@@ -1,0 +1,51 @@
+"""The error matrix of a computed attitude and its split into scale, skew and drift."""
+
+from __future__ import annotations
+
+import sympy as sp
+
+from strapgen.catalogue.kinematics import DCM_MEANING, THESIS, UNIT
+from strapgen.kernel import Kernel, KernelBuilder
+from strapgen.signal import Signal
+
+
+def error_matrix() -> Kernel:
+    """Derive E = C_computed C_true' - I and its parts.
+
+    Scale is the diagonal, skew the symmetric part off the diagonal, drift the skew-symmetric part: for
+    C_computed = exp(skew(eps)) C_true the drift is -eps to first order.
+
+    Returns
+    -------
+    Kernel
+        Inputs ``computed`` and ``truth`` (3, 3); outputs ``error`` (3, 3), ``scale`` (3,), ``skew`` (3,) and
+        ``drift`` (3,), the last two in rad, each in the order x, y, z.
+    """
+    build = KernelBuilder()
+    computed = build.input(Signal.matrix("computed", "C", meaning=f"{DCM_MEANING}, computed", bound=UNIT))
+    truth = build.input(Signal.matrix("truth", "T", meaning=f"{DCM_MEANING}, true", bound=UNIT))
+    E = build.output(
+        Signal.matrix("error", "E", meaning="error matrix, reference axes"),
+        computed * truth.T - sp.eye(3),
+    )
+    symmetric, turning = (E + E.T) / 2, (E - E.T) / 2
+    build.output(Signal.vector("scale", "scale", meaning="scale errors, reference axes"), E.diagonal())
+    build.output(
+        Signal.vector("skew", "skew", unit="rad", meaning="skew errors, reference axes"),
+        [symmetric[1, 2], symmetric[0, 2], symmetric[0, 1]],
+    )
+    build.output(
+        Signal.vector(
+            "drift",
+            "drift",
+            unit="rad",
+            meaning="drift errors, reference axes: the rotation from the computed frame to the true one",
+        ),
+        [-turning[2, 1], -turning[0, 2], -turning[1, 0]],
+    )
+    return build.kernel(
+        "error-matrix",
+        "Error matrix of a computed attitude: scale, skew and drift",
+        f"{THESIS}, chapter 4 A",
+        notes=("The true matrix is a rotation.",),
+    )

@@ -1,0 +1,132 @@
+"""Kinematics of the attitude representations: how each state turns with the body rate.
+
+Every state here obeys a linear equation dx/dt = f(x, g) with the generator g = scale * w, w the body rate,
+and is advanced by a product: a step applied to the identity gives the transition, and the product of state
+and transition is the same step applied to the state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+
+import sympy as sp
+
+from strapgen import algebra
+from strapgen.signal import Signal
+
+THESIS = "MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969)"
+
+
+@dataclass(frozen=True)
+class Kinematics:
+    """An attitude representation and its differential equation.
+
+    Parameters
+    ----------
+    name : str
+        Name of the algorithm on the command line.
+    title : str
+        The field's name of the state.
+    source : str
+        Where the equation stands.
+    state, transition, next : Signal
+        The state, the transition over one step, and the state after it.
+    identity : Matrix
+        The state of zero rotation.
+    scale : Rational
+        Factor of the body rate in the generator.
+    derivative : callable
+        ``derivative(x, g)``: dx/dt for the generator g, bilinear.
+    product : callable
+        ``product(x, p)``: the state x after the transition p, bilinear.
+    orthonormalize, attitude : str, str or None
+        Names of the kernels that restore the state's constraint and that turn it into a direction
+        cosine matrix.
+    """
+
+    name: str
+    title: str
+    source: str
+    state: Signal
+    transition: Signal
+    next: Signal
+    identity: sp.Matrix
+    scale: sp.Rational
+    derivative: Callable[[sp.Matrix, sp.Matrix], sp.Matrix]
+    product: Callable[[sp.Matrix, sp.Matrix], sp.Matrix]
+    orthonormalize: str
+    attitude: str | None
+
+
+def cayley_klein_derivative(a: sp.Matrix, g: sp.Matrix) -> sp.Matrix:
+    """Return da/dt from dU/dt = i (g . s) U, g half the body rate."""
+    turning = sp.I * sum((g[k] * algebra.PAULI[k] for k in range(3)), sp.zeros(2, 2))
+    return algebra.cayley_klein_parameters(turning * algebra.cayley_klein_matrix(a))
+
+
+def cayley_klein_product(a: sp.Matrix, p: sp.Matrix) -> sp.Matrix:
+    """Return the parameters of the matrix product P U, P the transition and U the state."""
+    return algebra.cayley_klein_parameters(
+        algebra.cayley_klein_matrix(p) * algebra.cayley_klein_matrix(a)
+    )
+
+
+UNIT = Fraction(1)
+DCM_MEANING = "direction cosine matrix, body to reference"
+EULER_MEANING = "Euler parameters, body to reference, scalar last"
+CAYLEY_KLEIN_MEANING = "Cayley-Klein parameters, body to reference, scalar first"
+
+DCM = Kinematics(
+    name="dcm",
+    title="Direction cosine matrix",
+    source=f"{THESIS}, chapter 2, equation (2.1): dC/dt = C skew(w)",
+    state=Signal.matrix("state", "C", meaning=DCM_MEANING, bound=UNIT),
+    transition=Signal.matrix("transition", "A", meaning="transition: the step applied to the identity"),
+    next=Signal.matrix("next", "next", meaning=f"{DCM_MEANING}, after the step", bound=UNIT),
+    identity=sp.eye(3),
+    scale=sp.Integer(1),
+    derivative=lambda C, g: C * algebra.skew(g),
+    product=lambda C, A: C * A,
+    orthonormalize="dcm-orthonormalize",
+    attitude=None,
+)
+
+EULER = Kinematics(
+    name="euler",
+    title="Euler parameters",
+    source=f"{THESIS}, chapter 2: de/dt = 1/2 e (w, 0), quaternion product",
+    state=Signal.labelled("state", "e", "xyzs", meaning=EULER_MEANING, bound=UNIT),
+    transition=Signal.labelled(
+        "transition", "p", "xyzs", meaning="transition: the step applied to the identity"
+    ),
+    next=Signal.labelled("next", "next", "xyzs", meaning=f"{EULER_MEANING}, after the step", bound=UNIT),
+    identity=sp.Matrix([0, 0, 0, 1]),
+    scale=sp.Rational(1, 2),
+    derivative=lambda e, g: algebra.quaternion_product(e, sp.Matrix([*g, 0])),
+    product=algebra.quaternion_product,
+    orthonormalize="euler-normalize",
+    attitude="dcm-from-euler",
+)
+
+CAYLEY_KLEIN = Kinematics(
+    name="cayley-klein",
+    title="Cayley-Klein parameters",
+    source=f"{THESIS}, chapter 2: dU/dt = (i/2) (w . s) U, s the Pauli matrices",
+    state=Signal.labelled("state", "a", "sxyz", meaning=CAYLEY_KLEIN_MEANING, bound=UNIT),
+    transition=Signal.labelled(
+        "transition", "p", "sxyz", meaning="transition: the step applied to the identity"
+    ),
+    next=Signal.labelled(
+        "next", "next", "sxyz", meaning=f"{CAYLEY_KLEIN_MEANING}, after the step", bound=UNIT
+    ),
+    identity=sp.Matrix([1, 0, 0, 0]),
+    scale=sp.Rational(1, 2),
+    derivative=cayley_klein_derivative,
+    product=cayley_klein_product,
+    orthonormalize="cayley-klein-normalize",
+    attitude="dcm-from-cayley-klein",
+)
+
+KINEMATICS = {kinematics.name: kinematics for kinematics in (DCM, EULER, CAYLEY_KLEIN)}

@@ -1,0 +1,168 @@
+"""Motions with a closed-form attitude: body rate, exact angle increments, true direction cosine matrix.
+
+Each formula is regular where its textbook form is 0/0: sin(x)/x stands for every removable singularity.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import sympy as sp
+
+from strapgen import algebra
+from strapgen.catalogue.kinematics import DCM_MEANING, THESIS
+from strapgen.kernel import Kernel, KernelBuilder
+from strapgen.signal import Signal
+
+Formula = Callable[..., sp.Matrix]
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A motion in closed form.
+
+    Parameters
+    ----------
+    name, title : str
+        Name on the command line, one line that describes it.
+    parameters : dict of str to str
+        Unit of every parameter, in SI.
+    rate : callable
+        ``rate(t, *parameters)``: body rate in rad/s.
+    increment : callable
+        ``increment(m, d, *parameters)``: the rate's integral over [m - d/2, m + d/2] in rad.
+    attitude : callable
+        ``attitude(t, *parameters)``: the direction cosine matrix, the identity at t = 0.
+    """
+
+    name: str
+    title: str
+    parameters: dict[str, str]
+    rate: Formula
+    increment: Formula
+    attitude: Formula
+
+
+def _about_y(angle: sp.Expr) -> sp.Matrix:
+    """Return the rotation about y; cosine and sine of one angle are cheaper than the general form."""
+    c, s = sp.cos(angle), sp.sin(angle)
+    return sp.Matrix([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+
+
+def _polynomial_rate(t: sp.Expr, *a: sp.Expr) -> sp.Expr:
+    return sp.Add(*(coefficient * t**k for k, coefficient in enumerate(a)))
+
+
+def _polynomial_angle(t: sp.Expr, *a: sp.Expr) -> sp.Expr:
+    return sp.Add(*(coefficient * t ** (k + 1) / (k + 1) for k, coefficient in enumerate(a)))
+
+
+def _polynomial_increment(m: sp.Expr, d: sp.Expr, *a: sp.Expr) -> sp.Expr:
+    # Expanded about the middle of the interval: no difference of large numbers is left.
+    return sp.expand(_polynomial_angle(m + d / 2, *a) - _polynomial_angle(m - d / 2, *a))
+
+
+def _chord(m: sp.Expr, d: sp.Expr, b: sp.Expr, wave: Callable[[sp.Expr], sp.Expr]) -> sp.Expr:
+    """Return the integral of wave(b t), a sine or a cosine, over [m - d/2, m + d/2]."""
+    return d * sp.sinc(b * d / 2) * wave(b * m)
+
+
+def _coning_attitude(t: sp.Expr, a: sp.Expr, b: sp.Expr, g: sp.Expr) -> sp.Matrix:
+    return algebra.rotation(t * sp.Matrix([0, b + g, a])) * _about_y(-b * t)
+
+
+MOTIONS = {
+    motion.name: motion
+    for motion in (
+        Motion(
+            "constant",
+            "constant body rate on three axes",
+            {"x": "rad/s", "y": "rad/s", "z": "rad/s"},
+            rate=lambda t, x, y, z: sp.Matrix([x, y, z]),
+            increment=lambda m, d, x, y, z: d * sp.Matrix([x, y, z]),
+            attitude=lambda t, x, y, z: algebra.rotation(t * sp.Matrix([x, y, z])),
+        ),
+        Motion(
+            "sinusoidal",
+            "rate a cos(b t) on the y axis",
+            {"a": "rad/s", "b": "rad/s"},
+            rate=lambda t, a, b: sp.Matrix([0, a * sp.cos(b * t), 0]),
+            increment=lambda m, d, a, b: sp.Matrix([0, a * _chord(m, d, b, sp.cos), 0]),
+            attitude=lambda t, a, b: _about_y(a * t * sp.sinc(b * t)),
+        ),
+        Motion(
+            "coning",
+            "coning on a constant pitch rate: rate (a sin(b t), g, a cos(b t))",
+            {"a": "rad/s", "b": "rad/s", "g": "rad/s"},
+            rate=lambda t, a, b, g: sp.Matrix([a * sp.sin(b * t), g, a * sp.cos(b * t)]),
+            increment=lambda m, d, a, b, g: sp.Matrix(
+                [a * _chord(m, d, b, sp.sin), g * d, a * _chord(m, d, b, sp.cos)]
+            ),
+            attitude=_coning_attitude,
+        ),
+        Motion(
+            "polynomial",
+            "rate a0 + a1 t + a2 t^2 + a3 t^3 + a4 t^4 on the y axis",
+            {"a0": "rad/s", "a1": "rad/s^2", "a2": "rad/s^3", "a3": "rad/s^4", "a4": "rad/s^5"},
+            rate=lambda t, *a: sp.Matrix([0, _polynomial_rate(t, *a), 0]),
+            increment=lambda m, d, *a: sp.Matrix([0, _polynomial_increment(m, d, *a), 0]),
+            attitude=lambda t, *a: _about_y(_polynomial_angle(t, *a)),
+        ),
+    )
+}
+
+
+def _parameters(build: KernelBuilder, motion: Motion) -> list[sp.Symbol]:
+    return [
+        build.scalar(Signal.scalar(name, unit=unit, meaning=f"parameter of the rate, {motion.title}"))
+        for name, unit in motion.parameters.items()
+    ]
+
+
+def truth(name: str) -> Kernel:
+    """Return the kernel of a motion's body rate and true attitude at an instant.
+
+    Parameters
+    ----------
+    name : str
+        A key of `MOTIONS`.
+    """
+    motion = MOTIONS[name]
+    build = KernelBuilder()
+    t = build.scalar(Signal.scalar("time", unit="s", meaning="time since the identity attitude"))
+    parameters = _parameters(build, motion)
+    build.output(
+        Signal.vector("rate", "rate", unit="rad/s", meaning="body rate, body axes"),
+        motion.rate(t, *parameters),
+    )
+    build.output(
+        Signal.matrix("attitude", "C", meaning=DCM_MEANING, bound=None), motion.attitude(t, *parameters)
+    )
+    return build.kernel(
+        f"{name}-truth", f"True attitude: {motion.title}", f"{THESIS}, chapter 4 B and appendix A"
+    )
+
+
+def increments(name: str) -> Kernel:
+    """Return the kernel of a motion's exact angle increment over an interval.
+
+    Parameters
+    ----------
+    name : str
+        A key of `MOTIONS`.
+    """
+    motion = MOTIONS[name]
+    build = KernelBuilder()
+    m = build.scalar(Signal.scalar("middle", unit="s", meaning="middle of the interval"))
+    d = build.scalar(Signal.scalar("width", unit="s", meaning="width of the interval"))
+    parameters = _parameters(build, motion)
+    build.output(
+        Signal.vector(
+            "increment", "increment", unit="rad", meaning="angle increment over the interval, body axes"
+        ),
+        motion.increment(m, d, *parameters),
+    )
+    return build.kernel(
+        f"{name}-increments", f"Exact angle increments: {motion.title}", f"{THESIS}, chapter 4 B"
+    )

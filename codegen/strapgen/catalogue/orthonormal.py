@@ -1,0 +1,145 @@
+"""Orthonormalization: restoring the constraint that a computed attitude has lost to truncation and round-off."""
+
+from __future__ import annotations
+
+import sympy as sp
+
+from strapgen import algebra
+from strapgen.catalogue.kinematics import CAYLEY_KLEIN, DCM_MEANING, EULER, THESIS, UNIT, Kinematics
+from strapgen.kernel import Kernel, KernelBuilder
+from strapgen.signal import Signal
+
+_COMPUTED = Signal.matrix("computed", "C", meaning=f"{DCM_MEANING}, as computed", bound=UNIT)
+_RESULT = Signal.matrix("orthonormalized", "next", meaning=f"{DCM_MEANING}, orthonormalized", bound=UNIT)
+_NEAR = "Made for a matrix near a rotation: all products of its transpose and itself near the identity."
+
+
+def _normalize(kinematics: Kinematics) -> Kernel:
+    build = KernelBuilder()
+    x = build.input(kinematics.state)
+    factor = build.value("inverse_norm", 1 / sp.sqrt(algebra.dot(x, x)), "1/|state|")
+    build.output(kinematics.next, factor * x)
+    return build.kernel(
+        kinematics.orthonormalize,
+        f"{kinematics.title}: normalization to length 1, exact",
+        f"{THESIS}, chapter 3 C: x / sqrt(x . x)",
+        notes=("The state must not be zero.",),
+    )
+
+
+def euler() -> Kernel:
+    """Return the exact normalization of Euler parameters."""
+    return _normalize(EULER)
+
+
+def cayley_klein() -> Kernel:
+    """Return the exact normalization of Cayley-Klein parameters."""
+    return _normalize(CAYLEY_KLEIN)
+
+
+def dcm() -> Kernel:
+    """Return the thesis's scheme: to each row its dual is added, then each row is divided by its length."""
+    build = KernelBuilder()
+    C = build.input(_COMPUTED)
+    rows = [C[k, :].T for k in range(3)]
+    normalized = []
+    for k in range(3):
+        dual = algebra.cross(rows[(k + 1) % 3], rows[(k + 2) % 3])
+        row = build.stage(
+            Signal.vector(f"row_{k + 1}", f"row_{k + 1}", meaning=f"row {k + 1} and its dual, added"),
+            rows[k] + dual,
+        )
+        length = build.value(
+            f"inverse_length_{k + 1}", 1 / sp.sqrt(algebra.dot(row, row)), f"1/|row {k + 1}|"
+        )
+        normalized.append((length * row).T)
+    build.output(_RESULT, sp.Matrix.vstack(*normalized))
+    return build.kernel(
+        "dcm-orthonormalize",
+        "Direction cosine matrix: orthonormalization by dual rows",
+        f"{THESIS}, chapter 3 C, subroutine ORTHO",
+        notes=(_NEAR,),
+    )
+
+
+def _symmetric(build: KernelBuilder, name: str, meaning: str, A: sp.Matrix) -> sp.Matrix:
+    """Name the six different elements of a symmetric matrix and return the matrix of their symbols."""
+    places = [(i, j) for i in range(3) for j in range(i, 3)]
+    elements = tuple(f"{name}_{i + 1}{j + 1}" for i, j in places)
+    signal = Signal(name, (6,), elements, meaning=meaning)
+    named = dict(zip(places, build.stage(signal, [A[place] for place in places]), strict=True))
+    return sp.Matrix(3, 3, lambda i, j: named[min(i, j), max(i, j)])
+
+
+def dcm_optimal() -> Kernel:
+    """Return the rotation nearest to the computed matrix: C (C'C)^(-1/2).
+
+    With U = (C'C)^(1/2), its invariants i1, i2, i3 and G = C'C, the theorem of Cayley and Hamilton gives
+    U (G + i2 I) = i1 G + i3 I, so the inverse root is (G + i2 I) (i1 G + i3 I)^-1. The eigenvalues of G come
+    from the trigonometric solution of the cubic; atan2 keeps it free of singularities at equal eigenvalues.
+    """
+    build = KernelBuilder()
+    C = build.input(_COMPUTED)
+    G = _symmetric(build, "gram", "C' C", C.T * C)
+    mean = build.value("mean", G.trace() / 3, "mean of the eigenvalues of C' C")
+    B = _symmetric(build, "deviator", "C' C less its mean", G - mean * sp.eye(3))
+    spread = build.value("spread", (B * B).trace() / 6, "mean square spread of the eigenvalues, halved")
+    half_determinant = build.value("half_determinant", algebra.dot(B[:, 0], algebra.cross(B[:, 1], B[:, 2])) / 2)
+    radicand = sp.Max(0, spread**3 - half_determinant**2, evaluate=False)
+    angle = build.value("angle", sp.atan2(sp.sqrt(radicand), half_determinant) / 3, "angle of the cubic")
+    radius = build.value("radius", sp.sqrt(spread))
+    along = build.value("along", radius * sp.cos(angle))
+    across = build.value("across", sp.sqrt(3) * radius * sp.sin(angle))
+    stretches = [
+        build.value(f"stretch_{k}", sp.sqrt(eigenvalue), f"singular value {k} of C")
+        for k, eigenvalue in enumerate((mean + 2 * along, mean - along + across, mean - along - across), 1)
+    ]
+    u, v, w = stretches
+    i1 = build.value("invariant_1", u + v + w, "invariants of (C' C)^(1/2)")
+    i2 = build.value("invariant_2", u * v + v * w + w * u)
+    i3 = build.value("invariant_3", u * v * w)
+    N = _symmetric(build, "denominator", "i1 C' C + i3 I", i1 * G + i3 * sp.eye(3))
+    adjugate = _symmetric(build, "adjugate", "adjugate of the denominator", algebra.adjugate(N))
+    determinant = algebra.dot(N[0, :], adjugate[:, 0])
+    factor = build.value("inverse_determinant", 1 / determinant)
+    M = build.stage(
+        Signal.matrix("root", "root", meaning="inverse root of C' C, times the determinant"),
+        (G + i2 * sp.eye(3)) * adjugate,
+    )
+    build.output(_RESULT, factor * (C * M))
+    return build.kernel(
+        "dcm-orthonormalize-optimal",
+        "Direction cosine matrix: the nearest rotation, least sum of squared differences",
+        f"{THESIS}, appendix B, equation (B.1)",
+        notes=("The determinant of the matrix must be above 0.",),
+    )
+
+
+def _expansion(order: int) -> Kernel:
+    build = KernelBuilder()
+    C = build.input(_COMPUTED)
+    S = _symmetric(build, "excess", "C' C - I", C.T * C - sp.eye(3))
+    series = sp.eye(3) - S / 2
+    words = "first"
+    if order == 2:
+        words = "second"
+        square = _symmetric(build, "excess_squared", "(C' C - I)^2", S * S)
+        series += sp.Rational(3, 8) * square
+    root = _symmetric(build, "root", f"inverse root of C' C to {words} order", series)
+    build.output(_RESULT, C * root)
+    return build.kernel(
+        f"dcm-orthonormalize-{words}-order",
+        f"Direction cosine matrix: the nearest rotation to {words} order in C'C - I",
+        f"{THESIS}, appendix B, equation {'(B.4)' if order == 1 else '(B.14)'} in terms of the computed matrix",
+        notes=(_NEAR,),
+    )
+
+
+def dcm_first_order() -> Kernel:
+    """Return the optimal orthonormalization to first order: C (I - S/2), S = C'C - I."""
+    return _expansion(1)
+
+
+def dcm_second_order() -> Kernel:
+    """Return the optimal orthonormalization to second order: C (I - S/2 + 3/8 S^2), S = C'C - I."""
+    return _expansion(2)

@@ -1,0 +1,126 @@
+"""Runge-Kutta attitude steps: kinematics + tableau + rate extraction, fused, in transition form."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import sympy as sp
+
+from strapgen.catalogue.kinematics import KINEMATICS, Kinematics
+from strapgen.catalogue.rates import extraction
+from strapgen.catalogue.tableaux import Tableau
+from strapgen.kernel import Kernel, KernelBuilder
+from strapgen.program import Companions
+from strapgen.signal import Signal
+
+
+def increments_signal(count: int) -> Signal:
+    """Return the signal of the angle increments of one step, oldest first."""
+    return Signal(
+        "increments",
+        (count, 3),
+        tuple(f"d{k}_{axis}" for k in range(1, count + 1) for axis in "xyz"),
+        unit="rad",
+        meaning="angle increments of the step, body axes, oldest first: exact integrals of the body rate",
+    )
+
+
+def step(kinematics: Kinematics, tableau: Tableau, increments: int) -> Kernel:
+    """Derive one integration step from angle increments to the next state.
+
+    The method is applied to the identity, which gives the transition: the step is linear in the state. The
+    step length cancels, since increments and rates differ by it alone.
+
+    Parameters
+    ----------
+    kinematics : Kinematics
+        The attitude representation.
+    tableau : Tableau
+        The integration method.
+    increments : int
+        Angle increments a step, 1 to 8.
+
+    Returns
+    -------
+    Kernel
+        Inputs ``state`` and ``increments`` (increments, 3) in rad, output ``next``.
+    """
+    build = KernelBuilder()
+    state = build.input(kinematics.state)
+    d = build.input(increments_signal(increments))
+    turns = {
+        node: _turn(build, kinematics, d, increments, node) for node in dict.fromkeys(tableau.nodes)
+    }
+    slopes: list[sp.Matrix] = []
+    for number, (node, row) in enumerate(zip(tableau.nodes, tableau.matrix, strict=True), 1):
+        point = kinematics.identity + _combination(row, slopes, kinematics.identity)
+        if any(row):
+            point = build.stage(
+                _like(kinematics, f"point_{number}", f"argument of slope {number}, from the identity"), point
+            )
+        slope = kinematics.derivative(point, turns[node])
+        signal = _like(kinematics, f"slope_{number}", f"derivative times the step at stage {number}")
+        slopes.append(build.stage(signal, slope))
+    transition = build.stage(
+        kinematics.transition,
+        kinematics.identity + _combination(tableau.weights, slopes, kinematics.identity),
+    )
+    build.output(kinematics.next, kinematics.product(state, transition))
+    plural = "increment" if increments == 1 else "increments"
+    return build.kernel(
+        f"{kinematics.name}-{tableau.name}-{increments}",
+        f"{kinematics.title}: step by {tableau.title} from {increments} angle {plural}",
+        f"{kinematics.source}; rate extraction chapter 3 A; {tableau.title}: {tableau.source}",
+        transition=kinematics.transition.name,
+        companions=Companions(
+            f"{kinematics.name}-product",
+            kinematics.orthonormalize,
+            kinematics.attitude,
+            tuple(Fraction(int(x)) for x in kinematics.identity),
+        ),
+        arguments=f"{kinematics.name} --method {tableau.name} --increments {increments}",
+    )
+
+
+def product(name: str) -> Kernel:
+    """Return the kernel that advances a state by a transition, and a transition by the one that follows it.
+
+    Parameters
+    ----------
+    name : str
+        Name of the attitude algorithm.
+    """
+    kinematics = KINEMATICS[name]
+    build = KernelBuilder()
+    state, transition = build.input(kinematics.state), build.input(kinematics.transition)
+    build.output(kinematics.next, kinematics.product(state, transition))
+    return build.kernel(
+        f"{name}-product", f"{kinematics.title}: state after a transition", kinematics.source
+    )
+
+
+def _turn(
+    build: KernelBuilder, kinematics: Kinematics, d: sp.Matrix, increments: int, node: Fraction
+) -> sp.Matrix:
+    """Name the generator at a node: the extracted rate times the step, scaled for the kinematics."""
+    weights = [kinematics.scale * weight for weight in extraction(increments, node)]
+    half = "half_" if kinematics.scale == sp.Rational(1, 2) else ""
+    label = str(node).replace("/", "_")
+    meaning = f"{half.replace('_', ' the ')}rate times the step, at node {node}"
+    signal = Signal.vector(f"{half}turn_{label}", f"{half}turn_{label}", unit="rad", meaning=meaning)
+    return build.stage(
+        signal, [sp.Add(*(weights[k] * d[k, axis] for k in range(increments))) for axis in range(3)]
+    )
+
+
+def _combination(coefficients: tuple[Fraction, ...], slopes: list[sp.Matrix], like: sp.Matrix) -> sp.Matrix:
+    total = sp.zeros(*like.shape)
+    for coefficient, slope in zip(coefficients, slopes, strict=True):
+        total += sp.Rational(coefficient.numerator, coefficient.denominator) * slope
+    return total
+
+
+def _like(kinematics: Kinematics, name: str, meaning: str) -> Signal:
+    """Return a signal of the state's shape whose elements carry the state's labels."""
+    elements = tuple(f"{name}_{element.rsplit('_', 1)[1]}" for element in kinematics.transition.elements)
+    return Signal(name, kinematics.transition.shape, elements, meaning=meaning)

@@ -1,0 +1,123 @@
+"""Checks on what a caller hands over: names, numbers and arrays."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapgen.exceptions import InputError, InputTypeError
+
+
+def choice(what: str, value: str, allowed: Iterable[str]) -> str:
+    """Return `value` if it is one of `allowed`.
+
+    Raises
+    ------
+    InputError
+        If it is not; the message lists what is allowed.
+
+    Examples
+    --------
+    >>> choice("method", "rk4", ["rk1", "rk4"])
+    'rk4'
+    """
+    names = list(allowed)
+    if value not in names:
+        raise InputError(f"{what} {value!r} is not known; allowed: {', '.join(names)}")
+    return value
+
+
+def number(what: str, value: str | float | Fraction, *, positive: bool = False) -> Fraction:
+    """Read a finite number exactly: decimals stay decimals.
+
+    A float is taken at its shortest decimal form, so that 0.1 means 1/10.
+
+    Raises
+    ------
+    InputError
+        If it is no number, not finite, or not positive where that is asked.
+
+    Examples
+    --------
+    >>> number("step", "0.125", positive=True)
+    Fraction(1, 8)
+    """
+    try:
+        exact = value if isinstance(value, Fraction) else Fraction(str(value).strip())
+        finite = math.isfinite(float(exact))
+    except (ValueError, ZeroDivisionError, OverflowError):
+        finite = False
+    if not finite:
+        raise InputError(f"{what} is {str(value)!r}; a finite number is needed")
+    if positive and exact <= 0:
+        raise InputError(f"{what} is {value}; a number above 0 is needed")
+    return exact
+
+
+def count(what: str, value: Any, *, largest: int | None = None) -> int:
+    """Return `value` as a whole number from 1 to `largest`.
+
+    Raises
+    ------
+    InputError
+        If it is not one.
+    """
+    limit = "at least 1" if largest is None else f"from 1 to {largest}"
+    whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+    if not whole or value < 1 or (largest is not None and value > largest):
+        raise InputError(f"{what} is {value!r}; a whole number {limit} is needed")
+    return int(value)
+
+
+def multiple(what: str, value: Fraction, of: str, unit: Fraction) -> int:
+    """Return ``value / unit``, which must be a whole number of at least 1.
+
+    Raises
+    ------
+    InputError
+        If `unit` does not divide `value`.
+    """
+    ratio = value / unit
+    if ratio.denominator != 1 or ratio < 1:
+        raise InputError(
+            f"{what} {float(value):g} s is not a whole multiple of the {of} {float(unit):g} s "
+            f"(their ratio is {float(ratio):.9g})"
+        )
+    return int(ratio)
+
+
+def real_array(what: str, value: Any, tail: tuple[int, ...], dtype: Any = np.float64) -> NDArray[Any]:
+    """Return `value` as a finite array of `dtype` whose last axes have the shape `tail`.
+
+    Raises
+    ------
+    InputTypeError
+        If it does not hold floating-point numbers.
+    InputError
+        If its last axes have another shape, or a value is not finite.
+
+    Examples
+    --------
+    >>> real_array("increments", [[1e-3, 0.0, 0.0]], (3,)).shape
+    (1, 3)
+    """
+    array = np.asarray(value)
+    if array.dtype.kind != "f":
+        raise InputTypeError(f"{what} has dtype {array.dtype}; a floating-point dtype is needed")
+    if array.shape[array.ndim - len(tail) :] != tail or array.ndim < len(tail):
+        wanted = ", ".join(["...", *map(str, tail)])
+        raise InputError(f"{what} has shape {array.shape}; ({wanted}) is needed")
+    # A sum is finite if every term is, and runs faster than a test of each; it may overflow, so look again.
+    with np.errstate(over="ignore", invalid="ignore"):
+        if not np.isfinite(array.sum()) and not np.isfinite(array).all():
+            worst = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+            raise InputError(f"{what} holds {array[worst]} at index {worst}; finite numbers are needed")
+        converted = np.ascontiguousarray(array, dtype=dtype)
+    if converted.dtype.itemsize < array.dtype.itemsize and not np.isfinite(converted).all():
+        raise InputError(f"{what} holds numbers beyond the range of {converted.dtype}")
+    return converted

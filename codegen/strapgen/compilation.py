@@ -1,0 +1,151 @@
+"""Building: source text becomes a module that can be called.
+
+The numpy target is imported as it is. C is compiled through cffi in API mode and cached by content, so that
+a second call compiles nothing.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.util
+import io
+import os
+import platform
+import shlex
+import shutil
+import sys
+import sysconfig
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from strapgen import cache
+from strapgen.exceptions import CompilerError
+from strapgen.targets import Sources
+
+#: Flags beside the compiler's own: no contraction to fused multiply-add, so that every machine gives the same bits.
+C_FLAGS = ("-std=c99", "-O3", "-ffp-contract=off")
+
+_loaded: dict[str, Any] = {}
+
+
+def load(sources: Sources) -> Any:
+    """Return what the generated function is called through.
+
+    Parameters
+    ----------
+    sources : Sources
+
+    Returns
+    -------
+    module
+        For numpy the generated module; for C a cffi module with ``ffi`` and ``lib``.
+
+    Raises
+    ------
+    CompilerError
+        If there is no C compiler, or it fails.
+    """
+    key = cache.digest([sources.target, *sources.files, *sources.files.values()])
+    if key not in _loaded:
+        _loaded[key] = _import_text(sources) if sources.target == "numpy" else _compiled(sources)
+    return _loaded[key]
+
+
+def _import_text(sources: Sources) -> ModuleType:
+    (name, text), *_ = sources.files.items()
+    module = ModuleType(name.removesuffix(".py"))
+    exec(compile(text, f"<generated {name}>", "exec"), module.__dict__)
+    return module
+
+
+def compiler() -> str:
+    """Return the path of the C compiler: $CC, or `cc`.
+
+    Raises
+    ------
+    CompilerError
+        If there is none.
+    """
+    command = shlex.split(os.environ.get("CC") or "cc")[0]
+    path = shutil.which(command)
+    if path is None:
+        raise CompilerError(
+            f"no C compiler: {command!r} is not on the PATH; install gcc (or set CC), or use the numpy back end"
+        )
+    return path
+
+
+def _compiled(sources: Sources) -> Any:
+    # Compiling with another compiler, or for another Python, makes another entry.
+    path = compiler()
+    executable = Path(path).resolve()
+    stat = executable.stat()
+    key = cache.digest(
+        [
+            *sources.files,
+            *sources.files.values(),
+            *C_FLAGS,
+            os.environ.get("CC", ""),
+            f"{executable} {stat.st_size} {stat.st_mtime_ns}",
+            f"{platform.machine()} {sys.platform} {sysconfig.get_config_var('SOABI')}",
+            _cffi_version(),
+        ]
+    )
+    name = f"strapgen_{sources.function.name}"
+    folder = cache.entry("builds", key, lambda draft: _compile(sources, name, path, draft))
+    (file,) = folder.iterdir()
+    spec = importlib.util.spec_from_file_location(name, file)
+    if spec is None or spec.loader is None:
+        raise CompilerError(f"{file} cannot be loaded")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def _cffi_version() -> str:
+    import _cffi_backend
+
+    return str(_cffi_backend.__version__)
+
+
+def _compile(sources: Sources, name: str, path: str, draft: Path) -> None:
+    from cffi import FFI, VerificationError
+
+    for file, text in sources.files.items():
+        (draft / file).write_text(text)
+    header = next(file for file in sources.files if file.endswith(".h"))
+    ffi = FFI()
+    ffi.cdef(_declarations(sources.files[header]))
+    ffi.set_source(
+        name,
+        f'#include "{header}"',
+        sources=[str(draft / file) for file in sources.files if file.endswith(".c")],
+        include_dirs=[str(draft)],
+        extra_compile_args=list(C_FLAGS),
+        libraries=[] if sys.platform == "win32" else ["m"],
+    )
+    before = os.environ.get("CC")
+    os.environ["CC"] = before or path
+    said = io.StringIO()
+    try:
+        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+            built = Path(ffi.compile(tmpdir=str(draft)))
+    except VerificationError as error:
+        raise CompilerError(f"{path} failed on {name}: {str(error).splitlines()[0]}") from error
+    finally:
+        if before is None:
+            del os.environ["CC"]
+    for leftover in draft.iterdir():
+        if leftover.is_dir():
+            shutil.rmtree(leftover)
+        elif leftover != built:
+            leftover.unlink()
+
+
+def _declarations(header: str) -> str:
+    """Return the declarations of a generated header, without its preprocessor lines."""
+    lines = [line for line in header.splitlines() if not line.startswith("#")]
+    text = "\n".join(lines).replace('extern "C" {', "")
+    head, _, tail = text.rpartition("}")
+    return head + tail

@@ -1,0 +1,21 @@
+"""What strapgen raises. Each message is one line that names the thing and what is allowed."""
+
+
+class StrapgenError(Exception):
+    """Base of every error that strapgen raises on purpose."""
+
+
+class InputError(StrapgenError, ValueError):
+    """A name, number, shape or file that strapgen cannot use."""
+
+
+class InputTypeError(StrapgenError, TypeError):
+    """A value of a type that strapgen cannot use."""
+
+
+class CompilerError(StrapgenError, RuntimeError):
+    """No C compiler was found, or it refused the generated code."""
+
+
+class MissingExtraError(StrapgenError, ImportError):
+    """An optional dependency is not installed."""

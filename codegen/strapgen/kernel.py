@@ -1,0 +1,164 @@
+"""Kernels: exact symbolic algorithms, the one place where a formula is written."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import sympy as sp
+
+from strapgen.algebra import evaluate
+from strapgen.program import Companions
+from strapgen.signal import Signal
+
+
+def symbols(signal: Signal) -> sp.Matrix:
+    """Return the real symbols of a signal as a column vector, or as a matrix if it is one.
+
+    Examples
+    --------
+    >>> symbols(Signal.vector("rate", "w")).T
+    Matrix([[w_x, w_y, w_z]])
+    """
+    shape = signal.shape if len(signal.shape) == 2 else (signal.size, 1)
+    return sp.Matrix(*shape, [sp.Symbol(name, real=True) for name in signal.elements])
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A named intermediate quantity: symbols, what they stand for, and its meaning in the field's terms."""
+
+    signal: Signal
+    expressions: tuple[sp.Expr, ...]
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """An algorithm as exact expressions.
+
+    Parameters
+    ----------
+    name : str
+        Name on the command line, lower case with hyphens.
+    title : str
+        One line that says what it computes.
+    source : str
+        Where the algorithm comes from, with the equation's number.
+    inputs : tuple of Signal
+        Inputs; their elements are the free symbols of the expressions.
+    outputs : tuple of Stage
+        Outputs, each with one expression an element.
+    stages : tuple of Stage
+        Intermediate quantities in order; later expressions may use their symbols.
+    transition : str or None
+        Name of the stage on which the state's update depends linearly, see `Program.transition`.
+    companions : Companions or None
+        What belongs to an attitude step.
+    arguments : str
+        Name and options on the command line; by default the name alone.
+    notes : tuple of str
+        Remarks for the reader of generated code: domain, conventions.
+    """
+
+    name: str
+    title: str
+    source: str
+    inputs: tuple[Signal, ...]
+    outputs: tuple[Stage, ...]
+    stages: tuple[Stage, ...] = ()
+    transition: str | None = None
+    companions: Companions | None = None
+    arguments: str = ""
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def identifier(self) -> str:
+        """The name in generated code."""
+        return self.name.replace("-", "_")
+
+    def expand(self, values: Mapping[str, Any] | None = None) -> dict[str, list[Any]]:
+        """Evaluate the outputs with all stages substituted.
+
+        Parameters
+        ----------
+        values : mapping of str to number or ring element, optional
+            A value for every input element: numbers, polynomials or symbols. By default the inputs' own
+            symbols, which gives each output as one expression of the inputs.
+
+        Returns
+        -------
+        dict of str to list
+            For each output its elements, row-major.
+        """
+        if values is None:
+            values = {n: sp.Symbol(n, real=True) for signal in self.inputs for n in signal.elements}
+        known = dict(values)
+        for stage in (*self.stages, *self.outputs):
+            for name, expression in zip(stage.signal.elements, stage.expressions, strict=True):
+                known[name] = evaluate(expression, known)
+        return {stage.signal.name: [known[n] for n in stage.signal.elements] for stage in self.outputs}
+
+    def polynomials(self) -> dict[str, list[Any]]:
+        """Return every output element as a polynomial of the inputs, with rational coefficients.
+
+        Raises
+        ------
+        TypeError
+            If the kernel divides or calls functions.
+        """
+        names = [name for signal in self.inputs for name in signal.elements]
+        ring, *generators = sp.ring(names, sp.QQ)
+        outputs = self.expand(dict(zip(names, generators, strict=True)))
+        return {name: [ring(element) for element in elements] for name, elements in outputs.items()}
+
+
+class KernelBuilder:
+    """Collects the stages of a kernel while its formulas are written down.
+
+    Examples
+    --------
+    >>> build = KernelBuilder()
+    >>> w = build.input(Signal.vector("rate", "w"))
+    >>> v = build.stage(Signal.vector("twice", "v"), 2 * w)
+    >>> v.T
+    Matrix([[v_x, v_y, v_z]])
+    """
+
+    def __init__(self) -> None:
+        self.inputs: list[Signal] = []
+        self.stages: list[Stage] = []
+        self.outputs: list[Stage] = []
+
+    def input(self, signal: Signal) -> sp.Matrix:
+        """Declare an input and return its symbols."""
+        self.inputs.append(signal)
+        return symbols(signal)
+
+    def scalar(self, signal: Signal) -> sp.Symbol:
+        """Declare a scalar input and return its symbol."""
+        return self.input(signal)[0]
+
+    def stage(self, signal: Signal, expressions: Iterable[Any]) -> sp.Matrix:
+        """Give an intermediate quantity its name and return its symbols."""
+        self.stages.append(Stage(signal, _expressions(expressions)))
+        return symbols(signal)
+
+    def value(self, name: str, expression: Any, meaning: str = "") -> sp.Symbol:
+        """Give a scalar intermediate quantity its name and return its symbol."""
+        return self.stage(Signal.scalar(name, meaning=meaning), [expression])[0]
+
+    def output(self, signal: Signal, expressions: Iterable[Any]) -> sp.Matrix:
+        """Declare an output and return its symbols, which later outputs may use."""
+        self.outputs.append(Stage(signal, _expressions(expressions)))
+        return symbols(signal)
+
+    def kernel(self, name: str, title: str, source: str, **rest: Any) -> Kernel:
+        """Finish the kernel."""
+        return Kernel(
+            name, title, source, tuple(self.inputs), tuple(self.outputs), tuple(self.stages), **rest
+        )
+
+
+def _expressions(items: Iterable[Any] | Sequence[Any]) -> tuple[sp.Expr, ...]:
+    return tuple(sp.sympify(item) for item in items)

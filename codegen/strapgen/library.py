@@ -1,0 +1,43 @@
+"""The library: generated sources by name, made when first asked for and cached.
+
+The key is the generator itself, its code and templates: a change of either makes new sources, so what runs is
+never out of step with the derivation. A second use loads neither SymPy nor Jinja.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from strapgen import cache
+from strapgen.catalogue import Choice
+from strapgen.targets import Sources
+
+
+def sources(choice: Choice, target: str) -> Sources:
+    """Return the generated sources of a kernel of the catalogue.
+
+    Parameters
+    ----------
+    choice : Choice
+        What `strapgen.catalogue.choose` returned.
+    target : str
+        A key of `strapgen.targets.TARGETS`.
+
+    Returns
+    -------
+    Sources
+    """
+
+    def fill(draft: Path) -> None:
+        from strapgen import pipeline
+
+        made = pipeline.generate(pipeline.lower(pipeline.derive(*choice)), target)
+        for name, text in made.files.items():
+            (draft / name).write_text(text)
+        (draft / "interface.json").write_text(json.dumps(made.interface()))
+
+    key = cache.digest([cache.generator_digest(), choice.kernel, target])
+    folder = cache.entry("sources", key, fill)
+    interface = json.loads((folder / "interface.json").read_text())
+    return Sources.restore(interface, {name: (folder / name).read_text() for name in interface["files"]})

@@ -1,0 +1,181 @@
+"""The gate: SymPy expressions become the nodes of a program.
+
+Sums are written with the pure number last, so that it is rounded once; terms with the same coefficient are
+gathered before they are multiplied by it; signs become subtractions.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import sympy as sp
+from sympy.core.relational import GreaterThan, LessThan, StrictGreaterThan, StrictLessThan
+
+from strapgen.kernel import Kernel
+from strapgen.lowering.share import Shared
+from strapgen.program import Assignment, Constant, Node, Operation, Program, Reference, Result
+from strapgen.signal import Signal
+
+_FUNCTIONS = {sp.sin: "sin", sp.cos: "cos", sp.sinc: "sinc", sp.atan2: "atan2"}
+
+
+def gate(kernel: Kernel, shared: Shared) -> Program:
+    """Return the program of a kernel whose common subexpressions have been named.
+
+    Raises
+    ------
+    NotImplementedError
+        If an expression holds a function that programs do not know.
+    """
+    writer = _Writer()
+    for definition in shared.definitions:
+        value = writer.node(definition.expression)
+        writer.body.append(Assignment(definition.symbol.name, value, definition.meaning))
+
+    def result(signal: Signal) -> Result:
+        symbols = (sp.Symbol(name, real=True) for name in signal.elements)
+        return Result(signal, tuple(writer.node(shared.values.get(s, s)) for s in symbols))
+
+    stages = {stage.signal.name: stage.signal for stage in kernel.stages}
+    return Program(
+        name=kernel.identifier,
+        kernel=kernel.name,
+        title=kernel.title,
+        source=kernel.source,
+        arguments=kernel.arguments or kernel.name,
+        notes=kernel.notes,
+        inputs=kernel.inputs,
+        body=tuple(writer.body),
+        outputs=tuple(result(stage.signal) for stage in kernel.outputs),
+        transition=None if kernel.transition is None else result(stages[kernel.transition]),
+        companions=kernel.companions,
+    )
+
+
+class _Writer:
+    """Turns expressions into nodes; names a value of its own only where a power needs it twice."""
+
+    def __init__(self) -> None:
+        self.body: list[Assignment] = []
+        self._powers = 0
+
+    def node(self, expression: sp.Expr) -> Node:
+        if expression.is_Symbol:
+            return Reference(expression.name)
+        if expression.is_Rational:
+            return Constant(Fraction(int(expression.p), int(expression.q)))
+        if expression.is_Add:
+            return self._sum(expression)
+        if expression.is_Mul:
+            return self._product(expression)
+        if expression.is_Pow:
+            return self._power(expression.base, expression.exp)
+        if isinstance(expression, sp.Max):
+            first, *rest = (self.node(a) for a in sorted(expression.args, key=sp.default_sort_key))
+            for argument in rest:
+                first = Operation("maximum", (first, argument))
+            return first
+        if isinstance(expression, sp.Piecewise):
+            return self._choice(list(expression.args))
+        if expression.func in _FUNCTIONS:
+            return Operation(_FUNCTIONS[expression.func], tuple(self.node(a) for a in expression.args))
+        raise NotImplementedError(f"no operation for {expression.func.__name__} in {expression}")
+
+    def _sum(self, expression: sp.Add) -> Node:
+        groups: dict[Fraction, list[tuple[bool, Node]]] = {}
+        constant = Fraction(0)
+        for term in sorted(expression.args, key=sp.default_sort_key):
+            coefficient, rest = term.as_coeff_Mul(rational=True)
+            value = Fraction(int(coefficient.p), int(coefficient.q))
+            if rest == 1:
+                constant += value
+            else:
+                groups.setdefault(abs(value), []).append((value > 0, self.node(rest)))
+        terms: list[tuple[bool, Node]] = []
+        for magnitude, members in groups.items():
+            positive, total = _signed_sum(members)
+            if magnitude != 1:
+                total = Operation("multiply", (Constant(magnitude), total))
+            terms.append((positive, total))
+        if constant:
+            terms.append((constant > 0, Constant(abs(constant))))
+        positive, total = _signed_sum(terms)
+        return total if positive else Operation("negate", (total,))
+
+    def _product(self, expression: sp.Mul) -> Node:
+        coefficient, rest = expression.as_coeff_Mul(rational=True)
+        value = Fraction(int(coefficient.p), int(coefficient.q))
+        above: list[Node] = []
+        below: list[Node] = []
+        for factor in sorted(sp.Mul.make_args(rest), key=sp.default_sort_key):
+            if factor.is_Pow and factor.exp.is_negative:
+                below.append(self._power(factor.base, -factor.exp))
+            else:
+                above.append(self.node(factor))
+        if abs(value) != 1 or not above:
+            above.insert(0, Constant(abs(value)))
+        result = _chain("multiply", above)
+        if below:
+            result = Operation("divide", (result, _chain("multiply", below)))
+        return Operation("negate", (result,)) if value < 0 else result
+
+    def _power(self, base: sp.Expr, exponent: sp.Expr) -> Node:
+        if exponent.is_negative:
+            return Operation("divide", (Constant(Fraction(1)), self._power(base, -exponent)))
+        if exponent == sp.Rational(1, 2):
+            return Operation("sqrt", (self.node(base),))
+        if not exponent.is_Integer:
+            raise NotImplementedError(f"no operation for the power {exponent} of {base}")
+        return self._repeated(self._named(self.node(base)), int(exponent))
+
+    def _repeated(self, base: Node, exponent: int) -> Node:
+        """Multiply by squaring."""
+        if exponent == 1:
+            return base
+        if exponent % 2:
+            return Operation("multiply", (self._repeated(base, exponent - 1), base))
+        half = self._named(self._repeated(base, exponent // 2))
+        return Operation("multiply", (half, half))
+
+    def _named(self, node: Node) -> Node:
+        if not isinstance(node, Operation):
+            return node
+        for assignment in self.body:
+            if assignment.value == node:
+                return Reference(assignment.name)
+        self._powers += 1
+        name = f"factor_{self._powers}"
+        self.body.append(Assignment(name, node))
+        return Reference(name)
+
+    def _choice(self, pieces: list[tuple[sp.Expr, sp.Basic]]) -> Node:
+        value, condition = pieces[0]
+        if condition == sp.true:
+            return self.node(value)
+        yes, no = self.node(value), self._choice(pieces[1:])
+        if isinstance(condition, (GreaterThan, LessThan)):
+            test = Operation("at_least", (self.node(condition.gts), self.node(condition.lts)))
+        elif isinstance(condition, (StrictGreaterThan, StrictLessThan)):
+            test = Operation("at_least", (self.node(condition.lts), self.node(condition.gts)))
+            yes, no = no, yes
+        else:
+            raise NotImplementedError(f"no operation for the condition {condition}")
+        return Operation("select", (test, yes, no))
+
+
+def _signed_sum(terms: list[tuple[bool, Node]]) -> tuple[bool, Node]:
+    """Add and subtract terms in order, a positive one first; all negative ones are added and the sign told."""
+    if not any(positive for positive, _ in terms):
+        return False, _chain("add", [node for _, node in terms])
+    first = next(k for k, (positive, _) in enumerate(terms) if positive)
+    total = terms[first][1]
+    for positive, node in terms[:first] + terms[first + 1 :]:
+        total = Operation("add" if positive else "subtract", (total, node))
+    return True, total
+
+
+def _chain(kind: str, nodes: list[Node]) -> Node:
+    total = nodes[0]
+    for node in nodes[1:]:
+        total = Operation(kind, (total, node))
+    return total

@@ -1,0 +1,76 @@
+"""Common subexpressions of a kernel, across all its stages and outputs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import sympy as sp
+
+from strapgen.kernel import Kernel
+
+_PREFIX = "shared_"
+
+
+@dataclass(frozen=True)
+class Definition:
+    """``symbol = expression``, in the order of computation."""
+
+    symbol: sp.Symbol
+    expression: sp.Expr
+    meaning: str = ""
+
+
+@dataclass(frozen=True)
+class Shared:
+    """A kernel's formulas with every common subexpression named.
+
+    Parameters
+    ----------
+    definitions : list of Definition
+        Stages, outputs and common subexpressions, each before its first use.
+    values : dict of Symbol to Expr
+        Elements that need no computation: a number or another symbol, negated perhaps inside the kernel.
+    """
+
+    definitions: list[Definition]
+    values: dict[sp.Symbol, sp.Expr]
+
+
+def share(kernel: Kernel) -> Shared:
+    """Name the common subexpressions of a kernel.
+
+    Elements are taken in the order of their names, so that two kernels that differ only in the order in
+    which they store a state get the same arithmetic.
+    """
+    values: dict[sp.Symbol, sp.Expr] = {}
+    definitions: list[Definition] = []
+    for stage in (*kernel.stages, *kernel.outputs):
+        meaning = stage.signal.meaning
+        result = stage in kernel.outputs or stage.signal.name == kernel.transition
+        for name, expression in sorted(zip(stage.signal.elements, stage.expressions, strict=True)):
+            symbol, expression = sp.Symbol(name, real=True), expression.xreplace(values)
+            if expression.is_Symbol or expression.is_Rational or (not result and (-expression).is_Symbol):
+                values[symbol] = expression
+            else:
+                definitions.append(Definition(symbol, expression, meaning))
+                meaning = ""
+    names = sp.numbered_symbols(_PREFIX, start=1, real=True)
+    common, reduced = sp.cse([d.expression for d in definitions], symbols=names, order="canonical")
+    # A condition is no value that a program could hold: it goes back to where it is used.
+    conditions = {symbol: expression for symbol, expression in common if expression.is_Relational}
+    pending = {s: e.xreplace(conditions) for s, e in common if s not in conditions}
+    reduced = [expression.xreplace(conditions) for expression in reduced]
+    ordered: list[Definition] = []
+
+    def needed(expression: sp.Expr) -> Iterator[Definition]:
+        for symbol in sorted(expression.free_symbols & pending.keys(), key=lambda s: int(s.name[len(_PREFIX) :])):
+            if symbol in pending:
+                definition = pending.pop(symbol)
+                yield from needed(definition)
+                yield Definition(symbol, definition)
+
+    for definition, expression in zip(definitions, reduced, strict=True):
+        ordered.extend(needed(expression))
+        ordered.append(Definition(definition.symbol, expression, definition.meaning))
+    return Shared(ordered, values)

@@ -1,0 +1,92 @@
+"""The front door: the stages of the generator in order, each with its input and its output.
+
+    algorithm, method, increments
+        | derive      exact formulas
+    Kernel
+        | lower       straight-line code
+    Program
+        | generate    source text
+    Sources
+        | build       compiled, callable
+    Backend
+        | simulate    against the truth
+    Run
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from strapgen import catalogue, targets
+
+if TYPE_CHECKING:
+    from strapgen.backends import Backend
+    from strapgen.kernel import Kernel
+    from strapgen.program import Program
+    from strapgen.targets import Sources
+
+
+def derive(algorithm: str, method: str | None = None, increments: int | None = None) -> Kernel:
+    """Derive an algorithm exactly.
+
+    Parameters
+    ----------
+    algorithm : str
+        An attitude algorithm ("dcm", "euler", "cayley-klein") or another kernel of the catalogue.
+    method : str, optional
+        Integration method, "rk1" to "rk4" (default), of an attitude algorithm.
+    increments : int, optional
+        Angle increments a step, 1 to 8 (default 2), of an attitude algorithm.
+
+    Returns
+    -------
+    Kernel
+
+    Raises
+    ------
+    InputError
+        If a name or number is not allowed.
+
+    Examples
+    --------
+    >>> derive("euler", method="rk4", increments=2).name
+    'euler-rk4-2'
+    """
+    return catalogue.derive(catalogue.choose(algorithm, method, increments))
+
+
+def lower(kernel: Kernel) -> Program:
+    """Turn a kernel into straight-line code; see `strapgen.lowering.lower`.
+
+    Examples
+    --------
+    >>> lower(derive("euler")).operations["divide"]
+    0
+    """
+    from strapgen.lowering import lower as lower_kernel
+
+    return lower_kernel(kernel)
+
+
+def generate(program: Program, target: str) -> Sources:
+    """Turn a program into source text; see `strapgen.targets.emit`.
+
+    Examples
+    --------
+    >>> sorted(generate(lower(derive("euler")), "c").files)
+    ['euler_rk4_2.c', 'euler_rk4_2.h']
+    """
+    return targets.emit(program, target)
+
+
+def build(sources: Sources) -> Backend:
+    """Turn the sources of an attitude step into a back end; see `strapgen.backends.build`.
+
+    Examples
+    --------
+    >>> build(generate(lower(derive("euler")), "numpy")).name
+    'numpy'
+    """
+    from strapgen.backends import build as build_backend
+
+    return build_backend(sources)

@@ -1,0 +1,280 @@
+"""Programs: straight-line code on scalars, the form between symbolic kernels and printed sources.
+
+A program is a list of single static assignments. The right side of each is a small tree of operations over
+constants (exact rationals), inputs and names assigned before it. Nothing here knows SymPy or a target.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import cached_property
+from typing import Any
+
+from strapgen.signal import Signal
+
+
+@dataclass(frozen=True)
+class Constant:
+    """An exact rational number."""
+
+    value: Fraction
+
+
+@dataclass(frozen=True)
+class Reference:
+    """An input element or a name assigned earlier."""
+
+    name: str
+
+
+@dataclass(frozen=True)
+class Operation:
+    """An operation of `OPERATIONS` on its arguments."""
+
+    kind: str
+    arguments: tuple[Node, ...]
+
+
+Node = Constant | Reference | Operation
+
+
+def _sinc(x: Any) -> Any:
+    return math.sin(x) / x if x else 1
+
+
+#: What each operation means, on any ordered numbers; the integer, exact and float interpreters share it.
+OPERATIONS: dict[str, Callable[..., Any]] = {
+    "add": operator.add,
+    "subtract": operator.sub,
+    "multiply": operator.mul,
+    "divide": operator.truediv,
+    "negate": operator.neg,
+    "sqrt": math.sqrt,
+    "sin": math.sin,
+    "cos": math.cos,
+    "sinc": _sinc,  # sin(x)/x, 1 at 0
+    "atan2": math.atan2,
+    "maximum": max,
+    "at_least": operator.ge,  # a condition: first >= second
+    "select": lambda condition, yes, no: yes if condition else no,
+}
+
+#: The key of `Program.operations` under which an operation is counted.
+COUNTED_AS = {
+    "add": "add",
+    "subtract": "add",
+    "multiply": "multiply",
+    "divide": "divide",
+    "sqrt": "sqrt",
+    "negate": "negate",
+    "maximum": "select",
+    "select": "select",
+    "at_least": None,  # counted with its select
+    "sin": "function",
+    "cos": "function",
+    "sinc": "function",
+    "atan2": "function",
+}
+
+
+@dataclass(frozen=True)
+class Assignment:
+    """``name = value``; `meaning` is said where a named stage of the algorithm begins."""
+
+    name: str
+    value: Node
+    meaning: str = ""
+
+
+@dataclass(frozen=True)
+class Result:
+    """An output signal and, element by element, the reference or constant that holds it."""
+
+    signal: Signal
+    nodes: tuple[Node, ...]
+
+
+@dataclass(frozen=True)
+class Companions:
+    """Kernels that go with an attitude step: what a back end needs beside it.
+
+    Parameters
+    ----------
+    product : str
+        Kernel that advances a state by a transition, and one transition by the next.
+    orthonormalize : str
+        Kernel that restores the state's norm or orthogonality.
+    attitude : str or None
+        Kernel that turns the state into a direction cosine matrix; None where the state is one.
+    identity : tuple of Fraction
+        The state of zero rotation, row-major.
+    """
+
+    product: str
+    orthonormalize: str
+    attitude: str | None
+    identity: tuple[Fraction, ...]
+
+
+@dataclass(frozen=True)
+class Program:
+    """Straight-line code for one kernel.
+
+    Parameters
+    ----------
+    name : str
+        Name in generated code, an identifier.
+    kernel : str
+        Name of the kernel it was lowered from.
+    title, source : str
+        What it computes and where the algorithm comes from.
+    arguments : str
+        Name and options that choose the kernel on the command line.
+    notes : tuple of str
+        Remarks for the reader of generated code.
+    inputs : tuple of Signal
+        Inputs; their elements are known from the start.
+    body : tuple of Assignment
+        The code.
+    outputs : tuple of Result
+        What comes out.
+    transition : Result or None
+        For a step that is linear in the state, the part that depends on the increments alone.
+    companions : Companions or None
+        What belongs to an attitude step; None for every other kernel.
+
+    Raises
+    ------
+    ValueError
+        If a name is used before it is assigned, or assigned twice.
+    """
+
+    name: str
+    kernel: str
+    title: str
+    source: str
+    arguments: str
+    notes: tuple[str, ...]
+    inputs: tuple[Signal, ...]
+    body: tuple[Assignment, ...]
+    outputs: tuple[Result, ...]
+    transition: Result | None = None
+    companions: Companions | None = None
+
+    def __post_init__(self) -> None:
+        known = {element for signal in self.inputs for element in signal.elements}
+        for assignment in self.body:
+            if assignment.name in known:
+                raise ValueError(f"{self.name}: {assignment.name!r} is assigned twice")
+            unknown = set(references(assignment.value)) - known
+            if unknown:
+                raise ValueError(f"{self.name}: {assignment.name!r} uses {sorted(unknown)} before assignment")
+            known.add(assignment.name)
+        for result in self._results:
+            missing = {name for node in result.nodes for name in references(node)} - known
+            if len(result.nodes) != result.signal.size or missing:
+                raise ValueError(f"{self.name}: {result.signal.name!r} is not computed: {sorted(missing)}")
+
+    @property
+    def _results(self) -> tuple[Result, ...]:
+        return self.outputs if self.transition is None else (*self.outputs, self.transition)
+
+    @cached_property
+    def operations(self) -> dict[str, int]:
+        """Count of operations by kind; subtractions count as additions.
+
+        "select" counts choices between two values, "function" counts sin, cos, sin(x)/x and atan2.
+        """
+        counts = dict.fromkeys(("add", "multiply", "divide", "sqrt", "negate", "select", "function"), 0)
+        for assignment in self.body:
+            for node in walk(assignment.value):
+                key = COUNTED_AS[node.kind] if isinstance(node, Operation) else None
+                if key:
+                    counts[key] += 1
+        return counts
+
+    @cached_property
+    def temporaries(self) -> int:
+        """Number of assigned names that are not elements of an output."""
+        held = {node.name for result in self.outputs for node in result.nodes if isinstance(node, Reference)}
+        return sum(assignment.name not in held for assignment in self.body)
+
+    def run(self, values: Mapping[str, Any]) -> dict[str, list[Any]]:
+        """Execute the program on numbers of any kind.
+
+        Sums, products and quotients are the numbers' own, exact for `Fraction`; roots and functions are
+        computed in double.
+
+        Parameters
+        ----------
+        values : mapping of str to number
+            A value for every input element.
+
+        Returns
+        -------
+        dict of str to list
+            For each output its elements, row-major.
+        """
+        known = dict(values)
+
+        def value(node: Node) -> Any:
+            if isinstance(node, Constant):
+                return node.value
+            if isinstance(node, Reference):
+                return known[node.name]
+            return OPERATIONS[node.kind](*map(value, node.arguments))
+
+        for assignment in self.body:
+            known[assignment.name] = value(assignment.value)
+        return {result.signal.name: [value(node) for node in result.nodes] for result in self.outputs}
+
+    def used(self, results: Iterable[Result] | None = None) -> set[str]:
+        """Return the names that the given results need, by default all of them."""
+        wanted = {
+            name
+            for result in (self._results if results is None else results)
+            for node in result.nodes
+            for name in references(node)
+        }
+        for assignment in reversed(self.body):
+            if assignment.name in wanted:
+                wanted.update(references(assignment.value))
+        return wanted
+
+    def transition_program(self) -> Program:
+        """Return the part that turns the increments into the transition, as a program of its own.
+
+        Raises
+        ------
+        ValueError
+            If the program has no transition.
+        """
+        if self.transition is None:
+            raise ValueError(f"{self.name} has no transition")
+        used = self.used([self.transition])
+        return replace(
+            self,
+            title=f"{self.title}: its transition",
+            inputs=tuple(s for s in self.inputs if used & set(s.elements)),
+            body=tuple(a for a in self.body if a.name in used),
+            outputs=(self.transition,),
+            transition=None,
+            companions=None,
+        )
+
+
+def walk(node: Node) -> Iterator[Node]:
+    """Yield a node and all below it."""
+    yield node
+    if isinstance(node, Operation):
+        for argument in node.arguments:
+            yield from walk(argument)
+
+
+def references(node: Node) -> Iterator[str]:
+    """Yield the names that a node uses."""
+    return (n.name for n in walk(node) if isinstance(n, Reference))

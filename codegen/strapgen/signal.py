@@ -1,0 +1,90 @@
+"""Signals: the typed inputs and outputs of kernels, programs and generated functions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from fractions import Fraction
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A named array with a shape, a unit, a frame and a range.
+
+    Parameters
+    ----------
+    name : str
+        Name of the argument in generated code.
+    shape : tuple of int
+        Shape of one sample; () for a scalar.
+    elements : tuple of str
+        Name of every element, in row-major order.
+    unit : str
+        Unit, "1" for a pure number.
+    meaning : str
+        What it is, in the field's terms, with its frame.
+    bound : Fraction or None
+        Largest magnitude of an element in proper use; None where the algorithm sets no limit.
+
+    Examples
+    --------
+    >>> Signal.vector("rate", "w", unit="rad/s", meaning="body rate").elements
+    ('w_x', 'w_y', 'w_z')
+    """
+
+    name: str
+    shape: tuple[int, ...]
+    elements: tuple[str, ...]
+    unit: str = "1"
+    meaning: str = ""
+    bound: Fraction | None = None
+
+    def __post_init__(self) -> None:
+        if math.prod(self.shape) != len(self.elements):
+            raise ValueError(f"signal {self.name!r}: shape {self.shape} with {len(self.elements)} elements")
+
+    @classmethod
+    def labelled(cls, name: str, prefix: str, labels: Iterable[str], **rest: Any) -> Signal:
+        """Make a one-dimensional signal whose elements are `prefix` with each of `labels`."""
+        elements = tuple(f"{prefix}_{label}" for label in labels)
+        return cls(name, (len(elements),), elements, **rest)
+
+    @classmethod
+    def scalar(cls, name: str, **rest: Any) -> Signal:
+        """Make a scalar signal."""
+        return cls(name, (), (name,), **rest)
+
+    @classmethod
+    def vector(cls, name: str, prefix: str, **rest: Any) -> Signal:
+        """Make a 3-vector with elements x, y, z."""
+        return cls.labelled(name, prefix, "xyz", **rest)
+
+    @classmethod
+    def matrix(cls, name: str, prefix: str, **rest: Any) -> Signal:
+        """Make a 3 x 3 matrix with elements 11 to 33."""
+        elements = tuple(f"{prefix}_{row}{column}" for row in "123" for column in "123")
+        return cls(name, (3, 3), elements, **rest)
+
+    @property
+    def size(self) -> int:
+        """Number of elements."""
+        return len(self.elements)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the signal as plain JSON data."""
+        return asdict(self) | {"bound": None if self.bound is None else str(self.bound)}
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any]) -> Signal:
+        """Rebuild a signal from `as_dict`."""
+        bound = data["bound"]
+        return cls(
+            **data
+            | {
+                "shape": tuple(data["shape"]),
+                "elements": tuple(data["elements"]),
+                "bound": None if bound is None else Fraction(bound),
+            }
+        )

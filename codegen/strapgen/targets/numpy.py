@@ -1,0 +1,120 @@
+"""The numpy target: one module a kernel, its functions vectorised over leading axes."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from strapgen.program import Constant, Operation, Program, Reference, walk
+from strapgen.targets.printer import Printer, fill_expression
+from strapgen.targets.rendering import render
+from strapgen.targets.sources import Function, Sources
+
+_FUNCTIONS = {
+    "sqrt": "np.sqrt({})",
+    "sin": "np.sin({})",
+    "cos": "np.cos({})",
+    "sinc": "_sinc({})",
+    "atan2": "np.arctan2({}, {})",
+    "maximum": "np.maximum({}, {})",
+    "at_least": "{} >= {}",
+    "select": "np.where({}, {}, {})",
+}
+
+
+class NumpyPrinter(Printer):
+    """Prints nodes as numpy expressions."""
+
+    def constant(self, value: Fraction) -> str:
+        """Return the shortest decimal that reads as the nearest double."""
+        return repr(float(value))
+
+    def function(self, kind: str, arguments: list[str]) -> str:
+        """Return a numpy call."""
+        return _FUNCTIONS[kind].format(*arguments)
+
+
+def emit(program: Program) -> Sources:
+    """Generate a numpy module for a program.
+
+    Parameters
+    ----------
+    program : Program
+
+    Returns
+    -------
+    Sources
+        One file. Its function takes and returns arrays (..., shape); a step has a second function,
+        ``<name>_transition``, from the increments to the transition.
+    """
+    functions = [program] if program.transition is None else [program, program.transition_program()]
+    uses_sinc = any(
+        isinstance(node, Operation) and node.kind == "sinc"
+        for assignment in program.body
+        for node in walk(assignment.value)
+    )
+    text = render(
+        "numpy/module.py.j2",
+        program=program,
+        command=f"strapgen generate {program.arguments} --target numpy",
+        functions=[_function(part, part is not program) for part in functions],
+        uses_sinc=uses_sinc,
+    )
+    function = Function(program.name, program.inputs, tuple(result.signal for result in program.outputs))
+    return Sources(
+        program.kernel,
+        "numpy",
+        {f"{program.name}.py": text},
+        function,
+        program.operations,
+        program.temporaries,
+        program.companions,
+    )
+
+
+def _function(program: Program, is_transition: bool) -> dict[str, object]:
+    printer = NumpyPrinter()
+    used = program.used()
+    loads = []
+    for signal in program.inputs:
+        for place, name in zip(_places(signal.shape), signal.elements, strict=True):
+            if name in used and signal.shape:
+                loads.append(f"{name} = {signal.name}[..., {place}]")
+    assigned = [
+        {"text": _statement(a.name, printer.text(a.value)), "meaning": a.meaning} for a in program.body
+    ]
+    inputs = {name for signal in program.inputs for name in signal.elements}
+    stores = []
+    for result in program.outputs:
+        for place, node in zip(_places(result.signal.shape), result.nodes, strict=True):
+            value = printer.text(node)
+            # An input that goes straight out is copied first: the output may be the input.
+            copied = isinstance(node, Reference) and node.name in inputs
+            stores.append(
+                {
+                    "target": f"{result.signal.name}[..., {place}]",
+                    "value": value,
+                    "copied": copied,
+                    "constant": isinstance(node, Constant),
+                }
+            )
+    return {
+        "name": f"{program.name}_transition" if is_transition else program.name,
+        "program": program,
+        "loads": loads,
+        "body": assigned,
+        "stores": stores,
+        "copies": sorted({str(store["value"]) for store in stores if store["copied"]}),
+    }
+
+
+def _places(shape: tuple[int, ...]) -> list[str]:
+    if len(shape) == 2:
+        return [f"{i}, {j}" for i in range(shape[0]) for j in range(shape[1])]
+    return [str(i) for i in range(shape[0])] if shape else [""]
+
+
+def _statement(name: str, value: str, width: int = 100) -> str:
+    line = f"{name} = {value}"
+    if len(line) + 4 <= width:
+        return line
+    return f"{name} = (\n        {fill_expression(value, ' ' * 8, width)}\n    )"

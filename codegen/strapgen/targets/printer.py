@@ -1,0 +1,101 @@
+"""Printing the nodes of a program: what all targets share."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from fractions import Fraction
+
+from strapgen.program import Constant, Node, Program, Reference
+from strapgen.signal import Signal
+
+_SUM, _PRODUCT, _UNARY, _ATOM = range(4)
+
+
+class Printer:
+    """Prints nodes with as few parentheses as keep the order of the operations.
+
+    A target's printer says how a constant and each function look; sums and products look the same in
+    every language here.
+    """
+
+    def text(self, node: Node) -> str:
+        """Return a node as source text."""
+        return self._print(node)[0]
+
+    def constant(self, value: Fraction) -> str:
+        """Return a number as source text, correctly rounded."""
+        raise NotImplementedError
+
+    def function(self, kind: str, arguments: list[str]) -> str:
+        """Return a call, for every operation that is not written with an operator."""
+        raise NotImplementedError
+
+    def _print(self, node: Node) -> tuple[str, int]:
+        if isinstance(node, Reference):
+            return node.name, _ATOM
+        if isinstance(node, Constant):
+            text = self.constant(abs(node.value))
+            return (f"-{text}", _UNARY) if node.value < 0 else (text, _ATOM)
+        method = getattr(self, f"_{node.kind}", None)
+        if method is not None:
+            printed: tuple[str, int] = method(*node.arguments)
+            return printed
+        return self.function(node.kind, [self.text(argument) for argument in node.arguments]), _ATOM
+
+    def _inside(self, node: Node, level: int) -> str:
+        text, own = self._print(node)
+        return text if own >= level else f"({text})"
+
+    def _add(self, left: Node, right: Node) -> tuple[str, int]:
+        return f"{self._inside(left, _SUM)} + {self._inside(right, _PRODUCT)}", _SUM
+
+    def _subtract(self, left: Node, right: Node) -> tuple[str, int]:
+        return f"{self._inside(left, _SUM)} - {self._inside(right, _PRODUCT)}", _SUM
+
+    def _multiply(self, left: Node, right: Node) -> tuple[str, int]:
+        return f"{self._inside(left, _PRODUCT)} * {self._inside(right, _UNARY)}", _PRODUCT
+
+    def _divide(self, left: Node, right: Node) -> tuple[str, int]:
+        return f"{self._inside(left, _PRODUCT)} / {self._inside(right, _UNARY)}", _PRODUCT
+
+    def _negate(self, argument: Node) -> tuple[str, int]:
+        return f"-{self._inside(argument, _UNARY)}", _UNARY
+
+
+def elements_text(signal: Signal) -> str:
+    """Return the order of a signal's elements in words, for a contract."""
+    return f"{signal.elements[0]}, ..., {signal.elements[-1]}" if signal.size > 4 else ", ".join(signal.elements)
+
+
+def range_text(signal: Signal) -> str:
+    """Return the range of a signal in words, for a contract."""
+    if signal.bound is None:
+        return "any finite number"
+    return f"any finite number; at most {signal.bound} in magnitude in proper use"
+
+
+def operations_text(program: Program) -> str:
+    """Return the operation count in words."""
+    counts = ", ".join(f"{number} {kind}" for kind, number in program.operations.items() if number)
+    return f"{counts or 'none'}; {program.temporaries} temporaries"
+
+
+def fill(text: str, indent: str, width: int = 100) -> str:
+    """Wrap text at spaces, every line after the first with `indent`."""
+    return "\n".join(
+        textwrap.wrap(
+            text, width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False
+        )
+    )
+
+
+def fill_expression(text: str, indent: str, width: int = 100) -> str:
+    """Wrap an expression before its sums' signs, every line after the first with `indent`."""
+    lines: list[str] = []
+    for term in re.split(r" (?=[+-] )", text):
+        if lines and len(lines[-1]) + 1 + len(term) <= width:
+            lines[-1] += f" {term}"
+        else:
+            lines.append(f"{indent if lines else ''}{term}")
+    return "\n".join(lines)

@@ -1,0 +1,31 @@
+"""Rendering templates."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import jinja2
+
+from strapgen import resources
+from strapgen.targets.printer import elements_text, fill, operations_text, range_text
+
+
+@cache
+def _environment() -> jinja2.Environment:
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(resources.folder("templates")),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    environment.filters.update(
+        fill=fill, range=range_text, elements=elements_text, operations=operations_text
+    )
+    return environment
+
+
+def render(template: str, **values: Any) -> str:
+    """Return a template of `templates/` filled with values."""
+    return _environment().get_template(template).render(**values)
