@@ -95,6 +95,8 @@ class Backend(ABC):
         Angle increments a step.
     state_shape : tuple of int
         Shape of the state.
+    elements : tuple of str
+        Names of the state's elements, row-major.
     identity : array
         The state of zero rotation.
     attitude : str or None
@@ -115,6 +117,7 @@ class Backend(ABC):
         self.kernel = sources.kernel
         self.increments = increments.shape[0]
         self.state_shape = state.shape
+        self.elements = state.elements
         self.attitude = companions.attitude
         self._sources = sources
         self._evaluate = evaluate

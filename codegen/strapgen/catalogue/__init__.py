@@ -10,6 +10,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, NamedTuple
 
 from strapgen import checks
+from strapgen.exceptions import InputError
 
 if TYPE_CHECKING:
     from strapgen.kernel import Kernel
@@ -44,6 +45,7 @@ MOTIONS = {
 class Recipe(NamedTuple):
     """Where a kernel that takes no method is derived: a module of this package, a function, its arguments."""
 
+    title: str
     module: str
     function: str
     arguments: tuple[str, ...] = ()
@@ -51,22 +53,39 @@ class Recipe(NamedTuple):
 
 #: Kernels that take no method.
 KERNELS = {
-    **{f"{algorithm}-product": Recipe("runge_kutta", "product", (algorithm,)) for algorithm in ALGORITHMS},
-    "dcm-orthonormalize": Recipe("orthonormal", "dcm"),
-    "dcm-orthonormalize-optimal": Recipe("orthonormal", "dcm_optimal"),
-    "dcm-orthonormalize-first-order": Recipe("orthonormal", "dcm_first_order"),
-    "dcm-orthonormalize-second-order": Recipe("orthonormal", "dcm_second_order"),
-    "euler-normalize": Recipe("orthonormal", "euler"),
-    "cayley-klein-normalize": Recipe("orthonormal", "cayley_klein"),
-    "dcm-from-euler": Recipe("conversions", "dcm_from_euler"),
-    "dcm-from-cayley-klein": Recipe("conversions", "dcm_from_cayley_klein"),
-    "euler-from-dcm": Recipe("conversions", "euler_from_dcm"),
-    "euler-from-cayley-klein": Recipe("conversions", "euler_from_cayley_klein"),
-    "cayley-klein-from-dcm": Recipe("conversions", "cayley_klein_from_dcm"),
-    "cayley-klein-from-euler": Recipe("conversions", "cayley_klein_from_euler"),
-    "error-matrix": Recipe("error_matrix", "error_matrix"),
-    **{f"{motion}-truth": Recipe("motions", "truth", (motion,)) for motion in MOTIONS},
-    **{f"{motion}-increments": Recipe("motions", "increments", (motion,)) for motion in MOTIONS},
+    **{
+        f"{algorithm}-product": Recipe(f"{title}: state after a transition", "runge_kutta", "product", (algorithm,))
+        for algorithm, title in ALGORITHMS.items()
+    },
+    "dcm-orthonormalize": Recipe("orthonormalization by dual rows, the thesis's scheme", "orthonormal", "dcm"),
+    "dcm-orthonormalize-optimal": Recipe("the nearest rotation", "orthonormal", "dcm_optimal"),
+    "dcm-orthonormalize-first-order": Recipe(
+        "the nearest rotation to first order", "orthonormal", "dcm_first_order"
+    ),
+    "dcm-orthonormalize-second-order": Recipe(
+        "the nearest rotation to second order", "orthonormal", "dcm_second_order"
+    ),
+    "euler-normalize": Recipe("exact normalization", "orthonormal", "euler"),
+    "cayley-klein-normalize": Recipe("exact normalization", "orthonormal", "cayley_klein"),
+    **{
+        f"{to}-from-{source}": Recipe(
+            f"conversion: {ALGORITHMS[to]} from {ALGORITHMS[source]}",
+            "conversions",
+            f"{to}_from_{source}".replace("-", "_"),
+        )
+        for to in ALGORITHMS
+        for source in ALGORITHMS
+        if to != source
+    },
+    "error-matrix": Recipe("scale, skew and drift of a computed attitude", "error_matrix", "error_matrix"),
+    **{
+        f"{motion}-truth": Recipe(f"rate and true attitude of the {motion} motion", "motions", "truth", (motion,))
+        for motion in MOTIONS
+    },
+    **{
+        f"{motion}-increments": Recipe(f"exact increments of the {motion} motion", "motions", "increments", (motion,))
+        for motion in MOTIONS
+    },
 }
 
 
@@ -100,7 +119,8 @@ def choose(name: str, method: str | None = None, increments: int | None = None) 
     if name in KERNELS:
         for option, value in (("method", method), ("increments", increments)):
             if value is not None:
-                checks.choice(f"algorithm with {option} {value}:", name, ALGORITHMS)
+                takers = ", ".join(ALGORITHMS)
+                raise InputError(f"kernel {name} takes no {option} (got {value}); these do: {takers}")
         return Choice(name)
     method = checks.choice("method", "rk4" if method is None else method, METHODS)
     increments = checks.count("increments", 2 if increments is None else increments, largest=MOST_INCREMENTS)

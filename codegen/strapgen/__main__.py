@@ -1,0 +1,5 @@
+"""``python -m strapgen``."""
+
+from strapgen.cli import main
+
+main()

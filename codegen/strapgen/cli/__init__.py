@@ -1,0 +1,67 @@
+"""The command line. Each command is a module; what a command needs is imported when it runs."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+
+import typer
+
+from strapgen.cli import derive, generate, listing, simulate, tables, version
+from strapgen.exceptions import StrapgenError
+
+app = typer.Typer(
+    name="strapgen",
+    help="Derive strapdown attitude algorithms, generate numpy and C code for them, and test it against truth.",
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+app.callback()(version.options)
+app.command("list")(listing.list_names)
+app.command("derive")(derive.derive)
+app.command("generate")(generate.generate)
+app.command("simulate")(simulate.simulate)
+app.command("tables")(tables.tables)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line; exit with 2 and one line on stderr for input that cannot be used."""
+    words = _spread_settings(list(sys.argv[1:] if arguments is None else arguments)) or ["--help"]
+    try:
+        status = app(words, prog_name="strapgen", standalone_mode=False)
+        sys.stdout.flush()
+    except StrapgenError as error:
+        _fail(str(error))
+    except BrokenPipeError:  # the reader has gone, as `head` does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)
+    except (KeyboardInterrupt, typer.Abort):
+        sys.stderr.write("strapgen: interrupted\n")
+        sys.exit(130)
+    except Exception as error:
+        # Typer's errors of usage share no public base class over the releases that are allowed.
+        explain = getattr(error, "format_message", None)
+        if explain is None:
+            raise
+        _fail(explain() or "a command is needed; see strapgen --help")
+    sys.exit(status if isinstance(status, int) else 0)
+
+
+def _fail(message: str) -> None:
+    sys.stderr.write(f"strapgen: {' '.join(message.split())}\n")
+    sys.exit(2)
+
+
+def _spread_settings(words: list[str]) -> list[str]:
+    """Let one --set take several settings: ``--set a=1 b=2`` becomes ``--set a=1 --set b=2``."""
+    spread: list[str] = []
+    inside = False
+    for word in words:
+        if inside and "=" in word and not word.startswith("-") and spread[-1] != "--set":
+            spread.append("--set")
+        elif word.startswith("-"):
+            inside = word == "--set"
+        spread.append(word)
+    return spread

@@ -1,0 +1,38 @@
+"""strapgen list."""
+
+from __future__ import annotations
+
+import typer
+
+from strapgen.cli.options import Format, check_format, print_json
+
+
+def list_names(format: Format = "text") -> None:
+    """List algorithms, methods, kernels, motions, targets and back ends.
+
+    Example: strapgen list
+    """
+    check_format(format)
+    from strapgen import catalogue
+    from strapgen.backends import BACKENDS
+    from strapgen.motions import keys
+    from strapgen.targets import TARGETS
+
+    parts = {
+        "algorithms": catalogue.ALGORITHMS,
+        "methods": catalogue.METHODS,
+        "kernels": {name: recipe.title for name, recipe in catalogue.KERNELS.items()},
+        "motions": {
+            name: ", ".join(" or ".join(choices) for choices in keys(name).values()) for name in catalogue.MOTIONS
+        },
+        "targets": TARGETS,
+        "backends": BACKENDS,
+    }
+    if format == "json":
+        print_json(parts)
+        return
+    width = max(len(name) for part in parts.values() for name in part)
+    for title, part in parts.items():
+        typer.echo(title)
+        for name, meaning in part.items():
+            typer.echo(f"  {name:<{width}}  {meaning}".rstrip())

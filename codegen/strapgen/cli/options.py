@@ -1,0 +1,31 @@
+"""Options and arguments that several commands share, and how data is printed."""
+
+from __future__ import annotations
+
+import json
+import sys
+from typing import Annotated, Any
+
+import typer
+
+from strapgen import checks
+
+Algorithm = Annotated[str, typer.Argument(help="dcm, euler, cayley-klein, or another kernel; see strapgen list.")]
+Method = Annotated[
+    str | None, typer.Option("--method", help="Integration method, rk1 to rk4.  [default: rk4]", show_default=False)
+]
+Increments = Annotated[
+    int | None,
+    typer.Option("--increments", help="Angle increments a step, 1 to 8.  [default: 2]", show_default=False),
+]
+Format = Annotated[str, typer.Option("--format", help="text or json.")]
+
+
+def check_format(value: str, *more: str) -> str:
+    """Check the value of --format: text, json, or one of `more`."""
+    return checks.choice("format", value, ["text", "json", *more])
+
+
+def print_json(data: Any) -> None:
+    """Print data as JSON on one line of output a top-level entry."""
+    sys.stdout.write(json.dumps(data, indent=None if isinstance(data, list) else 1) + "\n")

@@ -1,0 +1,53 @@
+"""Options of the program itself."""
+
+from __future__ import annotations
+
+import platform
+from importlib.metadata import PackageNotFoundError, version
+from typing import Annotated
+
+import typer
+
+import strapgen
+
+_SHAPES_OUTPUT = ("sympy", "numpy", "jinja2", "cffi", "typer", "rich")
+
+
+def _show(wanted: bool) -> None:
+    if not wanted:
+        return
+    lines = [f"strapgen {strapgen.__version__}", f"python {platform.python_version()}"]
+    for name in _SHAPES_OUTPUT:
+        try:
+            lines.append(f"{name} {version(name)}")
+        except PackageNotFoundError:
+            lines.append(f"{name} is not installed")
+    lines.append(f"C compiler {_compiler()}")
+    typer.echo("\n".join(lines))
+    raise typer.Exit
+
+
+def _compiler() -> str:
+    import subprocess
+
+    from strapgen import compilation
+    from strapgen.exceptions import CompilerError
+
+    try:
+        path = compilation.compiler()
+    except CompilerError:
+        return "is not installed"
+    said = subprocess.run([path, "--version"], capture_output=True, text=True, check=False).stdout
+    return said.splitlines()[0] if said else path
+
+
+def options(
+    show_version: Annotated[
+        bool, typer.Option("--version", callback=_show, is_eager=True, help="Show all versions that shape the output.")
+    ] = False,
+) -> None:
+    """Derive strapdown attitude algorithms, generate numpy and C code for them, and test it against truth.
+
+    Example: strapgen simulate euler --backend c --motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10
+    --step 0.125 --duration 180
+    """

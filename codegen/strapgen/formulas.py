@@ -1,0 +1,71 @@
+"""Kernels in words: their formulas as text, LaTeX or plain data."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import sympy as sp
+
+from strapgen.kernel import Kernel, Stage
+from strapgen.program import Program
+
+
+def as_text(kernel: Kernel) -> str:
+    """Return a kernel's formulas as text, stage by stage."""
+    lines = [kernel.title, f"source: {kernel.source}", ""]
+    for signal in kernel.inputs:
+        shape = " x ".join(map(str, signal.shape)) or "scalar"
+        lines.append(f"in   {signal.name} ({shape}, unit {signal.unit}): {signal.meaning}")
+    for stage in kernel.outputs:
+        lines.append(f"out  {stage.signal.name} (unit {stage.signal.unit}): {stage.signal.meaning}")
+    lines += [f"note {note}" for note in kernel.notes]
+    for stage in (*kernel.stages, *kernel.outputs):
+        lines += ["", f"{stage.signal.name}: {stage.signal.meaning}" if stage.signal.meaning else stage.signal.name]
+        lines += [
+            f"  {name} = {sp.sstr(expression)}"
+            for name, expression in zip(stage.signal.elements, stage.expressions, strict=True)
+        ]
+    return "\n".join(lines)
+
+
+def as_latex(kernel: Kernel) -> str:
+    """Return a kernel's formulas as one LaTeX align environment."""
+    names = {
+        sp.Symbol(element, real=True): _latex_name(element)
+        for signal in (*kernel.inputs, *(stage.signal for stage in (*kernel.stages, *kernel.outputs)))
+        for element in signal.elements
+    }
+    rows = [
+        f"{_latex_name(element)} &= {sp.latex(expression, symbol_names=names)}"
+        for stage in (*kernel.stages, *kernel.outputs)
+        for element, expression in zip(stage.signal.elements, stage.expressions, strict=True)
+    ]
+    return "\\begin{align*}\n" + " \\\\\n".join(rows) + "\n\\end{align*}"
+
+
+def _latex_name(element: str) -> str:
+    head, _, label = element.rpartition("_")
+    if not head:
+        return element if len(element) == 1 else f"\\mathit{{{element}}}"
+    words = head.replace("_", "\\_")
+    return f"{words}_{{{label}}}" if len(head) == 1 else f"\\mathit{{{words}}}_{{{label}}}"
+
+
+def as_data(kernel: Kernel, program: Program) -> dict[str, Any]:
+    """Return a kernel as plain JSON data; expressions are strings that SymPy parses."""
+
+    def stage_data(stage: Stage) -> dict[str, Any]:
+        expressions = map(sp.sstr, stage.expressions)
+        return stage.signal.as_dict() | {"expressions": dict(zip(stage.signal.elements, expressions, strict=True))}
+
+    return {
+        "kernel": kernel.name,
+        "title": kernel.title,
+        "source": kernel.source,
+        "notes": list(kernel.notes),
+        "inputs": [signal.as_dict() for signal in kernel.inputs],
+        "stages": [stage_data(stage) for stage in kernel.stages],
+        "outputs": [stage_data(stage) for stage in kernel.outputs],
+        "operations": program.operations,
+        "temporaries": program.temporaries,
+    }

@@ -1,0 +1,134 @@
+"""Motions with known attitude: exact increments to feed an algorithm, and the truth to hold against it.
+
+The formulas are kernels of the catalogue; here they get their parameters and run as generated numpy code.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapgen import catalogue, checks
+from strapgen.backends import evaluator
+from strapgen.exceptions import InputError
+
+Array = NDArray[np.float64]
+
+#: Parameters that stand for zero when only others of the motion are given.
+_MAY_BE_LEFT_OUT = ("constant", "polynomial")
+
+
+def keys(name: str) -> dict[str, dict[str, float]]:
+    """Return, for every parameter of a motion, the keys that set it and the factor to SI of each.
+
+    Examples
+    --------
+    >>> sorted(keys("sinusoidal")["b"])
+    ['b_deg_s', 'b_rad_s']
+    """
+    parameters = catalogue.MOTIONS[checks.choice("motion", name, catalogue.MOTIONS)]
+    degree = math.pi / 180
+    if name == "polynomial":
+        return {parameter: {parameter: degree} for parameter in parameters}
+    return {p: {f"{p}_deg_s": degree, f"{p}_rad_s": 1.0} for p in parameters}
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A motion with its parameters.
+
+    Parameters
+    ----------
+    name : str
+        Name of the motion.
+    parameters : dict of str to float
+        Its parameters in SI.
+    """
+
+    name: str
+    parameters: dict[str, float]
+
+    def increments(self, step: Fraction, steps: int, samples: int) -> Array:
+        """Return the exact angle increments.
+
+        Parameters
+        ----------
+        step : Fraction
+            Step length in s.
+        steps : int
+            Number of steps from t = 0.
+        samples : int
+            Increments a step.
+
+        Returns
+        -------
+        array, (steps, samples, 3)
+            Integrals of the body rate in rad, body axes.
+        """
+        width = step / samples
+        middles = (2 * np.arange(steps * samples) + 1) * float(width / 2)
+        values: Array = evaluator(f"{self.name}-increments")(middles, float(width), *self.parameters.values())
+        return values.reshape(steps, samples, 3)
+
+    def attitude(self, time: Any) -> Array:
+        """Return the true direction cosine matrix, body to reference, (..., 3, 3), at times in s."""
+        return self._truth(time)[1]
+
+    def rate(self, time: Any) -> Array:
+        """Return the body rate in rad/s, body axes, (..., 3), at times in s."""
+        return self._truth(time)[0]
+
+    def _truth(self, time: Any) -> tuple[Array, Array]:
+        times = np.asarray(time, float)
+        result: tuple[Array, Array] = evaluator(f"{self.name}-truth")(times, *self.parameters.values())
+        return result
+
+
+def motion(name: str, **settings: float | str | Fraction) -> Motion:
+    """Return a motion with a closed-form attitude.
+
+    Parameters
+    ----------
+    name : str
+        "constant" (keys x, y, z), "sinusoidal" (a, b), "coning" (a, b, g): each key with its unit, as in
+        ``a_deg_s`` or ``a_rad_s``; or "polynomial" (a0, ..., a4, in deg/s^(k+1)). For "constant" and
+        "polynomial" what is left out is zero, if at least one is given.
+    **settings : number
+        The parameters.
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    InputError
+        If the motion or a key is unknown, a parameter is missing or set twice, or a number is not finite.
+
+    Examples
+    --------
+    >>> motion("coning", a_deg_s=10, b_rad_s=0.5, g_deg_s=0).parameters["b"]
+    0.5
+    """
+    known = keys(name)
+    allowed = [key for choices in known.values() for key in choices]
+    for key in settings:
+        checks.choice(f"key of motion {name}:", key, allowed)
+    if not settings:
+        raise InputError(f"motion {name} needs parameters; allowed: {', '.join(allowed)}")
+    parameters: dict[str, float] = {}
+    for parameter, choices in known.items():
+        given = [key for key in choices if key in settings]
+        if len(given) > 1:
+            raise InputError(f"motion {name}: {' and '.join(given)} are both given; one is needed")
+        if not given and name not in _MAY_BE_LEFT_OUT:
+            raise InputError(f"motion {name} lacks {' or '.join(choices)}")
+        parameters[parameter] = 0.0
+        for key in given:
+            parameters[parameter] = float(checks.number(key, settings[key])) * choices[key]
+    return Motion(name, parameters)

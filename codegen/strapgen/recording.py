@@ -1,0 +1,271 @@
+"""Recorded gyro data: reading files of increments or rates, and propagating them."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapgen import checks
+from strapgen.backends import Backend
+from strapgen.exceptions import InputError
+
+Array = NDArray[np.float64]
+
+#: Units of recorded rates, and their factor to rad/s.
+RATE_UNITS = {"rad/s": 1.0, "deg/s": math.pi / 180}
+
+_INCREMENT_COLUMNS = ("t", "dx", "dy", "dz")
+#: Largest departure of an interval from the median, as a part of it, that counts as even.
+_EVEN = 1e-3
+#: An interval this many times the median is a gap: nothing is known of the motion inside.
+_GAP = 10
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Angle increments at even intervals.
+
+    Parameters
+    ----------
+    start : float
+        Beginning of the first increment in s.
+    interval : float
+        Time from sample to sample in s.
+    increments : array, (N, 3)
+        Angle increments in rad, body axes.
+    """
+
+    start: float
+    interval: float
+    increments: Array
+
+
+@dataclass(frozen=True)
+class History:
+    """The attitude along a recording.
+
+    Parameters
+    ----------
+    time : array, (N,)
+        Times in s, on the recording's clock.
+    states : array, (N, state shape)
+        States of the back end.
+    step : float
+        Step length in s.
+    unused : int
+        Increments at the end that make no whole step.
+    """
+
+    time: Array
+    states: NDArray[Any]
+    step: float
+    unused: int
+
+
+def _rows(path: Path, names: tuple[str, ...] | None) -> tuple[Array, list[int]]:
+    """Read four columns of numbers and the line number of each row."""
+    values: list[list[float]] = []
+    lines: list[int] = []
+    places = [0, 1, 2, 3]
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            for count, (line, row) in enumerate(_numbered(csv.reader(file))):
+                if count == 0 and not _is_number(row[0]):
+                    header = [cell.strip().lower() for cell in row]
+                    if names is not None:
+                        places = [_place(path, header, name) for name in names]
+                    continue
+                values.append([_number(path, line, row, place) for place in places])
+                lines.append(line)
+    except OSError as error:
+        raise InputError(f"{path} cannot be read ({error.strerror})") from None
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"{path} is no text file of comma-separated values ({error})") from None
+    if len(values) < 2:
+        raise InputError(f"{path} holds {len(values)} rows of numbers; at least 2 are needed")
+    return np.array(values), lines
+
+
+def _numbered(reader: Any) -> Iterator[tuple[int, list[str]]]:
+    for row in reader:
+        if any(cell.strip() for cell in row):
+            yield reader.line_num, row
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
+
+
+def _place(path: Path, header: list[str], name: str) -> int:
+    if name not in header:
+        raise InputError(f"{path} has no column {name!r}; the columns {', '.join(_INCREMENT_COLUMNS)} are needed")
+    return header.index(name)
+
+
+def _number(path: Path, line: int, row: list[str], place: int) -> float:
+    if place >= len(row):
+        raise InputError(f"{path}, line {line}: {len(row)} columns; column {place + 1} is needed")
+    if not _is_number(row[place]) or not math.isfinite(float(row[place])):
+        cell = row[place].strip()
+        raise InputError(f"{path}, line {line}: column {place + 1} is {cell!r}; a finite number is needed")
+    return float(row[place])
+
+
+def _intervals(path: Path, time: Array, lines: list[int]) -> tuple[Array, float]:
+    """Return the intervals and their median; refuse times that do not rise, and gaps."""
+    intervals = np.diff(time)
+    worst = int(intervals.argmin())
+    if intervals[worst] <= 0:
+        raise InputError(
+            f"{path}, line {lines[worst + 1]}: time {time[worst + 1]!r} s does not come after {time[worst]!r} s"
+        )
+    median = float(np.median(intervals))
+    widest = int(intervals.argmax())
+    if intervals[widest] > _GAP * median:
+        raise InputError(
+            f"{path}, line {lines[widest + 1]}: a gap of {intervals[widest]:.6g} s; "
+            f"the median interval is {median:.6g} s, and up to {_GAP} times that is allowed"
+        )
+    return intervals, median
+
+
+def _require_even(path: Path, intervals: Array, median: float, lines: list[int], remedy: str) -> None:
+    departures = np.abs(intervals - median)
+    worst = int(departures.argmax())
+    if departures[worst] > _EVEN * median:
+        raise InputError(
+            f"{path}, line {lines[worst + 1]}: sample times are not even: the interval of {intervals[worst]:.6g} s "
+            f"before it is the worst, the median is {median:.6g} s; {remedy}"
+        )
+
+
+def read_increments(path: str | Path) -> Recording:
+    """Read a file of angle increments.
+
+    Parameters
+    ----------
+    path : path
+        Comma-separated values: time in s at the end of each increment, and the increments about x, y, z in
+        rad. A header, if there is one, names the columns t, dx, dy, dz, in any order.
+
+    Returns
+    -------
+    Recording
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, a value is no finite number, or the times are not even; the message names
+        the line.
+    """
+    path = Path(path)
+    values, lines = _rows(path, _INCREMENT_COLUMNS)
+    intervals, median = _intervals(path, values[:, 0], lines)
+    _require_even(path, intervals, median, lines, "increments are needed at even times")
+    interval = float((values[-1, 0] - values[0, 0]) / len(intervals))
+    return Recording(float(values[0, 0]) - interval, interval, np.ascontiguousarray(values[:, 1:]))
+
+
+def read_rates(path: str | Path, unit: str, resample_hz: float | str | None = None) -> Recording:
+    """Read a file of body rates and integrate them, taken as linear from sample to sample.
+
+    Parameters
+    ----------
+    path : path
+        Comma-separated values: time in s and the rates about x, y, z in the first four columns, whatever a
+        header calls them; other columns are ignored.
+    unit : str
+        Unit of the rates, a key of `RATE_UNITS`.
+    resample_hz : number, optional
+        Integrate over an even grid of this frequency, as times that are not even need.
+
+    Returns
+    -------
+    Recording
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, a value is no finite number, there is a gap, or the times are not even
+        and `resample_hz` is not given; the message names the line.
+    """
+    path = Path(path)
+    factor = RATE_UNITS[checks.choice("rate unit", unit, RATE_UNITS)]
+    values, lines = _rows(path, None)
+    time, rates = values[:, 0], values[:, 1:] * factor
+    intervals, median = _intervals(path, time, lines)
+    pieces = (rates[1:] + rates[:-1]) / 2 * intervals[:, None]
+    if resample_hz is None:
+        _require_even(path, intervals, median, lines, "--resample-hz integrates them over an even grid")
+        return Recording(float(time[0]), float((time[-1] - time[0]) / len(intervals)), pieces)
+    interval = 1 / float(checks.number("resample-hz", resample_hz, positive=True))
+    count = math.floor((time[-1] - time[0]) / interval * (1 + 1e-12))
+    if count < 1:
+        raise InputError(f"resample-hz {resample_hz}: {path} is {time[-1] - time[0]:.6g} s long, less than one interval")
+    grid = np.minimum(time[0] + interval * np.arange(count + 1), time[-1])
+    before = np.minimum(np.searchsorted(time, grid, side="right") - 1, len(intervals) - 1)
+    inside = (grid - time[before])[:, None]
+    slopes = np.diff(rates, axis=0) / intervals[:, None]
+    angles = np.vstack([np.zeros(3), np.cumsum(pieces, axis=0)])[before]
+    angles += inside * (rates[before] + inside / 2 * slopes[before])
+    return Recording(float(time[0]), interval, np.diff(angles, axis=0))
+
+
+def propagate(
+    backend: Backend,
+    recording: Recording,
+    orthonormalize: float | str | None = None,
+    record: float | str | None = None,
+) -> History:
+    """Run an algorithm over recorded increments, from zero rotation.
+
+    Parameters
+    ----------
+    backend : Backend
+        The algorithm; each of its steps takes as many increments as it was built for.
+    recording : Recording
+    orthonormalize, record : number, optional
+        Time in s from orthonormalization to orthonormalization (never by default) and from record to record
+        (every step by default), multiples of the step to a hundredth of a step.
+
+    Returns
+    -------
+    History
+
+    Raises
+    ------
+    InputError
+        If the recording is shorter than a step, or a time is no multiple of the step.
+    """
+    step = recording.interval * backend.increments
+    steps, unused = divmod(len(recording.increments), backend.increments)
+    if steps < 1:
+        raise InputError(
+            f"the recording holds {len(recording.increments)} increments; a step needs {backend.increments}"
+        )
+    record_every = 1 if record is None else _multiple("record", record, step)
+    every = None if orthonormalize is None else _multiple("orthonormalize", orthonormalize, step)
+    if record_every > steps:
+        raise InputError(f"record {record} s is longer than the recording, {steps * step:.6g} s")
+    used = recording.increments[: steps * backend.increments]
+    states = backend.propagate(used.reshape(steps, backend.increments, 3), record_every, every)
+    time = recording.start + step * record_every * np.arange(len(states))
+    return History(time, states, step, unused)
+
+
+def _multiple(what: str, value: float | str, step: float) -> int:
+    ratio = float(checks.number(what, value, positive=True)) / step
+    if round(ratio) < 1 or abs(ratio - round(ratio)) > 0.01:
+        raise InputError(f"{what} {value} s is not a whole multiple of the step {step:.6g} s")
+    return round(ratio)

@@ -1,0 +1,119 @@
+"""The simulator: an algorithm run on a motion and held against the truth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapgen import checks
+from strapgen.backends import Backend, evaluator
+from strapgen.exceptions import InputError
+from strapgen.motions import Motion
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a simulation recorded.
+
+    Parameters
+    ----------
+    time : array, (N,)
+        Times of the records in s, the first one 0.
+    computed, true : array, (N, 3, 3)
+        Direction cosine matrices, body to reference.
+    error : array, (N, 3, 3)
+        Error matrices, computed times true transposed less the identity; reference axes.
+    scale, skew, drift : array, (N, 3)
+        Their parts on the axes x, y, z; scale dimensionless, skew and drift in rad.
+    """
+
+    time: Array
+    computed: Array
+    true: Array
+    error: Array
+    scale: Array
+    skew: Array
+    drift: Array
+
+    @property
+    def drift_by_axis(self) -> Array:
+        """Largest magnitude of the drift on each axis over the records, in rad."""
+        largest: Array = np.abs(self.drift).max(axis=0)
+        return largest
+
+    @property
+    def mean_drift(self) -> float:
+        """Mean drift of the run in rad: the root of the sum of squares of `drift_by_axis` (chapter 5)."""
+        return float(np.linalg.norm(self.drift_by_axis))
+
+
+def attitude(backend: Backend, states: Any) -> Array:
+    """Return direction cosine matrices (..., 3, 3) in double of the states of a back end."""
+    states = np.asarray(states, np.float64)
+    if backend.attitude is None:
+        return np.array(states)
+    result: Array = evaluator(backend.attitude)(states)
+    return result
+
+
+def simulate(
+    backend: Backend,
+    motion: Motion,
+    step: float | str | Fraction,
+    duration: float | str | Fraction,
+    orthonormalize: float | str | Fraction | None = None,
+    record: float | str | Fraction | None = None,
+) -> Run:
+    """Run an algorithm on a motion with a known attitude.
+
+    Parameters
+    ----------
+    backend : Backend
+        The algorithm.
+    motion : Motion
+        The motion; its increments are exact.
+    step, duration : number
+        Step and duration in s; the step divides the duration. Decimals are taken exactly.
+    orthonormalize : number, optional
+        Time from orthonormalization to orthonormalization in s, a multiple of the step; never by default.
+    record : number, optional
+        Time from record to record in s, a multiple of the step; by default every step is recorded.
+
+    Returns
+    -------
+    Run
+
+    Raises
+    ------
+    InputError
+        If a time is not finite, not positive, or no multiple of the step.
+
+    Examples
+    --------
+    >>> from strapgen import backend, motion
+    >>> run = simulate(backend("dcm", method="rk1"), motion("constant", y_deg_s=10), "0.125", 180, 5, 5)
+    >>> round(float(np.degrees(run.mean_drift)), 4)
+    0.2855
+    """
+    h = checks.number("step", step, positive=True)
+    total = checks.number("duration", duration, positive=True)
+    steps = checks.multiple("duration", total, "step", h)
+    every = None
+    if orthonormalize is not None:
+        interval = checks.number("orthonormalize", orthonormalize, positive=True)
+        every = checks.multiple("orthonormalize", interval, "step", h)
+    interval = h if record is None else checks.number("record", record, positive=True)
+    record_every = checks.multiple("record", interval, "step", h)
+    if record_every > steps:
+        raise InputError(f"record {float(interval):g} s is longer than the duration {float(total):g} s")
+    states = backend.propagate(motion.increments(h, steps, backend.increments), record_every, every)
+    time = np.arange(len(states)) * float(interval)
+    true = motion.attitude(time)
+    computed = attitude(backend, states)
+    return Run(time, computed, true, *evaluator("error-matrix")(computed, true))
