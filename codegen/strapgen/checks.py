@@ -117,7 +117,7 @@ def real_array(what: str, value: Any, tail: tuple[int, ...], dtype: Any = np.flo
         if not np.isfinite(array.sum()) and not np.isfinite(array).all():
             worst = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
             raise InputError(f"{what} holds {array[worst]} at index {worst}; finite numbers are needed")
-        converted = np.ascontiguousarray(array, dtype=dtype)
+        converted: NDArray[Any] = np.asarray(array, dtype=dtype, order="C")
     if converted.dtype.itemsize < array.dtype.itemsize and not np.isfinite(converted).all():
         raise InputError(f"{what} holds numbers beyond the range of {converted.dtype}")
     return converted

@@ -20,7 +20,10 @@ def as_text(kernel: Kernel) -> str:
         lines.append(f"out  {stage.signal.name} (unit {stage.signal.unit}): {stage.signal.meaning}")
     lines += [f"note {note}" for note in kernel.notes]
     for stage in (*kernel.stages, *kernel.outputs):
-        lines += ["", f"{stage.signal.name}: {stage.signal.meaning}" if stage.signal.meaning else stage.signal.name]
+        lines += [
+            "",
+            f"{stage.signal.name}: {stage.signal.meaning}" if stage.signal.meaning else stage.signal.name,
+        ]
         lines += [
             f"  {name} = {sp.sstr(expression)}"
             for name, expression in zip(stage.signal.elements, stage.expressions, strict=True)
@@ -56,7 +59,9 @@ def as_data(kernel: Kernel, program: Program) -> dict[str, Any]:
 
     def stage_data(stage: Stage) -> dict[str, Any]:
         expressions = map(sp.sstr, stage.expressions)
-        return stage.signal.as_dict() | {"expressions": dict(zip(stage.signal.elements, expressions, strict=True))}
+        return stage.signal.as_dict() | {
+            "expressions": dict(zip(stage.signal.elements, expressions, strict=True))
+        }
 
     return {
         "kernel": kernel.name,

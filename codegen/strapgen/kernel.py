@@ -109,8 +109,11 @@ class Kernel:
         """
         names = [name for signal in self.inputs for name in signal.elements]
         ring, *generators = sp.ring(names, sp.QQ)
-        outputs = self.expand(dict(zip(names, generators, strict=True)))
-        return {name: [ring(element) for element in elements] for name, elements in outputs.items()}
+        try:
+            outputs = self.expand(dict(zip(names, generators, strict=True)))
+            return {name: [ring(element) for element in elements] for name, elements in outputs.items()}
+        except (TypeError, ValueError):  # SymPy's errors where a ring element meets what is no polynomial
+            raise TypeError(f"{self.name} is no polynomial: it divides or calls functions") from None
 
 
 class KernelBuilder:

@@ -1,16 +1,16 @@
 """The front door: the stages of the generator in order, each with its input and its output.
 
-    algorithm, method, increments
-        | derive      exact formulas
-    Kernel
-        | lower       straight-line code
-    Program
-        | generate    source text
-    Sources
-        | build       compiled, callable
-    Backend
-        | simulate    against the truth
-    Run
+algorithm, method, increments
+    | derive      exact formulas
+Kernel
+    | lower       straight-line code
+Program
+    | generate    source text
+Sources
+    | build       compiled, callable
+Backend
+    | simulate    against the truth
+Run
 """
 
 from __future__ import annotations

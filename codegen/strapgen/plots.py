@@ -92,7 +92,13 @@ def plot_history(history: History, elements: Sequence[str], title: str, path: st
     columns = 3 if len(elements) == 9 else 1
     rows = -(-len(elements) // columns)
     figure, grid = pyplot.subplots(
-        rows, columns, figsize=(10, 1.9 * rows + 0.6), sharex=True, sharey=True, layout="constrained", squeeze=False
+        rows,
+        columns,
+        figsize=(10, 1.9 * rows + 0.6),
+        sharex=True,
+        sharey=True,
+        layout="constrained",
+        squeeze=False,
     )
     for axes, name, values in zip(grid.flat, elements, states.T, strict=True):
         axes.plot(history.time, values, color=_COLOURS[0], linewidth=1.2)

@@ -109,7 +109,9 @@ def _is_number(cell: str) -> bool:
 
 def _place(path: Path, header: list[str], name: str) -> int:
     if name not in header:
-        raise InputError(f"{path} has no column {name!r}; the columns {', '.join(_INCREMENT_COLUMNS)} are needed")
+        raise InputError(
+            f"{path} has no column {name!r}; the columns {', '.join(_INCREMENT_COLUMNS)} are needed"
+        )
     return header.index(name)
 
 
@@ -212,7 +214,9 @@ def read_rates(path: str | Path, unit: str, resample_hz: float | str | None = No
     interval = 1 / float(checks.number("resample-hz", resample_hz, positive=True))
     count = math.floor((time[-1] - time[0]) / interval * (1 + 1e-12))
     if count < 1:
-        raise InputError(f"resample-hz {resample_hz}: {path} is {time[-1] - time[0]:.6g} s long, less than one interval")
+        raise InputError(
+            f"resample-hz {resample_hz}: {path} is {time[-1] - time[0]:.6g} s long, less than one interval"
+        )
     grid = np.minimum(time[0] + interval * np.arange(count + 1), time[-1])
     before = np.minimum(np.searchsorted(time, grid, side="right") - 1, len(intervals) - 1)
     inside = (grid - time[before])[:, None]
@@ -260,7 +264,7 @@ def propagate(
         raise InputError(f"record {record} s is longer than the recording, {steps * step:.6g} s")
     used = recording.increments[: steps * backend.increments]
     states = backend.propagate(used.reshape(steps, backend.increments, 3), record_every, every)
-    time = recording.start + step * record_every * np.arange(len(states))
+    time: Array = recording.start + step * record_every * np.arange(len(states), dtype=np.float64)
     return History(time, states, step, unused)
 
 

@@ -44,7 +44,9 @@ def run_csv(run: Run) -> str:
     """Return a run as comma-separated values: the nine errors and all matrices at each record."""
     header = ["time_s"]
     header += [f"{kind}_{axis}{unit}" for kind, unit in _PARTS for axis in AXES]
-    header += [f"{matrix}_{place}" for matrix in ("computed", "true", "difference", "error") for place in _PLACES]
+    header += [
+        f"{matrix}_{place}" for matrix in ("computed", "true", "difference", "error") for place in _PLACES
+    ]
     flat = [m.reshape(-1, 9) for m in (run.computed, run.true, run.computed - run.true, run.error)]
     columns = [run.time[:, None], run.scale, np.degrees(run.skew), np.degrees(run.drift), *flat]
     return _csv(header, np.hstack(columns).tolist())
@@ -66,7 +68,9 @@ def run_text(run: Run, settings: dict[str, Any]) -> str:
         cells = "  ".join(" ".join(f"{value:12.4e}" for value in part) for part in parts)
         lines.append(f"{run.time[k]:9.3f}  {cells}")
     if len(shown) < len(run.time):
-        lines.append(f"({len(shown)} of {len(run.time)} records; --format csv prints all, --record S thins them)")
+        lines.append(
+            f"({len(shown)} of {len(run.time)} records; --format csv prints all, --record S thins them)"
+        )
     lines += ["", f"at {run.time[-1]:g} s"]
     titles = ("computed C", "true C", "computed - true", "error matrix E")
     lines.append("  ".join(f"{title:<38}" for title in titles).rstrip())
@@ -74,7 +78,9 @@ def run_text(run: Run, settings: dict[str, Any]) -> str:
     for row in range(3):
         cells = "  ".join(" ".join(_cell(v, k > 1) for v in m[row]) for k, m in enumerate(matrices))
         lines.append(cells)
-    largest = ", ".join(f"{axis} {value:.6g}" for axis, value in zip(AXES, np.degrees(run.drift_by_axis), strict=True))
+    largest = ", ".join(
+        f"{axis} {value:.6g}" for axis, value in zip(AXES, np.degrees(run.drift_by_axis), strict=True)
+    )
     lines += ["", f"largest drift, deg: {largest}", f"mean drift, deg: {np.degrees(run.mean_drift):.6g}"]
     return "\n".join(lines)
 

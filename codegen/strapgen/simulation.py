@@ -113,7 +113,7 @@ def simulate(
     if record_every > steps:
         raise InputError(f"record {float(interval):g} s is longer than the duration {float(total):g} s")
     states = backend.propagate(motion.increments(h, steps, backend.increments), record_every, every)
-    time = np.arange(len(states)) * float(interval)
+    time: Array = np.arange(len(states), dtype=np.float64) * float(interval)
     true = motion.attitude(time)
     computed = attitude(backend, states)
     return Run(time, computed, true, *evaluator("error-matrix")(computed, true))

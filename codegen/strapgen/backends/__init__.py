@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from strapgen import catalogue, checks, library
-from strapgen.backends.backend import Backend, Evaluator
+from strapgen.backends.protocol import Backend, Evaluator
 from strapgen.targets import Sources
 
 __all__ = ["BACKENDS", "Backend", "Evaluator", "backend", "build", "evaluator"]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from strapgen import compilation
-from strapgen.backends.backend import Array, Backend, Evaluator
+from strapgen.backends.protocol import Array, Backend, Evaluator
 from strapgen.targets import Sources
 
 _TYPES = {"c": ("double", np.float64), "c-float": ("float", np.float32)}
@@ -79,5 +79,7 @@ class CBackend(Backend):
             self._pointer(history),
         )
         if status:
-            raise RuntimeError(f"{self.kernel}: the generated loop refused its arguments with status {status}")
+            raise RuntimeError(
+                f"{self.kernel}: the generated loop refused its arguments with status {status}"
+            )
         return history

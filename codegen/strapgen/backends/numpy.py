@@ -9,12 +9,11 @@ operation runs over contiguous memory.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
 from strapgen import compilation
-from strapgen.backends.backend import Array, Backend, Evaluator
+from strapgen.backends.protocol import Array, Backend, Evaluator
 from strapgen.targets import Sources
 
 #: Steps times runs that are held at once: some megabytes, which stay in the cache.
@@ -94,7 +93,9 @@ class NumpyBackend(Backend):
         totals = self._scan(local[:, -1])  # (elements, blocks, width)
         starts = np.empty((runs, segments, *self.state_shape))
         ends = np.empty_like(starts)
-        segment_totals = np.moveaxis(self._open(totals[:, -1]).reshape(runs, segments, *self.state_shape), 1, 0)
+        segment_totals = np.moveaxis(
+            self._open(totals[:, -1]).reshape(runs, segments, *self.state_shape), 1, 0
+        )
         full = steps // length
         for segment, total in enumerate(segment_totals):
             starts[:, segment] = state
@@ -117,21 +118,16 @@ class NumpyBackend(Backend):
             states[:, :full, -1] = ends[:, :full]
         return states.reshape(runs, segments * length, *self.state_shape)[:, :steps], state
 
-    def _transitions(
-        self, increments: Array, length: int, segments: int, blocks: int, depth: int
-    ) -> Array:
+    def _transitions(self, increments: Array, length: int, segments: int, blocks: int, depth: int) -> Array:
         """Return the transitions, (elements, depth, blocks, runs * segments).
 
         Steps beyond the end have zero increments, so that their transition is the identity.
         """
         runs, steps = increments.shape[:2]
-        padded = np.zeros((runs, segments * length, self.increments * 3))
-        padded[:, :steps] = increments.reshape(runs, steps, -1)
-        padded = padded.reshape(runs, segments, length, -1)
-        if blocks * depth > length:
-            longer = np.zeros((runs, segments, blocks * depth, padded.shape[-1]))
-            longer[:, :, :length] = padded
-            padded = longer
+        whole = np.zeros((runs, segments * length, self.increments * 3))
+        whole[:, :steps] = increments.reshape(runs, steps, -1)
+        padded = np.zeros((runs, segments, blocks * depth, self.increments * 3))
+        padded[:, :, :length] = whole.reshape(runs, segments, length, -1)
         split = padded.reshape(runs, segments, blocks, depth, -1).transpose(4, 3, 2, 0, 1)
         split = np.ascontiguousarray(split).reshape(self.increments, 3, -1)
         result = np.empty((self._elements, split.shape[-1]))
@@ -192,5 +188,3 @@ def _spans(steps: int, segment: int, most: int) -> list[tuple[int, int, int]]:
         spans.append((first, length, 1))
         first += length
     return spans
-
-

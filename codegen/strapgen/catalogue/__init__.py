@@ -54,10 +54,14 @@ class Recipe(NamedTuple):
 #: Kernels that take no method.
 KERNELS = {
     **{
-        f"{algorithm}-product": Recipe(f"{title}: state after a transition", "runge_kutta", "product", (algorithm,))
+        f"{algorithm}-product": Recipe(
+            f"{title}: state after a transition", "runge_kutta", "product", (algorithm,)
+        )
         for algorithm, title in ALGORITHMS.items()
     },
-    "dcm-orthonormalize": Recipe("orthonormalization by dual rows, the thesis's scheme", "orthonormal", "dcm"),
+    "dcm-orthonormalize": Recipe(
+        "orthonormalization by dual rows, the thesis's scheme", "orthonormal", "dcm"
+    ),
     "dcm-orthonormalize-optimal": Recipe("the nearest rotation", "orthonormal", "dcm_optimal"),
     "dcm-orthonormalize-first-order": Recipe(
         "the nearest rotation to first order", "orthonormal", "dcm_first_order"
@@ -79,11 +83,15 @@ KERNELS = {
     },
     "error-matrix": Recipe("scale, skew and drift of a computed attitude", "error_matrix", "error_matrix"),
     **{
-        f"{motion}-truth": Recipe(f"rate and true attitude of the {motion} motion", "motions", "truth", (motion,))
+        f"{motion}-truth": Recipe(
+            f"rate and true attitude of the {motion} motion", "motions", "truth", (motion,)
+        )
         for motion in MOTIONS
     },
     **{
-        f"{motion}-increments": Recipe(f"exact increments of the {motion} motion", "motions", "increments", (motion,))
+        f"{motion}-increments": Recipe(
+            f"exact increments of the {motion} motion", "motions", "increments", (motion,)
+        )
         for motion in MOTIONS
     },
 }

@@ -68,9 +68,7 @@ def cayley_klein_derivative(a: sp.Matrix, g: sp.Matrix) -> sp.Matrix:
 
 def cayley_klein_product(a: sp.Matrix, p: sp.Matrix) -> sp.Matrix:
     """Return the parameters of the matrix product P U, P the transition and U the state."""
-    return algebra.cayley_klein_parameters(
-        algebra.cayley_klein_matrix(p) * algebra.cayley_klein_matrix(a)
-    )
+    return algebra.cayley_klein_parameters(algebra.cayley_klein_matrix(p) * algebra.cayley_klein_matrix(a))
 
 
 UNIT = Fraction(1)

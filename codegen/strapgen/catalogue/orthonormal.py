@@ -84,7 +84,9 @@ def dcm_optimal() -> Kernel:
     mean = build.value("mean", G.trace() / 3, "mean of the eigenvalues of C' C")
     B = _symmetric(build, "deviator", "C' C less its mean", G - mean * sp.eye(3))
     spread = build.value("spread", (B * B).trace() / 6, "mean square spread of the eigenvalues, halved")
-    half_determinant = build.value("half_determinant", algebra.dot(B[:, 0], algebra.cross(B[:, 1], B[:, 2])) / 2)
+    half_determinant = build.value(
+        "half_determinant", algebra.dot(B[:, 0], algebra.cross(B[:, 1], B[:, 2])) / 2
+    )
     radicand = sp.Max(0, spread**3 - half_determinant**2, evaluate=False)
     angle = build.value("angle", sp.atan2(sp.sqrt(radicand), half_determinant) / 3, "angle of the cubic")
     radius = build.value("radius", sp.sqrt(spread))

@@ -48,9 +48,7 @@ def step(kinematics: Kinematics, tableau: Tableau, increments: int) -> Kernel:
     build = KernelBuilder()
     state = build.input(kinematics.state)
     d = build.input(increments_signal(increments))
-    turns = {
-        node: _turn(build, kinematics, d, increments, node) for node in dict.fromkeys(tableau.nodes)
-    }
+    turns = {node: _turn(build, kinematics, d, increments, node) for node in dict.fromkeys(tableau.nodes)}
     slopes: list[sp.Matrix] = []
     for number, (node, row) in enumerate(zip(tableau.nodes, tableau.matrix, strict=True), 1):
         point = kinematics.identity + _combination(row, slopes, kinematics.identity)
@@ -94,9 +92,7 @@ def product(name: str) -> Kernel:
     build = KernelBuilder()
     state, transition = build.input(kinematics.state), build.input(kinematics.transition)
     build.output(kinematics.next, kinematics.product(state, transition))
-    return build.kernel(
-        f"{name}-product", f"{kinematics.title}: state after a transition", kinematics.source
-    )
+    return build.kernel(f"{name}-product", f"{kinematics.title}: state after a transition", kinematics.source)
 
 
 def _turn(

@@ -19,7 +19,8 @@ def generate(
     method: Method = None,
     increments: Increments = None,
     target: Annotated[
-        str | None, typer.Option("--target", help="numpy, c or c-float.  [default: numpy]", show_default=False)
+        str | None,
+        typer.Option("--target", help="numpy, c or c-float.  [default: numpy]", show_default=False),
     ] = None,
     out: Annotated[
         Path | None,
@@ -41,7 +42,12 @@ def generate(
     if check and not all_:
         raise InputError("--check goes with --all")
     if all_:
-        for name, value in (("an algorithm", algorithm), ("--method", method), ("--increments", increments), ("--target", target)):
+        for name, value in (
+            ("an algorithm", algorithm),
+            ("--method", method),
+            ("--increments", increments),
+            ("--target", target),
+        ):
             if value is not None:
                 raise InputError(f"--all generates the whole catalogue; {name} does not go with it")
         _generate_all(out, check, format)

@@ -23,7 +23,8 @@ def list_names(format: Format = "text") -> None:
         "methods": catalogue.METHODS,
         "kernels": {name: recipe.title for name, recipe in catalogue.KERNELS.items()},
         "motions": {
-            name: ", ".join(" or ".join(choices) for choices in keys(name).values()) for name in catalogue.MOTIONS
+            name: ", ".join(" or ".join(choices) for choices in keys(name).values())
+            for name in catalogue.MOTIONS
         },
         "targets": TARGETS,
         "backends": BACKENDS,

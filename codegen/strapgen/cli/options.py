@@ -10,9 +10,12 @@ import typer
 
 from strapgen import checks
 
-Algorithm = Annotated[str, typer.Argument(help="dcm, euler, cayley-klein, or another kernel; see strapgen list.")]
+Algorithm = Annotated[
+    str, typer.Argument(help="dcm, euler, cayley-klein, or another kernel; see strapgen list.")
+]
 Method = Annotated[
-    str | None, typer.Option("--method", help="Integration method, rk1 to rk4.  [default: rk4]", show_default=False)
+    str | None,
+    typer.Option("--method", help="Integration method, rk1 to rk4.  [default: rk4]", show_default=False),
 ]
 Increments = Annotated[
     int | None,

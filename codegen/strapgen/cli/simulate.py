@@ -26,47 +26,64 @@ def simulate(
     increments: Increments = None,
     backend: Annotated[str, typer.Option("--backend", help="numpy, c or c-float.")] = "numpy",
     motion: Annotated[
-        _Number, typer.Option("--motion", help="constant, sinusoidal, coning or polynomial.", show_default=False)
+        _Number,
+        typer.Option("--motion", help="constant, sinusoidal, coning or polynomial.", show_default=False),
     ] = None,
     settings: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE...", help="Parameters of the motion; see strapgen list."),
     ] = None,
     step: Annotated[_Number, typer.Option("--step", help="Step in s.", show_default=False)] = None,
-    duration: Annotated[_Number, typer.Option("--duration", help="Duration in s.", show_default=False)] = None,
+    duration: Annotated[
+        _Number, typer.Option("--duration", help="Duration in s.", show_default=False)
+    ] = None,
     orthonormalize: Annotated[
         _Number,
-        typer.Option("--orthonormalize", help="Orthonormalize every so many s.  [default: never]", show_default=False),
+        typer.Option(
+            "--orthonormalize", help="Orthonormalize every so many s.  [default: never]", show_default=False
+        ),
     ] = None,
     scheme: Annotated[
         _Number,
-        typer.Option("--scheme", help="Kernel that orthonormalizes.  [default: the thesis's]", show_default=False),
+        typer.Option(
+            "--scheme", help="Kernel that orthonormalizes.  [default: the thesis's]", show_default=False
+        ),
     ] = None,
     record: Annotated[
-        _Number, typer.Option("--record", help="Record every so many s.  [default: every step]", show_default=False)
+        _Number,
+        typer.Option("--record", help="Record every so many s.  [default: every step]", show_default=False),
     ] = None,
     increments_csv: Annotated[
         Path | None,
-        typer.Option("--increments-csv", help="Propagate recorded increments: columns t, dx, dy, dz; s, rad."),
+        typer.Option(
+            "--increments-csv", help="Propagate recorded increments: columns t, dx, dy, dz; s, rad."
+        ),
     ] = None,
     rates_csv: Annotated[
         Path | None,
-        typer.Option("--rates-csv", help="Propagate recorded rates: first four columns time in s, three rates."),
+        typer.Option(
+            "--rates-csv", help="Propagate recorded rates: first four columns time in s, three rates."
+        ),
     ] = None,
     rate_unit: Annotated[
         _Number, typer.Option("--rate-unit", help="deg/s or rad/s, for --rates-csv.", show_default=False)
     ] = None,
     resample_hz: Annotated[
         _Number,
-        typer.Option("--resample-hz", help="Integrate uneven recorded rates over an even grid.", show_default=False),
+        typer.Option(
+            "--resample-hz", help="Integrate uneven recorded rates over an even grid.", show_default=False
+        ),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option("--out", help="File for the output.  [default: the terminal]", show_default=False)
+        Path | None,
+        typer.Option("--out", help="File for the output.  [default: the terminal]", show_default=False),
     ] = None,
     plot: Annotated[
         Path | None, typer.Option("--plot", help="Image file for the plots.", show_default=False)
     ] = None,
-    matrices: Annotated[bool, typer.Option("--matrices", help="Add all matrices to the JSON output.")] = False,
+    matrices: Annotated[
+        bool, typer.Option("--matrices", help="Add all matrices to the JSON output.")
+    ] = False,
     format: Annotated[
         _Number,
         typer.Option(
@@ -193,7 +210,9 @@ def _of_recording(
     if plot is not None:
         from strapgen.plots import plot_history
 
-        title = f"{named['algorithm']} {named['method']}, {named['backend']}: attitude along {named['source']}"
+        title = (
+            f"{named['algorithm']} {named['method']}, {named['backend']}: attitude along {Path(named['source']).name}"
+        )
         plot_history(history, elements, title, plot)
     if format == "csv":
         return reports.history_csv(history, elements)

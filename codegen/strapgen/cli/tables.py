@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -42,27 +43,28 @@ _NAMES = {"dcm": "direction cosines", "euler": "Euler parameters"}
 
 
 def _print_table(table: Table, entries: list[Entry]) -> None:
-    """Print one table, a line for each back end and algorithm."""
-    from strapgen.tables import ORDERS
+    """Print one table: for each algorithm the thesis's line, then one for each back end."""
+    from strapgen.tables import ALGORITHMS, ORDERS
 
-    base = f"; the thesis's base drift {table.base} deg" if table.base else ""
-    ratio = "to direction cosines of the same order" if table.by_order else "to direction cosines of first order"
-    typer.echo(f"Table {table.number}: {table.title}")
-    typer.echo(f"  drift in deg, and its ratio {ratio}{base}")
-    heads = "".join(f"  {f'order {order}':<35}" for order in ORDERS)
-    typer.echo(f"  {'':<26}{heads}".rstrip())
-    columns = f"  {'drift':<12}{'ratio':<13}{'thesis':<10}" * len(ORDERS)
-    typer.echo(f"  {'':<26}{columns}".rstrip())
-    by_line: dict[tuple[str, str], list[Entry]] = {}
-    for entry in entries:
-        by_line.setdefault((entry.backend, entry.algorithm), []).append(entry)
-    for (backend, algorithm), line in by_line.items():
-        cells = "".join(
-            f"  {e.drift_deg:<12.4g}{e.normalised:<13.4g}{e.thesis + ('' if e.agrees else ' *'):<10}" for e in line
-        )
-        typer.echo(f"  {backend:<8}{_NAMES[algorithm]:<18}{cells}".rstrip())
-    for note in dict.fromkeys(entry.note for entry in entries if entry.note):
-        typer.echo(f"  {note}")
+    ratio = "of the same order" if table.by_order else "of first order"
+    lines = [f"Table {table.number}: {table.title}"]
+    lines.append(f"  drift in deg, and its ratio to that of direction cosines {ratio}")
+    lines.append(" " * 14 + "".join(f"{f'order {order}':>20}    " for order in ORDERS))
+    lines.append(" " * 14 + f"{'drift':>11}{'ratio':>11}  " * len(ORDERS))
+    for algorithm in ALGORITHMS:
+        lines.append(f"  {_NAMES[algorithm]}")
+        drifts = [table.base if (algorithm, order) == ("dcm", 1) else "" for order in ORDERS]
+        printed = zip(drifts, table.printed[algorithm], strict=True)
+        lines.append(f"    {'thesis':<10}" + "".join(f"{drift:>11}{figure:>11}  " for drift, figure in printed))
+        for backend in dict.fromkeys(entry.backend for entry in entries):
+            cells = [
+                f"{e.drift_deg:>11.4g}{e.normalised:>11.4g}{' ' if e.agrees else '*'} "
+                for e in entries
+                if (e.backend, e.algorithm) == (backend, algorithm)
+            ]
+            lines.append(f"    {backend:<10}" + "".join(cells))
     if not all(entry.agrees for entry in entries):
-        typer.echo("  * differs from the thesis in its printed digits")
-    typer.echo("")
+        lines.append("  * not the thesis's figure in its printed digits")
+    for note in dict.fromkeys(entry.note for entry in entries if entry.note):
+        lines += [f"  {line}" for line in textwrap.wrap(note, 90)]
+    typer.echo("\n".join(line.rstrip() for line in lines) + "\n")

@@ -43,7 +43,10 @@ def _compiler() -> str:
 
 def options(
     show_version: Annotated[
-        bool, typer.Option("--version", callback=_show, is_eager=True, help="Show all versions that shape the output.")
+        bool,
+        typer.Option(
+            "--version", callback=_show, is_eager=True, help="Show all versions that shape the output."
+        ),
     ] = False,
 ) -> None:
     """Derive strapdown attitude algorithms, generate numpy and C code for them, and test it against truth.

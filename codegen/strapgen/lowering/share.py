@@ -64,7 +64,9 @@ def share(kernel: Kernel) -> Shared:
     ordered: list[Definition] = []
 
     def needed(expression: sp.Expr) -> Iterator[Definition]:
-        for symbol in sorted(expression.free_symbols & pending.keys(), key=lambda s: int(s.name[len(_PREFIX) :])):
+        for symbol in sorted(
+            expression.free_symbols & pending.keys(), key=lambda s: int(s.name[len(_PREFIX) :])
+        ):
             if symbol in pending:
                 definition = pending.pop(symbol)
                 yield from needed(definition)

@@ -114,7 +114,9 @@ def emit(program: Program, real: Real = DOUBLE) -> Sources:
         ],
         "body": [
             {
-                "text": fill_expression(f"const {real.name} {a.name} = {printer.text(a.value)};", " " * 8, 96),
+                "text": fill_expression(
+                    f"const {real.name} {a.name} = {printer.text(a.value)};", " " * 8, 96
+                ),
                 "meaning": a.meaning,
             }
             for a in program.body
@@ -124,7 +126,9 @@ def emit(program: Program, real: Real = DOUBLE) -> Sources:
             for result in program.outputs
             for place, node in enumerate(result.nodes)
         ],
-        "uses_math": any(node.kind in _FUNCTIONS and node.kind not in ("at_least", "select") for node in nodes),
+        "uses_math": any(
+            node.kind in _FUNCTIONS and node.kind not in ("at_least", "select") for node in nodes
+        ),
         "uses_sinc": any(node.kind == "sinc" for node in nodes),
     }
     files = {
@@ -149,7 +153,8 @@ def _target(signal: Signal, place: int) -> str:
 
 def _parameters(program: Program, real: Real) -> str:
     inputs = [
-        f"const {real.name} {s.name}[{s.size}]" if s.shape else f"{real.name} {s.name}" for s in program.inputs
+        f"const {real.name} {s.name}[{s.size}]" if s.shape else f"{real.name} {s.name}"
+        for s in program.inputs
     ]
     outputs = [f"{real.name} {r.signal.name}[{r.signal.size}]" for r in program.outputs]
     return ", ".join(inputs + outputs)

@@ -65,7 +65,9 @@ class Printer:
 
 def elements_text(signal: Signal) -> str:
     """Return the order of a signal's elements in words, for a contract."""
-    return f"{signal.elements[0]}, ..., {signal.elements[-1]}" if signal.size > 4 else ", ".join(signal.elements)
+    return (
+        f"{signal.elements[0]}, ..., {signal.elements[-1]}" if signal.size > 4 else ", ".join(signal.elements)
+    )
 
 
 def range_text(signal: Signal) -> str:
@@ -84,9 +86,7 @@ def operations_text(program: Program) -> str:
 def fill(text: str, indent: str, width: int = 100) -> str:
     """Wrap text at spaces, every line after the first with `indent`."""
     return "\n".join(
-        textwrap.wrap(
-            text, width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False
-        )
+        textwrap.wrap(text, width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
     )
 
 

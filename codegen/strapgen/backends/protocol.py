@@ -52,7 +52,9 @@ class Evaluator(ABC):
         signals = self.function.inputs
         if len(values) != len(signals):
             names = ", ".join(signal.name for signal in signals)
-            raise InputError(f"{self.function.name} got {len(values)} inputs; {len(signals)} are needed: {names}")
+            raise InputError(
+                f"{self.function.name} got {len(values)} inputs; {len(signals)} are needed: {names}"
+            )
         arrays = [
             checks.real_array(signal.name, value, signal.shape, self.dtype)
             for signal, value in zip(signals, values, strict=True)
@@ -125,7 +127,9 @@ class Backend(ABC):
         self._orthonormalization = orthonormalization or companions.orthonormalize
         self._step = evaluate(sources.kernel)
         self.dtype = self._step.dtype
-        self.identity: Array = np.array([float(x) for x in companions.identity], self.dtype).reshape(state.shape)
+        self.identity: Array = np.array([float(x) for x in companions.identity], self.dtype).reshape(
+            state.shape
+        )
 
     def step(self, state: Any, increments: Any) -> Array:
         """Advance the state by one step.

@@ -1,0 +1,46 @@
+# Everything runs in .venv, which the first target that needs it sets up.
+
+PYTHON ?= python3
+BIN := .venv/bin
+READY := .venv/.ready
+
+.PHONY: help demo test check bench generate clean
+
+help:
+	@echo "make demo      set up, regenerate the code, build it, print the five tables on every back end"
+	@echo "make test      set up, run the whole test suite"
+	@echo "make check     generated code in step, ruff, mypy"
+	@echo "make bench     measure throughput and whole-process times"
+	@echo "make generate  rebuild generated/"
+	@echo "make clean     remove .venv and what tools left behind"
+
+$(READY): pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
+	  || { echo "strapgen needs Python 3.11 or newer; set PYTHON to one" >&2; exit 2; }
+	@$(PYTHON) -m venv .venv \
+	  || { echo "no virtual environment: on Debian, apt-get install python3-venv python3-dev gcc" >&2; exit 2; }
+	$(BIN)/python -m pip install --disable-pip-version-check --progress-bar on -e '.[dev]'
+	@touch $@
+
+demo: $(READY)
+	$(BIN)/strapgen generate --all
+	$(BIN)/strapgen tables
+
+test: $(READY)
+	$(BIN)/python -m pytest -n auto --dist worksteal
+
+check: $(READY)
+	$(BIN)/strapgen generate --all --check
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+bench: $(READY)
+	$(BIN)/python benchmarks/throughput.py
+
+generate: $(READY)
+	$(BIN)/strapgen generate --all
+
+clean:
+	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis build dist
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,76 @@
+"""Throughput of the back ends and whole-process times of the command line, printed as a table.
+
+Rounds of all candidates are interleaved, so that a change of the machine's speed falls on all alike; medians and
+ratios are what to quote.
+"""
+
+from __future__ import annotations
+
+import argparse
+import platform
+import statistics
+import subprocess
+import sys
+import time
+
+import numpy as np
+
+import strapgen
+from strapgen.backends import BACKENDS
+from strapgen.catalogue import ALGORITHMS
+
+COMMANDS = {
+    "strapgen --help": ["--help"],
+    "strapgen tables --backend c": ["tables", "--backend", "c"],
+    "strapgen tables --backend numpy": ["tables", "--backend", "numpy"],
+    "strapgen generate --all --check": ["generate", "--all", "--check"],
+}
+
+
+def timed(function) -> float:
+    """Return the seconds that a call takes."""
+    start = time.perf_counter()
+    function()
+    return time.perf_counter() - start
+
+
+def interleaved(candidates: dict, rounds: int) -> dict[str, float]:
+    """Return the median seconds of each candidate over interleaved rounds, after one that does not count."""
+    times: dict[str, list[float]] = {name: [] for name in candidates}
+    for k in range(rounds + 1):
+        for name, function in candidates.items():
+            seconds = timed(function)
+            if k:
+                times[name].append(seconds)
+    return {name: statistics.median(values) for name, values in times.items()}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--steps", type=int, default=1_000_000, help="steps of the run, two increments each")
+    parser.add_argument("--rounds", type=int, default=11)
+    options = parser.parse_args()
+
+    print(f"{platform.platform()}, Python {platform.python_version()}, numpy {np.__version__}")
+    increments = np.random.default_rng(1).normal(scale=0.01, size=(options.steps, 2, 3))
+    print(f"\npropagation of one run of {options.steps} steps with full history, RK4 on two increments")
+    print(f"{'':<14}" + "".join(f"{name + ', ns/step':>20}" for name in BACKENDS) + f"{'numpy/c':>10}")
+    for algorithm in ALGORITHMS:
+        backends = {name: strapgen.backend(algorithm, backend=name) for name in BACKENDS}
+        candidates = {name: lambda b=b: b.propagate(increments) for name, b in backends.items()}
+        medians = interleaved(candidates, options.rounds)
+        cells = "".join(f"{medians[name] / options.steps * 1e9:>20.1f}" for name in BACKENDS)
+        print(f"{algorithm:<14}{cells}{medians['numpy'] / medians['c']:>10.1f}")
+
+    print(f"\nwhole process, seconds, median of {options.rounds} interleaved rounds, everything built before")
+    program = [sys.executable, "-m", "strapgen"]
+    commands = {
+        name: lambda words=words: subprocess.run([*program, *words], check=True, stdout=subprocess.DEVNULL)
+        for name, words in COMMANDS.items()
+    }
+    for name, seconds in interleaved(commands, options.rounds).items():
+        print(f"{name:<34}{seconds:>8.2f}")
+
+
+if __name__ == "__main__":
+    main()

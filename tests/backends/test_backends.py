@@ -1,0 +1,243 @@
+"""The protocol of back ends, on every one of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import strapgen
+from strapgen.backends import numpy as numpy_module
+from strapgen.exceptions import InputError, InputTypeError
+
+STEPS = 1440
+
+# One step multiplies the state by a transition near a rotation: a sum of at most four products of numbers up
+# to 1, whose rounding is below 5 units of round-off for each of at most two terms that matter, and a
+# transition that is itself off by a few units. 16 units a step bounds the sum.
+UNITS_A_STEP = 16
+
+
+def roundoff(backend, steps: int) -> float:
+    """Bound of the accumulated rounding of a run, in an element of the state."""
+    return UNITS_A_STEP * steps * float(np.finfo(backend.dtype).eps) / 2
+
+
+def random_increments(rng, *shape: int, size: float = 0.02) -> np.ndarray:
+    return rng.normal(scale=size, size=(*shape, 3))
+
+
+@pytest.mark.parametrize("method", ["rk1", "rk2", "rk3", "rk4"])
+def test_back_ends_agree_over_a_run(make, backend_name, algorithm, method, rng):
+    increments = random_increments(rng, STEPS, 2)
+    reference = strapgen.backend(algorithm, method, 2, "numpy")
+    candidate = make(algorithm, method)
+    # Orthonormalized as in the tables, so that a low order does not grow out of the range of the bound.
+    history = candidate.propagate(increments, orthonormalize_every=40)
+    wanted = reference.propagate(increments, orthonormalize_every=40)
+    allowed = 1e-12 if candidate.dtype == np.float64 else roundoff(candidate, STEPS)
+    assert np.abs(history - wanted).max() <= allowed
+
+
+def test_plain_fourth_order_run_agrees(make, algorithm, rng):
+    increments = random_increments(rng, STEPS, 2)
+    candidate = make(algorithm)
+    wanted = strapgen.backend(algorithm, backend="numpy").propagate(increments)
+    allowed = 1e-12 if candidate.dtype == np.float64 else roundoff(candidate, STEPS)
+    assert np.abs(candidate.propagate(increments) - wanted).max() <= allowed
+
+
+def test_propagation_is_the_step_repeated(make, algorithm, rng):
+    backend = make(algorithm)
+    increments = random_increments(rng, 50, 2)
+    state, states = backend.identity, [backend.identity]
+    for d in increments:
+        state = backend.step(state, d)
+        states.append(state)
+    assert np.abs(backend.propagate(increments) - np.array(states)).max() <= roundoff(backend, 50)
+
+
+def test_orthonormalization_comes_after_every_so_many_steps(make, algorithm, rng):
+    backend = make(algorithm, "rk1")
+    increments = random_increments(rng, 50, 2)
+    state, states = backend.identity, [backend.identity]
+    for k, d in enumerate(increments, 1):
+        state = backend.step(state, d)
+        if k % 7 == 0:
+            state = backend.orthonormalize(state)
+        states.append(state)
+    history = backend.propagate(increments, orthonormalize_every=7)
+    assert np.abs(history - np.array(states)).max() <= roundoff(backend, 50)
+    assert np.abs(backend.propagate(increments) - history).max() > 1e-4, "orthonormalization must be seen"
+
+
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    steps=st.integers(0, 120),
+    record_every=st.integers(1, 50),
+    orthonormalize_every=st.one_of(st.none(), st.integers(1, 60)),
+    runs=st.integers(1, 3),
+)
+def test_records_are_samples_of_the_full_history(make, steps, record_every, orthonormalize_every, runs):
+    backend = make("euler", "rk2")
+    increments = random_increments(np.random.default_rng(steps), runs, steps, 2)
+    every = backend.propagate(increments, 1, orthonormalize_every)
+    assert every.shape == (runs, steps + 1, 4)
+    some = backend.propagate(increments, record_every, orthonormalize_every)
+    np.testing.assert_array_equal(some, every[:, ::record_every])
+    for run in range(runs):
+        alone = backend.propagate(increments[run], record_every, orthonormalize_every)
+        assert np.abs(alone - some[run]).max() <= roundoff(backend, max(steps, 1))
+
+
+@pytest.mark.parametrize("orthonormalize_every", [None, 1, 3, 64, 100, 1000])
+@pytest.mark.parametrize("span", [32, 100, 257])
+def test_spans_of_the_numpy_scan_join_without_a_seam(monkeypatch, rng, span, orthonormalize_every):
+    backend = strapgen.backend("euler", "rk1", 2, "numpy")
+    increments = random_increments(rng, 2, 700, 2)
+    whole = backend.propagate(increments, 1, orthonormalize_every)
+    monkeypatch.setattr(numpy_module, "_SPAN", span)
+    monkeypatch.setattr(numpy_module, "_WIDTH", 16)
+    monkeypatch.setattr(numpy_module, "_PASS", 64)
+    pieces = backend.propagate(increments, 1, orthonormalize_every)
+    scale = np.abs(whole).max()  # without orthonormalization first order grows
+    assert np.abs(pieces - whole).max() <= scale * roundoff(backend, 700)
+
+
+def test_increments_per_step_from_1_to_8(make, backend_name, algorithm, rng):
+    # The same motion in more samples: with an exact fit of a linear rate the step is the same.
+    for count in (1, 3, 8):
+        backend = make(algorithm, "rk4", count)
+        assert backend.increments == count
+        turn = np.full((10, count, 3), 0.01 / count)
+        wanted = strapgen.backend(algorithm, "rk4", 2, backend_name).propagate(np.full((10, 2, 3), 0.005))
+        assert np.abs(backend.propagate(turn) - wanted).max() <= roundoff(backend, 10)
+
+
+def test_zero_increments_leave_the_state(make, algorithm):
+    backend = make(algorithm)
+    history = backend.propagate(np.zeros((5, 2, 3)))
+    np.testing.assert_array_equal(history, np.broadcast_to(backend.identity, history.shape))
+
+
+def test_a_start_other_than_the_identity(make, algorithm, rng):
+    backend = make(algorithm)
+    first, second = random_increments(rng, 30, 2), random_increments(rng, 20, 2)
+    middle = backend.propagate(first)[-1]
+    joined = backend.propagate(np.concatenate([first, second]))[-1]
+    assert np.abs(backend.propagate(second, initial=middle)[-1] - joined).max() <= roundoff(backend, 50)
+    runs = backend.propagate(np.stack([second, second]), initial=middle)
+    np.testing.assert_array_equal(runs[0], runs[1])
+
+
+def test_step_broadcasts_leading_axes(make, algorithm, rng):
+    backend = make(algorithm)
+    d = random_increments(rng, 4, 5, 2)
+    state = backend.step(backend.identity, d[0, 0])
+    together = backend.step(state, d)
+    assert together.shape == (4, 5, *backend.state_shape)
+    np.testing.assert_array_equal(together[3, 2], backend.step(state, d[3, 2]))
+
+
+@pytest.mark.parametrize(
+    ("increments", "error", "words"),
+    [
+        (np.zeros((4, 3, 3)), InputError, ["increments", "(4, 3, 3)", "(..., 2, 3)"]),
+        (np.zeros((2, 3)), InputError, ["increments", "steps"]),
+        (np.zeros((4, 2, 3), int), InputTypeError, ["increments", "int64", "floating-point"]),
+        (np.zeros((4, 2, 3), complex), InputTypeError, ["increments", "complex128"]),
+        ([[["a", "b", "c"]] * 2], InputTypeError, ["increments"]),
+        (np.full((4, 2, 3), np.nan), InputError, ["increments", "nan", "finite"]),
+        (np.full((4, 2, 3), np.inf), InputError, ["increments", "inf", "finite"]),
+    ],
+)
+def test_increments_that_cannot_be_used(make, increments, error, words):
+    with pytest.raises(error) as caught:
+        make("euler").propagate(increments)
+    assert all(word in str(caught.value) for word in words)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"record_every": 0},
+        {"record_every": -1},
+        {"record_every": 1.5},
+        {"record_every": True},
+        {"orthonormalize_every": 0},
+        {"orthonormalize_every": "5"},
+        {"initial": np.zeros(3)},
+        {"initial": np.full(4, np.nan)},
+        {"initial": np.zeros((7, 4))},
+    ],
+)
+def test_options_that_cannot_be_used(make, options):
+    with pytest.raises(InputError) as caught:
+        make("euler").propagate(np.zeros((4, 2, 3)), **options)
+    assert next(iter(options)) in str(caught.value)
+
+
+def test_number_of_inputs_and_axes_of_an_evaluator(backend_name):
+    convert = strapgen.evaluator("dcm-from-euler", backend_name)
+    with pytest.raises(InputError, match="2 inputs; 1 are needed: state"):
+        convert(np.zeros(4), np.zeros(4))
+    error = strapgen.evaluator("error-matrix", backend_name)
+    with pytest.raises(InputError, match="do not broadcast"):
+        error(np.zeros((2, 3, 3)), np.zeros((3, 3, 3)))
+
+
+def test_unknown_names():
+    with pytest.raises(InputError, match="algorithm 'dmc' is not known; allowed: dcm, euler, cayley-klein"):
+        strapgen.backend("dmc")
+    with pytest.raises(InputError, match="method 'rk9'"):
+        strapgen.backend("dcm", "rk9")
+    with pytest.raises(InputError, match="backend 'fortran' is not known; allowed: numpy, c, c-float"):
+        strapgen.backend("dcm", backend="fortran")
+    with pytest.raises(InputError, match="increments is 0"):
+        strapgen.backend("dcm", increments=0)
+    with pytest.raises(InputError, match="orthonormalization 'euler-normalize'"):
+        strapgen.backend("dcm", orthonormalization="euler-normalize")
+    with pytest.raises(InputError, match="no attitude step"):
+        strapgen.build(strapgen.generate(strapgen.lower(strapgen.derive("error-matrix")), "numpy"))
+
+
+def test_the_pipeline_by_hand_gives_the_same_back_end(backend_name, rng):
+    built = strapgen.build(strapgen.generate(strapgen.lower(strapgen.derive("dcm", "rk3", 2)), backend_name))
+    increments = random_increments(rng, 20, 2)
+    cached = strapgen.backend("dcm", "rk3", 2, backend_name)
+    np.testing.assert_array_equal(built.propagate(increments), cached.propagate(increments))
+
+
+def test_every_orthonormalization_restores_the_constraint(make, rng):
+    # What each leaves of the excess S = C'C - I (thesis, appendix B); adding the duals cancels S to first order.
+    left = {
+        "dcm-orthonormalize": lambda S: S**2,
+        "dcm-orthonormalize-optimal": lambda S: 0,
+        "dcm-orthonormalize-first-order": lambda S: 3 / 4 * S**2 + 1 / 4 * S**3,
+        "dcm-orthonormalize-second-order": lambda S: 5 / 8 * S**3 + 15 / 64 * S**4 + 9 / 64 * S**5,
+    }
+    assert set(left) == set(strapgen.catalogue.orthonormalizations("dcm"))
+    rotations = strapgen.motion("coning", a_deg_s=30, b_deg_s=20, g_deg_s=10).attitude(np.arange(50.0))
+    computed = rotations + rng.normal(scale=0.01 / 3, size=(50, 3, 3))
+    excess = np.linalg.norm(np.swapaxes(computed, 1, 2) @ computed - np.eye(3), ord=2, axis=(1, 2))
+    for scheme, residue in left.items():
+        backend = make("dcm", orthonormalization=scheme)
+        restored = backend.orthonormalize(computed).astype(float)
+        after = np.linalg.norm(np.swapaxes(restored, 1, 2) @ restored - np.eye(3), ord=2, axis=(1, 2))
+        # 100 units: some dozens of operations on numbers near 1, all well conditioned.
+        assert np.all(after <= residue(excess) + 100 * np.finfo(backend.dtype).eps), scheme
+
+
+def test_conversions_close_on_every_back_end(backend_name, rng):
+    to_dcm = strapgen.evaluator("dcm-from-euler", backend_name)
+    back = strapgen.evaluator("euler-from-dcm", backend_name)
+    e = rng.normal(size=(1000, 4))
+    e *= np.sign(e[:, 3:]) / np.linalg.norm(e, axis=1, keepdims=True)
+    # Each element of the matrix is off by a few units; the largest parameter is at least 1/2, so dividing by
+    # four times it magnifies no more than that.
+    assert np.abs(back(to_dcm(e)) - e).max() <= 16 * np.finfo(to_dcm.dtype).eps
+    klein = strapgen.evaluator("cayley-klein-from-euler", backend_name)(e)
+    np.testing.assert_array_equal(klein, np.roll(e, 1, axis=1).astype(klein.dtype))
+    via_klein = strapgen.evaluator("dcm-from-cayley-klein", backend_name)(klein)
+    np.testing.assert_array_equal(via_klein, to_dcm(e))

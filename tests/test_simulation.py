@@ -1,0 +1,61 @@
+"""The simulator: what it records, and the input that it refuses."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import strapgen
+from strapgen.exceptions import InputError
+from strapgen.simulation import simulate
+
+CONING = {"a_deg_s": 10, "b_deg_s": 10, "g_deg_s": 10}
+
+
+def test_records_and_errors_fit_together(make, algorithm):
+    run = simulate(make(algorithm), strapgen.motion("coning", **CONING), "0.125", 10, 5, "2.5")
+    np.testing.assert_array_equal(run.time, [0, 2.5, 5, 7.5, 10])
+    assert run.computed.shape == run.true.shape == run.error.shape == (5, 3, 3)
+    E = run.computed @ np.swapaxes(run.true, -1, -2) - np.eye(3)
+    ulp = 8 * np.finfo(float).eps  # sums of three products of numbers up to 1
+    np.testing.assert_allclose(run.error, E, atol=ulp)
+    np.testing.assert_allclose(run.scale, np.einsum("tii->ti", E), atol=ulp)
+    np.testing.assert_allclose(run.skew[:, 0], (E[:, 1, 2] + E[:, 2, 1]) / 2, atol=ulp)
+    np.testing.assert_allclose(run.drift[:, 1], (E[:, 2, 0] - E[:, 0, 2]) / 2, atol=ulp)
+    assert run.mean_drift == pytest.approx(np.linalg.norm(np.abs(run.drift).max(axis=0)))
+
+
+def test_the_computed_frame_lags_with_a_positive_drift(make):
+    # First order turns by arctan(x) instead of x: the computed frame stays behind.
+    run = simulate(make("dcm", "rk1"), strapgen.motion("constant", y_deg_s=10), "0.125", 10, 5)
+    assert run.drift[-1, 1] > 0
+    x = np.radians(10) / 8
+    assert run.drift[-1, 1] == pytest.approx(80 * (x - np.arctan(x)), rel=1e-3)
+
+
+def test_decimals_are_exact(make):
+    # 0.1 divides 0.3, though not in binary.
+    run = simulate(make("euler"), strapgen.motion("constant", y_deg_s=10), 0.1, 0.3)
+    np.testing.assert_allclose(run.time, [0, 0.1, 0.2, 0.3], rtol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("times", "words"),
+    [
+        ({"step": "0.7", "duration": 1}, "duration 1 s is not a whole multiple of the step 0.7 s"),
+        ({"step": 2, "duration": 1}, "not a whole multiple"),
+        ({"step": 0, "duration": 1}, "step is 0; a number above 0"),
+        ({"step": -0.1, "duration": 1}, "step is -0.1"),
+        ({"step": "nan", "duration": 1}, "step is 'nan'; a finite number"),
+        ({"step": 0.1, "duration": float("inf")}, "duration is 'inf'"),
+        ({"step": "1/0", "duration": 1}, "step is '1/0'"),
+        ({"step": "fast", "duration": 1}, "step is 'fast'"),
+        ({"step": 0.1, "duration": 1, "record": 0.15}, "record 0.15 s is not a whole multiple"),
+        ({"step": 0.1, "duration": 1, "record": 2}, "record 2 s is longer than the duration"),
+        ({"step": 0.1, "duration": 1, "orthonormalize": 0.25}, "orthonormalize 0.25 s is not"),
+        ({"step": 0.1, "duration": 1, "orthonormalize": -1}, "orthonormalize is -1"),
+    ],
+)
+def test_times_that_cannot_be_used(times, words):
+    with pytest.raises(InputError, match=words.replace("(", r"\(")):
+        simulate(strapgen.backend("euler"), strapgen.motion("constant", y_deg_s=1), **times)
