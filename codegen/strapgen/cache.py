@@ -27,7 +27,7 @@ def root() -> Path:
     """Return the cache folder: $STRAPGEN_CACHE_DIR, or `strapgen` in the user's cache folder."""
     chosen = os.environ.get("STRAPGEN_CACHE_DIR")
     if chosen:
-        return Path(chosen)
+        return Path(chosen).absolute()
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "strapgen"
 
 

@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 
 from strapgen.exceptions import InputError, InputTypeError
 
+#: More than this many steps, samples or records is no run that a machine holds.
+MOST = 10**9
+
 
 def choice(what: str, value: str, allowed: Iterable[str]) -> str:
     """Return `value` if it is one of `allowed`.
@@ -35,7 +38,7 @@ def choice(what: str, value: str, allowed: Iterable[str]) -> str:
 def number(what: str, value: str | float | Fraction, *, positive: bool = False) -> Fraction:
     """Read a finite number exactly: decimals stay decimals.
 
-    A float is taken at its shortest decimal form, so that 0.1 means 1/10.
+    A float is taken at its shortest decimal form, so that 0.1 means 1/10. What is too small for a double is 0.
 
     Raises
     ------
@@ -47,12 +50,14 @@ def number(what: str, value: str | float | Fraction, *, positive: bool = False) 
     >>> number("step", "0.125", positive=True)
     Fraction(1, 8)
     """
+    text = str(value).strip()
     try:
-        exact = value if isinstance(value, Fraction) else Fraction(str(value).strip())
-        finite = math.isfinite(float(exact))
+        # In double first: exact, a number like 1e-999999999 would be written out digit by digit.
+        near = float(Fraction(text) if "/" in text else text)
+        exact = Fraction(text if near and math.isfinite(near) else 0)
     except (ValueError, ZeroDivisionError, OverflowError):
-        finite = False
-    if not finite:
+        near = math.nan
+    if not math.isfinite(near):
         raise InputError(f"{what} is {str(value)!r}; a finite number is needed")
     if positive and exact <= 0:
         raise InputError(f"{what} is {value}; a number above 0 is needed")
@@ -75,14 +80,18 @@ def count(what: str, value: Any, *, largest: int | None = None) -> int:
 
 
 def multiple(what: str, value: Fraction, of: str, unit: Fraction) -> int:
-    """Return ``value / unit``, which must be a whole number of at least 1.
+    """Return ``value / unit``, which must be a whole number from 1 to `MOST`.
 
     Raises
     ------
     InputError
-        If `unit` does not divide `value`.
+        If `unit` does not divide `value`, or goes into it too many times.
     """
     ratio = value / unit
+    if ratio > MOST:
+        raise InputError(
+            f"{what} {float(value):g} s is over {MOST:.0e} times the {of} {float(unit):g} s; that is too many"
+        )
     if ratio.denominator != 1 or ratio < 1:
         raise InputError(
             f"{what} {float(value):g} s is not a whole multiple of the {of} {float(unit):g} s "
@@ -106,7 +115,10 @@ def real_array(what: str, value: Any, tail: tuple[int, ...], dtype: Any = np.flo
     >>> real_array("increments", [[1e-3, 0.0, 0.0]], (3,)).shape
     (1, 3)
     """
-    array = np.asarray(value)
+    try:
+        array = np.asarray(value)
+    except ValueError:
+        raise InputError(f"{what} has rows of different lengths; an array of numbers is needed") from None
     if array.dtype.kind != "f":
         raise InputTypeError(f"{what} has dtype {array.dtype}; a floating-point dtype is needed")
     if array.shape[array.ndim - len(tail) :] != tail or array.ndim < len(tail):

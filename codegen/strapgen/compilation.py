@@ -67,13 +67,21 @@ def compiler() -> str:
     CompilerError
         If there is none.
     """
-    command = shlex.split(os.environ.get("CC") or "cc")[0]
+    chosen = _chosen_compiler() or "cc"
+    try:
+        command = shlex.split(chosen)[0]
+    except ValueError:  # a quotation mark that is not closed
+        command = chosen
     path = shutil.which(command)
     if path is None:
         raise CompilerError(
             f"no C compiler: {command!r} is not on the PATH; install gcc (or set CC), or use the numpy back end"
         )
     return path
+
+
+def _chosen_compiler() -> str:
+    return os.environ.get("CC", "").strip()
 
 
 def _compiled(sources: Sources) -> Any:
@@ -86,7 +94,7 @@ def _compiled(sources: Sources) -> Any:
             *sources.files,
             *sources.files.values(),
             *C_FLAGS,
-            os.environ.get("CC", ""),
+            _chosen_compiler(),
             f"{executable} {stat.st_size} {stat.st_mtime_ns}",
             f"{platform.machine()} {sys.platform} {sysconfig.get_config_var('SOABI')}",
             _cffi_version(),
@@ -126,7 +134,7 @@ def _compile(sources: Sources, name: str, path: str, draft: Path) -> None:
         libraries=[] if sys.platform == "win32" else ["m"],
     )
     before = os.environ.get("CC")
-    os.environ["CC"] = before or path
+    os.environ["CC"] = _chosen_compiler() or path
     said = io.StringIO()
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import sympy as sp
@@ -50,6 +51,9 @@ def _latex_name(element: str) -> str:
     head, _, label = element.rpartition("_")
     if not head:
         return element if len(element) == 1 else f"\\mathit{{{element}}}"
+    numbered = re.fullmatch(r"([a-z])(\d+)", head)
+    if numbered:
+        return f"{numbered[1]}_{{{numbered[2]}{label}}}"
     words = head.replace("_", "\\_")
     return f"{words}_{{{label}}}" if len(head) == 1 else f"\\mathit{{{words}}}_{{{label}}}"
 

@@ -10,8 +10,8 @@ import json
 from pathlib import Path
 
 from strapgen import cache
-from strapgen.catalogue import Choice
-from strapgen.targets import Sources
+from strapgen.catalogue import Choice, derive
+from strapgen.targets import Sources, emit
 
 
 def sources(choice: Choice, target: str) -> Sources:
@@ -30,9 +30,10 @@ def sources(choice: Choice, target: str) -> Sources:
     """
 
     def fill(draft: Path) -> None:
-        from strapgen import pipeline
+        # Imported here: with the sources in the cache, SymPy and Jinja stay unloaded.
+        from strapgen.lowering import lower
 
-        made = pipeline.generate(pipeline.lower(pipeline.derive(*choice)), target)
+        made = emit(lower(derive(choice)), target)
         for name, text in made.files.items():
             (draft / name).write_text(text)
         (draft / "interface.json").write_text(json.dumps(made.interface()))

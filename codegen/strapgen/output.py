@@ -33,29 +33,46 @@ def write_files(folder: str | Path, files: Mapping[str, str | bytes]) -> list[Pa
         If the folder or a file cannot be written; no file has been changed then.
     """
     folder = Path(folder)
+    places = [folder / name for name in files]
     drafts: list[tuple[Path, Path]] = []
     try:
-        for name, content in files.items():
-            place = folder / name
-            place.parent.mkdir(parents=True, exist_ok=True)
-            if place.is_dir():
-                raise InputError(f"{place} is a folder; a file is to be written there")
+        for nominal, content in zip(places, files.values(), strict=True):
+            nominal.parent.mkdir(parents=True, exist_ok=True)
+            if nominal.is_dir():
+                raise InputError(f"{nominal} is a folder; a file is to be written there")
+            place = nominal.resolve()  # a link stays, what it points to is written
+            if place.exists() and not place.is_file():  # a device or a pipe must not be replaced by a file
+                raise InputError(f"{nominal} is no ordinary file; only those are written")
             handle, draft = tempfile.mkstemp(prefix=f".{place.name}-", dir=place.parent)
             drafts.append((Path(draft), place))
             with os.fdopen(handle, "wb") as file:
                 file.write(content.encode() if isinstance(content, str) else content)
         umask = os.umask(0)
         os.umask(umask)
-        for draft_path, place in drafts:
-            draft_path.chmod(0o666 & ~umask)
-            draft_path.replace(place)
+        _put_in_place(drafts, 0o666 & ~umask)
     except OSError as error:
         raise InputError(f"{folder} cannot be written ({error.strerror})") from None
     finally:
         for draft_path, _ in drafts:
             with contextlib.suppress(OSError):
                 draft_path.unlink()
-    return [place for _, place in drafts]
+    return places
+
+
+def _put_in_place(drafts: list[tuple[Path, Path]], mode: int) -> None:
+    """Rename drafts into their places; put back what was there if one of them cannot be."""
+    replaced: list[tuple[Path, bytes | None]] = []
+    try:
+        for draft, place in drafts:
+            before = place.read_bytes() if place.exists() else None
+            draft.chmod(mode)
+            draft.replace(place)
+            replaced.append((place, before))
+    except OSError:
+        for place, before in replaced:
+            with contextlib.suppress(OSError):
+                place.unlink() if before is None else place.write_bytes(before)
+        raise
 
 
 def write_file(path: str | Path, content: str | bytes) -> Path:

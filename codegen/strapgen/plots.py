@@ -31,13 +31,13 @@ def _pyplot() -> Any:
 
 def _save(figure: Any, path: str | Path) -> Path:
     path = Path(path)
+    _pyplot().close(figure)  # pyplot lets go of it, it can still be drawn
     kind = path.suffix.lstrip(".").lower()
     allowed = sorted(figure.canvas.get_supported_filetypes())
     if kind not in allowed:
         raise InputError(f"plot {path}: file type {kind!r} is not known; allowed: {', '.join(allowed)}")
     image = io.BytesIO()
     figure.savefig(image, format=kind, dpi=150)
-    _pyplot().close(figure)
     return output.write_file(path, image.getvalue())
 
 

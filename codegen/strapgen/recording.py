@@ -77,10 +77,10 @@ def _rows(path: Path, names: tuple[str, ...] | None) -> tuple[Array, list[int]]:
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             for count, (line, row) in enumerate(_numbered(csv.reader(file))):
-                if count == 0 and not _is_number(row[0]):
+                if count == 0 and not any(map(_is_number, row)):
                     header = [cell.strip().lower() for cell in row]
                     if names is not None:
-                        places = [_place(path, header, name) for name in names]
+                        places = [_place(path, line, header, name) for name in names]
                     continue
                 values.append([_number(path, line, row, place) for place in places])
                 lines.append(line)
@@ -107,10 +107,10 @@ def _is_number(cell: str) -> bool:
     return True
 
 
-def _place(path: Path, header: list[str], name: str) -> int:
+def _place(path: Path, line: int, header: list[str], name: str) -> int:
     if name not in header:
         raise InputError(
-            f"{path} has no column {name!r}; the columns {', '.join(_INCREMENT_COLUMNS)} are needed"
+            f"{path}, line {line}: no column {name!r}; the columns {', '.join(_INCREMENT_COLUMNS)} are needed"
         )
     return header.index(name)
 
@@ -130,7 +130,8 @@ def _intervals(path: Path, time: Array, lines: list[int]) -> tuple[Array, float]
     worst = int(intervals.argmin())
     if intervals[worst] <= 0:
         raise InputError(
-            f"{path}, line {lines[worst + 1]}: time {time[worst + 1]!r} s does not come after {time[worst]!r} s"
+            f"{path}, line {lines[worst + 1]}: "
+            f"time {float(time[worst + 1])!r} s does not come after {float(time[worst])!r} s"
         )
     median = float(np.median(intervals))
     widest = int(intervals.argmax())
@@ -212,7 +213,10 @@ def read_rates(path: str | Path, unit: str, resample_hz: float | str | None = No
         _require_even(path, intervals, median, lines, "--resample-hz integrates them over an even grid")
         return Recording(float(time[0]), float((time[-1] - time[0]) / len(intervals)), pieces)
     interval = 1 / float(checks.number("resample-hz", resample_hz, positive=True))
-    count = math.floor((time[-1] - time[0]) / interval * (1 + 1e-12))
+    ratio = float((time[-1] - time[0]) / interval * (1 + 1e-12))
+    if ratio > checks.MOST:
+        raise InputError(f"resample-hz {resample_hz}: {path} would make over {checks.MOST:.0e} increments")
+    count = math.floor(ratio)
     if count < 1:
         raise InputError(
             f"resample-hz {resample_hz}: {path} is {time[-1] - time[0]:.6g} s long, less than one interval"
@@ -250,7 +254,8 @@ def propagate(
     Raises
     ------
     InputError
-        If the recording is shorter than a step, or a time is no multiple of the step.
+        If the recording is shorter than a step, a time is no multiple of the step, or the attitude leaves
+        the range of the back end's numbers.
     """
     step = recording.interval * backend.increments
     steps, unused = divmod(len(recording.increments), backend.increments)
@@ -265,11 +270,16 @@ def propagate(
     used = recording.increments[: steps * backend.increments]
     states = backend.propagate(used.reshape(steps, backend.increments, 3), record_every, every)
     time: Array = recording.start + step * record_every * np.arange(len(states), dtype=np.float64)
+    broken = ~np.isfinite(states.reshape(len(states), -1)).all(axis=1)
+    if broken.any():
+        raise InputError(
+            f"the attitude is not finite from {time[broken][0]:.6g} s on; the increments are too large"
+        )
     return History(time, states, step, unused)
 
 
 def _multiple(what: str, value: float | str, step: float) -> int:
     ratio = float(checks.number(what, value, positive=True)) / step
-    if round(ratio) < 1 or abs(ratio - round(ratio)) > 0.01:
+    if not 0.5 < ratio <= checks.MOST or abs(ratio - round(ratio)) > 0.01:
         raise InputError(f"{what} {value} s is not a whole multiple of the step {step:.6g} s")
     return round(ratio)

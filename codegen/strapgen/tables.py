@@ -146,8 +146,9 @@ class Entry:
     note: str | None = None
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the entry as plain JSON data."""
-        return {key: value for key, value in asdict(self).items() if value is not None}
+        """Return the entry as plain JSON data, the thesis's figure as a number and as it is printed."""
+        data = {key: value for key, value in asdict(self).items() if value is not None}
+        return data | {"thesis": float(Fraction(self.thesis)), "thesis_printed": self.thesis}
 
 
 def agrees(value: float, printed: str) -> bool:
@@ -215,6 +216,20 @@ def entries(table: Table, backend_name: str) -> Iterator[Entry]:
             bool(np.isfinite(value)) and agrees(normalised, printed),
             note,
         )
+
+
+def build_all(backends: tuple[str, ...] = tuple(BACKENDS)) -> Iterator[str]:
+    """Generate and compile what the tables run, one algorithm after the other.
+
+    Yields
+    ------
+    str
+        Name of the kernel that is ready.
+    """
+    for name in backends:
+        for algorithm in ALGORITHMS:
+            for order in ORDERS:
+                yield backend(algorithm, f"rk{order}", 2, name).kernel
 
 
 def run_tables(backends: tuple[str, ...] = tuple(BACKENDS)) -> Iterator[Entry]:

@@ -34,7 +34,7 @@ static inline void one_(const double state[4], const double increments[6], doubl
         + half_turn_0_z * half_turn_1_x;
     const double slope_2_z = half_turn_1_z + half_turn_0_x * half_turn_1_y
         - half_turn_0_y * half_turn_1_x;
-    /* transition: the step applied to the identity */
+    /* the step applied to the identity */
     const double p_s = 0.5 * slope_2_s + 1.0;
     const double p_x = 0.5 * (half_turn_0_x + slope_2_x);
     const double p_y = 0.5 * (half_turn_0_y + slope_2_y);

@@ -26,7 +26,7 @@ static inline void one_(const double state[9], const double increments[6], doubl
     const double turn_0_x = 3.0 * d1_x - d2_x;
     const double turn_0_y = 3.0 * d1_y - d2_y;
     const double turn_0_z = 3.0 * d1_z - d2_z;
-    /* transition: the step applied to the identity */
+    /* the step applied to the identity */
     const double A_12 = -turn_0_z;
     const double A_23 = -turn_0_x;
     const double A_31 = -turn_0_y;

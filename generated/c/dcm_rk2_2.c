@@ -43,7 +43,7 @@ static inline void one_(const double state[9], const double increments[6], doubl
     const double slope_2_31 = turn_0_x * turn_1_z - turn_1_y;
     const double slope_2_32 = turn_1_x + turn_0_y * turn_1_z;
     const double slope_2_33 = -(shared_1 + shared_3);
-    /* transition: the step applied to the identity */
+    /* the step applied to the identity */
     const double A_11 = 0.5 * slope_2_11 + 1.0;
     const double shared_4 = 0.5 * turn_0_z;
     const double A_12 = 0.5 * slope_2_12 - shared_4;

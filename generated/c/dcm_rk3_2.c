@@ -77,7 +77,7 @@ static inline void one_(const double state[9], const double increments[6], doubl
     const double slope_3_31 = point_3_32 * turn_1_z - point_3_33 * turn_1_y;
     const double slope_3_32 = point_3_33 * turn_1_x - point_3_31 * turn_1_z;
     const double slope_3_33 = point_3_31 * turn_1_y - point_3_32 * turn_1_x;
-    /* transition: the step applied to the identity */
+    /* the step applied to the identity */
     const double A_11 = 0.6666666666666666 * slope_2_11 + 0.16666666666666666 * slope_3_11 + 1.0;
     const double shared_7 = 0.16666666666666666 * turn_0_z;
     const double A_12 = 0.6666666666666666 * slope_2_12 - shared_7

@@ -91,7 +91,7 @@ static inline void one_(const double state[9], const double increments[6], doubl
     const double slope_4_31 = slope_3_32 * turn_1_z - point_4_33 * turn_1_y;
     const double slope_4_32 = point_4_33 * turn_1_x - slope_3_31 * turn_1_z;
     const double slope_4_33 = slope_3_31 * turn_1_y - slope_3_32 * turn_1_x;
-    /* transition: the step applied to the identity */
+    /* the step applied to the identity */
     const double A_11 = 0.3333333333333333 * (slope_2_11 + slope_3_11)
         + 0.16666666666666666 * slope_4_11 + 1.0;
     const double shared_7 = 0.16666666666666666 * turn_0_z;

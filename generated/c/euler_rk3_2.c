@@ -62,7 +62,7 @@ static inline void one_(const double state[4], const double increments[6], doubl
         - half_turn_1_z * point_3_x;
     const double slope_3_z = half_turn_1_y * point_3_x - half_turn_1_x * point_3_y
         + half_turn_1_z * point_3_s;
-    /* transition: the step applied to the identity */
+    /* the step applied to the identity */
     const double p_s = 0.6666666666666666 * slope_2_s + 0.16666666666666666 * slope_3_s + 1.0;
     const double p_x = 0.16666666666666666 * (half_turn_0_x + slope_3_x)
         + 0.6666666666666666 * slope_2_x;

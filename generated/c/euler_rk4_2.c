@@ -73,7 +73,7 @@ static inline void one_(const double state[4], const double increments[6], doubl
         - half_turn_1_z * slope_3_x;
     const double slope_4_z = half_turn_1_y * slope_3_x - half_turn_1_x * slope_3_y
         + half_turn_1_z * point_4_s;
-    /* transition: the step applied to the identity */
+    /* the step applied to the identity */
     const double p_s = 0.3333333333333333 * (slope_2_s + slope_3_s)
         + 0.16666666666666666 * slope_4_s + 1.0;
     const double p_x = 0.16666666666666666 * (half_turn_0_x + slope_4_x)

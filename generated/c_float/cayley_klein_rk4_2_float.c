@@ -73,7 +73,7 @@ static inline void one_(const float state[4], const float increments[6], float n
         - half_turn_1_z * slope_3_x;
     const float slope_4_z = half_turn_1_y * slope_3_x - half_turn_1_x * slope_3_y
         + half_turn_1_z * point_4_s;
-    /* transition: the step applied to the identity */
+    /* the step applied to the identity */
     const float p_s = 0.33333334f * (slope_2_s + slope_3_s) + 0.16666667f * slope_4_s + 1.0f;
     const float p_x = 0.16666667f * (half_turn_0_x + slope_4_x) + 0.33333334f * (slope_2_x
         + slope_3_x);

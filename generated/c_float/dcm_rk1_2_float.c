@@ -26,7 +26,7 @@ static inline void one_(const float state[9], const float increments[6], float n
     const float turn_0_x = 3.0f * d1_x - d2_x;
     const float turn_0_y = 3.0f * d1_y - d2_y;
     const float turn_0_z = 3.0f * d1_z - d2_z;
-    /* transition: the step applied to the identity */
+    /* the step applied to the identity */
     const float A_12 = -turn_0_z;
     const float A_23 = -turn_0_x;
     const float A_31 = -turn_0_y;

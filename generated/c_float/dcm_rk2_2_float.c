@@ -43,7 +43,7 @@ static inline void one_(const float state[9], const float increments[6], float n
     const float slope_2_31 = turn_0_x * turn_1_z - turn_1_y;
     const float slope_2_32 = turn_1_x + turn_0_y * turn_1_z;
     const float slope_2_33 = -(shared_1 + shared_3);
-    /* transition: the step applied to the identity */
+    /* the step applied to the identity */
     const float A_11 = 0.5f * slope_2_11 + 1.0f;
     const float shared_4 = 0.5f * turn_0_z;
     const float A_12 = 0.5f * slope_2_12 - shared_4;

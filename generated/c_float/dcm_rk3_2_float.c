@@ -77,7 +77,7 @@ static inline void one_(const float state[9], const float increments[6], float n
     const float slope_3_31 = point_3_32 * turn_1_z - point_3_33 * turn_1_y;
     const float slope_3_32 = point_3_33 * turn_1_x - point_3_31 * turn_1_z;
     const float slope_3_33 = point_3_31 * turn_1_y - point_3_32 * turn_1_x;
-    /* transition: the step applied to the identity */
+    /* the step applied to the identity */
     const float A_11 = 0.6666667f * slope_2_11 + 0.16666667f * slope_3_11 + 1.0f;
     const float shared_7 = 0.16666667f * turn_0_z;
     const float A_12 = 0.6666667f * slope_2_12 - shared_7 + 0.16666667f * slope_3_12;

@@ -91,7 +91,7 @@ static inline void one_(const float state[9], const float increments[6], float n
     const float slope_4_31 = slope_3_32 * turn_1_z - point_4_33 * turn_1_y;
     const float slope_4_32 = point_4_33 * turn_1_x - slope_3_31 * turn_1_z;
     const float slope_4_33 = slope_3_31 * turn_1_y - slope_3_32 * turn_1_x;
-    /* transition: the step applied to the identity */
+    /* the step applied to the identity */
     const float A_11 = 0.33333334f * (slope_2_11 + slope_3_11) + 0.16666667f * slope_4_11 + 1.0f;
     const float shared_7 = 0.16666667f * turn_0_z;
     const float A_12 = 0.33333334f * (slope_2_12 + slope_3_12) - shared_7

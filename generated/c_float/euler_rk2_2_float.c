@@ -34,7 +34,7 @@ static inline void one_(const float state[4], const float increments[6], float n
         + half_turn_0_z * half_turn_1_x;
     const float slope_2_z = half_turn_1_z + half_turn_0_x * half_turn_1_y
         - half_turn_0_y * half_turn_1_x;
-    /* transition: the step applied to the identity */
+    /* the step applied to the identity */
     const float p_s = 0.5f * slope_2_s + 1.0f;
     const float p_x = 0.5f * (half_turn_0_x + slope_2_x);
     const float p_y = 0.5f * (half_turn_0_y + slope_2_y);

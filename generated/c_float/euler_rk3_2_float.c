@@ -62,7 +62,7 @@ static inline void one_(const float state[4], const float increments[6], float n
         - half_turn_1_z * point_3_x;
     const float slope_3_z = half_turn_1_y * point_3_x - half_turn_1_x * point_3_y
         + half_turn_1_z * point_3_s;
-    /* transition: the step applied to the identity */
+    /* the step applied to the identity */
     const float p_s = 0.6666667f * slope_2_s + 0.16666667f * slope_3_s + 1.0f;
     const float p_x = 0.16666667f * (half_turn_0_x + slope_3_x) + 0.6666667f * slope_2_x;
     const float p_y = 0.16666667f * (half_turn_0_y + slope_3_y) + 0.6666667f * slope_2_y;

@@ -83,7 +83,7 @@ def cayley_klein_rk1_2_transition(increments, out=None):
     Returns
     -------
     transition : array, (..., 4)
-        transition: the step applied to the identity, unit 1.
+        the step applied to the identity, unit 1.
         Elements: p_s, p_x, p_y, p_z.
     """
     increments = np.asarray(increments)

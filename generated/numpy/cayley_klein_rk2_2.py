@@ -62,7 +62,7 @@ def cayley_klein_rk2_2(state, increments, out=None):
     slope_2_x = half_turn_1_x + half_turn_0_y * half_turn_1_z - half_turn_0_z * half_turn_1_y
     slope_2_y = half_turn_1_y - half_turn_0_x * half_turn_1_z + half_turn_0_z * half_turn_1_x
     slope_2_z = half_turn_1_z + half_turn_0_x * half_turn_1_y - half_turn_0_y * half_turn_1_x
-    # transition: the step applied to the identity
+    # the step applied to the identity
     p_s = 0.5 * slope_2_s + 1.0
     p_x = 0.5 * (half_turn_0_x + slope_2_x)
     p_y = 0.5 * (half_turn_0_y + slope_2_y)
@@ -99,7 +99,7 @@ def cayley_klein_rk2_2_transition(increments, out=None):
     Returns
     -------
     transition : array, (..., 4)
-        transition: the step applied to the identity, unit 1.
+        the step applied to the identity, unit 1.
         Elements: p_s, p_x, p_y, p_z.
     """
     increments = np.asarray(increments)
@@ -124,7 +124,7 @@ def cayley_klein_rk2_2_transition(increments, out=None):
     slope_2_x = half_turn_1_x + half_turn_0_y * half_turn_1_z - half_turn_0_z * half_turn_1_y
     slope_2_y = half_turn_1_y - half_turn_0_x * half_turn_1_z + half_turn_0_z * half_turn_1_x
     slope_2_z = half_turn_1_z + half_turn_0_x * half_turn_1_y - half_turn_0_y * half_turn_1_x
-    # transition: the step applied to the identity
+    # the step applied to the identity
     p_s = 0.5 * slope_2_s + 1.0
     p_x = 0.5 * (half_turn_0_x + slope_2_x)
     p_y = 0.5 * (half_turn_0_y + slope_2_y)

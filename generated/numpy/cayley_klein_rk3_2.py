@@ -86,7 +86,7 @@ def cayley_klein_rk3_2(state, increments, out=None):
     slope_3_x = half_turn_1_x * point_3_s - half_turn_1_y * point_3_z + half_turn_1_z * point_3_y
     slope_3_y = half_turn_1_x * point_3_z + half_turn_1_y * point_3_s - half_turn_1_z * point_3_x
     slope_3_z = half_turn_1_y * point_3_x - half_turn_1_x * point_3_y + half_turn_1_z * point_3_s
-    # transition: the step applied to the identity
+    # the step applied to the identity
     p_s = 0.6666666666666666 * slope_2_s + 0.16666666666666666 * slope_3_s + 1.0
     p_x = 0.16666666666666666 * (half_turn_0_x + slope_3_x) + 0.6666666666666666 * slope_2_x
     p_y = 0.16666666666666666 * (half_turn_0_y + slope_3_y) + 0.6666666666666666 * slope_2_y
@@ -123,7 +123,7 @@ def cayley_klein_rk3_2_transition(increments, out=None):
     Returns
     -------
     transition : array, (..., 4)
-        transition: the step applied to the identity, unit 1.
+        the step applied to the identity, unit 1.
         Elements: p_s, p_x, p_y, p_z.
     """
     increments = np.asarray(increments)
@@ -172,7 +172,7 @@ def cayley_klein_rk3_2_transition(increments, out=None):
     slope_3_x = half_turn_1_x * point_3_s - half_turn_1_y * point_3_z + half_turn_1_z * point_3_y
     slope_3_y = half_turn_1_x * point_3_z + half_turn_1_y * point_3_s - half_turn_1_z * point_3_x
     slope_3_z = half_turn_1_y * point_3_x - half_turn_1_x * point_3_y + half_turn_1_z * point_3_s
-    # transition: the step applied to the identity
+    # the step applied to the identity
     p_s = 0.6666666666666666 * slope_2_s + 0.16666666666666666 * slope_3_s + 1.0
     p_x = 0.16666666666666666 * (half_turn_0_x + slope_3_x) + 0.6666666666666666 * slope_2_x
     p_y = 0.16666666666666666 * (half_turn_0_y + slope_3_y) + 0.6666666666666666 * slope_2_y

@@ -56,7 +56,7 @@ def dcm_rk1_2(state, increments, out=None):
     turn_0_x = 3.0 * d1_x - d2_x
     turn_0_y = 3.0 * d1_y - d2_y
     turn_0_z = 3.0 * d1_z - d2_z
-    # transition: the step applied to the identity
+    # the step applied to the identity
     A_12 = -turn_0_z
     A_23 = -turn_0_x
     A_31 = -turn_0_y
@@ -102,7 +102,7 @@ def dcm_rk1_2_transition(increments, out=None):
     Returns
     -------
     transition : array, (..., 3, 3)
-        transition: the step applied to the identity, unit 1.
+        the step applied to the identity, unit 1.
         Elements: A_11, ..., A_33.
     """
     increments = np.asarray(increments)
@@ -116,7 +116,7 @@ def dcm_rk1_2_transition(increments, out=None):
     turn_0_x = 3.0 * d1_x - d2_x
     turn_0_y = 3.0 * d1_y - d2_y
     turn_0_z = 3.0 * d1_z - d2_z
-    # transition: the step applied to the identity
+    # the step applied to the identity
     A_12 = -turn_0_z
     A_23 = -turn_0_x
     A_31 = -turn_0_y

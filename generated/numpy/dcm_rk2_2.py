@@ -73,7 +73,7 @@ def dcm_rk2_2(state, increments, out=None):
     slope_2_31 = turn_0_x * turn_1_z - turn_1_y
     slope_2_32 = turn_1_x + turn_0_y * turn_1_z
     slope_2_33 = -(shared_1 + shared_3)
-    # transition: the step applied to the identity
+    # the step applied to the identity
     A_11 = 0.5 * slope_2_11 + 1.0
     shared_4 = 0.5 * turn_0_z
     A_12 = 0.5 * slope_2_12 - shared_4
@@ -128,7 +128,7 @@ def dcm_rk2_2_transition(increments, out=None):
     Returns
     -------
     transition : array, (..., 3, 3)
-        transition: the step applied to the identity, unit 1.
+        the step applied to the identity, unit 1.
         Elements: A_11, ..., A_33.
     """
     increments = np.asarray(increments)
@@ -159,7 +159,7 @@ def dcm_rk2_2_transition(increments, out=None):
     slope_2_31 = turn_0_x * turn_1_z - turn_1_y
     slope_2_32 = turn_1_x + turn_0_y * turn_1_z
     slope_2_33 = -(shared_1 + shared_3)
-    # transition: the step applied to the identity
+    # the step applied to the identity
     A_11 = 0.5 * slope_2_11 + 1.0
     shared_4 = 0.5 * turn_0_z
     A_12 = 0.5 * slope_2_12 - shared_4

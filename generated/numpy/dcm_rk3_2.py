@@ -107,7 +107,7 @@ def dcm_rk3_2(state, increments, out=None):
     slope_3_31 = point_3_32 * turn_1_z - point_3_33 * turn_1_y
     slope_3_32 = point_3_33 * turn_1_x - point_3_31 * turn_1_z
     slope_3_33 = point_3_31 * turn_1_y - point_3_32 * turn_1_x
-    # transition: the step applied to the identity
+    # the step applied to the identity
     A_11 = 0.6666666666666666 * slope_2_11 + 0.16666666666666666 * slope_3_11 + 1.0
     shared_7 = 0.16666666666666666 * turn_0_z
     A_12 = 0.6666666666666666 * slope_2_12 - shared_7 + 0.16666666666666666 * slope_3_12
@@ -162,7 +162,7 @@ def dcm_rk3_2_transition(increments, out=None):
     Returns
     -------
     transition : array, (..., 3, 3)
-        transition: the step applied to the identity, unit 1.
+        the step applied to the identity, unit 1.
         Elements: A_11, ..., A_33.
     """
     increments = np.asarray(increments)
@@ -227,7 +227,7 @@ def dcm_rk3_2_transition(increments, out=None):
     slope_3_31 = point_3_32 * turn_1_z - point_3_33 * turn_1_y
     slope_3_32 = point_3_33 * turn_1_x - point_3_31 * turn_1_z
     slope_3_33 = point_3_31 * turn_1_y - point_3_32 * turn_1_x
-    # transition: the step applied to the identity
+    # the step applied to the identity
     A_11 = 0.6666666666666666 * slope_2_11 + 0.16666666666666666 * slope_3_11 + 1.0
     shared_7 = 0.16666666666666666 * turn_0_z
     A_12 = 0.6666666666666666 * slope_2_12 - shared_7 + 0.16666666666666666 * slope_3_12

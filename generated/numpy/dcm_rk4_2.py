@@ -121,7 +121,7 @@ def dcm_rk4_2(state, increments, out=None):
     slope_4_31 = slope_3_32 * turn_1_z - point_4_33 * turn_1_y
     slope_4_32 = point_4_33 * turn_1_x - slope_3_31 * turn_1_z
     slope_4_33 = slope_3_31 * turn_1_y - slope_3_32 * turn_1_x
-    # transition: the step applied to the identity
+    # the step applied to the identity
     A_11 = 0.3333333333333333 * (slope_2_11 + slope_3_11) + 0.16666666666666666 * slope_4_11 + 1.0
     shared_7 = 0.16666666666666666 * turn_0_z
     A_12 = (
@@ -188,7 +188,7 @@ def dcm_rk4_2_transition(increments, out=None):
     Returns
     -------
     transition : array, (..., 3, 3)
-        transition: the step applied to the identity, unit 1.
+        the step applied to the identity, unit 1.
         Elements: A_11, ..., A_33.
     """
     increments = np.asarray(increments)
@@ -267,7 +267,7 @@ def dcm_rk4_2_transition(increments, out=None):
     slope_4_31 = slope_3_32 * turn_1_z - point_4_33 * turn_1_y
     slope_4_32 = point_4_33 * turn_1_x - slope_3_31 * turn_1_z
     slope_4_33 = slope_3_31 * turn_1_y - slope_3_32 * turn_1_x
-    # transition: the step applied to the identity
+    # the step applied to the identity
     A_11 = 0.3333333333333333 * (slope_2_11 + slope_3_11) + 0.16666666666666666 * slope_4_11 + 1.0
     shared_7 = 0.16666666666666666 * turn_0_z
     A_12 = (

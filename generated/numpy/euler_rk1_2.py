@@ -83,7 +83,7 @@ def euler_rk1_2_transition(increments, out=None):
     Returns
     -------
     transition : array, (..., 4)
-        transition: the step applied to the identity, unit 1.
+        the step applied to the identity, unit 1.
         Elements: p_x, p_y, p_z, p_s.
     """
     increments = np.asarray(increments)

@@ -101,7 +101,7 @@ def euler_rk4_2(state, increments, out=None):
     slope_4_x = half_turn_1_x * point_4_s - half_turn_1_y * slope_3_z + half_turn_1_z * slope_3_y
     slope_4_y = half_turn_1_x * slope_3_z + half_turn_1_y * point_4_s - half_turn_1_z * slope_3_x
     slope_4_z = half_turn_1_y * slope_3_x - half_turn_1_x * slope_3_y + half_turn_1_z * point_4_s
-    # transition: the step applied to the identity
+    # the step applied to the identity
     p_s = 0.3333333333333333 * (slope_2_s + slope_3_s) + 0.16666666666666666 * slope_4_s + 1.0
     p_x = (
         0.16666666666666666 * (half_turn_0_x + slope_4_x) + 0.3333333333333333 * (slope_2_x + slope_3_x)
@@ -144,7 +144,7 @@ def euler_rk4_2_transition(increments, out=None):
     Returns
     -------
     transition : array, (..., 4)
-        transition: the step applied to the identity, unit 1.
+        the step applied to the identity, unit 1.
         Elements: p_x, p_y, p_z, p_s.
     """
     increments = np.asarray(increments)
@@ -208,7 +208,7 @@ def euler_rk4_2_transition(increments, out=None):
     slope_4_x = half_turn_1_x * point_4_s - half_turn_1_y * slope_3_z + half_turn_1_z * slope_3_y
     slope_4_y = half_turn_1_x * slope_3_z + half_turn_1_y * point_4_s - half_turn_1_z * slope_3_x
     slope_4_z = half_turn_1_y * slope_3_x - half_turn_1_x * slope_3_y + half_turn_1_z * point_4_s
-    # transition: the step applied to the identity
+    # the step applied to the identity
     p_s = 0.3333333333333333 * (slope_2_s + slope_3_s) + 0.16666666666666666 * slope_4_s + 1.0
     p_x = (
         0.16666666666666666 * (half_turn_0_x + slope_4_x) + 0.3333333333333333 * (slope_2_x + slope_3_x)

@@ -81,7 +81,7 @@ DCM = Kinematics(
     title="Direction cosine matrix",
     source=f"{THESIS}, chapter 2, equation (2.1): dC/dt = C skew(w)",
     state=Signal.matrix("state", "C", meaning=DCM_MEANING, bound=UNIT),
-    transition=Signal.matrix("transition", "A", meaning="transition: the step applied to the identity"),
+    transition=Signal.matrix("transition", "A", meaning="the step applied to the identity"),
     next=Signal.matrix("next", "next", meaning=f"{DCM_MEANING}, after the step", bound=UNIT),
     identity=sp.eye(3),
     scale=sp.Integer(1),
@@ -97,7 +97,7 @@ EULER = Kinematics(
     source=f"{THESIS}, chapter 2: de/dt = 1/2 e (w, 0), quaternion product",
     state=Signal.labelled("state", "e", "xyzs", meaning=EULER_MEANING, bound=UNIT),
     transition=Signal.labelled(
-        "transition", "p", "xyzs", meaning="transition: the step applied to the identity"
+        "transition", "p", "xyzs", meaning="the step applied to the identity"
     ),
     next=Signal.labelled("next", "next", "xyzs", meaning=f"{EULER_MEANING}, after the step", bound=UNIT),
     identity=sp.Matrix([0, 0, 0, 1]),
@@ -114,7 +114,7 @@ CAYLEY_KLEIN = Kinematics(
     source=f"{THESIS}, chapter 2: dU/dt = (i/2) (w . s) U, s the Pauli matrices",
     state=Signal.labelled("state", "a", "sxyz", meaning=CAYLEY_KLEIN_MEANING, bound=UNIT),
     transition=Signal.labelled(
-        "transition", "p", "sxyz", meaning="transition: the step applied to the identity"
+        "transition", "p", "sxyz", meaning="the step applied to the identity"
     ),
     next=Signal.labelled(
         "next", "next", "sxyz", meaning=f"{CAYLEY_KLEIN_MEANING}, after the step", bound=UNIT

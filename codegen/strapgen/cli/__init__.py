@@ -35,8 +35,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except StrapgenError as error:
         _fail(str(error))
     except BrokenPipeError:  # the reader has gone, as `head` does
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _drop_output()
         sys.exit(1)
+    except OSError as error:  # the files that are asked for have errors of their own
+        _drop_output()
+        _fail(f"the output cannot be written ({error.strerror or error})")
+    except MemoryError:
+        _fail("the memory does not hold a run of so many steps")
     except (KeyboardInterrupt, typer.Abort):
         sys.stderr.write("strapgen: interrupted\n")
         sys.exit(130)
@@ -47,6 +52,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
             raise
         _fail(explain() or "a command is needed; see strapgen --help")
     sys.exit(status if isinstance(status, int) else 0)
+
+
+def _drop_output() -> None:
+    """Let what is still to be written go nowhere, so that Python does not stumble over it at its end."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _fail(message: str) -> None:
@@ -62,6 +72,6 @@ def _spread_settings(words: list[str]) -> list[str]:
         if inside and "=" in word and not word.startswith("-") and spread[-1] != "--set":
             spread.append("--set")
         elif word.startswith("-"):
-            inside = word == "--set"
+            inside = word == "--set" or word.startswith("--set=")
         spread.append(word)
     return spread

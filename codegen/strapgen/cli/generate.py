@@ -68,7 +68,7 @@ def generate(
                 "kernel": sources.kernel,
                 "target": target,
                 "files": [str(path) for path in written],
-                "operations": operations,
+                "operations": {kind: operations[kind] for kind in ("add", "multiply", "divide", "sqrt")},
                 "temporaries": sources.temporaries,
             }
         )

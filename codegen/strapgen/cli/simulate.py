@@ -101,6 +101,8 @@ def simulate(
     """
     if format is not None:
         check_format(format, "csv")
+    import numpy as np
+
     from strapgen import checks, output
     from strapgen.backends import BACKENDS
     from strapgen.backends import backend as make_backend
@@ -138,16 +140,18 @@ def simulate(
         profile = make_motion(motion, **_pairs(settings or []))
         ready = make_backend(algorithm, method, increments, backend, scheme)
         times = (str(step), str(duration), orthonormalize, record)
-        text = _on_motion(ready, profile, times, named, format or "text", plot, matrices)
+        with np.errstate(all="ignore"):  # numbers that overflow are refused, in one line
+            text = _on_motion(ready, profile, times, named, format or "text", plot, matrices)
     else:
         from strapgen import recording as recordings
 
-        if increments_csv is not None:
-            recording = recordings.read_increments(increments_csv)
-        else:
-            recording = recordings.read_rates(rates_csv or "", rate_unit or "", resample_hz)
-        ready = make_backend(algorithm, method, increments, backend, scheme)
-        history = recordings.propagate(ready, recording, orthonormalize, record)
+        with np.errstate(all="ignore"):
+            if increments_csv is not None:
+                recording = recordings.read_increments(increments_csv)
+            else:
+                recording = recordings.read_rates(rates_csv or "", rate_unit or "", resample_hz)
+            ready = make_backend(algorithm, method, increments, backend, scheme)
+            history = recordings.propagate(ready, recording, orthonormalize, record)
         named["source"] = str(increments_csv or rates_csv)
         text = _of_recording(history, ready.elements, named, format or "csv", plot)
     if out is None:
@@ -183,7 +187,7 @@ def _on_motion(
     plot: Path | None,
     matrices: bool,
 ) -> str:
-    from strapgen import reports
+    from strapgen import checks, reports
     from strapgen.simulation import simulate as run_simulation
 
     step, duration, _, _ = times
@@ -195,7 +199,11 @@ def _on_motion(
         plot_run(run, title, plot)
     if format == "csv":
         return reports.run_csv(run)
-    named |= {"motion": profile.name, "step_s": float(step), "duration_s": float(duration)}
+    named |= {
+        "motion": profile.name,
+        "step_s": float(checks.number("step", step)),
+        "duration_s": float(checks.number("duration", duration)),
+    }
     if format == "text":
         return reports.run_text(run, named)
     data = reports.run_data(run, named)
@@ -210,9 +218,7 @@ def _of_recording(
     if plot is not None:
         from strapgen.plots import plot_history
 
-        title = (
-            f"{named['algorithm']} {named['method']}, {named['backend']}: attitude along {Path(named['source']).name}"
-        )
+        title = f"{named['algorithm']} {named['method']}, {named['backend']}: attitude along {Path(named['source']).name}"
         plot_history(history, elements, title, plot)
     if format == "csv":
         return reports.history_csv(history, elements)

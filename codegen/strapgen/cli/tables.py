@@ -27,16 +27,33 @@ def tables(
     check_format(format)
     from strapgen import checks
     from strapgen.backends import BACKENDS
-    from strapgen.tables import ALGORITHMS, ORDERS, TABLES, run_tables
+    from strapgen.tables import ALGORITHMS, ORDERS, TABLES, build_all, run_tables
 
-    names = tuple(BACKENDS) if backend is None else (checks.choice("backend", backend, BACKENDS),)
-    total = len(TABLES) * len(names) * len(ALGORITHMS) * len(ORDERS)
-    entries = list(track(run_tables(names), "simulating", total))
+    names = _runnable() if backend is None else (checks.choice("backend", backend, BACKENDS),)
+    cases = len(names) * len(ALGORITHMS) * len(ORDERS)
+    for _ in track(build_all(names), "building", cases):
+        pass
+    entries = list(track(run_tables(names), "simulating", cases * len(TABLES)))
     if format == "json":
-        print_json([entry.as_dict() for entry in entries])
+        # The note goes with the printed tables: every entry has the same keys.
+        print_json([{k: v for k, v in entry.as_dict().items() if k != "note"} for entry in entries])
         return
     for table in TABLES:
         _print_table(table, [entry for entry in entries if entry.table == table.number])
+
+
+def _runnable() -> tuple[str, ...]:
+    """Return all back ends, or, with a word on stderr, those that need no compiler if there is none."""
+    from strapgen import compilation
+    from strapgen.backends import BACKENDS
+    from strapgen.exceptions import CompilerError
+
+    try:
+        compilation.compiler()
+    except CompilerError as error:
+        typer.echo(f"strapgen: only numpy is shown: {error}", err=True)
+        return ("numpy",)
+    return tuple(BACKENDS)
 
 
 _NAMES = {"dcm": "direction cosines", "euler": "Euler parameters"}
@@ -55,7 +72,9 @@ def _print_table(table: Table, entries: list[Entry]) -> None:
         lines.append(f"  {_NAMES[algorithm]}")
         drifts = [table.base if (algorithm, order) == ("dcm", 1) else "" for order in ORDERS]
         printed = zip(drifts, table.printed[algorithm], strict=True)
-        lines.append(f"    {'thesis':<10}" + "".join(f"{drift:>11}{figure:>11}  " for drift, figure in printed))
+        lines.append(
+            f"    {'thesis':<10}" + "".join(f"{drift:>11}{figure:>11}  " for drift, figure in printed)
+        )
         for backend in dict.fromkeys(entry.backend for entry in entries):
             cells = [
                 f"{e.drift_deg:>11.4g}{e.normalised:>11.4g}{' ' if e.agrees else '*'} "

@@ -60,7 +60,8 @@ class Printer:
         return f"{self._inside(left, _PRODUCT)} / {self._inside(right, _UNARY)}", _PRODUCT
 
     def _negate(self, argument: Node) -> tuple[str, int]:
-        return f"-{self._inside(argument, _UNARY)}", _UNARY
+        # Two signs in a row are another operator in C.
+        return f"-{self._inside(argument, _ATOM)}", _UNARY
 
 
 def elements_text(signal: Signal) -> str:
