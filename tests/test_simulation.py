@@ -44,6 +44,7 @@ def test_decimals_are_exact(make):
     [
         ({"step": "0.7", "duration": 1}, "duration 1 s is not a whole multiple of the step 0.7 s"),
         ({"step": 2, "duration": 1}, "not a whole multiple"),
+        ({"step": "1e-9", "duration": "1e9"}, "duration 1e.09 s is over 2e.07 times the step 1e-09 s"),
         ({"step": 0, "duration": 1}, "step is 0; a number above 0"),
         ({"step": -0.1, "duration": 1}, "step is -0.1"),
         ({"step": "nan", "duration": 1}, "step is 'nan'; a finite number"),

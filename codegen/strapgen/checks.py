@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from strapgen.exceptions import InputError, InputTypeError
 
-#: More than this many steps, samples or records is no run that a machine holds.
-MOST = 10**9
+#: Steps, samples or records of the longest run: what it holds still fits into some gigabytes.
+MOST = 20_000_000
 
 
 def choice(what: str, value: str, allowed: Iterable[str]) -> str:

@@ -29,7 +29,8 @@ static inline void one_(double time, double x, double y, double z, double rate[3
     const double C_11 = -(shared_7 + shared_8);
     const double shared_9 = time * sinc_(shared_5);
     const double shared_10 = shared_9 * z;
-    const double shared_11 = shared_1 * shared_6 * x;
+    const double shared_18 = shared_1 * shared_6;
+    const double shared_11 = shared_18 * x;
     const double shared_12 = shared_11 * y;
     const double C_12 = shared_12 - shared_10;
     const double shared_13 = shared_9 * y;
@@ -39,7 +40,7 @@ static inline void one_(double time, double x, double y, double z, double rate[3
     const double shared_15 = shared_3 * shared_6;
     const double C_22 = -(shared_15 + shared_8);
     const double shared_16 = shared_9 * x;
-    const double shared_17 = shared_1 * shared_6 * y * z;
+    const double shared_17 = shared_18 * y * z;
     const double C_23 = shared_17 - shared_16;
     const double C_31 = shared_14 - shared_13;
     const double C_32 = shared_16 + shared_17;

@@ -29,9 +29,10 @@ static inline void one_(const double state[4], double attitude[9])
     const double shared_11 = -shared_1;
     const double C_22 = shared_11 + shared_2 + shared_6;
     const double shared_12 = a_x * shared_7;
-    const double C_23 = 2.0 * (a_y * a_z) - shared_12;
+    const double shared_13 = 2.0 * (a_y * a_z);
+    const double C_23 = shared_13 - shared_12;
     const double C_31 = 2.0 * (a_x * a_z) - shared_9;
-    const double C_32 = shared_12 + 2.0 * (a_y * a_z);
+    const double C_32 = shared_12 + shared_13;
     const double C_33 = shared_11 + shared_3 + shared_4 + shared_5;
     attitude[0] = C_11;
     attitude[1] = C_12;

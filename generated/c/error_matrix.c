@@ -41,13 +41,14 @@ static inline void one_(const double computed[9], const double truth[9], double 
     /* skew errors, reference axes */
     const double skew_x = shared_1 + shared_2;
     const double shared_3 = 0.5 * E_13;
-    const double skew_y = 0.5 * E_31 + shared_3;
+    const double shared_6 = 0.5 * E_31;
+    const double skew_y = shared_6 + shared_3;
     const double shared_4 = 0.5 * E_12;
     const double shared_5 = 0.5 * E_21;
     const double skew_z = shared_4 + shared_5;
     /* drift errors, reference axes: the rotation from the computed frame to the true one */
     const double drift_x = shared_1 - shared_2;
-    const double drift_y = 0.5 * E_31 - shared_3;
+    const double drift_y = shared_6 - shared_3;
     const double drift_z = shared_4 - shared_5;
     error[0] = E_11;
     error[1] = E_12;

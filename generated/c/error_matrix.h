@@ -6,7 +6,7 @@
  * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter 4
  *     A.
  * The true matrix is a rotation.
- * Operations of one call: 27 add, 34 multiply; 5 temporaries.
+ * Operations of one call: 27 add, 33 multiply; 6 temporaries.
  *
  * No heap, no global state, reentrant. Every input is read before any output is written: an output may
  * be the same memory as an input. Matrices are stored by rows.

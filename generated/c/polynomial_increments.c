@@ -8,12 +8,13 @@
 static inline void one_(double middle, double width, double a0, double a1, double a2, double a3,
     double a4, double increment[3])
 {
-    const double shared_1 = width * width * width;
+    const double shared_3 = width * width;
+    const double shared_1 = shared_3 * width;
     const double shared_2 = middle * middle;
-    const double factor_1 = width * width;
+    const double factor_1 = shared_3;
     /* angle increment over the interval, body axes */
     const double increment_y = a0 * width + a1 * middle * width + a2 * shared_2 * width
-        + a3 * (middle * middle * middle) * width + a4 * (shared_2 * shared_2) * width
+        + a3 * (shared_2 * middle) * width + a4 * (shared_2 * shared_2) * width
         + 0.08333333333333333 * (a2 * shared_1) + 0.0125 * (a4 * (factor_1 * factor_1 * width))
         + 0.25 * (a3 * middle * shared_1) + 0.5 * (a4 * shared_1 * shared_2);
     increment[0] = 0.0;

@@ -11,12 +11,12 @@ static inline void one_(double time, double a0, double a1, double a2, double a3,
     rate[3], double attitude[9])
 {
     const double shared_1 = time * time;
-    const double shared_2 = time * time * time;
+    const double shared_2 = shared_1 * time;
     const double shared_3 = shared_1 * shared_1;
     /* body rate, body axes */
     const double rate_y = a0 + a1 * time + a2 * shared_1 + a3 * shared_2 + a4 * shared_3;
     const double shared_4 = a0 * time + 0.5 * (a1 * shared_1) + 0.3333333333333333 * (a2 * shared_2)
-        + 0.25 * (a3 * shared_3) + 0.2 * (a4 * (shared_1 * shared_1 * time));
+        + 0.25 * (a3 * shared_3) + 0.2 * (a4 * (shared_3 * time));
     const double shared_5 = cos(shared_4);
     /* direction cosine matrix, body to reference */
     const double C_11 = shared_5;

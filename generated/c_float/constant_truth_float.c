@@ -28,7 +28,8 @@ static inline void one_(float time, float x, float y, float z, float rate[3], fl
     const float C_11 = -(shared_7 + shared_8);
     const float shared_9 = time * sinc_(shared_5);
     const float shared_10 = shared_9 * z;
-    const float shared_11 = shared_1 * shared_6 * x;
+    const float shared_18 = shared_1 * shared_6;
+    const float shared_11 = shared_18 * x;
     const float shared_12 = shared_11 * y;
     const float C_12 = shared_12 - shared_10;
     const float shared_13 = shared_9 * y;
@@ -38,7 +39,7 @@ static inline void one_(float time, float x, float y, float z, float rate[3], fl
     const float shared_15 = shared_3 * shared_6;
     const float C_22 = -(shared_15 + shared_8);
     const float shared_16 = shared_9 * x;
-    const float shared_17 = shared_1 * shared_6 * y * z;
+    const float shared_17 = shared_18 * y * z;
     const float C_23 = shared_17 - shared_16;
     const float C_31 = shared_14 - shared_13;
     const float C_32 = shared_16 + shared_17;

@@ -29,9 +29,10 @@ static inline void one_(const float state[4], float attitude[9])
     const float shared_11 = -shared_1;
     const float C_22 = shared_11 + shared_2 + shared_6;
     const float shared_12 = e_x * shared_7;
-    const float C_23 = 2.0f * (e_y * e_z) - shared_12;
+    const float shared_13 = 2.0f * (e_y * e_z);
+    const float C_23 = shared_13 - shared_12;
     const float C_31 = 2.0f * (e_x * e_z) - shared_9;
-    const float C_32 = shared_12 + 2.0f * (e_y * e_z);
+    const float C_32 = shared_12 + shared_13;
     const float C_33 = shared_11 + shared_3 + shared_4 + shared_5;
     attitude[0] = C_11;
     attitude[1] = C_12;

@@ -41,13 +41,14 @@ static inline void one_(const float computed[9], const float truth[9], float err
     /* skew errors, reference axes */
     const float skew_x = shared_1 + shared_2;
     const float shared_3 = 0.5f * E_13;
-    const float skew_y = 0.5f * E_31 + shared_3;
+    const float shared_6 = 0.5f * E_31;
+    const float skew_y = shared_6 + shared_3;
     const float shared_4 = 0.5f * E_12;
     const float shared_5 = 0.5f * E_21;
     const float skew_z = shared_4 + shared_5;
     /* drift errors, reference axes: the rotation from the computed frame to the true one */
     const float drift_x = shared_1 - shared_2;
-    const float drift_y = 0.5f * E_31 - shared_3;
+    const float drift_y = shared_6 - shared_3;
     const float drift_z = shared_4 - shared_5;
     error[0] = E_11;
     error[1] = E_12;

@@ -8,12 +8,13 @@
 static inline void one_(float middle, float width, float a0, float a1, float a2, float a3, float a4,
     float increment[3])
 {
-    const float shared_1 = width * width * width;
+    const float shared_3 = width * width;
+    const float shared_1 = shared_3 * width;
     const float shared_2 = middle * middle;
-    const float factor_1 = width * width;
+    const float factor_1 = shared_3;
     /* angle increment over the interval, body axes */
     const float increment_y = a0 * width + a1 * middle * width + a2 * shared_2 * width
-        + a3 * (middle * middle * middle) * width + a4 * (shared_2 * shared_2) * width
+        + a3 * (shared_2 * middle) * width + a4 * (shared_2 * shared_2) * width
         + 0.083333336f * (a2 * shared_1) + 0.0125f * (a4 * (factor_1 * factor_1 * width))
         + 0.25f * (a3 * middle * shared_1) + 0.5f * (a4 * shared_1 * shared_2);
     increment[0] = 0.0f;

@@ -11,12 +11,12 @@ static inline void one_(float time, float a0, float a1, float a2, float a3, floa
     float attitude[9])
 {
     const float shared_1 = time * time;
-    const float shared_2 = time * time * time;
+    const float shared_2 = shared_1 * time;
     const float shared_3 = shared_1 * shared_1;
     /* body rate, body axes */
     const float rate_y = a0 + a1 * time + a2 * shared_1 + a3 * shared_2 + a4 * shared_3;
     const float shared_4 = a0 * time + 0.5f * (a1 * shared_1) + 0.33333334f * (a2 * shared_2)
-        + 0.25f * (a3 * shared_3) + 0.2f * (a4 * (shared_1 * shared_1 * time));
+        + 0.25f * (a3 * shared_3) + 0.2f * (a4 * (shared_3 * time));
     const float shared_5 = cosf(shared_4);
     /* direction cosine matrix, body to reference */
     const float C_11 = shared_5;

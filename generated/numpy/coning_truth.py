@@ -84,7 +84,7 @@ def coning_truth(time, a, b, g):
     C_32 = a * shared_19
     C_33 = shared_13 + shared_20 * shared_4
     batch = np.broadcast_shapes(time.shape, a.shape, b.shape, g.shape)
-    dtype = np.result_type(time, a, b, g)
+    dtype = np.result_type(time.dtype, a.dtype, b.dtype, g.dtype, np.float32)
     rate = np.empty((*batch, 3), dtype)
     attitude = np.empty((*batch, 3, 3), dtype)
     rate[..., 0] = rate_x

@@ -19,7 +19,7 @@ def _sinc(x):
 def constant_truth(time, x, y, z):
     """True attitude: constant body rate on three axes.
 
-    Operations: 13 add, 24 multiply, 1 sqrt, 2 negate, 2 function; 18 temporaries.
+    Operations: 13 add, 23 multiply, 1 sqrt, 2 negate, 2 function; 19 temporaries.
 
     Parameters
     ----------
@@ -61,7 +61,8 @@ def constant_truth(time, x, y, z):
     C_11 = -(shared_7 + shared_8)
     shared_9 = time * _sinc(shared_5)
     shared_10 = shared_9 * z
-    shared_11 = shared_1 * shared_6 * x
+    shared_18 = shared_1 * shared_6
+    shared_11 = shared_18 * x
     shared_12 = shared_11 * y
     C_12 = shared_12 - shared_10
     shared_13 = shared_9 * y
@@ -71,13 +72,13 @@ def constant_truth(time, x, y, z):
     shared_15 = shared_3 * shared_6
     C_22 = -(shared_15 + shared_8)
     shared_16 = shared_9 * x
-    shared_17 = shared_1 * shared_6 * y * z
+    shared_17 = shared_18 * y * z
     C_23 = shared_17 - shared_16
     C_31 = shared_14 - shared_13
     C_32 = shared_16 + shared_17
     C_33 = 1.0 - (shared_15 + shared_7)
     batch = np.broadcast_shapes(time.shape, x.shape, y.shape, z.shape)
-    dtype = np.result_type(time, x, y, z)
+    dtype = np.result_type(time.dtype, x.dtype, y.dtype, z.dtype, np.float32)
     rate = np.empty((*batch, 3), dtype)
     attitude = np.empty((*batch, 3, 3), dtype)
     rate[..., 0] = x

@@ -5,7 +5,8 @@ Do not edit: change the algorithm and generate again.
 
 Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), appendix B,
     equation (B.1)
-The determinant of the matrix must be above 0.
+The determinant of the matrix must be above 0. Round-off grows with the fourth power of its
+condition.
 """
 
 import numpy as np
@@ -130,7 +131,7 @@ def dcm_orthonormalize_optimal(computed, out=None):
     next_32 = inverse_determinant * (C_31 * root_12 + C_32 * root_22 + C_33 * root_32)
     next_33 = inverse_determinant * (C_31 * root_13 + C_32 * root_23 + C_33 * root_33)
     batch = np.broadcast_shapes(computed.shape[:-2])
-    dtype = np.result_type(computed)
+    dtype = np.result_type(computed.dtype, np.float32)
     orthonormalized = np.empty((*batch, 3, 3), dtype) if out is None else out
     orthonormalized[..., 0, 0] = next_11
     orthonormalized[..., 0, 1] = next_12

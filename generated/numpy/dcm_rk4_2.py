@@ -157,7 +157,7 @@ def dcm_rk4_2(state, increments, out=None):
     next_32 = A_12 * C_31 + A_22 * C_32 + A_32 * C_33
     next_33 = A_13 * C_31 + A_23 * C_32 + A_33 * C_33
     batch = np.broadcast_shapes(state.shape[:-2], increments.shape[:-2])
-    dtype = np.result_type(state, increments)
+    dtype = np.result_type(state.dtype, increments.dtype, np.float32)
     next = np.empty((*batch, 3, 3), dtype) if out is None else out
     next[..., 0, 0] = next_11
     next[..., 0, 1] = next_12
@@ -293,7 +293,7 @@ def dcm_rk4_2_transition(increments, out=None):
     )
     A_33 = 0.3333333333333333 * (slope_2_33 + slope_3_33) + 0.16666666666666666 * slope_4_33 + 1.0
     batch = np.broadcast_shapes(increments.shape[:-2])
-    dtype = np.result_type(increments)
+    dtype = np.result_type(increments.dtype, np.float32)
     transition = np.empty((*batch, 3, 3), dtype) if out is None else out
     transition[..., 0, 0] = A_11
     transition[..., 0, 1] = A_12

@@ -118,7 +118,7 @@ def euler_rk4_2(state, increments, out=None):
     next_y = e_s * p_y - e_x * p_z + e_y * p_s + e_z * p_x
     next_z = e_s * p_z + e_x * p_y - e_y * p_x + e_z * p_s
     batch = np.broadcast_shapes(state.shape[:-1], increments.shape[:-2])
-    dtype = np.result_type(state, increments)
+    dtype = np.result_type(state.dtype, increments.dtype, np.float32)
     next = np.empty((*batch, 4), dtype) if out is None else out
     next[..., 0] = next_x
     next[..., 1] = next_y
@@ -220,7 +220,7 @@ def euler_rk4_2_transition(increments, out=None):
         0.16666666666666666 * (half_turn_0_z + slope_4_z) + 0.3333333333333333 * (slope_2_z + slope_3_z)
     )
     batch = np.broadcast_shapes(increments.shape[:-2])
-    dtype = np.result_type(increments)
+    dtype = np.result_type(increments.dtype, np.float32)
     transition = np.empty((*batch, 4), dtype) if out is None else out
     transition[..., 0] = p_x
     transition[..., 1] = p_y

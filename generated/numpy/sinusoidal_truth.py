@@ -54,7 +54,7 @@ def sinusoidal_truth(time, a, b):
     C_31 = -shared_4
     C_33 = shared_3
     batch = np.broadcast_shapes(time.shape, a.shape, b.shape)
-    dtype = np.result_type(time, a, b)
+    dtype = np.result_type(time.dtype, a.dtype, b.dtype, np.float32)
     rate = np.empty((*batch, 3), dtype)
     attitude = np.empty((*batch, 3, 3), dtype)
     rate[..., 0] = 0.0

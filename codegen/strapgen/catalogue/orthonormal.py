@@ -113,7 +113,9 @@ def dcm_optimal() -> Kernel:
         "dcm-orthonormalize-optimal",
         "Direction cosine matrix: the nearest rotation, least sum of squared differences",
         f"{THESIS}, appendix B, equation (B.1)",
-        notes=("The determinant of the matrix must be above 0.",),
+        notes=(
+            "The determinant of the matrix must be above 0. Round-off grows with the fourth power of its condition.",
+        ),
     )
 
 

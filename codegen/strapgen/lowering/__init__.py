@@ -11,6 +11,7 @@ from dataclasses import replace
 
 from strapgen.kernel import Kernel
 from strapgen.lowering.gate import gate
+from strapgen.lowering.reuse import reuse_values
 from strapgen.lowering.share import share
 from strapgen.program import Program
 
@@ -24,7 +25,7 @@ def remove_unused(program: Program) -> Program:
 
 
 #: Passes in the order in which they run.
-PASSES: tuple[Pass, ...] = (remove_unused,)
+PASSES: tuple[Pass, ...] = (reuse_values, remove_unused)
 
 
 def lower(kernel: Kernel) -> Program:

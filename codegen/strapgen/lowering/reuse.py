@@ -1,0 +1,68 @@
+"""The pass `reuse_values`: equal operations are computed once.
+
+`share` finds common subexpressions of formulas; once sums and products have been ordered and powers unrolled, a few
+more operations turn out to be equal. They are found here, node by node.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+from itertools import count
+
+from strapgen.program import Assignment, Node, Operation, Program, Reference
+
+
+def reuse_values(program: Program) -> Program:
+    """Name every operation that occurs more than once and refer to it by its name.
+
+    Examples
+    --------
+    >>> from strapgen.catalogue import choose, derive
+    >>> from strapgen.lowering.gate import gate
+    >>> from strapgen.lowering.share import share
+    >>> kernel = derive(choose("error-matrix"))
+    >>> before = gate(kernel, share(kernel))
+    >>> before.operations["multiply"] - reuse_values(before).operations["multiply"]
+    1
+    """
+    occurrences = _occurrences(program)
+    taken = {assignment.name for assignment in program.body}
+    names = (name for k in count(1) if (name := f"shared_{k}") not in taken)
+    known: dict[Node, Reference] = {}
+    body: list[Assignment] = []
+
+    def rewrite(node: Node, whole: bool = False) -> Node:
+        if not isinstance(node, Operation):
+            return node
+        if node in known:
+            return known[node]
+        rewritten = Operation(node.kind, tuple(rewrite(argument) for argument in node.arguments))
+        if whole or occurrences[node] < 2:
+            return rewritten
+        known[node] = Reference(next(names))
+        body.append(Assignment(known[node].name, rewritten))
+        return known[node]
+
+    for assignment in program.body:
+        body.append(replace(assignment, value=rewrite(assignment.value, whole=True)))
+        known.setdefault(assignment.value, Reference(assignment.name))
+    return replace(program, body=tuple(body))
+
+
+def _occurrences(program: Program) -> Counter[Node]:
+    """Count equal operations; what stands below one that has been seen is not counted again."""
+    seen: Counter[Node] = Counter()
+
+    def visit(node: Node) -> None:
+        if not isinstance(node, Operation):
+            return
+        if node.kind != "at_least":  # a condition is no value that could be named
+            seen[node] += 1
+        if seen[node] < 2:
+            for argument in node.arguments:
+                visit(argument)
+
+    for assignment in program.body:
+        visit(assignment.value)
+    return seen

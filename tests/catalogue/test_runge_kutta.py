@@ -1,0 +1,228 @@
+"""Runge-Kutta steps: the fused kernels are the staged formulas of the thesis (chapter 3 A and B), exactly."""
+
+from fractions import Fraction
+from functools import cache
+from itertools import pairwise
+from random import Random
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from strapgen import derive
+from strapgen.catalogue import ALGORITHMS, METHODS, MOST_INCREMENTS
+from strapgen.catalogue.runge_kutta import increments_signal
+
+ALGORITHM = pytest.mark.parametrize("algorithm", ALGORITHMS)
+METHOD = pytest.mark.parametrize("method", METHODS)
+
+# The rate times the step at the beginning, the middle and the end, from the increments oldest first. For two
+# increments as printed; for three from the differences of a cubic, f'(0) = (-11 f0 + 18 f1 - 9 f2 + 2 f3)/6 and
+# f'(3/2) = (f0 - 27 f1 + 27 f2 - f3)/24 at unit distance.
+EXTRACTION = {
+    1: {"begin": (1,), "middle": (1,), "end": (1,)},
+    2: {"begin": (3, -1), "middle": (1, 1), "end": (-1, 3)},
+    3: {
+        "begin": (Fraction(11, 2), Fraction(-7, 2), 1),
+        "middle": (Fraction(-1, 8), Fraction(13, 4), Fraction(-1, 8)),
+        "end": (1, Fraction(-7, 2), Fraction(11, 2)),
+    },
+}
+
+
+def derivative(algorithm: str, x: np.ndarray, w: np.ndarray) -> np.ndarray:
+    """Return f(x, w) of chapter 2; elements are numbers or polynomials."""
+    wx, wy, wz = w
+    if algorithm == "dcm":
+        return x @ np.array([[0, -wz, wy], [wz, 0, -wx], [-wy, wx, 0]], dtype=object)
+    if algorithm == "euler":
+        matrix = [[0, wz, -wy, wx], [-wz, 0, wx, wy], [wy, -wx, 0, wz], [-wx, -wy, -wz, 0]]
+    else:
+        matrix = [[0, -wx, -wy, -wz], [wx, 0, wz, -wy], [wy, -wz, 0, wx], [wz, wy, -wx, 0]]
+    return np.array(matrix, dtype=object) @ x * Fraction(1, 2)
+
+
+def staged(algorithm: str, method: str, x: np.ndarray, d: np.ndarray) -> np.ndarray:
+    """Return one step as the formulas stand; f is linear in w, so h f(x, w) = f(x, h w)."""
+    weights = EXTRACTION[len(d)]
+    begin, middle, end = (
+        sum(Fraction(c) * row for c, row in zip(weights[node], d, strict=True))
+        for node in ("begin", "middle", "end")
+    )
+
+    def f(x, w):
+        return derivative(algorithm, x, w)
+
+    half, third, sixth = Fraction(1, 2), Fraction(1, 3), Fraction(1, 6)
+    if method == "rk1":
+        return x + f(x, begin)
+    if method == "rk2":
+        y = x + f(x, begin)
+        return x + (f(y, end) + f(x, begin)) * half
+    A = f(x, begin)
+    B = f(x + A * half, middle)
+    if method == "rk3":  # Kutta
+        C = f(x - A + B * 2, end)
+        return x + (A + B * 4 + C) * sixth
+    C = f(x + B * half, middle)
+    D = f(x + C, end)
+    return x + A * sixth + B * third + C * third + D * sixth
+
+
+def shape(algorithm: str) -> tuple[int, ...]:
+    return (3, 3) if algorithm == "dcm" else (4,)
+
+
+@cache
+def kernel(algorithm: str, method: str, increments: int = 2):
+    return derive(algorithm, method, increments)
+
+
+@cache
+def polynomials(algorithm: str, method: str, increments: int = 2) -> list:
+    return kernel(algorithm, method, increments).polynomials()["next"]
+
+
+def split(algorithm: str, generators: list, increments: int) -> tuple[np.ndarray, np.ndarray]:
+    size = 9 if algorithm == "dcm" else 4
+    state = np.array(generators[:size], dtype=object).reshape(shape(algorithm))
+    return state, np.array(generators[size:], dtype=object).reshape(increments, 3)
+
+
+@ALGORITHM
+@METHOD
+def test_the_kernel_is_the_staged_step_on_any_state(algorithm, method):
+    result = polynomials(algorithm, method)
+    x, d = split(algorithm, list(result[0].ring.gens), 2)
+    assert list(staged(algorithm, method, x, d).flat) == result
+
+
+@pytest.mark.parametrize("increments", [1, 3])
+@ALGORITHM
+@METHOD
+def test_other_counts_of_increments(algorithm, method, increments):
+    step, random = kernel(algorithm, method, increments), Random(1969)
+    names = [name for signal in step.inputs for name in signal.elements]
+    for _ in range(3):
+        # A polynomial identity that fails holds on three random points of this size next to never.
+        values = [Fraction(random.randint(-99, 99), random.randint(1, 99)) for _ in names]
+        x, d = split(algorithm, values, increments)
+        result = step.expand(dict(zip(names, values, strict=True)))["next"]
+        expected = staged(algorithm, method, x, d).flat
+        assert [Fraction(int(r.p), int(r.q)) for r in map(sp.Rational, result)] == list(expected)
+
+
+@ALGORITHM
+@METHOD
+def test_the_step_is_linear_in_the_state(algorithm, method):
+    size = 9 if algorithm == "dcm" else 4
+    for polynomial in polynomials(algorithm, method):
+        assert {sum(monomial[:size]) for monomial in polynomial.itermonoms()} == {1}
+
+
+@ALGORITHM
+@METHOD
+def test_the_step_is_the_product_with_the_step_of_the_identity(algorithm, method):
+    step, result = kernel(algorithm, method), polynomials(algorithm, method)
+    ring = result[0].ring
+    x, d = split(algorithm, list(ring.gens), 2)
+    identity = step.companions.identity
+    names = [name for signal in step.inputs for name in signal.elements]
+    transition = step.expand(dict(zip(names, [*map(ring, identity), *d.flat], strict=True)))["next"]
+    product = derive(step.companions.product)
+    elements = [name for signal in product.inputs for name in signal.elements]
+    assert product.expand(dict(zip(elements, [*x.flat, *transition], strict=True)))["next"] == result
+
+
+@ALGORITHM
+def test_transitions_may_be_multiplied_in_any_grouping(algorithm):
+    size = 9 if algorithm == "dcm" else 4
+    product = derive(f"{algorithm}-product")
+    names = [name for signal in product.inputs for name in signal.elements]
+    _, *generators = sp.ring(" ".join(f"x{k}" for k in range(3 * size)), sp.QQ)
+    x, y, z = (generators[k * size : (k + 1) * size] for k in range(3))
+
+    def times(a, b):
+        return product.expand(dict(zip(names, [*a, *b], strict=True)))["next"]
+
+    assert times(times(x, y), z) == times(x, times(y, z))
+    assert times(x, y) != times(y, x)
+
+
+@METHOD
+def test_cayley_klein_equals_euler_after_renaming(method):
+    # a1 = e4, a2 = e1, a3 = e2, a4 = e3
+    euler = polynomials("euler", method)
+    ring = euler[0].ring
+    e, d = ring.gens[:4], ring.gens[4:]
+    step = kernel("cayley-klein", method)
+    names = [name for signal in step.inputs for name in signal.elements]
+    renamed = step.expand(dict(zip(names, [e[3], *e[:3], *d], strict=True)))["next"]
+    assert renamed == [euler[3], *euler[:3]]
+
+
+def local_error(algorithm: str, method: str, increments: int) -> int:
+    """Return the lowest power of the step in one step's error, on a rate that is a polynomial of time."""
+    ring, h = sp.ring("h", sp.QQ)
+    random, top = Random(7), 6
+    rate = [[Fraction(random.randint(-9, 9), 7) for _ in range(3)] for _ in range(4)]  # degree 3
+
+    def truncated(p):
+        return ring.from_dict({m: c for m, c in p.items() if m[0] <= top})
+
+    # Picard's iteration on x(t) = x(0) + integral of f(x, w), each round right by one more power.
+    power = np.array([ring(0)] * 3, dtype=object)
+    for k, row in enumerate(rate):
+        power = power + np.array([ring(c) * h**k for c in row], dtype=object)
+    start = np.array(
+        [ring(c) for c in kernel(algorithm, method, increments).companions.identity], dtype=object
+    )
+    start = start.reshape(shape(algorithm))
+    x = start
+    for _ in range(top + 1):
+        slope = derivative(algorithm, x, power)
+        integral = [
+            truncated(ring.from_dict({(m[0] + 1,): c / (m[0] + 1) for m, c in ring(p).items()}))
+            for p in slope.flat
+        ]
+        x = start + np.array(integral, dtype=object).reshape(start.shape)
+    # The increments of the step are integrals over its parts.
+    angle = [ring.from_dict({(m[0] + 1,): c / (m[0] + 1) for m, c in p.items()}) for p in power]
+    samples = [[a.compose(h, h * Fraction(k, increments)) for a in angle] for k in range(increments + 1)]
+    d = [b - a for before, after in pairwise(samples) for a, b in zip(before, after, strict=True)]
+    step = kernel(algorithm, method, increments)
+    names = [name for signal in step.inputs for name in signal.elements]
+    computed = step.expand(dict(zip(names, [*start.flat, *d], strict=True)))["next"]
+    errors = [truncated(ring(c) - t) for c, t in zip(computed, x.flat, strict=True)]
+    return min(m[0] for e in errors for m in e.itermonoms())
+
+
+@pytest.mark.parametrize("increments", [2, 3, 5, MOST_INCREMENTS])
+@ALGORITHM
+@METHOD
+def test_the_local_error_is_one_order_above_the_method(algorithm, method, increments):
+    assert local_error(algorithm, method, increments) == int(method[2:]) + 1
+
+
+@pytest.mark.parametrize("method", ["rk2", "rk3", "rk4"])
+def test_one_increment_cannot_see_coning(method):
+    # The commutator of rates at two instants, of power 3, is lost, whatever the method.
+    assert local_error("euler", method, 1) == 3
+
+
+@pytest.mark.parametrize("count", [1, 2, 8])
+def test_increments_are_rows_oldest_first(count):
+    signal = increments_signal(count)
+    assert signal.shape == (count, 3)
+    assert signal.unit == "rad"
+    assert signal.elements[:3] == ("d1_x", "d1_y", "d1_z")
+    assert signal.elements[-3:] == (f"d{count}_x", f"d{count}_y", f"d{count}_z")
+
+
+@ALGORITHM
+@METHOD
+def test_the_transition_is_a_stage_of_the_kernel(algorithm, method):
+    step = kernel(algorithm, method)
+    assert step.transition in [stage.signal.name for stage in step.stages]
+    assert step.name == f"{algorithm}-{method}-2"
+    assert step.companions.attitude == (None if algorithm == "dcm" else f"dcm-from-{algorithm}")

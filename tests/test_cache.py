@@ -1,0 +1,196 @@
+"""The cache: an entry is whole or absent, whoever fails and whoever is first."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from strapgen import cache, library
+from strapgen.catalogue import choose
+from strapgen.exceptions import CompilerError, InputError
+
+
+@pytest.fixture(autouse=True)
+def root(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Point the cache to an empty folder."""
+    folder = tmp_path / "cache"
+    monkeypatch.setenv("STRAPGEN_CACHE_DIR", str(folder))
+    return folder
+
+
+def write(name: str, text: str = "x"):
+    return lambda draft: (draft / name).write_text(text)
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+def never(_: Path) -> None:
+    raise AssertionError("filled again")
+
+
+def test_folder_is_chosen_by_the_environment(root, tmp_path, monkeypatch):
+    assert cache.root() == root
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("STRAPGEN_CACHE_DIR", "here")
+    assert cache.root() == tmp_path / "here", "a change of folder must not move it"
+    monkeypatch.delenv("STRAPGEN_CACHE_DIR")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
+    assert cache.root() == tmp_path / "xdg" / "strapgen"
+    monkeypatch.setenv("XDG_CACHE_HOME", "")
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    assert cache.root() == tmp_path / "home" / ".cache" / "strapgen"
+
+
+def test_digest_tells_where_texts_end():
+    assert cache.digest(["ab", "c"]) != cache.digest(["a", "bc"])
+    assert cache.digest(["a"]) != cache.digest(["a", ""])
+    assert cache.digest(["σ"]) == cache.digest(["σ".encode()])
+
+
+def test_entry_is_filled_once(root):
+    place = cache.entry("kind", "key", write("file", "content"))
+    assert place == root / "kind" / "key"
+    assert cache.entry("kind", "key", never) == place
+    assert (place / "file").read_text() == "content"
+    assert names(root / "kind") == ["key"]
+
+
+@pytest.mark.parametrize("error", [CompilerError("refused"), KeyboardInterrupt(), ZeroDivisionError()])
+def test_failing_fill_leaves_nothing(root, error):
+    def fill(draft: Path) -> None:
+        write("half")(draft)
+        raise error
+
+    with pytest.raises(type(error)):
+        cache.entry("kind", "key", fill)
+    assert names(root / "kind") == []
+    cache.entry("kind", "key", write("file"))
+    assert names(root / "kind" / "key") == ["file"]
+
+
+def test_full_disk_is_told_in_words(root):
+    def fill(draft: Path) -> None:
+        write("half")(draft)
+        raise OSError(28, "No space left on device")
+
+    with pytest.raises(InputError, match=r"^cache folder .* cannot be written \(No space left on device\)$"):
+        cache.entry("kind", "key", fill)
+    assert names(root / "kind") == []
+
+
+def test_first_of_two_wins(root):
+    def fill(draft: Path) -> None:
+        cache.entry("kind", "key", write("file", "first"))  # another process, in the meantime
+        write("file", "second")(draft)
+
+    place = cache.entry("kind", "key", fill)
+    assert (place / "file").read_text() == "first"
+    assert names(root / "kind") == ["key"]
+
+
+def test_draft_of_a_killed_process_is_never_read(root):
+    killed = root / "kind" / ".draft-killed"
+    killed.mkdir(parents=True)
+    write("file", "half")(killed)
+    place = cache.entry("kind", "key", write("file", "whole"))
+    assert (place / "file").read_text() == "whole"
+    assert killed.is_dir(), "it may belong to a process at work"
+    yesterday = time.time() - 86400
+    os.utime(killed, (yesterday, yesterday))
+    cache.entry("kind", "other", write("file"))
+    assert names(root / "kind") == ["key", "other"]
+
+
+def test_entries_of_long_ago_are_removed(root):
+    old = cache.entry("kind", "old", write("file"))
+    recent = cache.entry("kind", "recent", write("file"))
+    for place, days in ((old, 100), (recent, 10)):
+        then = time.time() - days * 86400
+        os.utime(place, (then, then))
+    cache.entry("kind", "new", write("file"))
+    assert names(root / "kind") == ["new", "recent"]
+
+
+@pytest.mark.parametrize("place", ["file/cache", "/proc/strapgen"])
+def test_folder_that_cannot_be_written(place, tmp_path, monkeypatch):
+    (tmp_path / "file").write_text("x")
+    monkeypatch.setenv("STRAPGEN_CACHE_DIR", str(tmp_path / place))
+    with pytest.raises(
+        InputError, match=r"^cache folder .* cannot be written .*; set STRAPGEN_CACHE_DIR to one"
+    ):
+        cache.entry("kind", "key", never)
+
+
+# What is kept there
+
+
+def test_sources_are_derived_once(monkeypatch):
+    from strapgen import pipeline
+
+    first = library.sources(choose("euler", "rk1", 1), "c")
+    monkeypatch.setattr(pipeline, "derive", never)
+    assert library.sources(choose("euler", "rk1", 1), "c") == first
+
+
+def test_sources_change_with_the_generator(monkeypatch, root):
+    library.sources(choose("euler-product"), "c")
+    monkeypatch.setattr(cache, "generator_digest", lambda: "another version")
+    library.sources(choose("euler-product"), "c")
+    assert len(names(root / "sources")) == 2
+
+
+def test_generator_digest_sees_every_template(monkeypatch, tmp_path):
+    from strapgen import resources
+
+    files = resources.package_files()
+    assert {path.name for path in files} >= {"printer.py", "runge_kutta.py", "source.c.j2", "module.py.j2"}
+    changed = tmp_path / "source.c.j2"
+    template = next(path for path in files if path.name == changed.name)
+    changed.write_bytes(template.read_bytes() + b"\n")
+    before = cache.generator_digest.__wrapped__()
+    monkeypatch.setattr(resources, "package_files", lambda: [changed if p == template else p for p in files])
+    assert cache.generator_digest.__wrapped__() != before
+
+
+BUILD = """
+import json, sys
+import strapgen
+print("ready", flush=True)
+sys.stdin.readline()
+backend = strapgen.backend("euler", "rk1", 1, backend="c")
+print(json.dumps(backend.propagate([[[0.1, 0.2, 0.3]]] * 5).tolist()))
+"""
+
+
+def test_processes_may_build_the_same_at_once(root):
+    processes = [
+        subprocess.Popen(
+            [sys.executable, "-c", BUILD],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        for _ in range(4)
+    ]
+    for process in processes:
+        assert process.stdout.readline() == "ready\n"
+    for process in processes:  # all together
+        process.stdin.write("go\n")
+        process.stdin.flush()
+    results = [process.communicate(timeout=120) for process in processes]
+    assert [process.returncode for process in processes] == [0] * 4, results
+    assert len({out for out, _ in results}) == 1
+    assert len(json.loads(results[0][0])) == 6
+    # The step and the normalization, and of each its sources and its build.
+    assert {kind: len(names(root / kind)) for kind in names(root)} == {"sources": 2, "builds": 2}
+    for place in (root / "builds").iterdir():
+        assert len(list(place.iterdir())) == 1

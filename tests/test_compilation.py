@@ -1,0 +1,186 @@
+"""Building: one compilation for each content and compiler, and clear words where there is no compiler."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import strapgen
+from strapgen import compilation, pipeline
+from strapgen.cli import main
+from strapgen.exceptions import CompilerError
+from strapgen.targets import Sources
+
+SIMULATE = ["simulate", "euler", "--method", "rk1", "--increments", "1", "--step", "1", "--duration", "2"]
+SIMULATE += ["--motion", "constant", "--set", "x_deg_s=1"]
+
+
+@pytest.fixture(autouse=True)
+def root(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Start with an empty cache, on disk and in memory, and the machine's own compiler."""
+    monkeypatch.setenv("STRAPGEN_CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setattr(compilation, "_loaded", {})
+    monkeypatch.delenv("CC", raising=False)
+    return tmp_path / "cache"
+
+
+@pytest.fixture(scope="module")
+def sources() -> Sources:
+    return pipeline.generate(pipeline.lower(pipeline.derive("euler-normalize")), "c")
+
+
+@pytest.fixture
+def counting(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Return a compiler that counts its calls, and the count."""
+    script, log = tmp_path / "counting-cc", tmp_path / "log"
+    log.write_text("")
+    script.write_text(f'#!/bin/sh\necho "$@" >> {log}\nexec {shutil.which("cc")} "$@"\n')
+    script.chmod(0o755)
+    monkeypatch.setenv("CC", str(script))
+    return lambda: len(log.read_text().splitlines())
+
+
+@pytest.fixture
+def without_compiler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Hide every compiler."""
+    (tmp_path / "nothing").mkdir()
+    monkeypatch.setenv("PATH", str(tmp_path / "nothing"))
+
+
+def test_compiled_function_is_called(sources):
+    module = compilation.load(sources)
+    result = module.ffi.new("double[4]")
+    module.lib.euler_normalize([0.0, 0.0, 3.0, 4.0], result)
+    np.testing.assert_allclose(list(result), [0, 0, 0.6, 0.8])
+
+
+def test_second_call_compiles_nothing(sources, counting, root, monkeypatch):
+    first = compilation.load(sources)
+    calls = counting()
+    assert calls > 0
+    assert compilation.load(sources) is first
+    monkeypatch.setattr(compilation, "_loaded", {})  # as another process
+    again = compilation.load(sources)
+    assert again.__file__ == first.__file__
+    assert counting() == calls
+    (place,) = (root / "builds").iterdir()
+    assert len(list(place.iterdir())) == 1, "only what is loaded is kept"
+
+
+def test_back_end_compiles_nothing_the_second_time(counting, monkeypatch):
+    strapgen.backend("euler", "rk1", 1, "c")
+    calls = counting()
+    monkeypatch.setattr(compilation, "_loaded", {})
+    strapgen.backend("euler", "rk1", 1, "c")
+    assert counting() == calls
+
+
+def test_other_text_compiles_again(sources, counting):
+    compilation.load(sources)
+    calls = counting()
+    files = {name: text.replace("Euler", "Euler's") for name, text in sources.files.items()}
+    compilation.load(Sources.restore(sources.interface(), files))
+    assert counting() == 2 * calls
+
+
+def test_other_compiler_compiles_again(sources, counting, root, monkeypatch):
+    compilation.load(sources)
+    monkeypatch.delenv("CC")
+    monkeypatch.setattr(compilation, "_loaded", {})
+    compilation.load(sources)
+    assert len(list((root / "builds").iterdir())) == 2
+
+
+def test_environment_is_put_back(sources, monkeypatch):
+    compilation.load(sources)
+    assert "CC" not in os.environ
+    monkeypatch.setenv("CC", "cc -Wall")
+    monkeypatch.setattr(compilation, "_loaded", {})
+    compilation.load(sources)
+    assert os.environ["CC"] == "cc -Wall"
+
+
+@pytest.mark.parametrize("blank", ["", "  "])
+def test_blank_choice_of_compiler_is_none(blank, sources, monkeypatch):
+    monkeypatch.setenv("CC", blank)
+    assert compilation.compiler() == shutil.which("cc")
+    assert compilation.load(sources).lib.euler_normalize
+
+
+def test_cache_folder_may_be_relative(sources, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("STRAPGEN_CACHE_DIR", "relative")
+    assert compilation.load(sources).lib.euler_normalize
+    assert len(list((tmp_path / "relative" / "builds").iterdir())) == 1
+
+
+# No compiler, or a bad one
+
+
+def test_no_compiler(sources, without_compiler, root):
+    with pytest.raises(CompilerError, match=r"^no C compiler: 'cc' is not on the PATH; install gcc .*numpy"):
+        compilation.load(sources)
+    assert not (root / "builds").exists()
+
+
+@pytest.mark.parametrize("chosen", ["strange-cc -O2", "/nowhere/cc", "'unclosed", '""'])
+def test_chosen_compiler_is_not_there(chosen, sources, monkeypatch):
+    monkeypatch.setenv("CC", chosen)
+    with pytest.raises(
+        CompilerError, match=r"^no C compiler: .* is not on the PATH; install gcc \(or set CC\)"
+    ):
+        compilation.load(sources)
+
+
+def test_numpy_works_without_a_compiler(without_compiler):
+    history = strapgen.backend("euler", "rk4", 2, "numpy").propagate(np.full((3, 2, 3), 0.01))
+    assert np.isfinite(history).all()
+
+
+def test_generation_works_without_a_compiler(without_compiler, tmp_path, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(["generate", "euler", "--target", "c", "--out", str(tmp_path / "out")])
+    assert stop.value.code == 0
+    assert (tmp_path / "out" / "euler_rk4_2.c").is_file()
+
+
+@pytest.mark.parametrize("backend", ["c", "c-float"])
+def test_command_line_without_a_compiler(backend, without_compiler, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main([*SIMULATE, "--backend", backend])
+    assert stop.value.code == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.startswith("strapgen: no C compiler: ")
+    assert said.err.count("\n") == 1
+    with pytest.raises(SystemExit) as stop:
+        main([*SIMULATE, "--backend", "numpy"])
+    assert stop.value.code == 0
+
+
+def test_version_without_a_compiler(without_compiler, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(["--version"])
+    assert stop.value.code == 0
+    assert "C compiler is not installed" in capsys.readouterr().out
+
+
+def test_compiler_that_fails(sources, root, monkeypatch, capfd):
+    monkeypatch.setenv("CC", "false")
+    with pytest.raises(CompilerError, match=r"false failed on strapgen_euler_normalize") as failure:
+        compilation.load(sources)
+    assert "\n" not in str(failure.value)
+    assert list((root / "builds").iterdir()) == []
+    assert capfd.readouterr().out == ""
+
+
+def test_source_that_does_not_compile(sources, root, capfd):
+    files = {name: text.replace("#include", "#error no") for name, text in sources.files.items()}
+    with pytest.raises(CompilerError):
+        compilation.load(Sources.restore(sources.interface(), files))
+    assert list((root / "builds").iterdir()) == []
+    assert capfd.readouterr().out == ""

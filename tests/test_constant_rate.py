@@ -1,0 +1,189 @@
+"""Constant rate: the thesis's claims 1 to 4 as series in the angle a step, from the kernels themselves."""
+
+from functools import cache
+from itertools import pairwise
+
+import pytest
+import sympy as sp
+
+from strapgen import derive
+from strapgen.catalogue import METHODS
+
+X = sp.Symbol("x", positive=True)
+STEP_NAMES = ("dcm", "euler")
+INCREMENTS = (1, 2, 3)
+TERMS = 11
+
+
+@cache
+def transition(algorithm: str, method: str, axes: str, increments: int) -> sp.Matrix:
+    """Return the step of the identity at the angle x about each of the axes, in equal increments."""
+    step = derive(algorithm, method, increments)
+    state, d = step.inputs
+    values = dict(zip(state.elements, step.companions.identity, strict=True))
+    values |= {element: X / increments if element[-1] in axes else sp.Integer(0) for element in d.elements}
+    result = [sp.expand(element) for element in step.expand(values)["next"]]
+    return sp.Matrix(*(state.shape if len(state.shape) == 2 else (4, 1)), result)
+
+
+def cosine_and_sine(algorithm: str, method: str, axes: str, increments: int) -> tuple[sp.Expr, sp.Expr]:
+    """Return length times cosine and sine of the angle that a step turns by; of half of it for "euler"."""
+    turn = transition(algorithm, method, axes, increments)
+    norm = sp.sqrt(len(axes))
+    if algorithm == "euler":
+        vector, cosine = turn[:3, :], turn[3]
+    else:
+        # A = n n' + cosine (I - n n') + sine skew(n)
+        cosine = (turn.trace() - 1) / 2
+        vector = sp.Matrix([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]) / 2
+    along = [vector["xyz".index(axis)] for axis in axes]
+    assert len(set(along)) == 1 and vector.dot(vector).expand() == (len(axes) * along[0] ** 2).expand()
+    return sp.expand(cosine), sp.expand(along[0] * norm)
+
+
+@cache
+def lost(algorithm: str, method: str, axes: str = "y", increments: int = 2) -> sp.Expr:
+    """Return the angle lost in a step about each of the axes, as a series in x, the angle about each."""
+    cosine, sine = cosine_and_sine(algorithm, method, axes, increments)
+    norm, factor = sp.sqrt(len(axes)), 2 if algorithm == "euler" else 1
+    # The derivative of the angle is rational, so its series needs no root and no branch.
+    rate = (sine.diff(X) * cosine - sine * cosine.diff(X)) / (cosine**2 + sine**2)
+    series = sp.series(sp.cancel(rate), X, 0, TERMS).removeO()
+    return sp.expand(X - factor * sp.integrate(series, X) / norm)
+
+
+def leading(series: sp.Expr) -> tuple[sp.Expr, int]:
+    """Return the coefficient and the power of the lowest term."""
+    power = min(m[0] for m in sp.Poly(series, X).monoms())
+    return sp.Poly(series, X).coeff_monomial(X**power), power
+
+
+def ratio(above: sp.Expr, below: sp.Expr, terms: int) -> sp.Expr:
+    """Return the first terms of a quotient of two series, up to the power `terms` - 1."""
+    return sp.series(sp.cancel(above / below), X, 0, terms).removeO()
+
+
+@pytest.mark.parametrize("increments", INCREMENTS)
+@pytest.mark.parametrize("method", METHODS)
+def test_the_loss_is_that_of_a_truncated_exponential(method, increments):
+    # A step of order p multiplies cos + i sin by the powers of exp(ix) up to p, of exp(ix/2) for Euler parameters.
+    for algorithm, angle in (("dcm", X), ("euler", X / 2)):
+        cosine, sine = cosine_and_sine(algorithm, method, "y", increments)
+        powers = [(sp.I * angle) ** k / sp.factorial(k) for k in range(int(method[2:]) + 1)]
+        assert sp.expand(cosine + sp.I * sine - sum(powers)) == 0
+
+
+@pytest.mark.parametrize(
+    ("method", "printed"),
+    [
+        ("rk1", sp.Rational(1, 4) + 9 * X**2 / 80),
+        ("rk2", sp.Rational(1, 4) + 9 * X**2 / 160),
+        ("rk3", sp.Rational(1, 16)),
+        ("rk4", sp.Rational(1, 16)),
+    ],
+)
+def test_claim_2_drift_of_euler_parameters_against_direction_cosines(method, printed):
+    terms = 3 if printed.has(X) else 1
+    assert ratio(lost("euler", method), lost("dcm", method), terms) == printed
+
+
+@pytest.mark.parametrize("axes", ["y", "xyz"])
+@pytest.mark.parametrize("method", METHODS)
+def test_claim_2_the_ratio_is_of_a_half_step(method, axes):
+    # 2 delta(x/2)/delta(x), whatever the axis: Euler parameters see half the angle.
+    delta = lost("dcm", method, axes)
+    assert sp.expand(lost("euler", method, axes) - 2 * delta.subs(X, X / 2)) == 0
+
+
+@pytest.mark.parametrize("algorithm", STEP_NAMES)
+@pytest.mark.parametrize(("low", "high", "expected"), [(1, 2, (-1, 2)), (3, 4, (-1, 4))])
+def test_claim_3_orders_in_pairs(algorithm, low, high, expected):
+    # Second order loses -1/2 of first, fourth -1/4 of third (McKern): of one power, of opposite signs.
+    first, second = leading(lost(algorithm, f"rk{low}")), leading(lost(algorithm, f"rk{high}"))
+    assert first[1] == second[1]
+    assert second[0] / first[0] == sp.Rational(*expected)
+
+
+@pytest.mark.parametrize("algorithm", STEP_NAMES)
+def test_claim_3_the_powers(algorithm):
+    assert [leading(lost(algorithm, method))[1] for method in METHODS] == [3, 3, 5, 5]
+
+
+@pytest.mark.parametrize("increments", INCREMENTS)
+@pytest.mark.parametrize("algorithm", STEP_NAMES)
+def test_claim_4_three_equal_axes_against_one(algorithm, increments):
+    ratios = {
+        axes: ratio(lost(algorithm, "rk4", axes, increments), lost(algorithm, "rk1", axes, increments), 7)
+        for axes in ("y", "xyz")
+    }
+    assert ratio(ratios["xyz"], ratios["y"], 1) == 3
+
+
+def test_claim_4_at_the_rate_of_the_thesis():
+    # 10 deg/s and steps of 1/8 s: what the series leave out is below x^8.
+    x = float(sp.rad(10)) / 8
+    value = {
+        (axes, method): float(lost("dcm", method, axes).subs(X, x))
+        for axes in ("y", "xyz")
+        for method in ("rk1", "rk4")
+    }
+    ratios = {axes: value[axes, "rk4"] / value[axes, "rk1"] for axes in ("y", "xyz")}
+    assert ratios["xyz"] / ratios["y"] == pytest.approx(3.00069, abs=5e-6)
+
+
+def parts(computed: sp.Matrix, truth: sp.Matrix) -> dict[str, list]:
+    """Return the error matrix's parts, from its kernel."""
+    kernel = derive("error-matrix")
+    names = [name for signal in kernel.inputs for name in signal.elements]
+    return kernel.expand(dict(zip(names, [*computed, *truth], strict=True)))
+
+
+def true_turn() -> sp.Matrix:
+    return sp.Matrix([[sp.cos(X), 0, sp.sin(X)], [0, 1, 0], [-sp.sin(X), 0, sp.cos(X)]])
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_claim_1_on_one_axis_there_is_no_skew(method):
+    turn, computed, truth = transition("dcm", method, "y", 2), sp.eye(3), sp.eye(3)
+    for _ in range(4):
+        computed, truth = (computed * turn).expand(), truth * true_turn()
+        assert [sp.expand(element) for element in parts(computed, truth)["skew"]] == [0, 0, 0]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_claim_1_drift_and_scale_grow_linearly(method):
+    # After n steps n times the error of one, to leading order in the angle of a step.
+    turn, computed, truth = transition("dcm", method, "y", 2), sp.eye(3), sp.eye(3)
+    order = int(method[2:])
+    highest = order + 3
+    found = []
+    for _ in range(4):
+        computed, truth = (computed * turn).expand(), (truth * true_turn()).applyfunc(sp.expand)
+        errors = parts(computed, truth)
+        assert errors["drift"][0] == errors["drift"][2] == 0
+        found.append(
+            [
+                leading(sp.series(errors[k][1 if k == "drift" else 0], X, 0, highest).removeO())
+                for k in ("drift", "scale")
+            ]
+        )
+    one = found[0]
+    assert {one[0][1], one[1][1]} == {order + 1, order + 2}
+    for n, each in enumerate(found, 1):
+        assert [(n * coefficient, power) for coefficient, power in one] == each
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_drift_is_positive_where_angle_is_lost(method):
+    # Of one step, to leading order: the drift about the axis is the angle lost.
+    errors = parts(transition("dcm", method, "y", 2), true_turn())
+    coefficient, power = leading(lost("dcm", method))
+    drift = sp.series(errors["drift"][1], X, 0, power + 1).removeO()
+    assert sp.expand(drift - coefficient * X**power) == 0
+
+
+def test_more_samples_change_nothing_at_a_constant_rate():
+    for algorithm in STEP_NAMES:
+        for method in METHODS:
+            turns = [transition(algorithm, method, "xyz", increments) for increments in INCREMENTS]
+            assert all(before == after for before, after in pairwise(turns))

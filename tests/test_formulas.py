@@ -1,0 +1,88 @@
+"""Kernels in words: text and LaTeX with every formula, and data that SymPy reads back."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+import sympy as sp
+
+from strapgen import formulas, pipeline
+from strapgen.catalogue import standard
+
+SOME = [
+    choice for choice in standard() if choice.kernel in ("euler-rk4-2", "dcm-rk2-2", "cayley-klein-rk1-2")
+]
+SOME += [choice for choice in standard() if choice.method is None]
+
+
+@pytest.fixture(params=SOME, ids=lambda choice: choice.kernel)
+def kernel(request):
+    return pipeline.derive(*request.param)
+
+
+def stages(kernel):
+    return (*kernel.stages, *kernel.outputs)
+
+
+def test_text_has_every_formula(kernel):
+    lines = formulas.as_text(kernel).splitlines()
+    assert lines[0] == kernel.title
+    assert lines[1] == f"source: {kernel.source}"
+    for signal in kernel.inputs:
+        assert any(line.startswith(f"in   {signal.name} (") and signal.meaning in line for line in lines)
+    for stage in kernel.outputs:
+        assert f"out  {stage.signal.name} (unit {stage.signal.unit}): {stage.signal.meaning}" in lines
+    for note in kernel.notes:
+        assert f"note {note}" in lines
+    for stage in stages(kernel):
+        for name, expression in zip(stage.signal.elements, stage.expressions, strict=True):
+            assert f"  {name} = {expression}" in lines
+
+
+def test_latex_has_a_row_for_every_formula(kernel):
+    text = formulas.as_latex(kernel)
+    assert text.startswith("\\begin{align*}\n") and text.endswith("\n\\end{align*}")
+    rows = text.splitlines()[1:-1]
+    assert len(rows) == sum(stage.signal.size for stage in stages(kernel))
+    assert all(" &= " in row for row in rows)
+    assert all(row.endswith(" \\\\") for row in rows[:-1]) and not rows[-1].endswith("\\\\")
+    assert text.count("{") == text.count("}")
+    assert "**" not in text
+
+
+def test_latex_names():
+    text = formulas.as_latex(pipeline.derive("euler", "rk1", 1))
+    assert "e_{x}" in text
+    assert (
+        "\\mathit{half\\_turn\\_0}_{x} &= \\frac{d_{1 x}}{2}" in text
+        or "\\mathit{half\\_turn\\_0}_{x} &=" in text
+    )
+
+
+def test_data_reads_back(kernel):
+    program = pipeline.lower(kernel)
+    data = json.loads(json.dumps(formulas.as_data(kernel, program), allow_nan=False))
+    wanted = [
+        "kernel",
+        "title",
+        "source",
+        "notes",
+        "inputs",
+        "stages",
+        "outputs",
+        "operations",
+        "temporaries",
+    ]
+    assert list(data) == wanted
+    assert data["kernel"] == kernel.name
+    assert data["operations"] == program.operations
+    assert data["temporaries"] == program.temporaries
+    assert [signal["name"] for signal in data["inputs"]] == [signal.name for signal in kernel.inputs]
+    names = {name: sp.Symbol(name, real=True) for signal in kernel.inputs for name in signal.elements}
+    for described, stage in zip(data["stages"] + data["outputs"], stages(kernel), strict=True):
+        names |= {name: sp.Symbol(name, real=True) for name in stage.signal.elements}
+        assert described["elements"] == list(stage.signal.elements)
+        for name, expression in zip(stage.signal.elements, stage.expressions, strict=True):
+            read = sp.sympify(described["expressions"][name], locals=names)
+            assert sp.simplify(read - expression) == 0 or sp.sstr(read) == sp.sstr(expression)

@@ -1,0 +1,44 @@
+"""Generated sources by name: never out of step, and quick the second time."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import strapgen
+from strapgen import cache, catalogue, library
+
+RUN = """
+import sys
+import numpy as np
+import strapgen
+for backend in ("numpy", "c"):
+    strapgen.backend("euler", "rk3", 2, backend).propagate(np.zeros((4, 2, 3)))
+print(*sorted({"sympy", "jinja2", "cffi"} & set(sys.modules)))
+"""
+
+
+def test_a_second_use_loads_neither_sympy_nor_jinja_nor_a_compiler():
+    outputs = [
+        subprocess.run([sys.executable, "-c", RUN], capture_output=True, text=True, check=True).stdout.strip()
+        for _ in range(2)
+    ]
+    assert outputs[1] == ""
+
+
+def test_sources_are_those_of_the_pipeline():
+    choice = catalogue.choose("dcm", "rk2", 3)
+    for target in strapgen.targets.TARGETS:
+        made = strapgen.generate(strapgen.lower(strapgen.derive(*choice)), target)
+        assert library.sources(choice, target) == made
+
+
+def test_a_change_of_the_generator_makes_new_sources(monkeypatch, tmp_path):
+    monkeypatch.setenv("STRAPGEN_CACHE_DIR", str(tmp_path))
+    choice = catalogue.choose("euler-normalize")
+    library.sources(choice, "numpy")
+    library.sources(choice, "numpy")
+    assert len(list((tmp_path / "sources").iterdir())) == 1
+    monkeypatch.setattr(cache, "generator_digest", lambda: "another generator")
+    library.sources(choice, "numpy")
+    assert len(list((tmp_path / "sources").iterdir())) == 2

@@ -1,0 +1,155 @@
+"""Writing files: all of them or none, whole, with ordinary permissions."""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from pathlib import Path
+
+import pytest
+
+from strapgen import output
+from strapgen.exceptions import InputError
+
+FILES = {"a.txt": "alpha\n", "deep/er/b.txt": "beta\n", "c.bin": b"\x00\xff"}
+
+
+def tree(folder: Path) -> dict[str, bytes]:
+    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+
+
+def test_files_are_written_in_order(tmp_path):
+    written = output.write_files(tmp_path / "new", FILES)
+    assert written == [tmp_path / "new" / name for name in FILES]
+    assert tree(tmp_path / "new") == {"a.txt": b"alpha\n", "deep/er/b.txt": b"beta\n", "c.bin": b"\x00\xff"}
+
+
+def test_text_is_utf8_with_line_feeds(tmp_path):
+    assert output.write_file(tmp_path / "x", "σ\nτ\n").read_bytes() == "σ\nτ\n".encode()
+
+
+def test_name_without_a_folder_goes_here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert output.write_file("x.txt", "x") == Path("x.txt")
+    assert tree(tmp_path) == {"x.txt": b"x"}
+
+
+def test_old_files_are_replaced_and_others_left(tmp_path):
+    (tmp_path / "a.txt").write_text("old, and longer than the new")
+    (tmp_path / "mine.txt").write_text("mine")
+    output.write_files(tmp_path, FILES)
+    assert tree(tmp_path)["a.txt"] == b"alpha\n"
+    assert tree(tmp_path)["mine.txt"] == b"mine"
+
+
+def disk_full(*_: object, **__: object) -> None:
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+class FullDisk:
+    """A disk that is full after so many files."""
+
+    def __init__(self, files: int) -> None:
+        self.left = files
+        self.fdopen = os.fdopen
+
+    def __call__(self, handle: int, mode: str):
+        file = self.fdopen(handle, mode)
+        if self.left == 0:
+            file.write(b"hal")  # half of it gets there
+            file.write = disk_full
+        self.left -= 1
+        return file
+
+
+@pytest.mark.parametrize("fitting", [0, 1, 2])
+def test_full_disk_changes_nothing(fitting, tmp_path, monkeypatch):
+    output.write_files(tmp_path, FILES)
+    before = tree(tmp_path)
+    monkeypatch.setattr(output.os, "fdopen", FullDisk(fitting))
+    with pytest.raises(InputError, match=r"cannot be written .*No space left on device"):
+        output.write_files(tmp_path, {name: "changed" for name in FILES})
+    assert tree(tmp_path) == before
+
+
+@pytest.mark.parametrize("good", [0, 1, 2])
+def test_failure_while_renaming_changes_nothing(good, tmp_path, monkeypatch):
+    (tmp_path / "a.txt").write_text("old")
+    before = tree(tmp_path)
+    renamed = []
+    rename = Path.replace
+
+    def replace(self: Path, target: Path) -> None:
+        if len(renamed) == good:
+            raise PermissionError(errno.EPERM, os.strerror(errno.EPERM))
+        renamed.append(target)
+        rename(self, target)
+
+    monkeypatch.setattr(Path, "replace", replace)
+    with pytest.raises(InputError, match=r"cannot be written .*Operation not permitted"):
+        output.write_files(tmp_path, FILES)
+    assert tree(tmp_path) == before
+
+
+def test_interruption_leaves_no_draft(tmp_path, monkeypatch):
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Path, "replace", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        output.write_files(tmp_path, FILES)
+    assert tree(tmp_path) == {}
+
+
+@pytest.mark.parametrize("umask", [0o022, 0o077, 0o002])
+def test_permissions_are_those_of_an_ordinary_file(umask, tmp_path):
+    before = os.umask(umask)
+    try:
+        (path,) = output.write_files(tmp_path, {"a": "x"})
+        assert os.umask(umask) == umask, "the umask is put back"
+    finally:
+        os.umask(before)
+    assert stat.S_IMODE(path.stat().st_mode) == 0o666 & ~umask
+
+
+def test_folder_under_a_file(tmp_path):
+    (tmp_path / "file").write_text("x")
+    with pytest.raises(InputError, match=r"file/folder cannot be written \(Not a directory\)"):
+        output.write_files(tmp_path / "file" / "folder", FILES)
+    assert tree(tmp_path) == {"file": b"x"}
+
+
+def test_folder_that_nothing_can_be_made_in():
+    with pytest.raises(InputError, match=r"/proc/strapgen cannot be written"):
+        output.write_files("/proc/strapgen", FILES)
+
+
+def test_folder_where_a_file_belongs(tmp_path):
+    (tmp_path / "c.bin").mkdir()
+    with pytest.raises(InputError, match=r"c.bin is a folder; a file is to be written there"):
+        output.write_files(tmp_path, FILES)
+    assert tree(tmp_path) == {}
+
+
+def test_name_that_is_too_long(tmp_path):
+    with pytest.raises(InputError, match=r"cannot be written"):
+        output.write_file(tmp_path / ("x" * 300), "x")
+
+
+def test_link_is_written_through(tmp_path):
+    (tmp_path / "elsewhere").mkdir()
+    target = tmp_path / "elsewhere" / "target.txt"
+    target.write_text("old")
+    link = tmp_path / "link.txt"
+    link.symlink_to(target)
+    assert output.write_file(link, "new") == link
+    assert link.is_symlink()
+    assert target.read_text() == "new"
+
+
+def test_pipe_is_not_replaced_by_a_file(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(InputError, match=r"pipe is no ordinary file"):
+        output.write_file(tmp_path / "pipe", "x")
+    assert stat.S_ISFIFO((tmp_path / "pipe").stat().st_mode)

@@ -1,0 +1,112 @@
+"""Plots: nine axes with the errors of the run, an image file of the kind that is asked for, clear refusals."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import strapgen
+from strapgen import plots
+from strapgen.exceptions import InputError, MissingExtraError
+from strapgen.recording import History
+from strapgen.simulation import Run, simulate
+
+pyplot = pytest.importorskip("matplotlib.pyplot")
+
+
+@pytest.fixture(scope="module")
+def run() -> Run:
+    motion = strapgen.motion("coning", a_deg_s=10, b_deg_s=10, g_deg_s=10)
+    return simulate(strapgen.backend("euler", "rk1", 2, "numpy"), motion, "0.125", 20)
+
+
+@pytest.fixture
+def figures(monkeypatch: pytest.MonkeyPatch) -> list:
+    """Return the figures as they are saved, without drawing them."""
+    saved: list = []
+
+    def keep(figure, path):
+        pyplot.close(figure)
+        saved.append(figure)
+        return Path(path)
+
+    monkeypatch.setattr(plots, "_save", keep)
+    return saved
+
+
+@pytest.fixture(autouse=True)
+def all_figures_are_closed():
+    yield
+    assert pyplot.get_fignums() == []
+
+
+def test_nine_axes_show_the_nine_errors(run, figures):
+    plots.plot_run(run, "A title", "run.png")
+    (figure,) = figures
+    assert figure.get_suptitle() == "A title"
+    assert len(figure.axes) == 9
+    parts = [
+        ("{} scale", "xyz", run.scale),
+        ("{} skew, deg", ("y-z", "z-x", "x-y"), np.degrees(run.skew)),
+        ("{} drift, deg", "xyz", np.degrees(run.drift)),
+    ]
+    for row, (title, names, values) in enumerate(parts):
+        for column, name in enumerate(names):
+            axes = figure.axes[3 * row + column]
+            assert axes.get_title(loc="left") == title.format(name)
+            curve = axes.get_lines()[0]
+            np.testing.assert_array_equal(curve.get_xdata(), run.time)
+            np.testing.assert_array_equal(curve.get_ydata(), values[:, column])
+    assert [axes.get_xlabel() for axes in figure.axes] == [""] * 6 + ["time, s"] * 3
+
+
+@pytest.mark.parametrize(("shape", "grid"), [((3, 3), (3, 3)), ((4,), (4, 1))])
+def test_history_has_an_axis_for_each_element(shape, grid, figures, rng):
+    states = rng.normal(size=(10, *shape))
+    elements = [f"element {k}" for k in range(states[0].size)]
+    plots.plot_history(History(np.arange(10.0), states, 1.0, 0), elements, "A title", "history.png")
+    (figure,) = figures
+    assert figure.axes[0].get_gridspec().get_geometry() == grid
+    for k, axes in enumerate(figure.axes):
+        assert axes.get_title(loc="left") == f"element {k}"
+        np.testing.assert_array_equal(axes.get_lines()[0].get_ydata(), states.reshape(10, -1)[:, k])
+
+
+@pytest.mark.parametrize(
+    ("name", "head"), [("run.png", b"\x89PNG\r\n\x1a\n"), ("run.PDF", b"%PDF-"), ("run.svg", b"<?xml")]
+)
+def test_image_is_of_the_kind_that_the_ending_says(name, head, run, tmp_path):
+    path = plots.plot_run(run, "A title", tmp_path / "new" / name)
+    assert path == tmp_path / "new" / name
+    assert path.read_bytes().startswith(head)
+    assert [p.name for p in path.parent.iterdir()] == [name]
+
+
+@pytest.mark.parametrize("name", ["run.docx", "run", "png"])
+def test_unknown_ending(name, run, tmp_path):
+    with pytest.raises(InputError, match=r"^plot .*: file type '(docx)?' is not known; allowed: .*png.*svg"):
+        plots.plot_run(run, "A title", tmp_path / name)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_folder_that_cannot_be_written(run, tmp_path):
+    (tmp_path / "file").write_text("x")
+    with pytest.raises(InputError, match=r"cannot be written"):
+        plots.plot_run(run, "A title", tmp_path / "file" / "run.png")
+
+
+def test_without_matplotlib(run, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(MissingExtraError, match=r"^plots need matplotlib: pip install 'strapgen\[plot\]'$"):
+        plots.plot_run(run, "A title", tmp_path / "run.png")
+    assert issubclass(MissingExtraError, ImportError)
+
+
+def test_no_screen_is_needed(run, figures, monkeypatch):
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.setenv("MPLBACKEND", "tkagg")
+    plots.plot_run(run, "A title", "run.png")
+    assert pyplot.get_backend().lower() == "agg"

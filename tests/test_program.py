@@ -1,0 +1,174 @@
+"""Programs: their validation, their interpreter and what they say about themselves."""
+
+import math
+from dataclasses import replace
+from fractions import Fraction
+
+import pytest
+
+from strapgen.program import (
+    COUNTED_AS,
+    OPERATIONS,
+    Assignment,
+    Constant,
+    Operation,
+    Program,
+    Reference,
+    Result,
+    references,
+    walk,
+)
+from strapgen.signal import Signal
+
+X, Y = Reference("x"), Reference("y")
+SUM = Operation("add", (X, Y))
+
+
+def program(*body: Assignment, result: tuple = ("r",), **rest) -> Program:
+    nodes = tuple(Reference(name) if isinstance(name, str) else name for name in result)
+    signal = Signal("result", (len(nodes),), tuple(f"result_{k}" for k in range(len(nodes))))
+    return Program(
+        name="made_up",
+        kernel="made-up",
+        title="Made up",
+        source="this test",
+        arguments="made-up",
+        notes=(),
+        inputs=(Signal.scalar("x"), Signal.scalar("y")),
+        body=body,
+        outputs=(Result(signal, nodes),),
+        **rest,
+    )
+
+
+def test_a_name_is_not_used_before_its_assignment():
+    late = Assignment("s", SUM)
+    with pytest.raises(ValueError, match=r"made_up: 'r' uses \['s'\] before assignment"):
+        program(Assignment("r", Operation("negate", (Reference("s"),))), late)
+    # The other way round it is right, so it is the order that was refused.
+    program(late, Assignment("r", Operation("negate", (Reference("s"),))))
+
+
+def test_a_name_is_not_used_in_its_own_assignment():
+    with pytest.raises(ValueError, match=r"'r' uses \['r'\]"):
+        program(Assignment("r", Operation("negate", (Reference("r"),))))
+
+
+@pytest.mark.parametrize("name", ["r", "x"])
+def test_a_name_is_assigned_once(name):
+    with pytest.raises(ValueError, match=f"'{name}' is assigned twice"):
+        program(Assignment("r", SUM), Assignment(name, X))
+
+
+def test_results_are_computed():
+    with pytest.raises(ValueError, match=r"'result' is not computed: \['z'\]"):
+        program(Assignment("r", SUM), result=("r", "z"))
+
+
+def test_results_have_a_node_for_every_element():
+    good = program(Assignment("r", SUM))
+    with pytest.raises(ValueError, match="'result' is not computed"):
+        replace(good, outputs=(Result(good.outputs[0].signal, ()),))
+
+
+def test_the_transition_is_computed():
+    with pytest.raises(ValueError, match="'turn' is not computed"):
+        program(Assignment("r", SUM), transition=Result(Signal.scalar("turn"), (Reference("t"),)))
+
+
+def test_run_is_exact_on_fractions():
+    third = Constant(Fraction(1, 3))
+    made = program(
+        Assignment("s", SUM),
+        Assignment("r", Operation("divide", (Operation("multiply", (third, Reference("s"))), Y))),
+        result=("r", "x", Constant(Fraction(2, 5))),
+    )
+    x, y = Fraction(1, 7), Fraction(3, 11)
+    assert made.run({"x": x, "y": y}) == {"result": [(x + y) / 3 / y, x, Fraction(2, 5)]}
+
+
+@pytest.mark.parametrize(
+    ("kind", "arguments", "expected"),
+    [
+        ("add", (5, 3), 8),
+        ("subtract", (5, 3), 2),
+        ("multiply", (5, 3), 15),
+        ("divide", (Fraction(5), 3), Fraction(5, 3)),
+        ("negate", (5,), -5),
+        ("sqrt", (2,), 2**0.5),
+        ("sin", (0.5,), math.sin(0.5)),
+        ("cos", (0.5,), math.cos(0.5)),
+        ("sinc", (0.5,), math.sin(0.5) / 0.5),
+        ("sinc", (0,), 1),
+        ("atan2", (1, -1), 3 * math.pi / 4),
+        ("maximum", (5, 3), 5),
+        ("maximum", (3, 5), 5),
+        ("at_least", (3, 3), True),
+        ("at_least", (2, 3), False),
+        ("at_least", (3, 2), True),
+        ("select", (True, 5, 3), 5),
+        ("select", (False, 5, 3), 3),
+    ],
+)
+def test_operations_mean_what_they_say(kind, arguments, expected):
+    assert OPERATIONS[kind](*arguments) == expected
+
+
+def test_every_operation_is_counted_somehow():
+    assert OPERATIONS.keys() == COUNTED_AS.keys()
+
+
+def test_operations_are_counted_at_any_depth():
+    inner = Operation("subtract", (Operation("multiply", (X, X)), Operation("sqrt", (Y,))))
+    test = Operation("at_least", (inner, Y))
+    choice = Operation("select", (test, Operation("sin", (X,)), Operation("negate", (Y,))))
+    made = program(
+        Assignment("s", choice),
+        Assignment("t", Operation("maximum", (X, Operation("divide", (SUM, Y))))),
+        Assignment("r", Operation("add", (Reference("s"), Reference("t")))),
+    )
+    assert made.operations == {
+        "add": 3,
+        "multiply": 1,
+        "divide": 1,
+        "sqrt": 1,
+        "negate": 1,
+        "select": 2,
+        "function": 1,
+    }
+    assert made.temporaries == 2
+
+
+def test_walk_and_references_reach_every_node():
+    tree = Operation("select", (Operation("at_least", (X, Y)), SUM, Constant(Fraction(1))))
+    kinds = [node.kind for node in walk(tree) if isinstance(node, Operation)]
+    assert kinds == ["select", "at_least", "add"]
+    assert list(references(tree)) == ["x", "y", "x", "y"]
+
+
+def step() -> Program:
+    """Return a program whose result is x t with the transition t = y + y, and an assignment nobody needs."""
+    return program(
+        Assignment("t", Operation("add", (Y, Y))),
+        Assignment("unused", Operation("multiply", (X, X))),
+        Assignment("r", Operation("multiply", (X, Reference("t")))),
+        transition=Result(Signal.scalar("turn"), (Reference("t"),)),
+    )
+
+
+def test_used_follows_the_assignments_backwards():
+    assert step().used() == {"x", "y", "t", "r"}
+    assert step().used([step().transition]) == {"y", "t"}
+
+
+def test_the_transition_is_a_program_of_its_own():
+    part = step().transition_program()
+    assert [signal.name for signal in part.inputs] == ["y"]
+    assert [a.name for a in part.body] == ["t"]
+    assert part.run({"y": Fraction(1, 3)}) == {"turn": [Fraction(2, 3)]}
+    assert part.transition is None
+
+
+def test_a_program_without_a_transition_has_no_transition_program():
+    with pytest.raises(ValueError, match="made_up has no transition"):
+        program(Assignment("r", SUM)).transition_program()

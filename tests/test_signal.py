@@ -1,0 +1,53 @@
+"""Signals: names and shapes agree, and plain data holds all of a signal."""
+
+import json
+from dataclasses import FrozenInstanceError
+from fractions import Fraction
+
+import pytest
+
+from strapgen.signal import Signal
+
+
+def test_a_matrix_names_its_elements_row_by_row():
+    signal = Signal.matrix("attitude", "C")
+    assert signal.shape == (3, 3)
+    assert signal.elements == ("C_11", "C_12", "C_13", "C_21", "C_22", "C_23", "C_31", "C_32", "C_33")
+
+
+@pytest.mark.parametrize(
+    ("signal", "shape", "elements"),
+    [
+        (Signal.vector("rate", "w"), (3,), ("w_x", "w_y", "w_z")),
+        (Signal.labelled("state", "e", "xyzs"), (4,), ("e_x", "e_y", "e_z", "e_s")),
+        (Signal.scalar("time"), (), ("time",)),
+    ],
+)
+def test_vectors_and_scalars_name_their_elements(signal, shape, elements):
+    assert (signal.shape, signal.elements, signal.size) == (shape, elements, len(elements))
+
+
+@pytest.mark.parametrize(("shape", "elements"), [((3,), ("a", "b")), ((), ()), ((2, 2), ("a", "b", "c"))])
+def test_shape_and_elements_must_agree(shape, elements):
+    with pytest.raises(ValueError, match="'rate'"):
+        Signal("rate", shape, elements)
+
+
+@pytest.mark.parametrize(
+    "signal",
+    [
+        Signal.vector("rate", "w", unit="rad/s", meaning="body rate", bound=Fraction(1, 3)),
+        Signal.matrix("attitude", "C", bound=Fraction(1)),
+        Signal.scalar("time", unit="s"),
+    ],
+)
+def test_plain_data_holds_all_of_a_signal(signal):
+    restored = Signal.from_dict(json.loads(json.dumps(signal.as_dict())))
+    assert restored == signal
+    assert isinstance(restored.shape, tuple) and isinstance(restored.elements, tuple)
+    assert type(restored.bound) is type(signal.bound)  # 1/3 must not come back as a decimal
+
+
+def test_a_signal_does_not_change():
+    with pytest.raises(FrozenInstanceError):
+        Signal.scalar("time").unit = "s"
