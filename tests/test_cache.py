@@ -73,7 +73,7 @@ def test_failing_fill_leaves_nothing(root, error):
         cache.entry("kind", "key", fill)
     assert names(root / "kind") == []
     cache.entry("kind", "key", write("file"))
-    assert names(root / "kind" / "key") == ["file"]
+    assert names(root / "kind" / "key") == ["file", "manifest.json"]
 
 
 def test_full_disk_is_told_in_words(root):
@@ -117,6 +117,66 @@ def test_entries_of_long_ago_are_removed(root):
         os.utime(place, (then, then))
     cache.entry("kind", "new", write("file"))
     assert names(root / "kind") == ["new", "recent"]
+
+
+def test_entry_in_use_is_not_of_long_ago(root):
+    place = cache.entry("kind", "old", write("file"))
+    then = time.time() - 100 * 86400
+    os.utime(place, (then, then))
+    cache.entry("kind", "old", never)
+    cache.entry("kind", "new", write("file"))
+    assert names(root / "kind") == ["new", "old"]
+
+
+def remove(place: Path) -> None:
+    (place / "file").unlink()
+
+
+def cut(place: Path) -> None:
+    (place / "file").write_text("who")
+
+
+def add(place: Path) -> None:
+    (place / "stray").write_text("x")
+
+
+def empty(place: Path) -> None:
+    for path in place.iterdir():
+        path.unlink()
+
+
+def replace(place: Path) -> None:
+    empty(place)
+    place.rmdir()
+    place.write_text("a file")
+
+
+@pytest.mark.parametrize("damage", [remove, cut, add, empty, replace])
+def test_damaged_entry_is_made_again(damage, root):
+    place = cache.entry("kind", "key", write("file", "whole"))
+    damage(place)
+    assert cache.entry("kind", "key", write("file", "whole")) == place
+    assert (place / "file").read_text() == "whole"
+    assert "stray" not in names(place)
+    cache.entry("kind", "key", never)
+
+
+def test_entry_that_appears_meanwhile_is_kept(root, monkeypatch):
+    """Another process puts its entry in place just after this one has looked for it."""
+    looks = []
+    is_whole = cache._is_whole
+
+    def look(place: Path) -> bool:
+        found = is_whole(place)
+        looks.append(found)
+        if len(looks) == 1:
+            assert not found
+            cache.entry("kind", "key", write("file", "theirs"))
+        return found
+
+    monkeypatch.setattr(cache, "_is_whole", look)
+    place = cache.entry("kind", "key", write("file", "ours"))
+    assert (place / "file").read_text() == "theirs"
 
 
 @pytest.mark.parametrize("place", ["file/cache", "/proc/strapgen"])
@@ -193,4 +253,49 @@ def test_processes_may_build_the_same_at_once(root):
     # The step and the normalization, and of each its sources and its build.
     assert {kind: len(names(root / kind)) for kind in names(root)} == {"sources": 2, "builds": 2}
     for place in (root / "builds").iterdir():
-        assert len(list(place.iterdir())) == 1
+        assert len([path for path in place.iterdir() if path.name != "manifest.json"]) == 1
+
+
+def empty(place: Path) -> None:
+    for path in place.iterdir():
+        path.unlink()
+
+
+DAMAGE = {
+    "emptied": empty,
+    "removed": lambda place: (place / "file").unlink(),
+    "cut": lambda place: (place / "file").write_text(""),
+    "changed": lambda place: (place / "file").write_text("something else"),
+    "more": lambda place: (place / "stranger").write_text("not ours"),
+    "unlisted": lambda place: (place / "manifest.json").unlink(),
+    "garbled": lambda place: (place / "manifest.json").write_text("{"),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGE.values(), ids=DAMAGE)
+def test_a_damaged_entry_is_made_again(root, damage):
+    place = cache.entry("kind", "key", write("file"))
+    whole = {path.name: path.read_bytes() for path in place.iterdir()}
+    damage(place)
+    assert cache.entry("kind", "key", write("file")) == place
+    assert {path.name: path.read_bytes() for path in place.iterdir()} == whole
+
+
+def test_a_file_in_the_place_of_an_entry_gives_way(root):
+    place = cache.entry("kind", "key", write("file"))
+    empty(place)
+    place.rmdir()
+    place.write_text("a file")
+    assert names(cache.entry("kind", "key", write("file"))) == ["file", "manifest.json"]
+
+
+def test_an_entry_in_use_is_not_pruned(root):
+    place = cache.entry("kind", "old", write("file"))
+    long_ago = 1_000_000_000
+    os.utime(place, (long_ago, long_ago))
+    cache.entry("kind", "old", write("file"))
+    cache.entry("kind", "new", write("file"))
+    assert "old" in names(root / "kind")
+    os.utime(place, (long_ago, long_ago))
+    cache.entry("kind", "newer", write("file"))
+    assert "old" not in names(root / "kind")

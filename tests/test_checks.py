@@ -52,7 +52,21 @@ def test_number_of_a_float_is_its_shortest_decimal(value):
 @pytest.mark.parametrize(
     "value",
     [
-        *("", "x", "nan", "-inf", "Infinity", "1e999", "1e999999999", "1/0", "1 2", "0x10", "1,5", "--1"),
+        *(
+            "",
+            "x",
+            "nan",
+            "-inf",
+            "Infinity",
+            "1e999",
+            "1e999999999",
+            "1/0",
+            "1 2",
+            "0x10",
+            "1,5",
+            "--1",
+            "1_0",
+        ),
         *(math.nan, -math.inf, np.nan, None, True, [1.0], 1j, "1/00000"),
     ],
 )

@@ -68,7 +68,8 @@ def test_second_call_compiles_nothing(sources, counting, root, monkeypatch):
     assert again.__file__ == first.__file__
     assert counting() == calls
     (place,) = (root / "builds").iterdir()
-    assert len(list(place.iterdir())) == 1, "only what is loaded is kept"
+    kept = {path.name for path in place.iterdir()} - {"manifest.json"}
+    assert kept == {Path(first.__file__).name}, "only what is loaded is kept"
 
 
 def test_back_end_compiles_nothing_the_second_time(counting, monkeypatch):
@@ -175,12 +176,34 @@ def test_compiler_that_fails(sources, root, monkeypatch, capfd):
         compilation.load(sources)
     assert "\n" not in str(failure.value)
     assert list((root / "builds").iterdir()) == []
-    assert capfd.readouterr().out == ""
+    assert capfd.readouterr() == ("", "")
 
 
 def test_source_that_does_not_compile(sources, root, capfd):
     files = {name: text.replace("#include", "#error no") for name, text in sources.files.items()}
-    with pytest.raises(CompilerError):
+    with pytest.raises(CompilerError, match=r"failed on strapgen_euler_normalize: .*error.* no") as failure:
         compilation.load(Sources.restore(sources.interface(), files))
+    assert "\n" not in str(failure.value)
     assert list((root / "builds").iterdir()) == []
-    assert capfd.readouterr().out == ""
+    assert capfd.readouterr() == ("", "")
+
+
+def test_flags_of_the_environment_do_not_reach_the_compiler(sources, root, monkeypatch):
+    for name in ("CFLAGS", "CPPFLAGS", "LDFLAGS"):
+        monkeypatch.setenv(name, "-no-such-flag-at-all")
+    assert compilation.load(sources).lib.euler_normalize
+
+
+def test_a_compiler_that_fails_is_told_in_one_line(sources, root, monkeypatch, capfd):
+    monkeypatch.setenv("CC", "cc -no-such-flag-at-all")
+    with pytest.raises(CompilerError, match=r"cc failed on strapgen_\w+: .*error.*no-such-flag-at-all"):
+        compilation.load(sources)
+    assert capfd.readouterr() == ("", "")
+    assert not list((root / "builds").iterdir())
+
+
+def test_a_compiler_that_makes_nothing(sources, root, monkeypatch):
+    monkeypatch.setenv("CC", "true")
+    with pytest.raises(CompilerError, match="failed on"):
+        compilation.load(sources)
+    assert not list((root / "builds").iterdir())

@@ -130,7 +130,6 @@ def test_blank_lines_and_blanks_are_overlooked(write, read):
         ["t", "dx", "dy", "dz"],
         [" "],
         EVEN[0],
-        ["", "", "", ""],
         [f"  {c} " for c in EVEN[1]],
         [],
         EVEN[2],
@@ -138,6 +137,9 @@ def test_blank_lines_and_blanks_are_overlooked(write, read):
     plain = write(EVEN).read_bytes()
     wanted = read(write(plain)).increments
     np.testing.assert_array_equal(read(write(rows)).increments, wanted)
+    # Empty cells are data that is missing, not a blank line.
+    with pytest.raises(InputError, match="line 3: column 1 is ''"):
+        read(write([EVEN[0], EVEN[1], ["", "", "", ""], EVEN[2]]))
 
 
 def test_units_of_rates(write):
@@ -187,6 +189,10 @@ def test_line_numbers_count_blank_lines(write, read):
 def test_first_row_with_a_bad_time_is_no_header(cell, write, read):
     rows = changed(2, 1, cell)[1:]
     refused(read, write(rows), f"line 1: column 1 is {cell!r}")
+
+
+def test_times_that_are_too_far_apart(write, read):
+    refused(read, write([["-1e308", "0", "0", "0"], ["1e308", "0", "0", "0"]]), "1e+308 s are too far apart")
 
 
 def test_row_that_is_too_short(write, read):

@@ -1,7 +1,7 @@
 """Exact algebra of rotations: skew matrices, quaternions, Pauli matrices, on SymPy expressions.
 
 Vectors are 3 x 1 matrices. Quaternions are 4 x 1 matrices with the scalar **last**, as the Euler parameters.
-Everything is built from sums and products alone, so it also holds for polynomials and numbers.
+But for `rotation`, everything is built from sums and products alone and also holds for polynomials and numbers.
 """
 
 from __future__ import annotations

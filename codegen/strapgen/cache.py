@@ -1,13 +1,15 @@
 """The cache: folders of generated and compiled files, addressed by the content that made them.
 
-An entry is filled in a folder of its own and then renamed into place, so that an entry is whole or absent:
-two processes may make the same one at once, and a killed or failed one leaves nothing that is ever read.
+An entry is filled in a folder of its own and then renamed into place: two processes may make the same one at once,
+and a killed or failed one leaves nothing that is ever read. Every entry holds the hashes of its files; one that was
+damaged is made again.
 """
 
 from __future__ import annotations
 
 import contextlib
 import hashlib
+import json
 import os
 import shutil
 import tempfile
@@ -21,6 +23,7 @@ from strapgen import resources
 from strapgen.exceptions import InputError
 
 _UNUSED_DAYS = 60
+_MANIFEST = "manifest.json"
 
 
 def root() -> Path:
@@ -64,10 +67,17 @@ def entry(kind: str, key: str, fill: Callable[[Path], None]) -> Path:
         If the cache folder cannot be written.
     """
     place = root() / kind / key
-    if place.is_dir():
+    if _is_whole(place):
+        with contextlib.suppress(OSError):
+            os.utime(place)  # in use: not to be pruned
         return place
     try:
         place.parent.mkdir(parents=True, exist_ok=True)
+        if place.is_dir():
+            if not _is_whole(place):  # looked at again: another process may have been first
+                shutil.rmtree(place, ignore_errors=True)
+        elif place.exists():
+            place.unlink()
         draft = Path(tempfile.mkdtemp(prefix=".draft-", dir=place.parent))
     except OSError as error:
         raise InputError(
@@ -75,14 +85,30 @@ def entry(kind: str, key: str, fill: Callable[[Path], None]) -> Path:
         ) from None
     try:
         fill(draft)
+        (draft / _MANIFEST).write_text(json.dumps(_hashes(draft)))
         with contextlib.suppress(OSError):  # another process was first: its entry is the same
             draft.rename(place)
+        if not _is_whole(place):
+            raise InputError(f"cache entry {place} cannot be made; remove it")
     except OSError as error:
         raise InputError(f"cache folder {root()} cannot be written ({error.strerror})") from error
     finally:
         shutil.rmtree(draft, ignore_errors=True)
     _prune(place.parent)
     return place
+
+
+def _hashes(folder: Path) -> dict[str, str]:
+    return {
+        path.name: digest([path.read_bytes()]) for path in sorted(folder.iterdir()) if path.name != _MANIFEST
+    }
+
+
+def _is_whole(place: Path) -> bool:
+    try:
+        return bool(json.loads((place / _MANIFEST).read_text()) == _hashes(place))
+    except (OSError, ValueError):
+        return False
 
 
 def _prune(folder: Path) -> None:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from fractions import Fraction
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
+from numbers import Integral
+from typing import TYPE_CHECKING, Any
 
 from strapgen.exceptions import InputError, InputTypeError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 #: Steps, samples or records of the longest run: what it holds still fits into some gigabytes.
 MOST = 20_000_000
@@ -50,7 +51,7 @@ def number(what: str, value: str | float | Fraction, *, positive: bool = False) 
     >>> number("step", "0.125", positive=True)
     Fraction(1, 8)
     """
-    text = str(value).strip()
+    text = str(value).strip().replace("_", "?")  # Python reads 1_0 as 10, nobody else does
     try:
         # In double first: exact, a number like 1e-999999999 would be written out digit by digit.
         near = float(Fraction(text) if "/" in text else text)
@@ -73,7 +74,7 @@ def count(what: str, value: Any, *, largest: int | None = None) -> int:
         If it is not one.
     """
     limit = "at least 1" if largest is None else f"from 1 to {largest}"
-    whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+    whole = isinstance(value, Integral) and not isinstance(value, bool)
     if not whole or value < 1 or (largest is not None and value > largest):
         raise InputError(f"{what} is {value!r}; a whole number {limit} is needed")
     return int(value)
@@ -100,7 +101,7 @@ def multiple(what: str, value: Fraction, of: str, unit: Fraction) -> int:
     return int(ratio)
 
 
-def real_array(what: str, value: Any, tail: tuple[int, ...], dtype: Any = np.float64) -> NDArray[Any]:
+def real_array(what: str, value: Any, tail: tuple[int, ...], dtype: Any = float) -> NDArray[Any]:
     """Return `value` as a finite array of `dtype` whose last axes have the shape `tail`.
 
     Raises
@@ -115,6 +116,10 @@ def real_array(what: str, value: Any, tail: tuple[int, ...], dtype: Any = np.flo
     >>> real_array("increments", [[1e-3, 0.0, 0.0]], (3,)).shape
     (1, 3)
     """
+    import numpy as np  # here, so that the command line answers without it
+
+    if np.ma.isMaskedArray(value):
+        raise InputTypeError(f"{what} is a masked array; an array without missing values is needed")
     try:
         array = np.asarray(value)
     except ValueError:

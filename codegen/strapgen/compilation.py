@@ -6,13 +6,14 @@ a second call compiles nothing.
 
 from __future__ import annotations
 
-import contextlib
+import importlib.machinery
 import importlib.util
-import io
+import json
 import os
 import platform
 import shlex
 import shutil
+import subprocess
 import sys
 import sysconfig
 from pathlib import Path
@@ -102,7 +103,7 @@ def _compiled(sources: Sources) -> Any:
     )
     name = f"strapgen_{sources.function.name}"
     folder = cache.entry("builds", key, lambda draft: _compile(sources, name, path, draft))
-    (file,) = folder.iterdir()
+    file = folder / _library(name)
     spec = importlib.util.spec_from_file_location(name, file)
     if spec is None or spec.loader is None:
         raise CompilerError(f"{file} cannot be loaded")
@@ -118,37 +119,49 @@ def _cffi_version() -> str:
 
 
 def _compile(sources: Sources, name: str, path: str, draft: Path) -> None:
-    from cffi import FFI, VerificationError
-
     for file, text in sources.files.items():
         (draft / file).write_text(text)
     header = next(file for file in sources.files if file.endswith(".h"))
-    ffi = FFI()
-    ffi.cdef(_declarations(sources.files[header]))
-    ffi.set_source(
-        name,
-        f'#include "{header}"',
-        sources=[str(draft / file) for file in sources.files if file.endswith(".c")],
-        include_dirs=[str(draft)],
-        extra_compile_args=list(C_FLAGS),
-        libraries=[] if sys.platform == "win32" else ["m"],
+    wanted = {
+        "name": name,
+        "cdef": _declarations(sources.files[header]),
+        "header": header,
+        "sources": [str(draft / file) for file in sources.files if file.endswith(".c")],
+        "flags": C_FLAGS,
+        "libraries": [] if sys.platform == "win32" else ["m"],
+        "folder": str(draft),
+    }
+    # Flags of the environment would change the bits of the result without being seen in the cache's key.
+    environment = {
+        k: v for k, v in os.environ.items() if k not in ("CFLAGS", "CPPFLAGS", "LDFLAGS", "LDSHARED")
+    }
+    done = subprocess.run(
+        [sys.executable, "-P", str(Path(__file__).with_name("extension.py"))],
+        input=json.dumps(wanted),
+        env=environment | {"CC": _chosen_compiler() or path},
+        capture_output=True,
+        text=True,
+        check=False,
     )
-    before = os.environ.get("CC")
-    os.environ["CC"] = _chosen_compiler() or path
-    said = io.StringIO()
-    try:
-        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
-            built = Path(ffi.compile(tmpdir=str(draft)))
-    except VerificationError as error:
-        raise CompilerError(f"{path} failed on {name}: {str(error).splitlines()[0]}") from error
-    finally:
-        if before is None:
-            del os.environ["CC"]
+    built = Path(done.stdout.strip().splitlines()[-1]) if done.stdout.strip() else draft
+    if done.returncode or not built.is_file():
+        said = (done.stderr + done.stdout).splitlines()
+        reasons = (
+            [line.strip() for line in said if "error" in line.lower()] or said[-1:] or ["no output file"]
+        )
+        raise CompilerError(f"{path} failed on {name}: {reasons[0]}")
+    library = draft / _library(name)
+    built.rename(library)
     for leftover in draft.iterdir():
         if leftover.is_dir():
             shutil.rmtree(leftover)
-        elif leftover != built:
+        elif leftover != library:
             leftover.unlink()
+
+
+def _library(name: str) -> str:
+    """Return the file name of a compiled module."""
+    return name + importlib.machinery.EXTENSION_SUFFIXES[0]
 
 
 def _declarations(header: str) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 import sympy as sp
 
 from strapgen.algebra import evaluate
-from strapgen.program import Companions
+from strapgen.companions import Companions
 from strapgen.signal import Signal
 
 

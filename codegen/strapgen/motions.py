@@ -89,7 +89,7 @@ class Motion:
         return result
 
 
-def motion(name: str, **settings: float | str | Fraction) -> Motion:
+def motion(name: str, /, **settings: float | str | Fraction) -> Motion:
     """Return a motion with a closed-form attitude.
 
     Parameters

@@ -35,8 +35,10 @@ def write_files(folder: str | Path, files: Mapping[str, str | bytes]) -> list[Pa
     folder = Path(folder)
     places = [folder / name for name in files]
     drafts: list[tuple[Path, Path]] = []
+    writing = folder
     try:
         for nominal, content in zip(places, files.values(), strict=True):
+            writing = nominal.parent
             nominal.parent.mkdir(parents=True, exist_ok=True)
             if nominal.is_dir():
                 raise InputError(f"{nominal} is a folder; a file is to be written there")
@@ -51,7 +53,7 @@ def write_files(folder: str | Path, files: Mapping[str, str | bytes]) -> list[Pa
         os.umask(umask)
         _put_in_place(drafts, 0o666 & ~umask)
     except OSError as error:
-        raise InputError(f"{folder} cannot be written ({error.strerror})") from None
+        raise InputError(f"{writing} cannot be written ({error.strerror})") from None
     finally:
         for draft_path, _ in drafts:
             with contextlib.suppress(OSError):
@@ -68,7 +70,7 @@ def _put_in_place(drafts: list[tuple[Path, Path]], mode: int) -> None:
             draft.chmod(mode)
             draft.replace(place)
             replaced.append((place, before))
-    except OSError:
+    except BaseException:
         for place, before in replaced:
             with contextlib.suppress(OSError):
                 place.unlink() if before is None else place.write_bytes(before)

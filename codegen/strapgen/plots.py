@@ -29,7 +29,7 @@ def _pyplot() -> Any:
     return pyplot
 
 
-def _save(figure: Any, path: str | Path) -> Path:
+def _image(figure: Any, path: str | Path) -> bytes:
     path = Path(path)
     _pyplot().close(figure)  # pyplot lets go of it, it can still be drawn
     kind = path.suffix.lstrip(".").lower()
@@ -38,7 +38,7 @@ def _save(figure: Any, path: str | Path) -> Path:
         raise InputError(f"plot {path}: file type {kind!r} is not known; allowed: {', '.join(allowed)}")
     image = io.BytesIO()
     figure.savefig(image, format=kind, dpi=150)
-    return output.write_file(path, image.getvalue())
+    return image.getvalue()
 
 
 def _style(axes: Any) -> None:
@@ -50,21 +50,36 @@ def _style(axes: Any) -> None:
 
 
 def plot_run(run: Run, title: str, path: str | Path) -> Path:
-    """Plot the nine errors of a run against time: scale, skew and drift, three axes each.
+    """Plot the nine errors of a run to a file; see `run_image`."""
+    return output.write_file(path, run_image(run, title, path))
+
+
+def plot_history(history: History, elements: Sequence[str], title: str, path: str | Path) -> Path:
+    """Plot an attitude history to a file; see `history_image`."""
+    return output.write_file(path, history_image(history, elements, title, path))
+
+
+def run_image(run: Run, title: str, path: str | Path) -> bytes:
+    """Return the nine errors of a run against time: scale, skew and drift, three axes each.
 
     Parameters
     ----------
     run : Run
     title : str
     path : path
-        Image file; its ending says which kind.
+        File for the image; its ending says which kind.
+
+    Returns
+    -------
+    bytes
+        The content of the file.
 
     Raises
     ------
     MissingExtraError
         If matplotlib is not installed.
     InputError
-        If the kind of image is unknown, or the file cannot be written.
+        If the kind of image is unknown.
     """
     pyplot = _pyplot()
     figure, grid = pyplot.subplots(3, 3, figsize=(12, 8), sharex=True, layout="constrained")
@@ -81,12 +96,12 @@ def plot_run(run: Run, title: str, path: str | Path) -> Path:
             _style(axes)
             if row == 2:
                 axes.set_xlabel("time, s")
-    figure.suptitle(title, fontsize=12)
-    return _save(figure, path)
+    figure.suptitle(title.encode(errors="replace").decode(), fontsize=12)
+    return _image(figure, path)
 
 
-def plot_history(history: History, elements: Sequence[str], title: str, path: str | Path) -> Path:
-    """Plot the elements of an attitude history against time; see `plot_run` for the errors raised."""
+def history_image(history: History, elements: Sequence[str], title: str, path: str | Path) -> bytes:
+    """Return the elements of an attitude history against time; parameters and errors are those of `run_image`."""
     pyplot = _pyplot()
     states = history.states.reshape(len(history.time), -1)
     columns = 3 if len(elements) == 9 else 1
@@ -108,5 +123,5 @@ def plot_history(history: History, elements: Sequence[str], title: str, path: st
         axes.set_ylim(-1.05, 1.05)
     for axes in grid[-1]:
         axes.set_xlabel("time, s")
-    figure.suptitle(title, fontsize=12)
-    return _save(figure, path)
+    figure.suptitle(title.encode(errors="replace").decode(), fontsize=12)
+    return _image(figure, path)

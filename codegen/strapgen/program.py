@@ -14,6 +14,7 @@ from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
+from strapgen.companions import Companions
 from strapgen.signal import Signal
 
 
@@ -96,28 +97,6 @@ class Result:
 
     signal: Signal
     nodes: tuple[Node, ...]
-
-
-@dataclass(frozen=True)
-class Companions:
-    """Kernels that go with an attitude step: what a back end needs beside it.
-
-    Parameters
-    ----------
-    product : str
-        Kernel that advances a state by a transition, and one transition by the next.
-    orthonormalize : str
-        Kernel that restores the state's norm or orthogonality.
-    attitude : str or None
-        Kernel that turns the state into a direction cosine matrix; None where the state is one.
-    identity : tuple of Fraction
-        The state of zero rotation, row-major.
-    """
-
-    product: str
-    orthonormalize: str
-    attitude: str | None
-    identity: tuple[Fraction, ...]
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from strapgen import checks
 from strapgen.backends import Backend
 from strapgen.exceptions import InputError
+from strapgen.simulation import require_finite
 
 Array = NDArray[np.float64]
 
@@ -95,7 +96,9 @@ def _rows(path: Path, names: tuple[str, ...] | None) -> tuple[Array, list[int]]:
 
 def _numbered(reader: Any) -> Iterator[tuple[int, list[str]]]:
     for row in reader:
-        if any(cell.strip() for cell in row):
+        if len(row) > 1 or any(
+            cell.strip() for cell in row
+        ):  # a row of empty cells is a row with data missing
             yield reader.line_num, row
 
 
@@ -126,6 +129,8 @@ def _number(path: Path, line: int, row: list[str], place: int) -> float:
 
 def _intervals(path: Path, time: Array, lines: list[int]) -> tuple[Array, float]:
     """Return the intervals and their median; refuse times that do not rise, and gaps."""
+    if not math.isfinite(float(time[-1]) - float(time[0])):
+        raise InputError(f"{path}: times from {time[0]:g} s to {time[-1]:g} s are too far apart")
     intervals = np.diff(time)
     worst = int(intervals.argmin())
     if intervals[worst] <= 0:
@@ -270,11 +275,7 @@ def propagate(
     used = recording.increments[: steps * backend.increments]
     states = backend.propagate(used.reshape(steps, backend.increments, 3), record_every, every)
     time: Array = recording.start + step * record_every * np.arange(len(states), dtype=np.float64)
-    broken = ~np.isfinite(states.reshape(len(states), -1)).all(axis=1)
-    if broken.any():
-        raise InputError(
-            f"the attitude is not finite from {time[broken][0]:.6g} s on; the increments are too large"
-        )
+    require_finite(states, time)
     return History(time, states, step, unused)
 
 

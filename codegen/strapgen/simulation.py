@@ -62,6 +62,27 @@ def attitude(backend: Backend, states: Any) -> Array:
     return result
 
 
+def require_finite(states: Any, time: Array) -> None:
+    """Refuse a run whose numbers have left the range of its back end.
+
+    Parameters
+    ----------
+    states : array, (N, state shape)
+    time : array, (N,)
+        Time of each state in s.
+
+    Raises
+    ------
+    InputError
+        If a state is not finite; the message says from when on.
+    """
+    broken = ~np.isfinite(states.reshape(len(states), -1)).all(axis=1)
+    if broken.any():
+        raise InputError(
+            f"the attitude is not finite from {time[broken][0]:.6g} s on; the increments are too large for the method"
+        )
+
+
 def simulate(
     backend: Backend,
     motion: Motion,
@@ -92,7 +113,8 @@ def simulate(
     Raises
     ------
     InputError
-        If a time is not finite, not positive, or no multiple of the step.
+        If a time is not finite, not positive, or no multiple of the step, or the attitude leaves the range
+        of the back end's numbers.
 
     Examples
     --------
@@ -112,8 +134,10 @@ def simulate(
     record_every = checks.multiple("record", interval, "step", h)
     if record_every > steps:
         raise InputError(f"record {float(interval):g} s is longer than the duration {float(total):g} s")
+    checks.multiple("duration", total, "record interval", interval)
     states = backend.propagate(motion.increments(h, steps, backend.increments), record_every, every)
     time: Array = np.arange(len(states), dtype=np.float64) * float(interval)
+    require_finite(states, time)
     true = motion.attitude(time)
     computed = attitude(backend, states)
     return Run(time, computed, true, *evaluator("error-matrix")(computed, true))

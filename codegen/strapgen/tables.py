@@ -110,7 +110,7 @@ TABLES = (
 _SIXTEENTHS = {".75e-6": ".12e-4", ".225e-5": ".36e-4"}
 
 #: The thesis gives table 3 as fractions, whose exactness it does not state; its other tables have two digits.
-_AS_GOOD_AS_A_FRACTION = 5e-3
+_FRACTION_TOLERANCE = 5e-3
 
 
 @dataclass(frozen=True)
@@ -147,8 +147,7 @@ class Entry:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the entry as plain JSON data, the thesis's figure as a number and as it is printed."""
-        data = {key: value for key, value in asdict(self).items() if value is not None}
-        return data | {"thesis": float(Fraction(self.thesis)), "thesis_printed": self.thesis}
+        return asdict(self) | {"thesis": float(Fraction(self.thesis)), "thesis_printed": self.thesis}
 
 
 def agrees(value: float, printed: str) -> bool:
@@ -168,7 +167,7 @@ def agrees(value: float, printed: str) -> bool:
     if printed in _SIXTEENTHS:
         return agrees(16 * value, _SIXTEENTHS[printed])
     if "/" in printed:
-        return math.isclose(value, float(Fraction(printed)), rel_tol=_AS_GOOD_AS_A_FRACTION)
+        return math.isclose(value, float(Fraction(printed)), rel_tol=_FRACTION_TOLERANCE)
     wanted = Decimal(printed)
     exponent = -2 if wanted == 1 else wanted.as_tuple().exponent
     assert isinstance(exponent, int)
@@ -195,9 +194,9 @@ def entries(table: Table, backend_name: str) -> Iterator[Entry]:
         printed = table.printed[algorithm][ORDERS.index(order)]
         note = None
         if printed in _SIXTEENTHS:
+            rounded = _SIXTEENTHS[printed]
             note = (
-                f"The thesis's {printed} is a sixteenth of its rounded {_SIXTEENTHS[printed]} and only as exact as "
-                f"that; the figure is {normalised:.4g}."
+                f"The thesis's {printed} is a sixteenth of its rounded {rounded} and only as exact as that."
             )
         if table.number == 2 and (algorithm, order) == ("dcm", 1):
             plain = drift("dcm", 1, None)

@@ -8,8 +8,8 @@
  * The state must not be zero.
  * Operations of one call: 3 add, 8 multiply, 1 divide, 1 sqrt; 1 temporaries.
  *
- * No heap, no global state, reentrant. Every input is read before any output is written: an output may
- * be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is written: an
+ * output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef CAYLEY_KLEIN_NORMALIZE_H
 #define CAYLEY_KLEIN_NORMALIZE_H
@@ -28,7 +28,9 @@ extern "C" {
  */
 void cayley_klein_normalize(const double state[4], double next[4]);
 
-/* `count` calls on arrays of samples one after the other. */
+/* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
+ * whose samples have the same size; otherwise they must not overlap.
+ */
 void cayley_klein_normalize_array(size_t count, const double *state, double *next);
 
 #ifdef __cplusplus

@@ -7,8 +7,8 @@
  *     B.
  * Operations of one call: 8 multiply, 3 function; 2 temporaries.
  *
- * No heap, no global state, reentrant. Every input is read before any output is written: an output may
- * be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is written: an
+ * output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef CONING_INCREMENTS_H
 #define CONING_INCREMENTS_H
@@ -34,7 +34,9 @@ extern "C" {
 void coning_increments(double middle, double width, double a, double b, double g, double
     increment[3]);
 
-/* `count` calls on arrays of samples one after the other. */
+/* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
+ * whose samples have the same size; otherwise they must not overlap.
+ */
 void coning_increments_array(size_t count, const double *middle, const double *width, const double
     *a, const double *b, const double *g, double *increment);
 

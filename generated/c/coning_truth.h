@@ -7,8 +7,8 @@
  *     and appendix A.
  * Operations of one call: 11 add, 29 multiply, 1 sqrt, 3 negate, 4 function; 21 temporaries.
  *
- * No heap, no global state, reentrant. Every input is read before any output is written: an output may
- * be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is written: an
+ * output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef CONING_TRUTH_H
 #define CONING_TRUTH_H
@@ -32,7 +32,9 @@ extern "C" {
  */
 void coning_truth(double time, double a, double b, double g, double rate[3], double attitude[9]);
 
-/* `count` calls on arrays of samples one after the other. */
+/* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
+ * whose samples have the same size; otherwise they must not overlap.
+ */
 void coning_truth_array(size_t count, const double *time, const double *a, const double *b, const
     double *g, double *rate, double *attitude);
 

@@ -7,8 +7,8 @@
  *     and appendix A.
  * Operations of one call: 13 add, 23 multiply, 1 sqrt, 2 negate, 2 function; 19 temporaries.
  *
- * No heap, no global state, reentrant. Every input is read before any output is written: an output may
- * be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is written: an
+ * output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef CONSTANT_TRUTH_H
 #define CONSTANT_TRUTH_H
@@ -29,7 +29,9 @@ extern "C" {
  */
 void constant_truth(double time, double x, double y, double z, double rate[3], double attitude[9]);
 
-/* `count` calls on arrays of samples one after the other. */
+/* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
+ * whose samples have the same size; otherwise they must not overlap.
+ */
 void constant_truth_array(size_t count, const double *time, const double *x, const double *y, const
     double *z, double *rate, double *attitude);
 

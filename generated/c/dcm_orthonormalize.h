@@ -8,8 +8,8 @@
  * Made for a matrix near a rotation: all products of its transpose and itself near the identity.
  * Operations of one call: 24 add, 36 multiply, 3 divide, 3 sqrt; 12 temporaries.
  *
- * No heap, no global state, reentrant. Every input is read before any output is written: an output may
- * be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is written: an
+ * output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef DCM_ORTHONORMALIZE_H
 #define DCM_ORTHONORMALIZE_H
@@ -28,7 +28,9 @@ extern "C" {
  */
 void dcm_orthonormalize(const double computed[9], double orthonormalized[9]);
 
-/* `count` calls on arrays of samples one after the other. */
+/* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
+ * whose samples have the same size; otherwise they must not overlap.
+ */
 void dcm_orthonormalize_array(size_t count, const double *computed, double *orthonormalized);
 
 #ifdef __cplusplus

@@ -9,8 +9,8 @@
  * condition.
  * Operations of one call: 87 add, 129 multiply, 1 divide, 6 sqrt, 2 negate, 1 select, 3 function; 54 temporaries.
  *
- * No heap, no global state, reentrant. Every input is read before any output is written: an output may
- * be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is written: an
+ * output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef DCM_ORTHONORMALIZE_OPTIMAL_H
 #define DCM_ORTHONORMALIZE_OPTIMAL_H
@@ -29,7 +29,9 @@ extern "C" {
  */
 void dcm_orthonormalize_optimal(const double computed[9], double orthonormalized[9]);
 
-/* `count` calls on arrays of samples one after the other. */
+/* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
+ * whose samples have the same size; otherwise they must not overlap.
+ */
 void dcm_orthonormalize_optimal_array(size_t count, const double *computed, double
     *orthonormalized);
 

@@ -7,8 +7,8 @@
  *     a1 = e4, a2 = e1, a3 = e2, a4 = e3.
  * Operations of one call: none; 0 temporaries.
  *
- * No heap, no global state, reentrant. Every input is read before any output is written: an output may
- * be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is written: an
+ * output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef EULER_FROM_CAYLEY_KLEIN_H
 #define EULER_FROM_CAYLEY_KLEIN_H
@@ -27,7 +27,9 @@ extern "C" {
  */
 void euler_from_cayley_klein(const double state[4], double converted[4]);
 
-/* `count` calls on arrays of samples one after the other. */
+/* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
+ * whose samples have the same size; otherwise they must not overlap.
+ */
 void euler_from_cayley_klein_array(size_t count, const double *state, double *converted);
 
 #ifdef __cplusplus

@@ -7,8 +7,8 @@
  *     B.
  * Operations of one call: 8 add, 26 multiply; 4 temporaries.
  *
- * No heap, no global state, reentrant. Every input is read before any output is written: an output may
- * be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is written: an
+ * output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef POLYNOMIAL_INCREMENTS_H
 #define POLYNOMIAL_INCREMENTS_H
@@ -38,7 +38,9 @@ extern "C" {
 void polynomial_increments(double middle, double width, double a0, double a1, double a2, double a3,
     double a4, double increment[3]);
 
-/* `count` calls on arrays of samples one after the other. */
+/* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
+ * whose samples have the same size; otherwise they must not overlap.
+ */
 void polynomial_increments_array(size_t count, const double *middle, const double *width, const
     double *a0, const double *a1, const double *a2, const double *a3, const double *a4, double
     *increment);

@@ -7,8 +7,8 @@
  *     and appendix A.
  * Operations of one call: 8 add, 17 multiply, 1 negate, 2 function; 6 temporaries.
  *
- * No heap, no global state, reentrant. Every input is read before any output is written: an output may
- * be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is written: an
+ * output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef POLYNOMIAL_TRUTH_H
 #define POLYNOMIAL_TRUTH_H
@@ -37,7 +37,9 @@ extern "C" {
 void polynomial_truth(double time, double a0, double a1, double a2, double a3, double a4, double
     rate[3], double attitude[9]);
 
-/* `count` calls on arrays of samples one after the other. */
+/* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
+ * whose samples have the same size; otherwise they must not overlap.
+ */
 void polynomial_truth_array(size_t count, const double *time, const double *a0, const double *a1,
     const double *a2, const double *a3, const double *a4, double *rate, double *attitude);
 

@@ -7,8 +7,8 @@
  *     B.
  * Operations of one call: 6 multiply, 2 function; 0 temporaries.
  *
- * No heap, no global state, reentrant. Every input is read before any output is written: an output may
- * be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is written: an
+ * output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef SINUSOIDAL_INCREMENTS_H
 #define SINUSOIDAL_INCREMENTS_H
@@ -29,7 +29,9 @@ extern "C" {
  */
 void sinusoidal_increments(double middle, double width, double a, double b, double increment[3]);
 
-/* `count` calls on arrays of samples one after the other. */
+/* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
+ * whose samples have the same size; otherwise they must not overlap.
+ */
 void sinusoidal_increments_array(size_t count, const double *middle, const double *width, const
     double *a, const double *b, double *increment);
 

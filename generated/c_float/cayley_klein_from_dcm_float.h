@@ -9,8 +9,8 @@
  * The scalar part of the result is not negative.
  * Operations of one call: 13 add, 8 multiply, 1 divide, 1 sqrt, 16 select; 18 temporaries.
  *
- * No heap, no global state, reentrant. Every input is read before any output is written: an output may
- * be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is written: an
+ * output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef CAYLEY_KLEIN_FROM_DCM_FLOAT_H
 #define CAYLEY_KLEIN_FROM_DCM_FLOAT_H
@@ -29,7 +29,9 @@ extern "C" {
  */
 void cayley_klein_from_dcm_float(const float state[9], float converted[4]);
 
-/* `count` calls on arrays of samples one after the other. */
+/* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
+ * whose samples have the same size; otherwise they must not overlap.
+ */
 void cayley_klein_from_dcm_float_array(size_t count, const float *state, float *converted);
 
 #ifdef __cplusplus

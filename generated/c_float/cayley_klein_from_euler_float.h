@@ -7,8 +7,8 @@
  *     a1 = e4, a2 = e1, a3 = e2, a4 = e3.
  * Operations of one call: none; 0 temporaries.
  *
- * No heap, no global state, reentrant. Every input is read before any output is written: an output may
- * be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is written: an
+ * output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef CAYLEY_KLEIN_FROM_EULER_FLOAT_H
 #define CAYLEY_KLEIN_FROM_EULER_FLOAT_H
@@ -27,7 +27,9 @@ extern "C" {
  */
 void cayley_klein_from_euler_float(const float state[4], float converted[4]);
 
-/* `count` calls on arrays of samples one after the other. */
+/* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
+ * whose samples have the same size; otherwise they must not overlap.
+ */
 void cayley_klein_from_euler_float_array(size_t count, const float *state, float *converted);
 
 #ifdef __cplusplus

@@ -8,8 +8,8 @@
  *     third-order method: W. Kutta, Z. Math. Phys. 46 (1901) 435-453.
  * Operations of one call: 49 add, 64 multiply, 2 negate; 34 temporaries.
  *
- * No heap, no global state, reentrant. Every input is read before any output is written: an output may
- * be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is written: an
+ * output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef CAYLEY_KLEIN_RK3_2_FLOAT_H
 #define CAYLEY_KLEIN_RK3_2_FLOAT_H
@@ -24,13 +24,16 @@ extern "C" {
  * in   state[4]: Cayley-Klein parameters, body to reference, scalar first; unit 1; a_s, a_x, a_y,
  *      a_z; any finite number; at most 1 in magnitude in proper use.
  * in   increments[6]: angle increments of the step, body axes, oldest first: exact integrals of the
- *      body rate; unit rad; d1_x, ..., d2_z; any finite number.
+ *      body rate; unit rad; d1_x, ..., d2_z; any finite number; at most 1 in magnitude in proper
+ *      use.
  * out  next[4]: Cayley-Klein parameters, body to reference, scalar first, after the step; unit 1;
  *      next_s, next_x, next_y, next_z.
  */
 void cayley_klein_rk3_2_float(const float state[4], const float increments[6], float next[4]);
 
-/* `count` calls on arrays of samples one after the other. */
+/* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
+ * whose samples have the same size; otherwise they must not overlap.
+ */
 void cayley_klein_rk3_2_float_array(size_t count, const float *state, const float *increments, float
     *next);
 

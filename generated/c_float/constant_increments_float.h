@@ -7,8 +7,8 @@
  *     B.
  * Operations of one call: 3 multiply; 0 temporaries.
  *
- * No heap, no global state, reentrant. Every input is read before any output is written: an output may
- * be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is written: an
+ * output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef CONSTANT_INCREMENTS_FLOAT_H
 #define CONSTANT_INCREMENTS_FLOAT_H
@@ -31,7 +31,9 @@ extern "C" {
 void constant_increments_float(float middle, float width, float x, float y, float z, float
     increment[3]);
 
-/* `count` calls on arrays of samples one after the other. */
+/* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
+ * whose samples have the same size; otherwise they must not overlap.
+ */
 void constant_increments_float_array(size_t count, const float *middle, const float *width, const
     float *x, const float *y, const float *z, float *increment);
 

@@ -7,8 +7,8 @@
  * The result is |state|^2 times a rotation: a rotation for a state of length 1.
  * Operations of one call: 14 add, 17 multiply, 2 negate; 13 temporaries.
  *
- * No heap, no global state, reentrant. Every input is read before any output is written: an output may
- * be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is written: an
+ * output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef DCM_FROM_CAYLEY_KLEIN_FLOAT_H
 #define DCM_FROM_CAYLEY_KLEIN_FLOAT_H
@@ -26,7 +26,9 @@ extern "C" {
  */
 void dcm_from_cayley_klein_float(const float state[4], float attitude[9]);
 
-/* `count` calls on arrays of samples one after the other. */
+/* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
+ * whose samples have the same size; otherwise they must not overlap.
+ */
 void dcm_from_cayley_klein_float_array(size_t count, const float *state, float *attitude);
 
 #ifdef __cplusplus

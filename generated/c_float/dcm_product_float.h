@@ -7,8 +7,8 @@
  *     equation (2.1): dC/dt = C skew(w).
  * Operations of one call: 18 add, 27 multiply; 0 temporaries.
  *
- * No heap, no global state, reentrant. Every input is read before any output is written: an output may
- * be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is written: an
+ * output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef DCM_PRODUCT_FLOAT_H
 #define DCM_PRODUCT_FLOAT_H
@@ -28,7 +28,9 @@ extern "C" {
  */
 void dcm_product_float(const float state[9], const float transition[9], float next[9]);
 
-/* `count` calls on arrays of samples one after the other. */
+/* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
+ * whose samples have the same size; otherwise they must not overlap.
+ */
 void dcm_product_float_array(size_t count, const float *state, const float *transition, float
     *next);
 

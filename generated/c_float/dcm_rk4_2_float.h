@@ -8,8 +8,8 @@
  *     Runge-Kutta method: thesis, chapter 3 B.
  * Operations of one call: 87 add, 114 multiply, 9 negate; 72 temporaries.
  *
- * No heap, no global state, reentrant. Every input is read before any output is written: an output may
- * be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is written: an
+ * output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef DCM_RK4_2_FLOAT_H
 #define DCM_RK4_2_FLOAT_H
@@ -24,13 +24,16 @@ extern "C" {
  * in   state[9]: direction cosine matrix, body to reference; unit 1; C_11, ..., C_33; any finite
  *      number; at most 1 in magnitude in proper use.
  * in   increments[6]: angle increments of the step, body axes, oldest first: exact integrals of the
- *      body rate; unit rad; d1_x, ..., d2_z; any finite number.
+ *      body rate; unit rad; d1_x, ..., d2_z; any finite number; at most 1 in magnitude in proper
+ *      use.
  * out  next[9]: direction cosine matrix, body to reference, after the step; unit 1; next_11, ...,
  *      next_33.
  */
 void dcm_rk4_2_float(const float state[9], const float increments[6], float next[9]);
 
-/* `count` calls on arrays of samples one after the other. */
+/* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
+ * whose samples have the same size; otherwise they must not overlap.
+ */
 void dcm_rk4_2_float_array(size_t count, const float *state, const float *increments, float *next);
 
 /* A function that restores the constraint of a state, in place. */

@@ -8,8 +8,8 @@
  * The true matrix is a rotation.
  * Operations of one call: 27 add, 33 multiply; 6 temporaries.
  *
- * No heap, no global state, reentrant. Every input is read before any output is written: an output may
- * be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is written: an
+ * output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef ERROR_MATRIX_FLOAT_H
 #define ERROR_MATRIX_FLOAT_H
@@ -34,7 +34,9 @@ extern "C" {
 void error_matrix_float(const float computed[9], const float truth[9], float error[9], float
     scale[3], float skew[3], float drift[3]);
 
-/* `count` calls on arrays of samples one after the other. */
+/* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
+ * whose samples have the same size; otherwise they must not overlap.
+ */
 void error_matrix_float_array(size_t count, const float *computed, const float *truth, float *error,
     float *scale, float *skew, float *drift);
 

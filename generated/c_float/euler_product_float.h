@@ -7,8 +7,8 @@
  *     de/dt = 1/2 e (w, 0), quaternion product.
  * Operations of one call: 12 add, 16 multiply; 0 temporaries.
  *
- * No heap, no global state, reentrant. Every input is read before any output is written: an output may
- * be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is written: an
+ * output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef EULER_PRODUCT_FLOAT_H
 #define EULER_PRODUCT_FLOAT_H
@@ -29,7 +29,9 @@ extern "C" {
  */
 void euler_product_float(const float state[4], const float transition[4], float next[4]);
 
-/* `count` calls on arrays of samples one after the other. */
+/* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
+ * whose samples have the same size; otherwise they must not overlap.
+ */
 void euler_product_float_array(size_t count, const float *state, const float *transition, float
     *next);
 

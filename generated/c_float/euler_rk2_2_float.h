@@ -8,8 +8,8 @@
  *     thesis, chapter 3 B.
  * Operations of one call: 30 add, 41 multiply, 1 negate; 14 temporaries.
  *
- * No heap, no global state, reentrant. Every input is read before any output is written: an output may
- * be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is written: an
+ * output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef EULER_RK2_2_FLOAT_H
 #define EULER_RK2_2_FLOAT_H
@@ -24,13 +24,16 @@ extern "C" {
  * in   state[4]: Euler parameters, body to reference, scalar last; unit 1; e_x, e_y, e_z, e_s; any
  *      finite number; at most 1 in magnitude in proper use.
  * in   increments[6]: angle increments of the step, body axes, oldest first: exact integrals of the
- *      body rate; unit rad; d1_x, ..., d2_z; any finite number.
+ *      body rate; unit rad; d1_x, ..., d2_z; any finite number; at most 1 in magnitude in proper
+ *      use.
  * out  next[4]: Euler parameters, body to reference, scalar last, after the step; unit 1; next_x,
  *      next_y, next_z, next_s.
  */
 void euler_rk2_2_float(const float state[4], const float increments[6], float next[4]);
 
-/* `count` calls on arrays of samples one after the other. */
+/* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
+ * whose samples have the same size; otherwise they must not overlap.
+ */
 void euler_rk2_2_float_array(size_t count, const float *state, const float *increments, float
     *next);
 

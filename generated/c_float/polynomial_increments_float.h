@@ -7,8 +7,8 @@
  *     B.
  * Operations of one call: 8 add, 26 multiply; 4 temporaries.
  *
- * No heap, no global state, reentrant. Every input is read before any output is written: an output may
- * be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is written: an
+ * output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef POLYNOMIAL_INCREMENTS_FLOAT_H
 #define POLYNOMIAL_INCREMENTS_FLOAT_H
@@ -38,7 +38,9 @@ extern "C" {
 void polynomial_increments_float(float middle, float width, float a0, float a1, float a2, float a3,
     float a4, float increment[3]);
 
-/* `count` calls on arrays of samples one after the other. */
+/* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
+ * whose samples have the same size; otherwise they must not overlap.
+ */
 void polynomial_increments_float_array(size_t count, const float *middle, const float *width, const
     float *a0, const float *a1, const float *a2, const float *a3, const float *a4, float
     *increment);

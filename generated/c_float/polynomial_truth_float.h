@@ -7,8 +7,8 @@
  *     and appendix A.
  * Operations of one call: 8 add, 17 multiply, 1 negate, 2 function; 6 temporaries.
  *
- * No heap, no global state, reentrant. Every input is read before any output is written: an output may
- * be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is written: an
+ * output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef POLYNOMIAL_TRUTH_FLOAT_H
 #define POLYNOMIAL_TRUTH_FLOAT_H
@@ -37,7 +37,9 @@ extern "C" {
 void polynomial_truth_float(float time, float a0, float a1, float a2, float a3, float a4, float
     rate[3], float attitude[9]);
 
-/* `count` calls on arrays of samples one after the other. */
+/* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
+ * whose samples have the same size; otherwise they must not overlap.
+ */
 void polynomial_truth_float_array(size_t count, const float *time, const float *a0, const float *a1,
     const float *a2, const float *a3, const float *a4, float *rate, float *attitude);
 

@@ -7,8 +7,8 @@
  *     and appendix A.
  * Operations of one call: 4 multiply, 1 negate, 4 function; 4 temporaries.
  *
- * No heap, no global state, reentrant. Every input is read before any output is written: an output may
- * be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is written: an
+ * output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef SINUSOIDAL_TRUTH_FLOAT_H
 #define SINUSOIDAL_TRUTH_FLOAT_H
@@ -28,7 +28,9 @@ extern "C" {
  */
 void sinusoidal_truth_float(float time, float a, float b, float rate[3], float attitude[9]);
 
-/* `count` calls on arrays of samples one after the other. */
+/* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
+ * whose samples have the same size; otherwise they must not overlap.
+ */
 void sinusoidal_truth_float_array(size_t count, const float *time, const float *a, const float *b,
     float *rate, float *attitude);
 

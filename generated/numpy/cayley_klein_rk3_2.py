@@ -24,7 +24,7 @@ def cayley_klein_rk3_2(state, increments, out=None):
         Elements: a_s, a_x, a_y, a_z.
     increments : array, (..., 2, 3)
         angle increments of the step, body axes, oldest first: exact integrals of the body rate,
-        unit rad; any finite number.
+        unit rad; any finite number; at most 1 in magnitude in proper use.
         Elements: d1_x, ..., d2_z.
     out : array, optional
         Where the result is stored; it may be an input.
@@ -115,7 +115,7 @@ def cayley_klein_rk3_2_transition(increments, out=None):
     ----------
     increments : array, (..., 2, 3)
         angle increments of the step, body axes, oldest first: exact integrals of the body rate,
-        unit rad; any finite number.
+        unit rad; any finite number; at most 1 in magnitude in proper use.
         Elements: d1_x, ..., d2_z.
     out : array, optional
         Where the result is stored; it may be an input.

@@ -24,7 +24,7 @@ def dcm_rk4_2(state, increments, out=None):
         Elements: C_11, ..., C_33.
     increments : array, (..., 2, 3)
         angle increments of the step, body axes, oldest first: exact integrals of the body rate,
-        unit rad; any finite number.
+        unit rad; any finite number; at most 1 in magnitude in proper use.
         Elements: d1_x, ..., d2_z.
     out : array, optional
         Where the result is stored; it may be an input.
@@ -180,7 +180,7 @@ def dcm_rk4_2_transition(increments, out=None):
     ----------
     increments : array, (..., 2, 3)
         angle increments of the step, body axes, oldest first: exact integrals of the body rate,
-        unit rad; any finite number.
+        unit rad; any finite number; at most 1 in magnitude in proper use.
         Elements: d1_x, ..., d2_z.
     out : array, optional
         Where the result is stored; it may be an input.

@@ -2,18 +2,38 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from importlib import import_module
+from typing import NamedTuple
+
 from strapgen import catalogue, checks, library
 from strapgen.backends.protocol import Backend, Evaluator
 from strapgen.targets import Sources
 
-__all__ = ["BACKENDS", "Backend", "Evaluator", "backend", "build", "evaluator"]
+__all__ = ["BACKENDS", "Backend", "Entry", "Evaluator", "backend", "build", "evaluator"]
+
+
+class Entry(NamedTuple):
+    """A back end: what it is, and the module and classes of this package that run it."""
+
+    title: str
+    module: str
+    evaluator: str
+    backend: str
+
 
 #: Back ends by name; each runs the target of the same name.
 BACKENDS = {
-    "numpy": "generated numpy code in double",
-    "c": "generated C in double, compiled",
-    "c-float": "generated C in float, compiled",
+    "numpy": Entry("generated numpy code in double", "numpy", "NumpyEvaluator", "NumpyBackend"),
+    "c": Entry("generated C in double, compiled", "c", "CEvaluator", "CBackend"),
+    "c-float": Entry("generated C in float, compiled", "c", "CEvaluator", "CBackend"),
 }
+
+
+def _loaded(target: str) -> tuple[type[Evaluator], type[Backend]]:
+    entry = BACKENDS[target]
+    module = import_module(f"{__name__}.{entry.module}")
+    return getattr(module, entry.evaluator), getattr(module, entry.backend)
 
 
 def evaluator(kernel: str, backend: str = "numpy") -> Evaluator:
@@ -34,6 +54,8 @@ def evaluator(kernel: str, backend: str = "numpy") -> Evaluator:
     ------
     InputError
         If a name is unknown.
+    CompilerError
+        If the back end needs a C compiler and there is none.
 
     Examples
     --------
@@ -43,6 +65,7 @@ def evaluator(kernel: str, backend: str = "numpy") -> Evaluator:
            [ 0.,  0.,  1.]])
     """
     checks.choice("backend", backend, BACKENDS)
+    checks.choice("kernel", kernel, catalogue.KERNELS)
     return _evaluator(library.sources(catalogue.choose(kernel), backend))
 
 
@@ -116,20 +139,10 @@ def build(sources: Sources, orthonormalization: str | None = None) -> Backend:
     def evaluate(kernel: str) -> Evaluator:
         return _evaluator(sources) if kernel == sources.kernel else evaluator(kernel, sources.target)
 
-    if sources.target == "numpy":
-        from strapgen.backends.numpy import NumpyBackend
-
-        return NumpyBackend(sources, evaluate, orthonormalization)
-    from strapgen.backends.c import CBackend
-
-    return CBackend(sources, evaluate, orthonormalization)
+    make = _loaded(sources.target)[1]
+    return make(sources, evaluate, orthonormalization)
 
 
 def _evaluator(sources: Sources) -> Evaluator:
-    if sources.target == "numpy":
-        from strapgen.backends.numpy import NumpyEvaluator
-
-        return NumpyEvaluator(sources)
-    from strapgen.backends.c import CEvaluator
-
-    return CEvaluator(sources)
+    make: Callable[[Sources], Evaluator] = _loaded(sources.target)[0]
+    return make(sources)

@@ -199,9 +199,9 @@ class Backend(ABC):
         d = checks.real_array("increments", increments, (self.increments, 3), self.dtype)
         if d.ndim < 3:
             raise InputError(f"increments has shape {d.shape}; (..., steps, {self.increments}, 3) is needed")
-        checks.count("record_every", record_every)
+        checks.count("record_every", record_every, largest=checks.MOST)
         if orthonormalize_every is not None:
-            checks.count("orthonormalize_every", orthonormalize_every)
+            checks.count("orthonormalize_every", orthonormalize_every, largest=checks.MOST)
         start = self.identity if initial is None else initial
         start = checks.real_array("initial", start, self.state_shape, self.dtype)
         batch, steps = d.shape[:-3], d.shape[-3]
@@ -212,6 +212,8 @@ class Backend(ABC):
                 f"initial has shape {start.shape}; it must broadcast to {batch + self.state_shape}"
             ) from None
         runs = int(np.prod(batch, dtype=int))
+        if not runs:
+            return np.empty((*batch, 1 + steps // record_every, *self.state_shape), self.dtype)
         history = self._propagate(
             d.reshape(runs, steps, self.increments, 3),
             record_every,

@@ -10,6 +10,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, NamedTuple
 
 from strapgen import checks
+from strapgen.catalogue.tableaux import TABLEAUX
 from strapgen.exceptions import InputError
 
 if TYPE_CHECKING:
@@ -23,22 +24,17 @@ ALGORITHMS = {
 }
 
 #: Integration methods.
-METHODS = {
-    "rk1": "Euler's method, first order",
-    "rk2": "Heun's method, second order",
-    "rk3": "Kutta's method, third order",
-    "rk4": "the classical Runge-Kutta method, fourth order",
-}
+METHODS = {name: tableau.title for name, tableau in TABLEAUX.items()}
 
 #: Most angle increments that one step may take.
 MOST_INCREMENTS = 8
 
-#: Motions with a closed-form attitude, and their parameters.
+#: Motions with a closed-form attitude, and the unit of each of their parameters.
 MOTIONS = {
-    "constant": ("x", "y", "z"),
-    "sinusoidal": ("a", "b"),
-    "coning": ("a", "b", "g"),
-    "polynomial": ("a0", "a1", "a2", "a3", "a4"),
+    "constant": dict.fromkeys("xyz", "rad/s"),
+    "sinusoidal": dict.fromkeys("ab", "rad/s"),
+    "coning": dict.fromkeys("abg", "rad/s"),
+    "polynomial": {"a0": "rad/s", **{f"a{k}": f"rad/s^{k + 1}" for k in range(1, 5)}},
 }
 
 
@@ -162,6 +158,5 @@ def derive(choice: Choice) -> Kernel:
         return kernel
     from strapgen.catalogue.kinematics import KINEMATICS
     from strapgen.catalogue.runge_kutta import step
-    from strapgen.catalogue.tableaux import TABLEAUX
 
     return step(KINEMATICS[choice.name], TABLEAUX[choice.method], choice.increments)

@@ -96,9 +96,7 @@ EULER = Kinematics(
     title="Euler parameters",
     source=f"{THESIS}, chapter 2: de/dt = 1/2 e (w, 0), quaternion product",
     state=Signal.labelled("state", "e", "xyzs", meaning=EULER_MEANING, bound=UNIT),
-    transition=Signal.labelled(
-        "transition", "p", "xyzs", meaning="the step applied to the identity"
-    ),
+    transition=Signal.labelled("transition", "p", "xyzs", meaning="the step applied to the identity"),
     next=Signal.labelled("next", "next", "xyzs", meaning=f"{EULER_MEANING}, after the step", bound=UNIT),
     identity=sp.Matrix([0, 0, 0, 1]),
     scale=sp.Rational(1, 2),
@@ -113,9 +111,7 @@ CAYLEY_KLEIN = Kinematics(
     title="Cayley-Klein parameters",
     source=f"{THESIS}, chapter 2: dU/dt = (i/2) (w . s) U, s the Pauli matrices",
     state=Signal.labelled("state", "a", "sxyz", meaning=CAYLEY_KLEIN_MEANING, bound=UNIT),
-    transition=Signal.labelled(
-        "transition", "p", "sxyz", meaning="the step applied to the identity"
-    ),
+    transition=Signal.labelled("transition", "p", "sxyz", meaning="the step applied to the identity"),
     next=Signal.labelled(
         "next", "next", "sxyz", meaning=f"{CAYLEY_KLEIN_MEANING}, after the step", bound=UNIT
     ),

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from strapgen import algebra
+from strapgen import algebra, catalogue
 from strapgen.catalogue.kinematics import DCM_MEANING, THESIS
 from strapgen.kernel import Kernel, KernelBuilder
 from strapgen.signal import Signal
@@ -19,15 +19,13 @@ Formula = Callable[..., sp.Matrix]
 
 
 @dataclass(frozen=True)
-class Motion:
+class MotionModel:
     """A motion in closed form.
 
     Parameters
     ----------
     name, title : str
         Name on the command line, one line that describes it.
-    parameters : dict of str to str
-        Unit of every parameter, in SI.
     rate : callable
         ``rate(t, *parameters)``: body rate in rad/s.
     increment : callable
@@ -38,7 +36,6 @@ class Motion:
 
     name: str
     title: str
-    parameters: dict[str, str]
     rate: Formula
     increment: Formula
     attitude: Formula
@@ -48,10 +45,6 @@ def _about_y(angle: sp.Expr) -> sp.Matrix:
     """Return the rotation about y; cosine and sine of one angle are cheaper than the general form."""
     c, s = sp.cos(angle), sp.sin(angle)
     return sp.Matrix([[c, 0, s], [0, 1, 0], [-s, 0, c]])
-
-
-def _polynomial_rate(t: sp.Expr, *a: sp.Expr) -> sp.Expr:
-    return sp.Add(*(coefficient * t**k for k, coefficient in enumerate(a)))
 
 
 def _polynomial_angle(t: sp.Expr, *a: sp.Expr) -> sp.Expr:
@@ -75,37 +68,33 @@ def _coning_attitude(t: sp.Expr, a: sp.Expr, b: sp.Expr, g: sp.Expr) -> sp.Matri
 MOTIONS = {
     motion.name: motion
     for motion in (
-        Motion(
+        MotionModel(
             "constant",
             "constant body rate on three axes",
-            {"x": "rad/s", "y": "rad/s", "z": "rad/s"},
             rate=lambda t, x, y, z: sp.Matrix([x, y, z]),
             increment=lambda m, d, x, y, z: d * sp.Matrix([x, y, z]),
             attitude=lambda t, x, y, z: algebra.rotation(t * sp.Matrix([x, y, z])),
         ),
-        Motion(
+        MotionModel(
             "sinusoidal",
             "rate a cos(b t) on the y axis",
-            {"a": "rad/s", "b": "rad/s"},
             rate=lambda t, a, b: sp.Matrix([0, a * sp.cos(b * t), 0]),
             increment=lambda m, d, a, b: sp.Matrix([0, a * _chord(m, d, b, sp.cos), 0]),
             attitude=lambda t, a, b: _about_y(a * t * sp.sinc(b * t)),
         ),
-        Motion(
+        MotionModel(
             "coning",
             "coning on a constant pitch rate: rate (a sin(b t), g, a cos(b t))",
-            {"a": "rad/s", "b": "rad/s", "g": "rad/s"},
             rate=lambda t, a, b, g: sp.Matrix([a * sp.sin(b * t), g, a * sp.cos(b * t)]),
             increment=lambda m, d, a, b, g: sp.Matrix(
                 [a * _chord(m, d, b, sp.sin), g * d, a * _chord(m, d, b, sp.cos)]
             ),
             attitude=_coning_attitude,
         ),
-        Motion(
+        MotionModel(
             "polynomial",
             "rate a0 + a1 t + a2 t^2 + a3 t^3 + a4 t^4 on the y axis",
-            {"a0": "rad/s", "a1": "rad/s^2", "a2": "rad/s^3", "a3": "rad/s^4", "a4": "rad/s^5"},
-            rate=lambda t, *a: sp.Matrix([0, _polynomial_rate(t, *a), 0]),
+            rate=lambda t, *a: sp.Matrix([0, sp.diff(_polynomial_angle(t, *a), t), 0]),
             increment=lambda m, d, *a: sp.Matrix([0, _polynomial_increment(m, d, *a), 0]),
             attitude=lambda t, *a: _about_y(_polynomial_angle(t, *a)),
         ),
@@ -113,10 +102,10 @@ MOTIONS = {
 }
 
 
-def _parameters(build: KernelBuilder, motion: Motion) -> list[sp.Symbol]:
+def _parameters(build: KernelBuilder, motion: MotionModel) -> list[sp.Symbol]:
     return [
         build.scalar(Signal.scalar(name, unit=unit, meaning=f"parameter of the rate, {motion.title}"))
-        for name, unit in motion.parameters.items()
+        for name, unit in catalogue.MOTIONS[motion.name].items()
     ]
 
 

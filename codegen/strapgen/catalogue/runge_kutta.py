@@ -9,8 +9,8 @@ import sympy as sp
 from strapgen.catalogue.kinematics import KINEMATICS, Kinematics
 from strapgen.catalogue.rates import extraction
 from strapgen.catalogue.tableaux import Tableau
+from strapgen.companions import Companions
 from strapgen.kernel import Kernel, KernelBuilder
-from strapgen.program import Companions
 from strapgen.signal import Signal
 
 
@@ -22,6 +22,7 @@ def increments_signal(count: int) -> Signal:
         tuple(f"d{k}_{axis}" for k in range(1, count + 1) for axis in "xyz"),
         unit="rad",
         meaning="angle increments of the step, body axes, oldest first: exact integrals of the body rate",
+        bound=Fraction(1),
     )
 
 

@@ -28,6 +28,9 @@ app.command("tables")(tables.tables)
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line; exit with 2 and one line on stderr for input that cannot be used."""
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:  # closed by whoever started us
+            setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115, PTH123
     words = _spread_settings(list(sys.argv[1:] if arguments is None else arguments)) or ["--help"]
     try:
         status = app(words, prog_name="strapgen", standalone_mode=False)
@@ -50,7 +53,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
         explain = getattr(error, "format_message", None)
         if explain is None:
             raise
-        _fail(explain() or "a command is needed; see strapgen --help")
+        said = explain() or "a command is needed"
+        if said.startswith("No such command"):
+            said += f" Allowed: {', '.join(str(command.name) for command in app.registered_commands)}."
+        _fail(said)
     sys.exit(status if isinstance(status, int) else 0)
 
 

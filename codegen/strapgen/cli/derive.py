@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from strapgen import checks
-from strapgen.cli.options import Algorithm, Format, Increments, Method, check_format, print_json
+from strapgen.cli.options import Algorithm, Format, Increments, Method, check_format, print_json, whole
 
 
 def derive(
@@ -25,7 +25,7 @@ def derive(
     checks.choice("show", show, ("text", "latex", "operations"))
     from strapgen import formulas, pipeline
 
-    kernel = pipeline.derive(algorithm, method, increments)
+    kernel = pipeline.derive(algorithm, method, whole("increments", increments))
     program = pipeline.lower(kernel)
     if format == "json":
         data = formulas.as_data(kernel, program)

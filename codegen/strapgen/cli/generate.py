@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from strapgen.cli.options import Format, Increments, Method, check_format, print_json
+from strapgen.cli.options import Format, Increments, Method, check_format, print_json, whole
 from strapgen.cli.progress import track
 from strapgen.exceptions import InputError
 
@@ -57,8 +57,8 @@ def generate(
     from strapgen import checks, output, pipeline
     from strapgen.targets import TARGETS
 
-    target = checks.choice("target", target or "numpy", TARGETS)
-    program = pipeline.lower(pipeline.derive(algorithm, method, increments))
+    target = checks.choice("target", "numpy" if target is None else target, TARGETS)
+    program = pipeline.lower(pipeline.derive(algorithm, method, whole("increments", increments)))
     sources = pipeline.generate(program, target)
     written = output.write_files(out or Path(), sources.files)
     operations = sources.operations
@@ -85,15 +85,21 @@ def _generate_all(out: Path | None, check: bool, format: str) -> None:
     if out is None:
         in_place = resources.checkout() is not None or check
         out = resources.folder("generated") if in_place else Path("generated")
+    if check and not out.is_dir():
+        raise InputError(f"{out} is no folder; --check needs the one to look at")
     total = len(catalogue.standard())
     files = standard_tree.tree(track(standard_tree.programs(), "deriving", total))
     if check:
         difference = standard_tree.difference(out, files)
-        if difference:
+        if format == "json":
+            print_json({"in_step": not difference, "difference": difference})
+        elif difference:
             typer.echo(difference, nl=False)
+        if difference:
             typer.echo(f"strapgen: {out} is out of step; strapgen generate --all rebuilds it", err=True)
             raise typer.Exit(1)
-        typer.echo(f"{out}: {len(files)} files, in step")
+        if format == "text":
+            typer.echo(f"{out}: {len(files)} files, in step")
         return
     written = standard_tree.write(out, files)
     if format == "json":

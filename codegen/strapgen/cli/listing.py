@@ -26,8 +26,8 @@ def list_names(format: Format = "text") -> None:
             name: ", ".join(" or ".join(choices) for choices in keys(name).values())
             for name in catalogue.MOTIONS
         },
-        "targets": TARGETS,
-        "backends": BACKENDS,
+        "targets": {name: target.title for name, target in TARGETS.items()},
+        "backends": {name: entry.title for name, entry in BACKENDS.items()},
     }
     if format == "json":
         print_json(parts)

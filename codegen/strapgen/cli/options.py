@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from strapgen import checks
+from strapgen.exceptions import InputError
 
 Algorithm = Annotated[
     str, typer.Argument(help="dcm, euler, cayley-klein, or another kernel; see strapgen list.")
@@ -18,8 +19,10 @@ Method = Annotated[
     typer.Option("--method", help="Integration method, rk1 to rk4.  [default: rk4]", show_default=False),
 ]
 Increments = Annotated[
-    int | None,
-    typer.Option("--increments", help="Angle increments a step, 1 to 8.  [default: 2]", show_default=False),
+    str | None,
+    typer.Option(
+        "--increments", metavar="N", help="Angle increments a step, 1 to 8.  [default: 2]", show_default=False
+    ),
 ]
 Format = Annotated[str, typer.Option("--format", help="text or json.")]
 
@@ -30,5 +33,15 @@ def check_format(value: str, *more: str) -> str:
 
 
 def print_json(data: Any) -> None:
-    """Print data as JSON on one line of output a top-level entry."""
+    """Print data as JSON: a list on one line, an object indented."""
     sys.stdout.write(json.dumps(data, indent=None if isinstance(data, list) else 1) + "\n")
+
+
+def whole(what: str, value: str | None) -> int | None:
+    """Read an option that takes a whole number."""
+    if value is None:
+        return None
+    try:
+        return int(value)
+    except ValueError:
+        raise InputError(f"{what} is {value!r}; a whole number is needed") from None

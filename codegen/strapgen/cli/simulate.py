@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from strapgen.catalogue import ALGORITHMS, MOTIONS
-from strapgen.cli.options import Increments, Method, check_format
+from strapgen.cli.options import Increments, Method, check_format, whole
 from strapgen.exceptions import InputError
 
 if TYPE_CHECKING:
     from strapgen.backends import Backend
-    from strapgen.motions import Motion
-    from strapgen.recording import History
 
 _Number = str | None
 
@@ -33,14 +32,19 @@ def simulate(
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE...", help="Parameters of the motion; see strapgen list."),
     ] = None,
-    step: Annotated[_Number, typer.Option("--step", help="Step in s.", show_default=False)] = None,
+    step: Annotated[
+        _Number, typer.Option("--step", metavar="S", help="Step in s.", show_default=False)
+    ] = None,
     duration: Annotated[
-        _Number, typer.Option("--duration", help="Duration in s.", show_default=False)
+        _Number, typer.Option("--duration", metavar="S", help="Duration in s.", show_default=False)
     ] = None,
     orthonormalize: Annotated[
         _Number,
         typer.Option(
-            "--orthonormalize", help="Orthonormalize every so many s.  [default: never]", show_default=False
+            "--orthonormalize",
+            metavar="S",
+            help="Orthonormalize every so many s.  [default: never]",
+            show_default=False,
         ),
     ] = None,
     scheme: Annotated[
@@ -51,7 +55,12 @@ def simulate(
     ] = None,
     record: Annotated[
         _Number,
-        typer.Option("--record", help="Record every so many s.  [default: every step]", show_default=False),
+        typer.Option(
+            "--record",
+            metavar="S",
+            help="Record every so many s, a divisor of the duration.  [default: every step]",
+            show_default=False,
+        ),
     ] = None,
     increments_csv: Annotated[
         Path | None,
@@ -71,7 +80,10 @@ def simulate(
     resample_hz: Annotated[
         _Number,
         typer.Option(
-            "--resample-hz", help="Integrate uneven recorded rates over an even grid.", show_default=False
+            "--resample-hz",
+            metavar="HZ",
+            help="Integrate uneven recorded rates over an even grid.",
+            show_default=False,
         ),
     ] = None,
     out: Annotated[
@@ -93,26 +105,22 @@ def simulate(
 ) -> None:
     """Run an algorithm on a motion with known attitude, or on recorded gyro data.
 
-    Example: strapgen simulate euler --method rk4 --increments 2 --backend c --motion coning
-    --set a_deg_s=10 b_deg_s=10 g_deg_s=10 --step 0.125 --duration 180 --orthonormalize 5 --record 5
+    Recorded times that are not even are refused unless --resample-hz is given; then intervals of up to ten times the
+    median are bridged by a straight line.
 
-    Example: strapgen simulate dcm --backend c --rates-csv gyro.csv --rate-unit deg/s --resample-hz 100
-    --out attitude.csv
-    """
-    if format is not None:
-        check_format(format, "csv")
-    import numpy as np
+    Example:
 
-    from strapgen import checks, output
-    from strapgen.backends import BACKENDS
-    from strapgen.backends import backend as make_backend
-    from strapgen.catalogue import choose
+    \b
+      strapgen simulate euler --method rk4 --increments 2 --backend c \\
+        --motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 \\
+        --step 0.125 --duration 180 --orthonormalize 5 --record 5
 
-    checks.choice("algorithm", algorithm, ALGORITHMS)
-    choice = choose(algorithm, method, increments)
-    checks.choice("backend", backend, BACKENDS)
-    if motion is not None:
-        checks.choice("motion", motion, MOTIONS)
+    \b
+      strapgen simulate dcm --backend c --rates-csv gyro.csv \\
+        --rate-unit deg/s --resample-hz 100 --out attitude.csv
+    """  # noqa: D301
+    samples = whole("increments", increments)
+    _check_names(algorithm, method, samples, backend, motion, format)
     sources = {"--motion": motion, "--increments-csv": increments_csv, "--rates-csv": rates_csv}
     chosen = [name for name, value in sources.items() if value is not None]
     if len(chosen) != 1:
@@ -124,40 +132,67 @@ def simulate(
         _refuse({"--rate-unit": rate_unit, "--resample-hz": resample_hz}, "--rates-csv", chosen[0])
     elif rate_unit is None:
         raise InputError("--rates-csv needs --rate-unit deg/s or rad/s")
-    for name, value in (("--step", step), ("--duration", duration)):
-        if motion is not None and value is None:
-            raise InputError(f"--motion needs {name} in s")
+    if matrices and format != "json":
+        raise InputError("--matrices goes with --format json; --format csv has the matrices")
+    if out is not None and plot is not None and out.resolve() == plot.resolve():
+        raise InputError(f"--out and --plot are both {out}; two files are needed")
 
-    named = {
-        "algorithm": algorithm,
-        "method": choice.method,
-        "increments": choice.increments,
-        "backend": backend,
-    }
-    if motion is not None:
-        from strapgen.motions import motion as make_motion
+    import numpy as np
 
-        profile = make_motion(motion, **_pairs(settings or []))
-        ready = make_backend(algorithm, method, increments, backend, scheme)
-        times = (str(step), str(duration), orthonormalize, record)
-        with np.errstate(all="ignore"):  # numbers that overflow are refused, in one line
-            text = _on_motion(ready, profile, times, named, format or "text", plot, matrices)
-    else:
-        from strapgen import recording as recordings
+    from strapgen import output
+    from strapgen.backends import backend as make_backend
 
-        with np.errstate(all="ignore"):
-            if increments_csv is not None:
-                recording = recordings.read_increments(increments_csv)
-            else:
-                recording = recordings.read_rates(rates_csv or "", rate_unit or "", resample_hz)
-            ready = make_backend(algorithm, method, increments, backend, scheme)
-            history = recordings.propagate(ready, recording, orthonormalize, record)
-        named["source"] = str(increments_csv or rates_csv)
-        text = _of_recording(history, ready.elements, named, format or "csv", plot)
+    def ready() -> Backend:
+        return make_backend(algorithm, method, samples, backend, scheme)
+
+    with np.errstate(all="ignore"):  # numbers that overflow are refused, in one line
+        if motion is not None:
+            for name, value in (("--step", step), ("--duration", duration)):
+                if value is None:
+                    raise InputError(f"--motion needs {name} in s")
+            times = (str(step), str(duration), orthonormalize, record)
+            text, image = _on_motion(
+                ready, motion, _pairs(settings or []), times, format or "text", plot, matrices
+            )
+        else:
+            text, image = _on_recording(
+                ready,
+                increments_csv,
+                (rates_csv, rate_unit, resample_hz),
+                (orthonormalize, record),
+                format or "csv",
+                plot,
+            )
+    text = text.rstrip("\n")
+    files: dict[str, str | bytes] = {}
+    if out is not None:
+        files[str(out)] = f"{text}\n"
+    if plot is not None and image is not None:
+        files[str(plot)] = image
+    output.write_files(Path(), files)
     if out is None:
-        typer.echo(text.rstrip("\n"))
-    else:
-        output.write_file(out, text.rstrip("\n") + "\n")
+        typer.echo(text)
+
+
+def _check_names(
+    algorithm: str,
+    method: str | None,
+    increments: int | None,
+    backend: str,
+    motion: str | None,
+    format: str | None,
+) -> None:
+    from strapgen import checks
+    from strapgen.backends import BACKENDS
+    from strapgen.catalogue import choose
+
+    checks.choice("algorithm", algorithm, ALGORITHMS)
+    choose(algorithm, method, increments)
+    checks.choice("backend", backend, BACKENDS)
+    if motion is not None:
+        checks.choice("motion", motion, MOTIONS)
+    if format is not None:
+        check_format(format, "csv")
 
 
 def _refuse(options: dict[str, Any], owner: str, chosen: str) -> None:
@@ -178,50 +213,68 @@ def _pairs(settings: list[str]) -> dict[str, str]:
     return pairs
 
 
+def _named(ready: Backend) -> dict[str, Any]:
+    algorithm, method, increments = ready.kernel.rsplit("-", 2)
+    return {"algorithm": algorithm, "method": method, "increments": int(increments), "backend": ready.name}
+
+
 def _on_motion(
-    ready: Backend,
-    profile: Motion,
+    make: Callable[[], Backend],
+    motion: str,
+    settings: dict[str, str],
     times: tuple[str, str, str | None, str | None],
-    named: dict[str, Any],
     format: str,
     plot: Path | None,
     matrices: bool,
-) -> str:
-    from strapgen import checks, reports
+) -> tuple[str, bytes | None]:
+    """Simulate; return the output and, if one is wanted, the image."""
+    from strapgen import checks, plots, reports
+    from strapgen.motions import motion as make_motion
     from strapgen.simulation import simulate as run_simulation
 
-    step, duration, _, _ = times
+    profile = make_motion(motion, **settings)
+    ready = make()
     run = run_simulation(ready, profile, *times)
-    if plot is not None:
-        from strapgen.plots import plot_run
-
-        title = f"{ready.kernel}, {named['backend']}: {profile.name} motion, step {step} s"
-        plot_run(run, title, plot)
+    step, duration, _, _ = times
+    title = f"{ready.kernel}, {ready.name}: {profile.name} motion, step {step} s"
+    image = None if plot is None else plots.run_image(run, title, plot)
     if format == "csv":
-        return reports.run_csv(run)
-    named |= {
+        return reports.run_csv(run), image
+    named = _named(ready) | {
         "motion": profile.name,
         "step_s": float(checks.number("step", step)),
         "duration_s": float(checks.number("duration", duration)),
     }
     if format == "text":
-        return reports.run_text(run, named)
+        return reports.run_text(run, named), image
     data = reports.run_data(run, named)
-    return json.dumps(data | reports.matrices_data(run) if matrices else data)
+    return json.dumps(data | reports.matrices_data(run) if matrices else data), image
 
 
-def _of_recording(
-    history: History, elements: tuple[str, ...], named: dict[str, Any], format: str, plot: Path | None
-) -> str:
-    from strapgen import reports
+def _on_recording(
+    make: Callable[[], Backend],
+    increments_csv: Path | None,
+    rates: tuple[Path | None, str | None, str | None],
+    times: tuple[str | None, str | None],
+    format: str,
+    plot: Path | None,
+) -> tuple[str, bytes | None]:
+    """Propagate recorded data; return the output and, if one is wanted, the image."""
+    from strapgen import plots, recording, reports
 
-    if plot is not None:
-        from strapgen.plots import plot_history
-
-        title = f"{named['algorithm']} {named['method']}, {named['backend']}: attitude along {Path(named['source']).name}"
-        plot_history(history, elements, title, plot)
+    rates_csv, unit, resample_hz = rates
+    if increments_csv is not None:
+        data = recording.read_increments(increments_csv)
+    else:
+        data = recording.read_rates(rates_csv or "", unit or "", resample_hz)
+    ready = make()
+    history = recording.propagate(ready, data, *times)
+    source = increments_csv or rates_csv or Path()
+    title = f"{ready.kernel}, {ready.name}: attitude along {source.name}"
+    image = None if plot is None else plots.history_image(history, ready.elements, title, plot)
+    named = _named(ready) | {"source": str(source)}
     if format == "csv":
-        return reports.history_csv(history, elements)
+        return reports.history_csv(history, ready.elements), image
     if format == "text":
-        return reports.history_text(history, elements, named)
-    return json.dumps(reports.history_data(history, elements, named))
+        return reports.history_text(history, ready.elements, named), image
+    return json.dumps(reports.history_data(history, ready.elements, named)), image

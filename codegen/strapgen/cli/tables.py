@@ -35,8 +35,7 @@ def tables(
         pass
     entries = list(track(run_tables(names), "simulating", cases * len(TABLES)))
     if format == "json":
-        # The note goes with the printed tables: every entry has the same keys.
-        print_json([{k: v for k, v in entry.as_dict().items() if k != "note"} for entry in entries])
+        print_json([entry.as_dict() for entry in entries])
         return
     for table in TABLES:
         _print_table(table, [entry for entry in entries if entry.table == table.number])

@@ -2,17 +2,28 @@
 
 from __future__ import annotations
 
+from importlib import import_module
+from typing import NamedTuple
+
 from strapgen import checks
 from strapgen.program import Program
 from strapgen.targets.sources import Function, Sources
 
-__all__ = ["TARGETS", "Function", "Sources", "emit"]
+__all__ = ["TARGETS", "Function", "Sources", "Target", "emit"]
+
+
+class Target(NamedTuple):
+    """A target: what it is, and the module of this package whose ``emit(program, target)`` prints it."""
+
+    title: str
+    module: str
+
 
 #: Targets by name.
 TARGETS = {
-    "numpy": "numpy, vectorised over leading axes",
-    "c": "C99 in double",
-    "c-float": "C99 in float",
+    "numpy": Target("numpy, vectorised over leading axes", "numpy"),
+    "c": Target("C99 in double", "c"),
+    "c-float": Target("C99 in float", "c"),
 }
 
 
@@ -34,11 +45,6 @@ def emit(program: Program, target: str) -> Sources:
     InputError
         If the target is unknown.
     """
-    checks.choice("target", target, TARGETS)
-    if target == "numpy":
-        from strapgen.targets import numpy
-
-        return numpy.emit(program)
-    from strapgen.targets import c
-
-    return c.emit(program, c.DOUBLE if target == "c" else c.FLOAT)
+    module = import_module(f"{__name__}.{TARGETS[checks.choice('target', target, TARGETS)].module}")
+    sources: Sources = module.emit(program, target)
+    return sources

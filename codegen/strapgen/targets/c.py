@@ -38,6 +38,7 @@ class Real:
 
 DOUBLE = Real("c", "double", "", "")
 FLOAT = Real("c-float", "float", "f", "_float")
+REALS = {real.target: real for real in (DOUBLE, FLOAT)}
 
 _FUNCTIONS = {
     "sqrt": "sqrt{s}({})",
@@ -74,14 +75,14 @@ def _nearest_single(value: Fraction) -> np.float32:
     return min(candidates, key=lambda c: (abs(Fraction(float(c)) - value), int(c.view(np.uint32)) & 1))
 
 
-def emit(program: Program, real: Real = DOUBLE) -> Sources:
+def emit(program: Program, target: str = "c") -> Sources:
     """Generate a C header and source for a program.
 
     Parameters
     ----------
     program : Program
-    real : Real, optional
-        `DOUBLE` or `FLOAT`.
+    target : str, optional
+        A key of `REALS`.
 
     Returns
     -------
@@ -89,6 +90,7 @@ def emit(program: Program, real: Real = DOUBLE) -> Sources:
         Two files. The function ``<name>`` works on one sample, ``<name>_array`` on many; a step has
         ``<name>_propagate`` too, the loop over runs and steps.
     """
+    real = REALS[target]
     printer = CPrinter(real)
     name = f"{program.name}{real.infix}"
     used = program.used()

@@ -33,12 +33,14 @@ class NumpyPrinter(Printer):
         return _FUNCTIONS[kind].format(*arguments)
 
 
-def emit(program: Program) -> Sources:
+def emit(program: Program, target: str = "numpy") -> Sources:
     """Generate a numpy module for a program.
 
     Parameters
     ----------
     program : Program
+    target : str, optional
+        Name of the target.
 
     Returns
     -------
@@ -55,14 +57,14 @@ def emit(program: Program) -> Sources:
     text = render(
         "numpy/module.py.j2",
         program=program,
-        command=f"strapgen generate {program.arguments} --target numpy",
+        command=f"strapgen generate {program.arguments} --target {target}",
         functions=[_function(part, part is not program) for part in functions],
         uses_sinc=uses_sinc,
     )
     function = Function(program.name, program.inputs, tuple(result.signal for result in program.outputs))
     return Sources(
         program.kernel,
-        "numpy",
+        target,
         {f"{program.name}.py": text},
         function,
         program.operations,

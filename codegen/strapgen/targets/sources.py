@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from strapgen.program import Companions
+from strapgen.companions import Companions
 from strapgen.signal import Signal
 
 

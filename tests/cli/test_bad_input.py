@@ -1,0 +1,262 @@
+"""Bad input on the command line: exit 2, one line on stderr that says what is wrong, nothing done."""
+
+from __future__ import annotations
+
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from strapgen.cli import main
+
+# A warning would be a second line on stderr.
+pytestmark = pytest.mark.filterwarnings("error")
+
+DATA = Path(__file__).resolve().parents[1] / "data"
+TIMES = "--step 0.125 --duration 1"
+CONSTANT = f"--motion constant --set x_deg_s=1 {TIMES}"
+CONING = "--motion coning --step 0.125 --duration 1 --set"
+EVEN = f"--rates-csv {DATA}/rates_even.csv"
+
+BAD = {
+    # Commands and options
+    "integrate": "No such command 'integrate'",
+    "list --formatt json": "No such option: --formatt",
+    "list euler": "unexpected extra argument",
+    "list --format yaml": "format 'yaml' is not known; allowed: text, json",
+    "derive": "Missing argument",
+    "simulate": "Missing argument",
+    # derive
+    "derive eulr": "algorithm 'eulr' is not known; allowed: dcm, euler, cayley-klein, ",
+    "derive euler --method rk5": "method 'rk5' is not known; allowed: rk1, rk2, rk3, rk4",
+    "derive euler --increments 0": "increments is 0; a whole number from 1 to 8 is needed",
+    "derive euler --increments 9": "increments is 9; a whole number from 1 to 8 is needed",
+    "derive euler --increments -1": "increments is -1; a whole number from 1 to 8 is needed",
+    "derive euler --increments two": "increments is 'two'; a whole number is needed",
+    "derive euler --show html": "show 'html' is not known; allowed: text, latex, operations",
+    "derive euler --format csv": "format 'csv' is not known; allowed: text, json",
+    "derive euler-product --method rk4": "kernel euler-product takes no method (got rk4)",
+    "derive euler-product --increments 2": "kernel euler-product takes no increments (got 2)",
+    # generate
+    "generate": "an algorithm is needed, or --all",
+    "generate eulr": "algorithm 'eulr' is not known",
+    "generate euler --method heun": "method 'heun' is not known",
+    "generate euler --increments 9": "increments is 9",
+    "generate euler --target rust": "target 'rust' is not known; allowed: numpy, c, c-float",
+    "generate euler --format csv": "format 'csv' is not known",
+    "generate euler --check": "--check goes with --all",
+    "generate --check": "--check goes with --all",
+    "generate euler --all": "an algorithm does not go with it",
+    "generate --all --method rk4": "--method does not go with it",
+    "generate --all --increments 2": "--increments does not go with it",
+    "generate --all --target c": "--target does not go with it",
+    "generate --all --check --out none": "none is no folder; --check needs the one to look at",
+    "generate euler --target ''": "target '' is not known",
+    "generate euler --out file": "file cannot be written",
+    "generate euler --out file/folder": "file/folder cannot be written (Not a directory)",
+    "generate euler --out /proc/strapgen": "/proc/strapgen cannot be written",
+    "generate --all --out file/folder": "file/folder cannot be written",
+    # simulate: names
+    f"simulate eulr {CONSTANT}": "algorithm 'eulr' is not known; allowed: dcm, euler, cayley-klein",
+    f"simulate euler-product {CONSTANT}": "algorithm 'euler-product' is not known",
+    f"simulate euler --method rk5 {CONSTANT}": "method 'rk5' is not known",
+    f"simulate euler --increments 9 {CONSTANT}": "increments is 9",
+    f"simulate euler --backend fortran {CONSTANT}": "backend 'fortran' is not known; allowed: numpy, c, c-float",
+    f"simulate euler --motion spin --set a=1 {TIMES}": "motion 'spin' is not known; allowed: constant, sinusoidal",
+    f"simulate euler {CONSTANT} --format xml": "format 'xml' is not known; allowed: text, json, csv",
+    f"simulate euler {CONSTANT} --scheme dcm-orthonormalize": "'dcm-orthonormalize' is not known; allowed: euler-",
+    f"simulate dcm {CONSTANT} --scheme optimal": "'optimal' is not known; allowed: dcm-orthonormalize, ",
+    # simulate: parameters of the motion
+    f"simulate euler --motion constant --set w_deg_s=1 {TIMES}": "'w_deg_s' is not known; allowed: x_deg_s",
+    f"simulate euler --motion constant {TIMES}": "motion constant needs parameters; allowed: x_deg_s",
+    f"simulate euler {CONING} a_deg_s=1 b_deg_s=1": "motion coning lacks g_deg_s or g_rad_s",
+    f"simulate euler {CONING} a_deg_s=1 g_deg_s=1": "motion coning lacks b_deg_s or b_rad_s",
+    f"simulate euler {CONING} a_deg_s=1 b_deg_s=1 b_rad_s=1 g_deg_s=1": "b_deg_s and b_rad_s are both given",
+    f"simulate euler {CONING} a_deg_s=1 a_deg_s=2": "--set a_deg_s is given twice",
+    f"simulate euler {CONING} a_deg_s": "--set 'a_deg_s' is no setting; key=value is needed",
+    f"simulate euler {CONING} =1": "--set '=1' is no setting; key=value is needed",
+    f"simulate euler {CONING} a_deg_s=": "a_deg_s is ''; a finite number is needed",
+    f"simulate euler {CONING} a_deg_s=fast": "a_deg_s is 'fast'; a finite number is needed",
+    f"simulate euler {CONING} a_deg_s=nan b_deg_s=1 g_deg_s=1": "a_deg_s is 'nan'; a finite number is needed",
+    f"simulate euler {CONING} a_deg_s=-inf b_deg_s=1 g_deg_s=1": "a_deg_s is '-inf'; a finite number",
+    f"simulate euler {CONING} a_deg_s=1e999 b_deg_s=1 g_deg_s=1": "a_deg_s is '1e999'; a finite number",
+    f"simulate euler --motion polynomial --set a5=1 {TIMES}": "'a5' is not known; allowed: a0, a1, a2, a3, a4",
+    f"simulate euler --motion constant --set x_deg_s=1e300 {TIMES}": "the increments are too large",
+    f"simulate dcm --motion constant --set x_deg_s=1e300 {TIMES} --backend c": "the increments are too large",
+    f"simulate dcm --motion constant --set x_deg_s=1e60 {TIMES} --backend c-float": "beyond the range of float32",
+    # simulate: times
+    "simulate euler --motion constant --set x_deg_s=1 --duration 1": "--motion needs --step in s",
+    "simulate euler --motion constant --set x_deg_s=1 --step 1": "--motion needs --duration in s",
+    **{
+        f"simulate euler --motion constant --set x_deg_s=1 --step {step} --duration 1": said
+        for step, said in {
+            "0": "step is 0; a number above 0 is needed",
+            "-0.1": "step is -0.1; a number above 0 is needed",
+            "nan": "step is 'nan'; a finite number is needed",
+            "inf": "step is 'inf'; a finite number is needed",
+            "short": "step is 'short'; a finite number is needed",
+            "''": "step is ''; a finite number is needed",
+            "1/0": "step is '1/0'; a finite number is needed",
+            "0.3": "duration 1 s is not a whole multiple of the step 0.3 s (their ratio is 3.33333333)",
+            "2": "duration 1 s is not a whole multiple of the step 2 s",
+            "1e-15": "that is too many",
+            "1e-400": "step is 1e-400; a number above 0 is needed",
+            "1e-999999999": "a number above 0 is needed",
+        }.items()
+    },
+    "simulate euler --motion constant --set x_deg_s=1 --step 1 --duration 0": "duration is 0; a number above 0",
+    "simulate euler --motion constant --set x_deg_s=1 --step 1 --duration -5": "duration is -5; a number above 0",
+    "simulate euler --motion constant --set x_deg_s=1 --step 1 --duration inf": "duration is 'inf'; a finite",
+    f"simulate euler {CONSTANT} --orthonormalize 0.3": "orthonormalize 0.3 s is not a whole multiple of the step",
+    f"simulate euler {CONSTANT} --orthonormalize 0": "orthonormalize is 0; a number above 0 is needed",
+    f"simulate euler {CONSTANT} --orthonormalize nan": "orthonormalize is 'nan'; a finite number is needed",
+    f"simulate euler {CONSTANT} --record 0.3": "record 0.3 s is not a whole multiple of the step",
+    f"simulate euler {CONSTANT} --record 0.75": "duration 1 s is not a whole multiple of the record interval",
+    f"simulate euler {CONSTANT} --record -1": "record is -1; a number above 0 is needed",
+    f"simulate euler {CONSTANT} --record 2": "record 2 s is longer than the duration 1 s",
+    # simulate: what goes with what
+    "simulate euler": "one of --motion, --increments-csv, --rates-csv is needed; none given",
+    f"simulate euler {CONSTANT} {EVEN} --rate-unit deg/s": "is needed; --motion and --rates-csv given",
+    f"simulate euler {EVEN}": "--rates-csv needs --rate-unit deg/s or rad/s",
+    f"simulate euler {EVEN} --rate-unit rpm": "rate unit 'rpm' is not known; allowed: rad/s, deg/s",
+    f"simulate euler {EVEN} --rate-unit deg/s --step 1": "--step goes with --motion, not with --rates-csv",
+    f"simulate euler {EVEN} --rate-unit deg/s --duration 1": "--duration goes with --motion",
+    f"simulate euler {EVEN} --rate-unit deg/s --set x_deg_s=1": "--set goes with --motion",
+    f"simulate euler {CONSTANT} --matrices": "--matrices goes with --format json",
+    f"simulate euler {CONSTANT} --out run.png --plot run.png": "--out and --plot are both run.png",
+    f"simulate euler {CONSTANT} --out file/run.txt --plot run.png": "cannot be written",
+    f"simulate euler {CONSTANT} --out run.txt --plot file/run.png": "cannot be written",
+    f"simulate euler {EVEN} --rate-unit deg/s --matrices": "--matrices goes with --motion",
+    f"simulate euler {CONSTANT} --rate-unit deg/s": "--rate-unit goes with --rates-csv, not with --motion",
+    f"simulate euler {CONSTANT} --resample-hz 50": "--resample-hz goes with --rates-csv, not with --motion",
+    f"simulate euler --increments-csv {DATA}/increments.csv --resample-hz 50": "--resample-hz goes with --rates-csv",
+    # simulate: recorded data
+    "simulate euler --increments-csv none.csv": "none.csv cannot be read (No such file or directory)",
+    "simulate euler --increments-csv .": "cannot be read (Is a directory)",
+    "simulate euler --increments-csv nan.csv": "nan.csv, line 3: column 3 is 'nan'; a finite number is needed",
+    "simulate euler --rates-csv nan.csv --rate-unit rad/s": "nan.csv, line 3: column 3 is 'nan'",
+    "simulate euler --increments-csv gap.csv": "gap.csv, line 5: a gap of 0.97 s",
+    "simulate euler --rates-csv gap.csv --rate-unit rad/s --resample-hz 100": "gap.csv, line 5: a gap of 0.97 s",
+    f"simulate euler --rates-csv {DATA}/rates_uneven.csv --rate-unit deg/s": "sample times are not even",
+    f"simulate euler {EVEN} --rate-unit deg/s --resample-hz 0": "resample-hz is 0; a number above 0 is needed",
+    f"simulate euler {EVEN} --rate-unit deg/s --resample-hz often": "resample-hz is 'often'; a finite number",
+    f"simulate euler {EVEN} --rate-unit deg/s --resample-hz 1e15": "would make over",
+    f"simulate euler {EVEN} --rate-unit deg/s --record 0.033": "record 0.033 s is not a whole multiple",
+    f"simulate euler {EVEN} --rate-unit deg/s --record 500": "record 500 s is longer than the recording",
+    f"simulate euler {EVEN} --rate-unit deg/s --orthonormalize 0": "orthonormalize is 0; a number above 0",
+    "simulate dcm --increments-csv large.csv": "not finite",
+    "simulate dcm --rates-csv large.csv --rate-unit rad/s": "finite",
+    # simulate: output
+    f"simulate euler {CONSTANT} --out file/run.txt": "file cannot be written",
+    f"simulate euler {CONSTANT} --out .": "is a folder; a file is to be written there",
+    f"simulate euler {CONSTANT} --plot run.docx": "run.docx: file type 'docx' is not known; allowed: ",
+    f"simulate euler {CONSTANT} --plot file/run.png": "file cannot be written",
+    f"simulate euler {EVEN} --rate-unit deg/s --plot run": "file type '' is not known",
+    # tables
+    "tables --backend fortran": "backend 'fortran' is not known; allowed: numpy, c, c-float",
+    "tables --format csv": "format 'csv' is not known; allowed: text, json",
+}
+
+FILES = {
+    "file": "mine",
+    "nan.csv": "t,dx,dy,dz\n0.01,0,0,0\n0.02,0,nan,0\n0.03,0,0,0\n",
+    "gap.csv": "t,dx,dy,dz\n0.01,0,0,0\n0.02,0,0,0\n0.03,0,0,0\n1,0,0,0\n1.01,0,0,0\n1.02,0,0,0\n",
+    "large.csv": "t,dx,dy,dz\n" + "".join(f"0.{k},1e300,1e300,1e300\n" for k in range(1, 10)),
+}
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return the folder in which the commands run, with the files that they are to stumble over."""
+    place = tmp_path / "folder"
+    place.mkdir()
+    for name, text in FILES.items():
+        (place / name).write_text(text)
+    monkeypatch.chdir(place)
+    return place
+
+
+@pytest.mark.parametrize("command", BAD)
+def test_one_line_and_nothing_done(command, folder, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(shlex.split(command))
+    said = capsys.readouterr()
+    assert stop.value.code == 2
+    assert said.out == ""
+    assert said.err.startswith("strapgen: ")
+    assert said.err.count("\n") == 1 and said.err.endswith("\n")
+    assert BAD[command].lower() in said.err.lower()
+    assert {path.name: path.read_text() for path in folder.iterdir()} == FILES
+
+
+def test_old_output_survives_a_failure(folder, capsys):
+    (folder / "run.csv").write_text("of yesterday")
+    command = f"simulate euler --motion constant --set x_deg_s=1e300 {TIMES} --format csv --out run.csv"
+    with pytest.raises(SystemExit) as stop:
+        main(shlex.split(command))
+    assert stop.value.code == 2
+    assert (folder / "run.csv").read_text() == "of yesterday"
+
+
+def test_missing_matplotlib(folder, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(SystemExit) as stop:
+        main(shlex.split(f"simulate euler {CONSTANT} --plot run.png"))
+    said = capsys.readouterr()
+    assert (stop.value.code, said.out) == (2, "")
+    assert said.err == "strapgen: plots need matplotlib: pip install 'strapgen[plot]'\n"
+
+
+@pytest.mark.parametrize("place", ["file/cache", "/proc/strapgen"])
+def test_cache_folder_that_cannot_be_written(place, folder, capsys, monkeypatch):
+    monkeypatch.setenv("STRAPGEN_CACHE_DIR", place)
+    with pytest.raises(SystemExit) as stop:
+        main(shlex.split(f"simulate euler --method rk2 --increments 7 {CONSTANT}"))
+    said = capsys.readouterr()
+    assert (stop.value.code, said.out) == (2, "")
+    assert said.err.startswith("strapgen: cache folder ") and said.err.count("\n") == 1
+
+
+def test_run_that_the_memory_does_not_hold(folder, capsys, monkeypatch):
+    from strapgen import simulation
+
+    def exhausted(*_: object) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr(simulation, "simulate", exhausted)
+    with pytest.raises(SystemExit) as stop:
+        main(shlex.split(f"simulate euler {CONSTANT}"))
+    said = capsys.readouterr()
+    assert (stop.value.code, said.out) == (2, "")
+    assert said.err == "strapgen: the memory does not hold a run of so many steps\n"
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "derive eulr",
+        "simulate",
+        "simulate euler --increments-csv nan.csv",
+        f"simulate dcm --motion constant --set x_deg_s=1e300 {TIMES}",
+        "simulate dcm --rates-csv large.csv --rate-unit rad/s",
+    ],
+)
+def test_so_it_is_for_a_process(command, folder):
+    program = [sys.executable, "-m", "strapgen", *shlex.split(command)]
+    done = subprocess.run(program, capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("strapgen: ") and done.stderr.count("\n") == 1
+
+
+def test_errors_of_our_own_are_not_hidden(capsys, monkeypatch):
+    """What is no bad input keeps its traceback."""
+    from strapgen import pipeline
+
+    def broken(*_: object) -> None:
+        raise AssertionError("a fault in strapgen")
+
+    monkeypatch.setattr(pipeline, "derive", broken)
+    with pytest.raises(AssertionError, match="a fault in strapgen"):
+        main(["derive", "euler"])

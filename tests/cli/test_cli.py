@@ -1,0 +1,486 @@
+"""The command line: help with examples, JSON as promised, output where it is asked for, quick answers."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import re
+import shlex
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import strapgen
+from strapgen import catalogue, formulas, pipeline
+from strapgen.backends import BACKENDS
+from strapgen.cli import main
+from strapgen.tables import TABLES
+from strapgen.targets import TARGETS
+
+pytestmark = pytest.mark.filterwarnings("error")
+
+COMMANDS = ("list", "derive", "generate", "simulate", "tables")
+DATA = Path(__file__).resolve().parents[1] / "data"
+CONING = "--motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 --step 0.125 --duration 5"
+
+
+@pytest.fixture
+def strapgen_says(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Run a command line in a folder of its own and return what it prints; it must succeed and be quiet."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(command: str, *more: str) -> str:
+        with pytest.raises(SystemExit) as stop:
+            main([*shlex.split(command), *more])
+        said = capsys.readouterr()
+        assert (stop.value.code, said.err) == (0, "")
+        return said.out
+
+    return run
+
+
+# Help and versions
+
+
+def unwrapped(text: str) -> str:
+    return " ".join(text.split())
+
+
+@pytest.mark.parametrize("words", ["", "-h", "--help"])
+def test_help_names_every_command(words, strapgen_says):
+    said = strapgen_says(words)
+    for command in COMMANDS:
+        assert re.search(rf"^  {command} +\S", said, flags=re.MULTILINE)
+
+
+def examples(text: str) -> list[str]:
+    """Return the commands of the examples in a help text; a paragraph holds one, perhaps over several lines."""
+    paragraphs = [unwrapped(paragraph).replace("\\ ", "") for paragraph in text.split("\n\n")]
+    commands = [paragraph.removeprefix("Example: ") for paragraph in paragraphs]
+    return [command for command in commands if command.startswith("strapgen ")]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_examples_of_the_help_run(command, strapgen_says, tmp_path):
+    said = strapgen_says(f"{command} --help")
+    shown = examples(said)
+    assert shown and "Example:" in said
+    (tmp_path / "gyro.csv").write_text((DATA / "rates_uneven.csv").read_text())
+    for example in shown:
+        program, *words = shlex.split(example)
+        assert (program, words[0]) == ("strapgen", command)
+        strapgen_says("", *words)
+
+
+@pytest.mark.parametrize("command", ["list", "derive", "generate", "simulate", "tables"])
+def test_help_says_what_the_format_may_be(command, strapgen_says):
+    assert "--format" in strapgen_says(f"{command} --help")
+
+
+def test_version_names_all_that_shapes_the_output(strapgen_says):
+    lines = strapgen_says("--version").splitlines()
+    assert lines[0] == f"strapgen {strapgen.__version__}"
+    named = {line.split()[0] for line in lines}
+    assert named >= {"strapgen", "python", "sympy", "numpy", "jinja2", "cffi"}
+    for line in lines[1:]:
+        assert re.search(r"\d+\.\d+", line) or "not installed" in line
+    assert lines[-1].startswith("C compiler ")
+
+
+# list
+
+
+def test_list(strapgen_says):
+    data = json.loads(strapgen_says("list --format json"))
+    assert list(data) == ["algorithms", "methods", "kernels", "motions", "targets", "backends"]
+    assert list(data["algorithms"]) == ["dcm", "euler", "cayley-klein"]
+    assert list(data["methods"]) == ["rk1", "rk2", "rk3", "rk4"]
+    assert data["kernels"].keys() == catalogue.KERNELS.keys()
+    assert list(data["motions"]) == ["constant", "sinusoidal", "coning", "polynomial"]
+    assert list(data["targets"]) == list(TARGETS) == ["numpy", "c", "c-float"]
+    assert list(data["backends"]) == list(BACKENDS) == ["numpy", "c", "c-float"]
+    lines = strapgen_says("list").splitlines()
+    for title, part in data.items():
+        assert title in lines
+        for name, meaning in part.items():
+            assert any(line.split() == [name, *meaning.split()] for line in lines)
+
+
+# derive
+
+
+def test_derive_as_text_and_latex(strapgen_says):
+    kernel = pipeline.derive("dcm", "rk2", 2)
+    assert strapgen_says("derive dcm --method rk2 --increments 2") == formulas.as_text(kernel) + "\n"
+    assert strapgen_says("derive dcm --method rk2 --show latex") == formulas.as_latex(kernel) + "\n"
+
+
+def test_derive_operations(strapgen_says):
+    program = pipeline.lower(pipeline.derive("euler-normalize"))
+    lines = strapgen_says("derive euler-normalize --show operations").splitlines()
+    assert lines[0] == "euler-normalize"
+    shown = {kind: int(number) for kind, number in map(str.split, lines[1:])}
+    assert shown == program.operations | {"temporaries": program.temporaries}
+
+
+@pytest.mark.parametrize("show", ["text", "latex", "operations"])
+def test_derive_json(show, strapgen_says):
+    data = json.loads(strapgen_says(f"derive euler --show {show} --format json"))
+    wanted = [
+        "kernel",
+        "title",
+        "source",
+        "notes",
+        "inputs",
+        "stages",
+        "outputs",
+        "operations",
+        "temporaries",
+    ]
+    assert list(data) == wanted + ["latex"] * (show == "latex")
+    assert data["kernel"] == "euler-rk4-2"
+    assert [signal["name"] for signal in data["inputs"]] == ["state", "increments"]
+
+
+@pytest.mark.parametrize("kernel", sorted(catalogue.KERNELS))
+def test_every_kernel_can_be_shown(kernel, strapgen_says):
+    assert strapgen_says(f"derive {kernel}")
+
+
+# generate
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_generate_json(target, strapgen_says, tmp_path):
+    command = f"generate cayley-klein --method rk3 --increments 4 --target {target} --out out --format json"
+    data = json.loads(strapgen_says(command))
+    assert list(data) == ["kernel", "target", "files", "operations", "temporaries"]
+    assert (data["kernel"], data["target"]) == ("cayley-klein-rk3-4", target)
+    assert list(data["operations"]) == ["add", "multiply", "divide", "sqrt"]
+    program = pipeline.lower(pipeline.derive("cayley-klein", "rk3", 4))
+    assert data["operations"].items() <= program.operations.items()
+    assert data["temporaries"] == program.temporaries
+    sources = pipeline.generate(program, target)
+    assert data["files"] == [str(Path("out") / name) for name in sources.files]
+    assert {path.name: path.read_text() for path in (tmp_path / "out").iterdir()} == sources.files
+
+
+def test_generate_text(strapgen_says):
+    said = strapgen_says("generate euler --target c --out out").splitlines()
+    assert re.fullmatch(r"euler-rk4-2 for c: \d+ add, \d+ multiply.*, \d+ temporaries", said[0])
+    assert said[1:] == ["  out/euler_rk4_2.h", "  out/euler_rk4_2.c"]
+
+
+def test_generate_writes_numpy_here_by_default(strapgen_says, tmp_path):
+    strapgen_says("generate euler")
+    assert [path.name for path in tmp_path.iterdir()] == ["euler_rk4_2.py"]
+
+
+def test_generate_all_as_json(strapgen_says, tmp_path):
+    data = json.loads(strapgen_says("generate --all --out out --format json"))
+    assert list(data) == ["files"]
+    written = {str(path.relative_to(tmp_path)) for path in (tmp_path / "out").rglob("*") if path.is_file()}
+    assert set(data["files"]) == written
+    assert strapgen_says("generate --all --check --out out").endswith(f"{len(written)} files, in step\n")
+
+
+# simulate on a motion
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize(
+    ("motion", "settings"),
+    [
+        ("constant", "y_deg_s=10"),
+        ("constant", "x_deg_s=1 y_deg_s=-2 z_deg_s=3.5"),
+        ("sinusoidal", "a_deg_s=10 b_rad_s=0.2"),
+        ("sinusoidal", "a_deg_s=10 b_deg_s=10"),
+        ("coning", "a_deg_s=10 b_deg_s=-10 g_deg_s=0"),
+        ("coning", "a_deg_s=10 b_rad_s=0.5 g_deg_s=1e1"),
+        ("polynomial", "a0=1 a1=-0.5 a2=0.1 a3=0.01 a4=1e-4"),
+        ("polynomial", "a2=0.1"),
+    ],
+)
+def test_simulate_json(backend, motion, settings, strapgen_says):
+    said = strapgen_says(
+        f"simulate euler --method rk4 --increments 2 --backend {backend} --motion {motion} --set {settings} "
+        "--step 0.125 --duration 4 --record 0.5 --orthonormalize 1 --format json"
+    )
+    data = json.loads(said, parse_constant=pytest.fail)
+    assert list(data) == [
+        *("algorithm", "method", "increments", "backend", "motion", "step_s", "duration_s"),
+        *("time_s", "scale", "skew_deg", "drift_deg", "mean_drift_deg"),
+    ]
+    named = {"algorithm": "euler", "method": "rk4", "increments": 2, "backend": backend, "motion": motion}
+    assert data.items() >= (named | {"step_s": 0.125, "duration_s": 4.0}).items()
+    assert data["time_s"] == [0.5 * k for k in range(9)]
+    for part in ("scale", "skew_deg", "drift_deg"):
+        assert np.shape(data[part]) == (9, 3)
+        assert data[part][0] == [0, 0, 0]
+    assert data["mean_drift_deg"] == pytest.approx(np.linalg.norm(np.abs(data["drift_deg"]).max(axis=0)))
+    assert data["mean_drift_deg"] < (0.01 if backend == "c-float" else 1e-3)
+
+
+@pytest.mark.parametrize("algorithm", catalogue.ALGORITHMS)
+def test_simulate_has_defaults(algorithm, strapgen_says):
+    data = json.loads(strapgen_says(f"simulate {algorithm} {CONING} --format json"))
+    assert [data[key] for key in ("algorithm", "method", "increments", "backend")] == [
+        algorithm,
+        "rk4",
+        2,
+        "numpy",
+    ]
+    assert len(data["time_s"]) == 41
+
+
+def test_settings_may_be_gathered_or_repeated(strapgen_says):
+    rest = "--motion coning --step 0.125 --duration 1 --format json"
+    a, b, g = "a_deg_s=10", "b_deg_s=-5", "g_deg_s=3"
+    said = {
+        strapgen_says(f"simulate euler {rest} --set {a} {b} {g}"),
+        strapgen_says(f"simulate euler {rest} --set {a} --set {b} --set {g}"),
+        strapgen_says(f"simulate euler {rest} --set {g} {a} --set {b}"),
+        strapgen_says(f"simulate euler {rest} --set={a} {b} --set={g}"),
+        strapgen_says(f"simulate --set {a} {b} {g} {rest} euler"),
+        strapgen_says(f"simulate --set {a} {b} {g} euler {rest}"),
+    }
+    assert len(said) == 1
+
+
+def test_numbers_may_be_quotients(strapgen_says):
+    command = "simulate euler --motion constant --set x_deg_s=1 --step 1/8 --duration 1 --format json"
+    quotient = json.loads(strapgen_says(command))
+    assert quotient["step_s"] == 0.125
+    assert len(quotient["time_s"]) == 9
+
+
+def test_decimals_are_exact(strapgen_says):
+    said = strapgen_says(
+        "simulate euler --motion constant --set x_deg_s=1 --step 0.1 --duration 0.3 --format json"
+    )
+    assert len(json.loads(said)["time_s"]) == 4
+
+
+def test_simulate_csv(strapgen_says):
+    table = list(csv.DictReader(io.StringIO(strapgen_says(f"simulate dcm {CONING} --format csv"))))
+    data = json.loads(strapgen_says(f"simulate dcm {CONING} --format json"))
+    assert [float(row["time_s"]) for row in table] == data["time_s"]
+    assert [float(row["drift_y_deg"]) for row in table] == [drift[1] for drift in data["drift_deg"]]
+
+
+def test_simulate_text_is_the_default(strapgen_says):
+    said = strapgen_says(f"simulate dcm {CONING}")
+    assert said == strapgen_says(f"simulate dcm {CONING} --format text")
+    assert "error matrix E" in said and "mean drift, deg: " in said
+
+
+def test_simulate_matrices(strapgen_says):
+    plain = json.loads(strapgen_says(f"simulate dcm {CONING} --format json"))
+    data = json.loads(strapgen_says(f"simulate dcm {CONING} --format json --matrices"))
+    matrices = ["computed", "true", "difference", "error"]
+    assert list(data) == [*plain, *matrices]
+    for name in matrices:
+        assert np.shape(data[name]) == (41, 3, 3)
+
+
+def test_scheme_matters(strapgen_says):
+    command = f"simulate dcm --method rk1 {CONING} --orthonormalize 1 --format json"
+    drifts = {
+        json.loads(strapgen_says(f"{command} --scheme {scheme}"))["mean_drift_deg"]
+        for scheme in catalogue.orthonormalizations("dcm")
+    }
+    assert len(drifts) == len(catalogue.orthonormalizations("dcm")) > 1
+
+
+def test_output_into_a_file(strapgen_says, tmp_path):
+    wanted = strapgen_says(f"simulate dcm {CONING} --format csv")
+    assert strapgen_says(f"simulate dcm {CONING} --format csv --out deep/er/run.csv") == ""
+    assert (tmp_path / "deep" / "er" / "run.csv").read_text() == wanted
+
+
+def test_plot(strapgen_says, tmp_path):
+    pytest.importorskip("matplotlib")
+    assert strapgen_says(f"simulate dcm {CONING} --plot run.png") == strapgen_says(f"simulate dcm {CONING}")
+    assert (tmp_path / "run.png").read_bytes().startswith(b"\x89PNG")
+
+
+# simulate on recorded data
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_recorded_increments(backend, strapgen_says):
+    options = f"--method rk3 --increments 4 --backend {backend} --increments-csv {DATA}/increments.csv"
+    table = list(csv.reader(io.StringIO(strapgen_says(f"simulate euler {options}"))))
+    assert table[0] == ["time_s", "e_x", "e_y", "e_z", "e_s"]
+    values = np.array(table[1:], float)
+    assert values.shape == (101, 5)
+    np.testing.assert_allclose(values[:, 0], 0.04 * np.arange(101), atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(values[:, 1:], axis=1), 1, atol=1e-5)
+
+
+def test_recorded_rates(strapgen_says):
+    options = f"--rates-csv {DATA}/rates_uneven.csv --rate-unit deg/s --resample-hz 100"
+    data = json.loads(strapgen_says(f"simulate dcm {options} --record 0.5 --orthonormalize 1 --format json"))
+    assert list(data) == [
+        *("algorithm", "method", "increments", "backend", "source"),
+        *("step_s", "duration_s", "unused_increments", "elements", "time_s", "attitude"),
+    ]
+    assert data["source"] == f"{DATA}/rates_uneven.csv"
+    assert np.shape(data["attitude"]) == (9, 9)
+    assert (data["step_s"], data["duration_s"], data["unused_increments"]) == (0.02, 4.0, 0)
+
+
+def test_unit_of_rates_matters(strapgen_says):
+    last = []
+    for unit in ("deg/s", "rad/s"):
+        said = strapgen_says(
+            f"simulate euler --rates-csv {DATA}/rates_even.csv --rate-unit {unit} --format json"
+        )
+        last.append(json.loads(said)["attitude"][-1])
+    assert not np.allclose(*last)
+
+
+def test_increments_left_over_are_told(strapgen_says):
+    options = f"--increments 7 --increments-csv {DATA}/increments.csv"
+    assert json.loads(strapgen_says(f"simulate euler {options} --format json"))["unused_increments"] == 1
+    said = strapgen_says(f"simulate euler {options} --format text")
+    assert said.endswith("1 increments at the end make no whole step and were not used\n")
+
+
+def test_recording_into_files(strapgen_says, tmp_path):
+    pytest.importorskip("matplotlib")
+    options = f"--rates-csv {DATA}/rates_even.csv --rate-unit deg/s"
+    wanted = strapgen_says(f"simulate euler {options}")
+    assert strapgen_says(f"simulate euler {options} --out attitude.csv --plot attitude.png") == ""
+    assert (tmp_path / "attitude.csv").read_text() == wanted
+    assert (tmp_path / "attitude.png").read_bytes().startswith(b"\x89PNG")
+
+
+# tables
+
+TABLE_KEYS = ["table", "backend", "algorithm", "order", "drift_deg", "normalised", "thesis", "agrees"]
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_tables_json(backend, strapgen_says):
+    entries = json.loads(
+        strapgen_says(f"tables --backend {backend} --format json"), parse_constant=pytest.fail
+    )
+    for entry in entries:
+        assert list(entry)[: len(TABLE_KEYS)] == TABLE_KEYS
+        assert set(entry) - set(TABLE_KEYS) == {"thesis_printed", "note"}
+        assert entry.keys() == entries[0].keys()
+        assert type(entry["agrees"]) is bool
+    cases = [(e["table"], e["algorithm"], e["order"]) for e in entries]
+    assert cases == [(t.number, a, n) for t in TABLES for a in ("dcm", "euler") for n in (1, 2, 4)]
+    assert {entry["backend"] for entry in entries} == {backend}
+
+
+def test_tables_run_on_every_back_end_by_default(strapgen_says):
+    entries = json.loads(strapgen_says("tables --format json"))
+    assert len(entries) == 3 * 30
+    assert {entry["backend"] for entry in entries} == set(BACKENDS)
+
+
+def test_tables_text(strapgen_says):
+    said = strapgen_says("tables --backend numpy")
+    for table in TABLES:
+        assert f"Table {table.number}: {table.title}" in said
+    assert "2.391" in said and "0.856" in said
+
+
+# Speed, and life in a pipe
+
+
+def started(*words: str, **rest) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, "-m", "strapgen", *words], capture_output=True, text=True, **rest)
+
+
+def test_help_is_quick():
+    def seconds() -> float:
+        start = time.perf_counter()
+        assert started("--help").returncode == 0
+        return time.perf_counter() - start
+
+    assert min(seconds() for _ in range(5)) < 0.5
+
+
+@pytest.mark.parametrize("words", [["--help"], ["simulate", "--help"], ["generate", "--check"]])
+def test_quick_answers_load_no_heavy_library(words):
+    code = f"""
+import sys
+from strapgen.cli import main
+try:
+    main({words!r})
+except SystemExit:
+    pass
+print("loaded", *sorted({{"numpy", "sympy", "jinja2", "cffi", "matplotlib"}} & sys.modules.keys()))
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "loaded"
+
+
+def test_simulation_loads_no_computer_algebra():
+    """Once the sources are in the cache."""
+    command = f"simulate euler {CONING} --backend numpy".split()
+    assert started(*command).returncode == 0
+    code = f"""
+import sys
+from strapgen.cli import main
+try:
+    main({command!r})
+except SystemExit:
+    pass
+print("loaded", *sorted({{"sympy", "jinja2"}} & sys.modules.keys()))
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "loaded"
+
+
+@pytest.mark.parametrize(
+    "command", ["list", f"simulate dcm {CONING} --record 0.125 --format csv", "derive dcm"]
+)
+def test_reader_that_leaves_is_no_error(command):
+    program = shlex.join([sys.executable, "-m", "strapgen", *shlex.split(command)])
+    done = subprocess.run(["sh", "-c", f"{program} | head -1"], capture_output=True, text=True)
+    assert done.stderr == ""
+    assert done.stdout.count("\n") == 1
+
+
+def test_reader_that_is_gone_before_is_no_error():
+    program = [sys.executable, "-m", "strapgen", "list"]
+    with subprocess.Popen(program, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        process.stdout.close()
+        assert process.stderr.read() == ""
+    assert process.returncode == 1
+
+
+@pytest.mark.parametrize(
+    "command", ["list", f"simulate dcm {CONING}", "tables --backend numpy --format json"]
+)
+def test_full_disk(command):
+    if not Path("/dev/full").exists():
+        pytest.skip("there is no /dev/full on this machine")
+    with Path("/dev/full").open("w") as full:
+        program = [sys.executable, "-m", "strapgen", *shlex.split(command)]
+        done = subprocess.run(program, stdout=full, stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 2
+    assert done.stderr == "strapgen: the output cannot be written (No space left on device)\n"
+
+
+def test_interruption(capsys, monkeypatch):
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(pipeline, "derive", interrupted)
+    with pytest.raises(SystemExit) as stop:
+        main(["derive", "euler"])
+    assert stop.value.code == 130
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert "Traceback" not in said.err

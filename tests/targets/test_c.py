@@ -1,0 +1,570 @@
+"""The C target: strict compilation, aliasing, the contract of propagate, operation counts, literals, headers."""
+
+from __future__ import annotations
+
+import math
+import re
+import shutil
+import subprocess
+from fractions import Fraction
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from cffi import FFI
+from hypothesis import example, given
+from hypothesis import strategies as st
+from pycparser import c_ast, c_parser
+
+from strapgen import standard_tree
+from strapgen.catalogue import standard
+from strapgen.compilation import C_FLAGS
+from strapgen.program import Program
+from strapgen.targets import Sources, c, emit
+
+STRICT = ["-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-Werror", "-pedantic"]
+COMPILERS = {
+    "gcc": ["gcc", "-std=c99"],
+    "clang": ["clang", "-std=c99"],
+    "g++": ["g++", "-std=c++11", "-x", "c++"],
+    "clang++": ["clang++", "-std=c++11", "-x", "c++"],
+}
+TARGETS = ("c", "c-float")
+DTYPES = {"c": np.float64, "c-float": np.float32}
+KERNELS = [choice.kernel for choice in standard()]
+STEPS = ["dcm-rk4-2", "euler-rk4-2", "cayley-klein-rk4-2"]
+
+
+@cache
+def programs() -> dict[str, Program]:
+    return {program.kernel: program for program in standard_tree.programs()}
+
+
+@cache
+def generated(kernel: str, target: str) -> Sources:
+    return emit(programs()[kernel], target)
+
+
+def text_of(sources: Sources, ending: str) -> str:
+    (text,) = (text for name, text in sources.files.items() if name.endswith(ending))
+    return text
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with the C of the standard catalogue in both types."""
+    place = tmp_path_factory.mktemp("sources")
+    for kernel in KERNELS:
+        for target in TARGETS:
+            for name, text in generated(kernel, target).files.items():
+                (place / name).write_text(text)
+    return place
+
+
+def needed(program: str) -> str:
+    path = shutil.which(program)
+    if path is None:
+        pytest.skip(f"{program} is not on this machine")
+    return path
+
+
+# Compilation
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_whole_catalogue_compiles_without_a_warning(compiler, folder):
+    command = COMPILERS[compiler]
+    needed(command[0])
+    files = sorted(str(path) for path in folder.glob("*.c"))
+    assert len(files) == 2 * len(KERNELS)
+    done = subprocess.run([*command, *STRICT, "-fsyntax-only", *files], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_strict_compilation_can_fail(tmp_path):
+    needed("gcc")
+    sources = generated("euler-rk4-2", "c-float")
+    for name, text in sources.files.items():
+        (tmp_path / name).write_text(text.replace("0.5f", "0.5"))
+    command = ["gcc", "-std=c99", *STRICT, "-fsyntax-only", str(tmp_path / "euler_rk4_2_float.c")]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode != 0
+    assert "double" in done.stderr
+
+
+@pytest.fixture(scope="module")
+def objects(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with the objects of the standard catalogue, compiled by gcc as a user would."""
+    needed("gcc")
+    place = tmp_path_factory.mktemp("objects")
+    files = sorted(str(path) for path in folder.glob("*.c"))
+    command = ["gcc", *C_FLAGS, *STRICT, "-fPIC", "-c", *files]
+    done = subprocess.run(command, cwd=place, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    return place
+
+
+def test_objects_have_no_state_of_their_own(objects):
+    needed("nm")
+    files = sorted(objects.glob("*.o"))
+    assert len(files) == 2 * len(KERNELS)
+    listing = subprocess.run(
+        ["nm", "-A", *map(str, files)], capture_output=True, text=True, check=True
+    ).stdout
+    kinds: dict[str, set[str]] = {}
+    for line in listing.splitlines():
+        *_, kind, name = line.split()
+        kinds.setdefault(kind, set()).add(name)
+    assert kinds["T"] >= {"euler_rk4_2", "euler_rk4_2_float_propagate"}
+    # Code and read-only data; functions of the C library. No data (d), no zeroed data (b), nothing common (c).
+    assert set(kinds) <= set("TtrRU")
+    library = {name.removesuffix("f") for name in kinds["U"]} - {"_GLOBAL_OFFSET_TABLE_"}
+    assert library <= {"sqrt", "sin", "cos", "atan2", "fmax", "memcpy", "memmove", "sincos"}
+
+
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("kernel", KERNELS)
+def test_text_has_no_heap_and_no_static_data(kernel, target):
+    for text in generated(kernel, target).files.values():
+        code = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
+        assert not re.search(r"\b(malloc|calloc|realloc|alloca|free)\b", code)
+        for line in code.splitlines():
+            if re.search(r"\b(static|extern)\b", line):
+                assert "(" in line or line == 'extern "C" {', f"not a function: {line}"
+
+
+# One library of the whole catalogue, called through cffi
+
+
+def declarations(header: str) -> str:
+    plain = re.sub(r"#ifdef __cplusplus.*?#endif", "", header, flags=re.DOTALL)
+    return "\n".join(line for line in plain.splitlines() if not line.startswith("#"))
+
+
+class Library:
+    """The compiled catalogue and the memory that it is called with."""
+
+    def __init__(self, path: Path) -> None:
+        self.ffi = FFI()
+        for kernel in KERNELS:
+            for target in TARGETS:
+                self.ffi.cdef(declarations(text_of(generated(kernel, target), ".h")))
+        self.lib = self.ffi.dlopen(str(path))
+
+    def pointer(self, array: np.ndarray) -> Any:
+        assert array.flags.c_contiguous
+        return self.ffi.from_buffer("float[]" if array.dtype == np.float32 else "double[]", array)
+
+    def function(self, sources: Sources, suffix: str = "") -> Any:
+        return getattr(self.lib, sources.function.name + suffix)
+
+
+@pytest.fixture(scope="module")
+def library(objects: Path) -> Library:
+    path = objects / "catalogue.so"
+    files = sorted(str(file) for file in objects.glob("*.o"))
+    subprocess.run(["gcc", "-shared", "-o", str(path), *files, "-lm"], check=True)
+    return Library(path)
+
+
+def samples(program: Program, count: int, dtype: Any, rng: np.random.Generator) -> dict[str, np.ndarray]:
+    """Return inputs in proper use: attitudes near orthonormal, all else small."""
+    values = {}
+    for signal in program.inputs:
+        value = 0.3 * rng.normal(size=(count, *signal.shape))
+        if signal.shape == (3, 3):
+            value = np.linalg.qr(value)[0] + 1e-3 * rng.normal(size=(count, 3, 3))
+        if signal.shape == (4,):
+            value /= np.linalg.norm(value, axis=1, keepdims=True)
+        values[signal.name] = value.astype(dtype)
+    return values
+
+
+def pairs(kernel: str) -> list[tuple[str, str]]:
+    """Return names of outputs and inputs of the same shape."""
+    program = programs()[kernel]
+    return [
+        (result.signal.name, signal.name)
+        for result in program.outputs
+        for signal in program.inputs
+        if result.signal.shape == signal.shape and signal.shape
+    ]
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_output_may_be_an_input(target, library, rng):
+    checked = 0
+    for kernel, program in programs().items():
+        sources = generated(kernel, target)
+        for output, shared in pairs(kernel):
+            inputs = samples(program, 4, DTYPES[target], rng)
+            outputs = {r.signal.name: np.empty((4, *r.signal.shape), DTYPES[target]) for r in program.outputs}
+            call = library.function(sources, "_array")
+            call(4, *map(library.pointer, (*inputs.values(), *outputs.values())))
+            wanted = {name: value.tobytes() for name, value in outputs.items()}
+            assert np.isfinite(outputs[output]).all()
+
+            # The loop over samples, in place.
+            memory = {name: value.copy() for name, value in inputs.items()}
+            own = outputs | {output: memory[shared]}
+            call(4, *map(library.pointer, (*memory.values(), *own.values())))
+            assert {name: value.tobytes() for name, value in own.items()} == wanted, (kernel, output, shared)
+            for name, value in memory.items():
+                assert name == shared or value.tobytes() == inputs[name].tobytes(), f"{kernel} wrote {name}"
+
+            # One call, in place.
+            memory = {name: value[:1].copy() for name, value in inputs.items()}
+            own = {name: value[:1].copy() for name, value in outputs.items()} | {output: memory[shared]}
+            arguments = [
+                library.pointer(memory[s.name]) if s.shape else memory[s.name].item() for s in program.inputs
+            ]
+            library.function(sources)(*arguments, *map(library.pointer, own.values()))
+            size = len(own[output].tobytes())
+            assert own[output].tobytes() == wanted[output][:size], (kernel, output, shared)
+            checked += 1
+    assert checked >= len(KERNELS) / 2
+
+
+def test_every_step_and_orthonormalization_has_a_shared_size():
+    for kernel in KERNELS:
+        if re.search(r"-rk\d-|normalize|-product", kernel):
+            assert pairs(kernel), kernel
+
+
+# Propagation
+
+
+class Propagation:
+    """The generated loop of one attitude step, with memory around the history that must stay as it is."""
+
+    def __init__(self, library: Library, kernel: str, target: str, rng: np.random.Generator) -> None:
+        self.library, self.dtype = library, DTYPES[target]
+        self.program, self.sources = programs()[kernel], generated(kernel, target)
+        companions = self.program.companions
+        assert companions is not None
+        normalizer = generated(companions.orthonormalize, target).function.name
+        self.normalize = library.ffi.addressof(library.lib, normalizer)
+        self.size = self.program.inputs[0].size
+        self.identity = np.array([float(x) for x in companions.identity], self.dtype)
+        self.increments = rng.normal(scale=0.05, size=(3, 20, 6)).astype(self.dtype)
+
+    def step(self, state: np.ndarray, increments: np.ndarray) -> np.ndarray:
+        result = np.empty_like(state)
+        self.library.function(self.sources)(*map(self.library.pointer, (state, increments, result)))
+        return result
+
+    def __call__(
+        self,
+        increments: np.ndarray | None,
+        record_every: int = 1,
+        orthonormalize_every: int = 0,
+        *,
+        runs: int = 1,
+        steps: int = 20,
+        initial: np.ndarray | bool | None = True,
+        history: np.ndarray | bool | None = True,
+        function: Any = None,
+    ) -> tuple[int, np.ndarray]:
+        null, pointer = self.library.ffi.NULL, self.library.pointer
+        start = np.tile(self.identity, (runs, 1)) if initial is True else initial
+        records = 1 + steps // record_every if record_every else 1
+        memory = np.full((runs * records + 2, self.size), 7.0, self.dtype)
+        inside = memory[1:-1]
+        status = self.library.function(self.sources, "_propagate")(
+            runs,
+            steps,
+            record_every,
+            orthonormalize_every,
+            null if function is None else function,
+            null if start is None else pointer(start),
+            null if increments is None else pointer(increments),
+            pointer(inside) if history is True else null,
+        )
+        assert (memory[[0, -1]] == 7.0).all(), "written outside the history"
+        return status, inside.reshape(runs, records, self.size)
+
+
+@pytest.fixture(params=STEPS)
+def step_kernel(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+@pytest.fixture(params=TARGETS)
+def propagate(request, step_kernel, library, rng) -> Propagation:
+    return Propagation(library, step_kernel, request.param, rng)
+
+
+def test_propagation_is_the_step_repeated_bit_for_bit(propagate):
+    status, history = propagate(propagate.increments[0])
+    assert status == 0
+    state = propagate.identity
+    assert history[0, 0].tobytes() == state.tobytes()
+    for increments, record in zip(propagate.increments[0], history[0, 1:], strict=True):
+        state = propagate.step(state, increments)
+        assert record.tobytes() == state.tobytes()
+
+
+@pytest.mark.parametrize("every", [1, 3, 7, 20])
+def test_propagation_orthonormalizes_before_it_records(propagate, every):
+    status, history = propagate(propagate.increments[0], 2, every, function=propagate.normalize)
+    assert status == 0
+    state = propagate.identity
+    for number, increments in enumerate(propagate.increments[0], 1):
+        state = propagate.step(state, increments)
+        if number % every == 0:
+            done = np.empty_like(state)
+            propagate.normalize(*map(propagate.library.pointer, (state, done)))
+            state = done
+        if number % 2 == 0:
+            assert history[0, number // 2].tobytes() == state.tobytes()
+
+
+def test_several_runs_equal_single_runs_bit_for_bit(propagate):
+    arguments = {"record_every": 3, "orthonormalize_every": 4, "function": propagate.normalize}
+    starts = np.ascontiguousarray(propagate(propagate.increments[0], 6)[1][0, :3])
+    status, together = propagate(propagate.increments, runs=3, initial=starts, **arguments)
+    assert status == 0
+    for run in range(3):
+        _, alone = propagate(propagate.increments[run], initial=starts[run : run + 1], **arguments)
+        assert alone[0].tobytes() == together[run].tobytes()
+
+
+def test_no_steps_give_the_initial_state(propagate):
+    for increments in (None, propagate.increments[0]):
+        status, history = propagate(increments, steps=0)
+        assert status == 0
+        assert history[0].tobytes() == propagate.identity.tobytes()
+
+
+def test_no_runs_write_nothing(propagate):
+    assert propagate(propagate.increments, runs=0)[0] == 0
+
+
+def test_steps_after_the_last_record_are_run_and_not_recorded(propagate):
+    status, history = propagate(propagate.increments[0], 21)
+    assert status == 0
+    assert history.shape[1] == 1
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [
+        {"initial": None},
+        {"increments": None},
+        {"history": None},
+        {"record_every": 0},
+        {"orthonormalize_every": 1},
+    ],
+    ids=lambda fault: next(iter(fault)),
+)
+def test_bad_arguments_give_status_1_and_leave_the_history_alone(propagate, fault):
+    status, history = propagate(**{"increments": propagate.increments[0]} | fault)
+    assert status == 1
+    assert (history == 7.0).all()
+
+
+# Operation counts
+
+
+BINARY = {"+": "add", "-": "add", "*": "multiply", "/": "divide"}
+CALLS = {
+    "sqrt": "sqrt",
+    "fmax": "select",
+    "sin": "function",
+    "cos": "function",
+    "atan2": "function",
+    "sinc_": "function",
+}
+
+
+class Counter(c_ast.NodeVisitor):
+    """Counts the operations of a C function."""
+
+    def __init__(self) -> None:
+        kinds = ("add", "multiply", "divide", "sqrt", "negate", "select", "function")
+        self.counts = dict.fromkeys(kinds, 0)
+
+    def visit_BinaryOp(self, node):
+        if node.op != ">=":  # counted with its choice
+            self.counts[BINARY[node.op]] += 1
+        self.generic_visit(node)
+
+    def visit_UnaryOp(self, node):
+        if node.op == "-" and not isinstance(node.expr, c_ast.Constant):
+            self.counts["negate"] += 1
+        else:
+            assert node.op in "-*"
+        self.generic_visit(node)
+
+    def visit_TernaryOp(self, node):
+        self.counts["select"] += 1
+        self.generic_visit(node)
+
+    def visit_FuncCall(self, node):
+        name = node.name.name
+        self.counts[CALLS[name if name in CALLS else name.removesuffix("f")]] += 1
+        self.generic_visit(node.args)
+
+
+def function_body(source: str) -> str:
+    code = re.sub(r"/\*.*?\*/", "", source, flags=re.DOTALL)
+    (body,) = re.findall(r"^static inline (void one_\(.*?^\})", code, flags=re.DOTALL | re.MULTILINE)
+    return body
+
+
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("kernel", KERNELS)
+def test_operation_counts(kernel, target):
+    program, sources = programs()[kernel], generated(kernel, target)
+    tree = c_parser.CParser().parse(function_body(text_of(sources, ".c")))
+    counter = Counter()
+    counter.visit(tree)
+    assert counter.counts == program.operations == sources.operations
+
+    said = re.search(r"Operations of one call: (.*?); (\d+) temporaries\.", text_of(sources, ".h"))
+    assert said is not None
+    in_header = dict.fromkeys(counter.counts, 0)
+    if said[1] != "none":
+        in_header |= {kind: int(number) for number, kind in (part.split() for part in said[1].split(", "))}
+    assert in_header == counter.counts
+
+    loads = sum(len(signal.elements) for signal in program.inputs if signal.shape)
+    assigned = [node for node in tree.ext[0].body.block_items if isinstance(node, c_ast.Decl)]
+    elements = {name for signal in program.inputs for name in signal.elements}
+    own = [node.name for node in assigned if node.name not in elements]
+    assert len(assigned) - len(own) <= loads
+    stored = {node.rvalue.name for node in tree.ext[0].body.block_items if _stores_a_name(node)}
+    assert len([name for name in own if name not in stored]) == int(said[2]) == program.temporaries
+
+
+def _stores_a_name(node: Any) -> bool:
+    return isinstance(node, c_ast.Assignment) and isinstance(node.rvalue, c_ast.ID)
+
+
+# Literals
+
+
+def nearest(value: Fraction, digits: int, smallest: int) -> Fraction:
+    """Round a positive rational to `digits` binary digits, ties to even; 2**smallest is the least spacing."""
+    exponent = math.floor(math.log2(value.numerator) - math.log2(value.denominator)) - digits
+    while value / Fraction(2) ** exponent >= 2**digits:
+        exponent += 1
+    exponent = max(exponent, smallest)
+    return Fraction(round(value / Fraction(2) ** exponent)) * Fraction(2) ** exponent
+
+
+def nearest_double(value: Fraction) -> Fraction:
+    return nearest(value, 53, -1074)
+
+
+def nearest_single(value: Fraction) -> Fraction:
+    return nearest(value, 24, -149)
+
+
+def read(literal: str) -> Fraction:
+    """Read a C literal as a compiler does: the decimal exactly, then rounded once to the literal's type."""
+    assert re.fullmatch(r"\d+(\.\d+(e[+-]\d+)?|e[+-]\d+)f?", literal), literal
+    if literal.endswith("f"):
+        return nearest_single(Fraction(literal[:-1]))
+    return nearest_double(Fraction(literal))
+
+
+# Just above the middle of 1 and the next float: through double it becomes the middle, and then 1.
+TRAP = 1 + Fraction(1, 2**24) + Fraction(1, 2**60)
+positive = st.fractions(min_value=Fraction(1, 10**12), max_value=10**12)
+wide = st.builds(
+    lambda top, bottom, power: Fraction(top, bottom) * Fraction(10) ** power,
+    st.integers(1, 10**20),
+    st.integers(1, 10**20),
+    st.integers(-15, 15),
+)
+
+
+@given(positive | wide)
+@example(Fraction(1, 3))
+@example(TRAP)
+@example(Fraction(1))
+@example(Fraction(10**22))
+@example(Fraction(1, 10**40))
+def test_literals_are_rounded_once(value):
+    assert read(c.CPrinter(c.DOUBLE).constant(value)) == nearest_double(value)
+    assert read(c.CPrinter(c.FLOAT).constant(value)) == nearest_single(value)
+
+
+def test_the_trap_is_one():
+    assert nearest_single(TRAP) == 1 + Fraction(1, 2**23)
+    assert nearest_single(nearest_double(TRAP)) == 1
+    assert c.CPrinter(c.FLOAT).constant(TRAP) == "1.0000001f"
+
+
+def test_a_tie_goes_to_even():
+    printer = c.CPrinter(c.FLOAT)
+    assert read(printer.constant(1 + Fraction(1, 2**24))) == 1
+    assert read(printer.constant(1 + Fraction(3, 2**24))) == 1 + Fraction(1, 2**22)
+
+
+def test_compiler_reads_literals_as_meant(tmp_path):
+    needed("gcc")
+    values = [TRAP, *(Fraction(top, bottom) for top in range(1, 40) for bottom in (3, 7, 24, 720, 99991))]
+    lines = []
+    for real in (c.DOUBLE, c.FLOAT):
+        numbers = ", ".join(c.CPrinter(real).constant(value) for value in values)
+        lines.append(f"const {real.name} {real.name}s[] = {{{numbers}}};")
+    (tmp_path / "literals.c").write_text("\n".join(lines))
+    built = tmp_path / "literals.so"
+    command = ["gcc", "-std=c99", "-shared", "-fPIC", "-o", str(built), str(tmp_path / "literals.c")]
+    subprocess.run(command, check=True)
+    ffi = FFI()
+    ffi.cdef(f"extern const double doubles[{len(values)}]; extern const float floats[{len(values)}];")
+    lib = ffi.dlopen(str(built))
+    assert [Fraction(x) for x in lib.doubles] == [nearest_double(value) for value in values]
+    assert [Fraction(x) for x in lib.floats] == [nearest_single(value) for value in values]
+
+
+# Headers
+
+
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("kernel", KERNELS)
+def test_header_is_a_contract(kernel, target):
+    program, sources = programs()[kernel], generated(kernel, target)
+    header = re.sub(r"\n \*\s+", " ", text_of(sources, ".h"))
+    assert f"Generated by: strapgen generate {program.arguments} --target {target}" in header
+    assert f"Source: {program.source}." in header
+    for note in program.notes:
+        assert note in header
+    for way, signal in [("in", s) for s in program.inputs] + [("out", r.signal) for r in program.outputs]:
+        shape = f"[{signal.size}]" if signal.shape else ""
+        (line,) = re.findall(
+            rf"{way}\s+{signal.name}{re.escape(shape)}: (.*?)\.(?: in | out |\n| \*)", header
+        )
+        assert signal.meaning in line
+        assert f"; unit {signal.unit}" in line
+        assert signal.meaning and signal.unit
+        if way == "in":
+            assert "finite number" in line
+        if way == "in" and signal.bound is not None:
+            assert f"at most {signal.bound} in magnitude" in line
+        if signal.shape:
+            shown = signal.elements if signal.size <= 4 else (signal.elements[0], "...", signal.elements[-1])
+            assert ", ".join(shown) in line
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_names_of_both_types_differ(target):
+    suffix = "_float" if target == "c-float" else ""
+    sources = generated("euler-rk4-2", target)
+    assert list(sources.files) == [f"euler_rk4_2{suffix}.h", f"euler_rk4_2{suffix}.c"]
+    assert sources.function.name == f"euler_rk4_2{suffix}"
+
+
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("kernel", KERNELS)
+def test_text_is_clean(kernel, target):
+    for text in generated(kernel, target).files.values():
+        assert text.endswith("\n") and not text.endswith("\n\n")
+        assert "\t" not in text and "\r" not in text
+        assert all(line == line.rstrip() for line in text.splitlines())
+        assert text.isascii()

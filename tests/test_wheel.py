@@ -1,0 +1,121 @@
+"""The wheel: built from the checkout, installed elsewhere, at work without the checkout."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import venv
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from strapgen import resources
+
+pytestmark = pytest.mark.long
+
+
+def run(*command: str | Path, cwd: Path, environment: dict[str, str] | None = None) -> str:
+    done = subprocess.run(
+        [str(word) for word in command], cwd=cwd, env=environment, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    checkout = resources.checkout()
+    assert checkout is not None, "the tests run from a checkout"
+    folder = tmp_path_factory.mktemp("wheel")
+    run(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "-w", folder, checkout, cwd=folder)
+    (built,) = folder.glob("strapgen-*.whl")
+    return built
+
+
+def test_templates_and_generated_sources_are_in_the_wheel(wheel):
+    names = set(zipfile.ZipFile(wheel).namelist())
+    for kind in ("templates", "generated"):
+        folder = resources.folder(kind)
+        shipped = {
+            f"strapgen/_data/{kind}/{path.relative_to(folder).as_posix()}"
+            for path in folder.rglob("*")
+            if path.is_file() and "__pycache__" not in path.parts
+        }
+        assert shipped
+        assert shipped <= names
+    assert "strapgen/cli/generate.py" in names
+    assert not any("__pycache__" in name or name.startswith(("tests/", "codegen/")) for name in names)
+
+
+@pytest.fixture(scope="module")
+def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory):
+    """Return a function that runs the strapgen of a clean environment, in a folder of its own."""
+    folder = tmp_path_factory.mktemp("installed")
+    venv.create(folder / "venv", with_pip=True)
+    binaries = folder / "venv" / "bin"
+    run(binaries / "python", "-m", "pip", "install", "--quiet", wheel, cwd=folder)
+    home = folder / "home"
+    home.mkdir()
+    kept = {name: os.environ[name] for name in ("PATH", "LANG", "TMPDIR") if name in os.environ}
+    environment = kept | {"HOME": str(home), "STRAPGEN_CACHE_DIR": str(folder / "cache")}
+
+    def strapgen(*words: str, cwd: Path = folder) -> str:
+        return run(binaries / "strapgen", *words, cwd=cwd, environment=environment)
+
+    strapgen.python = lambda code: run(binaries / "python", "-c", code, cwd=folder, environment=environment)
+    return strapgen
+
+
+def test_package_is_the_installed_one(installed):
+    place = Path(installed.python("import strapgen; print(strapgen.__file__)").strip())
+    assert "site-packages" in place.parts
+    assert not place.is_relative_to(resources.checkout())
+
+
+def test_version(installed):
+    lines = installed("--version").splitlines()
+    assert lines[0].startswith("strapgen ")
+    assert {"sympy", "numpy", "jinja2", "cffi"} <= {line.split()[0] for line in lines}
+    assert not any("is not installed" in line for line in lines if not line.startswith("C compiler"))
+
+
+def test_generate(installed, tmp_path):
+    installed("generate", "euler", "--target", "c", "--out", "firmware", cwd=tmp_path)
+    checked_in = resources.folder("generated") / "c"
+    for name in ("euler_rk4_2.h", "euler_rk4_2.c"):
+        assert (tmp_path / "firmware" / name).read_text() == (checked_in / name).read_text()
+
+
+def test_generated_sources_are_in_step(installed, tmp_path):
+    assert installed("generate", "--all", "--check", cwd=tmp_path).endswith("in step\n")
+
+
+def test_whole_catalogue_goes_to_a_folder_of_the_user(installed, tmp_path):
+    installed("generate", "--all", cwd=tmp_path)
+    made = {p.relative_to(tmp_path / "generated") for p in (tmp_path / "generated").rglob("*") if p.is_file()}
+    folder = resources.folder("generated")
+    wanted = {
+        p.relative_to(folder) for p in folder.rglob("*") if p.is_file() and "__pycache__" not in p.parts
+    }
+    assert made == wanted
+    assert installed("generate", "--all", "--check", "--out", "generated", cwd=tmp_path).endswith("in step\n")
+
+
+@pytest.mark.parametrize("backend", ["numpy", "c"])
+def test_simulate(backend, installed, tmp_path):
+    words = [
+        "--backend",
+        backend,
+        "--motion",
+        "constant",
+        "--set",
+        "x_deg_s=10",
+        "--step",
+        "1",
+        "--duration",
+        "3",
+    ]
+    said = installed("simulate", "euler", *words, "--format", "csv", cwd=tmp_path)
+    assert len(said.splitlines()) == 5
