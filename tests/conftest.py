@@ -1,4 +1,4 @@
-"""What the tests share: one fixture over all back ends, and a cache folder of the test run's own."""
+"""What the tests share: one fixture over all back ends, and one over all attitude algorithms."""
 
 from __future__ import annotations
 

@@ -73,6 +73,8 @@ def write(folder: Path, files: dict[str, str]) -> list[Path]:
             )
     written = output.write_files(folder, files)
     for path in _unexpected(folder, files):
+        if path.relative_to(folder).parts[0] not in _FOLDERS.values():
+            continue  # what lies beside the tree's own folders is the user's
         with contextlib.suppress(OSError):
             if _HEAD.match(path.read_bytes()):
                 path.unlink()
@@ -99,9 +101,8 @@ def _text(path: Path) -> str:
 
 
 def _unexpected(folder: Path, files: dict[str, str]) -> list[Path]:
-    """Return the files in the tree's own folders that are no part of it; what lies beside them is the user's."""
-    present = [path for part in _FOLDERS.values() for path in (folder / part).rglob("*") if path.is_file()]
-    present = [path for path in present if "__pycache__" not in path.parts]
+    """Return the files in a folder that are no part of the tree."""
+    present = [path for path in folder.rglob("*") if path.is_file() and "__pycache__" not in path.parts]
     return sorted(path for path in present if path.relative_to(folder).as_posix() not in files)
 
 

@@ -115,6 +115,30 @@ def test_increments_per_step_from_1_to_8(make, backend_name, algorithm, rng):
         assert np.abs(backend.propagate(turn) - wanted).max() <= roundoff(backend, 10)
 
 
+@pytest.mark.parametrize("shape", [(0, 7, 2, 3), (3, 0, 2, 3), (2, 0, 4, 2, 3), (0, 2, 3)])
+def test_no_runs_and_no_steps(make, algorithm, shape):
+    backend = make(algorithm)
+    history = backend.propagate(np.zeros(shape))
+    assert history.shape == (*shape[:-3], 1 + shape[-3], *backend.state_shape)
+
+
+@pytest.mark.parametrize("kind", [">f8", "f4", "f2"])
+def test_any_floating_point_layout_is_read(make, kind, rng):
+    backend = make("euler")
+    increments = random_increments(rng, 3, 20, 2).astype(kind)
+    wanted = backend.propagate(increments.astype("f8"))
+    np.testing.assert_array_equal(backend.propagate(increments), wanted)
+    np.testing.assert_array_equal(backend.propagate(np.asfortranarray(increments)), wanted)
+    doubled = np.repeat(increments, 2, axis=0)
+    doubled.setflags(write=False)
+    np.testing.assert_array_equal(backend.propagate(doubled[::2]), wanted)
+
+
+def test_masked_arrays_are_refused(make):
+    with pytest.raises(InputTypeError, match="increments is a masked array"):
+        make("euler").propagate(np.ma.masked_array(np.zeros((4, 2, 3)), mask=True))
+
+
 def test_zero_increments_leave_the_state(make, algorithm):
     backend = make(algorithm)
     history = backend.propagate(np.zeros((5, 2, 3)))
@@ -163,6 +187,8 @@ def test_increments_that_cannot_be_used(make, increments, error, words):
     [
         {"record_every": 0},
         {"record_every": -1},
+        {"record_every": 2**70},
+        {"orthonormalize_every": 2**70},
         {"record_every": 1.5},
         {"record_every": True},
         {"orthonormalize_every": 0},
