@@ -76,11 +76,40 @@ class Motion:
         return values.reshape(steps, samples, 3)
 
     def attitude(self, time: Any) -> Array:
-        """Return the true direction cosine matrix, body to reference, (..., 3, 3), at times in s."""
+        """Return the true attitude.
+
+        Parameters
+        ----------
+        time : array_like, (...)
+            Times in s.
+
+        Returns
+        -------
+        array, (..., 3, 3)
+            Direction cosine matrices, body to reference; the identity at time 0.
+
+        Examples
+        --------
+        >>> motion("constant", z_deg_s=90).attitude(1.0).round(12) + 0.0
+        array([[ 0., -1.,  0.],
+               [ 1.,  0.,  0.],
+               [ 0.,  0.,  1.]])
+        """
         return self._truth(time)[1]
 
     def rate(self, time: Any) -> Array:
-        """Return the body rate in rad/s, body axes, (..., 3), at times in s."""
+        """Return the body rate.
+
+        Parameters
+        ----------
+        time : array_like, (...)
+            Times in s.
+
+        Returns
+        -------
+        array, (..., 3)
+            Rates in rad/s, body axes.
+        """
         return self._truth(time)[0]
 
     def _truth(self, time: Any) -> tuple[Array, Array]:

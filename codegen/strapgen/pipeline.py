@@ -56,7 +56,20 @@ def derive(algorithm: str, method: str | None = None, increments: int | None = N
 
 
 def lower(kernel: Kernel) -> Program:
-    """Turn a kernel into straight-line code; see `strapgen.lowering.lower`.
+    """Turn a kernel into straight-line code with common subexpressions computed once.
+
+    Parameters
+    ----------
+    kernel : Kernel
+
+    Returns
+    -------
+    Program
+
+    Raises
+    ------
+    NotImplementedError
+        If an expression holds a function that programs do not know.
 
     Examples
     --------
@@ -69,7 +82,23 @@ def lower(kernel: Kernel) -> Program:
 
 
 def generate(program: Program, target: str) -> Sources:
-    """Turn a program into source text; see `strapgen.targets.emit`.
+    """Turn a program into source text.
+
+    Parameters
+    ----------
+    program : Program
+    target : str
+        "numpy", "c" or "c-float".
+
+    Returns
+    -------
+    Sources
+        Text by file name, and the interface of the generated function.
+
+    Raises
+    ------
+    InputError
+        If the target is unknown.
 
     Examples
     --------
@@ -80,7 +109,22 @@ def generate(program: Program, target: str) -> Sources:
 
 
 def build(sources: Sources) -> Backend:
-    """Turn the sources of an attitude step into a back end; see `strapgen.backends.build`.
+    """Turn the sources of an attitude step into a back end; C is compiled, once.
+
+    Parameters
+    ----------
+    sources : Sources
+
+    Returns
+    -------
+    Backend
+
+    Raises
+    ------
+    InputError
+        If the sources are of no attitude step.
+    CompilerError
+        If a C compiler is needed and there is none, or it fails.
 
     Examples
     --------

@@ -176,6 +176,14 @@ def read_increments(path: str | Path) -> Recording:
     InputError
         If the file cannot be read, a value is no finite number, or the times are not even; the message names
         the line.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> log = Path(tempfile.mkdtemp()) / "gyro.csv"
+    >>> _ = log.write_text("t,dx,dy,dz\\n0.1,0,0,1e-3\\n0.2,0,0,2e-3\\n")
+    >>> read_increments(log).increments[:, 2]
+    array([0.001, 0.002])
     """
     path = Path(path)
     values, lines = _rows(path, _INCREMENT_COLUMNS)
@@ -207,6 +215,16 @@ def read_rates(path: str | Path, unit: str, resample_hz: float | str | None = No
     InputError
         If the file cannot be read, a value is no finite number, there is a gap, or the times are not even
         and `resample_hz` is not given; the message names the line.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> log = Path(tempfile.mkdtemp()) / "gyro.csv"
+    >>> _ = log.write_text("t,x,y,z\\n0,0,0,1\\n1,0,0,3\\n2,0,0,3\\n")
+    >>> read_rates(log, "rad/s").increments[:, 2]
+    array([2., 3.])
+    >>> read_rates(log, "rad/s", resample_hz=2).increments[:, 2]
+    array([0.75, 1.25, 1.5 , 1.5 ])
     """
     path = Path(path)
     factor = RATE_UNITS[checks.choice("rate unit", unit, RATE_UNITS)]
@@ -261,6 +279,14 @@ def propagate(
     InputError
         If the recording is shorter than a step, a time is no multiple of the step, or the attitude leaves
         the range of the back end's numbers.
+
+    Examples
+    --------
+    >>> from strapgen import backend
+    >>> recording = Recording(0.0, 0.01, np.full((9, 3), 1e-3))
+    >>> history = propagate(backend("euler", "rk4", 2), recording)
+    >>> history.states.shape, history.unused
+    ((5, 4), 1)
     """
     step = recording.interval * backend.increments
     steps, unused = divmod(len(recording.increments), backend.increments)

@@ -54,7 +54,18 @@ class Run:
 
 
 def attitude(backend: Backend, states: Any) -> Array:
-    """Return direction cosine matrices (..., 3, 3) in double of the states of a back end."""
+    """Return the attitude that states of a back end stand for.
+
+    Parameters
+    ----------
+    backend : Backend
+    states : array_like, (..., state shape)
+
+    Returns
+    -------
+    array, (..., 3, 3)
+        Direction cosine matrices, body to reference, in double.
+    """
     states = np.asarray(states, np.float64)
     if backend.attitude is None:
         return np.array(states)

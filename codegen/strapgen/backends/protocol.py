@@ -154,7 +154,16 @@ class Backend(ABC):
         return result
 
     def orthonormalize(self, state: Any) -> Array:
-        """Restore the constraint of a state, (..., state shape)."""
+        """Restore the constraint of a state: its length, or its orthogonality.
+
+        Parameters
+        ----------
+        state : array_like, (..., state shape)
+
+        Returns
+        -------
+        array, (..., state shape)
+        """
         result: Array = self._evaluate(self._orthonormalization)(state)
         return result
 
