@@ -159,7 +159,7 @@ def _require_even(path: Path, intervals: Array, median: float, lines: list[int],
 
 
 def read_increments(path: str | Path) -> Recording:
-    """Read a file of angle increments.
+    r"""Read a file of angle increments.
 
     Parameters
     ----------
@@ -181,7 +181,7 @@ def read_increments(path: str | Path) -> Recording:
     --------
     >>> import tempfile
     >>> log = Path(tempfile.mkdtemp()) / "gyro.csv"
-    >>> _ = log.write_text("t,dx,dy,dz\\n0.1,0,0,1e-3\\n0.2,0,0,2e-3\\n")
+    >>> _ = log.write_text("t,dx,dy,dz\n0.1,0,0,1e-3\n0.2,0,0,2e-3\n")
     >>> read_increments(log).increments[:, 2]
     array([0.001, 0.002])
     """
@@ -194,7 +194,7 @@ def read_increments(path: str | Path) -> Recording:
 
 
 def read_rates(path: str | Path, unit: str, resample_hz: float | str | None = None) -> Recording:
-    """Read a file of body rates and integrate them, taken as linear from sample to sample.
+    r"""Read a file of body rates and integrate them, taken as linear from sample to sample.
 
     Parameters
     ----------
@@ -220,7 +220,7 @@ def read_rates(path: str | Path, unit: str, resample_hz: float | str | None = No
     --------
     >>> import tempfile
     >>> log = Path(tempfile.mkdtemp()) / "gyro.csv"
-    >>> _ = log.write_text("t,x,y,z\\n0,0,0,1\\n1,0,0,3\\n2,0,0,3\\n")
+    >>> _ = log.write_text("t,x,y,z\n0,0,0,1\n1,0,0,3\n2,0,0,3\n")
     >>> read_rates(log, "rad/s").increments[:, 2]
     array([2., 3.])
     >>> read_rates(log, "rad/s", resample_hz=2).increments[:, 2]
