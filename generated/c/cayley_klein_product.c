@@ -31,8 +31,8 @@ void cayley_klein_product(const double state[4], const double transition[4], dou
     one_(state, transition, next);
 }
 
-void cayley_klein_product_array(size_t count, const double *state, const double *transition, double
-    *next)
+void cayley_klein_product_array(size_t count, const double *state, const double *transition,
+    double *next)
 {
     for (size_t k = 0; k < count; ++k)
         one_(state + 4 * k, transition + 4 * k, next + 4 * k);

@@ -32,8 +32,8 @@ void cayley_klein_product(const double state[4], const double transition[4], dou
 /* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
  * whose samples have the same size; otherwise they must not overlap.
  */
-void cayley_klein_product_array(size_t count, const double *state, const double *transition, double
-    *next);
+void cayley_klein_product_array(size_t count, const double *state, const double *transition,
+    double *next);
 
 #ifdef __cplusplus
 }

@@ -37,8 +37,8 @@ void cayley_klein_rk1_2(const double state[4], const double increments[6], doubl
     one_(state, increments, next);
 }
 
-void cayley_klein_rk1_2_array(size_t count, const double *state, const double *increments, double
-    *next)
+void cayley_klein_rk1_2_array(size_t count, const double *state, const double *increments,
+    double *next)
 {
     for (size_t k = 0; k < count; ++k)
         one_(state + 4 * k, increments + 6 * k, next + 4 * k);

@@ -34,8 +34,8 @@ void cayley_klein_rk3_2(const double state[4], const double increments[6], doubl
 /* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
  * whose samples have the same size; otherwise they must not overlap.
  */
-void cayley_klein_rk3_2_array(size_t count, const double *state, const double *increments, double
-    *next);
+void cayley_klein_rk3_2_array(size_t count, const double *state, const double *increments,
+    double *next);
 
 /* A function that restores the constraint of a state, in place. */
 typedef void (*cayley_klein_rk3_2_orthonormalizer)(const double *, double *);

@@ -13,8 +13,8 @@ static double sinc_(double x)
 }
 
 /* The algorithm. Static, so that the loops below can take it in. */
-static inline void one_(double middle, double width, double a, double b, double g, double
-    increment[3])
+static inline void one_(double middle, double width, double a, double b, double g,
+    double increment[3])
 {
     const double shared_1 = b * middle;
     const double shared_2 = a * width * sinc_(0.5 * b * width);
@@ -27,14 +27,14 @@ static inline void one_(double middle, double width, double a, double b, double 
     increment[2] = increment_z;
 }
 
-void coning_increments(double middle, double width, double a, double b, double g, double
-    increment[3])
+void coning_increments(double middle, double width, double a, double b, double g,
+    double increment[3])
 {
     one_(middle, width, a, b, g, increment);
 }
 
-void coning_increments_array(size_t count, const double *middle, const double *width, const double
-    *a, const double *b, const double *g, double *increment)
+void coning_increments_array(size_t count, const double *middle, const double *width,
+    const double *a, const double *b, const double *g, double *increment)
 {
     for (size_t k = 0; k < count; ++k)
         one_(middle[k], width[k], a[k], b[k], g[k], increment + 3 * k);

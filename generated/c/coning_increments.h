@@ -31,14 +31,14 @@ extern "C" {
  * out  increment[3]: angle increment over the interval, body axes; unit rad; increment_x,
  *      increment_y, increment_z.
  */
-void coning_increments(double middle, double width, double a, double b, double g, double
-    increment[3]);
+void coning_increments(double middle, double width, double a, double b, double g,
+    double increment[3]);
 
 /* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
  * whose samples have the same size; otherwise they must not overlap.
  */
-void coning_increments_array(size_t count, const double *middle, const double *width, const double
-    *a, const double *b, const double *g, double *increment);
+void coning_increments_array(size_t count, const double *middle, const double *width,
+    const double *a, const double *b, const double *g, double *increment);
 
 #ifdef __cplusplus
 }

@@ -13,8 +13,8 @@ static double sinc_(double x)
 }
 
 /* The algorithm. Static, so that the loops below can take it in. */
-static inline void one_(double time, double a, double b, double g, double rate[3], double
-    attitude[9])
+static inline void one_(double time, double a, double b, double g, double rate[3],
+    double attitude[9])
 {
     const double shared_1 = b * time;
     const double shared_2 = sin(shared_1);
@@ -69,8 +69,8 @@ void coning_truth(double time, double a, double b, double g, double rate[3], dou
     one_(time, a, b, g, rate, attitude);
 }
 
-void coning_truth_array(size_t count, const double *time, const double *a, const double *b, const
-    double *g, double *rate, double *attitude)
+void coning_truth_array(size_t count, const double *time, const double *a, const double *b,
+    const double *g, double *rate, double *attitude)
 {
     for (size_t k = 0; k < count; ++k)
         one_(time[k], a[k], b[k], g[k], rate + 3 * k, attitude + 9 * k);

@@ -35,8 +35,8 @@ void coning_truth(double time, double a, double b, double g, double rate[3], dou
 /* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
  * whose samples have the same size; otherwise they must not overlap.
  */
-void coning_truth_array(size_t count, const double *time, const double *a, const double *b, const
-    double *g, double *rate, double *attitude);
+void coning_truth_array(size_t count, const double *time, const double *a, const double *b,
+    const double *g, double *rate, double *attitude);
 
 #ifdef __cplusplus
 }

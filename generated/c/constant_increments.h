@@ -28,14 +28,14 @@ extern "C" {
  * out  increment[3]: angle increment over the interval, body axes; unit rad; increment_x,
  *      increment_y, increment_z.
  */
-void constant_increments(double middle, double width, double x, double y, double z, double
-    increment[3]);
+void constant_increments(double middle, double width, double x, double y, double z,
+    double increment[3]);
 
 /* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
  * whose samples have the same size; otherwise they must not overlap.
  */
-void constant_increments_array(size_t count, const double *middle, const double *width, const double
-    *x, const double *y, const double *z, double *increment);
+void constant_increments_array(size_t count, const double *middle, const double *width,
+    const double *x, const double *y, const double *z, double *increment);
 
 #ifdef __cplusplus
 }

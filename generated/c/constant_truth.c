@@ -13,8 +13,8 @@ static double sinc_(double x)
 }
 
 /* The algorithm. Static, so that the loops below can take it in. */
-static inline void one_(double time, double x, double y, double z, double rate[3], double
-    attitude[9])
+static inline void one_(double time, double x, double y, double z, double rate[3],
+    double attitude[9])
 {
     const double shared_1 = time * time;
     const double shared_2 = shared_1 * (y * y);
@@ -64,8 +64,8 @@ void constant_truth(double time, double x, double y, double z, double rate[3], d
     one_(time, x, y, z, rate, attitude);
 }
 
-void constant_truth_array(size_t count, const double *time, const double *x, const double *y, const
-    double *z, double *rate, double *attitude)
+void constant_truth_array(size_t count, const double *time, const double *x, const double *y,
+    const double *z, double *rate, double *attitude)
 {
     for (size_t k = 0; k < count; ++k)
         one_(time[k], x[k], y[k], z[k], rate + 3 * k, attitude + 9 * k);

@@ -32,8 +32,8 @@ void constant_truth(double time, double x, double y, double z, double rate[3], d
 /* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
  * whose samples have the same size; otherwise they must not overlap.
  */
-void constant_truth_array(size_t count, const double *time, const double *x, const double *y, const
-    double *z, double *rate, double *attitude);
+void constant_truth_array(size_t count, const double *time, const double *x, const double *y,
+    const double *z, double *rate, double *attitude);
 
 #ifdef __cplusplus
 }

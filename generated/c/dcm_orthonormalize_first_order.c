@@ -56,8 +56,8 @@ void dcm_orthonormalize_first_order(const double computed[9], double orthonormal
     one_(computed, orthonormalized);
 }
 
-void dcm_orthonormalize_first_order_array(size_t count, const double *computed, double
-    *orthonormalized)
+void dcm_orthonormalize_first_order_array(size_t count, const double *computed,
+    double *orthonormalized)
 {
     for (size_t k = 0; k < count; ++k)
         one_(computed + 9 * k, orthonormalized + 9 * k);

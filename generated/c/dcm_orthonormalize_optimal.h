@@ -32,8 +32,8 @@ void dcm_orthonormalize_optimal(const double computed[9], double orthonormalized
 /* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
  * whose samples have the same size; otherwise they must not overlap.
  */
-void dcm_orthonormalize_optimal_array(size_t count, const double *computed, double
-    *orthonormalized);
+void dcm_orthonormalize_optimal_array(size_t count, const double *computed,
+    double *orthonormalized);
 
 #ifdef __cplusplus
 }

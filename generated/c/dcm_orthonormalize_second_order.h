@@ -31,8 +31,8 @@ void dcm_orthonormalize_second_order(const double computed[9], double orthonorma
 /* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
  * whose samples have the same size; otherwise they must not overlap.
  */
-void dcm_orthonormalize_second_order_array(size_t count, const double *computed, double
-    *orthonormalized);
+void dcm_orthonormalize_second_order_array(size_t count, const double *computed,
+    double *orthonormalized);
 
 #ifdef __cplusplus
 }

@@ -5,8 +5,8 @@
 #include "error_matrix.h"
 
 /* The algorithm. Static, so that the loops below can take it in. */
-static inline void one_(const double computed[9], const double truth[9], double error[9], double
-    scale[3], double skew[3], double drift[3])
+static inline void one_(const double computed[9], const double truth[9], double error[9],
+    double scale[3], double skew[3], double drift[3])
 {
     const double C_11 = computed[0];
     const double C_12 = computed[1];
@@ -80,6 +80,6 @@ void error_matrix_array(size_t count, const double *computed, const double *trut
     double *scale, double *skew, double *drift)
 {
     for (size_t k = 0; k < count; ++k)
-        one_(computed + 9 * k, truth + 9 * k, error + 9 * k, scale + 3 * k, skew + 3 * k, drift + 3
-            * k);
+        one_(computed + 9 * k, truth + 9 * k, error + 9 * k, scale + 3 * k, skew + 3 * k,
+            drift + 3 * k);
 }

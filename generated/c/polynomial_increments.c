@@ -28,9 +28,9 @@ void polynomial_increments(double middle, double width, double a0, double a1, do
     one_(middle, width, a0, a1, a2, a3, a4, increment);
 }
 
-void polynomial_increments_array(size_t count, const double *middle, const double *width, const
-    double *a0, const double *a1, const double *a2, const double *a3, const double *a4, double
-    *increment)
+void polynomial_increments_array(size_t count, const double *middle, const double *width,
+    const double *a0, const double *a1, const double *a2, const double *a3, const double *a4,
+    double *increment)
 {
     for (size_t k = 0; k < count; ++k)
         one_(middle[k], width[k], a0[k], a1[k], a2[k], a3[k], a4[k], increment + 3 * k);

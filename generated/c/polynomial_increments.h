@@ -41,9 +41,9 @@ void polynomial_increments(double middle, double width, double a0, double a1, do
 /* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
  * whose samples have the same size; otherwise they must not overlap.
  */
-void polynomial_increments_array(size_t count, const double *middle, const double *width, const
-    double *a0, const double *a1, const double *a2, const double *a3, const double *a4, double
-    *increment);
+void polynomial_increments_array(size_t count, const double *middle, const double *width,
+    const double *a0, const double *a1, const double *a2, const double *a3, const double *a4,
+    double *increment);
 
 #ifdef __cplusplus
 }

@@ -7,8 +7,8 @@
 #include <math.h>
 
 /* The algorithm. Static, so that the loops below can take it in. */
-static inline void one_(double time, double a0, double a1, double a2, double a3, double a4, double
-    rate[3], double attitude[9])
+static inline void one_(double time, double a0, double a1, double a2, double a3, double a4,
+    double rate[3], double attitude[9])
 {
     const double shared_1 = time * time;
     const double shared_2 = shared_1 * time;
@@ -38,8 +38,8 @@ static inline void one_(double time, double a0, double a1, double a2, double a3,
     attitude[8] = C_33;
 }
 
-void polynomial_truth(double time, double a0, double a1, double a2, double a3, double a4, double
-    rate[3], double attitude[9])
+void polynomial_truth(double time, double a0, double a1, double a2, double a3, double a4,
+    double rate[3], double attitude[9])
 {
     one_(time, a0, a1, a2, a3, a4, rate, attitude);
 }

@@ -34,8 +34,8 @@ extern "C" {
  * out  rate[3]: body rate, body axes; unit rad/s; rate_x, rate_y, rate_z.
  * out  attitude[9]: direction cosine matrix, body to reference; unit 1; C_11, ..., C_33.
  */
-void polynomial_truth(double time, double a0, double a1, double a2, double a3, double a4, double
-    rate[3], double attitude[9]);
+void polynomial_truth(double time, double a0, double a1, double a2, double a3, double a4,
+    double rate[3], double attitude[9]);
 
 /* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
  * whose samples have the same size; otherwise they must not overlap.

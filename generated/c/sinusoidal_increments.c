@@ -27,8 +27,8 @@ void sinusoidal_increments(double middle, double width, double a, double b, doub
     one_(middle, width, a, b, increment);
 }
 
-void sinusoidal_increments_array(size_t count, const double *middle, const double *width, const
-    double *a, const double *b, double *increment)
+void sinusoidal_increments_array(size_t count, const double *middle, const double *width,
+    const double *a, const double *b, double *increment)
 {
     for (size_t k = 0; k < count; ++k)
         one_(middle[k], width[k], a[k], b[k], increment + 3 * k);

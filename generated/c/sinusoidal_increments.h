@@ -32,8 +32,8 @@ void sinusoidal_increments(double middle, double width, double a, double b, doub
 /* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
  * whose samples have the same size; otherwise they must not overlap.
  */
-void sinusoidal_increments_array(size_t count, const double *middle, const double *width, const
-    double *a, const double *b, double *increment);
+void sinusoidal_increments_array(size_t count, const double *middle, const double *width,
+    const double *a, const double *b, double *increment);
 
 #ifdef __cplusplus
 }

@@ -55,8 +55,8 @@ void cayley_klein_rk2_2_float(const float state[4], const float increments[6], f
     one_(state, increments, next);
 }
 
-void cayley_klein_rk2_2_float_array(size_t count, const float *state, const float *increments, float
-    *next)
+void cayley_klein_rk2_2_float_array(size_t count, const float *state, const float *increments,
+    float *next)
 {
     for (size_t k = 0; k < count; ++k)
         one_(state + 4 * k, increments + 6 * k, next + 4 * k);

@@ -26,14 +26,14 @@ static inline void one_(float middle, float width, float a, float b, float g, fl
     increment[2] = increment_z;
 }
 
-void coning_increments_float(float middle, float width, float a, float b, float g, float
-    increment[3])
+void coning_increments_float(float middle, float width, float a, float b, float g,
+    float increment[3])
 {
     one_(middle, width, a, b, g, increment);
 }
 
-void coning_increments_float_array(size_t count, const float *middle, const float *width, const
-    float *a, const float *b, const float *g, float *increment)
+void coning_increments_float_array(size_t count, const float *middle, const float *width,
+    const float *a, const float *b, const float *g, float *increment)
 {
     for (size_t k = 0; k < count; ++k)
         one_(middle[k], width[k], a[k], b[k], g[k], increment + 3 * k);

@@ -31,14 +31,14 @@ extern "C" {
  * out  increment[3]: angle increment over the interval, body axes; unit rad; increment_x,
  *      increment_y, increment_z.
  */
-void coning_increments_float(float middle, float width, float a, float b, float g, float
-    increment[3]);
+void coning_increments_float(float middle, float width, float a, float b, float g,
+    float increment[3]);
 
 /* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
  * whose samples have the same size; otherwise they must not overlap.
  */
-void coning_increments_float_array(size_t count, const float *middle, const float *width, const
-    float *a, const float *b, const float *g, float *increment);
+void coning_increments_float_array(size_t count, const float *middle, const float *width,
+    const float *a, const float *b, const float *g, float *increment);
 
 #ifdef __cplusplus
 }

@@ -68,8 +68,8 @@ void coning_truth_float(float time, float a, float b, float g, float rate[3], fl
     one_(time, a, b, g, rate, attitude);
 }
 
-void coning_truth_float_array(size_t count, const float *time, const float *a, const float *b, const
-    float *g, float *rate, float *attitude)
+void coning_truth_float_array(size_t count, const float *time, const float *a, const float *b,
+    const float *g, float *rate, float *attitude)
 {
     for (size_t k = 0; k < count; ++k)
         one_(time[k], a[k], b[k], g[k], rate + 3 * k, attitude + 9 * k);

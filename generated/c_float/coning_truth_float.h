@@ -35,8 +35,8 @@ void coning_truth_float(float time, float a, float b, float g, float rate[3], fl
 /* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
  * whose samples have the same size; otherwise they must not overlap.
  */
-void coning_truth_float_array(size_t count, const float *time, const float *a, const float *b, const
-    float *g, float *rate, float *attitude);
+void coning_truth_float_array(size_t count, const float *time, const float *a, const float *b,
+    const float *g, float *rate, float *attitude);
 
 #ifdef __cplusplus
 }

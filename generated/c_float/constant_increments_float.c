@@ -17,14 +17,14 @@ static inline void one_(float middle, float width, float x, float y, float z, fl
     increment[2] = increment_z;
 }
 
-void constant_increments_float(float middle, float width, float x, float y, float z, float
-    increment[3])
+void constant_increments_float(float middle, float width, float x, float y, float z,
+    float increment[3])
 {
     one_(middle, width, x, y, z, increment);
 }
 
-void constant_increments_float_array(size_t count, const float *middle, const float *width, const
-    float *x, const float *y, const float *z, float *increment)
+void constant_increments_float_array(size_t count, const float *middle, const float *width,
+    const float *x, const float *y, const float *z, float *increment)
 {
     for (size_t k = 0; k < count; ++k)
         one_(middle[k], width[k], x[k], y[k], z[k], increment + 3 * k);

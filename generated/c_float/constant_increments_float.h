@@ -28,14 +28,14 @@ extern "C" {
  * out  increment[3]: angle increment over the interval, body axes; unit rad; increment_x,
  *      increment_y, increment_z.
  */
-void constant_increments_float(float middle, float width, float x, float y, float z, float
-    increment[3]);
+void constant_increments_float(float middle, float width, float x, float y, float z,
+    float increment[3]);
 
 /* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
  * whose samples have the same size; otherwise they must not overlap.
  */
-void constant_increments_float_array(size_t count, const float *middle, const float *width, const
-    float *x, const float *y, const float *z, float *increment);
+void constant_increments_float_array(size_t count, const float *middle, const float *width,
+    const float *x, const float *y, const float *z, float *increment);
 
 #ifdef __cplusplus
 }

@@ -56,8 +56,8 @@ void dcm_orthonormalize_first_order_float(const float computed[9], float orthono
     one_(computed, orthonormalized);
 }
 
-void dcm_orthonormalize_first_order_float_array(size_t count, const float *computed, float
-    *orthonormalized)
+void dcm_orthonormalize_first_order_float_array(size_t count, const float *computed,
+    float *orthonormalized)
 {
     for (size_t k = 0; k < count; ++k)
         one_(computed + 9 * k, orthonormalized + 9 * k);

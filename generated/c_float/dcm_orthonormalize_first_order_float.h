@@ -31,8 +31,8 @@ void dcm_orthonormalize_first_order_float(const float computed[9], float orthono
 /* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
  * whose samples have the same size; otherwise they must not overlap.
  */
-void dcm_orthonormalize_first_order_float_array(size_t count, const float *computed, float
-    *orthonormalized);
+void dcm_orthonormalize_first_order_float_array(size_t count, const float *computed,
+    float *orthonormalized);
 
 #ifdef __cplusplus
 }

@@ -31,8 +31,8 @@ void dcm_product_float(const float state[9], const float transition[9], float ne
 /* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
  * whose samples have the same size; otherwise they must not overlap.
  */
-void dcm_product_float_array(size_t count, const float *state, const float *transition, float
-    *next);
+void dcm_product_float_array(size_t count, const float *state, const float *transition,
+    float *next);
 
 #ifdef __cplusplus
 }

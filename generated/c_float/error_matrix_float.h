@@ -31,8 +31,8 @@ extern "C" {
  * out  drift[3]: drift errors, reference axes: the rotation from the computed frame to the true one;
  *      unit rad; drift_x, drift_y, drift_z.
  */
-void error_matrix_float(const float computed[9], const float truth[9], float error[9], float
-    scale[3], float skew[3], float drift[3]);
+void error_matrix_float(const float computed[9], const float truth[9], float error[9],
+    float scale[3], float skew[3], float drift[3]);
 
 /* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
  * whose samples have the same size; otherwise they must not overlap.

@@ -31,8 +31,8 @@ void euler_product_float(const float state[4], const float transition[4], float 
     one_(state, transition, next);
 }
 
-void euler_product_float_array(size_t count, const float *state, const float *transition, float
-    *next)
+void euler_product_float_array(size_t count, const float *state, const float *transition,
+    float *next)
 {
     for (size_t k = 0; k < count; ++k)
         one_(state + 4 * k, transition + 4 * k, next + 4 * k);

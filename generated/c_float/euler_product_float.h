@@ -32,8 +32,8 @@ void euler_product_float(const float state[4], const float transition[4], float 
 /* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
  * whose samples have the same size; otherwise they must not overlap.
  */
-void euler_product_float_array(size_t count, const float *state, const float *transition, float
-    *next);
+void euler_product_float_array(size_t count, const float *state, const float *transition,
+    float *next);
 
 #ifdef __cplusplus
 }

@@ -34,8 +34,8 @@ void euler_rk3_2_float(const float state[4], const float increments[6], float ne
 /* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
  * whose samples have the same size; otherwise they must not overlap.
  */
-void euler_rk3_2_float_array(size_t count, const float *state, const float *increments, float
-    *next);
+void euler_rk3_2_float_array(size_t count, const float *state, const float *increments,
+    float *next);
 
 /* A function that restores the constraint of a state, in place. */
 typedef void (*euler_rk3_2_float_orthonormalizer)(const float *, float *);

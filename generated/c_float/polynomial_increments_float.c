@@ -28,8 +28,9 @@ void polynomial_increments_float(float middle, float width, float a0, float a1, 
     one_(middle, width, a0, a1, a2, a3, a4, increment);
 }
 
-void polynomial_increments_float_array(size_t count, const float *middle, const float *width, const
-    float *a0, const float *a1, const float *a2, const float *a3, const float *a4, float *increment)
+void polynomial_increments_float_array(size_t count, const float *middle, const float *width,
+    const float *a0, const float *a1, const float *a2, const float *a3, const float *a4,
+    float *increment)
 {
     for (size_t k = 0; k < count; ++k)
         one_(middle[k], width[k], a0[k], a1[k], a2[k], a3[k], a4[k], increment + 3 * k);

@@ -41,9 +41,9 @@ void polynomial_increments_float(float middle, float width, float a0, float a1, 
 /* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
  * whose samples have the same size; otherwise they must not overlap.
  */
-void polynomial_increments_float_array(size_t count, const float *middle, const float *width, const
-    float *a0, const float *a1, const float *a2, const float *a3, const float *a4, float
-    *increment);
+void polynomial_increments_float_array(size_t count, const float *middle, const float *width,
+    const float *a0, const float *a1, const float *a2, const float *a3, const float *a4,
+    float *increment);
 
 #ifdef __cplusplus
 }

@@ -38,8 +38,8 @@ static inline void one_(float time, float a0, float a1, float a2, float a3, floa
     attitude[8] = C_33;
 }
 
-void polynomial_truth_float(float time, float a0, float a1, float a2, float a3, float a4, float
-    rate[3], float attitude[9])
+void polynomial_truth_float(float time, float a0, float a1, float a2, float a3, float a4,
+    float rate[3], float attitude[9])
 {
     one_(time, a0, a1, a2, a3, a4, rate, attitude);
 }

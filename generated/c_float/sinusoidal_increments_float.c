@@ -27,8 +27,8 @@ void sinusoidal_increments_float(float middle, float width, float a, float b, fl
     one_(middle, width, a, b, increment);
 }
 
-void sinusoidal_increments_float_array(size_t count, const float *middle, const float *width, const
-    float *a, const float *b, float *increment)
+void sinusoidal_increments_float_array(size_t count, const float *middle, const float *width,
+    const float *a, const float *b, float *increment)
 {
     for (size_t k = 0; k < count; ++k)
         one_(middle[k], width[k], a[k], b[k], increment + 3 * k);

@@ -32,8 +32,8 @@ void sinusoidal_increments_float(float middle, float width, float a, float b, fl
 /* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
  * whose samples have the same size; otherwise they must not overlap.
  */
-void sinusoidal_increments_float_array(size_t count, const float *middle, const float *width, const
-    float *a, const float *b, float *increment);
+void sinusoidal_increments_float_array(size_t count, const float *middle, const float *width,
+    const float *a, const float *b, float *increment);
 
 #ifdef __cplusplus
 }

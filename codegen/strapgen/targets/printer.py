@@ -93,10 +93,19 @@ def fill(text: str, indent: str, width: int = 100) -> str:
 
 def fill_expression(text: str, indent: str, width: int = 100) -> str:
     """Wrap an expression before its sums' signs, every line after the first with `indent`."""
+    return _filled(re.split(r" (?=[+-] )", text), indent, width)
+
+
+def fill_arguments(text: str, indent: str, width: int = 100) -> str:
+    """Wrap a declaration or a call after its commas, every line after the first with `indent`."""
+    return _filled(re.split(r"(?<=,) ", text), indent, width)
+
+
+def _filled(pieces: list[str], indent: str, width: int) -> str:
     lines: list[str] = []
-    for term in re.split(r" (?=[+-] )", text):
-        if lines and len(lines[-1]) + 1 + len(term) <= width:
-            lines[-1] += f" {term}"
+    for piece in pieces:
+        if lines and len(lines[-1]) + 1 + len(piece) <= width:
+            lines[-1] += f" {piece}"
         else:
-            lines.append(f"{indent if lines else ''}{term}")
+            lines.append(f"{indent if lines else ''}{piece}")
     return "\n".join(lines)

@@ -8,7 +8,7 @@ from typing import Any
 import jinja2
 
 from strapgen import resources
-from strapgen.targets.printer import elements_text, fill, operations_text, range_text
+from strapgen.targets.printer import elements_text, fill, fill_arguments, operations_text, range_text
 
 
 @cache
@@ -21,7 +21,11 @@ def _environment() -> jinja2.Environment:
         keep_trailing_newline=True,
     )
     environment.filters.update(
-        fill=fill, range=range_text, elements=elements_text, operations=operations_text
+        fill=fill,
+        arguments=fill_arguments,
+        range=range_text,
+        elements=elements_text,
+        operations=operations_text,
     )
     return environment
 
