@@ -172,3 +172,23 @@ def test_the_transition_is_a_program_of_its_own():
 def test_a_program_without_a_transition_has_no_transition_program():
     with pytest.raises(ValueError, match="made_up has no transition"):
         program(Assignment("r", SUM)).transition_program()
+
+
+def test_split_cuts_where_the_first_input_comes_in():
+    whole = program(
+        Assignment("square", Operation("multiply", (Y, Y))),
+        Assignment("s", SUM),
+        Assignment("twice", Operation("add", (Reference("square"), Reference("square")))),
+        Assignment("r", Operation("multiply", (Reference("s"), Reference("twice")))),
+        result=("r", "square", Constant(Fraction(3))),
+    )
+    ahead, behind = whole.split()
+    assert [a.name for a in ahead.body] == ["square", "twice"]
+    assert [a.name for a in behind.body] == ["s", "r"]
+    (prepared,) = (result.signal for result in ahead.outputs)
+    assert prepared.elements == ("y", "square", "twice")
+    assert [signal.name for signal in behind.inputs] == ["x", "prepared"]
+    values = ahead.run({"y": Fraction(2, 3)})["prepared"]
+    together = behind.run({"x": Fraction(1, 7)} | dict(zip(prepared.elements, values, strict=True)))
+    assert together == whole.run({"x": Fraction(1, 7), "y": Fraction(2, 3)})
+    assert ahead.operations["multiply"] + behind.operations["multiply"] == whole.operations["multiply"]

@@ -94,7 +94,7 @@ def test_check_of_a_tree_in_step(folder, capsys):
 
 def test_check_finds_a_changed_file(folder, capsys):
     path = folder / "c" / "euler_rk4_2.c"
-    path.write_text(path.read_text().replace("1.5 * d1_x", "1.25 * d1_x"))
+    path.write_text(path.read_text().replace("1.5 * d1_x", "1.25 * d1_x", 1))
     before = contents(folder)
     status, out, err = command(capsys, *CHECK, str(folder))
     assert status == 1

@@ -245,6 +245,46 @@ class Program:
             companions=None,
         )
 
+    def split(self) -> tuple[Program, Program]:
+        """Cut the program in two: what does not depend on the first input, and the rest.
+
+        Run over many steps, the first part can be done for several steps at once; only the second waits for
+        the state of the step before.
+
+        Returns
+        -------
+        tuple of Program
+            The first part, whose one output is called ``prepared``, and the second, which takes the first
+            input and ``prepared``.
+        """
+        first = self.inputs[0]
+        waiting = set(first.elements)
+        ahead: list[Assignment] = []
+        behind: list[Assignment] = []
+        for assignment in self.body:
+            if waiting.isdisjoint(references(assignment.value)):
+                ahead.append(assignment)
+            else:
+                waiting.add(assignment.name)
+                behind.append(assignment)
+        results = {name for result in self.outputs for node in result.nodes for name in references(node)}
+        needed = results.union(*(references(assignment.value) for assignment in behind)) - waiting
+        order = [name for signal in self.inputs for name in signal.elements] + [a.name for a in ahead]
+        names = tuple(name for name in order if name in needed)
+        prepared = Signal("prepared", (len(names),), names, meaning="what depends on the other inputs alone")
+        result = Result(prepared, tuple(map(Reference, names)))
+        return (
+            replace(
+                self,
+                inputs=self.inputs[1:],
+                body=tuple(ahead),
+                outputs=(result,),
+                transition=None,
+                companions=None,
+            ),
+            replace(self, inputs=(first, prepared), body=tuple(behind), transition=None, companions=None),
+        )
+
 
 def walk(node: Node) -> Iterator[Node]:
     """Yield a node and all below it."""

@@ -4,7 +4,7 @@
  */
 #include "cayley_klein_from_euler.h"
 
-/* The algorithm. Static, so that the loops below can take it in. */
+/* The algorithm. Static, so that the loop below can take it in. */
 static inline void one_(const double state[4], double converted[4])
 {
     const double e_x = state[0];

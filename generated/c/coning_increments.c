@@ -12,7 +12,7 @@ static double sinc_(double x)
     return x >= 0.0 && x <= 0.0 ? 1.0 : sin(x) / x;
 }
 
-/* The algorithm. Static, so that the loops below can take it in. */
+/* The algorithm. Static, so that the loop below can take it in. */
 static inline void one_(double middle, double width, double a, double b, double g,
     double increment[3])
 {

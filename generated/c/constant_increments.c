@@ -4,7 +4,7 @@
  */
 #include "constant_increments.h"
 
-/* The algorithm. Static, so that the loops below can take it in. */
+/* The algorithm. Static, so that the loop below can take it in. */
 static inline void one_(double middle, double width, double x, double y, double z,
     double increment[3])
 {

@@ -4,7 +4,7 @@
  */
 #include "dcm_orthonormalize_second_order.h"
 
-/* The algorithm. Static, so that the loops below can take it in. */
+/* The algorithm. Static, so that the loop below can take it in. */
 static inline void one_(const double computed[9], double orthonormalized[9])
 {
     const double C_11 = computed[0];

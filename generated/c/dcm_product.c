@@ -4,7 +4,7 @@
  */
 #include "dcm_product.h"
 
-/* The algorithm. Static, so that the loops below can take it in. */
+/* The algorithm. Static, so that the loop below can take it in. */
 static inline void one_(const double state[9], const double transition[9], double next[9])
 {
     const double C_11 = state[0];

@@ -4,7 +4,7 @@
  */
 #include "dcm_rk2_2.h"
 
-/* The algorithm. Static, so that the loops below can take it in. */
+/* The algorithm. Static, so that the loop below can take it in. */
 static inline void one_(const double state[9], const double increments[6], double next[9])
 {
     const double C_11 = state[0];
@@ -88,6 +88,113 @@ void dcm_rk2_2_array(size_t count, const double *state, const double *increments
         one_(state + 9 * k, increments + 6 * k, next + 9 * k);
 }
 
+enum { BLOCK_ = 16 };
+
+/* The part of `count` steps, at most BLOCK_, that does not wait for the state. Arrays are ordered by element,
+ * so that the compiler can take several steps at once.
+ */
+static void prepare_(size_t count, const double *increments, double prepared[9][BLOCK_])
+{
+    double increments_by_element[6][BLOCK_];
+    for (size_t k = 0; k < count; ++k)
+        for (size_t j = 0; j < 6; ++j)
+            increments_by_element[j][k] = increments[6 * k + j];
+    for (size_t k = 0; k < count; ++k) {
+        const double d1_x = increments_by_element[0][k];
+        const double d1_y = increments_by_element[1][k];
+        const double d1_z = increments_by_element[2][k];
+        const double d2_x = increments_by_element[3][k];
+        const double d2_y = increments_by_element[4][k];
+        const double d2_z = increments_by_element[5][k];
+        /* rate times the step, at node 0 */
+        const double turn_0_x = 3.0 * d1_x - d2_x;
+        const double turn_0_y = 3.0 * d1_y - d2_y;
+        const double turn_0_z = 3.0 * d1_z - d2_z;
+        /* rate times the step, at node 1 */
+        const double turn_1_x = 3.0 * d2_x - d1_x;
+        const double turn_1_y = 3.0 * d2_y - d1_y;
+        const double turn_1_z = 3.0 * d2_z - d1_z;
+        const double shared_1 = turn_0_y * turn_1_y;
+        const double shared_2 = turn_0_z * turn_1_z;
+        /* derivative times the step at stage 2 */
+        const double slope_2_11 = -(shared_1 + shared_2);
+        const double slope_2_12 = turn_0_y * turn_1_x - turn_1_z;
+        const double slope_2_13 = turn_1_y + turn_0_z * turn_1_x;
+        const double slope_2_21 = turn_1_z + turn_0_x * turn_1_y;
+        const double shared_3 = turn_0_x * turn_1_x;
+        const double slope_2_22 = -(shared_2 + shared_3);
+        const double slope_2_23 = turn_0_z * turn_1_y - turn_1_x;
+        const double slope_2_31 = turn_0_x * turn_1_z - turn_1_y;
+        const double slope_2_32 = turn_1_x + turn_0_y * turn_1_z;
+        const double slope_2_33 = -(shared_1 + shared_3);
+        /* the step applied to the identity */
+        const double A_11 = 0.5 * slope_2_11 + 1.0;
+        const double shared_4 = 0.5 * turn_0_z;
+        const double A_12 = 0.5 * slope_2_12 - shared_4;
+        const double shared_5 = 0.5 * turn_0_y;
+        const double A_13 = shared_5 + 0.5 * slope_2_13;
+        const double A_21 = shared_4 + 0.5 * slope_2_21;
+        const double A_22 = 0.5 * slope_2_22 + 1.0;
+        const double shared_6 = 0.5 * turn_0_x;
+        const double A_23 = 0.5 * slope_2_23 - shared_6;
+        const double A_31 = 0.5 * slope_2_31 - shared_5;
+        const double A_32 = shared_6 + 0.5 * slope_2_32;
+        const double A_33 = 0.5 * slope_2_33 + 1.0;
+        prepared[0][k] = A_11;
+        prepared[1][k] = A_12;
+        prepared[2][k] = A_13;
+        prepared[3][k] = A_21;
+        prepared[4][k] = A_22;
+        prepared[5][k] = A_23;
+        prepared[6][k] = A_31;
+        prepared[7][k] = A_32;
+        prepared[8][k] = A_33;
+    }
+}
+
+/* The rest of step k of a block. */
+static inline void finish_(const double state[9], double prepared[9][BLOCK_], size_t k,
+    double next[9])
+{
+    const double C_11 = state[0];
+    const double C_12 = state[1];
+    const double C_13 = state[2];
+    const double C_21 = state[3];
+    const double C_22 = state[4];
+    const double C_23 = state[5];
+    const double C_31 = state[6];
+    const double C_32 = state[7];
+    const double C_33 = state[8];
+    const double A_11 = prepared[0][k];
+    const double A_12 = prepared[1][k];
+    const double A_13 = prepared[2][k];
+    const double A_21 = prepared[3][k];
+    const double A_22 = prepared[4][k];
+    const double A_23 = prepared[5][k];
+    const double A_31 = prepared[6][k];
+    const double A_32 = prepared[7][k];
+    const double A_33 = prepared[8][k];
+    /* direction cosine matrix, body to reference, after the step */
+    const double next_11 = A_11 * C_11 + A_21 * C_12 + A_31 * C_13;
+    const double next_12 = A_12 * C_11 + A_22 * C_12 + A_32 * C_13;
+    const double next_13 = A_13 * C_11 + A_23 * C_12 + A_33 * C_13;
+    const double next_21 = A_11 * C_21 + A_21 * C_22 + A_31 * C_23;
+    const double next_22 = A_12 * C_21 + A_22 * C_22 + A_32 * C_23;
+    const double next_23 = A_13 * C_21 + A_23 * C_22 + A_33 * C_23;
+    const double next_31 = A_11 * C_31 + A_21 * C_32 + A_31 * C_33;
+    const double next_32 = A_12 * C_31 + A_22 * C_32 + A_32 * C_33;
+    const double next_33 = A_13 * C_31 + A_23 * C_32 + A_33 * C_33;
+    next[0] = next_11;
+    next[1] = next_12;
+    next[2] = next_13;
+    next[3] = next_21;
+    next[4] = next_22;
+    next[5] = next_23;
+    next[6] = next_31;
+    next[7] = next_32;
+    next[8] = next_33;
+}
+
 int dcm_rk2_2_propagate(size_t runs, size_t steps, size_t record_every, size_t orthonormalize_every,
     dcm_rk2_2_orthonormalizer orthonormalize, const double *initial,
     const double *increments, double *history)
@@ -99,17 +206,23 @@ int dcm_rk2_2_propagate(size_t runs, size_t steps, size_t record_every, size_t o
         size_t until_record = record_every, until_orthonormalize = orthonormalize_every;
         for (size_t k = 0; k < 9; ++k)
             state[k] = *history++ = *initial++;
-        for (size_t step = 0; step < steps; ++step) {
-            one_(state, increments, state);
-            increments += 6;
-            if (orthonormalize_every && !--until_orthonormalize) {
-                orthonormalize(state, state);
-                until_orthonormalize = orthonormalize_every;
-            }
-            if (!--until_record) {
-                for (size_t k = 0; k < 9; ++k)
-                    *history++ = state[k];
-                until_record = record_every;
+        for (size_t step = 0; step < steps;) {
+            double prepared[9][BLOCK_];
+            const size_t count = steps - step < BLOCK_ ? steps - step : (size_t)BLOCK_;
+            prepare_(count, increments, prepared);
+            increments += 6 * count;
+            step += count;
+            for (size_t k = 0; k < count; ++k) {
+                finish_(state, prepared, k, state);
+                if (orthonormalize_every && !--until_orthonormalize) {
+                    orthonormalize(state, state);
+                    until_orthonormalize = orthonormalize_every;
+                }
+                if (!--until_record) {
+                    for (size_t j = 0; j < 9; ++j)
+                        *history++ = state[j];
+                    until_record = record_every;
+                }
             }
         }
     }

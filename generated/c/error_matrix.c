@@ -4,7 +4,7 @@
  */
 #include "error_matrix.h"
 
-/* The algorithm. Static, so that the loops below can take it in. */
+/* The algorithm. Static, so that the loop below can take it in. */
 static inline void one_(const double computed[9], const double truth[9], double error[9],
     double scale[3], double skew[3], double drift[3])
 {

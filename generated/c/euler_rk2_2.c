@@ -4,7 +4,7 @@
  */
 #include "euler_rk2_2.h"
 
-/* The algorithm. Static, so that the loops below can take it in. */
+/* The algorithm. Static, so that the loop below can take it in. */
 static inline void one_(const double state[4], const double increments[6], double next[4])
 {
     const double e_x = state[0];
@@ -61,6 +61,76 @@ void euler_rk2_2_array(size_t count, const double *state, const double *incremen
         one_(state + 4 * k, increments + 6 * k, next + 4 * k);
 }
 
+enum { BLOCK_ = 16 };
+
+/* The part of `count` steps, at most BLOCK_, that does not wait for the state. Arrays are ordered by element,
+ * so that the compiler can take several steps at once.
+ */
+static void prepare_(size_t count, const double *increments, double prepared[4][BLOCK_])
+{
+    double increments_by_element[6][BLOCK_];
+    for (size_t k = 0; k < count; ++k)
+        for (size_t j = 0; j < 6; ++j)
+            increments_by_element[j][k] = increments[6 * k + j];
+    for (size_t k = 0; k < count; ++k) {
+        const double d1_x = increments_by_element[0][k];
+        const double d1_y = increments_by_element[1][k];
+        const double d1_z = increments_by_element[2][k];
+        const double d2_x = increments_by_element[3][k];
+        const double d2_y = increments_by_element[4][k];
+        const double d2_z = increments_by_element[5][k];
+        /* half the rate times the step, at node 0 */
+        const double half_turn_0_x = 1.5 * d1_x - 0.5 * d2_x;
+        const double half_turn_0_y = 1.5 * d1_y - 0.5 * d2_y;
+        const double half_turn_0_z = 1.5 * d1_z - 0.5 * d2_z;
+        /* half the rate times the step, at node 1 */
+        const double half_turn_1_x = 1.5 * d2_x - 0.5 * d1_x;
+        const double half_turn_1_y = 1.5 * d2_y - 0.5 * d1_y;
+        const double half_turn_1_z = 1.5 * d2_z - 0.5 * d1_z;
+        /* derivative times the step at stage 2 */
+        const double slope_2_s = -(half_turn_0_x * half_turn_1_x + half_turn_0_y * half_turn_1_y
+            + half_turn_0_z * half_turn_1_z);
+        const double slope_2_x = half_turn_1_x + half_turn_0_y * half_turn_1_z
+            - half_turn_0_z * half_turn_1_y;
+        const double slope_2_y = half_turn_1_y - half_turn_0_x * half_turn_1_z
+            + half_turn_0_z * half_turn_1_x;
+        const double slope_2_z = half_turn_1_z + half_turn_0_x * half_turn_1_y
+            - half_turn_0_y * half_turn_1_x;
+        /* the step applied to the identity */
+        const double p_s = 0.5 * slope_2_s + 1.0;
+        const double p_x = 0.5 * (half_turn_0_x + slope_2_x);
+        const double p_y = 0.5 * (half_turn_0_y + slope_2_y);
+        const double p_z = 0.5 * (half_turn_0_z + slope_2_z);
+        prepared[0][k] = p_s;
+        prepared[1][k] = p_x;
+        prepared[2][k] = p_y;
+        prepared[3][k] = p_z;
+    }
+}
+
+/* The rest of step k of a block. */
+static inline void finish_(const double state[4], double prepared[4][BLOCK_], size_t k,
+    double next[4])
+{
+    const double e_x = state[0];
+    const double e_y = state[1];
+    const double e_z = state[2];
+    const double e_s = state[3];
+    const double p_s = prepared[0][k];
+    const double p_x = prepared[1][k];
+    const double p_y = prepared[2][k];
+    const double p_z = prepared[3][k];
+    /* Euler parameters, body to reference, scalar last, after the step */
+    const double next_s = e_s * p_s - e_x * p_x - e_y * p_y - e_z * p_z;
+    const double next_x = e_s * p_x + e_x * p_s + e_y * p_z - e_z * p_y;
+    const double next_y = e_s * p_y - e_x * p_z + e_y * p_s + e_z * p_x;
+    const double next_z = e_s * p_z + e_x * p_y - e_y * p_x + e_z * p_s;
+    next[0] = next_x;
+    next[1] = next_y;
+    next[2] = next_z;
+    next[3] = next_s;
+}
+
 int euler_rk2_2_propagate(size_t runs, size_t steps, size_t record_every, size_t orthonormalize_every,
     euler_rk2_2_orthonormalizer orthonormalize, const double *initial,
     const double *increments, double *history)
@@ -72,17 +142,23 @@ int euler_rk2_2_propagate(size_t runs, size_t steps, size_t record_every, size_t
         size_t until_record = record_every, until_orthonormalize = orthonormalize_every;
         for (size_t k = 0; k < 4; ++k)
             state[k] = *history++ = *initial++;
-        for (size_t step = 0; step < steps; ++step) {
-            one_(state, increments, state);
-            increments += 6;
-            if (orthonormalize_every && !--until_orthonormalize) {
-                orthonormalize(state, state);
-                until_orthonormalize = orthonormalize_every;
-            }
-            if (!--until_record) {
-                for (size_t k = 0; k < 4; ++k)
-                    *history++ = state[k];
-                until_record = record_every;
+        for (size_t step = 0; step < steps;) {
+            double prepared[4][BLOCK_];
+            const size_t count = steps - step < BLOCK_ ? steps - step : (size_t)BLOCK_;
+            prepare_(count, increments, prepared);
+            increments += 6 * count;
+            step += count;
+            for (size_t k = 0; k < count; ++k) {
+                finish_(state, prepared, k, state);
+                if (orthonormalize_every && !--until_orthonormalize) {
+                    orthonormalize(state, state);
+                    until_orthonormalize = orthonormalize_every;
+                }
+                if (!--until_record) {
+                    for (size_t j = 0; j < 4; ++j)
+                        *history++ = state[j];
+                    until_record = record_every;
+                }
             }
         }
     }

@@ -4,7 +4,7 @@
  */
 #include "polynomial_increments.h"
 
-/* The algorithm. Static, so that the loops below can take it in. */
+/* The algorithm. Static, so that the loop below can take it in. */
 static inline void one_(double middle, double width, double a0, double a1, double a2, double a3,
     double a4, double increment[3])
 {

@@ -6,7 +6,7 @@
 
 #include <math.h>
 
-/* The algorithm. Static, so that the loops below can take it in. */
+/* The algorithm. Static, so that the loop below can take it in. */
 static inline void one_(double time, double a0, double a1, double a2, double a3, double a4,
     double rate[3], double attitude[9])
 {

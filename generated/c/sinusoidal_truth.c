@@ -12,7 +12,7 @@ static double sinc_(double x)
     return x >= 0.0 && x <= 0.0 ? 1.0 : sin(x) / x;
 }
 
-/* The algorithm. Static, so that the loops below can take it in. */
+/* The algorithm. Static, so that the loop below can take it in. */
 static inline void one_(double time, double a, double b, double rate[3], double attitude[9])
 {
     const double shared_1 = b * time;

@@ -6,7 +6,7 @@
 
 #include <math.h>
 
-/* The algorithm. Static, so that the loops below can take it in. */
+/* The algorithm. Static, so that the loop below can take it in. */
 static inline void one_(const float state[9], float converted[4])
 {
     const float C_11 = state[0];

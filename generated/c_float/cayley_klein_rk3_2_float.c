@@ -4,7 +4,7 @@
  */
 #include "cayley_klein_rk3_2_float.h"
 
-/* The algorithm. Static, so that the loops below can take it in. */
+/* The algorithm. Static, so that the loop below can take it in. */
 static inline void one_(const float state[4], const float increments[6], float next[4])
 {
     const float a_s = state[0];
@@ -90,6 +90,104 @@ void cayley_klein_rk3_2_float_array(size_t count, const float *state, const floa
         one_(state + 4 * k, increments + 6 * k, next + 4 * k);
 }
 
+enum { BLOCK_ = 16 };
+
+/* The part of `count` steps, at most BLOCK_, that does not wait for the state. Arrays are ordered by element,
+ * so that the compiler can take several steps at once.
+ */
+static void prepare_(size_t count, const float *increments, float prepared[4][BLOCK_])
+{
+    float increments_by_element[6][BLOCK_];
+    for (size_t k = 0; k < count; ++k)
+        for (size_t j = 0; j < 6; ++j)
+            increments_by_element[j][k] = increments[6 * k + j];
+    for (size_t k = 0; k < count; ++k) {
+        const float d1_x = increments_by_element[0][k];
+        const float d1_y = increments_by_element[1][k];
+        const float d1_z = increments_by_element[2][k];
+        const float d2_x = increments_by_element[3][k];
+        const float d2_y = increments_by_element[4][k];
+        const float d2_z = increments_by_element[5][k];
+        const float shared_1 = 0.5f * d2_x;
+        /* half the rate times the step, at node 0 */
+        const float half_turn_0_x = 1.5f * d1_x - shared_1;
+        const float shared_2 = 0.5f * d2_y;
+        const float half_turn_0_y = 1.5f * d1_y - shared_2;
+        const float shared_3 = 0.5f * d2_z;
+        const float half_turn_0_z = 1.5f * d1_z - shared_3;
+        const float shared_4 = 0.5f * d1_x;
+        /* half the rate times the step, at node 1/2 */
+        const float half_turn_1_2_x = shared_1 + shared_4;
+        const float shared_5 = 0.5f * d1_y;
+        const float half_turn_1_2_y = shared_2 + shared_5;
+        const float shared_6 = 0.5f * d1_z;
+        const float half_turn_1_2_z = shared_3 + shared_6;
+        /* half the rate times the step, at node 1 */
+        const float half_turn_1_x = 1.5f * d2_x - shared_4;
+        const float half_turn_1_y = 1.5f * d2_y - shared_5;
+        const float half_turn_1_z = 1.5f * d2_z - shared_6;
+        /* argument of slope 2, from the identity */
+        const float point_2_x = 0.5f * half_turn_0_x;
+        const float point_2_y = 0.5f * half_turn_0_y;
+        const float point_2_z = 0.5f * half_turn_0_z;
+        /* derivative times the step at stage 2 */
+        const float slope_2_s = -(half_turn_1_2_x * point_2_x + half_turn_1_2_y * point_2_y
+            + half_turn_1_2_z * point_2_z);
+        const float slope_2_x = half_turn_1_2_x - half_turn_1_2_y * point_2_z
+            + half_turn_1_2_z * point_2_y;
+        const float slope_2_y = half_turn_1_2_y + half_turn_1_2_x * point_2_z
+            - half_turn_1_2_z * point_2_x;
+        const float slope_2_z = half_turn_1_2_z - half_turn_1_2_x * point_2_y
+            + half_turn_1_2_y * point_2_x;
+        /* argument of slope 3, from the identity */
+        const float point_3_s = 2.0f * slope_2_s + 1.0f;
+        const float point_3_x = 2.0f * slope_2_x - half_turn_0_x;
+        const float point_3_y = 2.0f * slope_2_y - half_turn_0_y;
+        const float point_3_z = 2.0f * slope_2_z - half_turn_0_z;
+        /* derivative times the step at stage 3 */
+        const float slope_3_s = -(half_turn_1_x * point_3_x + half_turn_1_y * point_3_y
+            + half_turn_1_z * point_3_z);
+        const float slope_3_x = half_turn_1_x * point_3_s - half_turn_1_y * point_3_z
+            + half_turn_1_z * point_3_y;
+        const float slope_3_y = half_turn_1_x * point_3_z + half_turn_1_y * point_3_s
+            - half_turn_1_z * point_3_x;
+        const float slope_3_z = half_turn_1_y * point_3_x - half_turn_1_x * point_3_y
+            + half_turn_1_z * point_3_s;
+        /* the step applied to the identity */
+        const float p_s = 0.6666667f * slope_2_s + 0.16666667f * slope_3_s + 1.0f;
+        const float p_x = 0.16666667f * (half_turn_0_x + slope_3_x) + 0.6666667f * slope_2_x;
+        const float p_y = 0.16666667f * (half_turn_0_y + slope_3_y) + 0.6666667f * slope_2_y;
+        const float p_z = 0.16666667f * (half_turn_0_z + slope_3_z) + 0.6666667f * slope_2_z;
+        prepared[0][k] = p_s;
+        prepared[1][k] = p_x;
+        prepared[2][k] = p_y;
+        prepared[3][k] = p_z;
+    }
+}
+
+/* The rest of step k of a block. */
+static inline void finish_(const float state[4], float prepared[4][BLOCK_], size_t k,
+    float next[4])
+{
+    const float a_s = state[0];
+    const float a_x = state[1];
+    const float a_y = state[2];
+    const float a_z = state[3];
+    const float p_s = prepared[0][k];
+    const float p_x = prepared[1][k];
+    const float p_y = prepared[2][k];
+    const float p_z = prepared[3][k];
+    /* Cayley-Klein parameters, body to reference, scalar first, after the step */
+    const float next_s = a_s * p_s - a_x * p_x - a_y * p_y - a_z * p_z;
+    const float next_x = a_s * p_x + a_x * p_s + a_y * p_z - a_z * p_y;
+    const float next_y = a_s * p_y - a_x * p_z + a_y * p_s + a_z * p_x;
+    const float next_z = a_s * p_z + a_x * p_y - a_y * p_x + a_z * p_s;
+    next[0] = next_s;
+    next[1] = next_x;
+    next[2] = next_y;
+    next[3] = next_z;
+}
+
 int cayley_klein_rk3_2_float_propagate(size_t runs, size_t steps, size_t record_every, size_t orthonormalize_every,
     cayley_klein_rk3_2_float_orthonormalizer orthonormalize, const float *initial,
     const float *increments, float *history)
@@ -101,17 +199,23 @@ int cayley_klein_rk3_2_float_propagate(size_t runs, size_t steps, size_t record_
         size_t until_record = record_every, until_orthonormalize = orthonormalize_every;
         for (size_t k = 0; k < 4; ++k)
             state[k] = *history++ = *initial++;
-        for (size_t step = 0; step < steps; ++step) {
-            one_(state, increments, state);
-            increments += 6;
-            if (orthonormalize_every && !--until_orthonormalize) {
-                orthonormalize(state, state);
-                until_orthonormalize = orthonormalize_every;
-            }
-            if (!--until_record) {
-                for (size_t k = 0; k < 4; ++k)
-                    *history++ = state[k];
-                until_record = record_every;
+        for (size_t step = 0; step < steps;) {
+            float prepared[4][BLOCK_];
+            const size_t count = steps - step < BLOCK_ ? steps - step : (size_t)BLOCK_;
+            prepare_(count, increments, prepared);
+            increments += 6 * count;
+            step += count;
+            for (size_t k = 0; k < count; ++k) {
+                finish_(state, prepared, k, state);
+                if (orthonormalize_every && !--until_orthonormalize) {
+                    orthonormalize(state, state);
+                    until_orthonormalize = orthonormalize_every;
+                }
+                if (!--until_record) {
+                    for (size_t j = 0; j < 4; ++j)
+                        *history++ = state[j];
+                    until_record = record_every;
+                }
             }
         }
     }

@@ -4,7 +4,7 @@
  */
 #include "constant_increments_float.h"
 
-/* The algorithm. Static, so that the loops below can take it in. */
+/* The algorithm. Static, so that the loop below can take it in. */
 static inline void one_(float middle, float width, float x, float y, float z, float increment[3])
 {
     (void)middle;

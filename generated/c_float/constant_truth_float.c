@@ -12,7 +12,7 @@ static float sinc_(float x)
     return x >= 0.0f && x <= 0.0f ? 1.0f : sinf(x) / x;
 }
 
-/* The algorithm. Static, so that the loops below can take it in. */
+/* The algorithm. Static, so that the loop below can take it in. */
 static inline void one_(float time, float x, float y, float z, float rate[3], float attitude[9])
 {
     const float shared_1 = time * time;

@@ -4,7 +4,7 @@
  */
 #include "dcm_from_euler_float.h"
 
-/* The algorithm. Static, so that the loops below can take it in. */
+/* The algorithm. Static, so that the loop below can take it in. */
 static inline void one_(const float state[4], float attitude[9])
 {
     const float e_x = state[0];

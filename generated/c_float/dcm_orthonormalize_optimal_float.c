@@ -6,7 +6,7 @@
 
 #include <math.h>
 
-/* The algorithm. Static, so that the loops below can take it in. */
+/* The algorithm. Static, so that the loop below can take it in. */
 static inline void one_(const float computed[9], float orthonormalized[9])
 {
     const float C_11 = computed[0];

@@ -4,7 +4,7 @@
  */
 #include "dcm_product_float.h"
 
-/* The algorithm. Static, so that the loops below can take it in. */
+/* The algorithm. Static, so that the loop below can take it in. */
 static inline void one_(const float state[9], const float transition[9], float next[9])
 {
     const float C_11 = state[0];

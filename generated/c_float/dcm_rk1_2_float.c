@@ -4,7 +4,7 @@
  */
 #include "dcm_rk1_2_float.h"
 
-/* The algorithm. Static, so that the loops below can take it in. */
+/* The algorithm. Static, so that the loop below can take it in. */
 static inline void one_(const float state[9], const float increments[6], float next[9])
 {
     const float C_11 = state[0];
@@ -62,6 +62,81 @@ void dcm_rk1_2_float_array(size_t count, const float *state, const float *increm
         one_(state + 9 * k, increments + 6 * k, next + 9 * k);
 }
 
+enum { BLOCK_ = 16 };
+
+/* The part of `count` steps, at most BLOCK_, that does not wait for the state. Arrays are ordered by element,
+ * so that the compiler can take several steps at once.
+ */
+static void prepare_(size_t count, const float *increments, float prepared[6][BLOCK_])
+{
+    float increments_by_element[6][BLOCK_];
+    for (size_t k = 0; k < count; ++k)
+        for (size_t j = 0; j < 6; ++j)
+            increments_by_element[j][k] = increments[6 * k + j];
+    for (size_t k = 0; k < count; ++k) {
+        const float d1_x = increments_by_element[0][k];
+        const float d1_y = increments_by_element[1][k];
+        const float d1_z = increments_by_element[2][k];
+        const float d2_x = increments_by_element[3][k];
+        const float d2_y = increments_by_element[4][k];
+        const float d2_z = increments_by_element[5][k];
+        /* rate times the step, at node 0 */
+        const float turn_0_x = 3.0f * d1_x - d2_x;
+        const float turn_0_y = 3.0f * d1_y - d2_y;
+        const float turn_0_z = 3.0f * d1_z - d2_z;
+        /* the step applied to the identity */
+        const float A_12 = -turn_0_z;
+        const float A_23 = -turn_0_x;
+        const float A_31 = -turn_0_y;
+        prepared[0][k] = turn_0_x;
+        prepared[1][k] = turn_0_y;
+        prepared[2][k] = turn_0_z;
+        prepared[3][k] = A_12;
+        prepared[4][k] = A_23;
+        prepared[5][k] = A_31;
+    }
+}
+
+/* The rest of step k of a block. */
+static inline void finish_(const float state[9], float prepared[6][BLOCK_], size_t k,
+    float next[9])
+{
+    const float C_11 = state[0];
+    const float C_12 = state[1];
+    const float C_13 = state[2];
+    const float C_21 = state[3];
+    const float C_22 = state[4];
+    const float C_23 = state[5];
+    const float C_31 = state[6];
+    const float C_32 = state[7];
+    const float C_33 = state[8];
+    const float turn_0_x = prepared[0][k];
+    const float turn_0_y = prepared[1][k];
+    const float turn_0_z = prepared[2][k];
+    const float A_12 = prepared[3][k];
+    const float A_23 = prepared[4][k];
+    const float A_31 = prepared[5][k];
+    /* direction cosine matrix, body to reference, after the step */
+    const float next_11 = C_11 + A_31 * C_13 + C_12 * turn_0_z;
+    const float next_12 = C_12 + A_12 * C_11 + C_13 * turn_0_x;
+    const float next_13 = C_13 + A_23 * C_12 + C_11 * turn_0_y;
+    const float next_21 = C_21 + A_31 * C_23 + C_22 * turn_0_z;
+    const float next_22 = C_22 + A_12 * C_21 + C_23 * turn_0_x;
+    const float next_23 = C_23 + A_23 * C_22 + C_21 * turn_0_y;
+    const float next_31 = C_31 + A_31 * C_33 + C_32 * turn_0_z;
+    const float next_32 = C_32 + A_12 * C_31 + C_33 * turn_0_x;
+    const float next_33 = C_33 + A_23 * C_32 + C_31 * turn_0_y;
+    next[0] = next_11;
+    next[1] = next_12;
+    next[2] = next_13;
+    next[3] = next_21;
+    next[4] = next_22;
+    next[5] = next_23;
+    next[6] = next_31;
+    next[7] = next_32;
+    next[8] = next_33;
+}
+
 int dcm_rk1_2_float_propagate(size_t runs, size_t steps, size_t record_every, size_t orthonormalize_every,
     dcm_rk1_2_float_orthonormalizer orthonormalize, const float *initial,
     const float *increments, float *history)
@@ -73,17 +148,23 @@ int dcm_rk1_2_float_propagate(size_t runs, size_t steps, size_t record_every, si
         size_t until_record = record_every, until_orthonormalize = orthonormalize_every;
         for (size_t k = 0; k < 9; ++k)
             state[k] = *history++ = *initial++;
-        for (size_t step = 0; step < steps; ++step) {
-            one_(state, increments, state);
-            increments += 6;
-            if (orthonormalize_every && !--until_orthonormalize) {
-                orthonormalize(state, state);
-                until_orthonormalize = orthonormalize_every;
-            }
-            if (!--until_record) {
-                for (size_t k = 0; k < 9; ++k)
-                    *history++ = state[k];
-                until_record = record_every;
+        for (size_t step = 0; step < steps;) {
+            float prepared[6][BLOCK_];
+            const size_t count = steps - step < BLOCK_ ? steps - step : (size_t)BLOCK_;
+            prepare_(count, increments, prepared);
+            increments += 6 * count;
+            step += count;
+            for (size_t k = 0; k < count; ++k) {
+                finish_(state, prepared, k, state);
+                if (orthonormalize_every && !--until_orthonormalize) {
+                    orthonormalize(state, state);
+                    until_orthonormalize = orthonormalize_every;
+                }
+                if (!--until_record) {
+                    for (size_t j = 0; j < 9; ++j)
+                        *history++ = state[j];
+                    until_record = record_every;
+                }
             }
         }
     }

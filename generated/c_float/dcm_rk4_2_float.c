@@ -4,7 +4,7 @@
  */
 #include "dcm_rk4_2_float.h"
 
-/* The algorithm. Static, so that the loops below can take it in. */
+/* The algorithm. Static, so that the loop below can take it in. */
 static inline void one_(const float state[9], const float increments[6], float next[9])
 {
     const float C_11 = state[0];
@@ -142,6 +142,170 @@ void dcm_rk4_2_float_array(size_t count, const float *state, const float *increm
         one_(state + 9 * k, increments + 6 * k, next + 9 * k);
 }
 
+enum { BLOCK_ = 16 };
+
+/* The part of `count` steps, at most BLOCK_, that does not wait for the state. Arrays are ordered by element,
+ * so that the compiler can take several steps at once.
+ */
+static void prepare_(size_t count, const float *increments, float prepared[9][BLOCK_])
+{
+    float increments_by_element[6][BLOCK_];
+    for (size_t k = 0; k < count; ++k)
+        for (size_t j = 0; j < 6; ++j)
+            increments_by_element[j][k] = increments[6 * k + j];
+    for (size_t k = 0; k < count; ++k) {
+        const float d1_x = increments_by_element[0][k];
+        const float d1_y = increments_by_element[1][k];
+        const float d1_z = increments_by_element[2][k];
+        const float d2_x = increments_by_element[3][k];
+        const float d2_y = increments_by_element[4][k];
+        const float d2_z = increments_by_element[5][k];
+        /* rate times the step, at node 0 */
+        const float turn_0_x = 3.0f * d1_x - d2_x;
+        const float turn_0_y = 3.0f * d1_y - d2_y;
+        const float turn_0_z = 3.0f * d1_z - d2_z;
+        /* rate times the step, at node 1/2 */
+        const float turn_1_2_x = d1_x + d2_x;
+        const float turn_1_2_y = d1_y + d2_y;
+        const float turn_1_2_z = d1_z + d2_z;
+        /* rate times the step, at node 1 */
+        const float turn_1_x = 3.0f * d2_x - d1_x;
+        const float turn_1_y = 3.0f * d2_y - d1_y;
+        const float turn_1_z = 3.0f * d2_z - d1_z;
+        const float shared_1 = 0.5f * turn_0_z;
+        /* argument of slope 2, from the identity */
+        const float point_2_12 = -shared_1;
+        const float shared_2 = 0.5f * turn_0_y;
+        const float point_2_13 = shared_2;
+        const float point_2_21 = shared_1;
+        const float shared_3 = 0.5f * turn_0_x;
+        const float point_2_23 = -shared_3;
+        const float point_2_31 = -shared_2;
+        const float point_2_32 = shared_3;
+        /* derivative times the step at stage 2 */
+        const float slope_2_11 = point_2_12 * turn_1_2_z - point_2_13 * turn_1_2_y;
+        const float shared_4 = -turn_1_2_z;
+        const float slope_2_12 = shared_4 + point_2_13 * turn_1_2_x;
+        const float shared_5 = -turn_1_2_y;
+        const float slope_2_13 = -(shared_5 + point_2_12 * turn_1_2_x);
+        const float slope_2_21 = -(shared_4 + point_2_23 * turn_1_2_y);
+        const float slope_2_22 = point_2_23 * turn_1_2_x - point_2_21 * turn_1_2_z;
+        const float shared_6 = -turn_1_2_x;
+        const float slope_2_23 = shared_6 + point_2_21 * turn_1_2_y;
+        const float slope_2_31 = shared_5 + point_2_32 * turn_1_2_z;
+        const float slope_2_32 = -(shared_6 + point_2_31 * turn_1_2_z);
+        const float slope_2_33 = point_2_31 * turn_1_2_y - point_2_32 * turn_1_2_x;
+        /* argument of slope 3, from the identity */
+        const float point_3_11 = 0.5f * slope_2_11 + 1.0f;
+        const float point_3_12 = 0.5f * slope_2_12;
+        const float point_3_13 = 0.5f * slope_2_13;
+        const float point_3_21 = 0.5f * slope_2_21;
+        const float point_3_22 = 0.5f * slope_2_22 + 1.0f;
+        const float point_3_23 = 0.5f * slope_2_23;
+        const float point_3_31 = 0.5f * slope_2_31;
+        const float point_3_32 = 0.5f * slope_2_32;
+        const float point_3_33 = 0.5f * slope_2_33 + 1.0f;
+        /* derivative times the step at stage 3 */
+        const float slope_3_11 = point_3_12 * turn_1_2_z - point_3_13 * turn_1_2_y;
+        const float slope_3_12 = point_3_13 * turn_1_2_x - point_3_11 * turn_1_2_z;
+        const float slope_3_13 = point_3_11 * turn_1_2_y - point_3_12 * turn_1_2_x;
+        const float slope_3_21 = point_3_22 * turn_1_2_z - point_3_23 * turn_1_2_y;
+        const float slope_3_22 = point_3_23 * turn_1_2_x - point_3_21 * turn_1_2_z;
+        const float slope_3_23 = point_3_21 * turn_1_2_y - point_3_22 * turn_1_2_x;
+        const float slope_3_31 = point_3_32 * turn_1_2_z - point_3_33 * turn_1_2_y;
+        const float slope_3_32 = point_3_33 * turn_1_2_x - point_3_31 * turn_1_2_z;
+        const float slope_3_33 = point_3_31 * turn_1_2_y - point_3_32 * turn_1_2_x;
+        /* argument of slope 4, from the identity */
+        const float point_4_11 = slope_3_11 + 1.0f;
+        const float point_4_22 = slope_3_22 + 1.0f;
+        const float point_4_33 = slope_3_33 + 1.0f;
+        /* derivative times the step at stage 4 */
+        const float slope_4_11 = slope_3_12 * turn_1_z - slope_3_13 * turn_1_y;
+        const float slope_4_12 = slope_3_13 * turn_1_x - point_4_11 * turn_1_z;
+        const float slope_4_13 = point_4_11 * turn_1_y - slope_3_12 * turn_1_x;
+        const float slope_4_21 = point_4_22 * turn_1_z - slope_3_23 * turn_1_y;
+        const float slope_4_22 = slope_3_23 * turn_1_x - slope_3_21 * turn_1_z;
+        const float slope_4_23 = slope_3_21 * turn_1_y - point_4_22 * turn_1_x;
+        const float slope_4_31 = slope_3_32 * turn_1_z - point_4_33 * turn_1_y;
+        const float slope_4_32 = point_4_33 * turn_1_x - slope_3_31 * turn_1_z;
+        const float slope_4_33 = slope_3_31 * turn_1_y - slope_3_32 * turn_1_x;
+        /* the step applied to the identity */
+        const float A_11 = 0.33333334f * (slope_2_11 + slope_3_11) + 0.16666667f * slope_4_11
+            + 1.0f;
+        const float shared_7 = 0.16666667f * turn_0_z;
+        const float A_12 = 0.33333334f * (slope_2_12 + slope_3_12) - shared_7
+            + 0.16666667f * slope_4_12;
+        const float shared_8 = 0.16666667f * turn_0_y;
+        const float A_13 = shared_8 + 0.33333334f * (slope_2_13 + slope_3_13)
+            + 0.16666667f * slope_4_13;
+        const float A_21 = shared_7 + 0.33333334f * (slope_2_21 + slope_3_21)
+            + 0.16666667f * slope_4_21;
+        const float A_22 = 0.33333334f * (slope_2_22 + slope_3_22) + 0.16666667f * slope_4_22
+            + 1.0f;
+        const float shared_9 = 0.16666667f * turn_0_x;
+        const float A_23 = 0.33333334f * (slope_2_23 + slope_3_23) - shared_9
+            + 0.16666667f * slope_4_23;
+        const float A_31 = 0.33333334f * (slope_2_31 + slope_3_31) - shared_8
+            + 0.16666667f * slope_4_31;
+        const float A_32 = shared_9 + 0.33333334f * (slope_2_32 + slope_3_32)
+            + 0.16666667f * slope_4_32;
+        const float A_33 = 0.33333334f * (slope_2_33 + slope_3_33) + 0.16666667f * slope_4_33
+            + 1.0f;
+        prepared[0][k] = A_11;
+        prepared[1][k] = A_12;
+        prepared[2][k] = A_13;
+        prepared[3][k] = A_21;
+        prepared[4][k] = A_22;
+        prepared[5][k] = A_23;
+        prepared[6][k] = A_31;
+        prepared[7][k] = A_32;
+        prepared[8][k] = A_33;
+    }
+}
+
+/* The rest of step k of a block. */
+static inline void finish_(const float state[9], float prepared[9][BLOCK_], size_t k,
+    float next[9])
+{
+    const float C_11 = state[0];
+    const float C_12 = state[1];
+    const float C_13 = state[2];
+    const float C_21 = state[3];
+    const float C_22 = state[4];
+    const float C_23 = state[5];
+    const float C_31 = state[6];
+    const float C_32 = state[7];
+    const float C_33 = state[8];
+    const float A_11 = prepared[0][k];
+    const float A_12 = prepared[1][k];
+    const float A_13 = prepared[2][k];
+    const float A_21 = prepared[3][k];
+    const float A_22 = prepared[4][k];
+    const float A_23 = prepared[5][k];
+    const float A_31 = prepared[6][k];
+    const float A_32 = prepared[7][k];
+    const float A_33 = prepared[8][k];
+    /* direction cosine matrix, body to reference, after the step */
+    const float next_11 = A_11 * C_11 + A_21 * C_12 + A_31 * C_13;
+    const float next_12 = A_12 * C_11 + A_22 * C_12 + A_32 * C_13;
+    const float next_13 = A_13 * C_11 + A_23 * C_12 + A_33 * C_13;
+    const float next_21 = A_11 * C_21 + A_21 * C_22 + A_31 * C_23;
+    const float next_22 = A_12 * C_21 + A_22 * C_22 + A_32 * C_23;
+    const float next_23 = A_13 * C_21 + A_23 * C_22 + A_33 * C_23;
+    const float next_31 = A_11 * C_31 + A_21 * C_32 + A_31 * C_33;
+    const float next_32 = A_12 * C_31 + A_22 * C_32 + A_32 * C_33;
+    const float next_33 = A_13 * C_31 + A_23 * C_32 + A_33 * C_33;
+    next[0] = next_11;
+    next[1] = next_12;
+    next[2] = next_13;
+    next[3] = next_21;
+    next[4] = next_22;
+    next[5] = next_23;
+    next[6] = next_31;
+    next[7] = next_32;
+    next[8] = next_33;
+}
+
 int dcm_rk4_2_float_propagate(size_t runs, size_t steps, size_t record_every, size_t orthonormalize_every,
     dcm_rk4_2_float_orthonormalizer orthonormalize, const float *initial,
     const float *increments, float *history)
@@ -153,17 +317,23 @@ int dcm_rk4_2_float_propagate(size_t runs, size_t steps, size_t record_every, si
         size_t until_record = record_every, until_orthonormalize = orthonormalize_every;
         for (size_t k = 0; k < 9; ++k)
             state[k] = *history++ = *initial++;
-        for (size_t step = 0; step < steps; ++step) {
-            one_(state, increments, state);
-            increments += 6;
-            if (orthonormalize_every && !--until_orthonormalize) {
-                orthonormalize(state, state);
-                until_orthonormalize = orthonormalize_every;
-            }
-            if (!--until_record) {
-                for (size_t k = 0; k < 9; ++k)
-                    *history++ = state[k];
-                until_record = record_every;
+        for (size_t step = 0; step < steps;) {
+            float prepared[9][BLOCK_];
+            const size_t count = steps - step < BLOCK_ ? steps - step : (size_t)BLOCK_;
+            prepare_(count, increments, prepared);
+            increments += 6 * count;
+            step += count;
+            for (size_t k = 0; k < count; ++k) {
+                finish_(state, prepared, k, state);
+                if (orthonormalize_every && !--until_orthonormalize) {
+                    orthonormalize(state, state);
+                    until_orthonormalize = orthonormalize_every;
+                }
+                if (!--until_record) {
+                    for (size_t j = 0; j < 9; ++j)
+                        *history++ = state[j];
+                    until_record = record_every;
+                }
             }
         }
     }

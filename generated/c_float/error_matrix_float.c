@@ -4,7 +4,7 @@
  */
 #include "error_matrix_float.h"
 
-/* The algorithm. Static, so that the loops below can take it in. */
+/* The algorithm. Static, so that the loop below can take it in. */
 static inline void one_(const float computed[9], const float truth[9], float error[9],
     float scale[3], float skew[3], float drift[3])
 {

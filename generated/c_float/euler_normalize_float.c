@@ -6,7 +6,7 @@
 
 #include <math.h>
 
-/* The algorithm. Static, so that the loops below can take it in. */
+/* The algorithm. Static, so that the loop below can take it in. */
 static inline void one_(const float state[4], float next[4])
 {
     const float e_x = state[0];

@@ -4,7 +4,7 @@
  */
 #include "euler_rk1_2_float.h"
 
-/* The algorithm. Static, so that the loops below can take it in. */
+/* The algorithm. Static, so that the loop below can take it in. */
 static inline void one_(const float state[4], const float increments[6], float next[4])
 {
     const float e_x = state[0];
@@ -43,6 +43,56 @@ void euler_rk1_2_float_array(size_t count, const float *state, const float *incr
         one_(state + 4 * k, increments + 6 * k, next + 4 * k);
 }
 
+enum { BLOCK_ = 16 };
+
+/* The part of `count` steps, at most BLOCK_, that does not wait for the state. Arrays are ordered by element,
+ * so that the compiler can take several steps at once.
+ */
+static void prepare_(size_t count, const float *increments, float prepared[3][BLOCK_])
+{
+    float increments_by_element[6][BLOCK_];
+    for (size_t k = 0; k < count; ++k)
+        for (size_t j = 0; j < 6; ++j)
+            increments_by_element[j][k] = increments[6 * k + j];
+    for (size_t k = 0; k < count; ++k) {
+        const float d1_x = increments_by_element[0][k];
+        const float d1_y = increments_by_element[1][k];
+        const float d1_z = increments_by_element[2][k];
+        const float d2_x = increments_by_element[3][k];
+        const float d2_y = increments_by_element[4][k];
+        const float d2_z = increments_by_element[5][k];
+        /* half the rate times the step, at node 0 */
+        const float half_turn_0_x = 1.5f * d1_x - 0.5f * d2_x;
+        const float half_turn_0_y = 1.5f * d1_y - 0.5f * d2_y;
+        const float half_turn_0_z = 1.5f * d1_z - 0.5f * d2_z;
+        prepared[0][k] = half_turn_0_x;
+        prepared[1][k] = half_turn_0_y;
+        prepared[2][k] = half_turn_0_z;
+    }
+}
+
+/* The rest of step k of a block. */
+static inline void finish_(const float state[4], float prepared[3][BLOCK_], size_t k,
+    float next[4])
+{
+    const float e_x = state[0];
+    const float e_y = state[1];
+    const float e_z = state[2];
+    const float e_s = state[3];
+    const float half_turn_0_x = prepared[0][k];
+    const float half_turn_0_y = prepared[1][k];
+    const float half_turn_0_z = prepared[2][k];
+    /* Euler parameters, body to reference, scalar last, after the step */
+    const float next_s = e_s - e_x * half_turn_0_x - e_y * half_turn_0_y - e_z * half_turn_0_z;
+    const float next_x = e_x + e_s * half_turn_0_x + e_y * half_turn_0_z - e_z * half_turn_0_y;
+    const float next_y = e_y + e_s * half_turn_0_y - e_x * half_turn_0_z + e_z * half_turn_0_x;
+    const float next_z = e_z + e_s * half_turn_0_z + e_x * half_turn_0_y - e_y * half_turn_0_x;
+    next[0] = next_x;
+    next[1] = next_y;
+    next[2] = next_z;
+    next[3] = next_s;
+}
+
 int euler_rk1_2_float_propagate(size_t runs, size_t steps, size_t record_every, size_t orthonormalize_every,
     euler_rk1_2_float_orthonormalizer orthonormalize, const float *initial,
     const float *increments, float *history)
@@ -54,17 +104,23 @@ int euler_rk1_2_float_propagate(size_t runs, size_t steps, size_t record_every, 
         size_t until_record = record_every, until_orthonormalize = orthonormalize_every;
         for (size_t k = 0; k < 4; ++k)
             state[k] = *history++ = *initial++;
-        for (size_t step = 0; step < steps; ++step) {
-            one_(state, increments, state);
-            increments += 6;
-            if (orthonormalize_every && !--until_orthonormalize) {
-                orthonormalize(state, state);
-                until_orthonormalize = orthonormalize_every;
-            }
-            if (!--until_record) {
-                for (size_t k = 0; k < 4; ++k)
-                    *history++ = state[k];
-                until_record = record_every;
+        for (size_t step = 0; step < steps;) {
+            float prepared[3][BLOCK_];
+            const size_t count = steps - step < BLOCK_ ? steps - step : (size_t)BLOCK_;
+            prepare_(count, increments, prepared);
+            increments += 6 * count;
+            step += count;
+            for (size_t k = 0; k < count; ++k) {
+                finish_(state, prepared, k, state);
+                if (orthonormalize_every && !--until_orthonormalize) {
+                    orthonormalize(state, state);
+                    until_orthonormalize = orthonormalize_every;
+                }
+                if (!--until_record) {
+                    for (size_t j = 0; j < 4; ++j)
+                        *history++ = state[j];
+                    until_record = record_every;
+                }
             }
         }
     }

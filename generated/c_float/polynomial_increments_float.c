@@ -4,7 +4,7 @@
  */
 #include "polynomial_increments_float.h"
 
-/* The algorithm. Static, so that the loops below can take it in. */
+/* The algorithm. Static, so that the loop below can take it in. */
 static inline void one_(float middle, float width, float a0, float a1, float a2, float a3, float a4,
     float increment[3])
 {

@@ -6,7 +6,7 @@
 
 #include <math.h>
 
-/* The algorithm. Static, so that the loops below can take it in. */
+/* The algorithm. Static, so that the loop below can take it in. */
 static inline void one_(float time, float a0, float a1, float a2, float a3, float a4, float rate[3],
     float attitude[9])
 {

@@ -12,7 +12,7 @@ static float sinc_(float x)
     return x >= 0.0f && x <= 0.0f ? 1.0f : sinf(x) / x;
 }
 
-/* The algorithm. Static, so that the loops below can take it in. */
+/* The algorithm. Static, so that the loop below can take it in. */
 static inline void one_(float middle, float width, float a, float b, float increment[3])
 {
     /* angle increment over the interval, body axes */

@@ -28,16 +28,19 @@ class Real:
         Suffix of its literals and of the functions of math.h.
     infix : str
         What function and file names have after the kernel's, so that both types link into one program.
+    bytes : int
+        Size of a number.
     """
 
     target: str
     name: str
     suffix: str
     infix: str
+    bytes: int
 
 
-DOUBLE = Real("c", "double", "", "")
-FLOAT = Real("c-float", "float", "f", "_float")
+DOUBLE = Real("c", "double", "", "", 8)
+FLOAT = Real("c-float", "float", "f", "_float", 4)
 REALS = {real.target: real for real in (DOUBLE, FLOAT)}
 
 _FUNCTIONS = {
@@ -93,7 +96,6 @@ def emit(program: Program, target: str = "c") -> Sources:
     real = REALS[target]
     printer = CPrinter(real)
     name = f"{program.name}{real.infix}"
-    used = program.used()
     nodes = [node for a in program.body for node in walk(a.value) if isinstance(node, Operation)]
     values = {
         "program": program,
@@ -106,28 +108,9 @@ def emit(program: Program, target: str = "c") -> Sources:
         "names": ", ".join(s.name for s in (*program.inputs, *(r.signal for r in program.outputs))),
         "arrays": _arrays(program, real),
         "calls": _calls(program),
-        "unused": [s.name for s in program.inputs if not used & set(s.elements)],
-        "loads": [
-            f"const {real.name} {element} = {signal.name}[{place}];"
-            for signal in program.inputs
-            if signal.shape
-            for place, element in enumerate(signal.elements)
-            if element in used
-        ],
-        "body": [
-            {
-                "text": fill_expression(
-                    f"const {real.name} {a.name} = {printer.text(a.value)};", " " * 8, 96
-                ),
-                "meaning": a.meaning,
-            }
-            for a in program.body
-        ],
-        "stores": [
-            f"{_target(result.signal, place)} = {printer.text(node)};"
-            for result in program.outputs
-            for place, node in enumerate(result.nodes)
-        ],
+        "unused": [s.name for s in program.inputs if not program.used() & set(s.elements)],
+        "code": _code(program, printer),
+        "loop": _loop(program, printer) if program.companions else None,
         "uses_math": any(
             node.kind in _FUNCTIONS and node.kind not in ("at_least", "select") for node in nodes
         ),
@@ -149,8 +132,61 @@ def emit(program: Program, target: str = "c") -> Sources:
     )
 
 
-def _target(signal: Signal, place: int) -> str:
-    return f"{signal.name}[{place}]" if signal.shape else f"*{signal.name}"
+def _code(
+    program: Program, printer: CPrinter, indices: dict[str, str] | None = None, depth: int = 1
+) -> dict[str, object]:
+    """Return the statements of a program: loads, assignments, stores.
+
+    `indices` gives the index of the element, by the signal's name, where it is not the plain ``[{}]``;
+    `depth` is how many blocks deep the statements stand.
+    """
+    real, used, indices = printer.real.name, program.used(program.outputs), indices or {}
+
+    def place(signal: Signal, number: int) -> str:
+        return signal.name + indices.get(signal.name, "[{}]").format(number) if signal.shape else signal.name
+
+    return {
+        "loads": [
+            f"const {real} {element} = {place(signal, number)};"
+            for signal in program.inputs
+            if signal.shape
+            for number, element in enumerate(signal.elements)
+            if element in used
+        ],
+        "body": [
+            {
+                "text": fill_expression(
+                    f"const {real} {a.name} = {printer.text(a.value)};",
+                    " " * 4 * (depth + 1),
+                    100 - 4 * depth,
+                ),
+                "meaning": a.meaning,
+            }
+            for a in program.body
+        ],
+        "stores": [
+            f"{place(result.signal, number)} = {printer.text(node)};"
+            for result in program.outputs
+            for number, node in enumerate(result.nodes)
+        ],
+    }
+
+
+#: Steps whose part without the state is computed together: enough for the compiler to take several at once.
+_BLOCK = 16
+
+
+def _loop(program: Program, printer: CPrinter) -> dict[str, object]:
+    """Return the statements of a step in a loop, cut where the state comes in."""
+    ahead, behind = program.split()
+    (increments,), (prepared,) = ahead.inputs, ahead.outputs
+    return {
+        "block": _BLOCK,
+        "prepared": prepared.signal.size,
+        "stack": _BLOCK * (prepared.signal.size + increments.size) * printer.real.bytes,
+        "ahead": _code(ahead, printer, {increments.name: "_by_element[{}][k]", "prepared": "[{}][k]"}, 2),
+        "behind": _code(behind, printer, {"prepared": "[{}][k]"}),
+    }
 
 
 def _parameters(program: Program, real: Real) -> str:
