@@ -299,3 +299,20 @@ def test_an_entry_in_use_is_not_pruned(root):
     os.utime(place, (long_ago, long_ago))
     cache.entry("kind", "newer", write("file"))
     assert "old" not in names(root / "kind")
+
+
+def test_a_user_without_a_home_folder_is_told_what_to_set(monkeypatch):
+    def no_home(_cls=None):
+        raise RuntimeError("Could not determine home directory.")
+
+    for name in ("STRAPGEN_CACHE_DIR", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(Path, "home", no_home)
+    with pytest.raises(InputError, match=r"^no home folder .* set STRAPGEN_CACHE_DIR"):
+        cache.root()
+
+
+def test_the_home_folder_may_be_written_as_a_tilde(monkeypatch, tmp_path):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("STRAPGEN_CACHE_DIR", "~/kept")
+    assert cache.root() == tmp_path / "kept"

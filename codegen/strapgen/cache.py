@@ -27,11 +27,22 @@ _MANIFEST = "manifest.json"
 
 
 def root() -> Path:
-    """Return the cache folder: $STRAPGEN_CACHE_DIR, or `strapgen` in the user's cache folder."""
-    chosen = os.environ.get("STRAPGEN_CACHE_DIR")
-    if chosen:
-        return Path(chosen).absolute()
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "strapgen"
+    """Return the cache folder: $STRAPGEN_CACHE_DIR, or `strapgen` in the user's cache folder.
+
+    Raises
+    ------
+    InputError
+        If it would lie in the user's home folder, and there is none.
+    """
+    try:
+        chosen = os.environ.get("STRAPGEN_CACHE_DIR")
+        if chosen:
+            return Path(chosen).expanduser().absolute()
+        return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "strapgen"
+    except RuntimeError:  # a user without a home folder, as in some containers
+        raise InputError(
+            "no home folder to keep the cache in; set STRAPGEN_CACHE_DIR to a folder that can be written"
+        ) from None
 
 
 def digest(parts: Iterable[str | bytes]) -> str:

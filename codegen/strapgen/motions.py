@@ -32,7 +32,7 @@ def keys(name: str) -> dict[str, dict[str, float]]:
     ['b_deg_s', 'b_rad_s']
     """
     parameters = catalogue.MOTIONS[checks.choice("motion", name, catalogue.MOTIONS)]
-    degree = math.pi / 180
+    degree = math.radians(1)
     if name == "polynomial":
         return {parameter: {parameter: degree} for parameter in parameters}
     return {p: {f"{p}_deg_s": degree, f"{p}_rad_s": 1.0} for p in parameters}

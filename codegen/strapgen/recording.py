@@ -20,7 +20,7 @@ from strapgen.simulation import require_finite
 Array = NDArray[np.float64]
 
 #: Units of recorded rates, and their factor to rad/s.
-RATE_UNITS = {"rad/s": 1.0, "deg/s": math.pi / 180}
+RATE_UNITS = {"rad/s": 1.0, "deg/s": math.radians(1)}
 
 _INCREMENT_COLUMNS = ("t", "dx", "dy", "dz")
 #: Largest departure of an interval from the median, as a part of it, that counts as even.
@@ -96,9 +96,8 @@ def _rows(path: Path, names: tuple[str, ...] | None) -> tuple[Array, list[int]]:
 
 def _numbered(reader: Any) -> Iterator[tuple[int, list[str]]]:
     for row in reader:
-        if len(row) > 1 or any(
-            cell.strip() for cell in row
-        ):  # a row of empty cells is a row with data missing
+        # A blank line is skipped; a row of empty cells is not: its data are missing.
+        if len(row) > 1 or any(cell.strip() for cell in row):
             yield reader.line_num, row
 
 

@@ -58,21 +58,6 @@ def test_propagation_is_the_step_repeated(make, algorithm, rng):
     assert np.abs(backend.propagate(increments) - np.array(states)).max() <= roundoff(backend, 50)
 
 
-@pytest.mark.parametrize("method", ["rk1", "rk4"])
-@pytest.mark.parametrize("name", ["c", "c-float"])
-def test_the_loop_in_c_has_the_bits_of_single_steps(name, algorithm, method, rng):
-    # Steps are prepared in blocks: lengths around the block's, and orthonormalization inside it.
-    backend = strapgen.backend(algorithm, method, 2, name)
-    for steps in (1, 15, 16, 17, 50):
-        increments = random_increments(rng, steps, 2)
-        state, states = backend.identity, [backend.identity]
-        for k, d in enumerate(increments, 1):
-            state = backend.step(state, d)
-            state = backend.orthonormalize(state) if k % 7 == 0 else state
-            states.append(state)
-        np.testing.assert_array_equal(backend.propagate(increments, orthonormalize_every=7), states)
-
-
 def test_orthonormalization_comes_after_every_so_many_steps(make, algorithm, rng):
     backend = make(algorithm, "rk1")
     increments = random_increments(rng, 50, 2)

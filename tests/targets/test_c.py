@@ -34,7 +34,7 @@ COMPILERS = {
 TARGETS = ("c", "c-float")
 DTYPES = {"c": np.float64, "c-float": np.float32}
 KERNELS = [choice.kernel for choice in standard()]
-STEPS = ["dcm-rk4-2", "euler-rk4-2", "cayley-klein-rk4-2"]
+STEPS = ["dcm-rk1-2", "dcm-rk4-2", "euler-rk1-2", "euler-rk4-2", "cayley-klein-rk4-2"]
 
 
 @cache
@@ -304,6 +304,26 @@ def test_propagation_is_the_step_repeated_bit_for_bit(propagate):
     for increments, record in zip(propagate.increments[0], history[0, 1:], strict=True):
         state = propagate.step(state, increments)
         assert record.tobytes() == state.tobytes()
+
+
+@pytest.mark.parametrize("steps", [1, 15, 16, 17])
+def test_blocks_of_prepared_steps_join_without_a_seam(propagate, steps):
+    _, whole = propagate(propagate.increments[0], 1, 7, function=propagate.normalize)
+    status, part = propagate(propagate.increments[0], 1, 7, steps=steps, function=propagate.normalize)
+    assert status == 0
+    assert part[0].tobytes() == whole[0, : steps + 1].tobytes()
+
+
+@pytest.mark.parametrize("step", STEPS)
+@pytest.mark.parametrize("target", TARGETS)
+def test_gcc_takes_several_steps_at_once(step, target, folder, tmp_path):
+    source = next(name for name in generated(step, target).files if name.endswith(".c"))
+    report = ["-fPIC", "-fopt-info-vec-optimized", "-c", source, "-o", str(tmp_path / "step.o")]
+    command = [needed("gcc"), *C_FLAGS, *report]
+    said = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True).stderr
+    lines = (folder / source).read_text().splitlines()
+    (loop,) = (k for k, line in enumerate(lines, 1) if line == "    for (size_t k = 0; k < count; ++k) {")
+    assert re.search(rf":{loop}:\d+: optimized: loop vectorized", said), said
 
 
 @pytest.mark.parametrize("every", [1, 3, 7, 20])

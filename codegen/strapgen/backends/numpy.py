@@ -85,11 +85,9 @@ class NumpyBackend(Backend):
         """
         runs, steps = increments.shape[:2]
         width = runs * segments
-        blocks = max(1, min(round(_WIDTH / width), length // 16))
-        depth = -(-length // blocks)
+        blocks, depth = _cut(length, width)
         local = self._transitions(increments, length, segments, blocks, depth)
-        for k in range(1, depth):
-            self._multiply(local[:, k - 1], local[:, k], local[:, k])
+        self._accumulate(local)
         totals = self._scan(local[:, -1])  # (elements, blocks, width)
         starts = np.empty((runs, segments, *self.state_shape))
         ends = np.empty_like(starts)
@@ -139,18 +137,21 @@ class NumpyBackend(Backend):
     def _scan(self, transitions: Array) -> Array:
         """Return the products of all transitions up to each place, (elements, length, width)."""
         elements, length, width = transitions.shape
-        blocks = max(1, min(round(_WIDTH / width), length // 16))
-        depth = -(-length // blocks)
+        blocks, depth = _cut(length, width)
         padded = np.empty((elements, blocks * depth, width))
         padded[:, :length] = transitions
         padded[:, length:] = self._close(self.identity[None])[:, :, None]
         local = np.ascontiguousarray(padded.reshape(elements, blocks, depth, width).transpose(0, 2, 1, 3))
-        for k in range(1, depth):
-            self._multiply(local[:, k - 1], local[:, k], local[:, k])
+        self._accumulate(local)
         if blocks > 1:
             totals = self._scan(local[:, -1])
             self._multiply(totals[:, None, :-1], local[:, :, 1:], local[:, :, 1:])
         return local.transpose(0, 2, 1, 3).reshape(elements, blocks * depth, width)[:, :length]
+
+    def _accumulate(self, local: Array) -> None:
+        """Multiply up the transitions of every block in place, (elements, depth, ...)."""
+        for k in range(1, local.shape[1]):
+            self._multiply(local[:, k - 1], local[:, k], local[:, k])
 
     def _multiply(self, state: Array, transition: Array, out: Array) -> None:
         """Advance states by transitions, all with the elements first."""
@@ -166,6 +167,12 @@ class NumpyBackend(Backend):
         """Return an array (elements, ...) of states (..., state shape)."""
         flat = states.reshape(*states.shape[: states.ndim - len(self.state_shape)], -1)
         return np.ascontiguousarray(np.moveaxis(flat, -1, 0))
+
+
+def _cut(length: int, width: int) -> tuple[int, int]:
+    """Return into how many blocks, of how many places, a scan of so many steps side by side is cut."""
+    blocks = max(1, min(round(_WIDTH / width), length // 16))
+    return blocks, -(-length // blocks)
 
 
 def _spans(steps: int, segment: int, most: int) -> list[tuple[int, int, int]]:

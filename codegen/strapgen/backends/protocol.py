@@ -121,7 +121,6 @@ class Backend(ABC):
         self.state_shape = state.shape
         self.elements = state.elements
         self.attitude = companions.attitude
-        self._sources = sources
         self._evaluate = evaluate
         self._product = companions.product
         self._orthonormalization = orthonormalization or companions.orthonormalize

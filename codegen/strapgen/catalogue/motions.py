@@ -125,9 +125,7 @@ def truth(name: str) -> Kernel:
         Signal.vector("rate", "rate", unit="rad/s", meaning="body rate, body axes"),
         motion.rate(t, *parameters),
     )
-    build.output(
-        Signal.matrix("attitude", "C", meaning=DCM_MEANING, bound=None), motion.attitude(t, *parameters)
-    )
+    build.output(Signal.matrix("attitude", "C", meaning=DCM_MEANING), motion.attitude(t, *parameters))
     return build.kernel(
         f"{name}-truth", f"True attitude: {motion.title}", f"{THESIS}, chapter 4 B and appendix A"
     )

@@ -16,7 +16,7 @@ from strapgen.exceptions import InputError
 if TYPE_CHECKING:
     from strapgen.backends import Backend
 
-_Number = str | None
+_Text = str | None
 
 
 def simulate(
@@ -25,21 +25,19 @@ def simulate(
     increments: Increments = None,
     backend: Annotated[str, typer.Option("--backend", help="numpy, c or c-float.")] = "numpy",
     motion: Annotated[
-        _Number,
+        _Text,
         typer.Option("--motion", help="constant, sinusoidal, coning or polynomial.", show_default=False),
     ] = None,
     settings: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE...", help="Parameters of the motion; see strapgen list."),
     ] = None,
-    step: Annotated[
-        _Number, typer.Option("--step", metavar="S", help="Step in s.", show_default=False)
-    ] = None,
+    step: Annotated[_Text, typer.Option("--step", metavar="S", help="Step in s.", show_default=False)] = None,
     duration: Annotated[
-        _Number, typer.Option("--duration", metavar="S", help="Duration in s.", show_default=False)
+        _Text, typer.Option("--duration", metavar="S", help="Duration in s.", show_default=False)
     ] = None,
     orthonormalize: Annotated[
-        _Number,
+        _Text,
         typer.Option(
             "--orthonormalize",
             metavar="S",
@@ -48,13 +46,13 @@ def simulate(
         ),
     ] = None,
     scheme: Annotated[
-        _Number,
+        _Text,
         typer.Option(
             "--scheme", help="Kernel that orthonormalizes.  [default: the thesis's]", show_default=False
         ),
     ] = None,
     record: Annotated[
-        _Number,
+        _Text,
         typer.Option(
             "--record",
             metavar="S",
@@ -75,10 +73,10 @@ def simulate(
         ),
     ] = None,
     rate_unit: Annotated[
-        _Number, typer.Option("--rate-unit", help="deg/s or rad/s, for --rates-csv.", show_default=False)
+        _Text, typer.Option("--rate-unit", help="deg/s or rad/s, for --rates-csv.", show_default=False)
     ] = None,
     resample_hz: Annotated[
-        _Number,
+        _Text,
         typer.Option(
             "--resample-hz",
             metavar="HZ",
@@ -97,7 +95,7 @@ def simulate(
         bool, typer.Option("--matrices", help="Add all matrices to the JSON output.")
     ] = False,
     format: Annotated[
-        _Number,
+        _Text,
         typer.Option(
             "--format", help="text, json or csv.  [default: text; csv for recorded data]", show_default=False
         ),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from strapgen.program import Constant, Operation, Program, Reference, walk
+from strapgen.program import Operation, Program, Reference, walk
 from strapgen.targets.printer import Printer, fill_expression
 from strapgen.targets.rendering import render
 from strapgen.targets.sources import Function, Sources
@@ -86,26 +86,19 @@ def _function(program: Program, is_transition: bool) -> dict[str, object]:
     ]
     inputs = {name for signal in program.inputs for name in signal.elements}
     stores = []
+    copies: set[str] = set()  # inputs that go straight out are copied first: the output may be the input
     for result in program.outputs:
         for place, node in zip(_places(result.signal.shape), result.nodes, strict=True):
-            value = printer.text(node)
-            # An input that goes straight out is copied first: the output may be the input.
-            copied = isinstance(node, Reference) and node.name in inputs
-            stores.append(
-                {
-                    "target": f"{result.signal.name}[..., {place}]",
-                    "value": value,
-                    "copied": copied,
-                    "constant": isinstance(node, Constant),
-                }
-            )
+            stores.append(f"{result.signal.name}[..., {place}] = {printer.text(node)}")
+            if isinstance(node, Reference) and node.name in inputs:
+                copies.add(node.name)
     return {
         "name": f"{program.name}_transition" if is_transition else program.name,
         "program": program,
         "loads": loads,
         "body": assigned,
         "stores": stores,
-        "copies": sorted({str(store["value"]) for store in stores if store["copied"]}),
+        "copies": sorted(copies),
     }
 
 
