@@ -94,7 +94,7 @@ def test_check_of_a_tree_in_step(folder, capsys):
 
 def test_check_finds_a_changed_file(folder, capsys):
     path = folder / "c" / "euler_rk4_2.c"
-    path.write_text(path.read_text().replace("1.5 * d1_x", "1.25 * d1_x", 1))
+    path.write_text(path.read_text().replace("d1_x + d2_x", "d2_x + d1_x", 1))
     before = contents(folder)
     status, out, err = command(capsys, *CHECK, str(folder))
     assert status == 1
@@ -102,10 +102,10 @@ def test_check_finds_a_changed_file(folder, capsys):
     assert lines[0] == f"--- {path}"
     assert lines[1] == "+++ c/euler_rk4_2.c"
     assert [line for line in lines[2:] if line.startswith("-")] == [
-        "-    const double half_turn_0_x = 1.25 * d1_x - shared_1;"
+        "-    const double sigma_x = d2_x + d1_x;"
     ]
     assert [line for line in lines[2:] if line.startswith("+")] == [
-        "+    const double half_turn_0_x = 1.5 * d1_x - shared_1;"
+        "+    const double sigma_x = d1_x + d2_x;"
     ]
     assert err == f"strapgen: {folder} is out of step; strapgen generate --all rebuilds it\n"
     assert contents(folder) == before, "a check writes nothing"

@@ -153,13 +153,14 @@ class Program:
             if unknown:
                 raise ValueError(f"{self.name}: {assignment.name!r} uses {sorted(unknown)} before assignment")
             known.add(assignment.name)
-        for result in self._results:
+        for result in self.results:
             missing = {name for node in result.nodes for name in references(node)} - known
             if len(result.nodes) != result.signal.size or missing:
                 raise ValueError(f"{self.name}: {result.signal.name!r} is not computed: {sorted(missing)}")
 
     @property
-    def _results(self) -> tuple[Result, ...]:
+    def results(self) -> tuple[Result, ...]:
+        """The outputs, and the transition where there is one."""
         return self.outputs if self.transition is None else (*self.outputs, self.transition)
 
     @cached_property
@@ -215,7 +216,7 @@ class Program:
         """Return the names that the given results need, by default all of them."""
         wanted = {
             name
-            for result in (self._results if results is None else results)
+            for result in (self.results if results is None else results)
             for node in result.nodes
             for name in references(node)
         }

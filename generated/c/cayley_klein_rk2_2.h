@@ -6,7 +6,7 @@
  * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter 2:
  *     dU/dt = (i/2) (w . s) U, s the Pauli matrices; rate extraction chapter 3 A; Heun's method:
  *     thesis, chapter 3 B.
- * Operations of one call: 30 add, 41 multiply, 1 negate; 14 temporaries.
+ * Operations of one call: 27 add, 33 multiply; 12 temporaries.
  *
  * No heap, no global state, reentrant. In one call every input is read before any output is written: an
  * output may be the same memory as an input. Matrices are stored by rows.

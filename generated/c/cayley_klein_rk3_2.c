@@ -17,59 +17,34 @@ static inline void one_(const double state[4], const double increments[6], doubl
     const double d2_x = increments[3];
     const double d2_y = increments[4];
     const double d2_z = increments[5];
-    const double shared_1 = 0.5 * d2_x;
-    /* half the rate times the step, at node 0 */
-    const double half_turn_0_x = 1.5 * d1_x - shared_1;
-    const double shared_2 = 0.5 * d2_y;
-    const double half_turn_0_y = 1.5 * d1_y - shared_2;
-    const double shared_3 = 0.5 * d2_z;
-    const double half_turn_0_z = 1.5 * d1_z - shared_3;
-    const double shared_4 = 0.5 * d1_x;
-    /* half the rate times the step, at node 1/2 */
-    const double half_turn_1_2_x = shared_1 + shared_4;
-    const double shared_5 = 0.5 * d1_y;
-    const double half_turn_1_2_y = shared_2 + shared_5;
-    const double shared_6 = 0.5 * d1_z;
-    const double half_turn_1_2_z = shared_3 + shared_6;
-    /* half the rate times the step, at node 1 */
-    const double half_turn_1_x = 1.5 * d2_x - shared_4;
-    const double half_turn_1_y = 1.5 * d2_y - shared_5;
-    const double half_turn_1_z = 1.5 * d2_z - shared_6;
-    /* argument of slope 2, from the identity */
-    const double point_2_x = 0.5 * half_turn_0_x;
-    const double point_2_y = 0.5 * half_turn_0_y;
-    const double point_2_z = 0.5 * half_turn_0_z;
-    /* derivative times the step at stage 2 */
-    const double slope_2_s = -(half_turn_1_2_x * point_2_x + half_turn_1_2_y * point_2_y
-        + half_turn_1_2_z * point_2_z);
-    const double slope_2_x = half_turn_1_2_x - half_turn_1_2_y * point_2_z
-        + half_turn_1_2_z * point_2_y;
-    const double slope_2_y = half_turn_1_2_y + half_turn_1_2_x * point_2_z
-        - half_turn_1_2_z * point_2_x;
-    const double slope_2_z = half_turn_1_2_z - half_turn_1_2_x * point_2_y
-        + half_turn_1_2_y * point_2_x;
-    /* argument of slope 3, from the identity */
-    const double point_3_s = 2.0 * slope_2_s + 1.0;
-    const double point_3_x = 2.0 * slope_2_x - half_turn_0_x;
-    const double point_3_y = 2.0 * slope_2_y - half_turn_0_y;
-    const double point_3_z = 2.0 * slope_2_z - half_turn_0_z;
-    /* derivative times the step at stage 3 */
-    const double slope_3_s = -(half_turn_1_x * point_3_x + half_turn_1_y * point_3_y
-        + half_turn_1_z * point_3_z);
-    const double slope_3_x = half_turn_1_x * point_3_s - half_turn_1_y * point_3_z
-        + half_turn_1_z * point_3_y;
-    const double slope_3_y = half_turn_1_x * point_3_z + half_turn_1_y * point_3_s
-        - half_turn_1_z * point_3_x;
-    const double slope_3_z = half_turn_1_y * point_3_x - half_turn_1_x * point_3_y
-        + half_turn_1_z * point_3_s;
-    /* the step applied to the identity */
-    const double p_s = 0.6666666666666666 * slope_2_s + 0.16666666666666666 * slope_3_s + 1.0;
-    const double p_x = 0.16666666666666666 * (half_turn_0_x + slope_3_x)
-        + 0.6666666666666666 * slope_2_x;
-    const double p_y = 0.16666666666666666 * (half_turn_0_y + slope_3_y)
-        + 0.6666666666666666 * slope_2_y;
-    const double p_z = 0.16666666666666666 * (half_turn_0_z + slope_3_z)
-        + 0.6666666666666666 * slope_2_z;
+    /* the angle increment of the whole step */
+    const double sigma_x = d1_x + d2_x;
+    const double sigma_y = d1_y + d2_y;
+    const double sigma_z = d1_z + d2_z;
+    /* first half minus second half */
+    const double delta_x = d1_x - d2_x;
+    const double delta_y = d1_y - d2_y;
+    const double delta_z = d1_z - d2_z;
+    const double delta_cross_sigma_x = delta_y * sigma_z - delta_z * sigma_y;
+    const double delta_cross_sigma_y = delta_z * sigma_x - delta_x * sigma_z;
+    const double delta_cross_sigma_z = delta_x * sigma_y - delta_y * sigma_x;
+    const double delta_dot_delta = delta_x * delta_x + delta_y * delta_y + delta_z * delta_z;
+    const double sigma_dot_sigma = sigma_x * sigma_x + sigma_y * sigma_y + sigma_z * sigma_z;
+    /* weight of sigma in p */
+    const double p_sigma = 0.5 - 0.08333333333333333 * delta_dot_delta
+        - 0.020833333333333332 * sigma_dot_sigma;
+    const double sigma_dot_delta = sigma_x * delta_x + sigma_y * delta_y + sigma_z * delta_z;
+    /* weight of delta in p */
+    const double p_delta = 0.16666666666666666 * sigma_dot_delta;
+    /* the step applied to the identity: its vector part */
+    const double p_x = p_sigma * sigma_x + p_delta * delta_x
+        + 0.16666666666666666 * delta_cross_sigma_x;
+    const double p_y = p_sigma * sigma_y + p_delta * delta_y
+        + 0.16666666666666666 * delta_cross_sigma_y;
+    const double p_z = p_sigma * sigma_z + p_delta * delta_z
+        + 0.16666666666666666 * delta_cross_sigma_z;
+    /* its scalar part */
+    const double p_s = 1.0 - 0.16666666666666666 * delta_dot_delta - 0.125 * sigma_dot_sigma;
     /* Cayley-Klein parameters, body to reference, scalar first, after the step */
     const double next_s = a_s * p_s - a_x * p_x - a_y * p_y - a_z * p_z;
     const double next_x = a_s * p_x + a_x * p_s + a_y * p_z - a_z * p_y;
@@ -111,63 +86,38 @@ static void prepare_(size_t count, const double *increments, double prepared[4][
         const double d2_x = increments_by_element[3][k];
         const double d2_y = increments_by_element[4][k];
         const double d2_z = increments_by_element[5][k];
-        const double shared_1 = 0.5 * d2_x;
-        /* half the rate times the step, at node 0 */
-        const double half_turn_0_x = 1.5 * d1_x - shared_1;
-        const double shared_2 = 0.5 * d2_y;
-        const double half_turn_0_y = 1.5 * d1_y - shared_2;
-        const double shared_3 = 0.5 * d2_z;
-        const double half_turn_0_z = 1.5 * d1_z - shared_3;
-        const double shared_4 = 0.5 * d1_x;
-        /* half the rate times the step, at node 1/2 */
-        const double half_turn_1_2_x = shared_1 + shared_4;
-        const double shared_5 = 0.5 * d1_y;
-        const double half_turn_1_2_y = shared_2 + shared_5;
-        const double shared_6 = 0.5 * d1_z;
-        const double half_turn_1_2_z = shared_3 + shared_6;
-        /* half the rate times the step, at node 1 */
-        const double half_turn_1_x = 1.5 * d2_x - shared_4;
-        const double half_turn_1_y = 1.5 * d2_y - shared_5;
-        const double half_turn_1_z = 1.5 * d2_z - shared_6;
-        /* argument of slope 2, from the identity */
-        const double point_2_x = 0.5 * half_turn_0_x;
-        const double point_2_y = 0.5 * half_turn_0_y;
-        const double point_2_z = 0.5 * half_turn_0_z;
-        /* derivative times the step at stage 2 */
-        const double slope_2_s = -(half_turn_1_2_x * point_2_x + half_turn_1_2_y * point_2_y
-            + half_turn_1_2_z * point_2_z);
-        const double slope_2_x = half_turn_1_2_x - half_turn_1_2_y * point_2_z
-            + half_turn_1_2_z * point_2_y;
-        const double slope_2_y = half_turn_1_2_y + half_turn_1_2_x * point_2_z
-            - half_turn_1_2_z * point_2_x;
-        const double slope_2_z = half_turn_1_2_z - half_turn_1_2_x * point_2_y
-            + half_turn_1_2_y * point_2_x;
-        /* argument of slope 3, from the identity */
-        const double point_3_s = 2.0 * slope_2_s + 1.0;
-        const double point_3_x = 2.0 * slope_2_x - half_turn_0_x;
-        const double point_3_y = 2.0 * slope_2_y - half_turn_0_y;
-        const double point_3_z = 2.0 * slope_2_z - half_turn_0_z;
-        /* derivative times the step at stage 3 */
-        const double slope_3_s = -(half_turn_1_x * point_3_x + half_turn_1_y * point_3_y
-            + half_turn_1_z * point_3_z);
-        const double slope_3_x = half_turn_1_x * point_3_s - half_turn_1_y * point_3_z
-            + half_turn_1_z * point_3_y;
-        const double slope_3_y = half_turn_1_x * point_3_z + half_turn_1_y * point_3_s
-            - half_turn_1_z * point_3_x;
-        const double slope_3_z = half_turn_1_y * point_3_x - half_turn_1_x * point_3_y
-            + half_turn_1_z * point_3_s;
-        /* the step applied to the identity */
-        const double p_s = 0.6666666666666666 * slope_2_s + 0.16666666666666666 * slope_3_s + 1.0;
-        const double p_x = 0.16666666666666666 * (half_turn_0_x + slope_3_x)
-            + 0.6666666666666666 * slope_2_x;
-        const double p_y = 0.16666666666666666 * (half_turn_0_y + slope_3_y)
-            + 0.6666666666666666 * slope_2_y;
-        const double p_z = 0.16666666666666666 * (half_turn_0_z + slope_3_z)
-            + 0.6666666666666666 * slope_2_z;
-        prepared[0][k] = p_s;
-        prepared[1][k] = p_x;
-        prepared[2][k] = p_y;
-        prepared[3][k] = p_z;
+        /* the angle increment of the whole step */
+        const double sigma_x = d1_x + d2_x;
+        const double sigma_y = d1_y + d2_y;
+        const double sigma_z = d1_z + d2_z;
+        /* first half minus second half */
+        const double delta_x = d1_x - d2_x;
+        const double delta_y = d1_y - d2_y;
+        const double delta_z = d1_z - d2_z;
+        const double delta_cross_sigma_x = delta_y * sigma_z - delta_z * sigma_y;
+        const double delta_cross_sigma_y = delta_z * sigma_x - delta_x * sigma_z;
+        const double delta_cross_sigma_z = delta_x * sigma_y - delta_y * sigma_x;
+        const double delta_dot_delta = delta_x * delta_x + delta_y * delta_y + delta_z * delta_z;
+        const double sigma_dot_sigma = sigma_x * sigma_x + sigma_y * sigma_y + sigma_z * sigma_z;
+        /* weight of sigma in p */
+        const double p_sigma = 0.5 - 0.08333333333333333 * delta_dot_delta
+            - 0.020833333333333332 * sigma_dot_sigma;
+        const double sigma_dot_delta = sigma_x * delta_x + sigma_y * delta_y + sigma_z * delta_z;
+        /* weight of delta in p */
+        const double p_delta = 0.16666666666666666 * sigma_dot_delta;
+        /* the step applied to the identity: its vector part */
+        const double p_x = p_sigma * sigma_x + p_delta * delta_x
+            + 0.16666666666666666 * delta_cross_sigma_x;
+        const double p_y = p_sigma * sigma_y + p_delta * delta_y
+            + 0.16666666666666666 * delta_cross_sigma_y;
+        const double p_z = p_sigma * sigma_z + p_delta * delta_z
+            + 0.16666666666666666 * delta_cross_sigma_z;
+        /* its scalar part */
+        const double p_s = 1.0 - 0.16666666666666666 * delta_dot_delta - 0.125 * sigma_dot_sigma;
+        prepared[0][k] = p_x;
+        prepared[1][k] = p_y;
+        prepared[2][k] = p_z;
+        prepared[3][k] = p_s;
     }
 }
 
@@ -179,10 +129,10 @@ static inline void finish_(const double state[4], double prepared[4][BLOCK_], si
     const double a_x = state[1];
     const double a_y = state[2];
     const double a_z = state[3];
-    const double p_s = prepared[0][k];
-    const double p_x = prepared[1][k];
-    const double p_y = prepared[2][k];
-    const double p_z = prepared[3][k];
+    const double p_x = prepared[0][k];
+    const double p_y = prepared[1][k];
+    const double p_z = prepared[2][k];
+    const double p_s = prepared[3][k];
     /* Cayley-Klein parameters, body to reference, scalar first, after the step */
     const double next_s = a_s * p_s - a_x * p_x - a_y * p_y - a_z * p_z;
     const double next_x = a_s * p_x + a_x * p_s + a_y * p_z - a_z * p_y;

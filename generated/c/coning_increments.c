@@ -17,7 +17,7 @@ static inline void one_(double middle, double width, double a, double b, double 
     double increment[3])
 {
     const double shared_1 = b * middle;
-    const double shared_2 = a * width * sinc_(0.5 * b * width);
+    const double shared_2 = a * width * sinc_(0.5 * (b * width));
     /* angle increment over the interval, body axes */
     const double increment_x = shared_2 * sin(shared_1);
     const double increment_y = g * width;

@@ -27,7 +27,8 @@ static inline void one_(double time, double a, double b, double g, double rate[3
     const double shared_6 = b + g;
     const double shared_7 = time * time;
     const double shared_8 = a * a * shared_7;
-    const double shared_9 = shared_6 * shared_6 * shared_7;
+    const double shared_21 = shared_6 * shared_7;
+    const double shared_9 = shared_21 * shared_6;
     const double shared_10 = sqrt(shared_8 + shared_9);
     const double shared_11 = time * sinc_(shared_10);
     const double shared_12 = shared_11 * shared_6;
@@ -36,13 +37,13 @@ static inline void one_(double time, double a, double b, double g, double rate[3
     const double shared_14 = 0.5 * (factor_1 * factor_1);
     const double shared_15 = shared_14 * shared_9;
     const double shared_16 = shared_14 * shared_8 - 1.0;
-    const double shared_17 = -(shared_15 + shared_16);
+    const double shared_17 = shared_15 + shared_16;
     /* direction cosine matrix, body to reference */
-    const double C_11 = shared_13 + shared_17 * shared_4;
+    const double C_11 = shared_13 - shared_17 * shared_4;
     const double C_12 = -(a * shared_11);
     const double shared_18 = shared_12 * shared_4;
-    const double C_13 = shared_18 - shared_17 * shared_2;
-    const double shared_19 = shared_14 * shared_6 * shared_7;
+    const double C_13 = shared_18 + shared_17 * shared_2;
+    const double shared_19 = shared_14 * shared_21;
     const double C_21 = shared_11 * shared_5 + shared_19 * shared_3;
     const double C_22 = -shared_16;
     const double C_23 = shared_19 * shared_5 - shared_11 * shared_3;

@@ -5,7 +5,7 @@
  *
  * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter 4 B
  *     and appendix A.
- * Operations of one call: 11 add, 29 multiply, 1 sqrt, 3 negate, 4 function; 21 temporaries.
+ * Operations of one call: 11 add, 28 multiply, 1 sqrt, 2 negate, 4 function; 22 temporaries.
  *
  * No heap, no global state, reentrant. In one call every input is read before any output is written: an
  * output may be the same memory as an input. Matrices are stored by rows.

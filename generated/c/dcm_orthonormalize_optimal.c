@@ -27,11 +27,10 @@ static inline void one_(const double computed[9], double orthonormalized[9])
     const double gram_33 = C_13 * C_13 + C_23 * C_23 + C_33 * C_33;
     /* mean of the eigenvalues of C' C */
     const double mean = 0.3333333333333333 * (gram_11 + gram_22 + gram_33);
-    const double shared_1 = -mean;
     /* C' C less its mean */
-    const double deviator_11 = gram_11 + shared_1;
-    const double deviator_22 = gram_22 + shared_1;
-    const double deviator_33 = gram_33 + shared_1;
+    const double deviator_11 = gram_11 - mean;
+    const double deviator_22 = gram_22 - mean;
+    const double deviator_33 = gram_33 - mean;
     const double shared_2 = gram_23 * gram_23;
     /* mean square spread of the eigenvalues, halved */
     const double spread = 0.16666666666666666 * (deviator_11 * deviator_11
@@ -48,14 +47,16 @@ static inline void one_(const double computed[9], double orthonormalized[9])
     const double across = sqrt(3.0) * radius * sin(angle);
     /* singular value 1 of C */
     const double stretch_1 = sqrt(2.0 * along + mean);
+    const double shared_10 = along - mean;
     /* singular value 2 of C */
-    const double stretch_2 = sqrt(across - along + mean);
+    const double stretch_2 = sqrt(across - shared_10);
     /* singular value 3 of C */
-    const double stretch_3 = sqrt(-(across + along + shared_1));
+    const double stretch_3 = sqrt(-(across + shared_10));
+    const double shared_1 = stretch_1 + stretch_2;
     /* invariants of (C' C)^(1/2) */
-    const double invariant_1 = stretch_1 + stretch_2 + stretch_3;
+    const double invariant_1 = shared_1 + stretch_3;
     const double shared_3 = stretch_1 * stretch_2;
-    const double invariant_2 = shared_3 + stretch_1 * stretch_3 + stretch_2 * stretch_3;
+    const double invariant_2 = stretch_3 * shared_1 + shared_3;
     const double invariant_3 = shared_3 * stretch_3;
     /* i1 C' C + i3 I */
     const double denominator_11 = invariant_3 + gram_11 * invariant_1;
@@ -71,9 +72,8 @@ static inline void one_(const double computed[9], double orthonormalized[9])
     const double adjugate_22 = denominator_11 * denominator_33 - denominator_13 * denominator_13;
     const double adjugate_23 = denominator_12 * denominator_13 - denominator_11 * denominator_23;
     const double adjugate_33 = denominator_11 * denominator_22 - denominator_12 * denominator_12;
-    const double factor_1 = adjugate_11 * denominator_11 + adjugate_12 * denominator_12
-        + adjugate_13 * denominator_13;
-    const double inverse_determinant = 1.0 / factor_1;
+    const double inverse_determinant = 1.0 / (adjugate_11 * denominator_11
+        + adjugate_12 * denominator_12 + adjugate_13 * denominator_13);
     const double shared_4 = adjugate_12 * gram_12;
     const double shared_5 = adjugate_13 * gram_13;
     const double shared_6 = gram_11 + invariant_2;

@@ -27,14 +27,11 @@ static inline void one_(const double computed[9], double orthonormalized[9])
     const double shared_2 = excess_13 * excess_13;
     /* (C' C - I)^2 */
     const double excess_squared_11 = excess_11 * excess_11 + shared_1 + shared_2;
-    const double excess_squared_12 = excess_11 * excess_12 + excess_12 * excess_22
-        + excess_13 * excess_23;
-    const double excess_squared_13 = excess_11 * excess_13 + excess_12 * excess_23
-        + excess_13 * excess_33;
+    const double excess_squared_12 = excess_12 * (excess_11 + excess_22) + excess_13 * excess_23;
+    const double excess_squared_13 = excess_13 * (excess_11 + excess_33) + excess_12 * excess_23;
     const double shared_3 = excess_23 * excess_23;
     const double excess_squared_22 = excess_22 * excess_22 + shared_1 + shared_3;
-    const double excess_squared_23 = excess_12 * excess_13 + excess_22 * excess_23
-        + excess_23 * excess_33;
+    const double excess_squared_23 = excess_23 * (excess_22 + excess_33) + excess_12 * excess_13;
     const double excess_squared_33 = excess_33 * excess_33 + shared_2 + shared_3;
     /* inverse root of C' C to second order */
     const double root_11 = 0.375 * excess_squared_11 - 0.5 * excess_11 + 1.0;

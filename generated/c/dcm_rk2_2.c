@@ -22,40 +22,40 @@ static inline void one_(const double state[9], const double increments[6], doubl
     const double d2_x = increments[3];
     const double d2_y = increments[4];
     const double d2_z = increments[5];
-    /* rate times the step, at node 0 */
-    const double turn_0_x = 3.0 * d1_x - d2_x;
-    const double turn_0_y = 3.0 * d1_y - d2_y;
-    const double turn_0_z = 3.0 * d1_z - d2_z;
-    /* rate times the step, at node 1 */
-    const double turn_1_x = 3.0 * d2_x - d1_x;
-    const double turn_1_y = 3.0 * d2_y - d1_y;
-    const double turn_1_z = 3.0 * d2_z - d1_z;
-    const double shared_1 = turn_0_y * turn_1_y;
-    const double shared_2 = turn_0_z * turn_1_z;
-    /* derivative times the step at stage 2 */
-    const double slope_2_11 = -(shared_1 + shared_2);
-    const double slope_2_12 = turn_0_y * turn_1_x - turn_1_z;
-    const double slope_2_13 = turn_1_y + turn_0_z * turn_1_x;
-    const double slope_2_21 = turn_1_z + turn_0_x * turn_1_y;
-    const double shared_3 = turn_0_x * turn_1_x;
-    const double slope_2_22 = -(shared_2 + shared_3);
-    const double slope_2_23 = turn_0_z * turn_1_y - turn_1_x;
-    const double slope_2_31 = turn_0_x * turn_1_z - turn_1_y;
-    const double slope_2_32 = turn_1_x + turn_0_y * turn_1_z;
-    const double slope_2_33 = -(shared_1 + shared_3);
-    /* the step applied to the identity */
-    const double A_11 = 0.5 * slope_2_11 + 1.0;
-    const double shared_4 = 0.5 * turn_0_z;
-    const double A_12 = 0.5 * slope_2_12 - shared_4;
-    const double shared_5 = 0.5 * turn_0_y;
-    const double A_13 = shared_5 + 0.5 * slope_2_13;
-    const double A_21 = shared_4 + 0.5 * slope_2_21;
-    const double A_22 = 0.5 * slope_2_22 + 1.0;
-    const double shared_6 = 0.5 * turn_0_x;
-    const double A_23 = 0.5 * slope_2_23 - shared_6;
-    const double A_31 = 0.5 * slope_2_31 - shared_5;
-    const double A_32 = shared_6 + 0.5 * slope_2_32;
-    const double A_33 = 0.5 * slope_2_33 + 1.0;
+    /* rate times the step, at node 0, times 1/3 */
+    const double turn_0_times_1_3_x = d1_x - 0.3333333333333333 * d2_x;
+    const double turn_0_times_1_3_y = d1_y - 0.3333333333333333 * d2_y;
+    const double turn_0_times_1_3_z = d1_z - 0.3333333333333333 * d2_z;
+    /* rate times the step, at node 1, times -1/3 */
+    const double minus_turn_1_times_1_3_x = 0.3333333333333333 * d1_x - d2_x;
+    const double minus_turn_1_times_1_3_y = 0.3333333333333333 * d1_y - d2_y;
+    const double minus_turn_1_times_1_3_z = 0.3333333333333333 * d1_z - d2_z;
+    /* the angle increment of the whole step */
+    const double sigma_x = d1_x + d2_x;
+    const double sigma_y = d1_y + d2_y;
+    const double sigma_z = d1_z + d2_z;
+    /* vector of the skew part */
+    const double skew_x = sigma_x;
+    const double skew_y = sigma_y;
+    const double skew_z = sigma_z;
+    /* left of turn_0_times_1_3 in an outer product */
+    const double partner_left_x = -(4.5 * minus_turn_1_times_1_3_x);
+    const double partner_left_y = -(4.5 * minus_turn_1_times_1_3_y);
+    const double partner_left_z = -(4.5 * minus_turn_1_times_1_3_z);
+    const double turn_0_times_1_3_dot_minus_turn_1_times_1_3 = turn_0_times_1_3_x * minus_turn_1_times_1_3_x
+        + turn_0_times_1_3_y * minus_turn_1_times_1_3_y
+        + turn_0_times_1_3_z * minus_turn_1_times_1_3_z;
+    /* multiple of the unit matrix */
+    const double diagonal = 4.5 * turn_0_times_1_3_dot_minus_turn_1_times_1_3 + 1.0;
+    const double A_11 = turn_0_times_1_3_x * partner_left_x + diagonal;
+    const double A_22 = turn_0_times_1_3_y * partner_left_y + diagonal;
+    const double A_33 = turn_0_times_1_3_z * partner_left_z + diagonal;
+    const double A_12 = turn_0_times_1_3_y * partner_left_x - skew_z;
+    const double A_21 = turn_0_times_1_3_x * partner_left_y + skew_z;
+    const double A_23 = turn_0_times_1_3_z * partner_left_y - skew_x;
+    const double A_32 = turn_0_times_1_3_y * partner_left_z + skew_x;
+    const double A_31 = turn_0_times_1_3_x * partner_left_z - skew_y;
+    const double A_13 = turn_0_times_1_3_z * partner_left_x + skew_y;
     /* direction cosine matrix, body to reference, after the step */
     const double next_11 = A_11 * C_11 + A_21 * C_12 + A_31 * C_13;
     const double next_12 = A_12 * C_11 + A_22 * C_12 + A_32 * C_13;
@@ -106,49 +106,49 @@ static void prepare_(size_t count, const double *increments, double prepared[9][
         const double d2_x = increments_by_element[3][k];
         const double d2_y = increments_by_element[4][k];
         const double d2_z = increments_by_element[5][k];
-        /* rate times the step, at node 0 */
-        const double turn_0_x = 3.0 * d1_x - d2_x;
-        const double turn_0_y = 3.0 * d1_y - d2_y;
-        const double turn_0_z = 3.0 * d1_z - d2_z;
-        /* rate times the step, at node 1 */
-        const double turn_1_x = 3.0 * d2_x - d1_x;
-        const double turn_1_y = 3.0 * d2_y - d1_y;
-        const double turn_1_z = 3.0 * d2_z - d1_z;
-        const double shared_1 = turn_0_y * turn_1_y;
-        const double shared_2 = turn_0_z * turn_1_z;
-        /* derivative times the step at stage 2 */
-        const double slope_2_11 = -(shared_1 + shared_2);
-        const double slope_2_12 = turn_0_y * turn_1_x - turn_1_z;
-        const double slope_2_13 = turn_1_y + turn_0_z * turn_1_x;
-        const double slope_2_21 = turn_1_z + turn_0_x * turn_1_y;
-        const double shared_3 = turn_0_x * turn_1_x;
-        const double slope_2_22 = -(shared_2 + shared_3);
-        const double slope_2_23 = turn_0_z * turn_1_y - turn_1_x;
-        const double slope_2_31 = turn_0_x * turn_1_z - turn_1_y;
-        const double slope_2_32 = turn_1_x + turn_0_y * turn_1_z;
-        const double slope_2_33 = -(shared_1 + shared_3);
-        /* the step applied to the identity */
-        const double A_11 = 0.5 * slope_2_11 + 1.0;
-        const double shared_4 = 0.5 * turn_0_z;
-        const double A_12 = 0.5 * slope_2_12 - shared_4;
-        const double shared_5 = 0.5 * turn_0_y;
-        const double A_13 = shared_5 + 0.5 * slope_2_13;
-        const double A_21 = shared_4 + 0.5 * slope_2_21;
-        const double A_22 = 0.5 * slope_2_22 + 1.0;
-        const double shared_6 = 0.5 * turn_0_x;
-        const double A_23 = 0.5 * slope_2_23 - shared_6;
-        const double A_31 = 0.5 * slope_2_31 - shared_5;
-        const double A_32 = shared_6 + 0.5 * slope_2_32;
-        const double A_33 = 0.5 * slope_2_33 + 1.0;
+        /* rate times the step, at node 0, times 1/3 */
+        const double turn_0_times_1_3_x = d1_x - 0.3333333333333333 * d2_x;
+        const double turn_0_times_1_3_y = d1_y - 0.3333333333333333 * d2_y;
+        const double turn_0_times_1_3_z = d1_z - 0.3333333333333333 * d2_z;
+        /* rate times the step, at node 1, times -1/3 */
+        const double minus_turn_1_times_1_3_x = 0.3333333333333333 * d1_x - d2_x;
+        const double minus_turn_1_times_1_3_y = 0.3333333333333333 * d1_y - d2_y;
+        const double minus_turn_1_times_1_3_z = 0.3333333333333333 * d1_z - d2_z;
+        /* the angle increment of the whole step */
+        const double sigma_x = d1_x + d2_x;
+        const double sigma_y = d1_y + d2_y;
+        const double sigma_z = d1_z + d2_z;
+        /* vector of the skew part */
+        const double skew_x = sigma_x;
+        const double skew_y = sigma_y;
+        const double skew_z = sigma_z;
+        /* left of turn_0_times_1_3 in an outer product */
+        const double partner_left_x = -(4.5 * minus_turn_1_times_1_3_x);
+        const double partner_left_y = -(4.5 * minus_turn_1_times_1_3_y);
+        const double partner_left_z = -(4.5 * minus_turn_1_times_1_3_z);
+        const double turn_0_times_1_3_dot_minus_turn_1_times_1_3 = turn_0_times_1_3_x * minus_turn_1_times_1_3_x
+            + turn_0_times_1_3_y * minus_turn_1_times_1_3_y
+            + turn_0_times_1_3_z * minus_turn_1_times_1_3_z;
+        /* multiple of the unit matrix */
+        const double diagonal = 4.5 * turn_0_times_1_3_dot_minus_turn_1_times_1_3 + 1.0;
+        const double A_11 = turn_0_times_1_3_x * partner_left_x + diagonal;
+        const double A_22 = turn_0_times_1_3_y * partner_left_y + diagonal;
+        const double A_33 = turn_0_times_1_3_z * partner_left_z + diagonal;
+        const double A_12 = turn_0_times_1_3_y * partner_left_x - skew_z;
+        const double A_21 = turn_0_times_1_3_x * partner_left_y + skew_z;
+        const double A_23 = turn_0_times_1_3_z * partner_left_y - skew_x;
+        const double A_32 = turn_0_times_1_3_y * partner_left_z + skew_x;
+        const double A_31 = turn_0_times_1_3_x * partner_left_z - skew_y;
+        const double A_13 = turn_0_times_1_3_z * partner_left_x + skew_y;
         prepared[0][k] = A_11;
-        prepared[1][k] = A_12;
-        prepared[2][k] = A_13;
-        prepared[3][k] = A_21;
-        prepared[4][k] = A_22;
+        prepared[1][k] = A_22;
+        prepared[2][k] = A_33;
+        prepared[3][k] = A_12;
+        prepared[4][k] = A_21;
         prepared[5][k] = A_23;
-        prepared[6][k] = A_31;
-        prepared[7][k] = A_32;
-        prepared[8][k] = A_33;
+        prepared[6][k] = A_32;
+        prepared[7][k] = A_31;
+        prepared[8][k] = A_13;
     }
 }
 
@@ -166,14 +166,14 @@ static inline void finish_(const double state[9], double prepared[9][BLOCK_], si
     const double C_32 = state[7];
     const double C_33 = state[8];
     const double A_11 = prepared[0][k];
-    const double A_12 = prepared[1][k];
-    const double A_13 = prepared[2][k];
-    const double A_21 = prepared[3][k];
-    const double A_22 = prepared[4][k];
+    const double A_22 = prepared[1][k];
+    const double A_33 = prepared[2][k];
+    const double A_12 = prepared[3][k];
+    const double A_21 = prepared[4][k];
     const double A_23 = prepared[5][k];
-    const double A_31 = prepared[6][k];
-    const double A_32 = prepared[7][k];
-    const double A_33 = prepared[8][k];
+    const double A_32 = prepared[6][k];
+    const double A_31 = prepared[7][k];
+    const double A_13 = prepared[8][k];
     /* direction cosine matrix, body to reference, after the step */
     const double next_11 = A_11 * C_11 + A_21 * C_12 + A_31 * C_13;
     const double next_12 = A_12 * C_11 + A_22 * C_12 + A_32 * C_13;

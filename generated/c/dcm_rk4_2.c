@@ -22,97 +22,55 @@ static inline void one_(const double state[9], const double increments[6], doubl
     const double d2_x = increments[3];
     const double d2_y = increments[4];
     const double d2_z = increments[5];
-    /* rate times the step, at node 0 */
-    const double turn_0_x = 3.0 * d1_x - d2_x;
-    const double turn_0_y = 3.0 * d1_y - d2_y;
-    const double turn_0_z = 3.0 * d1_z - d2_z;
-    /* rate times the step, at node 1/2 */
-    const double turn_1_2_x = d1_x + d2_x;
-    const double turn_1_2_y = d1_y + d2_y;
-    const double turn_1_2_z = d1_z + d2_z;
-    /* rate times the step, at node 1 */
-    const double turn_1_x = 3.0 * d2_x - d1_x;
-    const double turn_1_y = 3.0 * d2_y - d1_y;
-    const double turn_1_z = 3.0 * d2_z - d1_z;
-    const double shared_1 = 0.5 * turn_0_z;
-    /* argument of slope 2, from the identity */
-    const double point_2_12 = -shared_1;
-    const double shared_2 = 0.5 * turn_0_y;
-    const double point_2_13 = shared_2;
-    const double point_2_21 = shared_1;
-    const double shared_3 = 0.5 * turn_0_x;
-    const double point_2_23 = -shared_3;
-    const double point_2_31 = -shared_2;
-    const double point_2_32 = shared_3;
-    /* derivative times the step at stage 2 */
-    const double slope_2_11 = point_2_12 * turn_1_2_z - point_2_13 * turn_1_2_y;
-    const double shared_4 = -turn_1_2_z;
-    const double slope_2_12 = shared_4 + point_2_13 * turn_1_2_x;
-    const double shared_5 = -turn_1_2_y;
-    const double slope_2_13 = -(shared_5 + point_2_12 * turn_1_2_x);
-    const double slope_2_21 = -(shared_4 + point_2_23 * turn_1_2_y);
-    const double slope_2_22 = point_2_23 * turn_1_2_x - point_2_21 * turn_1_2_z;
-    const double shared_6 = -turn_1_2_x;
-    const double slope_2_23 = shared_6 + point_2_21 * turn_1_2_y;
-    const double slope_2_31 = shared_5 + point_2_32 * turn_1_2_z;
-    const double slope_2_32 = -(shared_6 + point_2_31 * turn_1_2_z);
-    const double slope_2_33 = point_2_31 * turn_1_2_y - point_2_32 * turn_1_2_x;
-    /* argument of slope 3, from the identity */
-    const double point_3_11 = 0.5 * slope_2_11 + 1.0;
-    const double point_3_12 = 0.5 * slope_2_12;
-    const double point_3_13 = 0.5 * slope_2_13;
-    const double point_3_21 = 0.5 * slope_2_21;
-    const double point_3_22 = 0.5 * slope_2_22 + 1.0;
-    const double point_3_23 = 0.5 * slope_2_23;
-    const double point_3_31 = 0.5 * slope_2_31;
-    const double point_3_32 = 0.5 * slope_2_32;
-    const double point_3_33 = 0.5 * slope_2_33 + 1.0;
-    /* derivative times the step at stage 3 */
-    const double slope_3_11 = point_3_12 * turn_1_2_z - point_3_13 * turn_1_2_y;
-    const double slope_3_12 = point_3_13 * turn_1_2_x - point_3_11 * turn_1_2_z;
-    const double slope_3_13 = point_3_11 * turn_1_2_y - point_3_12 * turn_1_2_x;
-    const double slope_3_21 = point_3_22 * turn_1_2_z - point_3_23 * turn_1_2_y;
-    const double slope_3_22 = point_3_23 * turn_1_2_x - point_3_21 * turn_1_2_z;
-    const double slope_3_23 = point_3_21 * turn_1_2_y - point_3_22 * turn_1_2_x;
-    const double slope_3_31 = point_3_32 * turn_1_2_z - point_3_33 * turn_1_2_y;
-    const double slope_3_32 = point_3_33 * turn_1_2_x - point_3_31 * turn_1_2_z;
-    const double slope_3_33 = point_3_31 * turn_1_2_y - point_3_32 * turn_1_2_x;
-    /* argument of slope 4, from the identity */
-    const double point_4_11 = slope_3_11 + 1.0;
-    const double point_4_22 = slope_3_22 + 1.0;
-    const double point_4_33 = slope_3_33 + 1.0;
-    /* derivative times the step at stage 4 */
-    const double slope_4_11 = slope_3_12 * turn_1_z - slope_3_13 * turn_1_y;
-    const double slope_4_12 = slope_3_13 * turn_1_x - point_4_11 * turn_1_z;
-    const double slope_4_13 = point_4_11 * turn_1_y - slope_3_12 * turn_1_x;
-    const double slope_4_21 = point_4_22 * turn_1_z - slope_3_23 * turn_1_y;
-    const double slope_4_22 = slope_3_23 * turn_1_x - slope_3_21 * turn_1_z;
-    const double slope_4_23 = slope_3_21 * turn_1_y - point_4_22 * turn_1_x;
-    const double slope_4_31 = slope_3_32 * turn_1_z - point_4_33 * turn_1_y;
-    const double slope_4_32 = point_4_33 * turn_1_x - slope_3_31 * turn_1_z;
-    const double slope_4_33 = slope_3_31 * turn_1_y - slope_3_32 * turn_1_x;
-    /* the step applied to the identity */
-    const double A_11 = 0.3333333333333333 * (slope_2_11 + slope_3_11)
-        + 0.16666666666666666 * slope_4_11 + 1.0;
-    const double shared_7 = 0.16666666666666666 * turn_0_z;
-    const double A_12 = 0.3333333333333333 * (slope_2_12 + slope_3_12) - shared_7
-        + 0.16666666666666666 * slope_4_12;
-    const double shared_8 = 0.16666666666666666 * turn_0_y;
-    const double A_13 = shared_8 + 0.3333333333333333 * (slope_2_13 + slope_3_13)
-        + 0.16666666666666666 * slope_4_13;
-    const double A_21 = shared_7 + 0.3333333333333333 * (slope_2_21 + slope_3_21)
-        + 0.16666666666666666 * slope_4_21;
-    const double A_22 = 0.3333333333333333 * (slope_2_22 + slope_3_22)
-        + 0.16666666666666666 * slope_4_22 + 1.0;
-    const double shared_9 = 0.16666666666666666 * turn_0_x;
-    const double A_23 = 0.3333333333333333 * (slope_2_23 + slope_3_23) - shared_9
-        + 0.16666666666666666 * slope_4_23;
-    const double A_31 = 0.3333333333333333 * (slope_2_31 + slope_3_31) - shared_8
-        + 0.16666666666666666 * slope_4_31;
-    const double A_32 = shared_9 + 0.3333333333333333 * (slope_2_32 + slope_3_32)
-        + 0.16666666666666666 * slope_4_32;
-    const double A_33 = 0.3333333333333333 * (slope_2_33 + slope_3_33)
-        + 0.16666666666666666 * slope_4_33 + 1.0;
+    /* the angle increment of the whole step */
+    const double sigma_x = d1_x + d2_x;
+    const double sigma_y = d1_y + d2_y;
+    const double sigma_z = d1_z + d2_z;
+    const double sigma_cross_d1_x = sigma_y * d1_z - sigma_z * d1_y;
+    const double sigma_cross_d1_y = sigma_z * d1_x - sigma_x * d1_z;
+    const double sigma_cross_d1_z = sigma_x * d1_y - sigma_y * d1_x;
+    const double sigma_dot_sigma = sigma_x * sigma_x + sigma_y * sigma_y + sigma_z * sigma_z;
+    /* weight of sigma in skew */
+    const double skew_sigma = 1.0 - 0.16666666666666666 * sigma_dot_sigma;
+    /* weight of sigma_cross_d1 in skew */
+    const double skew_sigma_cross_d1 = 0.3333333333333333 - skew_sigma;
+    /* vector of the skew part */
+    const double skew_x = skew_sigma * sigma_x + skew_sigma_cross_d1 * sigma_cross_d1_x;
+    const double skew_y = skew_sigma * sigma_y + skew_sigma_cross_d1 * sigma_cross_d1_y;
+    const double skew_z = skew_sigma * sigma_z + skew_sigma_cross_d1 * sigma_cross_d1_z;
+    const double d1_dot_d1 = d1_x * d1_x + d1_y * d1_y + d1_z * d1_z;
+    /* weight of sigma in partner */
+    const double partner_sigma = 0.0625 * sigma_dot_sigma - 0.3333333333333333 * d1_dot_d1 + 0.25;
+    const double d1_dot_sigma = d1_x * sigma_x + d1_y * sigma_y + d1_z * sigma_z;
+    const double shared_1 = 0.6666666666666666 * d1_dot_sigma;
+    /* weight of d1 in partner */
+    const double partner_d1 = shared_1 - 0.3333333333333333 * sigma_dot_sigma;
+    /* of sigma in outer products */
+    const double partner_x = partner_sigma * sigma_x + partner_d1 * d1_x
+        - 0.3333333333333333 * sigma_cross_d1_x;
+    const double partner_y = partner_sigma * sigma_y + partner_d1 * d1_y
+        - 0.3333333333333333 * sigma_cross_d1_y;
+    const double partner_z = partner_sigma * sigma_z + partner_d1 * d1_z
+        - 0.3333333333333333 * sigma_cross_d1_z;
+    /* multiple of the unit matrix */
+    const double diagonal = sigma_dot_sigma * (shared_1 - 0.125 * sigma_dot_sigma - 0.5)
+        - d1_dot_sigma * shared_1 + 1.0;
+    /* half of u y' + y u' on the diagonal */
+    const double half_xx = sigma_x * partner_x;
+    const double A_11 = half_xx + half_xx + diagonal;
+    const double half_yy = sigma_y * partner_y;
+    const double A_22 = half_yy + half_yy + diagonal;
+    const double half_zz = sigma_z * partner_z;
+    const double A_33 = half_zz + half_zz + diagonal;
+    const double symmetric_xy = sigma_x * partner_y + sigma_y * partner_x;
+    const double A_12 = symmetric_xy - skew_z;
+    const double A_21 = symmetric_xy + skew_z;
+    const double symmetric_yz = sigma_y * partner_z + sigma_z * partner_y;
+    const double A_23 = symmetric_yz - skew_x;
+    const double A_32 = symmetric_yz + skew_x;
+    const double symmetric_zx = sigma_z * partner_x + sigma_x * partner_z;
+    const double A_31 = symmetric_zx - skew_y;
+    const double A_13 = symmetric_zx + skew_y;
     /* direction cosine matrix, body to reference, after the step */
     const double next_11 = A_11 * C_11 + A_21 * C_12 + A_31 * C_13;
     const double next_12 = A_12 * C_11 + A_22 * C_12 + A_32 * C_13;
@@ -163,106 +121,65 @@ static void prepare_(size_t count, const double *increments, double prepared[9][
         const double d2_x = increments_by_element[3][k];
         const double d2_y = increments_by_element[4][k];
         const double d2_z = increments_by_element[5][k];
-        /* rate times the step, at node 0 */
-        const double turn_0_x = 3.0 * d1_x - d2_x;
-        const double turn_0_y = 3.0 * d1_y - d2_y;
-        const double turn_0_z = 3.0 * d1_z - d2_z;
-        /* rate times the step, at node 1/2 */
-        const double turn_1_2_x = d1_x + d2_x;
-        const double turn_1_2_y = d1_y + d2_y;
-        const double turn_1_2_z = d1_z + d2_z;
-        /* rate times the step, at node 1 */
-        const double turn_1_x = 3.0 * d2_x - d1_x;
-        const double turn_1_y = 3.0 * d2_y - d1_y;
-        const double turn_1_z = 3.0 * d2_z - d1_z;
-        const double shared_1 = 0.5 * turn_0_z;
-        /* argument of slope 2, from the identity */
-        const double point_2_12 = -shared_1;
-        const double shared_2 = 0.5 * turn_0_y;
-        const double point_2_13 = shared_2;
-        const double point_2_21 = shared_1;
-        const double shared_3 = 0.5 * turn_0_x;
-        const double point_2_23 = -shared_3;
-        const double point_2_31 = -shared_2;
-        const double point_2_32 = shared_3;
-        /* derivative times the step at stage 2 */
-        const double slope_2_11 = point_2_12 * turn_1_2_z - point_2_13 * turn_1_2_y;
-        const double shared_4 = -turn_1_2_z;
-        const double slope_2_12 = shared_4 + point_2_13 * turn_1_2_x;
-        const double shared_5 = -turn_1_2_y;
-        const double slope_2_13 = -(shared_5 + point_2_12 * turn_1_2_x);
-        const double slope_2_21 = -(shared_4 + point_2_23 * turn_1_2_y);
-        const double slope_2_22 = point_2_23 * turn_1_2_x - point_2_21 * turn_1_2_z;
-        const double shared_6 = -turn_1_2_x;
-        const double slope_2_23 = shared_6 + point_2_21 * turn_1_2_y;
-        const double slope_2_31 = shared_5 + point_2_32 * turn_1_2_z;
-        const double slope_2_32 = -(shared_6 + point_2_31 * turn_1_2_z);
-        const double slope_2_33 = point_2_31 * turn_1_2_y - point_2_32 * turn_1_2_x;
-        /* argument of slope 3, from the identity */
-        const double point_3_11 = 0.5 * slope_2_11 + 1.0;
-        const double point_3_12 = 0.5 * slope_2_12;
-        const double point_3_13 = 0.5 * slope_2_13;
-        const double point_3_21 = 0.5 * slope_2_21;
-        const double point_3_22 = 0.5 * slope_2_22 + 1.0;
-        const double point_3_23 = 0.5 * slope_2_23;
-        const double point_3_31 = 0.5 * slope_2_31;
-        const double point_3_32 = 0.5 * slope_2_32;
-        const double point_3_33 = 0.5 * slope_2_33 + 1.0;
-        /* derivative times the step at stage 3 */
-        const double slope_3_11 = point_3_12 * turn_1_2_z - point_3_13 * turn_1_2_y;
-        const double slope_3_12 = point_3_13 * turn_1_2_x - point_3_11 * turn_1_2_z;
-        const double slope_3_13 = point_3_11 * turn_1_2_y - point_3_12 * turn_1_2_x;
-        const double slope_3_21 = point_3_22 * turn_1_2_z - point_3_23 * turn_1_2_y;
-        const double slope_3_22 = point_3_23 * turn_1_2_x - point_3_21 * turn_1_2_z;
-        const double slope_3_23 = point_3_21 * turn_1_2_y - point_3_22 * turn_1_2_x;
-        const double slope_3_31 = point_3_32 * turn_1_2_z - point_3_33 * turn_1_2_y;
-        const double slope_3_32 = point_3_33 * turn_1_2_x - point_3_31 * turn_1_2_z;
-        const double slope_3_33 = point_3_31 * turn_1_2_y - point_3_32 * turn_1_2_x;
-        /* argument of slope 4, from the identity */
-        const double point_4_11 = slope_3_11 + 1.0;
-        const double point_4_22 = slope_3_22 + 1.0;
-        const double point_4_33 = slope_3_33 + 1.0;
-        /* derivative times the step at stage 4 */
-        const double slope_4_11 = slope_3_12 * turn_1_z - slope_3_13 * turn_1_y;
-        const double slope_4_12 = slope_3_13 * turn_1_x - point_4_11 * turn_1_z;
-        const double slope_4_13 = point_4_11 * turn_1_y - slope_3_12 * turn_1_x;
-        const double slope_4_21 = point_4_22 * turn_1_z - slope_3_23 * turn_1_y;
-        const double slope_4_22 = slope_3_23 * turn_1_x - slope_3_21 * turn_1_z;
-        const double slope_4_23 = slope_3_21 * turn_1_y - point_4_22 * turn_1_x;
-        const double slope_4_31 = slope_3_32 * turn_1_z - point_4_33 * turn_1_y;
-        const double slope_4_32 = point_4_33 * turn_1_x - slope_3_31 * turn_1_z;
-        const double slope_4_33 = slope_3_31 * turn_1_y - slope_3_32 * turn_1_x;
-        /* the step applied to the identity */
-        const double A_11 = 0.3333333333333333 * (slope_2_11 + slope_3_11)
-            + 0.16666666666666666 * slope_4_11 + 1.0;
-        const double shared_7 = 0.16666666666666666 * turn_0_z;
-        const double A_12 = 0.3333333333333333 * (slope_2_12 + slope_3_12) - shared_7
-            + 0.16666666666666666 * slope_4_12;
-        const double shared_8 = 0.16666666666666666 * turn_0_y;
-        const double A_13 = shared_8 + 0.3333333333333333 * (slope_2_13 + slope_3_13)
-            + 0.16666666666666666 * slope_4_13;
-        const double A_21 = shared_7 + 0.3333333333333333 * (slope_2_21 + slope_3_21)
-            + 0.16666666666666666 * slope_4_21;
-        const double A_22 = 0.3333333333333333 * (slope_2_22 + slope_3_22)
-            + 0.16666666666666666 * slope_4_22 + 1.0;
-        const double shared_9 = 0.16666666666666666 * turn_0_x;
-        const double A_23 = 0.3333333333333333 * (slope_2_23 + slope_3_23) - shared_9
-            + 0.16666666666666666 * slope_4_23;
-        const double A_31 = 0.3333333333333333 * (slope_2_31 + slope_3_31) - shared_8
-            + 0.16666666666666666 * slope_4_31;
-        const double A_32 = shared_9 + 0.3333333333333333 * (slope_2_32 + slope_3_32)
-            + 0.16666666666666666 * slope_4_32;
-        const double A_33 = 0.3333333333333333 * (slope_2_33 + slope_3_33)
-            + 0.16666666666666666 * slope_4_33 + 1.0;
+        /* the angle increment of the whole step */
+        const double sigma_x = d1_x + d2_x;
+        const double sigma_y = d1_y + d2_y;
+        const double sigma_z = d1_z + d2_z;
+        const double sigma_cross_d1_x = sigma_y * d1_z - sigma_z * d1_y;
+        const double sigma_cross_d1_y = sigma_z * d1_x - sigma_x * d1_z;
+        const double sigma_cross_d1_z = sigma_x * d1_y - sigma_y * d1_x;
+        const double sigma_dot_sigma = sigma_x * sigma_x + sigma_y * sigma_y + sigma_z * sigma_z;
+        /* weight of sigma in skew */
+        const double skew_sigma = 1.0 - 0.16666666666666666 * sigma_dot_sigma;
+        /* weight of sigma_cross_d1 in skew */
+        const double skew_sigma_cross_d1 = 0.3333333333333333 - skew_sigma;
+        /* vector of the skew part */
+        const double skew_x = skew_sigma * sigma_x + skew_sigma_cross_d1 * sigma_cross_d1_x;
+        const double skew_y = skew_sigma * sigma_y + skew_sigma_cross_d1 * sigma_cross_d1_y;
+        const double skew_z = skew_sigma * sigma_z + skew_sigma_cross_d1 * sigma_cross_d1_z;
+        const double d1_dot_d1 = d1_x * d1_x + d1_y * d1_y + d1_z * d1_z;
+        /* weight of sigma in partner */
+        const double partner_sigma = 0.0625 * sigma_dot_sigma - 0.3333333333333333 * d1_dot_d1
+            + 0.25;
+        const double d1_dot_sigma = d1_x * sigma_x + d1_y * sigma_y + d1_z * sigma_z;
+        const double shared_1 = 0.6666666666666666 * d1_dot_sigma;
+        /* weight of d1 in partner */
+        const double partner_d1 = shared_1 - 0.3333333333333333 * sigma_dot_sigma;
+        /* of sigma in outer products */
+        const double partner_x = partner_sigma * sigma_x + partner_d1 * d1_x
+            - 0.3333333333333333 * sigma_cross_d1_x;
+        const double partner_y = partner_sigma * sigma_y + partner_d1 * d1_y
+            - 0.3333333333333333 * sigma_cross_d1_y;
+        const double partner_z = partner_sigma * sigma_z + partner_d1 * d1_z
+            - 0.3333333333333333 * sigma_cross_d1_z;
+        /* multiple of the unit matrix */
+        const double diagonal = sigma_dot_sigma * (shared_1 - 0.125 * sigma_dot_sigma - 0.5)
+            - d1_dot_sigma * shared_1 + 1.0;
+        /* half of u y' + y u' on the diagonal */
+        const double half_xx = sigma_x * partner_x;
+        const double A_11 = half_xx + half_xx + diagonal;
+        const double half_yy = sigma_y * partner_y;
+        const double A_22 = half_yy + half_yy + diagonal;
+        const double half_zz = sigma_z * partner_z;
+        const double A_33 = half_zz + half_zz + diagonal;
+        const double symmetric_xy = sigma_x * partner_y + sigma_y * partner_x;
+        const double A_12 = symmetric_xy - skew_z;
+        const double A_21 = symmetric_xy + skew_z;
+        const double symmetric_yz = sigma_y * partner_z + sigma_z * partner_y;
+        const double A_23 = symmetric_yz - skew_x;
+        const double A_32 = symmetric_yz + skew_x;
+        const double symmetric_zx = sigma_z * partner_x + sigma_x * partner_z;
+        const double A_31 = symmetric_zx - skew_y;
+        const double A_13 = symmetric_zx + skew_y;
         prepared[0][k] = A_11;
-        prepared[1][k] = A_12;
-        prepared[2][k] = A_13;
-        prepared[3][k] = A_21;
-        prepared[4][k] = A_22;
+        prepared[1][k] = A_22;
+        prepared[2][k] = A_33;
+        prepared[3][k] = A_12;
+        prepared[4][k] = A_21;
         prepared[5][k] = A_23;
-        prepared[6][k] = A_31;
-        prepared[7][k] = A_32;
-        prepared[8][k] = A_33;
+        prepared[6][k] = A_32;
+        prepared[7][k] = A_31;
+        prepared[8][k] = A_13;
     }
 }
 
@@ -280,14 +197,14 @@ static inline void finish_(const double state[9], double prepared[9][BLOCK_], si
     const double C_32 = state[7];
     const double C_33 = state[8];
     const double A_11 = prepared[0][k];
-    const double A_12 = prepared[1][k];
-    const double A_13 = prepared[2][k];
-    const double A_21 = prepared[3][k];
-    const double A_22 = prepared[4][k];
+    const double A_22 = prepared[1][k];
+    const double A_33 = prepared[2][k];
+    const double A_12 = prepared[3][k];
+    const double A_21 = prepared[4][k];
     const double A_23 = prepared[5][k];
-    const double A_31 = prepared[6][k];
-    const double A_32 = prepared[7][k];
-    const double A_33 = prepared[8][k];
+    const double A_32 = prepared[6][k];
+    const double A_31 = prepared[7][k];
+    const double A_13 = prepared[8][k];
     /* direction cosine matrix, body to reference, after the step */
     const double next_11 = A_11 * C_11 + A_21 * C_12 + A_31 * C_13;
     const double next_12 = A_12 * C_11 + A_22 * C_12 + A_32 * C_13;

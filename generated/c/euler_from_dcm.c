@@ -40,7 +40,7 @@ static inline void one_(const double state[9], double converted[4])
     const double column_y = (four_ss >= largest ? four_sy : (four_xx >= largest ? four_xy : (four_yy >= largest ? four_yy : four_yz)));
     const double column_z = (four_ss >= largest ? four_sz : (four_xx >= largest ? four_zx : (four_yy >= largest ? four_yz : four_zz)));
     /* makes the scalar part positive */
-    const double factor = 0.5 * (column_s >= 0.0 ? 1.0 : -1.0) / sqrt(largest);
+    const double factor = 0.5 * ((column_s >= 0.0 ? 1.0 : -1.0) / sqrt(largest));
     /* Euler parameters, body to reference, scalar last */
     const double next_s = column_s * factor;
     const double next_x = column_x * factor;

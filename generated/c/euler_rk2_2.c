@@ -17,28 +17,21 @@ static inline void one_(const double state[4], const double increments[6], doubl
     const double d2_x = increments[3];
     const double d2_y = increments[4];
     const double d2_z = increments[5];
-    /* half the rate times the step, at node 0 */
-    const double half_turn_0_x = 1.5 * d1_x - 0.5 * d2_x;
-    const double half_turn_0_y = 1.5 * d1_y - 0.5 * d2_y;
-    const double half_turn_0_z = 1.5 * d1_z - 0.5 * d2_z;
-    /* half the rate times the step, at node 1 */
-    const double half_turn_1_x = 1.5 * d2_x - 0.5 * d1_x;
-    const double half_turn_1_y = 1.5 * d2_y - 0.5 * d1_y;
-    const double half_turn_1_z = 1.5 * d2_z - 0.5 * d1_z;
-    /* derivative times the step at stage 2 */
-    const double slope_2_s = -(half_turn_0_x * half_turn_1_x + half_turn_0_y * half_turn_1_y
-        + half_turn_0_z * half_turn_1_z);
-    const double slope_2_x = half_turn_1_x + half_turn_0_y * half_turn_1_z
-        - half_turn_0_z * half_turn_1_y;
-    const double slope_2_y = half_turn_1_y - half_turn_0_x * half_turn_1_z
-        + half_turn_0_z * half_turn_1_x;
-    const double slope_2_z = half_turn_1_z + half_turn_0_x * half_turn_1_y
-        - half_turn_0_y * half_turn_1_x;
-    /* the step applied to the identity */
-    const double p_s = 0.5 * slope_2_s + 1.0;
-    const double p_x = 0.5 * (half_turn_0_x + slope_2_x);
-    const double p_y = 0.5 * (half_turn_0_y + slope_2_y);
-    const double p_z = 0.5 * (half_turn_0_z + slope_2_z);
+    /* the angle increment of the whole step */
+    const double sigma_x = d1_x + d2_x;
+    const double sigma_y = d1_y + d2_y;
+    const double sigma_z = d1_z + d2_z;
+    const double sigma_cross_d1_x = sigma_y * d1_z - sigma_z * d1_y;
+    const double sigma_cross_d1_y = sigma_z * d1_x - sigma_x * d1_z;
+    const double sigma_cross_d1_z = sigma_x * d1_y - sigma_y * d1_x;
+    /* the step applied to the identity: its vector part */
+    const double p_x = 0.5 * sigma_x - sigma_cross_d1_x;
+    const double p_y = 0.5 * sigma_y - sigma_cross_d1_y;
+    const double p_z = 0.5 * sigma_z - sigma_cross_d1_z;
+    const double d1_dot_d2 = d1_x * d2_x + d1_y * d2_y + d1_z * d2_z;
+    const double sigma_dot_sigma = sigma_x * sigma_x + sigma_y * sigma_y + sigma_z * sigma_z;
+    /* its scalar part */
+    const double p_s = 0.375 * sigma_dot_sigma - 2.0 * d1_dot_d2 + 1.0;
     /* Euler parameters, body to reference, scalar last, after the step */
     const double next_s = e_s * p_s - e_x * p_x - e_y * p_y - e_z * p_z;
     const double next_x = e_s * p_x + e_x * p_s + e_y * p_z - e_z * p_y;
@@ -79,32 +72,25 @@ static void prepare_(size_t count, const double *increments, double prepared[4][
         const double d2_x = increments_by_element[3][k];
         const double d2_y = increments_by_element[4][k];
         const double d2_z = increments_by_element[5][k];
-        /* half the rate times the step, at node 0 */
-        const double half_turn_0_x = 1.5 * d1_x - 0.5 * d2_x;
-        const double half_turn_0_y = 1.5 * d1_y - 0.5 * d2_y;
-        const double half_turn_0_z = 1.5 * d1_z - 0.5 * d2_z;
-        /* half the rate times the step, at node 1 */
-        const double half_turn_1_x = 1.5 * d2_x - 0.5 * d1_x;
-        const double half_turn_1_y = 1.5 * d2_y - 0.5 * d1_y;
-        const double half_turn_1_z = 1.5 * d2_z - 0.5 * d1_z;
-        /* derivative times the step at stage 2 */
-        const double slope_2_s = -(half_turn_0_x * half_turn_1_x + half_turn_0_y * half_turn_1_y
-            + half_turn_0_z * half_turn_1_z);
-        const double slope_2_x = half_turn_1_x + half_turn_0_y * half_turn_1_z
-            - half_turn_0_z * half_turn_1_y;
-        const double slope_2_y = half_turn_1_y - half_turn_0_x * half_turn_1_z
-            + half_turn_0_z * half_turn_1_x;
-        const double slope_2_z = half_turn_1_z + half_turn_0_x * half_turn_1_y
-            - half_turn_0_y * half_turn_1_x;
-        /* the step applied to the identity */
-        const double p_s = 0.5 * slope_2_s + 1.0;
-        const double p_x = 0.5 * (half_turn_0_x + slope_2_x);
-        const double p_y = 0.5 * (half_turn_0_y + slope_2_y);
-        const double p_z = 0.5 * (half_turn_0_z + slope_2_z);
-        prepared[0][k] = p_s;
-        prepared[1][k] = p_x;
-        prepared[2][k] = p_y;
-        prepared[3][k] = p_z;
+        /* the angle increment of the whole step */
+        const double sigma_x = d1_x + d2_x;
+        const double sigma_y = d1_y + d2_y;
+        const double sigma_z = d1_z + d2_z;
+        const double sigma_cross_d1_x = sigma_y * d1_z - sigma_z * d1_y;
+        const double sigma_cross_d1_y = sigma_z * d1_x - sigma_x * d1_z;
+        const double sigma_cross_d1_z = sigma_x * d1_y - sigma_y * d1_x;
+        /* the step applied to the identity: its vector part */
+        const double p_x = 0.5 * sigma_x - sigma_cross_d1_x;
+        const double p_y = 0.5 * sigma_y - sigma_cross_d1_y;
+        const double p_z = 0.5 * sigma_z - sigma_cross_d1_z;
+        const double d1_dot_d2 = d1_x * d2_x + d1_y * d2_y + d1_z * d2_z;
+        const double sigma_dot_sigma = sigma_x * sigma_x + sigma_y * sigma_y + sigma_z * sigma_z;
+        /* its scalar part */
+        const double p_s = 0.375 * sigma_dot_sigma - 2.0 * d1_dot_d2 + 1.0;
+        prepared[0][k] = p_x;
+        prepared[1][k] = p_y;
+        prepared[2][k] = p_z;
+        prepared[3][k] = p_s;
     }
 }
 
@@ -116,10 +102,10 @@ static inline void finish_(const double state[4], double prepared[4][BLOCK_], si
     const double e_y = state[1];
     const double e_z = state[2];
     const double e_s = state[3];
-    const double p_s = prepared[0][k];
-    const double p_x = prepared[1][k];
-    const double p_y = prepared[2][k];
-    const double p_z = prepared[3][k];
+    const double p_x = prepared[0][k];
+    const double p_y = prepared[1][k];
+    const double p_z = prepared[2][k];
+    const double p_s = prepared[3][k];
     /* Euler parameters, body to reference, scalar last, after the step */
     const double next_s = e_s * p_s - e_x * p_x - e_y * p_y - e_z * p_z;
     const double next_x = e_s * p_x + e_x * p_s + e_y * p_z - e_z * p_y;

@@ -11,12 +11,11 @@ static inline void one_(double middle, double width, double a0, double a1, doubl
     const double shared_3 = width * width;
     const double shared_1 = shared_3 * width;
     const double shared_2 = middle * middle;
-    const double factor_1 = shared_3;
+    const double shared_4 = shared_2 * a4;
     /* angle increment over the interval, body axes */
-    const double increment_y = a0 * width + a1 * middle * width + a2 * shared_2 * width
-        + a3 * (shared_2 * middle) * width + a4 * (shared_2 * shared_2) * width
-        + 0.08333333333333333 * (a2 * shared_1) + 0.0125 * (a4 * (factor_1 * factor_1 * width))
-        + 0.25 * (a3 * middle * shared_1) + 0.5 * (a4 * shared_1 * shared_2);
+    const double increment_y = width * (middle * (a1 + shared_2 * a3) + shared_2 * (a2 + shared_4)
+        + a0 + 0.0125 * (a4 * shared_3 * shared_3)) + shared_1 * (0.25 * (middle * a3)
+        + 0.08333333333333333 * a2 + 0.5 * shared_4);
     increment[0] = 0.0;
     increment[1] = increment_y;
     increment[2] = 0.0;

@@ -10,20 +10,18 @@
 static inline void one_(double time, double a0, double a1, double a2, double a3, double a4,
     double rate[3], double attitude[9])
 {
-    const double shared_1 = time * time;
-    const double shared_2 = shared_1 * time;
-    const double shared_3 = shared_1 * shared_1;
+    const double factor_1 = time * time;
+    const double shared_2 = factor_1 * factor_1;
+    const double shared_3 = a4 * shared_2;
     /* body rate, body axes */
-    const double rate_y = a0 + a1 * time + a2 * shared_1 + a3 * shared_2 + a4 * shared_3;
-    const double shared_4 = a0 * time + 0.5 * (a1 * shared_1) + 0.3333333333333333 * (a2 * shared_2)
-        + 0.25 * (a3 * shared_3) + 0.2 * (a4 * (shared_3 * time));
-    const double shared_5 = cos(shared_4);
+    const double rate_y = time * (time * (time * a3 + a2) + a1) + a0 + shared_3;
+    const double shared_1 = time * (time * (0.3333333333333333 * (time * a2) + 0.5 * a1) + a0
+        + 0.2 * shared_3) + 0.25 * (a3 * shared_2);
     /* direction cosine matrix, body to reference */
-    const double C_11 = shared_5;
-    const double shared_6 = sin(shared_4);
-    const double C_13 = shared_6;
-    const double C_31 = -shared_6;
-    const double C_33 = shared_5;
+    const double C_11 = cos(shared_1);
+    const double C_13 = sin(shared_1);
+    const double C_31 = -C_13;
+    const double C_33 = C_11;
     rate[0] = 0.0;
     rate[1] = rate_y;
     rate[2] = 0.0;

@@ -16,7 +16,7 @@ static double sinc_(double x)
 static inline void one_(double middle, double width, double a, double b, double increment[3])
 {
     /* angle increment over the interval, body axes */
-    const double increment_y = a * width * cos(b * middle) * sinc_(0.5 * b * width);
+    const double increment_y = a * width * cos(b * middle) * sinc_(0.5 * (b * width));
     increment[0] = 0.0;
     increment[1] = increment_y;
     increment[2] = 0.0;

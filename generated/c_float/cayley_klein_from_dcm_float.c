@@ -40,7 +40,7 @@ static inline void one_(const float state[9], float converted[4])
     const float column_y = (four_ss >= largest ? four_sy : (four_xx >= largest ? four_xy : (four_yy >= largest ? four_yy : four_yz)));
     const float column_z = (four_ss >= largest ? four_sz : (four_xx >= largest ? four_zx : (four_yy >= largest ? four_yz : four_zz)));
     /* makes the scalar part positive */
-    const float factor = 0.5f * (column_s >= 0.0f ? 1.0f : -1.0f) / sqrtf(largest);
+    const float factor = 0.5f * ((column_s >= 0.0f ? 1.0f : -1.0f) / sqrtf(largest));
     /* Cayley-Klein parameters, body to reference, scalar first */
     const float next_s = column_s * factor;
     const float next_x = column_x * factor;

@@ -17,28 +17,21 @@ static inline void one_(const float state[4], const float increments[6], float n
     const float d2_x = increments[3];
     const float d2_y = increments[4];
     const float d2_z = increments[5];
-    /* half the rate times the step, at node 0 */
-    const float half_turn_0_x = 1.5f * d1_x - 0.5f * d2_x;
-    const float half_turn_0_y = 1.5f * d1_y - 0.5f * d2_y;
-    const float half_turn_0_z = 1.5f * d1_z - 0.5f * d2_z;
-    /* half the rate times the step, at node 1 */
-    const float half_turn_1_x = 1.5f * d2_x - 0.5f * d1_x;
-    const float half_turn_1_y = 1.5f * d2_y - 0.5f * d1_y;
-    const float half_turn_1_z = 1.5f * d2_z - 0.5f * d1_z;
-    /* derivative times the step at stage 2 */
-    const float slope_2_s = -(half_turn_0_x * half_turn_1_x + half_turn_0_y * half_turn_1_y
-        + half_turn_0_z * half_turn_1_z);
-    const float slope_2_x = half_turn_1_x + half_turn_0_y * half_turn_1_z
-        - half_turn_0_z * half_turn_1_y;
-    const float slope_2_y = half_turn_1_y - half_turn_0_x * half_turn_1_z
-        + half_turn_0_z * half_turn_1_x;
-    const float slope_2_z = half_turn_1_z + half_turn_0_x * half_turn_1_y
-        - half_turn_0_y * half_turn_1_x;
-    /* the step applied to the identity */
-    const float p_s = 0.5f * slope_2_s + 1.0f;
-    const float p_x = 0.5f * (half_turn_0_x + slope_2_x);
-    const float p_y = 0.5f * (half_turn_0_y + slope_2_y);
-    const float p_z = 0.5f * (half_turn_0_z + slope_2_z);
+    /* the angle increment of the whole step */
+    const float sigma_x = d1_x + d2_x;
+    const float sigma_y = d1_y + d2_y;
+    const float sigma_z = d1_z + d2_z;
+    const float sigma_cross_d1_x = sigma_y * d1_z - sigma_z * d1_y;
+    const float sigma_cross_d1_y = sigma_z * d1_x - sigma_x * d1_z;
+    const float sigma_cross_d1_z = sigma_x * d1_y - sigma_y * d1_x;
+    /* the step applied to the identity: its vector part */
+    const float p_x = 0.5f * sigma_x - sigma_cross_d1_x;
+    const float p_y = 0.5f * sigma_y - sigma_cross_d1_y;
+    const float p_z = 0.5f * sigma_z - sigma_cross_d1_z;
+    const float d1_dot_d2 = d1_x * d2_x + d1_y * d2_y + d1_z * d2_z;
+    const float sigma_dot_sigma = sigma_x * sigma_x + sigma_y * sigma_y + sigma_z * sigma_z;
+    /* its scalar part */
+    const float p_s = 0.375f * sigma_dot_sigma - 2.0f * d1_dot_d2 + 1.0f;
     /* Cayley-Klein parameters, body to reference, scalar first, after the step */
     const float next_s = a_s * p_s - a_x * p_x - a_y * p_y - a_z * p_z;
     const float next_x = a_s * p_x + a_x * p_s + a_y * p_z - a_z * p_y;
@@ -80,32 +73,25 @@ static void prepare_(size_t count, const float *increments, float prepared[4][BL
         const float d2_x = increments_by_element[3][k];
         const float d2_y = increments_by_element[4][k];
         const float d2_z = increments_by_element[5][k];
-        /* half the rate times the step, at node 0 */
-        const float half_turn_0_x = 1.5f * d1_x - 0.5f * d2_x;
-        const float half_turn_0_y = 1.5f * d1_y - 0.5f * d2_y;
-        const float half_turn_0_z = 1.5f * d1_z - 0.5f * d2_z;
-        /* half the rate times the step, at node 1 */
-        const float half_turn_1_x = 1.5f * d2_x - 0.5f * d1_x;
-        const float half_turn_1_y = 1.5f * d2_y - 0.5f * d1_y;
-        const float half_turn_1_z = 1.5f * d2_z - 0.5f * d1_z;
-        /* derivative times the step at stage 2 */
-        const float slope_2_s = -(half_turn_0_x * half_turn_1_x + half_turn_0_y * half_turn_1_y
-            + half_turn_0_z * half_turn_1_z);
-        const float slope_2_x = half_turn_1_x + half_turn_0_y * half_turn_1_z
-            - half_turn_0_z * half_turn_1_y;
-        const float slope_2_y = half_turn_1_y - half_turn_0_x * half_turn_1_z
-            + half_turn_0_z * half_turn_1_x;
-        const float slope_2_z = half_turn_1_z + half_turn_0_x * half_turn_1_y
-            - half_turn_0_y * half_turn_1_x;
-        /* the step applied to the identity */
-        const float p_s = 0.5f * slope_2_s + 1.0f;
-        const float p_x = 0.5f * (half_turn_0_x + slope_2_x);
-        const float p_y = 0.5f * (half_turn_0_y + slope_2_y);
-        const float p_z = 0.5f * (half_turn_0_z + slope_2_z);
-        prepared[0][k] = p_s;
-        prepared[1][k] = p_x;
-        prepared[2][k] = p_y;
-        prepared[3][k] = p_z;
+        /* the angle increment of the whole step */
+        const float sigma_x = d1_x + d2_x;
+        const float sigma_y = d1_y + d2_y;
+        const float sigma_z = d1_z + d2_z;
+        const float sigma_cross_d1_x = sigma_y * d1_z - sigma_z * d1_y;
+        const float sigma_cross_d1_y = sigma_z * d1_x - sigma_x * d1_z;
+        const float sigma_cross_d1_z = sigma_x * d1_y - sigma_y * d1_x;
+        /* the step applied to the identity: its vector part */
+        const float p_x = 0.5f * sigma_x - sigma_cross_d1_x;
+        const float p_y = 0.5f * sigma_y - sigma_cross_d1_y;
+        const float p_z = 0.5f * sigma_z - sigma_cross_d1_z;
+        const float d1_dot_d2 = d1_x * d2_x + d1_y * d2_y + d1_z * d2_z;
+        const float sigma_dot_sigma = sigma_x * sigma_x + sigma_y * sigma_y + sigma_z * sigma_z;
+        /* its scalar part */
+        const float p_s = 0.375f * sigma_dot_sigma - 2.0f * d1_dot_d2 + 1.0f;
+        prepared[0][k] = p_x;
+        prepared[1][k] = p_y;
+        prepared[2][k] = p_z;
+        prepared[3][k] = p_s;
     }
 }
 
@@ -117,10 +103,10 @@ static inline void finish_(const float state[4], float prepared[4][BLOCK_], size
     const float a_x = state[1];
     const float a_y = state[2];
     const float a_z = state[3];
-    const float p_s = prepared[0][k];
-    const float p_x = prepared[1][k];
-    const float p_y = prepared[2][k];
-    const float p_z = prepared[3][k];
+    const float p_x = prepared[0][k];
+    const float p_y = prepared[1][k];
+    const float p_z = prepared[2][k];
+    const float p_s = prepared[3][k];
     /* Cayley-Klein parameters, body to reference, scalar first, after the step */
     const float next_s = a_s * p_s - a_x * p_x - a_y * p_y - a_z * p_z;
     const float next_x = a_s * p_x + a_x * p_s + a_y * p_z - a_z * p_y;

@@ -17,70 +17,26 @@ static inline void one_(const float state[4], const float increments[6], float n
     const float d2_x = increments[3];
     const float d2_y = increments[4];
     const float d2_z = increments[5];
-    const float shared_1 = 0.5f * d2_x;
-    /* half the rate times the step, at node 0 */
-    const float half_turn_0_x = 1.5f * d1_x - shared_1;
-    const float shared_2 = 0.5f * d2_y;
-    const float half_turn_0_y = 1.5f * d1_y - shared_2;
-    const float shared_3 = 0.5f * d2_z;
-    const float half_turn_0_z = 1.5f * d1_z - shared_3;
-    const float shared_4 = 0.5f * d1_x;
-    /* half the rate times the step, at node 1/2 */
-    const float half_turn_1_2_x = shared_1 + shared_4;
-    const float shared_5 = 0.5f * d1_y;
-    const float half_turn_1_2_y = shared_2 + shared_5;
-    const float shared_6 = 0.5f * d1_z;
-    const float half_turn_1_2_z = shared_3 + shared_6;
-    /* half the rate times the step, at node 1 */
-    const float half_turn_1_x = 1.5f * d2_x - shared_4;
-    const float half_turn_1_y = 1.5f * d2_y - shared_5;
-    const float half_turn_1_z = 1.5f * d2_z - shared_6;
-    /* argument of slope 2, from the identity */
-    const float point_2_x = 0.5f * half_turn_0_x;
-    const float point_2_y = 0.5f * half_turn_0_y;
-    const float point_2_z = 0.5f * half_turn_0_z;
-    /* derivative times the step at stage 2 */
-    const float slope_2_s = -(half_turn_1_2_x * point_2_x + half_turn_1_2_y * point_2_y
-        + half_turn_1_2_z * point_2_z);
-    const float slope_2_x = half_turn_1_2_x - half_turn_1_2_y * point_2_z
-        + half_turn_1_2_z * point_2_y;
-    const float slope_2_y = half_turn_1_2_y + half_turn_1_2_x * point_2_z
-        - half_turn_1_2_z * point_2_x;
-    const float slope_2_z = half_turn_1_2_z - half_turn_1_2_x * point_2_y
-        + half_turn_1_2_y * point_2_x;
-    /* argument of slope 3, from the identity */
-    const float point_3_s = 0.5f * slope_2_s + 1.0f;
-    const float point_3_x = 0.5f * slope_2_x;
-    const float point_3_y = 0.5f * slope_2_y;
-    const float point_3_z = 0.5f * slope_2_z;
-    /* derivative times the step at stage 3 */
-    const float slope_3_s = -(half_turn_1_2_x * point_3_x + half_turn_1_2_y * point_3_y
-        + half_turn_1_2_z * point_3_z);
-    const float slope_3_x = half_turn_1_2_x * point_3_s - half_turn_1_2_y * point_3_z
-        + half_turn_1_2_z * point_3_y;
-    const float slope_3_y = half_turn_1_2_x * point_3_z + half_turn_1_2_y * point_3_s
-        - half_turn_1_2_z * point_3_x;
-    const float slope_3_z = half_turn_1_2_y * point_3_x - half_turn_1_2_x * point_3_y
-        + half_turn_1_2_z * point_3_s;
-    /* argument of slope 4, from the identity */
-    const float point_4_s = slope_3_s + 1.0f;
-    /* derivative times the step at stage 4 */
-    const float slope_4_s = -(half_turn_1_x * slope_3_x + half_turn_1_y * slope_3_y
-        + half_turn_1_z * slope_3_z);
-    const float slope_4_x = half_turn_1_x * point_4_s - half_turn_1_y * slope_3_z
-        + half_turn_1_z * slope_3_y;
-    const float slope_4_y = half_turn_1_x * slope_3_z + half_turn_1_y * point_4_s
-        - half_turn_1_z * slope_3_x;
-    const float slope_4_z = half_turn_1_y * slope_3_x - half_turn_1_x * slope_3_y
-        + half_turn_1_z * point_4_s;
-    /* the step applied to the identity */
-    const float p_s = 0.33333334f * (slope_2_s + slope_3_s) + 0.16666667f * slope_4_s + 1.0f;
-    const float p_x = 0.16666667f * (half_turn_0_x + slope_4_x) + 0.33333334f * (slope_2_x
-        + slope_3_x);
-    const float p_y = 0.16666667f * (half_turn_0_y + slope_4_y) + 0.33333334f * (slope_2_y
-        + slope_3_y);
-    const float p_z = 0.16666667f * (half_turn_0_z + slope_4_z) + 0.33333334f * (slope_2_z
-        + slope_3_z);
+    /* the angle increment of the whole step */
+    const float sigma_x = d1_x + d2_x;
+    const float sigma_y = d1_y + d2_y;
+    const float sigma_z = d1_z + d2_z;
+    const float sigma_cross_d1_x = sigma_y * d1_z - sigma_z * d1_y;
+    const float sigma_cross_d1_y = sigma_z * d1_x - sigma_x * d1_z;
+    const float sigma_cross_d1_z = sigma_x * d1_y - sigma_y * d1_x;
+    const float sigma_dot_sigma = sigma_x * sigma_x + sigma_y * sigma_y + sigma_z * sigma_z;
+    /* weight of sigma in p */
+    const float p_sigma = 0.5f - 0.020833334f * sigma_dot_sigma;
+    /* weight of sigma_cross_d1 in p */
+    const float p_sigma_cross_d1 = 0.16666667f - p_sigma;
+    /* the step applied to the identity: its vector part */
+    const float p_x = p_sigma * sigma_x + p_sigma_cross_d1 * sigma_cross_d1_x;
+    const float p_y = p_sigma * sigma_y + p_sigma_cross_d1 * sigma_cross_d1_y;
+    const float p_z = p_sigma * sigma_z + p_sigma_cross_d1 * sigma_cross_d1_z;
+    const float d1_dot_d2 = d1_x * d2_x + d1_y * d2_y + d1_z * d2_z;
+    /* its scalar part */
+    const float p_s = sigma_dot_sigma * (0.041666668f * d1_dot_d2 - 0.0078125f * sigma_dot_sigma
+        - 0.125f) + 1.0f;
     /* Cayley-Klein parameters, body to reference, scalar first, after the step */
     const float next_s = a_s * p_s - a_x * p_x - a_y * p_y - a_z * p_z;
     const float next_x = a_s * p_x + a_x * p_s + a_y * p_z - a_z * p_y;
@@ -122,74 +78,30 @@ static void prepare_(size_t count, const float *increments, float prepared[4][BL
         const float d2_x = increments_by_element[3][k];
         const float d2_y = increments_by_element[4][k];
         const float d2_z = increments_by_element[5][k];
-        const float shared_1 = 0.5f * d2_x;
-        /* half the rate times the step, at node 0 */
-        const float half_turn_0_x = 1.5f * d1_x - shared_1;
-        const float shared_2 = 0.5f * d2_y;
-        const float half_turn_0_y = 1.5f * d1_y - shared_2;
-        const float shared_3 = 0.5f * d2_z;
-        const float half_turn_0_z = 1.5f * d1_z - shared_3;
-        const float shared_4 = 0.5f * d1_x;
-        /* half the rate times the step, at node 1/2 */
-        const float half_turn_1_2_x = shared_1 + shared_4;
-        const float shared_5 = 0.5f * d1_y;
-        const float half_turn_1_2_y = shared_2 + shared_5;
-        const float shared_6 = 0.5f * d1_z;
-        const float half_turn_1_2_z = shared_3 + shared_6;
-        /* half the rate times the step, at node 1 */
-        const float half_turn_1_x = 1.5f * d2_x - shared_4;
-        const float half_turn_1_y = 1.5f * d2_y - shared_5;
-        const float half_turn_1_z = 1.5f * d2_z - shared_6;
-        /* argument of slope 2, from the identity */
-        const float point_2_x = 0.5f * half_turn_0_x;
-        const float point_2_y = 0.5f * half_turn_0_y;
-        const float point_2_z = 0.5f * half_turn_0_z;
-        /* derivative times the step at stage 2 */
-        const float slope_2_s = -(half_turn_1_2_x * point_2_x + half_turn_1_2_y * point_2_y
-            + half_turn_1_2_z * point_2_z);
-        const float slope_2_x = half_turn_1_2_x - half_turn_1_2_y * point_2_z
-            + half_turn_1_2_z * point_2_y;
-        const float slope_2_y = half_turn_1_2_y + half_turn_1_2_x * point_2_z
-            - half_turn_1_2_z * point_2_x;
-        const float slope_2_z = half_turn_1_2_z - half_turn_1_2_x * point_2_y
-            + half_turn_1_2_y * point_2_x;
-        /* argument of slope 3, from the identity */
-        const float point_3_s = 0.5f * slope_2_s + 1.0f;
-        const float point_3_x = 0.5f * slope_2_x;
-        const float point_3_y = 0.5f * slope_2_y;
-        const float point_3_z = 0.5f * slope_2_z;
-        /* derivative times the step at stage 3 */
-        const float slope_3_s = -(half_turn_1_2_x * point_3_x + half_turn_1_2_y * point_3_y
-            + half_turn_1_2_z * point_3_z);
-        const float slope_3_x = half_turn_1_2_x * point_3_s - half_turn_1_2_y * point_3_z
-            + half_turn_1_2_z * point_3_y;
-        const float slope_3_y = half_turn_1_2_x * point_3_z + half_turn_1_2_y * point_3_s
-            - half_turn_1_2_z * point_3_x;
-        const float slope_3_z = half_turn_1_2_y * point_3_x - half_turn_1_2_x * point_3_y
-            + half_turn_1_2_z * point_3_s;
-        /* argument of slope 4, from the identity */
-        const float point_4_s = slope_3_s + 1.0f;
-        /* derivative times the step at stage 4 */
-        const float slope_4_s = -(half_turn_1_x * slope_3_x + half_turn_1_y * slope_3_y
-            + half_turn_1_z * slope_3_z);
-        const float slope_4_x = half_turn_1_x * point_4_s - half_turn_1_y * slope_3_z
-            + half_turn_1_z * slope_3_y;
-        const float slope_4_y = half_turn_1_x * slope_3_z + half_turn_1_y * point_4_s
-            - half_turn_1_z * slope_3_x;
-        const float slope_4_z = half_turn_1_y * slope_3_x - half_turn_1_x * slope_3_y
-            + half_turn_1_z * point_4_s;
-        /* the step applied to the identity */
-        const float p_s = 0.33333334f * (slope_2_s + slope_3_s) + 0.16666667f * slope_4_s + 1.0f;
-        const float p_x = 0.16666667f * (half_turn_0_x + slope_4_x) + 0.33333334f * (slope_2_x
-            + slope_3_x);
-        const float p_y = 0.16666667f * (half_turn_0_y + slope_4_y) + 0.33333334f * (slope_2_y
-            + slope_3_y);
-        const float p_z = 0.16666667f * (half_turn_0_z + slope_4_z) + 0.33333334f * (slope_2_z
-            + slope_3_z);
-        prepared[0][k] = p_s;
-        prepared[1][k] = p_x;
-        prepared[2][k] = p_y;
-        prepared[3][k] = p_z;
+        /* the angle increment of the whole step */
+        const float sigma_x = d1_x + d2_x;
+        const float sigma_y = d1_y + d2_y;
+        const float sigma_z = d1_z + d2_z;
+        const float sigma_cross_d1_x = sigma_y * d1_z - sigma_z * d1_y;
+        const float sigma_cross_d1_y = sigma_z * d1_x - sigma_x * d1_z;
+        const float sigma_cross_d1_z = sigma_x * d1_y - sigma_y * d1_x;
+        const float sigma_dot_sigma = sigma_x * sigma_x + sigma_y * sigma_y + sigma_z * sigma_z;
+        /* weight of sigma in p */
+        const float p_sigma = 0.5f - 0.020833334f * sigma_dot_sigma;
+        /* weight of sigma_cross_d1 in p */
+        const float p_sigma_cross_d1 = 0.16666667f - p_sigma;
+        /* the step applied to the identity: its vector part */
+        const float p_x = p_sigma * sigma_x + p_sigma_cross_d1 * sigma_cross_d1_x;
+        const float p_y = p_sigma * sigma_y + p_sigma_cross_d1 * sigma_cross_d1_y;
+        const float p_z = p_sigma * sigma_z + p_sigma_cross_d1 * sigma_cross_d1_z;
+        const float d1_dot_d2 = d1_x * d2_x + d1_y * d2_y + d1_z * d2_z;
+        /* its scalar part */
+        const float p_s = sigma_dot_sigma * (0.041666668f * d1_dot_d2 - 0.0078125f * sigma_dot_sigma
+            - 0.125f) + 1.0f;
+        prepared[0][k] = p_x;
+        prepared[1][k] = p_y;
+        prepared[2][k] = p_z;
+        prepared[3][k] = p_s;
     }
 }
 
@@ -201,10 +113,10 @@ static inline void finish_(const float state[4], float prepared[4][BLOCK_], size
     const float a_x = state[1];
     const float a_y = state[2];
     const float a_z = state[3];
-    const float p_s = prepared[0][k];
-    const float p_x = prepared[1][k];
-    const float p_y = prepared[2][k];
-    const float p_z = prepared[3][k];
+    const float p_x = prepared[0][k];
+    const float p_y = prepared[1][k];
+    const float p_z = prepared[2][k];
+    const float p_s = prepared[3][k];
     /* Cayley-Klein parameters, body to reference, scalar first, after the step */
     const float next_s = a_s * p_s - a_x * p_x - a_y * p_y - a_z * p_z;
     const float next_x = a_s * p_x + a_x * p_s + a_y * p_z - a_z * p_y;

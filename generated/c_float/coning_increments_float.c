@@ -16,7 +16,7 @@ static float sinc_(float x)
 static inline void one_(float middle, float width, float a, float b, float g, float increment[3])
 {
     const float shared_1 = b * middle;
-    const float shared_2 = a * width * sinc_(0.5f * b * width);
+    const float shared_2 = a * width * sinc_(0.5f * (b * width));
     /* angle increment over the interval, body axes */
     const float increment_x = shared_2 * sinf(shared_1);
     const float increment_y = g * width;

@@ -26,7 +26,8 @@ static inline void one_(float time, float a, float b, float g, float rate[3], fl
     const float shared_6 = b + g;
     const float shared_7 = time * time;
     const float shared_8 = a * a * shared_7;
-    const float shared_9 = shared_6 * shared_6 * shared_7;
+    const float shared_21 = shared_6 * shared_7;
+    const float shared_9 = shared_21 * shared_6;
     const float shared_10 = sqrtf(shared_8 + shared_9);
     const float shared_11 = time * sinc_(shared_10);
     const float shared_12 = shared_11 * shared_6;
@@ -35,13 +36,13 @@ static inline void one_(float time, float a, float b, float g, float rate[3], fl
     const float shared_14 = 0.5f * (factor_1 * factor_1);
     const float shared_15 = shared_14 * shared_9;
     const float shared_16 = shared_14 * shared_8 - 1.0f;
-    const float shared_17 = -(shared_15 + shared_16);
+    const float shared_17 = shared_15 + shared_16;
     /* direction cosine matrix, body to reference */
-    const float C_11 = shared_13 + shared_17 * shared_4;
+    const float C_11 = shared_13 - shared_17 * shared_4;
     const float C_12 = -(a * shared_11);
     const float shared_18 = shared_12 * shared_4;
-    const float C_13 = shared_18 - shared_17 * shared_2;
-    const float shared_19 = shared_14 * shared_6 * shared_7;
+    const float C_13 = shared_18 + shared_17 * shared_2;
+    const float shared_19 = shared_14 * shared_21;
     const float C_21 = shared_11 * shared_5 + shared_19 * shared_3;
     const float C_22 = -shared_16;
     const float C_23 = shared_19 * shared_5 - shared_11 * shared_3;

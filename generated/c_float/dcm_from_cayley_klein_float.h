@@ -5,7 +5,7 @@
  *
  * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter 2.
  * The result is |state|^2 times a rotation: a rotation for a state of length 1.
- * Operations of one call: 14 add, 17 multiply, 2 negate; 13 temporaries.
+ * Operations of one call: 13 add, 13 multiply; 14 temporaries.
  *
  * No heap, no global state, reentrant. In one call every input is read before any output is written: an
  * output may be the same memory as an input. Matrices are stored by rows.

@@ -27,11 +27,10 @@ static inline void one_(const float computed[9], float orthonormalized[9])
     const float gram_33 = C_13 * C_13 + C_23 * C_23 + C_33 * C_33;
     /* mean of the eigenvalues of C' C */
     const float mean = 0.33333334f * (gram_11 + gram_22 + gram_33);
-    const float shared_1 = -mean;
     /* C' C less its mean */
-    const float deviator_11 = gram_11 + shared_1;
-    const float deviator_22 = gram_22 + shared_1;
-    const float deviator_33 = gram_33 + shared_1;
+    const float deviator_11 = gram_11 - mean;
+    const float deviator_22 = gram_22 - mean;
+    const float deviator_33 = gram_33 - mean;
     const float shared_2 = gram_23 * gram_23;
     /* mean square spread of the eigenvalues, halved */
     const float spread = 0.16666667f * (deviator_11 * deviator_11 + deviator_22 * deviator_22
@@ -48,14 +47,16 @@ static inline void one_(const float computed[9], float orthonormalized[9])
     const float across = sqrtf(3.0f) * radius * sinf(angle);
     /* singular value 1 of C */
     const float stretch_1 = sqrtf(2.0f * along + mean);
+    const float shared_10 = along - mean;
     /* singular value 2 of C */
-    const float stretch_2 = sqrtf(across - along + mean);
+    const float stretch_2 = sqrtf(across - shared_10);
     /* singular value 3 of C */
-    const float stretch_3 = sqrtf(-(across + along + shared_1));
+    const float stretch_3 = sqrtf(-(across + shared_10));
+    const float shared_1 = stretch_1 + stretch_2;
     /* invariants of (C' C)^(1/2) */
-    const float invariant_1 = stretch_1 + stretch_2 + stretch_3;
+    const float invariant_1 = shared_1 + stretch_3;
     const float shared_3 = stretch_1 * stretch_2;
-    const float invariant_2 = shared_3 + stretch_1 * stretch_3 + stretch_2 * stretch_3;
+    const float invariant_2 = stretch_3 * shared_1 + shared_3;
     const float invariant_3 = shared_3 * stretch_3;
     /* i1 C' C + i3 I */
     const float denominator_11 = invariant_3 + gram_11 * invariant_1;
@@ -71,9 +72,8 @@ static inline void one_(const float computed[9], float orthonormalized[9])
     const float adjugate_22 = denominator_11 * denominator_33 - denominator_13 * denominator_13;
     const float adjugate_23 = denominator_12 * denominator_13 - denominator_11 * denominator_23;
     const float adjugate_33 = denominator_11 * denominator_22 - denominator_12 * denominator_12;
-    const float factor_1 = adjugate_11 * denominator_11 + adjugate_12 * denominator_12
-        + adjugate_13 * denominator_13;
-    const float inverse_determinant = 1.0f / factor_1;
+    const float inverse_determinant = 1.0f / (adjugate_11 * denominator_11
+        + adjugate_12 * denominator_12 + adjugate_13 * denominator_13);
     const float shared_4 = adjugate_12 * gram_12;
     const float shared_5 = adjugate_13 * gram_13;
     const float shared_6 = gram_11 + invariant_2;

@@ -27,14 +27,11 @@ static inline void one_(const float computed[9], float orthonormalized[9])
     const float shared_2 = excess_13 * excess_13;
     /* (C' C - I)^2 */
     const float excess_squared_11 = excess_11 * excess_11 + shared_1 + shared_2;
-    const float excess_squared_12 = excess_11 * excess_12 + excess_12 * excess_22
-        + excess_13 * excess_23;
-    const float excess_squared_13 = excess_11 * excess_13 + excess_12 * excess_23
-        + excess_13 * excess_33;
+    const float excess_squared_12 = excess_12 * (excess_11 + excess_22) + excess_13 * excess_23;
+    const float excess_squared_13 = excess_13 * (excess_11 + excess_33) + excess_12 * excess_23;
     const float shared_3 = excess_23 * excess_23;
     const float excess_squared_22 = excess_22 * excess_22 + shared_1 + shared_3;
-    const float excess_squared_23 = excess_12 * excess_13 + excess_22 * excess_23
-        + excess_23 * excess_33;
+    const float excess_squared_23 = excess_23 * (excess_22 + excess_33) + excess_12 * excess_13;
     const float excess_squared_33 = excess_33 * excess_33 + shared_2 + shared_3;
     /* inverse root of C' C to second order */
     const float root_11 = 0.375f * excess_squared_11 - 0.5f * excess_11 + 1.0f;

@@ -22,40 +22,40 @@ static inline void one_(const float state[9], const float increments[6], float n
     const float d2_x = increments[3];
     const float d2_y = increments[4];
     const float d2_z = increments[5];
-    /* rate times the step, at node 0 */
-    const float turn_0_x = 3.0f * d1_x - d2_x;
-    const float turn_0_y = 3.0f * d1_y - d2_y;
-    const float turn_0_z = 3.0f * d1_z - d2_z;
-    /* rate times the step, at node 1 */
-    const float turn_1_x = 3.0f * d2_x - d1_x;
-    const float turn_1_y = 3.0f * d2_y - d1_y;
-    const float turn_1_z = 3.0f * d2_z - d1_z;
-    const float shared_1 = turn_0_y * turn_1_y;
-    const float shared_2 = turn_0_z * turn_1_z;
-    /* derivative times the step at stage 2 */
-    const float slope_2_11 = -(shared_1 + shared_2);
-    const float slope_2_12 = turn_0_y * turn_1_x - turn_1_z;
-    const float slope_2_13 = turn_1_y + turn_0_z * turn_1_x;
-    const float slope_2_21 = turn_1_z + turn_0_x * turn_1_y;
-    const float shared_3 = turn_0_x * turn_1_x;
-    const float slope_2_22 = -(shared_2 + shared_3);
-    const float slope_2_23 = turn_0_z * turn_1_y - turn_1_x;
-    const float slope_2_31 = turn_0_x * turn_1_z - turn_1_y;
-    const float slope_2_32 = turn_1_x + turn_0_y * turn_1_z;
-    const float slope_2_33 = -(shared_1 + shared_3);
-    /* the step applied to the identity */
-    const float A_11 = 0.5f * slope_2_11 + 1.0f;
-    const float shared_4 = 0.5f * turn_0_z;
-    const float A_12 = 0.5f * slope_2_12 - shared_4;
-    const float shared_5 = 0.5f * turn_0_y;
-    const float A_13 = shared_5 + 0.5f * slope_2_13;
-    const float A_21 = shared_4 + 0.5f * slope_2_21;
-    const float A_22 = 0.5f * slope_2_22 + 1.0f;
-    const float shared_6 = 0.5f * turn_0_x;
-    const float A_23 = 0.5f * slope_2_23 - shared_6;
-    const float A_31 = 0.5f * slope_2_31 - shared_5;
-    const float A_32 = shared_6 + 0.5f * slope_2_32;
-    const float A_33 = 0.5f * slope_2_33 + 1.0f;
+    /* rate times the step, at node 0, times 1/3 */
+    const float turn_0_times_1_3_x = d1_x - 0.33333334f * d2_x;
+    const float turn_0_times_1_3_y = d1_y - 0.33333334f * d2_y;
+    const float turn_0_times_1_3_z = d1_z - 0.33333334f * d2_z;
+    /* rate times the step, at node 1, times -1/3 */
+    const float minus_turn_1_times_1_3_x = 0.33333334f * d1_x - d2_x;
+    const float minus_turn_1_times_1_3_y = 0.33333334f * d1_y - d2_y;
+    const float minus_turn_1_times_1_3_z = 0.33333334f * d1_z - d2_z;
+    /* the angle increment of the whole step */
+    const float sigma_x = d1_x + d2_x;
+    const float sigma_y = d1_y + d2_y;
+    const float sigma_z = d1_z + d2_z;
+    /* vector of the skew part */
+    const float skew_x = sigma_x;
+    const float skew_y = sigma_y;
+    const float skew_z = sigma_z;
+    /* left of turn_0_times_1_3 in an outer product */
+    const float partner_left_x = -(4.5f * minus_turn_1_times_1_3_x);
+    const float partner_left_y = -(4.5f * minus_turn_1_times_1_3_y);
+    const float partner_left_z = -(4.5f * minus_turn_1_times_1_3_z);
+    const float turn_0_times_1_3_dot_minus_turn_1_times_1_3 = turn_0_times_1_3_x * minus_turn_1_times_1_3_x
+        + turn_0_times_1_3_y * minus_turn_1_times_1_3_y
+        + turn_0_times_1_3_z * minus_turn_1_times_1_3_z;
+    /* multiple of the unit matrix */
+    const float diagonal = 4.5f * turn_0_times_1_3_dot_minus_turn_1_times_1_3 + 1.0f;
+    const float A_11 = turn_0_times_1_3_x * partner_left_x + diagonal;
+    const float A_22 = turn_0_times_1_3_y * partner_left_y + diagonal;
+    const float A_33 = turn_0_times_1_3_z * partner_left_z + diagonal;
+    const float A_12 = turn_0_times_1_3_y * partner_left_x - skew_z;
+    const float A_21 = turn_0_times_1_3_x * partner_left_y + skew_z;
+    const float A_23 = turn_0_times_1_3_z * partner_left_y - skew_x;
+    const float A_32 = turn_0_times_1_3_y * partner_left_z + skew_x;
+    const float A_31 = turn_0_times_1_3_x * partner_left_z - skew_y;
+    const float A_13 = turn_0_times_1_3_z * partner_left_x + skew_y;
     /* direction cosine matrix, body to reference, after the step */
     const float next_11 = A_11 * C_11 + A_21 * C_12 + A_31 * C_13;
     const float next_12 = A_12 * C_11 + A_22 * C_12 + A_32 * C_13;
@@ -106,49 +106,49 @@ static void prepare_(size_t count, const float *increments, float prepared[9][BL
         const float d2_x = increments_by_element[3][k];
         const float d2_y = increments_by_element[4][k];
         const float d2_z = increments_by_element[5][k];
-        /* rate times the step, at node 0 */
-        const float turn_0_x = 3.0f * d1_x - d2_x;
-        const float turn_0_y = 3.0f * d1_y - d2_y;
-        const float turn_0_z = 3.0f * d1_z - d2_z;
-        /* rate times the step, at node 1 */
-        const float turn_1_x = 3.0f * d2_x - d1_x;
-        const float turn_1_y = 3.0f * d2_y - d1_y;
-        const float turn_1_z = 3.0f * d2_z - d1_z;
-        const float shared_1 = turn_0_y * turn_1_y;
-        const float shared_2 = turn_0_z * turn_1_z;
-        /* derivative times the step at stage 2 */
-        const float slope_2_11 = -(shared_1 + shared_2);
-        const float slope_2_12 = turn_0_y * turn_1_x - turn_1_z;
-        const float slope_2_13 = turn_1_y + turn_0_z * turn_1_x;
-        const float slope_2_21 = turn_1_z + turn_0_x * turn_1_y;
-        const float shared_3 = turn_0_x * turn_1_x;
-        const float slope_2_22 = -(shared_2 + shared_3);
-        const float slope_2_23 = turn_0_z * turn_1_y - turn_1_x;
-        const float slope_2_31 = turn_0_x * turn_1_z - turn_1_y;
-        const float slope_2_32 = turn_1_x + turn_0_y * turn_1_z;
-        const float slope_2_33 = -(shared_1 + shared_3);
-        /* the step applied to the identity */
-        const float A_11 = 0.5f * slope_2_11 + 1.0f;
-        const float shared_4 = 0.5f * turn_0_z;
-        const float A_12 = 0.5f * slope_2_12 - shared_4;
-        const float shared_5 = 0.5f * turn_0_y;
-        const float A_13 = shared_5 + 0.5f * slope_2_13;
-        const float A_21 = shared_4 + 0.5f * slope_2_21;
-        const float A_22 = 0.5f * slope_2_22 + 1.0f;
-        const float shared_6 = 0.5f * turn_0_x;
-        const float A_23 = 0.5f * slope_2_23 - shared_6;
-        const float A_31 = 0.5f * slope_2_31 - shared_5;
-        const float A_32 = shared_6 + 0.5f * slope_2_32;
-        const float A_33 = 0.5f * slope_2_33 + 1.0f;
+        /* rate times the step, at node 0, times 1/3 */
+        const float turn_0_times_1_3_x = d1_x - 0.33333334f * d2_x;
+        const float turn_0_times_1_3_y = d1_y - 0.33333334f * d2_y;
+        const float turn_0_times_1_3_z = d1_z - 0.33333334f * d2_z;
+        /* rate times the step, at node 1, times -1/3 */
+        const float minus_turn_1_times_1_3_x = 0.33333334f * d1_x - d2_x;
+        const float minus_turn_1_times_1_3_y = 0.33333334f * d1_y - d2_y;
+        const float minus_turn_1_times_1_3_z = 0.33333334f * d1_z - d2_z;
+        /* the angle increment of the whole step */
+        const float sigma_x = d1_x + d2_x;
+        const float sigma_y = d1_y + d2_y;
+        const float sigma_z = d1_z + d2_z;
+        /* vector of the skew part */
+        const float skew_x = sigma_x;
+        const float skew_y = sigma_y;
+        const float skew_z = sigma_z;
+        /* left of turn_0_times_1_3 in an outer product */
+        const float partner_left_x = -(4.5f * minus_turn_1_times_1_3_x);
+        const float partner_left_y = -(4.5f * minus_turn_1_times_1_3_y);
+        const float partner_left_z = -(4.5f * minus_turn_1_times_1_3_z);
+        const float turn_0_times_1_3_dot_minus_turn_1_times_1_3 = turn_0_times_1_3_x * minus_turn_1_times_1_3_x
+            + turn_0_times_1_3_y * minus_turn_1_times_1_3_y
+            + turn_0_times_1_3_z * minus_turn_1_times_1_3_z;
+        /* multiple of the unit matrix */
+        const float diagonal = 4.5f * turn_0_times_1_3_dot_minus_turn_1_times_1_3 + 1.0f;
+        const float A_11 = turn_0_times_1_3_x * partner_left_x + diagonal;
+        const float A_22 = turn_0_times_1_3_y * partner_left_y + diagonal;
+        const float A_33 = turn_0_times_1_3_z * partner_left_z + diagonal;
+        const float A_12 = turn_0_times_1_3_y * partner_left_x - skew_z;
+        const float A_21 = turn_0_times_1_3_x * partner_left_y + skew_z;
+        const float A_23 = turn_0_times_1_3_z * partner_left_y - skew_x;
+        const float A_32 = turn_0_times_1_3_y * partner_left_z + skew_x;
+        const float A_31 = turn_0_times_1_3_x * partner_left_z - skew_y;
+        const float A_13 = turn_0_times_1_3_z * partner_left_x + skew_y;
         prepared[0][k] = A_11;
-        prepared[1][k] = A_12;
-        prepared[2][k] = A_13;
-        prepared[3][k] = A_21;
-        prepared[4][k] = A_22;
+        prepared[1][k] = A_22;
+        prepared[2][k] = A_33;
+        prepared[3][k] = A_12;
+        prepared[4][k] = A_21;
         prepared[5][k] = A_23;
-        prepared[6][k] = A_31;
-        prepared[7][k] = A_32;
-        prepared[8][k] = A_33;
+        prepared[6][k] = A_32;
+        prepared[7][k] = A_31;
+        prepared[8][k] = A_13;
     }
 }
 
@@ -166,14 +166,14 @@ static inline void finish_(const float state[9], float prepared[9][BLOCK_], size
     const float C_32 = state[7];
     const float C_33 = state[8];
     const float A_11 = prepared[0][k];
-    const float A_12 = prepared[1][k];
-    const float A_13 = prepared[2][k];
-    const float A_21 = prepared[3][k];
-    const float A_22 = prepared[4][k];
+    const float A_22 = prepared[1][k];
+    const float A_33 = prepared[2][k];
+    const float A_12 = prepared[3][k];
+    const float A_21 = prepared[4][k];
     const float A_23 = prepared[5][k];
-    const float A_31 = prepared[6][k];
-    const float A_32 = prepared[7][k];
-    const float A_33 = prepared[8][k];
+    const float A_32 = prepared[6][k];
+    const float A_31 = prepared[7][k];
+    const float A_13 = prepared[8][k];
     /* direction cosine matrix, body to reference, after the step */
     const float next_11 = A_11 * C_11 + A_21 * C_12 + A_31 * C_13;
     const float next_12 = A_12 * C_11 + A_22 * C_12 + A_32 * C_13;

@@ -6,7 +6,7 @@
  * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter 2,
  *     equation (2.1): dC/dt = C skew(w); rate extraction chapter 3 A; Kutta's third-order method:
  *     W. Kutta, Z. Math. Phys. 46 (1901) 435-453.
- * Operations of one call: 72 add, 96 multiply, 9 negate; 60 temporaries.
+ * Operations of one call: 66 add, 76 multiply; 42 temporaries.
  *
  * No heap, no global state, reentrant. In one call every input is read before any output is written: an
  * output may be the same memory as an input. Matrices are stored by rows.

@@ -22,94 +22,55 @@ static inline void one_(const float state[9], const float increments[6], float n
     const float d2_x = increments[3];
     const float d2_y = increments[4];
     const float d2_z = increments[5];
-    /* rate times the step, at node 0 */
-    const float turn_0_x = 3.0f * d1_x - d2_x;
-    const float turn_0_y = 3.0f * d1_y - d2_y;
-    const float turn_0_z = 3.0f * d1_z - d2_z;
-    /* rate times the step, at node 1/2 */
-    const float turn_1_2_x = d1_x + d2_x;
-    const float turn_1_2_y = d1_y + d2_y;
-    const float turn_1_2_z = d1_z + d2_z;
-    /* rate times the step, at node 1 */
-    const float turn_1_x = 3.0f * d2_x - d1_x;
-    const float turn_1_y = 3.0f * d2_y - d1_y;
-    const float turn_1_z = 3.0f * d2_z - d1_z;
-    const float shared_1 = 0.5f * turn_0_z;
-    /* argument of slope 2, from the identity */
-    const float point_2_12 = -shared_1;
-    const float shared_2 = 0.5f * turn_0_y;
-    const float point_2_13 = shared_2;
-    const float point_2_21 = shared_1;
-    const float shared_3 = 0.5f * turn_0_x;
-    const float point_2_23 = -shared_3;
-    const float point_2_31 = -shared_2;
-    const float point_2_32 = shared_3;
-    /* derivative times the step at stage 2 */
-    const float slope_2_11 = point_2_12 * turn_1_2_z - point_2_13 * turn_1_2_y;
-    const float shared_4 = -turn_1_2_z;
-    const float slope_2_12 = shared_4 + point_2_13 * turn_1_2_x;
-    const float shared_5 = -turn_1_2_y;
-    const float slope_2_13 = -(shared_5 + point_2_12 * turn_1_2_x);
-    const float slope_2_21 = -(shared_4 + point_2_23 * turn_1_2_y);
-    const float slope_2_22 = point_2_23 * turn_1_2_x - point_2_21 * turn_1_2_z;
-    const float shared_6 = -turn_1_2_x;
-    const float slope_2_23 = shared_6 + point_2_21 * turn_1_2_y;
-    const float slope_2_31 = shared_5 + point_2_32 * turn_1_2_z;
-    const float slope_2_32 = -(shared_6 + point_2_31 * turn_1_2_z);
-    const float slope_2_33 = point_2_31 * turn_1_2_y - point_2_32 * turn_1_2_x;
-    /* argument of slope 3, from the identity */
-    const float point_3_11 = 0.5f * slope_2_11 + 1.0f;
-    const float point_3_12 = 0.5f * slope_2_12;
-    const float point_3_13 = 0.5f * slope_2_13;
-    const float point_3_21 = 0.5f * slope_2_21;
-    const float point_3_22 = 0.5f * slope_2_22 + 1.0f;
-    const float point_3_23 = 0.5f * slope_2_23;
-    const float point_3_31 = 0.5f * slope_2_31;
-    const float point_3_32 = 0.5f * slope_2_32;
-    const float point_3_33 = 0.5f * slope_2_33 + 1.0f;
-    /* derivative times the step at stage 3 */
-    const float slope_3_11 = point_3_12 * turn_1_2_z - point_3_13 * turn_1_2_y;
-    const float slope_3_12 = point_3_13 * turn_1_2_x - point_3_11 * turn_1_2_z;
-    const float slope_3_13 = point_3_11 * turn_1_2_y - point_3_12 * turn_1_2_x;
-    const float slope_3_21 = point_3_22 * turn_1_2_z - point_3_23 * turn_1_2_y;
-    const float slope_3_22 = point_3_23 * turn_1_2_x - point_3_21 * turn_1_2_z;
-    const float slope_3_23 = point_3_21 * turn_1_2_y - point_3_22 * turn_1_2_x;
-    const float slope_3_31 = point_3_32 * turn_1_2_z - point_3_33 * turn_1_2_y;
-    const float slope_3_32 = point_3_33 * turn_1_2_x - point_3_31 * turn_1_2_z;
-    const float slope_3_33 = point_3_31 * turn_1_2_y - point_3_32 * turn_1_2_x;
-    /* argument of slope 4, from the identity */
-    const float point_4_11 = slope_3_11 + 1.0f;
-    const float point_4_22 = slope_3_22 + 1.0f;
-    const float point_4_33 = slope_3_33 + 1.0f;
-    /* derivative times the step at stage 4 */
-    const float slope_4_11 = slope_3_12 * turn_1_z - slope_3_13 * turn_1_y;
-    const float slope_4_12 = slope_3_13 * turn_1_x - point_4_11 * turn_1_z;
-    const float slope_4_13 = point_4_11 * turn_1_y - slope_3_12 * turn_1_x;
-    const float slope_4_21 = point_4_22 * turn_1_z - slope_3_23 * turn_1_y;
-    const float slope_4_22 = slope_3_23 * turn_1_x - slope_3_21 * turn_1_z;
-    const float slope_4_23 = slope_3_21 * turn_1_y - point_4_22 * turn_1_x;
-    const float slope_4_31 = slope_3_32 * turn_1_z - point_4_33 * turn_1_y;
-    const float slope_4_32 = point_4_33 * turn_1_x - slope_3_31 * turn_1_z;
-    const float slope_4_33 = slope_3_31 * turn_1_y - slope_3_32 * turn_1_x;
-    /* the step applied to the identity */
-    const float A_11 = 0.33333334f * (slope_2_11 + slope_3_11) + 0.16666667f * slope_4_11 + 1.0f;
-    const float shared_7 = 0.16666667f * turn_0_z;
-    const float A_12 = 0.33333334f * (slope_2_12 + slope_3_12) - shared_7
-        + 0.16666667f * slope_4_12;
-    const float shared_8 = 0.16666667f * turn_0_y;
-    const float A_13 = shared_8 + 0.33333334f * (slope_2_13 + slope_3_13)
-        + 0.16666667f * slope_4_13;
-    const float A_21 = shared_7 + 0.33333334f * (slope_2_21 + slope_3_21)
-        + 0.16666667f * slope_4_21;
-    const float A_22 = 0.33333334f * (slope_2_22 + slope_3_22) + 0.16666667f * slope_4_22 + 1.0f;
-    const float shared_9 = 0.16666667f * turn_0_x;
-    const float A_23 = 0.33333334f * (slope_2_23 + slope_3_23) - shared_9
-        + 0.16666667f * slope_4_23;
-    const float A_31 = 0.33333334f * (slope_2_31 + slope_3_31) - shared_8
-        + 0.16666667f * slope_4_31;
-    const float A_32 = shared_9 + 0.33333334f * (slope_2_32 + slope_3_32)
-        + 0.16666667f * slope_4_32;
-    const float A_33 = 0.33333334f * (slope_2_33 + slope_3_33) + 0.16666667f * slope_4_33 + 1.0f;
+    /* the angle increment of the whole step */
+    const float sigma_x = d1_x + d2_x;
+    const float sigma_y = d1_y + d2_y;
+    const float sigma_z = d1_z + d2_z;
+    const float sigma_cross_d1_x = sigma_y * d1_z - sigma_z * d1_y;
+    const float sigma_cross_d1_y = sigma_z * d1_x - sigma_x * d1_z;
+    const float sigma_cross_d1_z = sigma_x * d1_y - sigma_y * d1_x;
+    const float sigma_dot_sigma = sigma_x * sigma_x + sigma_y * sigma_y + sigma_z * sigma_z;
+    /* weight of sigma in skew */
+    const float skew_sigma = 1.0f - 0.16666667f * sigma_dot_sigma;
+    /* weight of sigma_cross_d1 in skew */
+    const float skew_sigma_cross_d1 = 0.33333334f - skew_sigma;
+    /* vector of the skew part */
+    const float skew_x = skew_sigma * sigma_x + skew_sigma_cross_d1 * sigma_cross_d1_x;
+    const float skew_y = skew_sigma * sigma_y + skew_sigma_cross_d1 * sigma_cross_d1_y;
+    const float skew_z = skew_sigma * sigma_z + skew_sigma_cross_d1 * sigma_cross_d1_z;
+    const float d1_dot_d1 = d1_x * d1_x + d1_y * d1_y + d1_z * d1_z;
+    /* weight of sigma in partner */
+    const float partner_sigma = 0.0625f * sigma_dot_sigma - 0.33333334f * d1_dot_d1 + 0.25f;
+    const float d1_dot_sigma = d1_x * sigma_x + d1_y * sigma_y + d1_z * sigma_z;
+    const float shared_1 = 0.6666667f * d1_dot_sigma;
+    /* weight of d1 in partner */
+    const float partner_d1 = shared_1 - 0.33333334f * sigma_dot_sigma;
+    /* of sigma in outer products */
+    const float partner_x = partner_sigma * sigma_x + partner_d1 * d1_x
+        - 0.33333334f * sigma_cross_d1_x;
+    const float partner_y = partner_sigma * sigma_y + partner_d1 * d1_y
+        - 0.33333334f * sigma_cross_d1_y;
+    const float partner_z = partner_sigma * sigma_z + partner_d1 * d1_z
+        - 0.33333334f * sigma_cross_d1_z;
+    /* multiple of the unit matrix */
+    const float diagonal = sigma_dot_sigma * (shared_1 - 0.125f * sigma_dot_sigma - 0.5f)
+        - d1_dot_sigma * shared_1 + 1.0f;
+    /* half of u y' + y u' on the diagonal */
+    const float half_xx = sigma_x * partner_x;
+    const float A_11 = half_xx + half_xx + diagonal;
+    const float half_yy = sigma_y * partner_y;
+    const float A_22 = half_yy + half_yy + diagonal;
+    const float half_zz = sigma_z * partner_z;
+    const float A_33 = half_zz + half_zz + diagonal;
+    const float symmetric_xy = sigma_x * partner_y + sigma_y * partner_x;
+    const float A_12 = symmetric_xy - skew_z;
+    const float A_21 = symmetric_xy + skew_z;
+    const float symmetric_yz = sigma_y * partner_z + sigma_z * partner_y;
+    const float A_23 = symmetric_yz - skew_x;
+    const float A_32 = symmetric_yz + skew_x;
+    const float symmetric_zx = sigma_z * partner_x + sigma_x * partner_z;
+    const float A_31 = symmetric_zx - skew_y;
+    const float A_13 = symmetric_zx + skew_y;
     /* direction cosine matrix, body to reference, after the step */
     const float next_11 = A_11 * C_11 + A_21 * C_12 + A_31 * C_13;
     const float next_12 = A_12 * C_11 + A_22 * C_12 + A_32 * C_13;
@@ -160,106 +121,64 @@ static void prepare_(size_t count, const float *increments, float prepared[9][BL
         const float d2_x = increments_by_element[3][k];
         const float d2_y = increments_by_element[4][k];
         const float d2_z = increments_by_element[5][k];
-        /* rate times the step, at node 0 */
-        const float turn_0_x = 3.0f * d1_x - d2_x;
-        const float turn_0_y = 3.0f * d1_y - d2_y;
-        const float turn_0_z = 3.0f * d1_z - d2_z;
-        /* rate times the step, at node 1/2 */
-        const float turn_1_2_x = d1_x + d2_x;
-        const float turn_1_2_y = d1_y + d2_y;
-        const float turn_1_2_z = d1_z + d2_z;
-        /* rate times the step, at node 1 */
-        const float turn_1_x = 3.0f * d2_x - d1_x;
-        const float turn_1_y = 3.0f * d2_y - d1_y;
-        const float turn_1_z = 3.0f * d2_z - d1_z;
-        const float shared_1 = 0.5f * turn_0_z;
-        /* argument of slope 2, from the identity */
-        const float point_2_12 = -shared_1;
-        const float shared_2 = 0.5f * turn_0_y;
-        const float point_2_13 = shared_2;
-        const float point_2_21 = shared_1;
-        const float shared_3 = 0.5f * turn_0_x;
-        const float point_2_23 = -shared_3;
-        const float point_2_31 = -shared_2;
-        const float point_2_32 = shared_3;
-        /* derivative times the step at stage 2 */
-        const float slope_2_11 = point_2_12 * turn_1_2_z - point_2_13 * turn_1_2_y;
-        const float shared_4 = -turn_1_2_z;
-        const float slope_2_12 = shared_4 + point_2_13 * turn_1_2_x;
-        const float shared_5 = -turn_1_2_y;
-        const float slope_2_13 = -(shared_5 + point_2_12 * turn_1_2_x);
-        const float slope_2_21 = -(shared_4 + point_2_23 * turn_1_2_y);
-        const float slope_2_22 = point_2_23 * turn_1_2_x - point_2_21 * turn_1_2_z;
-        const float shared_6 = -turn_1_2_x;
-        const float slope_2_23 = shared_6 + point_2_21 * turn_1_2_y;
-        const float slope_2_31 = shared_5 + point_2_32 * turn_1_2_z;
-        const float slope_2_32 = -(shared_6 + point_2_31 * turn_1_2_z);
-        const float slope_2_33 = point_2_31 * turn_1_2_y - point_2_32 * turn_1_2_x;
-        /* argument of slope 3, from the identity */
-        const float point_3_11 = 0.5f * slope_2_11 + 1.0f;
-        const float point_3_12 = 0.5f * slope_2_12;
-        const float point_3_13 = 0.5f * slope_2_13;
-        const float point_3_21 = 0.5f * slope_2_21;
-        const float point_3_22 = 0.5f * slope_2_22 + 1.0f;
-        const float point_3_23 = 0.5f * slope_2_23;
-        const float point_3_31 = 0.5f * slope_2_31;
-        const float point_3_32 = 0.5f * slope_2_32;
-        const float point_3_33 = 0.5f * slope_2_33 + 1.0f;
-        /* derivative times the step at stage 3 */
-        const float slope_3_11 = point_3_12 * turn_1_2_z - point_3_13 * turn_1_2_y;
-        const float slope_3_12 = point_3_13 * turn_1_2_x - point_3_11 * turn_1_2_z;
-        const float slope_3_13 = point_3_11 * turn_1_2_y - point_3_12 * turn_1_2_x;
-        const float slope_3_21 = point_3_22 * turn_1_2_z - point_3_23 * turn_1_2_y;
-        const float slope_3_22 = point_3_23 * turn_1_2_x - point_3_21 * turn_1_2_z;
-        const float slope_3_23 = point_3_21 * turn_1_2_y - point_3_22 * turn_1_2_x;
-        const float slope_3_31 = point_3_32 * turn_1_2_z - point_3_33 * turn_1_2_y;
-        const float slope_3_32 = point_3_33 * turn_1_2_x - point_3_31 * turn_1_2_z;
-        const float slope_3_33 = point_3_31 * turn_1_2_y - point_3_32 * turn_1_2_x;
-        /* argument of slope 4, from the identity */
-        const float point_4_11 = slope_3_11 + 1.0f;
-        const float point_4_22 = slope_3_22 + 1.0f;
-        const float point_4_33 = slope_3_33 + 1.0f;
-        /* derivative times the step at stage 4 */
-        const float slope_4_11 = slope_3_12 * turn_1_z - slope_3_13 * turn_1_y;
-        const float slope_4_12 = slope_3_13 * turn_1_x - point_4_11 * turn_1_z;
-        const float slope_4_13 = point_4_11 * turn_1_y - slope_3_12 * turn_1_x;
-        const float slope_4_21 = point_4_22 * turn_1_z - slope_3_23 * turn_1_y;
-        const float slope_4_22 = slope_3_23 * turn_1_x - slope_3_21 * turn_1_z;
-        const float slope_4_23 = slope_3_21 * turn_1_y - point_4_22 * turn_1_x;
-        const float slope_4_31 = slope_3_32 * turn_1_z - point_4_33 * turn_1_y;
-        const float slope_4_32 = point_4_33 * turn_1_x - slope_3_31 * turn_1_z;
-        const float slope_4_33 = slope_3_31 * turn_1_y - slope_3_32 * turn_1_x;
-        /* the step applied to the identity */
-        const float A_11 = 0.33333334f * (slope_2_11 + slope_3_11) + 0.16666667f * slope_4_11
-            + 1.0f;
-        const float shared_7 = 0.16666667f * turn_0_z;
-        const float A_12 = 0.33333334f * (slope_2_12 + slope_3_12) - shared_7
-            + 0.16666667f * slope_4_12;
-        const float shared_8 = 0.16666667f * turn_0_y;
-        const float A_13 = shared_8 + 0.33333334f * (slope_2_13 + slope_3_13)
-            + 0.16666667f * slope_4_13;
-        const float A_21 = shared_7 + 0.33333334f * (slope_2_21 + slope_3_21)
-            + 0.16666667f * slope_4_21;
-        const float A_22 = 0.33333334f * (slope_2_22 + slope_3_22) + 0.16666667f * slope_4_22
-            + 1.0f;
-        const float shared_9 = 0.16666667f * turn_0_x;
-        const float A_23 = 0.33333334f * (slope_2_23 + slope_3_23) - shared_9
-            + 0.16666667f * slope_4_23;
-        const float A_31 = 0.33333334f * (slope_2_31 + slope_3_31) - shared_8
-            + 0.16666667f * slope_4_31;
-        const float A_32 = shared_9 + 0.33333334f * (slope_2_32 + slope_3_32)
-            + 0.16666667f * slope_4_32;
-        const float A_33 = 0.33333334f * (slope_2_33 + slope_3_33) + 0.16666667f * slope_4_33
-            + 1.0f;
+        /* the angle increment of the whole step */
+        const float sigma_x = d1_x + d2_x;
+        const float sigma_y = d1_y + d2_y;
+        const float sigma_z = d1_z + d2_z;
+        const float sigma_cross_d1_x = sigma_y * d1_z - sigma_z * d1_y;
+        const float sigma_cross_d1_y = sigma_z * d1_x - sigma_x * d1_z;
+        const float sigma_cross_d1_z = sigma_x * d1_y - sigma_y * d1_x;
+        const float sigma_dot_sigma = sigma_x * sigma_x + sigma_y * sigma_y + sigma_z * sigma_z;
+        /* weight of sigma in skew */
+        const float skew_sigma = 1.0f - 0.16666667f * sigma_dot_sigma;
+        /* weight of sigma_cross_d1 in skew */
+        const float skew_sigma_cross_d1 = 0.33333334f - skew_sigma;
+        /* vector of the skew part */
+        const float skew_x = skew_sigma * sigma_x + skew_sigma_cross_d1 * sigma_cross_d1_x;
+        const float skew_y = skew_sigma * sigma_y + skew_sigma_cross_d1 * sigma_cross_d1_y;
+        const float skew_z = skew_sigma * sigma_z + skew_sigma_cross_d1 * sigma_cross_d1_z;
+        const float d1_dot_d1 = d1_x * d1_x + d1_y * d1_y + d1_z * d1_z;
+        /* weight of sigma in partner */
+        const float partner_sigma = 0.0625f * sigma_dot_sigma - 0.33333334f * d1_dot_d1 + 0.25f;
+        const float d1_dot_sigma = d1_x * sigma_x + d1_y * sigma_y + d1_z * sigma_z;
+        const float shared_1 = 0.6666667f * d1_dot_sigma;
+        /* weight of d1 in partner */
+        const float partner_d1 = shared_1 - 0.33333334f * sigma_dot_sigma;
+        /* of sigma in outer products */
+        const float partner_x = partner_sigma * sigma_x + partner_d1 * d1_x
+            - 0.33333334f * sigma_cross_d1_x;
+        const float partner_y = partner_sigma * sigma_y + partner_d1 * d1_y
+            - 0.33333334f * sigma_cross_d1_y;
+        const float partner_z = partner_sigma * sigma_z + partner_d1 * d1_z
+            - 0.33333334f * sigma_cross_d1_z;
+        /* multiple of the unit matrix */
+        const float diagonal = sigma_dot_sigma * (shared_1 - 0.125f * sigma_dot_sigma - 0.5f)
+            - d1_dot_sigma * shared_1 + 1.0f;
+        /* half of u y' + y u' on the diagonal */
+        const float half_xx = sigma_x * partner_x;
+        const float A_11 = half_xx + half_xx + diagonal;
+        const float half_yy = sigma_y * partner_y;
+        const float A_22 = half_yy + half_yy + diagonal;
+        const float half_zz = sigma_z * partner_z;
+        const float A_33 = half_zz + half_zz + diagonal;
+        const float symmetric_xy = sigma_x * partner_y + sigma_y * partner_x;
+        const float A_12 = symmetric_xy - skew_z;
+        const float A_21 = symmetric_xy + skew_z;
+        const float symmetric_yz = sigma_y * partner_z + sigma_z * partner_y;
+        const float A_23 = symmetric_yz - skew_x;
+        const float A_32 = symmetric_yz + skew_x;
+        const float symmetric_zx = sigma_z * partner_x + sigma_x * partner_z;
+        const float A_31 = symmetric_zx - skew_y;
+        const float A_13 = symmetric_zx + skew_y;
         prepared[0][k] = A_11;
-        prepared[1][k] = A_12;
-        prepared[2][k] = A_13;
-        prepared[3][k] = A_21;
-        prepared[4][k] = A_22;
+        prepared[1][k] = A_22;
+        prepared[2][k] = A_33;
+        prepared[3][k] = A_12;
+        prepared[4][k] = A_21;
         prepared[5][k] = A_23;
-        prepared[6][k] = A_31;
-        prepared[7][k] = A_32;
-        prepared[8][k] = A_33;
+        prepared[6][k] = A_32;
+        prepared[7][k] = A_31;
+        prepared[8][k] = A_13;
     }
 }
 
@@ -277,14 +196,14 @@ static inline void finish_(const float state[9], float prepared[9][BLOCK_], size
     const float C_32 = state[7];
     const float C_33 = state[8];
     const float A_11 = prepared[0][k];
-    const float A_12 = prepared[1][k];
-    const float A_13 = prepared[2][k];
-    const float A_21 = prepared[3][k];
-    const float A_22 = prepared[4][k];
+    const float A_22 = prepared[1][k];
+    const float A_33 = prepared[2][k];
+    const float A_12 = prepared[3][k];
+    const float A_21 = prepared[4][k];
     const float A_23 = prepared[5][k];
-    const float A_31 = prepared[6][k];
-    const float A_32 = prepared[7][k];
-    const float A_33 = prepared[8][k];
+    const float A_32 = prepared[6][k];
+    const float A_31 = prepared[7][k];
+    const float A_13 = prepared[8][k];
     /* direction cosine matrix, body to reference, after the step */
     const float next_11 = A_11 * C_11 + A_21 * C_12 + A_31 * C_13;
     const float next_12 = A_12 * C_11 + A_22 * C_12 + A_32 * C_13;

@@ -11,12 +11,11 @@ static inline void one_(float middle, float width, float a0, float a1, float a2,
     const float shared_3 = width * width;
     const float shared_1 = shared_3 * width;
     const float shared_2 = middle * middle;
-    const float factor_1 = shared_3;
+    const float shared_4 = shared_2 * a4;
     /* angle increment over the interval, body axes */
-    const float increment_y = a0 * width + a1 * middle * width + a2 * shared_2 * width
-        + a3 * (shared_2 * middle) * width + a4 * (shared_2 * shared_2) * width
-        + 0.083333336f * (a2 * shared_1) + 0.0125f * (a4 * (factor_1 * factor_1 * width))
-        + 0.25f * (a3 * middle * shared_1) + 0.5f * (a4 * shared_1 * shared_2);
+    const float increment_y = width * (middle * (a1 + shared_2 * a3) + shared_2 * (a2 + shared_4)
+        + a0 + 0.0125f * (a4 * shared_3 * shared_3)) + shared_1 * (0.25f * (middle * a3)
+        + 0.083333336f * a2 + 0.5f * shared_4);
     increment[0] = 0.0f;
     increment[1] = increment_y;
     increment[2] = 0.0f;

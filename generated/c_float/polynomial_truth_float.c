@@ -10,20 +10,18 @@
 static inline void one_(float time, float a0, float a1, float a2, float a3, float a4, float rate[3],
     float attitude[9])
 {
-    const float shared_1 = time * time;
-    const float shared_2 = shared_1 * time;
-    const float shared_3 = shared_1 * shared_1;
+    const float factor_1 = time * time;
+    const float shared_2 = factor_1 * factor_1;
+    const float shared_3 = a4 * shared_2;
     /* body rate, body axes */
-    const float rate_y = a0 + a1 * time + a2 * shared_1 + a3 * shared_2 + a4 * shared_3;
-    const float shared_4 = a0 * time + 0.5f * (a1 * shared_1) + 0.33333334f * (a2 * shared_2)
-        + 0.25f * (a3 * shared_3) + 0.2f * (a4 * (shared_3 * time));
-    const float shared_5 = cosf(shared_4);
+    const float rate_y = time * (time * (time * a3 + a2) + a1) + a0 + shared_3;
+    const float shared_1 = time * (time * (0.33333334f * (time * a2) + 0.5f * a1) + a0
+        + 0.2f * shared_3) + 0.25f * (a3 * shared_2);
     /* direction cosine matrix, body to reference */
-    const float C_11 = shared_5;
-    const float shared_6 = sinf(shared_4);
-    const float C_13 = shared_6;
-    const float C_31 = -shared_6;
-    const float C_33 = shared_5;
+    const float C_11 = cosf(shared_1);
+    const float C_13 = sinf(shared_1);
+    const float C_31 = -C_13;
+    const float C_33 = C_11;
     rate[0] = 0.0f;
     rate[1] = rate_y;
     rate[2] = 0.0f;

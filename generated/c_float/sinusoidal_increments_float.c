@@ -16,7 +16,7 @@ static float sinc_(float x)
 static inline void one_(float middle, float width, float a, float b, float increment[3])
 {
     /* angle increment over the interval, body axes */
-    const float increment_y = a * width * cosf(b * middle) * sinc_(0.5f * b * width);
+    const float increment_y = a * width * cosf(b * middle) * sinc_(0.5f * (b * width));
     increment[0] = 0.0f;
     increment[1] = increment_y;
     increment[2] = 0.0f;

@@ -71,7 +71,7 @@ def cayley_klein_from_dcm(state, out=None):
         np.where(four_ss >= largest, four_sz, np.where(four_xx >= largest, four_zx, np.where(four_yy >= largest, four_yz, four_zz)))
     )
     # makes the scalar part positive
-    factor = 0.5 * np.where(column_s >= 0.0, 1.0, -1.0) / np.sqrt(largest)
+    factor = 0.5 * (np.where(column_s >= 0.0, 1.0, -1.0) / np.sqrt(largest))
     # Cayley-Klein parameters, body to reference, scalar first
     next_s = column_s * factor
     next_x = column_x * factor

@@ -50,7 +50,7 @@ def coning_increments(middle, width, a, b, g, out=None):
     b = np.asarray(b)
     g = np.asarray(g)
     shared_1 = b * middle
-    shared_2 = a * width * _sinc(0.5 * b * width)
+    shared_2 = a * width * _sinc(0.5 * (b * width))
     # angle increment over the interval, body axes
     increment_x = shared_2 * np.sin(shared_1)
     increment_y = g * width

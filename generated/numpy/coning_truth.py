@@ -19,7 +19,7 @@ def _sinc(x):
 def coning_truth(time, a, b, g):
     """True attitude: coning on a constant pitch rate: rate (a sin(b t), g, a cos(b t)).
 
-    Operations: 11 add, 29 multiply, 1 sqrt, 3 negate, 4 function; 21 temporaries.
+    Operations: 11 add, 28 multiply, 1 sqrt, 2 negate, 4 function; 22 temporaries.
 
     Parameters
     ----------
@@ -60,7 +60,8 @@ def coning_truth(time, a, b, g):
     shared_6 = b + g
     shared_7 = time * time
     shared_8 = a * a * shared_7
-    shared_9 = shared_6 * shared_6 * shared_7
+    shared_21 = shared_6 * shared_7
+    shared_9 = shared_21 * shared_6
     shared_10 = np.sqrt(shared_8 + shared_9)
     shared_11 = time * _sinc(shared_10)
     shared_12 = shared_11 * shared_6
@@ -69,13 +70,13 @@ def coning_truth(time, a, b, g):
     shared_14 = 0.5 * (factor_1 * factor_1)
     shared_15 = shared_14 * shared_9
     shared_16 = shared_14 * shared_8 - 1.0
-    shared_17 = -(shared_15 + shared_16)
+    shared_17 = shared_15 + shared_16
     # direction cosine matrix, body to reference
-    C_11 = shared_13 + shared_17 * shared_4
+    C_11 = shared_13 - shared_17 * shared_4
     C_12 = -(a * shared_11)
     shared_18 = shared_12 * shared_4
-    C_13 = shared_18 - shared_17 * shared_2
-    shared_19 = shared_14 * shared_6 * shared_7
+    C_13 = shared_18 + shared_17 * shared_2
+    shared_19 = shared_14 * shared_21
     C_21 = shared_11 * shared_5 + shared_19 * shared_3
     C_22 = -shared_16
     C_23 = shared_19 * shared_5 - shared_11 * shared_3

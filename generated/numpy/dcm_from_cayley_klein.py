@@ -13,7 +13,7 @@ import numpy as np
 def dcm_from_cayley_klein(state, out=None):
     """Direction cosine matrix from Cayley-Klein parameters.
 
-    Operations: 14 add, 17 multiply, 2 negate; 13 temporaries.
+    Operations: 13 add, 13 multiply; 14 temporaries.
 
     Parameters
     ----------
@@ -37,27 +37,28 @@ def dcm_from_cayley_klein(state, out=None):
     a_z = state[..., 3]
     shared_1 = a_x * a_x
     shared_2 = a_y * a_y
-    shared_3 = -shared_2
     shared_4 = a_s * a_s
     shared_5 = a_z * a_z
     shared_6 = shared_4 - shared_5
+    shared_13 = shared_1 - shared_2
     # direction cosine matrix, body to reference
-    C_11 = shared_1 + shared_3 + shared_6
+    C_11 = shared_13 + shared_6
     shared_7 = 2.0 * a_s
     shared_8 = a_z * shared_7
-    C_12 = 2.0 * (a_x * a_y) - shared_8
+    shared_11 = 2.0 * a_x
+    shared_10 = a_y * shared_11
+    C_12 = shared_10 - shared_8
     shared_9 = a_y * shared_7
-    shared_10 = 2.0 * a_x
-    C_13 = shared_9 + a_z * shared_10
-    C_21 = shared_8 + a_y * shared_10
-    shared_11 = -shared_1
-    C_22 = shared_11 + shared_2 + shared_6
+    shared_14 = a_z * shared_11
+    C_13 = shared_9 + shared_14
+    C_21 = shared_8 + shared_10
+    C_22 = shared_6 - shared_13
     shared_12 = a_x * shared_7
-    shared_13 = 2.0 * (a_y * a_z)
-    C_23 = shared_13 - shared_12
-    C_31 = 2.0 * (a_x * a_z) - shared_9
-    C_32 = shared_12 + shared_13
-    C_33 = shared_11 + shared_3 + shared_4 + shared_5
+    shared_3 = 2.0 * (a_y * a_z)
+    C_23 = shared_3 - shared_12
+    C_31 = shared_14 - shared_9
+    C_32 = shared_12 + shared_3
+    C_33 = shared_4 - shared_1 - shared_2 + shared_5
     batch = np.broadcast_shapes(state.shape[:-1])
     dtype = np.result_type(state.dtype, np.float32)
     attitude = np.empty((*batch, 3, 3), dtype) if out is None else out

@@ -15,7 +15,7 @@ import numpy as np
 def dcm_orthonormalize_optimal(computed, out=None):
     """Direction cosine matrix: the nearest rotation, least sum of squared differences.
 
-    Operations: 87 add, 129 multiply, 1 divide, 6 sqrt, 2 negate, 1 select, 3 function; 54 temporaries.
+    Operations: 85 add, 128 multiply, 1 divide, 6 sqrt, 1 negate, 1 select, 3 function; 54 temporaries.
 
     Parameters
     ----------
@@ -51,11 +51,10 @@ def dcm_orthonormalize_optimal(computed, out=None):
     gram_33 = C_13 * C_13 + C_23 * C_23 + C_33 * C_33
     # mean of the eigenvalues of C' C
     mean = 0.3333333333333333 * (gram_11 + gram_22 + gram_33)
-    shared_1 = -mean
     # C' C less its mean
-    deviator_11 = gram_11 + shared_1
-    deviator_22 = gram_22 + shared_1
-    deviator_33 = gram_33 + shared_1
+    deviator_11 = gram_11 - mean
+    deviator_22 = gram_22 - mean
+    deviator_33 = gram_33 - mean
     shared_2 = gram_23 * gram_23
     # mean square spread of the eigenvalues, halved
     spread = (
@@ -77,14 +76,16 @@ def dcm_orthonormalize_optimal(computed, out=None):
     across = np.sqrt(3.0) * radius * np.sin(angle)
     # singular value 1 of C
     stretch_1 = np.sqrt(2.0 * along + mean)
+    shared_10 = along - mean
     # singular value 2 of C
-    stretch_2 = np.sqrt(across - along + mean)
+    stretch_2 = np.sqrt(across - shared_10)
     # singular value 3 of C
-    stretch_3 = np.sqrt(-(across + along + shared_1))
+    stretch_3 = np.sqrt(-(across + shared_10))
+    shared_1 = stretch_1 + stretch_2
     # invariants of (C' C)^(1/2)
-    invariant_1 = stretch_1 + stretch_2 + stretch_3
+    invariant_1 = shared_1 + stretch_3
     shared_3 = stretch_1 * stretch_2
-    invariant_2 = shared_3 + stretch_1 * stretch_3 + stretch_2 * stretch_3
+    invariant_2 = stretch_3 * shared_1 + shared_3
     invariant_3 = shared_3 * stretch_3
     # i1 C' C + i3 I
     denominator_11 = invariant_3 + gram_11 * invariant_1
@@ -100,10 +101,9 @@ def dcm_orthonormalize_optimal(computed, out=None):
     adjugate_22 = denominator_11 * denominator_33 - denominator_13 * denominator_13
     adjugate_23 = denominator_12 * denominator_13 - denominator_11 * denominator_23
     adjugate_33 = denominator_11 * denominator_22 - denominator_12 * denominator_12
-    factor_1 = (
-        adjugate_11 * denominator_11 + adjugate_12 * denominator_12 + adjugate_13 * denominator_13
+    inverse_determinant = (
+        1.0 / (adjugate_11 * denominator_11 + adjugate_12 * denominator_12 + adjugate_13 * denominator_13)
     )
-    inverse_determinant = 1.0 / factor_1
     shared_4 = adjugate_12 * gram_12
     shared_5 = adjugate_13 * gram_13
     shared_6 = gram_11 + invariant_2

@@ -14,7 +14,7 @@ import numpy as np
 def dcm_orthonormalize_second_order(computed, out=None):
     """Direction cosine matrix: the nearest rotation to second order in C'C - I.
 
-    Operations: 54 add, 72 multiply; 21 temporaries.
+    Operations: 54 add, 69 multiply; 21 temporaries.
 
     Parameters
     ----------
@@ -52,11 +52,11 @@ def dcm_orthonormalize_second_order(computed, out=None):
     shared_2 = excess_13 * excess_13
     # (C' C - I)^2
     excess_squared_11 = excess_11 * excess_11 + shared_1 + shared_2
-    excess_squared_12 = excess_11 * excess_12 + excess_12 * excess_22 + excess_13 * excess_23
-    excess_squared_13 = excess_11 * excess_13 + excess_12 * excess_23 + excess_13 * excess_33
+    excess_squared_12 = excess_12 * (excess_11 + excess_22) + excess_13 * excess_23
+    excess_squared_13 = excess_13 * (excess_11 + excess_33) + excess_12 * excess_23
     shared_3 = excess_23 * excess_23
     excess_squared_22 = excess_22 * excess_22 + shared_1 + shared_3
-    excess_squared_23 = excess_12 * excess_13 + excess_22 * excess_23 + excess_23 * excess_33
+    excess_squared_23 = excess_23 * (excess_22 + excess_33) + excess_12 * excess_13
     excess_squared_33 = excess_33 * excess_33 + shared_2 + shared_3
     # inverse root of C' C to second order
     root_11 = 0.375 * excess_squared_11 - 0.5 * excess_11 + 1.0

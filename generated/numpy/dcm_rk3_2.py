@@ -14,7 +14,7 @@ import numpy as np
 def dcm_rk3_2(state, increments, out=None):
     """Direction cosine matrix: step by Kutta's third-order method from 2 angle increments.
 
-    Operations: 72 add, 96 multiply, 9 negate; 60 temporaries.
+    Operations: 66 add, 76 multiply; 42 temporaries.
 
     Parameters
     ----------
@@ -52,74 +52,57 @@ def dcm_rk3_2(state, increments, out=None):
     d2_x = increments[..., 1, 0]
     d2_y = increments[..., 1, 1]
     d2_z = increments[..., 1, 2]
-    # rate times the step, at node 0
-    turn_0_x = 3.0 * d1_x - d2_x
-    turn_0_y = 3.0 * d1_y - d2_y
-    turn_0_z = 3.0 * d1_z - d2_z
-    # rate times the step, at node 1/2
-    turn_1_2_x = d1_x + d2_x
-    turn_1_2_y = d1_y + d2_y
-    turn_1_2_z = d1_z + d2_z
-    # rate times the step, at node 1
-    turn_1_x = 3.0 * d2_x - d1_x
-    turn_1_y = 3.0 * d2_y - d1_y
-    turn_1_z = 3.0 * d2_z - d1_z
-    shared_1 = 0.5 * turn_0_z
-    # argument of slope 2, from the identity
-    point_2_12 = -shared_1
-    shared_2 = 0.5 * turn_0_y
-    point_2_13 = shared_2
-    point_2_21 = shared_1
-    shared_3 = 0.5 * turn_0_x
-    point_2_23 = -shared_3
-    point_2_31 = -shared_2
-    point_2_32 = shared_3
-    # derivative times the step at stage 2
-    slope_2_11 = point_2_12 * turn_1_2_z - point_2_13 * turn_1_2_y
-    shared_4 = -turn_1_2_z
-    slope_2_12 = shared_4 + point_2_13 * turn_1_2_x
-    shared_5 = -turn_1_2_y
-    slope_2_13 = -(shared_5 + point_2_12 * turn_1_2_x)
-    slope_2_21 = -(shared_4 + point_2_23 * turn_1_2_y)
-    slope_2_22 = point_2_23 * turn_1_2_x - point_2_21 * turn_1_2_z
-    shared_6 = -turn_1_2_x
-    slope_2_23 = shared_6 + point_2_21 * turn_1_2_y
-    slope_2_31 = shared_5 + point_2_32 * turn_1_2_z
-    slope_2_32 = -(shared_6 + point_2_31 * turn_1_2_z)
-    slope_2_33 = point_2_31 * turn_1_2_y - point_2_32 * turn_1_2_x
-    # argument of slope 3, from the identity
-    point_3_11 = 2.0 * slope_2_11 + 1.0
-    point_3_12 = 2.0 * slope_2_12 + turn_0_z
-    point_3_13 = 2.0 * slope_2_13 - turn_0_y
-    point_3_21 = 2.0 * slope_2_21 - turn_0_z
-    point_3_22 = 2.0 * slope_2_22 + 1.0
-    point_3_23 = 2.0 * slope_2_23 + turn_0_x
-    point_3_31 = 2.0 * slope_2_31 + turn_0_y
-    point_3_32 = 2.0 * slope_2_32 - turn_0_x
-    point_3_33 = 2.0 * slope_2_33 + 1.0
-    # derivative times the step at stage 3
-    slope_3_11 = point_3_12 * turn_1_z - point_3_13 * turn_1_y
-    slope_3_12 = point_3_13 * turn_1_x - point_3_11 * turn_1_z
-    slope_3_13 = point_3_11 * turn_1_y - point_3_12 * turn_1_x
-    slope_3_21 = point_3_22 * turn_1_z - point_3_23 * turn_1_y
-    slope_3_22 = point_3_23 * turn_1_x - point_3_21 * turn_1_z
-    slope_3_23 = point_3_21 * turn_1_y - point_3_22 * turn_1_x
-    slope_3_31 = point_3_32 * turn_1_z - point_3_33 * turn_1_y
-    slope_3_32 = point_3_33 * turn_1_x - point_3_31 * turn_1_z
-    slope_3_33 = point_3_31 * turn_1_y - point_3_32 * turn_1_x
-    # the step applied to the identity
-    A_11 = 0.6666666666666666 * slope_2_11 + 0.16666666666666666 * slope_3_11 + 1.0
-    shared_7 = 0.16666666666666666 * turn_0_z
-    A_12 = 0.6666666666666666 * slope_2_12 - shared_7 + 0.16666666666666666 * slope_3_12
-    shared_8 = 0.16666666666666666 * turn_0_y
-    A_13 = shared_8 + 0.6666666666666666 * slope_2_13 + 0.16666666666666666 * slope_3_13
-    A_21 = shared_7 + 0.6666666666666666 * slope_2_21 + 0.16666666666666666 * slope_3_21
-    A_22 = 0.6666666666666666 * slope_2_22 + 0.16666666666666666 * slope_3_22 + 1.0
-    shared_9 = 0.16666666666666666 * turn_0_x
-    A_23 = 0.6666666666666666 * slope_2_23 - shared_9 + 0.16666666666666666 * slope_3_23
-    A_31 = 0.6666666666666666 * slope_2_31 - shared_8 + 0.16666666666666666 * slope_3_31
-    A_32 = shared_9 + 0.6666666666666666 * slope_2_32 + 0.16666666666666666 * slope_3_32
-    A_33 = 0.6666666666666666 * slope_2_33 + 0.16666666666666666 * slope_3_33 + 1.0
+    # the angle increment of the whole step
+    sigma_x = d1_x + d2_x
+    sigma_y = d1_y + d2_y
+    sigma_z = d1_z + d2_z
+    # first half minus second half
+    delta_x = d1_x - d2_x
+    delta_y = d1_y - d2_y
+    delta_z = d1_z - d2_z
+    delta_cross_sigma_x = delta_y * sigma_z - delta_z * sigma_y
+    delta_cross_sigma_y = delta_z * sigma_x - delta_x * sigma_z
+    delta_cross_sigma_z = delta_x * sigma_y - delta_y * sigma_x
+    sigma_dot_sigma = sigma_x * sigma_x + sigma_y * sigma_y + sigma_z * sigma_z
+    # weight of sigma in skew
+    skew_sigma = 1.0 - 0.16666666666666666 * sigma_dot_sigma
+    sigma_dot_delta = sigma_x * delta_x + sigma_y * delta_y + sigma_z * delta_z
+    # weight of delta in skew
+    skew_delta = 0.6666666666666666 * sigma_dot_delta
+    shared_1 = 0.3333333333333333 * delta_cross_sigma_x
+    # vector of the skew part
+    skew_x = skew_sigma * sigma_x + skew_delta * delta_x + shared_1
+    shared_2 = 0.3333333333333333 * delta_cross_sigma_y
+    skew_y = skew_sigma * sigma_y + skew_delta * delta_y + shared_2
+    shared_3 = 0.3333333333333333 * delta_cross_sigma_z
+    skew_z = skew_sigma * sigma_z + skew_delta * delta_z + shared_3
+    # of sigma in outer products
+    partner_sigma_x = 0.25 * sigma_x + shared_1
+    partner_sigma_y = 0.25 * sigma_y + shared_2
+    partner_sigma_z = 0.25 * sigma_z + shared_3
+    # of delta in outer products
+    partner_delta_x = 0.6666666666666666 * delta_x
+    partner_delta_y = 0.6666666666666666 * delta_y
+    partner_delta_z = 0.6666666666666666 * delta_z
+    delta_dot_delta = delta_x * delta_x + delta_y * delta_y + delta_z * delta_z
+    # multiple of the unit matrix
+    diagonal = 1.0 - 0.6666666666666666 * delta_dot_delta - 0.5 * sigma_dot_sigma
+    # half of u y' + y u' on the diagonal
+    half_xx = sigma_x * partner_sigma_x
+    A_11 = delta_x * partner_delta_x + half_xx + half_xx + diagonal
+    half_yy = sigma_y * partner_sigma_y
+    A_22 = delta_y * partner_delta_y + half_yy + half_yy + diagonal
+    half_zz = sigma_z * partner_sigma_z
+    A_33 = delta_z * partner_delta_z + half_zz + half_zz + diagonal
+    symmetric_xy = sigma_x * partner_sigma_y + delta_x * partner_delta_y + sigma_y * partner_sigma_x
+    A_12 = symmetric_xy - skew_z
+    A_21 = symmetric_xy + skew_z
+    symmetric_yz = sigma_y * partner_sigma_z + delta_y * partner_delta_z + sigma_z * partner_sigma_y
+    A_23 = symmetric_yz - skew_x
+    A_32 = symmetric_yz + skew_x
+    symmetric_zx = sigma_z * partner_sigma_x + delta_z * partner_delta_x + sigma_x * partner_sigma_z
+    A_31 = symmetric_zx - skew_y
+    A_13 = symmetric_zx + skew_y
     # direction cosine matrix, body to reference, after the step
     next_11 = A_11 * C_11 + A_21 * C_12 + A_31 * C_13
     next_12 = A_12 * C_11 + A_22 * C_12 + A_32 * C_13
@@ -148,7 +131,7 @@ def dcm_rk3_2(state, increments, out=None):
 def dcm_rk3_2_transition(increments, out=None):
     """Direction cosine matrix: step by Kutta's third-order method from 2 angle increments: its transition.
 
-    Operations: 54 add, 69 multiply, 9 negate; 51 temporaries.
+    Operations: 48 add, 49 multiply; 33 temporaries.
 
     Parameters
     ----------
@@ -172,74 +155,57 @@ def dcm_rk3_2_transition(increments, out=None):
     d2_x = increments[..., 1, 0]
     d2_y = increments[..., 1, 1]
     d2_z = increments[..., 1, 2]
-    # rate times the step, at node 0
-    turn_0_x = 3.0 * d1_x - d2_x
-    turn_0_y = 3.0 * d1_y - d2_y
-    turn_0_z = 3.0 * d1_z - d2_z
-    # rate times the step, at node 1/2
-    turn_1_2_x = d1_x + d2_x
-    turn_1_2_y = d1_y + d2_y
-    turn_1_2_z = d1_z + d2_z
-    # rate times the step, at node 1
-    turn_1_x = 3.0 * d2_x - d1_x
-    turn_1_y = 3.0 * d2_y - d1_y
-    turn_1_z = 3.0 * d2_z - d1_z
-    shared_1 = 0.5 * turn_0_z
-    # argument of slope 2, from the identity
-    point_2_12 = -shared_1
-    shared_2 = 0.5 * turn_0_y
-    point_2_13 = shared_2
-    point_2_21 = shared_1
-    shared_3 = 0.5 * turn_0_x
-    point_2_23 = -shared_3
-    point_2_31 = -shared_2
-    point_2_32 = shared_3
-    # derivative times the step at stage 2
-    slope_2_11 = point_2_12 * turn_1_2_z - point_2_13 * turn_1_2_y
-    shared_4 = -turn_1_2_z
-    slope_2_12 = shared_4 + point_2_13 * turn_1_2_x
-    shared_5 = -turn_1_2_y
-    slope_2_13 = -(shared_5 + point_2_12 * turn_1_2_x)
-    slope_2_21 = -(shared_4 + point_2_23 * turn_1_2_y)
-    slope_2_22 = point_2_23 * turn_1_2_x - point_2_21 * turn_1_2_z
-    shared_6 = -turn_1_2_x
-    slope_2_23 = shared_6 + point_2_21 * turn_1_2_y
-    slope_2_31 = shared_5 + point_2_32 * turn_1_2_z
-    slope_2_32 = -(shared_6 + point_2_31 * turn_1_2_z)
-    slope_2_33 = point_2_31 * turn_1_2_y - point_2_32 * turn_1_2_x
-    # argument of slope 3, from the identity
-    point_3_11 = 2.0 * slope_2_11 + 1.0
-    point_3_12 = 2.0 * slope_2_12 + turn_0_z
-    point_3_13 = 2.0 * slope_2_13 - turn_0_y
-    point_3_21 = 2.0 * slope_2_21 - turn_0_z
-    point_3_22 = 2.0 * slope_2_22 + 1.0
-    point_3_23 = 2.0 * slope_2_23 + turn_0_x
-    point_3_31 = 2.0 * slope_2_31 + turn_0_y
-    point_3_32 = 2.0 * slope_2_32 - turn_0_x
-    point_3_33 = 2.0 * slope_2_33 + 1.0
-    # derivative times the step at stage 3
-    slope_3_11 = point_3_12 * turn_1_z - point_3_13 * turn_1_y
-    slope_3_12 = point_3_13 * turn_1_x - point_3_11 * turn_1_z
-    slope_3_13 = point_3_11 * turn_1_y - point_3_12 * turn_1_x
-    slope_3_21 = point_3_22 * turn_1_z - point_3_23 * turn_1_y
-    slope_3_22 = point_3_23 * turn_1_x - point_3_21 * turn_1_z
-    slope_3_23 = point_3_21 * turn_1_y - point_3_22 * turn_1_x
-    slope_3_31 = point_3_32 * turn_1_z - point_3_33 * turn_1_y
-    slope_3_32 = point_3_33 * turn_1_x - point_3_31 * turn_1_z
-    slope_3_33 = point_3_31 * turn_1_y - point_3_32 * turn_1_x
-    # the step applied to the identity
-    A_11 = 0.6666666666666666 * slope_2_11 + 0.16666666666666666 * slope_3_11 + 1.0
-    shared_7 = 0.16666666666666666 * turn_0_z
-    A_12 = 0.6666666666666666 * slope_2_12 - shared_7 + 0.16666666666666666 * slope_3_12
-    shared_8 = 0.16666666666666666 * turn_0_y
-    A_13 = shared_8 + 0.6666666666666666 * slope_2_13 + 0.16666666666666666 * slope_3_13
-    A_21 = shared_7 + 0.6666666666666666 * slope_2_21 + 0.16666666666666666 * slope_3_21
-    A_22 = 0.6666666666666666 * slope_2_22 + 0.16666666666666666 * slope_3_22 + 1.0
-    shared_9 = 0.16666666666666666 * turn_0_x
-    A_23 = 0.6666666666666666 * slope_2_23 - shared_9 + 0.16666666666666666 * slope_3_23
-    A_31 = 0.6666666666666666 * slope_2_31 - shared_8 + 0.16666666666666666 * slope_3_31
-    A_32 = shared_9 + 0.6666666666666666 * slope_2_32 + 0.16666666666666666 * slope_3_32
-    A_33 = 0.6666666666666666 * slope_2_33 + 0.16666666666666666 * slope_3_33 + 1.0
+    # the angle increment of the whole step
+    sigma_x = d1_x + d2_x
+    sigma_y = d1_y + d2_y
+    sigma_z = d1_z + d2_z
+    # first half minus second half
+    delta_x = d1_x - d2_x
+    delta_y = d1_y - d2_y
+    delta_z = d1_z - d2_z
+    delta_cross_sigma_x = delta_y * sigma_z - delta_z * sigma_y
+    delta_cross_sigma_y = delta_z * sigma_x - delta_x * sigma_z
+    delta_cross_sigma_z = delta_x * sigma_y - delta_y * sigma_x
+    sigma_dot_sigma = sigma_x * sigma_x + sigma_y * sigma_y + sigma_z * sigma_z
+    # weight of sigma in skew
+    skew_sigma = 1.0 - 0.16666666666666666 * sigma_dot_sigma
+    sigma_dot_delta = sigma_x * delta_x + sigma_y * delta_y + sigma_z * delta_z
+    # weight of delta in skew
+    skew_delta = 0.6666666666666666 * sigma_dot_delta
+    shared_1 = 0.3333333333333333 * delta_cross_sigma_x
+    # vector of the skew part
+    skew_x = skew_sigma * sigma_x + skew_delta * delta_x + shared_1
+    shared_2 = 0.3333333333333333 * delta_cross_sigma_y
+    skew_y = skew_sigma * sigma_y + skew_delta * delta_y + shared_2
+    shared_3 = 0.3333333333333333 * delta_cross_sigma_z
+    skew_z = skew_sigma * sigma_z + skew_delta * delta_z + shared_3
+    # of sigma in outer products
+    partner_sigma_x = 0.25 * sigma_x + shared_1
+    partner_sigma_y = 0.25 * sigma_y + shared_2
+    partner_sigma_z = 0.25 * sigma_z + shared_3
+    # of delta in outer products
+    partner_delta_x = 0.6666666666666666 * delta_x
+    partner_delta_y = 0.6666666666666666 * delta_y
+    partner_delta_z = 0.6666666666666666 * delta_z
+    delta_dot_delta = delta_x * delta_x + delta_y * delta_y + delta_z * delta_z
+    # multiple of the unit matrix
+    diagonal = 1.0 - 0.6666666666666666 * delta_dot_delta - 0.5 * sigma_dot_sigma
+    # half of u y' + y u' on the diagonal
+    half_xx = sigma_x * partner_sigma_x
+    A_11 = delta_x * partner_delta_x + half_xx + half_xx + diagonal
+    half_yy = sigma_y * partner_sigma_y
+    A_22 = delta_y * partner_delta_y + half_yy + half_yy + diagonal
+    half_zz = sigma_z * partner_sigma_z
+    A_33 = delta_z * partner_delta_z + half_zz + half_zz + diagonal
+    symmetric_xy = sigma_x * partner_sigma_y + delta_x * partner_delta_y + sigma_y * partner_sigma_x
+    A_12 = symmetric_xy - skew_z
+    A_21 = symmetric_xy + skew_z
+    symmetric_yz = sigma_y * partner_sigma_z + delta_y * partner_delta_z + sigma_z * partner_sigma_y
+    A_23 = symmetric_yz - skew_x
+    A_32 = symmetric_yz + skew_x
+    symmetric_zx = sigma_z * partner_sigma_x + delta_z * partner_delta_x + sigma_x * partner_sigma_z
+    A_31 = symmetric_zx - skew_y
+    A_13 = symmetric_zx + skew_y
     batch = np.broadcast_shapes(increments.shape[:-2])
     dtype = np.result_type(increments.dtype, np.float32)
     transition = np.empty((*batch, 3, 3), dtype) if out is None else out

@@ -14,7 +14,7 @@ import numpy as np
 def dcm_rk4_2(state, increments, out=None):
     """Direction cosine matrix: step by classical fourth-order Runge-Kutta method from 2 angle increments.
 
-    Operations: 87 add, 114 multiply, 9 negate; 72 temporaries.
+    Operations: 63 add, 74 multiply; 36 temporaries.
 
     Parameters
     ----------
@@ -52,100 +52,53 @@ def dcm_rk4_2(state, increments, out=None):
     d2_x = increments[..., 1, 0]
     d2_y = increments[..., 1, 1]
     d2_z = increments[..., 1, 2]
-    # rate times the step, at node 0
-    turn_0_x = 3.0 * d1_x - d2_x
-    turn_0_y = 3.0 * d1_y - d2_y
-    turn_0_z = 3.0 * d1_z - d2_z
-    # rate times the step, at node 1/2
-    turn_1_2_x = d1_x + d2_x
-    turn_1_2_y = d1_y + d2_y
-    turn_1_2_z = d1_z + d2_z
-    # rate times the step, at node 1
-    turn_1_x = 3.0 * d2_x - d1_x
-    turn_1_y = 3.0 * d2_y - d1_y
-    turn_1_z = 3.0 * d2_z - d1_z
-    shared_1 = 0.5 * turn_0_z
-    # argument of slope 2, from the identity
-    point_2_12 = -shared_1
-    shared_2 = 0.5 * turn_0_y
-    point_2_13 = shared_2
-    point_2_21 = shared_1
-    shared_3 = 0.5 * turn_0_x
-    point_2_23 = -shared_3
-    point_2_31 = -shared_2
-    point_2_32 = shared_3
-    # derivative times the step at stage 2
-    slope_2_11 = point_2_12 * turn_1_2_z - point_2_13 * turn_1_2_y
-    shared_4 = -turn_1_2_z
-    slope_2_12 = shared_4 + point_2_13 * turn_1_2_x
-    shared_5 = -turn_1_2_y
-    slope_2_13 = -(shared_5 + point_2_12 * turn_1_2_x)
-    slope_2_21 = -(shared_4 + point_2_23 * turn_1_2_y)
-    slope_2_22 = point_2_23 * turn_1_2_x - point_2_21 * turn_1_2_z
-    shared_6 = -turn_1_2_x
-    slope_2_23 = shared_6 + point_2_21 * turn_1_2_y
-    slope_2_31 = shared_5 + point_2_32 * turn_1_2_z
-    slope_2_32 = -(shared_6 + point_2_31 * turn_1_2_z)
-    slope_2_33 = point_2_31 * turn_1_2_y - point_2_32 * turn_1_2_x
-    # argument of slope 3, from the identity
-    point_3_11 = 0.5 * slope_2_11 + 1.0
-    point_3_12 = 0.5 * slope_2_12
-    point_3_13 = 0.5 * slope_2_13
-    point_3_21 = 0.5 * slope_2_21
-    point_3_22 = 0.5 * slope_2_22 + 1.0
-    point_3_23 = 0.5 * slope_2_23
-    point_3_31 = 0.5 * slope_2_31
-    point_3_32 = 0.5 * slope_2_32
-    point_3_33 = 0.5 * slope_2_33 + 1.0
-    # derivative times the step at stage 3
-    slope_3_11 = point_3_12 * turn_1_2_z - point_3_13 * turn_1_2_y
-    slope_3_12 = point_3_13 * turn_1_2_x - point_3_11 * turn_1_2_z
-    slope_3_13 = point_3_11 * turn_1_2_y - point_3_12 * turn_1_2_x
-    slope_3_21 = point_3_22 * turn_1_2_z - point_3_23 * turn_1_2_y
-    slope_3_22 = point_3_23 * turn_1_2_x - point_3_21 * turn_1_2_z
-    slope_3_23 = point_3_21 * turn_1_2_y - point_3_22 * turn_1_2_x
-    slope_3_31 = point_3_32 * turn_1_2_z - point_3_33 * turn_1_2_y
-    slope_3_32 = point_3_33 * turn_1_2_x - point_3_31 * turn_1_2_z
-    slope_3_33 = point_3_31 * turn_1_2_y - point_3_32 * turn_1_2_x
-    # argument of slope 4, from the identity
-    point_4_11 = slope_3_11 + 1.0
-    point_4_22 = slope_3_22 + 1.0
-    point_4_33 = slope_3_33 + 1.0
-    # derivative times the step at stage 4
-    slope_4_11 = slope_3_12 * turn_1_z - slope_3_13 * turn_1_y
-    slope_4_12 = slope_3_13 * turn_1_x - point_4_11 * turn_1_z
-    slope_4_13 = point_4_11 * turn_1_y - slope_3_12 * turn_1_x
-    slope_4_21 = point_4_22 * turn_1_z - slope_3_23 * turn_1_y
-    slope_4_22 = slope_3_23 * turn_1_x - slope_3_21 * turn_1_z
-    slope_4_23 = slope_3_21 * turn_1_y - point_4_22 * turn_1_x
-    slope_4_31 = slope_3_32 * turn_1_z - point_4_33 * turn_1_y
-    slope_4_32 = point_4_33 * turn_1_x - slope_3_31 * turn_1_z
-    slope_4_33 = slope_3_31 * turn_1_y - slope_3_32 * turn_1_x
-    # the step applied to the identity
-    A_11 = 0.3333333333333333 * (slope_2_11 + slope_3_11) + 0.16666666666666666 * slope_4_11 + 1.0
-    shared_7 = 0.16666666666666666 * turn_0_z
-    A_12 = (
-        0.3333333333333333 * (slope_2_12 + slope_3_12) - shared_7 + 0.16666666666666666 * slope_4_12
+    # the angle increment of the whole step
+    sigma_x = d1_x + d2_x
+    sigma_y = d1_y + d2_y
+    sigma_z = d1_z + d2_z
+    sigma_cross_d1_x = sigma_y * d1_z - sigma_z * d1_y
+    sigma_cross_d1_y = sigma_z * d1_x - sigma_x * d1_z
+    sigma_cross_d1_z = sigma_x * d1_y - sigma_y * d1_x
+    sigma_dot_sigma = sigma_x * sigma_x + sigma_y * sigma_y + sigma_z * sigma_z
+    # weight of sigma in skew
+    skew_sigma = 1.0 - 0.16666666666666666 * sigma_dot_sigma
+    # weight of sigma_cross_d1 in skew
+    skew_sigma_cross_d1 = 0.3333333333333333 - skew_sigma
+    # vector of the skew part
+    skew_x = skew_sigma * sigma_x + skew_sigma_cross_d1 * sigma_cross_d1_x
+    skew_y = skew_sigma * sigma_y + skew_sigma_cross_d1 * sigma_cross_d1_y
+    skew_z = skew_sigma * sigma_z + skew_sigma_cross_d1 * sigma_cross_d1_z
+    d1_dot_d1 = d1_x * d1_x + d1_y * d1_y + d1_z * d1_z
+    # weight of sigma in partner
+    partner_sigma = 0.0625 * sigma_dot_sigma - 0.3333333333333333 * d1_dot_d1 + 0.25
+    d1_dot_sigma = d1_x * sigma_x + d1_y * sigma_y + d1_z * sigma_z
+    shared_1 = 0.6666666666666666 * d1_dot_sigma
+    # weight of d1 in partner
+    partner_d1 = shared_1 - 0.3333333333333333 * sigma_dot_sigma
+    # of sigma in outer products
+    partner_x = partner_sigma * sigma_x + partner_d1 * d1_x - 0.3333333333333333 * sigma_cross_d1_x
+    partner_y = partner_sigma * sigma_y + partner_d1 * d1_y - 0.3333333333333333 * sigma_cross_d1_y
+    partner_z = partner_sigma * sigma_z + partner_d1 * d1_z - 0.3333333333333333 * sigma_cross_d1_z
+    # multiple of the unit matrix
+    diagonal = (
+        sigma_dot_sigma * (shared_1 - 0.125 * sigma_dot_sigma - 0.5) - d1_dot_sigma * shared_1 + 1.0
     )
-    shared_8 = 0.16666666666666666 * turn_0_y
-    A_13 = (
-        shared_8 + 0.3333333333333333 * (slope_2_13 + slope_3_13) + 0.16666666666666666 * slope_4_13
-    )
-    A_21 = (
-        shared_7 + 0.3333333333333333 * (slope_2_21 + slope_3_21) + 0.16666666666666666 * slope_4_21
-    )
-    A_22 = 0.3333333333333333 * (slope_2_22 + slope_3_22) + 0.16666666666666666 * slope_4_22 + 1.0
-    shared_9 = 0.16666666666666666 * turn_0_x
-    A_23 = (
-        0.3333333333333333 * (slope_2_23 + slope_3_23) - shared_9 + 0.16666666666666666 * slope_4_23
-    )
-    A_31 = (
-        0.3333333333333333 * (slope_2_31 + slope_3_31) - shared_8 + 0.16666666666666666 * slope_4_31
-    )
-    A_32 = (
-        shared_9 + 0.3333333333333333 * (slope_2_32 + slope_3_32) + 0.16666666666666666 * slope_4_32
-    )
-    A_33 = 0.3333333333333333 * (slope_2_33 + slope_3_33) + 0.16666666666666666 * slope_4_33 + 1.0
+    # half of u y' + y u' on the diagonal
+    half_xx = sigma_x * partner_x
+    A_11 = half_xx + half_xx + diagonal
+    half_yy = sigma_y * partner_y
+    A_22 = half_yy + half_yy + diagonal
+    half_zz = sigma_z * partner_z
+    A_33 = half_zz + half_zz + diagonal
+    symmetric_xy = sigma_x * partner_y + sigma_y * partner_x
+    A_12 = symmetric_xy - skew_z
+    A_21 = symmetric_xy + skew_z
+    symmetric_yz = sigma_y * partner_z + sigma_z * partner_y
+    A_23 = symmetric_yz - skew_x
+    A_32 = symmetric_yz + skew_x
+    symmetric_zx = sigma_z * partner_x + sigma_x * partner_z
+    A_31 = symmetric_zx - skew_y
+    A_13 = symmetric_zx + skew_y
     # direction cosine matrix, body to reference, after the step
     next_11 = A_11 * C_11 + A_21 * C_12 + A_31 * C_13
     next_12 = A_12 * C_11 + A_22 * C_12 + A_32 * C_13
@@ -174,7 +127,7 @@ def dcm_rk4_2(state, increments, out=None):
 def dcm_rk4_2_transition(increments, out=None):
     """Direction cosine matrix: step by classical fourth-order Runge-Kutta method from 2 angle increments: its transition.
 
-    Operations: 69 add, 87 multiply, 9 negate; 63 temporaries.
+    Operations: 45 add, 47 multiply; 27 temporaries.
 
     Parameters
     ----------
@@ -198,100 +151,53 @@ def dcm_rk4_2_transition(increments, out=None):
     d2_x = increments[..., 1, 0]
     d2_y = increments[..., 1, 1]
     d2_z = increments[..., 1, 2]
-    # rate times the step, at node 0
-    turn_0_x = 3.0 * d1_x - d2_x
-    turn_0_y = 3.0 * d1_y - d2_y
-    turn_0_z = 3.0 * d1_z - d2_z
-    # rate times the step, at node 1/2
-    turn_1_2_x = d1_x + d2_x
-    turn_1_2_y = d1_y + d2_y
-    turn_1_2_z = d1_z + d2_z
-    # rate times the step, at node 1
-    turn_1_x = 3.0 * d2_x - d1_x
-    turn_1_y = 3.0 * d2_y - d1_y
-    turn_1_z = 3.0 * d2_z - d1_z
-    shared_1 = 0.5 * turn_0_z
-    # argument of slope 2, from the identity
-    point_2_12 = -shared_1
-    shared_2 = 0.5 * turn_0_y
-    point_2_13 = shared_2
-    point_2_21 = shared_1
-    shared_3 = 0.5 * turn_0_x
-    point_2_23 = -shared_3
-    point_2_31 = -shared_2
-    point_2_32 = shared_3
-    # derivative times the step at stage 2
-    slope_2_11 = point_2_12 * turn_1_2_z - point_2_13 * turn_1_2_y
-    shared_4 = -turn_1_2_z
-    slope_2_12 = shared_4 + point_2_13 * turn_1_2_x
-    shared_5 = -turn_1_2_y
-    slope_2_13 = -(shared_5 + point_2_12 * turn_1_2_x)
-    slope_2_21 = -(shared_4 + point_2_23 * turn_1_2_y)
-    slope_2_22 = point_2_23 * turn_1_2_x - point_2_21 * turn_1_2_z
-    shared_6 = -turn_1_2_x
-    slope_2_23 = shared_6 + point_2_21 * turn_1_2_y
-    slope_2_31 = shared_5 + point_2_32 * turn_1_2_z
-    slope_2_32 = -(shared_6 + point_2_31 * turn_1_2_z)
-    slope_2_33 = point_2_31 * turn_1_2_y - point_2_32 * turn_1_2_x
-    # argument of slope 3, from the identity
-    point_3_11 = 0.5 * slope_2_11 + 1.0
-    point_3_12 = 0.5 * slope_2_12
-    point_3_13 = 0.5 * slope_2_13
-    point_3_21 = 0.5 * slope_2_21
-    point_3_22 = 0.5 * slope_2_22 + 1.0
-    point_3_23 = 0.5 * slope_2_23
-    point_3_31 = 0.5 * slope_2_31
-    point_3_32 = 0.5 * slope_2_32
-    point_3_33 = 0.5 * slope_2_33 + 1.0
-    # derivative times the step at stage 3
-    slope_3_11 = point_3_12 * turn_1_2_z - point_3_13 * turn_1_2_y
-    slope_3_12 = point_3_13 * turn_1_2_x - point_3_11 * turn_1_2_z
-    slope_3_13 = point_3_11 * turn_1_2_y - point_3_12 * turn_1_2_x
-    slope_3_21 = point_3_22 * turn_1_2_z - point_3_23 * turn_1_2_y
-    slope_3_22 = point_3_23 * turn_1_2_x - point_3_21 * turn_1_2_z
-    slope_3_23 = point_3_21 * turn_1_2_y - point_3_22 * turn_1_2_x
-    slope_3_31 = point_3_32 * turn_1_2_z - point_3_33 * turn_1_2_y
-    slope_3_32 = point_3_33 * turn_1_2_x - point_3_31 * turn_1_2_z
-    slope_3_33 = point_3_31 * turn_1_2_y - point_3_32 * turn_1_2_x
-    # argument of slope 4, from the identity
-    point_4_11 = slope_3_11 + 1.0
-    point_4_22 = slope_3_22 + 1.0
-    point_4_33 = slope_3_33 + 1.0
-    # derivative times the step at stage 4
-    slope_4_11 = slope_3_12 * turn_1_z - slope_3_13 * turn_1_y
-    slope_4_12 = slope_3_13 * turn_1_x - point_4_11 * turn_1_z
-    slope_4_13 = point_4_11 * turn_1_y - slope_3_12 * turn_1_x
-    slope_4_21 = point_4_22 * turn_1_z - slope_3_23 * turn_1_y
-    slope_4_22 = slope_3_23 * turn_1_x - slope_3_21 * turn_1_z
-    slope_4_23 = slope_3_21 * turn_1_y - point_4_22 * turn_1_x
-    slope_4_31 = slope_3_32 * turn_1_z - point_4_33 * turn_1_y
-    slope_4_32 = point_4_33 * turn_1_x - slope_3_31 * turn_1_z
-    slope_4_33 = slope_3_31 * turn_1_y - slope_3_32 * turn_1_x
-    # the step applied to the identity
-    A_11 = 0.3333333333333333 * (slope_2_11 + slope_3_11) + 0.16666666666666666 * slope_4_11 + 1.0
-    shared_7 = 0.16666666666666666 * turn_0_z
-    A_12 = (
-        0.3333333333333333 * (slope_2_12 + slope_3_12) - shared_7 + 0.16666666666666666 * slope_4_12
+    # the angle increment of the whole step
+    sigma_x = d1_x + d2_x
+    sigma_y = d1_y + d2_y
+    sigma_z = d1_z + d2_z
+    sigma_cross_d1_x = sigma_y * d1_z - sigma_z * d1_y
+    sigma_cross_d1_y = sigma_z * d1_x - sigma_x * d1_z
+    sigma_cross_d1_z = sigma_x * d1_y - sigma_y * d1_x
+    sigma_dot_sigma = sigma_x * sigma_x + sigma_y * sigma_y + sigma_z * sigma_z
+    # weight of sigma in skew
+    skew_sigma = 1.0 - 0.16666666666666666 * sigma_dot_sigma
+    # weight of sigma_cross_d1 in skew
+    skew_sigma_cross_d1 = 0.3333333333333333 - skew_sigma
+    # vector of the skew part
+    skew_x = skew_sigma * sigma_x + skew_sigma_cross_d1 * sigma_cross_d1_x
+    skew_y = skew_sigma * sigma_y + skew_sigma_cross_d1 * sigma_cross_d1_y
+    skew_z = skew_sigma * sigma_z + skew_sigma_cross_d1 * sigma_cross_d1_z
+    d1_dot_d1 = d1_x * d1_x + d1_y * d1_y + d1_z * d1_z
+    # weight of sigma in partner
+    partner_sigma = 0.0625 * sigma_dot_sigma - 0.3333333333333333 * d1_dot_d1 + 0.25
+    d1_dot_sigma = d1_x * sigma_x + d1_y * sigma_y + d1_z * sigma_z
+    shared_1 = 0.6666666666666666 * d1_dot_sigma
+    # weight of d1 in partner
+    partner_d1 = shared_1 - 0.3333333333333333 * sigma_dot_sigma
+    # of sigma in outer products
+    partner_x = partner_sigma * sigma_x + partner_d1 * d1_x - 0.3333333333333333 * sigma_cross_d1_x
+    partner_y = partner_sigma * sigma_y + partner_d1 * d1_y - 0.3333333333333333 * sigma_cross_d1_y
+    partner_z = partner_sigma * sigma_z + partner_d1 * d1_z - 0.3333333333333333 * sigma_cross_d1_z
+    # multiple of the unit matrix
+    diagonal = (
+        sigma_dot_sigma * (shared_1 - 0.125 * sigma_dot_sigma - 0.5) - d1_dot_sigma * shared_1 + 1.0
     )
-    shared_8 = 0.16666666666666666 * turn_0_y
-    A_13 = (
-        shared_8 + 0.3333333333333333 * (slope_2_13 + slope_3_13) + 0.16666666666666666 * slope_4_13
-    )
-    A_21 = (
-        shared_7 + 0.3333333333333333 * (slope_2_21 + slope_3_21) + 0.16666666666666666 * slope_4_21
-    )
-    A_22 = 0.3333333333333333 * (slope_2_22 + slope_3_22) + 0.16666666666666666 * slope_4_22 + 1.0
-    shared_9 = 0.16666666666666666 * turn_0_x
-    A_23 = (
-        0.3333333333333333 * (slope_2_23 + slope_3_23) - shared_9 + 0.16666666666666666 * slope_4_23
-    )
-    A_31 = (
-        0.3333333333333333 * (slope_2_31 + slope_3_31) - shared_8 + 0.16666666666666666 * slope_4_31
-    )
-    A_32 = (
-        shared_9 + 0.3333333333333333 * (slope_2_32 + slope_3_32) + 0.16666666666666666 * slope_4_32
-    )
-    A_33 = 0.3333333333333333 * (slope_2_33 + slope_3_33) + 0.16666666666666666 * slope_4_33 + 1.0
+    # half of u y' + y u' on the diagonal
+    half_xx = sigma_x * partner_x
+    A_11 = half_xx + half_xx + diagonal
+    half_yy = sigma_y * partner_y
+    A_22 = half_yy + half_yy + diagonal
+    half_zz = sigma_z * partner_z
+    A_33 = half_zz + half_zz + diagonal
+    symmetric_xy = sigma_x * partner_y + sigma_y * partner_x
+    A_12 = symmetric_xy - skew_z
+    A_21 = symmetric_xy + skew_z
+    symmetric_yz = sigma_y * partner_z + sigma_z * partner_y
+    A_23 = symmetric_yz - skew_x
+    A_32 = symmetric_yz + skew_x
+    symmetric_zx = sigma_z * partner_x + sigma_x * partner_z
+    A_31 = symmetric_zx - skew_y
+    A_13 = symmetric_zx + skew_y
     batch = np.broadcast_shapes(increments.shape[:-2])
     dtype = np.result_type(increments.dtype, np.float32)
     transition = np.empty((*batch, 3, 3), dtype) if out is None else out

@@ -71,7 +71,7 @@ def euler_from_dcm(state, out=None):
         np.where(four_ss >= largest, four_sz, np.where(four_xx >= largest, four_zx, np.where(four_yy >= largest, four_yz, four_zz)))
     )
     # makes the scalar part positive
-    factor = 0.5 * np.where(column_s >= 0.0, 1.0, -1.0) / np.sqrt(largest)
+    factor = 0.5 * (np.where(column_s >= 0.0, 1.0, -1.0) / np.sqrt(largest))
     # Euler parameters, body to reference, scalar last
     next_s = column_s * factor
     next_x = column_x * factor

@@ -44,7 +44,7 @@ def sinusoidal_increments(middle, width, a, b, out=None):
     a = np.asarray(a)
     b = np.asarray(b)
     # angle increment over the interval, body axes
-    increment_y = a * width * np.cos(b * middle) * _sinc(0.5 * b * width)
+    increment_y = a * width * np.cos(b * middle) * _sinc(0.5 * (b * width))
     batch = np.broadcast_shapes(middle.shape, width.shape, a.shape, b.shape)
     dtype = np.result_type(middle.dtype, width.dtype, a.dtype, b.dtype, np.float32)
     increment = np.empty((*batch, 3), dtype) if out is None else out

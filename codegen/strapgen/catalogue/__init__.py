@@ -94,7 +94,10 @@ KERNELS = {
 
 
 class Choice(NamedTuple):
-    """A kernel of the catalogue: its name, and method and increments where it is an attitude step."""
+    """A kernel of the catalogue: its name, and method and increments where it is an attitude step.
+
+    A step without increments is given the body rate at every node of its method.
+    """
 
     name: str
     method: str | None = None
@@ -103,16 +106,19 @@ class Choice(NamedTuple):
     @property
     def kernel(self) -> str:
         """Name of the kernel."""
-        return self.name if self.method is None else f"{self.name}-{self.method}-{self.increments}"
+        return self.name if self.method is None else f"{self.name}-{self.method}-{self.increments or 'rates'}"
 
 
-def choose(name: str, method: str | None = None, increments: int | None = None) -> Choice:
+def choose(
+    name: str, method: str | None = None, increments: int | None = None, rates: bool = False
+) -> Choice:
     """Check a choice of kernel and fill in the defaults: fourth order, two increments.
 
     Raises
     ------
     InputError
-        If a name is unknown, or a method is given for a kernel that takes none.
+        If a name is unknown, a method is given for a kernel that takes none, or increments for a step that
+        takes rates.
 
     Examples
     --------
@@ -121,12 +127,18 @@ def choose(name: str, method: str | None = None, increments: int | None = None) 
     """
     checks.choice("algorithm", name, [*ALGORITHMS, *KERNELS])
     if name in KERNELS:
-        for option, value in (("method", method), ("increments", increments)):
+        for option, value in (("method", method), ("increments", increments), ("rates", rates or None)):
             if value is not None:
                 takers = ", ".join(ALGORITHMS)
                 raise InputError(f"kernel {name} takes no {option} (got {value}); these do: {takers}")
         return Choice(name)
     method = checks.choice("method", "rk4" if method is None else method, METHODS)
+    if rates:
+        if increments is not None:
+            raise InputError(
+                f"a step takes increments or rates, not both (got {increments} increments and rates)"
+            )
+        return Choice(name, method)
     increments = checks.count("increments", 2 if increments is None else increments, largest=MOST_INCREMENTS)
     return Choice(name, method, increments)
 
@@ -151,7 +163,7 @@ def derive(choice: Choice) -> Kernel:
     choice : Choice
         What `choose` returned.
     """
-    if choice.method is None or choice.increments is None:
+    if choice.method is None:
         recipe = KERNELS[choice.name]
         function = getattr(import_module(f"{__name__}.{recipe.module}"), recipe.function)
         kernel: Kernel = function(*recipe.arguments)

@@ -26,8 +26,21 @@ def increments_signal(count: int) -> Signal:
     )
 
 
-def step(kinematics: Kinematics, tableau: Tableau, increments: int) -> Kernel:
-    """Derive one integration step from angle increments to the next state.
+def turns_signal(nodes: tuple[Fraction, ...]) -> Signal:
+    """Return the signal of the body rates of one step, each times the step length, in the order of the nodes."""
+    labels = [str(node).replace("/", "_") for node in nodes]
+    return Signal(
+        "turns",
+        (len(nodes), 3),
+        tuple(f"turn_{label}_{axis}" for label in labels for axis in "xyz"),
+        unit="rad",
+        meaning=f"body rate times the step length, body axes, at nodes {', '.join(map(str, nodes))} of the step",
+        bound=Fraction(1),
+    )
+
+
+def step(kinematics: Kinematics, tableau: Tableau, increments: int | None) -> Kernel:
+    """Derive one integration step from angle increments, or from rates, to the next state.
 
     The method is applied to the identity, which gives the transition: the step is linear in the state. The
     step length cancels, since increments and rates differ by it alone.
@@ -38,18 +51,26 @@ def step(kinematics: Kinematics, tableau: Tableau, increments: int) -> Kernel:
         The attitude representation.
     tableau : Tableau
         The integration method.
-    increments : int
-        Angle increments a step, 1 to 8.
+    increments : int or None
+        Angle increments a step, 1 to 8; None for a step that is given the rate at every node.
 
     Returns
     -------
     Kernel
-        Inputs ``state`` and ``increments`` (increments, 3) in rad, output ``next``.
+        Inputs ``state`` and ``increments`` (increments, 3) in rad, or ``turns`` (nodes, 3) in rad: the rates
+        times the step length; output ``next``.
     """
     build = KernelBuilder()
     state = build.input(kinematics.state)
-    d = build.input(increments_signal(increments))
-    turns = {node: _turn(build, kinematics, d, increments, node) for node in dict.fromkeys(tableau.nodes)}
+    nodes = tuple(dict.fromkeys(tableau.nodes))
+    samples = build.input(turns_signal(nodes) if increments is None else increments_signal(increments))
+    turns: dict[Fraction, sp.Matrix] = {}
+    for place, node in enumerate(nodes):
+        if increments is None:
+            weights = [sp.Integer(k == place) for k in range(len(nodes))]
+        else:
+            weights = extraction(increments, node)
+        turns[node] = _turn(build, kinematics, samples, weights, node)
     slopes: list[sp.Matrix] = []
     for number, (node, row) in enumerate(zip(tableau.nodes, tableau.matrix, strict=True), 1):
         point = kinematics.identity + _combination(row, slopes, kinematics.identity)
@@ -65,11 +86,21 @@ def step(kinematics: Kinematics, tableau: Tableau, increments: int) -> Kernel:
         kinematics.identity + _combination(tableau.weights, slopes, kinematics.identity),
     )
     build.output(kinematics.next, kinematics.product(state, transition))
-    plural = "increment" if increments == 1 else "increments"
+    if increments is None:
+        given, taken, option = (
+            f"the rate at {len(nodes)} {'node' if len(nodes) == 1 else 'nodes'}",
+            "rates",
+            "--rates",
+        )
+        extracted = ""
+    else:
+        given = f"{increments} angle {'increment' if increments == 1 else 'increments'}"
+        taken, option = str(increments), f"--increments {increments}"
+        extracted = "rate extraction chapter 3 A; "
     return build.kernel(
-        f"{kinematics.name}-{tableau.name}-{increments}",
-        f"{kinematics.title}: step by {tableau.title} from {increments} angle {plural}",
-        f"{kinematics.source}; rate extraction chapter 3 A; {tableau.title}: {tableau.source}",
+        f"{kinematics.name}-{tableau.name}-{taken}",
+        f"{kinematics.title}: step by {tableau.title} from {given}",
+        f"{kinematics.source}; {extracted}{tableau.title}: {tableau.source}",
         transition=kinematics.transition.name,
         companions=Companions(
             f"{kinematics.name}-product",
@@ -77,7 +108,7 @@ def step(kinematics: Kinematics, tableau: Tableau, increments: int) -> Kernel:
             kinematics.attitude,
             tuple(Fraction(int(x)) for x in kinematics.identity),
         ),
-        arguments=f"{kinematics.name} --method {tableau.name} --increments {increments}",
+        arguments=f"{kinematics.name} --method {tableau.name} {option}",
     )
 
 
@@ -97,16 +128,24 @@ def product(name: str) -> Kernel:
 
 
 def _turn(
-    build: KernelBuilder, kinematics: Kinematics, d: sp.Matrix, increments: int, node: Fraction
+    build: KernelBuilder,
+    kinematics: Kinematics,
+    samples: sp.Matrix,
+    weights: list[sp.Rational],
+    node: Fraction,
 ) -> sp.Matrix:
-    """Name the generator at a node: the extracted rate times the step, scaled for the kinematics."""
-    weights = [kinematics.scale * weight for weight in extraction(increments, node)]
+    """Name the generator at a node: the rate times the step, scaled for the kinematics."""
     half = "half_" if kinematics.scale == sp.Rational(1, 2) else ""
     label = str(node).replace("/", "_")
+    turn = [
+        kinematics.scale * sp.Add(*(weight * samples[k, axis] for k, weight in enumerate(weights)))
+        for axis in range(3)
+    ]
+    if all(element.is_Symbol for element in turn):  # an input itself
+        return sp.Matrix(turn)
     meaning = f"{half.replace('_', ' the ')}rate times the step, at node {node}"
-    signal = Signal.vector(f"{half}turn_{label}", f"{half}turn_{label}", unit="rad", meaning=meaning)
     return build.stage(
-        signal, [sp.Add(*(weights[k] * d[k, axis] for k in range(increments))) for axis in range(3)]
+        Signal.vector(f"{half}turn_{label}", f"{half}turn_{label}", unit="rad", meaning=meaning), turn
     )
 
 

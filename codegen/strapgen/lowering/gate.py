@@ -12,6 +12,7 @@ import sympy as sp
 from sympy.core.relational import GreaterThan, LessThan, StrictGreaterThan, StrictLessThan
 
 from strapgen.kernel import Kernel
+from strapgen.lowering.arithmetic import chain, gathered, plain, with_constant
 from strapgen.lowering.share import Shared
 from strapgen.program import Assignment, Constant, Node, Operation, Program, Reference, Result
 from strapgen.signal import Signal
@@ -82,7 +83,7 @@ class _Writer:
         raise NotImplementedError(f"no operation for {expression.func.__name__} in {expression}")
 
     def _sum(self, expression: sp.Add) -> Node:
-        groups: dict[Fraction, list[tuple[bool, Node]]] = {}
+        terms: list[tuple[Fraction, Node]] = []
         constant = Fraction(0)
         for term in sorted(expression.args, key=sp.default_sort_key):
             coefficient, rest = term.as_coeff_Mul(rational=True)
@@ -90,17 +91,8 @@ class _Writer:
             if rest == 1:
                 constant += value
             else:
-                groups.setdefault(abs(value), []).append((value > 0, self.node(rest)))
-        terms: list[tuple[bool, Node]] = []
-        for magnitude, members in groups.items():
-            positive, total = _signed_sum(members)
-            if magnitude != 1:
-                total = Operation("multiply", (Constant(magnitude), total))
-            terms.append((positive, total))
-        if constant:
-            terms.append((constant > 0, Constant(abs(constant))))
-        positive, total = _signed_sum(terms)
-        return total if positive else Operation("negate", (total,))
+                terms.append((value, self.node(rest)))
+        return plain(with_constant(gathered(terms), constant))
 
     def _product(self, expression: sp.Mul) -> Node:
         coefficient, rest = expression.as_coeff_Mul(rational=True)
@@ -114,9 +106,9 @@ class _Writer:
                 above.append(self.node(factor))
         if abs(value) != 1 or not above:
             above.insert(0, Constant(abs(value)))
-        result = _chain("multiply", above)
+        result = chain("multiply", above)
         if below:
-            result = Operation("divide", (result, _chain("multiply", below)))
+            result = Operation("divide", (result, chain("multiply", below)))
         return Operation("negate", (result,)) if value < 0 else result
 
     def _power(self, base: sp.Expr, exponent: sp.Expr) -> Node:
@@ -161,21 +153,3 @@ class _Writer:
         else:
             raise NotImplementedError(f"no operation for the condition {condition}")
         return Operation("select", (test, yes, no))
-
-
-def _signed_sum(terms: list[tuple[bool, Node]]) -> tuple[bool, Node]:
-    """Add and subtract terms in order, a positive one first; all negative ones are added and the sign told."""
-    if not any(positive for positive, _ in terms):
-        return False, _chain("add", [node for _, node in terms])
-    first = next(k for k, (positive, _) in enumerate(terms) if positive)
-    total = terms[first][1]
-    for positive, node in terms[:first] + terms[first + 1 :]:
-        total = Operation("add" if positive else "subtract", (total, node))
-    return True, total
-
-
-def _chain(kind: str, nodes: list[Node]) -> Node:
-    total = nodes[0]
-    for node in nodes[1:]:
-        total = Operation(kind, (total, node))
-    return total

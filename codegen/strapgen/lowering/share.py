@@ -37,8 +37,14 @@ class Shared:
     values: dict[sp.Symbol, sp.Expr]
 
 
-def share(kernel: Kernel) -> Shared:
+def share(kernel: Kernel, common: bool = True) -> Shared:
     """Name the common subexpressions of a kernel.
+
+    Parameters
+    ----------
+    kernel : Kernel
+    common : bool, optional
+        False leaves the formulas as they are.
 
     Elements are taken in the order of their names, so that two kernels that differ only in the order in
     which they store a state get the same arithmetic.
@@ -55,11 +61,13 @@ def share(kernel: Kernel) -> Shared:
             else:
                 definitions.append(Definition(symbol, expression, meaning))
                 meaning = ""
+    if not common:
+        return Shared(definitions, values)
     names = sp.numbered_symbols(_PREFIX, start=1, real=True)
-    common, reduced = sp.cse([d.expression for d in definitions], symbols=names, order="canonical")
+    found, reduced = sp.cse([d.expression for d in definitions], symbols=names, order="canonical")
     # A condition is no value that a program could hold: it goes back to where it is used.
-    conditions = {symbol: expression for symbol, expression in common if expression.is_Relational}
-    pending = {s: e.xreplace(conditions) for s, e in common if s not in conditions}
+    conditions = {symbol: expression for symbol, expression in found if expression.is_Relational}
+    pending = {s: e.xreplace(conditions) for s, e in found if s not in conditions}
     reduced = [expression.xreplace(conditions) for expression in reduced]
     ordered: list[Definition] = []
 

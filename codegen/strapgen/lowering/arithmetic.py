@@ -1,0 +1,143 @@
+"""Sums, products and polynomials as nodes: how arithmetic is written down, in one place."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable
+from fractions import Fraction
+from typing import Any
+
+from strapgen.lowering.polynomials import Polynomial
+from strapgen.program import Constant, Node, Operation
+
+#: A node and whether it is added or subtracted.
+Term = tuple[bool, Node]
+
+
+def chain(kind: str, nodes: list[Node]) -> Node:
+    """Apply an operation from left to right."""
+    total = nodes[0]
+    for node in nodes[1:]:
+        total = Operation(kind, (total, node))
+    return total
+
+
+def signed_sum(terms: list[Term]) -> Term:
+    """Add and subtract terms in order, a positive one first; all negative ones are added and the sign told."""
+    if not any(positive for positive, _ in terms):
+        return False, chain("add", [node for _, node in terms])
+    first = next(k for k, (positive, _) in enumerate(terms) if positive)
+    total = terms[first][1]
+    for positive, node in terms[:first] + terms[first + 1 :]:
+        total = Operation("add" if positive else "subtract", (total, node))
+    return True, total
+
+
+def plain(term: Term) -> Node:
+    """Return a signed node as a node."""
+    positive, node = term
+    if positive:
+        return node
+    return Constant(-node.value) if isinstance(node, Constant) else Operation("negate", (node,))
+
+
+def scaled(coefficient: Fraction, node: Node) -> Term:
+    """Return coefficient times node, without a multiplication where the coefficient is 1 or -1."""
+    if abs(coefficient) != 1:
+        node = Operation("multiply", (Constant(abs(coefficient)), node))
+    return coefficient > 0, node
+
+
+def gathered(terms: Iterable[tuple[Fraction, Node]]) -> list[Term]:
+    """Multiply terms by their coefficients; those with the same coefficient are summed before."""
+    groups: dict[Fraction, list[Term]] = {}
+    for coefficient, node in terms:
+        groups.setdefault(abs(coefficient), []).append((coefficient > 0, node))
+    total: list[Term] = []
+    for magnitude, members in groups.items():
+        positive, node = signed_sum(members)
+        total.append((positive, scaled(magnitude, node)[1]))
+    return total
+
+
+def with_constant(terms: list[Term], constant: Fraction) -> Term:
+    """Return the sum of terms and a number; the number comes last, so that it is rounded once."""
+    if constant or not terms:
+        terms = [*terms, (constant >= 0, Constant(abs(constant)))]
+    return signed_sum(terms)
+
+
+def expanded(polynomial: Polynomial, node: Callable[[Any], Node]) -> Term:
+    """Write a polynomial as a sum of products."""
+    terms = (
+        (coefficient, chain("multiply", [node(name) for name in monomial]))
+        for monomial, coefficient in sorted(polynomial.items())
+        if monomial
+    )
+    return with_constant(gathered(terms), polynomial.get((), Fraction(0)))
+
+
+def horner(polynomial: Polynomial, node: Callable[[Any], Node]) -> Term:
+    """Write a polynomial by Horner's scheme in several variables.
+
+    The atom that occurs in most terms is taken out of them, and so on for what it multiplies and for the
+    rest. Of atoms that occur equally often every one is tried, and the fewest operations win.
+
+    Parameters
+    ----------
+    polynomial : Polynomial
+        In atoms of any kind.
+    node : callable
+        Gives the node of an atom.
+
+    Examples
+    --------
+    >>> from strapgen.program import Reference
+    >>> p = {("x", "x"): Fraction(1, 2), ("x", "y"): Fraction(1), (): Fraction(1)}
+    >>> positive, tree = horner(p, Reference)
+    >>> operation_count(tree)
+    4
+    """
+    seen: dict[frozenset[Any], Term] = {}
+
+    def written(p: Polynomial) -> Term:
+        key = frozenset(p.items())
+        if key not in seen:
+            seen[key] = with_constant(terms({m: c for m, c in p.items() if m}), p.get((), Fraction(0)))
+        return seen[key]
+
+    def terms(p: Polynomial) -> list[Term]:
+        counts = Counter(name for monomial in p for name in set(monomial))
+        most = max(counts.values(), default=0)
+        powers = {m[0] for m in p if len(m) > 1 and len(set(m)) == 1}
+        if most < 2 and not powers:
+            factors = ((c, chain("multiply", [node(name) for name in m])) for m, c in sorted(p.items()))
+            return gathered(factors)
+        candidates = sorted(name for name in counts if counts[name] == most or (most < 2 and name in powers))
+        tried = (take_out(p, name) for name in candidates)
+        return min(tried, key=lambda found: sum(operation_count(tree) + 1 for _, tree in found))
+
+    def take_out(p: Polynomial, name: Any) -> list[Term]:
+        inside: Polynomial = {}
+        rest: Polynomial = {}
+        for monomial, coefficient in p.items():
+            if name in monomial:
+                place = monomial.index(name)
+                inside[monomial[:place] + monomial[place + 1 :]] = coefficient
+            else:
+                rest[monomial] = coefficient
+        positive, factor = written(inside)
+        if isinstance(factor, Constant):
+            first = scaled(factor.value if positive else -factor.value, node(name))
+        else:
+            first = positive, Operation("multiply", (node(name), factor))
+        return [first, *(terms(rest) if rest else [])]
+
+    return written(polynomial)
+
+
+def operation_count(node: Node) -> int:
+    """Return the number of operations in a tree."""
+    if not isinstance(node, Operation):
+        return 0
+    return 1 + sum(map(operation_count, node.arguments))

@@ -1,0 +1,174 @@
+"""The core of a kernel: its transition as a function of a few vectors that are linear in the inputs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import sympy as sp
+
+from strapgen.algebra import evaluate
+from strapgen.kernel import Kernel, Stage
+from strapgen.lowering.canonical.decomposition import Decomposition, Frame, NotCovariantError
+from strapgen.lowering.canonical.vectors import Form, components, independent
+from strapgen.program import Program
+from strapgen.signal import Signal
+
+
+@dataclass(frozen=True)
+class Core:
+    """A transition as a function of vectors.
+
+    Parameters
+    ----------
+    inputs : list of str
+        Names of the input vectors.
+    vectors : dict of str to (Signal, Form)
+        Elements, meaning, and coefficients along the inputs, of the vectors that the transition needs.
+    stages : list of Stage
+        From these vectors to the transition, which is the last.
+    """
+
+    inputs: list[str]
+    vectors: dict[str, tuple[Signal, Form]]
+    stages: list[Stage]
+
+    @property
+    def transition(self) -> Signal:
+        """The transition."""
+        return self.stages[-1].signal
+
+    def evaluate(self, values: dict[str, Any]) -> list[Any]:
+        """Return the transition's elements from values for the elements of the vectors."""
+        known = dict(values)
+        for stage in self.stages:
+            for name, expression in zip(stage.signal.elements, stage.expressions, strict=True):
+                known[name] = evaluate(expression, known)
+        return [known[name] for name in self.transition.elements]
+
+    def base(self) -> list[Form]:
+        """Return vectors that are independent and span the others."""
+        forms = [form for _, form in self.vectors.values()]
+        return [forms[k] for k in independent(forms)]
+
+
+def extract(kernel: Kernel) -> Core:
+    """Separate the stages of a kernel that are linear in its input vectors from the rest.
+
+    Raises
+    ------
+    NotCovariantError
+        If an input of the transition is no vector, or the transition is neither a quaternion nor a matrix.
+    """
+    columns: list[list[sp.Symbol]] = [[], [], []]
+    inputs: dict[str, Signal] = {}
+    for signal in kernel.inputs[1:]:
+        for k in range(0, signal.size, 3):
+            vector = Signal.vector(
+                signal.elements[k].removesuffix("_x"), signal.elements[k].removesuffix("_x")
+            )
+            if vector.elements != signal.elements[k : k + 3]:
+                raise NotCovariantError(f"{signal.name} does not consist of vectors")
+            inputs[vector.name] = vector
+            for column, element in zip(columns, vector.elements, strict=True):
+                column.append(sp.Symbol(element, real=True))
+    vectors: dict[str, tuple[Signal, Form]] = {}
+    stages: list[Stage] = []
+    for stage in kernel.stages:
+        form = _linear(stage, columns)
+        if form is None:
+            stages.append(stage)
+        else:
+            vectors[stage.signal.name] = stage.signal, form
+        if stage.signal.name == kernel.transition:
+            break
+    if not stages or (not vectors and not inputs):
+        raise NotCovariantError(f"{kernel.name} has no transition")
+    labels = {element.rsplit("_", 1)[-1] for element in stages[-1].signal.elements}
+    if stages[-1].signal.shape != (3, 3) and labels != set("xyzs"):
+        raise NotCovariantError(f"the transition of {kernel.name} is neither a quaternion nor a matrix")
+    used = set().union(*(e.free_symbols for stage in stages for e in stage.expressions))
+    for k, (name, vector) in enumerate(inputs.items()):
+        if used & {column[k] for column in columns}:
+            vectors[name] = vector, tuple(Fraction(int(j == k)) for j in range(len(inputs)))
+    return Core(list(inputs), vectors, stages)
+
+
+def decompose(core: Core) -> Decomposition:
+    """Return the covariant decomposition of a core's transition in the vectors of its base.
+
+    Raises
+    ------
+    NotCovariantError
+        If the transition does not turn with its vectors, or is no polynomial.
+    """
+    base = core.base()
+    frame = Frame(len(base))
+    values: dict[str, Any] = {}
+    for signal, form in core.vectors.values():
+        along = components(form, base)
+        for axis, element in enumerate(signal.elements):
+            terms = (
+                u[axis] * sp.Rational(x.numerator, x.denominator)
+                for x, u in zip(along, frame.vectors, strict=True)
+            )
+            values[element] = sum(terms, frame.ring.zero)
+    try:
+        elements = [frame.ring(element) for element in core.evaluate(values)]
+    except (TypeError, ValueError):  # SymPy's errors where a ring element meets what is no polynomial
+        raise NotCovariantError("the transition is no polynomial") from None
+    if core.transition.shape == (3, 3):
+        return frame.matrix(elements)
+    by_label = dict(zip((e[-1] for e in core.transition.elements), elements, strict=True))
+    return frame.quaternion([by_label[axis] for axis in "xyz"], by_label["s"])
+
+
+def verify(core: Core, program: Program) -> None:
+    """Check that a program computes the transition of a core, as an identity between polynomials.
+
+    The identity is in all elements of all inputs, in coordinates in which the transition needs as few of them
+    as possible.
+
+    Raises
+    ------
+    ArithmeticError
+        If the two differ.
+    """
+    count = len(core.inputs)
+    units = [tuple(Fraction(int(j == k)) for j in range(count)) for k in range(count)]
+    base = [*core.base(), *units]
+    base = [base[k] for k in independent(base)]
+    ring, *generators = sp.ring([f"y{k}_{axis}" for k in range(count) for axis in "xyz"], sp.QQ)
+    values: dict[str, Any] = {}
+    forms = [*((n, unit) for n, unit in zip(core.inputs, units, strict=True))]
+    forms += [(signal.elements[0].removesuffix("_x"), form) for signal, form in core.vectors.values()]
+    for name, form in forms:
+        along = components(form, base)
+        for axis, label in enumerate("xyz"):
+            terms = (
+                generators[3 * k + axis] * sp.Rational(x.numerator, x.denominator)
+                for k, x in enumerate(along)
+            )
+            values[f"{name}_{label}"] = sum(terms, ring.zero)
+    (computed,) = program.transition_program().run(values).values()
+    if [ring(element) for element in computed] != [ring(element) for element in core.evaluate(values)]:
+        raise ArithmeticError(
+            f"{program.name}: the canonical form differs from the transition it was derived from"
+        )
+
+
+def _linear(stage: Stage, columns: list[list[sp.Symbol]]) -> Form | None:
+    """Return the coefficients of a stage that is the same combination of the input vectors on every axis."""
+    if len(stage.expressions) != 3:
+        return None
+    forms = []
+    for expression, column in zip(stage.expressions, columns, strict=True):
+        coefficients = {symbol: sp.Integer(0) for symbol in column}
+        for term in sp.Add.make_args(expression):
+            coefficient, symbol = term.as_coeff_Mul()
+            if not coefficient.is_Rational or symbol not in coefficients:
+                return None
+            coefficients[symbol] += coefficient
+        forms.append(tuple(Fraction(int(c.p), int(c.q)) for c in coefficients.values()))
+    return forms[0] if forms[0] == forms[1] == forms[2] and any(forms[0]) else None

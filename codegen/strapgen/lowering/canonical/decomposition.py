@@ -1,0 +1,297 @@
+"""Covariant decomposition: a transition in terms of scalar and cross products of its vectors.
+
+Every transition here turns with its inputs. So its scalars are polynomials in the scalar products (and triple
+products) of the vectors, its vectors are sums of vectors and cross products with such coefficients, and its
+symmetric matrices are sums of the unit matrix and of symmetrized products of two vectors. The coefficients are
+found in a rotated frame, where the first vector lies along x and the second in the xy plane: one small linear
+system for every degree in each vector.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache
+from typing import Any
+
+import sympy as sp
+from sympy.polys.matrices import DomainMatrix
+
+from strapgen.lowering.polynomials import Monomial, Polynomial, add, substitute
+
+#: What a coefficient belongs to: () a scalar or the unit matrix; (i,) vector i; (i, j) the cross product i x j in
+#: a vector, the symmetrized product of i and j in a matrix; (i, j, k) the symmetrized product of i and j x k.
+Covariant = tuple[int, ...]
+#: The coefficient of every covariant, a polynomial in the products (i, j) = i . j and (i, j, k) = i . (j x k).
+Coefficients = dict[Covariant, Polynomial]
+
+_Degree = tuple[int, ...]
+
+
+class NotCovariantError(ValueError):
+    """A transition does not turn with its inputs."""
+
+
+@dataclass(frozen=True)
+class Decomposition:
+    """A transition as coefficients of covariants.
+
+    Parameters
+    ----------
+    scalar : Polynomial or None
+        The scalar part of a quaternion, None for a matrix.
+    vector : Coefficients
+        The vector part of a quaternion, or the vector of a matrix's skew part.
+    symmetric : Coefficients
+        The symmetric part of a matrix; empty for a quaternion.
+    """
+
+    scalar: Polynomial | None
+    vector: Coefficients
+    symmetric: Coefficients
+
+    def coefficients(self) -> list[Polynomial]:
+        """Return all polynomials."""
+        own = [] if self.scalar is None else [self.scalar]
+        return [*own, *self.vector.values(), *self.symmetric.values()]
+
+
+class Frame:
+    """Vectors in a rotated frame: polynomials in the coordinates that are not zero there.
+
+    Parameters
+    ----------
+    count : int
+        Number of vectors.
+    """
+
+    def __init__(self, count: int) -> None:
+        self.count = count
+        lengths = [min(k + 1, 3) for k in range(count)]
+        names = [f"u{k}_{axis}" for k, n in enumerate(lengths) for axis in "xyz"[:n]]
+        self.ring, *generators = sp.ring(names, sp.QQ)
+        coordinates = iter(generators)
+        self.vectors = [[next(coordinates) for _ in range(n)] + [self.ring.zero] * (3 - n) for n in lengths]
+        self._owner = [k for k, n in enumerate(lengths) for _ in range(n)]
+        self._values: dict[Monomial, Any] = {(): self.ring.one}
+
+    def quaternion(self, vector: list[Any], scalar: Any) -> Decomposition:
+        """Decompose a quaternion, given by its polynomials in the frame's coordinates.
+
+        Raises
+        ------
+        NotCovariantError
+            If it does not turn with the vectors.
+        """
+        return Decomposition(self._solve([scalar], self._scalars).get((), {}), self._vector(vector), {})
+
+    def matrix(self, m: list[Any]) -> Decomposition:
+        """Decompose a 3 x 3 matrix, given row by row.
+
+        Raises
+        ------
+        NotCovariantError
+            If it does not turn with the vectors.
+        """
+        half = sp.Rational(1, 2)
+        skew = [(m[7] - m[5]) * half, (m[2] - m[6]) * half, (m[3] - m[1]) * half]
+        symmetric = [(m[3 * i + j] + m[3 * j + i]) * half for i in range(3) for j in range(i, 3)]
+        return Decomposition(None, self._vector(skew), self._solve(symmetric, self._symmetrics))
+
+    def _vector(self, elements: list[Any]) -> Coefficients:
+        return self._solve(elements, self._vectors)
+
+    def _scalars(self, degree: _Degree) -> Iterator[tuple[Covariant, list[Any], _Degree]]:
+        yield (), [self.ring.one], degree
+
+    def _vectors(self, degree: _Degree) -> Iterator[tuple[Covariant, list[Any], _Degree]]:
+        # With products of two as coefficients the vectors are odd, the cross products even; triple products
+        # would add nothing: (a . b x c) d is a sum of cross products, (a . b x c) d x e one of vectors.
+        u = self.vectors
+        if sum(degree) % 2:
+            for i in range(self.count):
+                yield (i,), u[i], _less(degree, i)
+        else:
+            for i, j in itertools.combinations(range(self.count), 2):
+                yield (i, j), _cross(u[i], u[j]), _less(degree, i, j)
+
+    def _symmetrics(self, degree: _Degree) -> Iterator[tuple[Covariant, list[Any], _Degree]]:
+        # Products with the first vector come first: where several sums are equal, they are preferred.
+        u, one, zero = self.vectors, self.ring.one, self.ring.zero
+        for i in range(self.count):
+            if sum(degree) % 2:
+                for j, k in itertools.combinations(range(self.count), 2):
+                    yield (i, j, k), _symmetrized(u[i], _cross(u[j], u[k])), _less(degree, i, j, k)
+            else:
+                for j in range(i, self.count):
+                    yield (i, j), _symmetrized(u[i], u[j]), _less(degree, i, j)
+        yield (), [one, zero, zero, one, zero, one], degree
+
+    def _solve(
+        self, elements: list[Any], ansatz: Callable[[_Degree], Iterator[tuple[Covariant, list[Any], _Degree]]]
+    ) -> Coefficients:
+        found: Coefficients = {}
+        for degree, target in self._by_degree(elements).items():
+            labels: list[tuple[Covariant, Monomial]] = []
+            rows: dict[Any, dict[int, Any]] = {}
+            for covariant, parts, rest in ansatz(degree):
+                for monomial in invariants(rest, triple=not covariant):
+                    value = self._value(monomial)
+                    for k, part in enumerate(parts):
+                        for place, coefficient in (part * value).terms():
+                            rows.setdefault((k, place), {})[len(labels)] = coefficient
+                    labels.append((covariant, monomial))
+            for place, coefficient in target.items():
+                rows.setdefault(place, {})[len(labels)] = coefficient
+            system = dict(enumerate(rows.values()))
+            reduced, pivots = DomainMatrix(system, (len(rows), len(labels) + 1), sp.QQ).rref()
+            if len(labels) in pivots:
+                raise NotCovariantError(f"no covariant form in degree {degree}")
+            solution = reduced.to_dod()
+            for row, pivot in enumerate(pivots):
+                coefficient = solution.get(row, {}).get(len(labels), 0)
+                if coefficient:
+                    covariant, monomial = labels[pivot]
+                    value = Fraction(int(coefficient.numerator), int(coefficient.denominator))
+                    found.setdefault(covariant, {})[monomial] = value
+        return found
+
+    def _by_degree(self, elements: list[Any]) -> dict[_Degree, dict[Any, Any]]:
+        parts: dict[_Degree, dict[Any, Any]] = {}
+        for k, element in enumerate(elements):
+            for place, coefficient in self.ring(element).terms():
+                degree = [0] * self.count
+                for owner, power in zip(self._owner, place, strict=True):
+                    degree[owner] += power
+                parts.setdefault(tuple(degree), {})[k, place] = coefficient
+        return parts
+
+    def _value(self, monomial: Monomial) -> Any:
+        if monomial not in self._values:
+            i, j, *k = monomial[0]
+            other = _cross(self.vectors[j], self.vectors[k[0]]) if k else self.vectors[j]
+            self._values[monomial] = _dot(self.vectors[i], other) * self._value(monomial[1:])
+        return self._values[monomial]
+
+
+@cache
+def invariants(degree: _Degree, triple: bool = False) -> tuple[Monomial, ...]:
+    """Return all products of scalar products of a given degree in each vector.
+
+    Parameters
+    ----------
+    degree : tuple of int
+        How often each vector occurs; none exist where one is negative.
+    triple : bool, optional
+        Whether one triple product may occur: two are a sum of products of scalar products.
+    """
+    if min(degree) < 0:
+        return ()
+    if not any(degree):
+        return ((),)
+    first = next(k for k, n in enumerate(degree) if n)
+    products = {
+        tuple(sorted(((first, j), *rest)))
+        for j in range(first, len(degree))
+        for rest in invariants(_less(degree, first, j))
+    }
+    if triple and sum(degree) % 2:
+        for three in itertools.combinations(range(len(degree)), 3):
+            products |= {(three, *rest) for rest in invariants(_less(degree, *three))}
+    return tuple(sorted(products))
+
+
+def _less(degree: _Degree, *vectors: int) -> _Degree:
+    rest = list(degree)
+    for k in vectors:
+        rest[k] -= 1
+    return tuple(rest)
+
+
+def _dot(a: list[Any], b: list[Any]) -> Any:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _cross(a: list[Any], b: list[Any]) -> list[Any]:
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+
+
+def _symmetrized(a: list[Any], b: list[Any]) -> list[Any]:
+    return [a[i] * b[j] + a[j] * b[i] for i in range(3) for j in range(i, 3)]
+
+
+def transform(decomposition: Decomposition, matrix: list[list[Fraction]]) -> Decomposition:
+    """Return a decomposition in other vectors.
+
+    Parameters
+    ----------
+    decomposition : Decomposition
+    matrix : list of list of Fraction
+        Row i has the components of the old vector i along the new ones.
+    """
+    expansions = {(i,): {(j,): c for j, c in enumerate(row) if c} for i, row in enumerate(matrix)}
+
+    def expand(covariant: Covariant, canonical: Callable[[Covariant], tuple[Covariant, int]]) -> Polynomial:
+        """Return a product of old vectors as a sum of products of new ones."""
+        total: Polynomial = {}
+        for choice in itertools.product(*(expansions[i,].items() for i in covariant)):
+            coefficient = Fraction(1)
+            for _, factor in choice:
+                coefficient *= factor
+            product, sign = canonical(tuple(j for (j,), _ in choice))
+            if sign:
+                total = add(total, {(product,): coefficient * sign})
+        return total
+
+    products: dict[Covariant, Polynomial] = {}
+
+    def product_of(factor: Covariant) -> Polynomial:
+        if factor not in products:
+            products[factor] = expand(factor, _sorted_product)
+        return products[factor]
+
+    def coefficients(
+        old: Coefficients, canonical: Callable[[Covariant], tuple[Covariant, int]]
+    ) -> Coefficients:
+        found: Coefficients = {}
+        for covariant, polynomial in old.items():
+            moved = substitute(polynomial, product_of)
+            for (new,), factor in expand(covariant, canonical).items():
+                total = add(found.get(new, {}), moved, factor)
+                if total:
+                    found[new] = total
+                else:
+                    found.pop(new, None)
+        return found
+
+    return Decomposition(
+        None if decomposition.scalar is None else substitute(decomposition.scalar, product_of),
+        coefficients(decomposition.vector, _sorted_cross),
+        coefficients(decomposition.symmetric, _sorted_symmetric),
+    )
+
+
+def _sorted_product(indices: Covariant) -> tuple[Covariant, int]:
+    """Return the indices of a scalar or triple product in order, and the sign of the exchange."""
+    if len(indices) < 3:
+        return tuple(sorted(indices)), 1
+    if len(set(indices)) < 3:
+        return indices, 0
+    exchanges = sum(a > b for a, b in itertools.combinations(indices, 2))
+    return tuple(sorted(indices)), -1 if exchanges % 2 else 1
+
+
+def _sorted_cross(indices: Covariant) -> tuple[Covariant, int]:
+    if len(indices) < 2:
+        return indices, 1
+    i, j = indices
+    return (min(i, j), max(i, j)), (i < j) - (i > j)
+
+
+def _sorted_symmetric(indices: Covariant) -> tuple[Covariant, int]:
+    if len(indices) < 3:
+        return tuple(sorted(indices)), 1
+    crossed, sign = _sorted_cross(indices[1:])
+    return (indices[0], *crossed), sign

@@ -1,0 +1,292 @@
+"""Plans: a decomposition in a chosen basis as vectors to compute, before it becomes scalar code."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from enum import Enum
+from fractions import Fraction
+
+from strapgen.lowering.canonical.decomposition import Coefficients, Covariant, Decomposition
+from strapgen.lowering.canonical.vectors import Form, Pool
+from strapgen.lowering.polynomials import ONE, Polynomial, add, ratio, scale
+
+
+@dataclass(frozen=True)
+class Cross:
+    """A cross product of two named vectors."""
+
+    name: str
+    left: str
+    right: str
+
+
+@dataclass(frozen=True)
+class Weighted:
+    """A sum of named vectors, each with a polynomial in products of the basis as its weight."""
+
+    name: str
+    terms: tuple[tuple[Polynomial, str], ...]
+    meaning: str
+
+
+class Opened(Enum):
+    """Which cross products in the skew part go into outer products: u z' - z u' is the skew matrix of z x u."""
+
+    NONE = "none"
+    PLAIN = "those of two vectors"
+    RIGHT = "with them those of three vectors, so that the right partner gets them"
+    LEFT = "the same for the left partner"
+
+
+class Sides(Enum):
+    """Which outer products of a vector u of the basis and its partner y a matrix has."""
+
+    BOTH = "u y' + y u'"
+    PARALLEL = "u y', y along u"
+    RIGHT = "u y'"
+    LEFT = "y u'"
+
+
+@dataclass(frozen=True)
+class Outer:
+    """A part of a matrix: outer products of a vector of the basis and its partner."""
+
+    vector: str
+    partner: str
+    sides: Sides
+
+
+@dataclass
+class Plan:
+    """What a transition is computed from.
+
+    Parameters
+    ----------
+    pool : Pool
+        Vectors that are linear in the inputs.
+    basis : list of str
+        Names of the vectors to which the products in the weights refer.
+    """
+
+    pool: Pool
+    basis: list[str]
+    definitions: list[Cross | Weighted] = field(default_factory=list)
+    scalars: dict[str, tuple[Polynomial, str]] = field(default_factory=dict)
+    outers: list[Outer] = field(default_factory=list)
+
+    def polynomials(self) -> list[Polynomial]:
+        """Return all weights and scalars."""
+        weights = [p for d in self.definitions if isinstance(d, Weighted) for p, _ in d.terms]
+        return [*weights, *(p for p, _ in self.scalars.values())]
+
+    def forms(self) -> list[Form]:
+        """Return the forms of the basis."""
+        return [self.pool.vectors[name].form for name in self.basis]
+
+
+class Planner:
+    """Writes the plan of one decomposition.
+
+    Parameters
+    ----------
+    plan : Plan
+        With pool and basis.
+    weighted : bool
+        Whether weights are applied before cross products that share a factor, which saves cross products; or
+        after, which lets sums share them.
+    opened : Opened, optional
+        Which cross products in the skew part of a matrix are taken into its outer products.
+    """
+
+    def __init__(self, plan: Plan, weighted: bool, opened: Opened = Opened.NONE) -> None:
+        self.plan = plan
+        self._weighted = weighted
+        self._opened = opened
+        self._degrees: Counter[int] = Counter()
+
+    def quaternion(self, decomposition: Decomposition, name: str) -> None:
+        """Plan a quaternion: its vector part, under the quaternion's own name, and its scalar part."""
+        self._count_edges([decomposition.vector])
+        self.plan.scalars["scalar"] = (decomposition.scalar or {}, "its scalar part")
+        self._sum(name, decomposition.vector, "the step applied to the identity: its vector part")
+
+    def matrix(self, decomposition: Decomposition) -> None:
+        """Plan a matrix: the vector of its skew part, and outer products of vectors of the basis and partners."""
+        symmetric, skew = decomposition.symmetric, dict(decomposition.vector)
+        names = self.plan.basis
+        chosen = _axes(symmetric)
+        partners: dict[int, Coefficients] = {i: {} for i in chosen}
+        for covariant, coefficient in symmetric.items():
+            if not covariant:
+                continue
+            i = next(k for k in chosen if k in covariant[: 1 if len(covariant) == 3 else 2])
+            rest = list(covariant)
+            rest.remove(i)
+            partners[i][tuple(rest)] = coefficient
+        levers: dict[int, Coefficients] = {i: {} for i in chosen}
+        if self._opened is not Opened.NONE:
+            for i, partner in partners.items():
+                levers[i] = _take_lever(skew, i)
+                if self._opened is not Opened.PLAIN:
+                    levers[i] |= _take_triple(skew, i, partner, 1 if self._opened is Opened.RIGHT else -1)
+        self._count_edges([skew, *partners.values()])
+        self.plan.scalars["diagonal"] = (symmetric.get((), {}), "multiple of the unit matrix")
+        if skew:
+            self._sum("skew", skew, "vector of the skew part")
+        for i, partner in partners.items():
+            suffix = f"_{names[i]}" if len(partners) > 1 else ""
+            self._outer(names[i], f"partner{suffix}", partner, levers[i], alone=set(partner) == {(i,)})
+
+    def _outer(self, vector: str, name: str, partner: Coefficients, lever: Coefficients, alone: bool) -> None:
+        """Plan u y' + y u' and, for a lever z, u z' - z u'."""
+        if not lever:
+            if alone:
+                partner = {c: scale(p, 2) for c, p in partner.items()}
+            self._sum(name, partner, f"of {vector} in outer products")
+            self.plan.outers.append(Outer(vector, name, Sides.PARALLEL if alone else Sides.BOTH))
+            return
+        common = {c: p for c, p in partner.items() if c not in lever}
+        sides: list[Coefficients] = []
+        for sign in (1, -1):
+            side = {c: add(partner.get(c, {}), p, sign) for c, p in lever.items()}
+            sides.append({c: p for c, p in side.items() if p})
+        shared: list[tuple[Polynomial, str]] = []
+        if common and all(sides) and len(common) > 1:
+            self._sum(f"{name}_common", common, f"what both partners of {vector} have")
+            shared, common = [(ONE, f"{name}_common")], {}
+        for side, kind in zip(sides, (Sides.RIGHT, Sides.LEFT), strict=True):
+            if side or shared or common:
+                own = f"{name}_{kind.name.lower()}"
+                self._sum(own, side | common, f"{kind.name.lower()} of {vector} in an outer product", shared)
+                self.plan.outers.append(Outer(vector, own, kind))
+
+    def _count_edges(self, vectors: Iterable[Coefficients]) -> None:
+        for coefficients in vectors:
+            self._degrees.update(i for covariant in coefficients if len(covariant) == 2 for i in covariant)
+
+    def _sum(
+        self,
+        name: str,
+        coefficients: Coefficients,
+        meaning: str,
+        shared: Iterable[tuple[Polynomial, str]] = (),
+    ) -> None:
+        straight = {c[0]: p for c, p in coefficients.items() if len(c) == 1}
+        terms = [*shared, *self._grouped(straight)]
+        levers: dict[int, dict[int, Polynomial]] = {}
+        for covariant, polynomial in coefficients.items():
+            if len(covariant) == 2:
+                i, j = covariant
+                if (self._degrees[i], -i) > (self._degrees[j], -j):
+                    levers.setdefault(i, {})[j] = scale(polynomial, -1)
+                else:
+                    levers.setdefault(j, {})[i] = polynomial
+        for centre, lever in levers.items():
+            groups = self._grouped(lever)
+            right = self.plan.basis[centre]
+            if len(groups) > 1 and self._weighted:
+                left = f"{name}_lever" if len(levers) == 1 else f"{name}_lever_{right}"
+                self._define(
+                    Weighted(left, tuple(groups), f"its cross product with {right} goes into {name}")
+                )
+                groups = [(ONE, left)]
+            terms += [(weight, self._cross(left, right)) for weight, left in groups]
+        self._define(Weighted(name, tuple(terms), meaning))
+
+    def _cross(self, left: str, right: str) -> str:
+        name = f"{left}_cross_{right}"
+        self._define(Cross(name, left, right))
+        return name
+
+    def _define(self, definition: Cross | Weighted) -> None:
+        if definition not in self.plan.definitions:
+            self.plan.definitions.append(definition)
+
+    def _grouped(self, columns: dict[int, Polynomial]) -> list[tuple[Polynomial, str]]:
+        """Return weights and vectors; vectors with proportional weights are summed first where it pays."""
+        groups: list[tuple[Polynomial, list[tuple[Fraction, int]]]] = []
+        for index, polynomial in columns.items():
+            for first, members in groups:
+                factor = ratio(polynomial, first)
+                if factor is not None:
+                    members.append((factor, index))
+                    break
+            else:
+                groups.append((polynomial, [(Fraction(1), index)]))
+        terms: list[tuple[Polynomial, str]] = []
+        forms = self.plan.forms()
+        for polynomial, members in groups:
+            if len(members) > 1:
+                whole = tuple(
+                    sum((c * forms[i][k] for c, i in members), Fraction(0)) for k in range(len(forms[0]))
+                )
+                found = self.plan.pool.find(whole)
+                if found is None and all(abs(c) == 1 for c, _ in members):
+                    found = self.plan.pool.define(whole)
+                if found is not None:
+                    terms.append((scale(polynomial, found[1]), found[0]))
+                    continue
+            terms += [(scale(polynomial, c), self.plan.basis[i]) for c, i in members]
+        return terms
+
+
+def _take_lever(skew: Coefficients, axis: int) -> Coefficients:
+    """Take the cross products z x u with a vector u of the basis out of a skew part and return z."""
+    lever: Coefficients = {}
+    for covariant in [c for c in skew if len(c) == 2 and axis in c]:
+        i, j = covariant
+        polynomial = skew.pop(covariant)
+        lever[j if i == axis else i,] = scale(polynomial, -1) if i == axis else polynomial
+    return lever
+
+
+def _take_triple(skew: Coefficients, axis: int, partner: Coefficients, sign: int) -> Coefficients:
+    """Take (a x b) x u, for cross products a x b in a partner of u, out of a skew part and return the a x b.
+
+    (a x b) x u is (a . u) b - (b . u) a. The weights are those in the partner, or their negatives.
+    """
+    lever: Coefficients = {c: scale(p, sign) for c, p in partner.items() if len(c) == 2}
+    for covariant, polynomial in lever.items():
+        a, b = covariant
+        for kept, other, factor in ((b, a, -1), (a, b, 1)):
+            product = {tuple(sorted((*m, tuple(sorted((other, axis)))))): c for m, c in polynomial.items()}
+            total = add(skew.pop((kept,), {}), product, factor)
+            if total:
+                skew[kept,] = total
+    return lever
+
+
+def _axes(symmetric: Coefficients) -> list[int]:
+    """Return vectors of the basis such that every symmetrized product has one of them as its first factor."""
+    axes = {c[0] for c in symmetric if len(c) == 3 or (len(c) == 2 and c[0] == c[1])}
+    open_pairs = [c for c in symmetric if len(c) == 2 and not axes & set(c)]
+    while open_pairs:
+        counts = Counter(i for c in open_pairs for i in c)
+        axes.add(max(counts, key=lambda i: (counts[i], -i)))
+        open_pairs = [c for c in open_pairs if not axes & set(c)]
+    return sorted(axes)
+
+
+def without_triples(decomposition: Decomposition) -> list[Decomposition]:
+    """Return a decomposition and its equals by the relation between symmetrized triple products.
+
+    u1 (u2 x u3)' + u2 (u3 x u1)' + u3 (u1 x u2)', symmetrized, is twice the triple product times the unit
+    matrix: any one of the three can be exchanged for the others.
+    """
+    variants = [decomposition]
+    for covariant, coefficient in decomposition.symmetric.items():
+        if len(covariant) < 3 or len(set(covariant)) < 3:
+            continue
+        i, j, k = sorted(covariant)
+        cycle: dict[Covariant, int] = {(i, j, k): 1, (j, i, k): -1, (k, i, j): 1}
+        factor = -cycle[covariant]
+        symmetric = dict(decomposition.symmetric)
+        for other, sign in cycle.items():
+            symmetric[other] = add(symmetric.get(other, {}), coefficient, factor * sign)
+        triple = {tuple(sorted((*m, (i, j, k)))): c for m, c in coefficient.items()}
+        symmetric[()] = add(symmetric.get((), {}), triple, -2 * factor)
+        symmetric = {c: p for c, p in symmetric.items() if p}
+        variants.append(Decomposition(None, decomposition.vector, symmetric))
+    return variants

@@ -1,0 +1,80 @@
+"""Which scalar products to compute: the same polynomial is short in some and long in others."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from fractions import Fraction
+
+from strapgen.lowering.canonical.vectors import Form, components
+from strapgen.lowering.polynomials import Polynomial, atom, atoms, substitute
+
+#: The operations that a scalar product takes, in units of those that a term of a polynomial takes.
+_PRODUCT = 3
+
+
+def choose_products(
+    polynomials: Sequence[Polynomial], basis: Sequence[tuple[str, Form]], offered: dict[str, Form]
+) -> list[Polynomial]:
+    """Rewrite polynomials in the scalar products in which they are shortest.
+
+    One product after the other is exchanged for a product of vectors on offer, as long as that saves
+    operations.
+
+    Parameters
+    ----------
+    polynomials : sequence of Polynomial
+        In products (i, j) and (i, j, k) of vectors of the basis.
+    basis : sequence of (str, Form)
+        Names and coefficients of the basis.
+    offered : dict of str to Form
+        Vectors that products may be taken of, the basis among them; none outside its span.
+
+    Returns
+    -------
+    list of Polynomial
+        In products of names.
+    """
+    names = [name for name, _ in basis]
+    current = [substitute(p, lambda factor: atom(tuple(names[k] for k in factor))) for p in polynomials]
+    # Every product on offer in the products of the basis, and so in those that stand for them.
+    expansions: dict[tuple[str, ...], Polynomial] = {}
+    along = {name: components(form, [form for _, form in basis]) for name, form in offered.items()}
+    for a, b in itertools.combinations_with_replacement(offered, 2):
+        total: dict[tuple[str, ...], Fraction] = {}
+        for (i, x), (j, y) in itertools.product(enumerate(along[a]), enumerate(along[b])):
+            if x and y:
+                key = tuple(names[k] for k in sorted((i, j)))
+                total[key] = total.get(key, Fraction(0)) + x * y
+        expansions[a, b] = {(key,): value for key, value in total.items() if value}
+    cost = _cost(current)
+    while True:
+        best = None
+        used = {name for name in atoms(current) if len(name) == 2}
+        for new, expansion in expansions.items():
+            if new in used:
+                continue
+            for (old,), coefficient in expansion.items():
+                if old not in used or {(old,)} == expansion.keys():
+                    continue
+                value = {m: -c / coefficient for m, c in expansion.items() if m != (old,)}
+                value[new,] = 1 / coefficient
+                tried = [_exchange(p, old, value) for p in current]
+                if (found := _cost(tried)) < cost:
+                    cost, best = found, (new, old, value, tried)
+        if best is None:
+            return current
+        new, old, value, current = best
+        expansions = {key: _exchange(p, old, value) for key, p in expansions.items()}
+
+
+def _exchange(p: Polynomial, old: tuple[str, ...], value: Polynomial) -> Polynomial:
+    if not any(old in monomial for monomial in p):
+        return p
+    return substitute(p, lambda name: value if name == old else atom(name))
+
+
+def _cost(polynomials: Sequence[Polynomial]) -> int:
+    distinct = {frozenset(p.items()): p for p in polynomials}.values()
+    terms = sum(len(monomial) for p in distinct for monomial in p)
+    return terms + _PRODUCT * len(atoms(polynomials))

@@ -1,0 +1,154 @@
+"""The search for the basis in which a transition takes the fewest operations."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from fractions import Fraction
+
+from strapgen.lowering.canonical.core import Core
+from strapgen.lowering.canonical.decomposition import Decomposition, transform
+from strapgen.lowering.canonical.plan import Cross, Opened, Plan, Planner, Sides, without_triples
+from strapgen.lowering.canonical.vectors import (
+    Form,
+    Pool,
+    components,
+    independent,
+    mirrored,
+    normalized,
+    proportion,
+)
+from strapgen.lowering.canonical.writing import unsigned
+from strapgen.lowering.polynomials import Polynomial, atoms
+
+#: How many bases that look cheap are planned in every way.
+_PLANNED = 30
+#: Most bases that are looked at.
+_BASES = 400
+
+
+def plans(core: Core, decomposition: Decomposition) -> list[Plan]:
+    """Return plans for a transition, the one that looks cheapest first.
+
+    Parameters
+    ----------
+    core : Core
+    decomposition : Decomposition
+        In the vectors of the core's base.
+    """
+    base = core.base()
+    count = len(base)
+    forms, names = _candidates(core)
+    found: list[tuple[int, tuple[Form, ...], Decomposition]] = []
+    choices = (c for c in itertools.combinations(forms, count) if len(independent(c)) == count)
+    for basis in itertools.islice(choices, _BASES):
+        moved = transform(decomposition, [components(form, basis) for form in base])
+        found.append((_outlook(moved) + 3 * sum(map(_terms, basis)), basis, moved))
+    found.sort(key=lambda entry: entry[0])
+    ranked = [
+        (_estimate(plan), plan)
+        for _, basis, moved in found[:_PLANNED]
+        for plan in _plans(core, basis, moved, names)
+    ]
+    ranked.sort(key=lambda entry: entry[0])
+    return [plan for _, plan in ranked]
+
+
+def _candidates(core: Core) -> tuple[list[Form], dict[Form, tuple[str, str]]]:
+    """Return vectors that may stand in a basis, and what they are called."""
+    span = core.base()
+    count = len(core.inputs)
+    names: dict[Form, tuple[str, str]] = {}
+    forms: list[Form] = []
+
+    def offer(form: Form, name: str = "", meaning: str = "") -> None:
+        if not any(form) or len(independent([*span, form])) > len(span):
+            return
+        unit = normalized(form)
+        if name and not any(proportion(unit, known) for known in names):
+            names[form] = name, meaning
+        if unit not in forms:
+            forms.append(unit)
+
+    for k, name in enumerate(core.inputs):
+        offer(tuple(Fraction(int(j == k)) for j in range(count)), name)
+    if count > 1 and core.inputs[0].startswith("d"):
+        offer((Fraction(1),) * count, "sigma", "the angle increment of the whole step")
+    if count == 2:
+        offer((Fraction(1), Fraction(-1)), "delta", "first half minus second half")
+    for name, (signal, form) in core.vectors.items():
+        offer(form, name, signal.meaning)
+    for a, b in itertools.combinations([form for _, form in core.vectors.values()], 2):
+        for sign in (1, -1):
+            offer(tuple(x + sign * y for x, y in zip(a, b, strict=True)))
+    return forms, names
+
+
+def _plans(
+    core: Core, basis: tuple[Form, ...], decomposition: Decomposition, names: dict[Form, tuple[str, str]]
+) -> Iterator[Plan]:
+    both_ways = any(
+        tuple(s * x for x in mirrored(a)) == b for a in basis for b in basis for s in (1, -1) if a != b
+    )
+    for halves in (False, True) if len(core.inputs) > 2 and both_ways else (False,):
+        pool = Pool(core.inputs, names)
+        if halves:
+            for form in basis:
+                if mirrored(form) in basis or tuple(-x for x in mirrored(form)) in basis:
+                    pool.define_mirrored(form)
+        named = [pool.define(form) for form in basis]
+        lengths = [
+            [factor if i == j else Fraction(0) for j in range(len(named))]
+            for i, (_, factor) in enumerate(named)
+        ]
+        for variant in without_triples(decomposition):
+            if any(factor != 1 for _, factor in named):
+                variant = transform(variant, lengths)
+            matrix = core.transition.shape == (3, 3)
+            for weighted, opened in itertools.product((False, True), Opened if matrix else (Opened.NONE,)):
+                plan = Plan(pool.copy(), [name for name, _ in named])
+                planner = Planner(plan, weighted, opened)
+                if matrix:
+                    planner.matrix(variant)
+                else:
+                    planner.quaternion(variant, core.transition.elements[0].rsplit("_", 1)[0])
+                yield plan
+
+
+def _terms(form: Form) -> int:
+    return sum(1 + (abs(x) != 1) for x in form if x) - 1
+
+
+def _outlook(decomposition: Decomposition) -> int:
+    """Return a first guess at the operations of a decomposition."""
+    polynomials = decomposition.coefficients()
+    vectors = len(decomposition.vector) + len(decomposition.symmetric)
+    axes = {c[0] for c in decomposition.symmetric if c}
+    distinct = {unsigned(p): p for p in polynomials}.values()
+    monomials = sum(len(m) for p in distinct for m in p)
+    return 6 * vectors + 6 * len(axes) + monomials + 4 * len(atoms(polynomials))
+
+
+def _estimate(plan: Plan) -> int:
+    """Return about how many operations a plan takes."""
+    total = sum({Sides.BOTH: 21, Sides.PARALLEL: 12}.get(outer.sides, 15) for outer in plan.outers)
+    weights: dict[object, Polynomial] = {}
+    needed: list[str] = []
+    for definition in plan.definitions:
+        if isinstance(definition, Cross):
+            total += 9
+            needed += [definition.left, definition.right]
+            continue
+        for polynomial, vector in definition.terms:
+            needed.append(vector)
+            if polynomial.keys() != {()}:
+                weights[unsigned(polynomial)] = polynomial
+                total += 3
+            elif abs(polynomial[()]) != 1:
+                total += 3
+        total += 3 * (len(definition.terms) - 1)
+    polynomials = [*weights.values(), *(p for p, _ in plan.scalars.values())]
+    total += sum(len(monomial) + 1 for p in polynomials for monomial in p if monomial)
+    products = atoms(polynomials)
+    needed += [plan.basis[k] for factor in products for k in factor]
+    return total + 4 * len(products) + plan.pool.operations(needed)

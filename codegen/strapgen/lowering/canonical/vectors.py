@@ -1,0 +1,238 @@
+"""Vectors that are linear in a step's input vectors, and how they are computed with few operations."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+#: Coefficients of the input vectors.
+Form = tuple[Fraction, ...]
+
+
+@dataclass(frozen=True)
+class Vector:
+    """A named vector.
+
+    Parameters
+    ----------
+    name : str
+    form : tuple of Fraction
+        Its coefficients along the input vectors.
+    parts : tuple of (Fraction, str)
+        The sum by which it is computed; empty for an input.
+    meaning : str
+    """
+
+    name: str
+    form: Form
+    parts: tuple[tuple[Fraction, str], ...] = ()
+    meaning: str = ""
+
+    @property
+    def operations(self) -> int:
+        """Operations on scalars that computing it takes."""
+        products = sum(abs(coefficient) != 1 for coefficient, _ in self.parts)
+        return 3 * (products + max(len(self.parts) - 1, 0))
+
+
+def proportion(a: Form, b: Form) -> Fraction | None:
+    """Return the number c with a = c b, None if there is none."""
+    k = next((k for k, x in enumerate(b) if x), None)
+    if k is None or not a[k]:
+        return None
+    c = a[k] / b[k]
+    return c if all(x == c * y for x, y in zip(a, b, strict=True)) else None
+
+
+def normalized(form: Form) -> Form:
+    """Return a form scaled so that most of its coefficients are 1 or -1, the first one positive."""
+    counts = Counter(abs(x) for x in form if x)
+    most = max(counts.values())
+    unit = max(x for x, number in counts.items() if number == most)
+    first = next(x for x in form if x)
+    return tuple(x / (unit if first > 0 else -unit) for x in form)
+
+
+def mirrored(form: Form) -> Form:
+    """Return the form with the input vectors in the opposite order."""
+    return form[::-1]
+
+
+def independent(forms: Sequence[Form]) -> list[int]:
+    """Return the places of the first forms that span all of them."""
+    rows: list[list[Fraction]] = []
+    chosen = []
+    for place, form in enumerate(forms):
+        row = list(form)
+        for other in rows:
+            pivot = next(k for k, x in enumerate(other) if x)
+            if row[pivot]:
+                factor = row[pivot] / other[pivot]
+                row = [x - factor * y for x, y in zip(row, other, strict=True)]
+        if any(row):
+            rows.append(row)
+            chosen.append(place)
+    return chosen
+
+
+def components(form: Form, basis: Sequence[Form]) -> list[Fraction]:
+    """Return the components of a form along a basis.
+
+    Raises
+    ------
+    ValueError
+        If the basis does not span the form.
+    """
+    rows = [[*column, x] for *column, x in zip(*basis, form, strict=True)]
+    count = len(basis)
+    for pivot in range(count):
+        k = next(k for k in range(pivot, len(rows)) if rows[k][pivot])
+        rows[pivot], rows[k] = rows[k], rows[pivot]
+        rows[pivot] = [x / rows[pivot][pivot] for x in rows[pivot]]
+        for other in range(len(rows)):
+            if other != pivot and rows[other][pivot]:
+                factor = rows[other][pivot]
+                rows[other] = [x - factor * y for x, y in zip(rows[other], rows[pivot], strict=True)]
+    if any(row[-1] for row in rows[count:]):
+        raise ValueError("the form lies outside the span of the basis")
+    return [rows[k][-1] for k in range(count)]
+
+
+class Pool:
+    """The vectors that have a name, each defined once, in the order of computation.
+
+    Parameters
+    ----------
+    inputs : list of str
+        Names of the input vectors.
+    names : dict of Form to (str, str)
+        Name and meaning of forms that have one in the field.
+    """
+
+    def __init__(self, inputs: list[str], names: dict[Form, tuple[str, str]]) -> None:
+        self._inputs = inputs
+        self._names = names
+        self.vectors: dict[str, Vector] = {}
+        for k, name in enumerate(inputs):
+            form = tuple(Fraction(int(k == j)) for j in range(len(inputs)))
+            self.vectors[name] = Vector(name, form)
+
+    def copy(self) -> Pool:
+        """Return a pool to which vectors can be added without changing this one."""
+        other = Pool(self._inputs, self._names)
+        other.vectors = dict(self.vectors)
+        return other
+
+    def operations(self, names: Iterable[str]) -> int:
+        """Return how many operations on scalars the vectors of given names take; others are none of the pool's."""
+        needed = set(names)
+        for vector in reversed(self.vectors.values()):
+            if vector.name in needed:
+                needed |= {name for _, name in vector.parts}
+        return sum(vector.operations for vector in self.vectors.values() if vector.name in needed)
+
+    def find(self, form: Form) -> tuple[str, Fraction] | None:
+        """Return the vector that is proportional to a form, and form / vector."""
+        for vector in self.vectors.values():
+            factor = proportion(form, vector.form)
+            if factor is not None:
+                return vector.name, factor
+        return None
+
+    def define(self, form: Form) -> tuple[str, Fraction]:
+        """Return the vector that is proportional to a form and form / vector; define it if it is new."""
+        found = self.find(form)
+        if found:
+            return found
+        unit = normalized(form)
+        self._add(unit, self._sum_of_two(unit) or self._sum_of_pairs(unit) or self._sum_of_inputs(unit))
+        return self.define(form)
+
+    def define_mirrored(self, form: Form) -> None:
+        """Define a form and its mirror image together: the sum and the difference of two halves."""
+        other = mirrored(form)
+        halves = [tuple((x + s * y) / 2 for x, y in zip(form, other, strict=True)) for s in (1, -1)]
+        if not all(map(any, halves)):
+            return
+        even = normalized(halves[0])
+        scale = proportion(even, halves[0]) or Fraction(1)
+        odd = tuple(scale * x for x in halves[1])
+        names = []
+        for half in (even, odd):
+            found = self.find(half)
+            if found is None:
+                names.append(self._add(half, self._sum_of_pairs(half) or self._sum_of_inputs(half)))
+            elif found[1] == 1:
+                names.append(found[0])
+            else:
+                return
+        for sign in (1, -1):
+            whole = tuple(x + sign * y for x, y in zip(even, odd, strict=True))
+            if self.find(whole) is None:
+                self._add(whole, ((Fraction(1), names[0]), (Fraction(sign), names[1])))
+
+    def _add(self, form: Form, parts: tuple[tuple[Fraction, str], ...]) -> str:
+        name, meaning = self._named(form, parts)
+        self.vectors[name] = Vector(name, form, parts, meaning)
+        return name
+
+    def _sum_of_two(self, form: Form) -> tuple[tuple[Fraction, str], ...] | None:
+        """Return a form as the sum or difference of two vectors that have a name already."""
+        names = list(self.vectors)
+        for k, first in enumerate(names):
+            for second in names[k + 1 :]:
+                a, b = self.vectors[first].form, self.vectors[second].form
+                for sign in (1, -1):
+                    factor = proportion(form, tuple(x + sign * y for x, y in zip(a, b, strict=True)))
+                    if factor is not None and abs(factor) == 1:
+                        return (factor, first), (factor * sign, second)
+        return None
+
+    def _sum_of_pairs(self, form: Form) -> tuple[tuple[Fraction, str], ...] | None:
+        """Return a form that is even or odd in time through sums or differences of pairs of inputs."""
+        sign = next((s for s in (1, -1) if form == tuple(s * x for x in mirrored(form))), None)
+        count = len(form)
+        if sign is None or sum(map(bool, form)) < 3:
+            return None
+        parts = []
+        for k in range((count + 1) // 2):
+            if not form[k]:
+                continue
+            pair = [Fraction(0)] * count
+            pair[k] += 1
+            if k != count - 1 - k:
+                pair[count - 1 - k] += sign
+            name, factor = self.define(tuple(pair))
+            parts.append((form[k] * factor, name))
+        return tuple(parts)
+
+    def _sum_of_inputs(self, form: Form) -> tuple[tuple[Fraction, str], ...]:
+        return tuple((x, name) for x, name in zip(form, self._inputs, strict=True) if x)
+
+    def _named(self, form: Form, parts: tuple[tuple[Fraction, str], ...]) -> tuple[str, str]:
+        for known, (name, meaning) in self._names.items():
+            factor = proportion(form, known)
+            if factor is None:
+                continue
+            if factor != 1:
+                sign = "minus_" if factor < 0 else ""
+                times = str(abs(factor)).replace("/", "_")
+                name = f"{sign}{name}" + (f"_times_{times}" if abs(factor) != 1 else "")
+                meaning = f"{meaning}, times {factor}" if meaning else ""
+            if name not in self.vectors:
+                return name, meaning
+        if len(parts) == 2 and all(abs(coefficient) == 1 for coefficient, _ in parts):
+            (a, first), (b, second) = sorted(parts, key=lambda part: part[0] < 0)
+            name = f"{first}_{'plus' if b > 0 else 'minus'}_{second}"
+            if a > 0 and name not in self.vectors:
+                return name, ""
+        kind = next(
+            (k for k, s in (("even", 1), ("odd", -1)) if form == tuple(s * x for x in mirrored(form))),
+            "mixed",
+        )
+        number = 1 + sum(name.startswith(f"{kind}_") for name in self.vectors)
+        return f"{kind}_{number}", "a combination of the inputs" + (
+            "" if kind == "mixed" else f", {kind} in time"
+        )

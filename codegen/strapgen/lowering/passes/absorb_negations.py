@@ -1,0 +1,94 @@
+"""The pass `absorb_negations`: signs become subtractions."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from strapgen.lowering.passes.rewriting import is_unnamed, rewritten, with_values
+from strapgen.program import Constant, Node, Operation, Program, Reference
+
+_EVEN = ("cos", "sinc")
+
+
+def absorb_negations(program: Program) -> Program:
+    """Move signs up the trees until a sum takes them in; drop those of names that stand for nothing.
+
+    Examples
+    --------
+    >>> from strapgen.program import Assignment, Result
+    >>> from strapgen.signal import Signal
+    >>> minus = Operation("negate", (Reference("a"),))
+    >>> body = (Assignment("c", Operation("add", (minus, Reference("b")))),)
+    >>> result = Result(Signal.scalar("c"), (Reference("c"),))
+    >>> signals = (Signal.scalar("a"), Signal.scalar("b"))
+    >>> absorb_negations(Program("p", "p", "", "", "", (), signals, body, (result,))).body[0].value
+    Operation(kind='subtract', arguments=(Reference(name='b'), Reference(name='a')))
+    """
+    program = with_values(program, lambda value: rewritten(value, _rule))
+    results = {
+        node.name for result in program.results for node in result.nodes if isinstance(node, Reference)
+    }
+    for assignment in program.body:
+        name, inner = assignment.name, _inside(assignment.value)
+        if inner is None or not is_unnamed(name) or name in results:
+            continue
+
+        def rule(node: Node, name: str = name) -> Node:
+            return Operation("negate", (node,)) if node == Reference(name) else _rule(node)
+
+        body = tuple(
+            replace(a, value=inner if a.name == name else rewritten(a.value, rule)) for a in program.body
+        )
+        program = replace(program, body=body)
+    return program
+
+
+def _inside(node: Node) -> Node | None:
+    """Return what a negation negates."""
+    return node.arguments[0] if isinstance(node, Operation) and node.kind == "negate" else None
+
+
+def _negated(node: Node) -> Node:
+    if isinstance(node, Constant):
+        return Constant(-node.value)
+    if isinstance(node, Operation):
+        if node.kind == "negate":
+            return node.arguments[0]
+        if node.kind == "subtract":
+            return Operation("subtract", node.arguments[::-1])
+        if node.kind == "multiply":
+            for k, argument in enumerate(node.arguments):
+                if isinstance(argument, Operation) and argument.kind in ("subtract", "negate"):
+                    arguments = list(node.arguments)
+                    arguments[k] = _negated(argument)
+                    return Operation("multiply", tuple(arguments))
+    return Operation("negate", (node,))
+
+
+def _rule(node: Node) -> Node:
+    if not isinstance(node, Operation):
+        return node
+    inner = [_inside(argument) for argument in node.arguments]
+    if node.kind == "negate":
+        return _negated(node.arguments[0])
+    if not any(inner):
+        return node
+    if node.kind in ("add", "subtract"):
+        (left, right), (minus_left, minus_right) = node.arguments, inner
+        plus = node.kind == "add"
+        if minus_right is not None:
+            plus, right = not plus, minus_right
+        if minus_left is None:
+            return Operation("add" if plus else "subtract", (left, right))
+        if plus:
+            return Operation("subtract", (right, minus_left))
+        return Operation("negate", (Operation("add", (minus_left, right)),))
+    if node.kind in ("multiply", "divide"):
+        arguments = tuple(i if i is not None else a for i, a in zip(inner, node.arguments, strict=True))
+        result = Operation(node.kind, arguments)
+        return result if all(inner) else _negated(result)
+    if node.kind == "sin" and inner[0] is not None:
+        return Operation("negate", (Operation("sin", (inner[0],)),))
+    if node.kind in _EVEN and inner[0] is not None:
+        return Operation(node.kind, (inner[0],))
+    return node

@@ -1,0 +1,34 @@
+"""The pass `drop_copies`."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from strapgen.lowering.passes.rewriting import is_unnamed, rewritten
+from strapgen.program import Constant, Node, Program, Reference, Result
+
+
+def drop_copies(program: Program) -> Program:
+    """Use what a name that stands for nothing was copied from: another name, or a number."""
+    copies: dict[str, Node] = {}
+
+    def rule(node: Node) -> Node:
+        return copies.get(node.name, node) if isinstance(node, Reference) else node
+
+    body = []
+    for assignment in program.body:
+        value = rewritten(assignment.value, rule)
+        if isinstance(value, Reference | Constant) and is_unnamed(assignment.name):
+            copies[assignment.name] = value
+        else:
+            body.append(replace(assignment, value=value))
+    if not copies:
+        return program
+
+    def renamed(result: Result) -> Result:
+        return replace(result, nodes=tuple(map(rule, result.nodes)))
+
+    transition = None if program.transition is None else renamed(program.transition)
+    return replace(
+        program, body=tuple(body), outputs=tuple(map(renamed, program.outputs)), transition=transition
+    )

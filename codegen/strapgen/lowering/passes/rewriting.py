@@ -1,0 +1,48 @@
+"""Rewriting the trees of a program from the leaves upwards: what several passes share."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
+
+from strapgen.program import Node, Operation, Program, references
+
+#: How names begin that stand for no quantity of the algorithm: passes may drop, split or change what they hold.
+UNNAMED = ("shared_", "factor_")
+
+
+def is_unnamed(name: str) -> bool:
+    """Tell whether a name stands for no quantity of the algorithm."""
+    return name.startswith(UNNAMED)
+
+
+def rewritten(node: Node, rule: Callable[[Node], Node]) -> Node:
+    """Return a node with a rule applied to everything in it, arguments before what they belong to."""
+    if isinstance(node, Operation):
+        arguments = tuple(rewritten(argument, rule) for argument in node.arguments)
+        if any(new is not old for new, old in zip(arguments, node.arguments, strict=True)):
+            node = Operation(node.kind, arguments)
+    return rule(node)
+
+
+def with_values(program: Program, change: Callable[[Node], Node]) -> Program:
+    """Return a program with every assigned value changed."""
+    body = []
+    for assignment in program.body:
+        value = change(assignment.value)
+        body.append(assignment if value is assignment.value else replace(assignment, value=value))
+    if all(new is old for new, old in zip(body, program.body, strict=True)):
+        return program
+    return replace(program, body=tuple(body))
+
+
+def uses(program: Program) -> Counter[str]:
+    """Count how often each name is used, results included."""
+    counts: Counter[str] = Counter()
+    for assignment in program.body:
+        counts.update(references(assignment.value))
+    for result in program.results:
+        for node in result.nodes:
+            counts.update(references(node))
+    return counts

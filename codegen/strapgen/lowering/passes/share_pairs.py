@@ -1,0 +1,165 @@
+"""The pass `share_pairs`: pairs of terms or factors that occur together are computed once.
+
+x^2 + y^2 in one sum and x^2 + y^2 + z^2 in another are different trees, and no comparison of trees finds what they
+have in common. Here sums and products are sets: the pair that occurs in most of them gets a name, and so on.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import combinations, count
+
+from strapgen.lowering.arithmetic import Term, chain, plain, signed_sum
+from strapgen.lowering.passes.rewriting import is_unnamed, rewritten, uses
+from strapgen.program import Assignment, Node, Operation, Program, Reference, references
+
+#: A pair of members and whether their signs are equal; products have no signs.
+_Pair = tuple[str, Node, Node, bool]
+
+
+@dataclass
+class _Many:
+    """A sum or a product of any number of members."""
+
+    kind: str
+    members: list[tuple[bool, Node | _Many]]
+
+
+def share_pairs(program: Program) -> Program:
+    """Name the pairs of terms and of factors that occur more than once.
+
+    Examples
+    --------
+    >>> from strapgen.program import Result
+    >>> from strapgen.signal import Signal
+    >>> a, b, c, d = map(Reference, "abcd")
+    >>> sums = [chain("add", [a, b, c]), chain("add", [a, d, b])]
+    >>> body = tuple(Assignment(name, value) for name, value in zip("rs", sums))
+    >>> results = tuple(Result(Signal.scalar(name), (Reference(name),)) for name in "rs")
+    >>> signals = tuple(map(Signal.scalar, "abcd"))
+    >>> share_pairs(Program("p", "p", "", "", "", (), signals, body, results)).operations["add"]
+    3
+    """
+    inlined = _inlined(program)
+    taken = {assignment.name for assignment in inlined.body}
+    names = (name for k in count(1) if (name := f"shared_{k}") not in taken)
+    trees = [(assignment, _flat(assignment.value)) for assignment in inlined.body]
+    while pair := _most_frequent(tree for _, tree in trees):
+        name = next(names)
+        kind, a, b, equal = pair
+        replaced = False
+        for place, (_, tree) in enumerate(trees):
+            if _replace(tree, pair, Reference(name)) and not replaced:
+                replaced = True
+                first = place
+        value = Operation(kind if equal else "subtract", (a, b))
+        trees.insert(first, (Assignment(name, value), _flat(value)))
+    if len(trees) == len(inlined.body):
+        return program
+    body = tuple(replace(assignment, value=_tree(tree)) for assignment, tree in trees)
+    return replace(inlined, body=body)
+
+
+def _inlined(program: Program) -> Program:
+    """Put names that stand for nothing, and are used once, back into the tree that uses them."""
+    counts = uses(program)
+    held = {name for result in program.results for node in result.nodes for name in references(node)}
+    values: dict[str, Node] = {}
+    body = []
+
+    def rule(node: Node) -> Node:
+        return values.get(node.name, node) if isinstance(node, Reference) else node
+
+    for assignment in program.body:
+        value = rewritten(assignment.value, rule)
+        if counts[assignment.name] == 1 and is_unnamed(assignment.name) and assignment.name not in held:
+            values[assignment.name] = value
+        else:
+            body.append(replace(assignment, value=value))
+    return replace(program, body=tuple(body))
+
+
+def _flat(node: Node) -> Node | _Many:
+    if not isinstance(node, Operation):
+        return node
+    if node.kind in ("add", "subtract"):
+        return _Many("add", [(sign, _flat(term)) for sign, term in _terms(node, True)])
+    if node.kind == "multiply":
+        return _Many("multiply", [(True, _flat(factor)) for factor in _factors(node)])
+    return _Many(node.kind, [(True, _flat(argument)) for argument in node.arguments])
+
+
+def _terms(node: Node, sign: bool) -> Iterator[Term]:
+    if isinstance(node, Operation) and node.kind in ("add", "subtract"):
+        left, right = node.arguments
+        yield from _terms(left, sign)
+        yield from _terms(right, sign == (node.kind == "add"))
+    else:
+        yield sign, node
+
+
+def _factors(node: Node) -> Iterator[Node]:
+    if isinstance(node, Operation) and node.kind == "multiply":
+        for argument in node.arguments:
+            yield from _factors(argument)
+    else:
+        yield node
+
+
+def _tree(many: Node | _Many) -> Node:
+    if not isinstance(many, _Many):
+        return many
+    members = [(sign, _tree(member)) for sign, member in many.members]
+    if many.kind == "add":
+        return plain(signed_sum(members))
+    if many.kind == "multiply":
+        return chain("multiply", [node for _, node in members])
+    return Operation(many.kind, tuple(node for _, node in members))
+
+
+def _inside(many: Node | _Many) -> Iterator[_Many]:
+    if isinstance(many, _Many):
+        yield many
+        for _, member in many.members:
+            yield from _inside(member)
+
+
+def _pairs(many: _Many) -> Iterator[_Pair]:
+    if many.kind in ("add", "multiply") and len(many.members) > 1:
+        members = sorted(((_tree(member), sign) for sign, member in many.members), key=repr)
+        for (a, one), (b, other) in combinations(members, 2):
+            yield many.kind, a, b, one == other
+
+
+def _most_frequent(trees: Iterator[Node | _Many]) -> _Pair | None:
+    """Return the pair that occurs in most sums or products, of several the first; None if none occurs twice."""
+    counts: Counter[_Pair] = Counter()
+    for tree in trees:
+        for many in _inside(tree):
+            counts.update(set(_pairs(many)))
+    if not counts:
+        return None
+    most = max(counts.values())
+    return min((pair for pair, number in counts.items() if number == most), key=repr) if most > 1 else None
+
+
+def _replace(tree: Node | _Many, pair: _Pair, name: Reference) -> bool:
+    """Replace a pair wherever it occurs, once in each sum or product."""
+    kind, a, b, equal = pair
+    found = False
+    for many in list(_inside(tree)):
+        if many.kind != kind:
+            continue
+        nodes = [_tree(member) for _, member in many.members]
+        places = [
+            (i, j) for i, x in enumerate(nodes) for j, y in enumerate(nodes) if i != j and (x, y) == (a, b)
+        ]
+        places = [(i, j) for i, j in places if (many.members[i][0] == many.members[j][0]) == equal]
+        if places:
+            i, j = places[0]
+            many.members[i] = many.members[i][0], name
+            del many.members[j]
+            found = True
+    return found
