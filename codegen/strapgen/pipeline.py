@@ -26,7 +26,9 @@ if TYPE_CHECKING:
     from strapgen.targets import Sources
 
 
-def derive(algorithm: str, method: str | None = None, increments: int | None = None) -> Kernel:
+def derive(
+    algorithm: str, method: str | None = None, increments: int | None = None, *, rates: bool = False
+) -> Kernel:
     """Derive an algorithm exactly.
 
     Parameters
@@ -37,6 +39,9 @@ def derive(algorithm: str, method: str | None = None, increments: int | None = N
         Integration method, "rk1" to "rk4" (default), of an attitude algorithm.
     increments : int, optional
         Angle increments a step, 1 to 8 (default 2), of an attitude algorithm.
+    rates : bool, optional
+        Whether the step is given the body rate at every node of its method, times the step length, in place
+        of increments.
 
     Returns
     -------
@@ -51,12 +56,14 @@ def derive(algorithm: str, method: str | None = None, increments: int | None = N
     --------
     >>> derive("euler", method="rk4", increments=2).name
     'euler-rk4-2'
+    >>> derive("euler", method="rk4", rates=True).inputs[1].elements[:4]
+    ('turn_0_x', 'turn_0_y', 'turn_0_z', 'turn_1_2_x')
     """
-    return catalogue.derive(catalogue.choose(algorithm, method, increments))
+    return catalogue.derive(catalogue.choose(algorithm, method, increments, rates))
 
 
 def lower(kernel: Kernel) -> Program:
-    """Turn a kernel into straight-line code with common subexpressions computed once.
+    """Turn a kernel into straight-line code with the fewest operations that are known for it.
 
     Parameters
     ----------

@@ -276,7 +276,7 @@ def propagate(
     Raises
     ------
     InputError
-        If the recording is shorter than a step, a time is no multiple of the step, or the attitude leaves
+        If the algorithm takes no increments, the recording is shorter than a step, a time is no multiple of the step, or the attitude leaves
         the range of the back end's numbers.
 
     Examples
@@ -287,6 +287,7 @@ def propagate(
     >>> history.states.shape, history.unused
     ((5, 4), 1)
     """
+    backend.need_increments()
     step = recording.interval * backend.increments
     steps, unused = divmod(len(recording.increments), backend.increments)
     if steps < 1:

@@ -124,7 +124,7 @@ def simulate(
     Raises
     ------
     InputError
-        If a time is not finite, not positive, or no multiple of the step, or the attitude leaves the range
+        If the algorithm takes no increments, a time is not finite, not positive, or no multiple of the step, or the attitude leaves the range
         of the back end's numbers.
 
     Examples
@@ -134,6 +134,7 @@ def simulate(
     >>> round(float(np.degrees(run.mean_drift)), 4)
     0.2855
     """
+    backend.need_increments()
     h = checks.number("step", step, positive=True)
     total = checks.number("duration", duration, positive=True)
     steps = checks.multiple("duration", total, "step", h)

@@ -4,6 +4,10 @@
  */
 #include "cayley_klein_rk3_2.h"
 
+#ifdef __cplusplus
+#define restrict __restrict
+#endif
+
 /* The algorithm. Static, so that the loop below can take it in. */
 static inline void one_(const double state[4], const double increments[6], double next[4])
 {
@@ -66,6 +70,77 @@ void cayley_klein_rk3_2_array(size_t count, const double *state, const double *i
 {
     for (size_t k = 0; k < count; ++k)
         one_(state + 4 * k, increments + 6 * k, next + 4 * k);
+}
+
+/* One step of many runs, every element in an array of its own: restrict promises the compiler that it may take
+ * several runs at once.
+ */
+static void batch_(size_t runs, const double *restrict state_0, const double *restrict state_1,
+    const double *restrict state_2, const double *restrict state_3,
+    const double *restrict increments_0, const double *restrict increments_1,
+    const double *restrict increments_2, const double *restrict increments_3,
+    const double *restrict increments_4, const double *restrict increments_5,
+    double *restrict next_0, double *restrict next_1, double *restrict next_2,
+    double *restrict next_3)
+{
+    for (size_t k = 0; k < runs; ++k) {
+        const double a_s = state_0[k];
+        const double a_x = state_1[k];
+        const double a_y = state_2[k];
+        const double a_z = state_3[k];
+        const double d1_x = increments_0[k];
+        const double d1_y = increments_1[k];
+        const double d1_z = increments_2[k];
+        const double d2_x = increments_3[k];
+        const double d2_y = increments_4[k];
+        const double d2_z = increments_5[k];
+        /* the angle increment of the whole step */
+        const double sigma_x = d1_x + d2_x;
+        const double sigma_y = d1_y + d2_y;
+        const double sigma_z = d1_z + d2_z;
+        /* first half minus second half */
+        const double delta_x = d1_x - d2_x;
+        const double delta_y = d1_y - d2_y;
+        const double delta_z = d1_z - d2_z;
+        const double delta_cross_sigma_x = delta_y * sigma_z - delta_z * sigma_y;
+        const double delta_cross_sigma_y = delta_z * sigma_x - delta_x * sigma_z;
+        const double delta_cross_sigma_z = delta_x * sigma_y - delta_y * sigma_x;
+        const double delta_dot_delta = delta_x * delta_x + delta_y * delta_y + delta_z * delta_z;
+        const double sigma_dot_sigma = sigma_x * sigma_x + sigma_y * sigma_y + sigma_z * sigma_z;
+        /* weight of sigma in p */
+        const double p_sigma = 0.5 - 0.08333333333333333 * delta_dot_delta
+            - 0.020833333333333332 * sigma_dot_sigma;
+        const double sigma_dot_delta = sigma_x * delta_x + sigma_y * delta_y + sigma_z * delta_z;
+        /* weight of delta in p */
+        const double p_delta = 0.16666666666666666 * sigma_dot_delta;
+        /* the step applied to the identity: its vector part */
+        const double p_x = p_sigma * sigma_x + p_delta * delta_x
+            + 0.16666666666666666 * delta_cross_sigma_x;
+        const double p_y = p_sigma * sigma_y + p_delta * delta_y
+            + 0.16666666666666666 * delta_cross_sigma_y;
+        const double p_z = p_sigma * sigma_z + p_delta * delta_z
+            + 0.16666666666666666 * delta_cross_sigma_z;
+        /* its scalar part */
+        const double p_s = 1.0 - 0.16666666666666666 * delta_dot_delta - 0.125 * sigma_dot_sigma;
+        /* Cayley-Klein parameters, body to reference, scalar first, after the step */
+        const double next_s = a_s * p_s - a_x * p_x - a_y * p_y - a_z * p_z;
+        const double next_x = a_s * p_x + a_x * p_s + a_y * p_z - a_z * p_y;
+        const double next_y = a_s * p_y - a_x * p_z + a_y * p_s + a_z * p_x;
+        const double next_z = a_s * p_z + a_x * p_y - a_y * p_x + a_z * p_s;
+        next_0[k] = next_s;
+        next_1[k] = next_x;
+        next_2[k] = next_y;
+        next_3[k] = next_z;
+    }
+}
+
+void cayley_klein_rk3_2_batch(size_t runs, const double *state, const double *increments,
+    double *next)
+{
+    batch_(runs, state + 0 * runs, state + 1 * runs, state + 2 * runs, state + 3 * runs,
+        increments + 0 * runs, increments + 1 * runs, increments + 2 * runs,
+        increments + 3 * runs, increments + 4 * runs, increments + 5 * runs, next + 0 * runs,
+        next + 1 * runs, next + 2 * runs, next + 3 * runs);
 }
 
 enum { BLOCK_ = 16 };

@@ -37,12 +37,20 @@ void cayley_klein_rk4_2(const double state[4], const double increments[6], doubl
 void cayley_klein_rk4_2_array(size_t count, const double *state, const double *increments,
     double *next);
 
+/* One step of `runs` independent runs, side by side: arrays are ordered by element, so that the compiler takes several
+ * runs at once.
+ * in   state[4][runs], increments[6][runs]
+ * out  next[4][runs]; it must not overlap the inputs.
+ */
+void cayley_klein_rk4_2_batch(size_t runs, const double *state, const double *increments,
+    double *next);
+
 /* A function that restores the constraint of a state, in place. */
 typedef void (*cayley_klein_rk4_2_orthonormalizer)(const double *, double *);
 
 /* Propagates `runs` independent runs, each of `steps` steps.
  * in   initial[runs][4]: state at the start of each run.
- * in   increments[runs][steps][6]: angle increments, as for one call; not read for 0 steps.
+ * in   increments[runs][steps][6]: as for one call; not read for 0 steps.
  * in   record_every: a record is kept every so many steps, at least 1.
  * in   orthonormalize_every: `orthonormalize` is called after every so many steps; 0 for never.
  * out  history[runs][1 + steps / record_every][4]: the initial state and the records; it must not

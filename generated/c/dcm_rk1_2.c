@@ -4,6 +4,10 @@
  */
 #include "dcm_rk1_2.h"
 
+#ifdef __cplusplus
+#define restrict __restrict
+#endif
+
 /* The algorithm. Static, so that the loop below can take it in. */
 static inline void one_(const double state[9], const double increments[6], double next[9])
 {
@@ -60,6 +64,76 @@ void dcm_rk1_2_array(size_t count, const double *state, const double *increments
 {
     for (size_t k = 0; k < count; ++k)
         one_(state + 9 * k, increments + 6 * k, next + 9 * k);
+}
+
+/* One step of many runs, every element in an array of its own: restrict promises the compiler that it may take
+ * several runs at once.
+ */
+static void batch_(size_t runs, const double *restrict state_0, const double *restrict state_1,
+    const double *restrict state_2, const double *restrict state_3, const double *restrict state_4,
+    const double *restrict state_5, const double *restrict state_6, const double *restrict state_7,
+    const double *restrict state_8, const double *restrict increments_0,
+    const double *restrict increments_1, const double *restrict increments_2,
+    const double *restrict increments_3, const double *restrict increments_4,
+    const double *restrict increments_5, double *restrict next_0, double *restrict next_1,
+    double *restrict next_2, double *restrict next_3, double *restrict next_4,
+    double *restrict next_5, double *restrict next_6, double *restrict next_7,
+    double *restrict next_8)
+{
+    for (size_t k = 0; k < runs; ++k) {
+        const double C_11 = state_0[k];
+        const double C_12 = state_1[k];
+        const double C_13 = state_2[k];
+        const double C_21 = state_3[k];
+        const double C_22 = state_4[k];
+        const double C_23 = state_5[k];
+        const double C_31 = state_6[k];
+        const double C_32 = state_7[k];
+        const double C_33 = state_8[k];
+        const double d1_x = increments_0[k];
+        const double d1_y = increments_1[k];
+        const double d1_z = increments_2[k];
+        const double d2_x = increments_3[k];
+        const double d2_y = increments_4[k];
+        const double d2_z = increments_5[k];
+        /* rate times the step, at node 0 */
+        const double turn_0_x = 3.0 * d1_x - d2_x;
+        const double turn_0_y = 3.0 * d1_y - d2_y;
+        const double turn_0_z = 3.0 * d1_z - d2_z;
+        /* the step applied to the identity */
+        const double A_12 = -turn_0_z;
+        const double A_23 = -turn_0_x;
+        const double A_31 = -turn_0_y;
+        /* direction cosine matrix, body to reference, after the step */
+        const double next_11 = C_11 + A_31 * C_13 + C_12 * turn_0_z;
+        const double next_12 = C_12 + A_12 * C_11 + C_13 * turn_0_x;
+        const double next_13 = C_13 + A_23 * C_12 + C_11 * turn_0_y;
+        const double next_21 = C_21 + A_31 * C_23 + C_22 * turn_0_z;
+        const double next_22 = C_22 + A_12 * C_21 + C_23 * turn_0_x;
+        const double next_23 = C_23 + A_23 * C_22 + C_21 * turn_0_y;
+        const double next_31 = C_31 + A_31 * C_33 + C_32 * turn_0_z;
+        const double next_32 = C_32 + A_12 * C_31 + C_33 * turn_0_x;
+        const double next_33 = C_33 + A_23 * C_32 + C_31 * turn_0_y;
+        next_0[k] = next_11;
+        next_1[k] = next_12;
+        next_2[k] = next_13;
+        next_3[k] = next_21;
+        next_4[k] = next_22;
+        next_5[k] = next_23;
+        next_6[k] = next_31;
+        next_7[k] = next_32;
+        next_8[k] = next_33;
+    }
+}
+
+void dcm_rk1_2_batch(size_t runs, const double *state, const double *increments, double *next)
+{
+    batch_(runs, state + 0 * runs, state + 1 * runs, state + 2 * runs, state + 3 * runs,
+        state + 4 * runs, state + 5 * runs, state + 6 * runs, state + 7 * runs,
+        state + 8 * runs, increments + 0 * runs, increments + 1 * runs, increments + 2 * runs,
+        increments + 3 * runs, increments + 4 * runs, increments + 5 * runs, next + 0 * runs,
+        next + 1 * runs, next + 2 * runs, next + 3 * runs, next + 4 * runs, next + 5 * runs,
+        next + 6 * runs, next + 7 * runs, next + 8 * runs);
 }
 
 enum { BLOCK_ = 16 };

@@ -36,12 +36,19 @@ void dcm_rk1_2(const double state[9], const double increments[6], double next[9]
  */
 void dcm_rk1_2_array(size_t count, const double *state, const double *increments, double *next);
 
+/* One step of `runs` independent runs, side by side: arrays are ordered by element, so that the compiler takes several
+ * runs at once.
+ * in   state[9][runs], increments[6][runs]
+ * out  next[9][runs]; it must not overlap the inputs.
+ */
+void dcm_rk1_2_batch(size_t runs, const double *state, const double *increments, double *next);
+
 /* A function that restores the constraint of a state, in place. */
 typedef void (*dcm_rk1_2_orthonormalizer)(const double *, double *);
 
 /* Propagates `runs` independent runs, each of `steps` steps.
  * in   initial[runs][9]: state at the start of each run.
- * in   increments[runs][steps][6]: angle increments, as for one call; not read for 0 steps.
+ * in   increments[runs][steps][6]: as for one call; not read for 0 steps.
  * in   record_every: a record is kept every so many steps, at least 1.
  * in   orthonormalize_every: `orthonormalize` is called after every so many steps; 0 for never.
  * out  history[runs][1 + steps / record_every][9]: the initial state and the records; it must not

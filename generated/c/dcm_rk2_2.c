@@ -4,6 +4,10 @@
  */
 #include "dcm_rk2_2.h"
 
+#ifdef __cplusplus
+#define restrict __restrict
+#endif
+
 /* The algorithm. Static, so that the loop below can take it in. */
 static inline void one_(const double state[9], const double increments[6], double next[9])
 {
@@ -86,6 +90,102 @@ void dcm_rk2_2_array(size_t count, const double *state, const double *increments
 {
     for (size_t k = 0; k < count; ++k)
         one_(state + 9 * k, increments + 6 * k, next + 9 * k);
+}
+
+/* One step of many runs, every element in an array of its own: restrict promises the compiler that it may take
+ * several runs at once.
+ */
+static void batch_(size_t runs, const double *restrict state_0, const double *restrict state_1,
+    const double *restrict state_2, const double *restrict state_3, const double *restrict state_4,
+    const double *restrict state_5, const double *restrict state_6, const double *restrict state_7,
+    const double *restrict state_8, const double *restrict increments_0,
+    const double *restrict increments_1, const double *restrict increments_2,
+    const double *restrict increments_3, const double *restrict increments_4,
+    const double *restrict increments_5, double *restrict next_0, double *restrict next_1,
+    double *restrict next_2, double *restrict next_3, double *restrict next_4,
+    double *restrict next_5, double *restrict next_6, double *restrict next_7,
+    double *restrict next_8)
+{
+    for (size_t k = 0; k < runs; ++k) {
+        const double C_11 = state_0[k];
+        const double C_12 = state_1[k];
+        const double C_13 = state_2[k];
+        const double C_21 = state_3[k];
+        const double C_22 = state_4[k];
+        const double C_23 = state_5[k];
+        const double C_31 = state_6[k];
+        const double C_32 = state_7[k];
+        const double C_33 = state_8[k];
+        const double d1_x = increments_0[k];
+        const double d1_y = increments_1[k];
+        const double d1_z = increments_2[k];
+        const double d2_x = increments_3[k];
+        const double d2_y = increments_4[k];
+        const double d2_z = increments_5[k];
+        /* rate times the step, at node 0, times 1/3 */
+        const double turn_0_times_1_3_x = d1_x - 0.3333333333333333 * d2_x;
+        const double turn_0_times_1_3_y = d1_y - 0.3333333333333333 * d2_y;
+        const double turn_0_times_1_3_z = d1_z - 0.3333333333333333 * d2_z;
+        /* rate times the step, at node 1, times -1/3 */
+        const double minus_turn_1_times_1_3_x = 0.3333333333333333 * d1_x - d2_x;
+        const double minus_turn_1_times_1_3_y = 0.3333333333333333 * d1_y - d2_y;
+        const double minus_turn_1_times_1_3_z = 0.3333333333333333 * d1_z - d2_z;
+        /* the angle increment of the whole step */
+        const double sigma_x = d1_x + d2_x;
+        const double sigma_y = d1_y + d2_y;
+        const double sigma_z = d1_z + d2_z;
+        /* vector of the skew part */
+        const double skew_x = sigma_x;
+        const double skew_y = sigma_y;
+        const double skew_z = sigma_z;
+        /* left of turn_0_times_1_3 in an outer product */
+        const double partner_left_x = -(4.5 * minus_turn_1_times_1_3_x);
+        const double partner_left_y = -(4.5 * minus_turn_1_times_1_3_y);
+        const double partner_left_z = -(4.5 * minus_turn_1_times_1_3_z);
+        const double turn_0_times_1_3_dot_minus_turn_1_times_1_3 = turn_0_times_1_3_x * minus_turn_1_times_1_3_x
+            + turn_0_times_1_3_y * minus_turn_1_times_1_3_y
+            + turn_0_times_1_3_z * minus_turn_1_times_1_3_z;
+        /* multiple of the unit matrix */
+        const double diagonal = 4.5 * turn_0_times_1_3_dot_minus_turn_1_times_1_3 + 1.0;
+        const double A_11 = turn_0_times_1_3_x * partner_left_x + diagonal;
+        const double A_22 = turn_0_times_1_3_y * partner_left_y + diagonal;
+        const double A_33 = turn_0_times_1_3_z * partner_left_z + diagonal;
+        const double A_12 = turn_0_times_1_3_y * partner_left_x - skew_z;
+        const double A_21 = turn_0_times_1_3_x * partner_left_y + skew_z;
+        const double A_23 = turn_0_times_1_3_z * partner_left_y - skew_x;
+        const double A_32 = turn_0_times_1_3_y * partner_left_z + skew_x;
+        const double A_31 = turn_0_times_1_3_x * partner_left_z - skew_y;
+        const double A_13 = turn_0_times_1_3_z * partner_left_x + skew_y;
+        /* direction cosine matrix, body to reference, after the step */
+        const double next_11 = A_11 * C_11 + A_21 * C_12 + A_31 * C_13;
+        const double next_12 = A_12 * C_11 + A_22 * C_12 + A_32 * C_13;
+        const double next_13 = A_13 * C_11 + A_23 * C_12 + A_33 * C_13;
+        const double next_21 = A_11 * C_21 + A_21 * C_22 + A_31 * C_23;
+        const double next_22 = A_12 * C_21 + A_22 * C_22 + A_32 * C_23;
+        const double next_23 = A_13 * C_21 + A_23 * C_22 + A_33 * C_23;
+        const double next_31 = A_11 * C_31 + A_21 * C_32 + A_31 * C_33;
+        const double next_32 = A_12 * C_31 + A_22 * C_32 + A_32 * C_33;
+        const double next_33 = A_13 * C_31 + A_23 * C_32 + A_33 * C_33;
+        next_0[k] = next_11;
+        next_1[k] = next_12;
+        next_2[k] = next_13;
+        next_3[k] = next_21;
+        next_4[k] = next_22;
+        next_5[k] = next_23;
+        next_6[k] = next_31;
+        next_7[k] = next_32;
+        next_8[k] = next_33;
+    }
+}
+
+void dcm_rk2_2_batch(size_t runs, const double *state, const double *increments, double *next)
+{
+    batch_(runs, state + 0 * runs, state + 1 * runs, state + 2 * runs, state + 3 * runs,
+        state + 4 * runs, state + 5 * runs, state + 6 * runs, state + 7 * runs,
+        state + 8 * runs, increments + 0 * runs, increments + 1 * runs, increments + 2 * runs,
+        increments + 3 * runs, increments + 4 * runs, increments + 5 * runs, next + 0 * runs,
+        next + 1 * runs, next + 2 * runs, next + 3 * runs, next + 4 * runs, next + 5 * runs,
+        next + 6 * runs, next + 7 * runs, next + 8 * runs);
 }
 
 enum { BLOCK_ = 16 };

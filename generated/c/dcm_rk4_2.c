@@ -4,6 +4,10 @@
  */
 #include "dcm_rk4_2.h"
 
+#ifdef __cplusplus
+#define restrict __restrict
+#endif
+
 /* The algorithm. Static, so that the loop below can take it in. */
 static inline void one_(const double state[9], const double increments[6], double next[9])
 {
@@ -101,6 +105,118 @@ void dcm_rk4_2_array(size_t count, const double *state, const double *increments
 {
     for (size_t k = 0; k < count; ++k)
         one_(state + 9 * k, increments + 6 * k, next + 9 * k);
+}
+
+/* One step of many runs, every element in an array of its own: restrict promises the compiler that it may take
+ * several runs at once.
+ */
+static void batch_(size_t runs, const double *restrict state_0, const double *restrict state_1,
+    const double *restrict state_2, const double *restrict state_3, const double *restrict state_4,
+    const double *restrict state_5, const double *restrict state_6, const double *restrict state_7,
+    const double *restrict state_8, const double *restrict increments_0,
+    const double *restrict increments_1, const double *restrict increments_2,
+    const double *restrict increments_3, const double *restrict increments_4,
+    const double *restrict increments_5, double *restrict next_0, double *restrict next_1,
+    double *restrict next_2, double *restrict next_3, double *restrict next_4,
+    double *restrict next_5, double *restrict next_6, double *restrict next_7,
+    double *restrict next_8)
+{
+    for (size_t k = 0; k < runs; ++k) {
+        const double C_11 = state_0[k];
+        const double C_12 = state_1[k];
+        const double C_13 = state_2[k];
+        const double C_21 = state_3[k];
+        const double C_22 = state_4[k];
+        const double C_23 = state_5[k];
+        const double C_31 = state_6[k];
+        const double C_32 = state_7[k];
+        const double C_33 = state_8[k];
+        const double d1_x = increments_0[k];
+        const double d1_y = increments_1[k];
+        const double d1_z = increments_2[k];
+        const double d2_x = increments_3[k];
+        const double d2_y = increments_4[k];
+        const double d2_z = increments_5[k];
+        /* the angle increment of the whole step */
+        const double sigma_x = d1_x + d2_x;
+        const double sigma_y = d1_y + d2_y;
+        const double sigma_z = d1_z + d2_z;
+        const double sigma_cross_d1_x = sigma_y * d1_z - sigma_z * d1_y;
+        const double sigma_cross_d1_y = sigma_z * d1_x - sigma_x * d1_z;
+        const double sigma_cross_d1_z = sigma_x * d1_y - sigma_y * d1_x;
+        const double sigma_dot_sigma = sigma_x * sigma_x + sigma_y * sigma_y + sigma_z * sigma_z;
+        /* weight of sigma in skew */
+        const double skew_sigma = 1.0 - 0.16666666666666666 * sigma_dot_sigma;
+        /* weight of sigma_cross_d1 in skew */
+        const double skew_sigma_cross_d1 = 0.3333333333333333 - skew_sigma;
+        /* vector of the skew part */
+        const double skew_x = skew_sigma * sigma_x + skew_sigma_cross_d1 * sigma_cross_d1_x;
+        const double skew_y = skew_sigma * sigma_y + skew_sigma_cross_d1 * sigma_cross_d1_y;
+        const double skew_z = skew_sigma * sigma_z + skew_sigma_cross_d1 * sigma_cross_d1_z;
+        const double d1_dot_d1 = d1_x * d1_x + d1_y * d1_y + d1_z * d1_z;
+        /* weight of sigma in partner */
+        const double partner_sigma = 0.0625 * sigma_dot_sigma - 0.3333333333333333 * d1_dot_d1
+            + 0.25;
+        const double d1_dot_sigma = d1_x * sigma_x + d1_y * sigma_y + d1_z * sigma_z;
+        const double shared_1 = 0.6666666666666666 * d1_dot_sigma;
+        /* weight of d1 in partner */
+        const double partner_d1 = shared_1 - 0.3333333333333333 * sigma_dot_sigma;
+        /* of sigma in outer products */
+        const double partner_x = partner_sigma * sigma_x + partner_d1 * d1_x
+            - 0.3333333333333333 * sigma_cross_d1_x;
+        const double partner_y = partner_sigma * sigma_y + partner_d1 * d1_y
+            - 0.3333333333333333 * sigma_cross_d1_y;
+        const double partner_z = partner_sigma * sigma_z + partner_d1 * d1_z
+            - 0.3333333333333333 * sigma_cross_d1_z;
+        /* multiple of the unit matrix */
+        const double diagonal = sigma_dot_sigma * (shared_1 - 0.125 * sigma_dot_sigma - 0.5)
+            - d1_dot_sigma * shared_1 + 1.0;
+        /* half of u y' + y u' on the diagonal */
+        const double half_xx = sigma_x * partner_x;
+        const double A_11 = half_xx + half_xx + diagonal;
+        const double half_yy = sigma_y * partner_y;
+        const double A_22 = half_yy + half_yy + diagonal;
+        const double half_zz = sigma_z * partner_z;
+        const double A_33 = half_zz + half_zz + diagonal;
+        const double symmetric_xy = sigma_x * partner_y + sigma_y * partner_x;
+        const double A_12 = symmetric_xy - skew_z;
+        const double A_21 = symmetric_xy + skew_z;
+        const double symmetric_yz = sigma_y * partner_z + sigma_z * partner_y;
+        const double A_23 = symmetric_yz - skew_x;
+        const double A_32 = symmetric_yz + skew_x;
+        const double symmetric_zx = sigma_z * partner_x + sigma_x * partner_z;
+        const double A_31 = symmetric_zx - skew_y;
+        const double A_13 = symmetric_zx + skew_y;
+        /* direction cosine matrix, body to reference, after the step */
+        const double next_11 = A_11 * C_11 + A_21 * C_12 + A_31 * C_13;
+        const double next_12 = A_12 * C_11 + A_22 * C_12 + A_32 * C_13;
+        const double next_13 = A_13 * C_11 + A_23 * C_12 + A_33 * C_13;
+        const double next_21 = A_11 * C_21 + A_21 * C_22 + A_31 * C_23;
+        const double next_22 = A_12 * C_21 + A_22 * C_22 + A_32 * C_23;
+        const double next_23 = A_13 * C_21 + A_23 * C_22 + A_33 * C_23;
+        const double next_31 = A_11 * C_31 + A_21 * C_32 + A_31 * C_33;
+        const double next_32 = A_12 * C_31 + A_22 * C_32 + A_32 * C_33;
+        const double next_33 = A_13 * C_31 + A_23 * C_32 + A_33 * C_33;
+        next_0[k] = next_11;
+        next_1[k] = next_12;
+        next_2[k] = next_13;
+        next_3[k] = next_21;
+        next_4[k] = next_22;
+        next_5[k] = next_23;
+        next_6[k] = next_31;
+        next_7[k] = next_32;
+        next_8[k] = next_33;
+    }
+}
+
+void dcm_rk4_2_batch(size_t runs, const double *state, const double *increments, double *next)
+{
+    batch_(runs, state + 0 * runs, state + 1 * runs, state + 2 * runs, state + 3 * runs,
+        state + 4 * runs, state + 5 * runs, state + 6 * runs, state + 7 * runs,
+        state + 8 * runs, increments + 0 * runs, increments + 1 * runs, increments + 2 * runs,
+        increments + 3 * runs, increments + 4 * runs, increments + 5 * runs, next + 0 * runs,
+        next + 1 * runs, next + 2 * runs, next + 3 * runs, next + 4 * runs, next + 5 * runs,
+        next + 6 * runs, next + 7 * runs, next + 8 * runs);
 }
 
 enum { BLOCK_ = 16 };

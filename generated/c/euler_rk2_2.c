@@ -4,6 +4,10 @@
  */
 #include "euler_rk2_2.h"
 
+#ifdef __cplusplus
+#define restrict __restrict
+#endif
+
 /* The algorithm. Static, so that the loop below can take it in. */
 static inline void one_(const double state[4], const double increments[6], double next[4])
 {
@@ -52,6 +56,63 @@ void euler_rk2_2_array(size_t count, const double *state, const double *incremen
 {
     for (size_t k = 0; k < count; ++k)
         one_(state + 4 * k, increments + 6 * k, next + 4 * k);
+}
+
+/* One step of many runs, every element in an array of its own: restrict promises the compiler that it may take
+ * several runs at once.
+ */
+static void batch_(size_t runs, const double *restrict state_0, const double *restrict state_1,
+    const double *restrict state_2, const double *restrict state_3,
+    const double *restrict increments_0, const double *restrict increments_1,
+    const double *restrict increments_2, const double *restrict increments_3,
+    const double *restrict increments_4, const double *restrict increments_5,
+    double *restrict next_0, double *restrict next_1, double *restrict next_2,
+    double *restrict next_3)
+{
+    for (size_t k = 0; k < runs; ++k) {
+        const double e_x = state_0[k];
+        const double e_y = state_1[k];
+        const double e_z = state_2[k];
+        const double e_s = state_3[k];
+        const double d1_x = increments_0[k];
+        const double d1_y = increments_1[k];
+        const double d1_z = increments_2[k];
+        const double d2_x = increments_3[k];
+        const double d2_y = increments_4[k];
+        const double d2_z = increments_5[k];
+        /* the angle increment of the whole step */
+        const double sigma_x = d1_x + d2_x;
+        const double sigma_y = d1_y + d2_y;
+        const double sigma_z = d1_z + d2_z;
+        const double sigma_cross_d1_x = sigma_y * d1_z - sigma_z * d1_y;
+        const double sigma_cross_d1_y = sigma_z * d1_x - sigma_x * d1_z;
+        const double sigma_cross_d1_z = sigma_x * d1_y - sigma_y * d1_x;
+        /* the step applied to the identity: its vector part */
+        const double p_x = 0.5 * sigma_x - sigma_cross_d1_x;
+        const double p_y = 0.5 * sigma_y - sigma_cross_d1_y;
+        const double p_z = 0.5 * sigma_z - sigma_cross_d1_z;
+        const double d1_dot_d2 = d1_x * d2_x + d1_y * d2_y + d1_z * d2_z;
+        const double sigma_dot_sigma = sigma_x * sigma_x + sigma_y * sigma_y + sigma_z * sigma_z;
+        /* its scalar part */
+        const double p_s = 0.375 * sigma_dot_sigma - 2.0 * d1_dot_d2 + 1.0;
+        /* Euler parameters, body to reference, scalar last, after the step */
+        const double next_s = e_s * p_s - e_x * p_x - e_y * p_y - e_z * p_z;
+        const double next_x = e_s * p_x + e_x * p_s + e_y * p_z - e_z * p_y;
+        const double next_y = e_s * p_y - e_x * p_z + e_y * p_s + e_z * p_x;
+        const double next_z = e_s * p_z + e_x * p_y - e_y * p_x + e_z * p_s;
+        next_0[k] = next_x;
+        next_1[k] = next_y;
+        next_2[k] = next_z;
+        next_3[k] = next_s;
+    }
+}
+
+void euler_rk2_2_batch(size_t runs, const double *state, const double *increments, double *next)
+{
+    batch_(runs, state + 0 * runs, state + 1 * runs, state + 2 * runs, state + 3 * runs,
+        increments + 0 * runs, increments + 1 * runs, increments + 2 * runs,
+        increments + 3 * runs, increments + 4 * runs, increments + 5 * runs, next + 0 * runs,
+        next + 1 * runs, next + 2 * runs, next + 3 * runs);
 }
 
 enum { BLOCK_ = 16 };

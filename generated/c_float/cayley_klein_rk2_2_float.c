@@ -4,6 +4,10 @@
  */
 #include "cayley_klein_rk2_2_float.h"
 
+#ifdef __cplusplus
+#define restrict __restrict
+#endif
+
 /* The algorithm. Static, so that the loop below can take it in. */
 static inline void one_(const float state[4], const float increments[6], float next[4])
 {
@@ -53,6 +57,63 @@ void cayley_klein_rk2_2_float_array(size_t count, const float *state, const floa
 {
     for (size_t k = 0; k < count; ++k)
         one_(state + 4 * k, increments + 6 * k, next + 4 * k);
+}
+
+/* One step of many runs, every element in an array of its own: restrict promises the compiler that it may take
+ * several runs at once.
+ */
+static void batch_(size_t runs, const float *restrict state_0, const float *restrict state_1,
+    const float *restrict state_2, const float *restrict state_3,
+    const float *restrict increments_0, const float *restrict increments_1,
+    const float *restrict increments_2, const float *restrict increments_3,
+    const float *restrict increments_4, const float *restrict increments_5, float *restrict next_0,
+    float *restrict next_1, float *restrict next_2, float *restrict next_3)
+{
+    for (size_t k = 0; k < runs; ++k) {
+        const float a_s = state_0[k];
+        const float a_x = state_1[k];
+        const float a_y = state_2[k];
+        const float a_z = state_3[k];
+        const float d1_x = increments_0[k];
+        const float d1_y = increments_1[k];
+        const float d1_z = increments_2[k];
+        const float d2_x = increments_3[k];
+        const float d2_y = increments_4[k];
+        const float d2_z = increments_5[k];
+        /* the angle increment of the whole step */
+        const float sigma_x = d1_x + d2_x;
+        const float sigma_y = d1_y + d2_y;
+        const float sigma_z = d1_z + d2_z;
+        const float sigma_cross_d1_x = sigma_y * d1_z - sigma_z * d1_y;
+        const float sigma_cross_d1_y = sigma_z * d1_x - sigma_x * d1_z;
+        const float sigma_cross_d1_z = sigma_x * d1_y - sigma_y * d1_x;
+        /* the step applied to the identity: its vector part */
+        const float p_x = 0.5f * sigma_x - sigma_cross_d1_x;
+        const float p_y = 0.5f * sigma_y - sigma_cross_d1_y;
+        const float p_z = 0.5f * sigma_z - sigma_cross_d1_z;
+        const float d1_dot_d2 = d1_x * d2_x + d1_y * d2_y + d1_z * d2_z;
+        const float sigma_dot_sigma = sigma_x * sigma_x + sigma_y * sigma_y + sigma_z * sigma_z;
+        /* its scalar part */
+        const float p_s = 0.375f * sigma_dot_sigma - 2.0f * d1_dot_d2 + 1.0f;
+        /* Cayley-Klein parameters, body to reference, scalar first, after the step */
+        const float next_s = a_s * p_s - a_x * p_x - a_y * p_y - a_z * p_z;
+        const float next_x = a_s * p_x + a_x * p_s + a_y * p_z - a_z * p_y;
+        const float next_y = a_s * p_y - a_x * p_z + a_y * p_s + a_z * p_x;
+        const float next_z = a_s * p_z + a_x * p_y - a_y * p_x + a_z * p_s;
+        next_0[k] = next_s;
+        next_1[k] = next_x;
+        next_2[k] = next_y;
+        next_3[k] = next_z;
+    }
+}
+
+void cayley_klein_rk2_2_float_batch(size_t runs, const float *state, const float *increments,
+    float *next)
+{
+    batch_(runs, state + 0 * runs, state + 1 * runs, state + 2 * runs, state + 3 * runs,
+        increments + 0 * runs, increments + 1 * runs, increments + 2 * runs,
+        increments + 3 * runs, increments + 4 * runs, increments + 5 * runs, next + 0 * runs,
+        next + 1 * runs, next + 2 * runs, next + 3 * runs);
 }
 
 enum { BLOCK_ = 16 };

@@ -4,6 +4,10 @@
  */
 #include "dcm_rk1_2_float.h"
 
+#ifdef __cplusplus
+#define restrict __restrict
+#endif
+
 /* The algorithm. Static, so that the loop below can take it in. */
 static inline void one_(const float state[9], const float increments[6], float next[9])
 {
@@ -60,6 +64,75 @@ void dcm_rk1_2_float_array(size_t count, const float *state, const float *increm
 {
     for (size_t k = 0; k < count; ++k)
         one_(state + 9 * k, increments + 6 * k, next + 9 * k);
+}
+
+/* One step of many runs, every element in an array of its own: restrict promises the compiler that it may take
+ * several runs at once.
+ */
+static void batch_(size_t runs, const float *restrict state_0, const float *restrict state_1,
+    const float *restrict state_2, const float *restrict state_3, const float *restrict state_4,
+    const float *restrict state_5, const float *restrict state_6, const float *restrict state_7,
+    const float *restrict state_8, const float *restrict increments_0,
+    const float *restrict increments_1, const float *restrict increments_2,
+    const float *restrict increments_3, const float *restrict increments_4,
+    const float *restrict increments_5, float *restrict next_0, float *restrict next_1,
+    float *restrict next_2, float *restrict next_3, float *restrict next_4, float *restrict next_5,
+    float *restrict next_6, float *restrict next_7, float *restrict next_8)
+{
+    for (size_t k = 0; k < runs; ++k) {
+        const float C_11 = state_0[k];
+        const float C_12 = state_1[k];
+        const float C_13 = state_2[k];
+        const float C_21 = state_3[k];
+        const float C_22 = state_4[k];
+        const float C_23 = state_5[k];
+        const float C_31 = state_6[k];
+        const float C_32 = state_7[k];
+        const float C_33 = state_8[k];
+        const float d1_x = increments_0[k];
+        const float d1_y = increments_1[k];
+        const float d1_z = increments_2[k];
+        const float d2_x = increments_3[k];
+        const float d2_y = increments_4[k];
+        const float d2_z = increments_5[k];
+        /* rate times the step, at node 0 */
+        const float turn_0_x = 3.0f * d1_x - d2_x;
+        const float turn_0_y = 3.0f * d1_y - d2_y;
+        const float turn_0_z = 3.0f * d1_z - d2_z;
+        /* the step applied to the identity */
+        const float A_12 = -turn_0_z;
+        const float A_23 = -turn_0_x;
+        const float A_31 = -turn_0_y;
+        /* direction cosine matrix, body to reference, after the step */
+        const float next_11 = C_11 + A_31 * C_13 + C_12 * turn_0_z;
+        const float next_12 = C_12 + A_12 * C_11 + C_13 * turn_0_x;
+        const float next_13 = C_13 + A_23 * C_12 + C_11 * turn_0_y;
+        const float next_21 = C_21 + A_31 * C_23 + C_22 * turn_0_z;
+        const float next_22 = C_22 + A_12 * C_21 + C_23 * turn_0_x;
+        const float next_23 = C_23 + A_23 * C_22 + C_21 * turn_0_y;
+        const float next_31 = C_31 + A_31 * C_33 + C_32 * turn_0_z;
+        const float next_32 = C_32 + A_12 * C_31 + C_33 * turn_0_x;
+        const float next_33 = C_33 + A_23 * C_32 + C_31 * turn_0_y;
+        next_0[k] = next_11;
+        next_1[k] = next_12;
+        next_2[k] = next_13;
+        next_3[k] = next_21;
+        next_4[k] = next_22;
+        next_5[k] = next_23;
+        next_6[k] = next_31;
+        next_7[k] = next_32;
+        next_8[k] = next_33;
+    }
+}
+
+void dcm_rk1_2_float_batch(size_t runs, const float *state, const float *increments, float *next)
+{
+    batch_(runs, state + 0 * runs, state + 1 * runs, state + 2 * runs, state + 3 * runs,
+        state + 4 * runs, state + 5 * runs, state + 6 * runs, state + 7 * runs,
+        state + 8 * runs, increments + 0 * runs, increments + 1 * runs, increments + 2 * runs,
+        increments + 3 * runs, increments + 4 * runs, increments + 5 * runs, next + 0 * runs,
+        next + 1 * runs, next + 2 * runs, next + 3 * runs, next + 4 * runs, next + 5 * runs,
+        next + 6 * runs, next + 7 * runs, next + 8 * runs);
 }
 
 enum { BLOCK_ = 16 };

@@ -4,6 +4,10 @@
  */
 #include "dcm_rk2_2_float.h"
 
+#ifdef __cplusplus
+#define restrict __restrict
+#endif
+
 /* The algorithm. Static, so that the loop below can take it in. */
 static inline void one_(const float state[9], const float increments[6], float next[9])
 {
@@ -86,6 +90,101 @@ void dcm_rk2_2_float_array(size_t count, const float *state, const float *increm
 {
     for (size_t k = 0; k < count; ++k)
         one_(state + 9 * k, increments + 6 * k, next + 9 * k);
+}
+
+/* One step of many runs, every element in an array of its own: restrict promises the compiler that it may take
+ * several runs at once.
+ */
+static void batch_(size_t runs, const float *restrict state_0, const float *restrict state_1,
+    const float *restrict state_2, const float *restrict state_3, const float *restrict state_4,
+    const float *restrict state_5, const float *restrict state_6, const float *restrict state_7,
+    const float *restrict state_8, const float *restrict increments_0,
+    const float *restrict increments_1, const float *restrict increments_2,
+    const float *restrict increments_3, const float *restrict increments_4,
+    const float *restrict increments_5, float *restrict next_0, float *restrict next_1,
+    float *restrict next_2, float *restrict next_3, float *restrict next_4, float *restrict next_5,
+    float *restrict next_6, float *restrict next_7, float *restrict next_8)
+{
+    for (size_t k = 0; k < runs; ++k) {
+        const float C_11 = state_0[k];
+        const float C_12 = state_1[k];
+        const float C_13 = state_2[k];
+        const float C_21 = state_3[k];
+        const float C_22 = state_4[k];
+        const float C_23 = state_5[k];
+        const float C_31 = state_6[k];
+        const float C_32 = state_7[k];
+        const float C_33 = state_8[k];
+        const float d1_x = increments_0[k];
+        const float d1_y = increments_1[k];
+        const float d1_z = increments_2[k];
+        const float d2_x = increments_3[k];
+        const float d2_y = increments_4[k];
+        const float d2_z = increments_5[k];
+        /* rate times the step, at node 0, times 1/3 */
+        const float turn_0_times_1_3_x = d1_x - 0.33333334f * d2_x;
+        const float turn_0_times_1_3_y = d1_y - 0.33333334f * d2_y;
+        const float turn_0_times_1_3_z = d1_z - 0.33333334f * d2_z;
+        /* rate times the step, at node 1, times -1/3 */
+        const float minus_turn_1_times_1_3_x = 0.33333334f * d1_x - d2_x;
+        const float minus_turn_1_times_1_3_y = 0.33333334f * d1_y - d2_y;
+        const float minus_turn_1_times_1_3_z = 0.33333334f * d1_z - d2_z;
+        /* the angle increment of the whole step */
+        const float sigma_x = d1_x + d2_x;
+        const float sigma_y = d1_y + d2_y;
+        const float sigma_z = d1_z + d2_z;
+        /* vector of the skew part */
+        const float skew_x = sigma_x;
+        const float skew_y = sigma_y;
+        const float skew_z = sigma_z;
+        /* left of turn_0_times_1_3 in an outer product */
+        const float partner_left_x = -(4.5f * minus_turn_1_times_1_3_x);
+        const float partner_left_y = -(4.5f * minus_turn_1_times_1_3_y);
+        const float partner_left_z = -(4.5f * minus_turn_1_times_1_3_z);
+        const float turn_0_times_1_3_dot_minus_turn_1_times_1_3 = turn_0_times_1_3_x * minus_turn_1_times_1_3_x
+            + turn_0_times_1_3_y * minus_turn_1_times_1_3_y
+            + turn_0_times_1_3_z * minus_turn_1_times_1_3_z;
+        /* multiple of the unit matrix */
+        const float diagonal = 4.5f * turn_0_times_1_3_dot_minus_turn_1_times_1_3 + 1.0f;
+        const float A_11 = turn_0_times_1_3_x * partner_left_x + diagonal;
+        const float A_22 = turn_0_times_1_3_y * partner_left_y + diagonal;
+        const float A_33 = turn_0_times_1_3_z * partner_left_z + diagonal;
+        const float A_12 = turn_0_times_1_3_y * partner_left_x - skew_z;
+        const float A_21 = turn_0_times_1_3_x * partner_left_y + skew_z;
+        const float A_23 = turn_0_times_1_3_z * partner_left_y - skew_x;
+        const float A_32 = turn_0_times_1_3_y * partner_left_z + skew_x;
+        const float A_31 = turn_0_times_1_3_x * partner_left_z - skew_y;
+        const float A_13 = turn_0_times_1_3_z * partner_left_x + skew_y;
+        /* direction cosine matrix, body to reference, after the step */
+        const float next_11 = A_11 * C_11 + A_21 * C_12 + A_31 * C_13;
+        const float next_12 = A_12 * C_11 + A_22 * C_12 + A_32 * C_13;
+        const float next_13 = A_13 * C_11 + A_23 * C_12 + A_33 * C_13;
+        const float next_21 = A_11 * C_21 + A_21 * C_22 + A_31 * C_23;
+        const float next_22 = A_12 * C_21 + A_22 * C_22 + A_32 * C_23;
+        const float next_23 = A_13 * C_21 + A_23 * C_22 + A_33 * C_23;
+        const float next_31 = A_11 * C_31 + A_21 * C_32 + A_31 * C_33;
+        const float next_32 = A_12 * C_31 + A_22 * C_32 + A_32 * C_33;
+        const float next_33 = A_13 * C_31 + A_23 * C_32 + A_33 * C_33;
+        next_0[k] = next_11;
+        next_1[k] = next_12;
+        next_2[k] = next_13;
+        next_3[k] = next_21;
+        next_4[k] = next_22;
+        next_5[k] = next_23;
+        next_6[k] = next_31;
+        next_7[k] = next_32;
+        next_8[k] = next_33;
+    }
+}
+
+void dcm_rk2_2_float_batch(size_t runs, const float *state, const float *increments, float *next)
+{
+    batch_(runs, state + 0 * runs, state + 1 * runs, state + 2 * runs, state + 3 * runs,
+        state + 4 * runs, state + 5 * runs, state + 6 * runs, state + 7 * runs,
+        state + 8 * runs, increments + 0 * runs, increments + 1 * runs, increments + 2 * runs,
+        increments + 3 * runs, increments + 4 * runs, increments + 5 * runs, next + 0 * runs,
+        next + 1 * runs, next + 2 * runs, next + 3 * runs, next + 4 * runs, next + 5 * runs,
+        next + 6 * runs, next + 7 * runs, next + 8 * runs);
 }
 
 enum { BLOCK_ = 16 };

@@ -4,6 +4,10 @@
  */
 #include "dcm_rk3_2_float.h"
 
+#ifdef __cplusplus
+#define restrict __restrict
+#endif
+
 /* The algorithm. Static, so that the loop below can take it in. */
 static inline void one_(const float state[9], const float increments[6], float next[9])
 {
@@ -106,6 +110,121 @@ void dcm_rk3_2_float_array(size_t count, const float *state, const float *increm
 {
     for (size_t k = 0; k < count; ++k)
         one_(state + 9 * k, increments + 6 * k, next + 9 * k);
+}
+
+/* One step of many runs, every element in an array of its own: restrict promises the compiler that it may take
+ * several runs at once.
+ */
+static void batch_(size_t runs, const float *restrict state_0, const float *restrict state_1,
+    const float *restrict state_2, const float *restrict state_3, const float *restrict state_4,
+    const float *restrict state_5, const float *restrict state_6, const float *restrict state_7,
+    const float *restrict state_8, const float *restrict increments_0,
+    const float *restrict increments_1, const float *restrict increments_2,
+    const float *restrict increments_3, const float *restrict increments_4,
+    const float *restrict increments_5, float *restrict next_0, float *restrict next_1,
+    float *restrict next_2, float *restrict next_3, float *restrict next_4, float *restrict next_5,
+    float *restrict next_6, float *restrict next_7, float *restrict next_8)
+{
+    for (size_t k = 0; k < runs; ++k) {
+        const float C_11 = state_0[k];
+        const float C_12 = state_1[k];
+        const float C_13 = state_2[k];
+        const float C_21 = state_3[k];
+        const float C_22 = state_4[k];
+        const float C_23 = state_5[k];
+        const float C_31 = state_6[k];
+        const float C_32 = state_7[k];
+        const float C_33 = state_8[k];
+        const float d1_x = increments_0[k];
+        const float d1_y = increments_1[k];
+        const float d1_z = increments_2[k];
+        const float d2_x = increments_3[k];
+        const float d2_y = increments_4[k];
+        const float d2_z = increments_5[k];
+        /* the angle increment of the whole step */
+        const float sigma_x = d1_x + d2_x;
+        const float sigma_y = d1_y + d2_y;
+        const float sigma_z = d1_z + d2_z;
+        /* first half minus second half */
+        const float delta_x = d1_x - d2_x;
+        const float delta_y = d1_y - d2_y;
+        const float delta_z = d1_z - d2_z;
+        const float delta_cross_sigma_x = delta_y * sigma_z - delta_z * sigma_y;
+        const float delta_cross_sigma_y = delta_z * sigma_x - delta_x * sigma_z;
+        const float delta_cross_sigma_z = delta_x * sigma_y - delta_y * sigma_x;
+        const float sigma_dot_sigma = sigma_x * sigma_x + sigma_y * sigma_y + sigma_z * sigma_z;
+        /* weight of sigma in skew */
+        const float skew_sigma = 1.0f - 0.16666667f * sigma_dot_sigma;
+        const float sigma_dot_delta = sigma_x * delta_x + sigma_y * delta_y + sigma_z * delta_z;
+        /* weight of delta in skew */
+        const float skew_delta = 0.6666667f * sigma_dot_delta;
+        const float shared_1 = 0.33333334f * delta_cross_sigma_x;
+        /* vector of the skew part */
+        const float skew_x = skew_sigma * sigma_x + skew_delta * delta_x + shared_1;
+        const float shared_2 = 0.33333334f * delta_cross_sigma_y;
+        const float skew_y = skew_sigma * sigma_y + skew_delta * delta_y + shared_2;
+        const float shared_3 = 0.33333334f * delta_cross_sigma_z;
+        const float skew_z = skew_sigma * sigma_z + skew_delta * delta_z + shared_3;
+        /* of sigma in outer products */
+        const float partner_sigma_x = 0.25f * sigma_x + shared_1;
+        const float partner_sigma_y = 0.25f * sigma_y + shared_2;
+        const float partner_sigma_z = 0.25f * sigma_z + shared_3;
+        /* of delta in outer products */
+        const float partner_delta_x = 0.6666667f * delta_x;
+        const float partner_delta_y = 0.6666667f * delta_y;
+        const float partner_delta_z = 0.6666667f * delta_z;
+        const float delta_dot_delta = delta_x * delta_x + delta_y * delta_y + delta_z * delta_z;
+        /* multiple of the unit matrix */
+        const float diagonal = 1.0f - 0.6666667f * delta_dot_delta - 0.5f * sigma_dot_sigma;
+        /* half of u y' + y u' on the diagonal */
+        const float half_xx = sigma_x * partner_sigma_x;
+        const float A_11 = delta_x * partner_delta_x + half_xx + half_xx + diagonal;
+        const float half_yy = sigma_y * partner_sigma_y;
+        const float A_22 = delta_y * partner_delta_y + half_yy + half_yy + diagonal;
+        const float half_zz = sigma_z * partner_sigma_z;
+        const float A_33 = delta_z * partner_delta_z + half_zz + half_zz + diagonal;
+        const float symmetric_xy = sigma_x * partner_sigma_y + delta_x * partner_delta_y
+            + sigma_y * partner_sigma_x;
+        const float A_12 = symmetric_xy - skew_z;
+        const float A_21 = symmetric_xy + skew_z;
+        const float symmetric_yz = sigma_y * partner_sigma_z + delta_y * partner_delta_z
+            + sigma_z * partner_sigma_y;
+        const float A_23 = symmetric_yz - skew_x;
+        const float A_32 = symmetric_yz + skew_x;
+        const float symmetric_zx = sigma_z * partner_sigma_x + delta_z * partner_delta_x
+            + sigma_x * partner_sigma_z;
+        const float A_31 = symmetric_zx - skew_y;
+        const float A_13 = symmetric_zx + skew_y;
+        /* direction cosine matrix, body to reference, after the step */
+        const float next_11 = A_11 * C_11 + A_21 * C_12 + A_31 * C_13;
+        const float next_12 = A_12 * C_11 + A_22 * C_12 + A_32 * C_13;
+        const float next_13 = A_13 * C_11 + A_23 * C_12 + A_33 * C_13;
+        const float next_21 = A_11 * C_21 + A_21 * C_22 + A_31 * C_23;
+        const float next_22 = A_12 * C_21 + A_22 * C_22 + A_32 * C_23;
+        const float next_23 = A_13 * C_21 + A_23 * C_22 + A_33 * C_23;
+        const float next_31 = A_11 * C_31 + A_21 * C_32 + A_31 * C_33;
+        const float next_32 = A_12 * C_31 + A_22 * C_32 + A_32 * C_33;
+        const float next_33 = A_13 * C_31 + A_23 * C_32 + A_33 * C_33;
+        next_0[k] = next_11;
+        next_1[k] = next_12;
+        next_2[k] = next_13;
+        next_3[k] = next_21;
+        next_4[k] = next_22;
+        next_5[k] = next_23;
+        next_6[k] = next_31;
+        next_7[k] = next_32;
+        next_8[k] = next_33;
+    }
+}
+
+void dcm_rk3_2_float_batch(size_t runs, const float *state, const float *increments, float *next)
+{
+    batch_(runs, state + 0 * runs, state + 1 * runs, state + 2 * runs, state + 3 * runs,
+        state + 4 * runs, state + 5 * runs, state + 6 * runs, state + 7 * runs,
+        state + 8 * runs, increments + 0 * runs, increments + 1 * runs, increments + 2 * runs,
+        increments + 3 * runs, increments + 4 * runs, increments + 5 * runs, next + 0 * runs,
+        next + 1 * runs, next + 2 * runs, next + 3 * runs, next + 4 * runs, next + 5 * runs,
+        next + 6 * runs, next + 7 * runs, next + 8 * runs);
 }
 
 enum { BLOCK_ = 16 };

@@ -4,6 +4,10 @@
  */
 #include "dcm_rk4_2_float.h"
 
+#ifdef __cplusplus
+#define restrict __restrict
+#endif
+
 /* The algorithm. Static, so that the loop below can take it in. */
 static inline void one_(const float state[9], const float increments[6], float next[9])
 {
@@ -101,6 +105,116 @@ void dcm_rk4_2_float_array(size_t count, const float *state, const float *increm
 {
     for (size_t k = 0; k < count; ++k)
         one_(state + 9 * k, increments + 6 * k, next + 9 * k);
+}
+
+/* One step of many runs, every element in an array of its own: restrict promises the compiler that it may take
+ * several runs at once.
+ */
+static void batch_(size_t runs, const float *restrict state_0, const float *restrict state_1,
+    const float *restrict state_2, const float *restrict state_3, const float *restrict state_4,
+    const float *restrict state_5, const float *restrict state_6, const float *restrict state_7,
+    const float *restrict state_8, const float *restrict increments_0,
+    const float *restrict increments_1, const float *restrict increments_2,
+    const float *restrict increments_3, const float *restrict increments_4,
+    const float *restrict increments_5, float *restrict next_0, float *restrict next_1,
+    float *restrict next_2, float *restrict next_3, float *restrict next_4, float *restrict next_5,
+    float *restrict next_6, float *restrict next_7, float *restrict next_8)
+{
+    for (size_t k = 0; k < runs; ++k) {
+        const float C_11 = state_0[k];
+        const float C_12 = state_1[k];
+        const float C_13 = state_2[k];
+        const float C_21 = state_3[k];
+        const float C_22 = state_4[k];
+        const float C_23 = state_5[k];
+        const float C_31 = state_6[k];
+        const float C_32 = state_7[k];
+        const float C_33 = state_8[k];
+        const float d1_x = increments_0[k];
+        const float d1_y = increments_1[k];
+        const float d1_z = increments_2[k];
+        const float d2_x = increments_3[k];
+        const float d2_y = increments_4[k];
+        const float d2_z = increments_5[k];
+        /* the angle increment of the whole step */
+        const float sigma_x = d1_x + d2_x;
+        const float sigma_y = d1_y + d2_y;
+        const float sigma_z = d1_z + d2_z;
+        const float sigma_cross_d1_x = sigma_y * d1_z - sigma_z * d1_y;
+        const float sigma_cross_d1_y = sigma_z * d1_x - sigma_x * d1_z;
+        const float sigma_cross_d1_z = sigma_x * d1_y - sigma_y * d1_x;
+        const float sigma_dot_sigma = sigma_x * sigma_x + sigma_y * sigma_y + sigma_z * sigma_z;
+        /* weight of sigma in skew */
+        const float skew_sigma = 1.0f - 0.16666667f * sigma_dot_sigma;
+        /* weight of sigma_cross_d1 in skew */
+        const float skew_sigma_cross_d1 = 0.33333334f - skew_sigma;
+        /* vector of the skew part */
+        const float skew_x = skew_sigma * sigma_x + skew_sigma_cross_d1 * sigma_cross_d1_x;
+        const float skew_y = skew_sigma * sigma_y + skew_sigma_cross_d1 * sigma_cross_d1_y;
+        const float skew_z = skew_sigma * sigma_z + skew_sigma_cross_d1 * sigma_cross_d1_z;
+        const float d1_dot_d1 = d1_x * d1_x + d1_y * d1_y + d1_z * d1_z;
+        /* weight of sigma in partner */
+        const float partner_sigma = 0.0625f * sigma_dot_sigma - 0.33333334f * d1_dot_d1 + 0.25f;
+        const float d1_dot_sigma = d1_x * sigma_x + d1_y * sigma_y + d1_z * sigma_z;
+        const float shared_1 = 0.6666667f * d1_dot_sigma;
+        /* weight of d1 in partner */
+        const float partner_d1 = shared_1 - 0.33333334f * sigma_dot_sigma;
+        /* of sigma in outer products */
+        const float partner_x = partner_sigma * sigma_x + partner_d1 * d1_x
+            - 0.33333334f * sigma_cross_d1_x;
+        const float partner_y = partner_sigma * sigma_y + partner_d1 * d1_y
+            - 0.33333334f * sigma_cross_d1_y;
+        const float partner_z = partner_sigma * sigma_z + partner_d1 * d1_z
+            - 0.33333334f * sigma_cross_d1_z;
+        /* multiple of the unit matrix */
+        const float diagonal = sigma_dot_sigma * (shared_1 - 0.125f * sigma_dot_sigma - 0.5f)
+            - d1_dot_sigma * shared_1 + 1.0f;
+        /* half of u y' + y u' on the diagonal */
+        const float half_xx = sigma_x * partner_x;
+        const float A_11 = half_xx + half_xx + diagonal;
+        const float half_yy = sigma_y * partner_y;
+        const float A_22 = half_yy + half_yy + diagonal;
+        const float half_zz = sigma_z * partner_z;
+        const float A_33 = half_zz + half_zz + diagonal;
+        const float symmetric_xy = sigma_x * partner_y + sigma_y * partner_x;
+        const float A_12 = symmetric_xy - skew_z;
+        const float A_21 = symmetric_xy + skew_z;
+        const float symmetric_yz = sigma_y * partner_z + sigma_z * partner_y;
+        const float A_23 = symmetric_yz - skew_x;
+        const float A_32 = symmetric_yz + skew_x;
+        const float symmetric_zx = sigma_z * partner_x + sigma_x * partner_z;
+        const float A_31 = symmetric_zx - skew_y;
+        const float A_13 = symmetric_zx + skew_y;
+        /* direction cosine matrix, body to reference, after the step */
+        const float next_11 = A_11 * C_11 + A_21 * C_12 + A_31 * C_13;
+        const float next_12 = A_12 * C_11 + A_22 * C_12 + A_32 * C_13;
+        const float next_13 = A_13 * C_11 + A_23 * C_12 + A_33 * C_13;
+        const float next_21 = A_11 * C_21 + A_21 * C_22 + A_31 * C_23;
+        const float next_22 = A_12 * C_21 + A_22 * C_22 + A_32 * C_23;
+        const float next_23 = A_13 * C_21 + A_23 * C_22 + A_33 * C_23;
+        const float next_31 = A_11 * C_31 + A_21 * C_32 + A_31 * C_33;
+        const float next_32 = A_12 * C_31 + A_22 * C_32 + A_32 * C_33;
+        const float next_33 = A_13 * C_31 + A_23 * C_32 + A_33 * C_33;
+        next_0[k] = next_11;
+        next_1[k] = next_12;
+        next_2[k] = next_13;
+        next_3[k] = next_21;
+        next_4[k] = next_22;
+        next_5[k] = next_23;
+        next_6[k] = next_31;
+        next_7[k] = next_32;
+        next_8[k] = next_33;
+    }
+}
+
+void dcm_rk4_2_float_batch(size_t runs, const float *state, const float *increments, float *next)
+{
+    batch_(runs, state + 0 * runs, state + 1 * runs, state + 2 * runs, state + 3 * runs,
+        state + 4 * runs, state + 5 * runs, state + 6 * runs, state + 7 * runs,
+        state + 8 * runs, increments + 0 * runs, increments + 1 * runs, increments + 2 * runs,
+        increments + 3 * runs, increments + 4 * runs, increments + 5 * runs, next + 0 * runs,
+        next + 1 * runs, next + 2 * runs, next + 3 * runs, next + 4 * runs, next + 5 * runs,
+        next + 6 * runs, next + 7 * runs, next + 8 * runs);
 }
 
 enum { BLOCK_ = 16 };

@@ -4,6 +4,10 @@
  */
 #include "euler_rk3_2_float.h"
 
+#ifdef __cplusplus
+#define restrict __restrict
+#endif
+
 /* The algorithm. Static, so that the loop below can take it in. */
 static inline void one_(const float state[4], const float increments[6], float next[4])
 {
@@ -61,6 +65,72 @@ void euler_rk3_2_float_array(size_t count, const float *state, const float *incr
 {
     for (size_t k = 0; k < count; ++k)
         one_(state + 4 * k, increments + 6 * k, next + 4 * k);
+}
+
+/* One step of many runs, every element in an array of its own: restrict promises the compiler that it may take
+ * several runs at once.
+ */
+static void batch_(size_t runs, const float *restrict state_0, const float *restrict state_1,
+    const float *restrict state_2, const float *restrict state_3,
+    const float *restrict increments_0, const float *restrict increments_1,
+    const float *restrict increments_2, const float *restrict increments_3,
+    const float *restrict increments_4, const float *restrict increments_5, float *restrict next_0,
+    float *restrict next_1, float *restrict next_2, float *restrict next_3)
+{
+    for (size_t k = 0; k < runs; ++k) {
+        const float e_x = state_0[k];
+        const float e_y = state_1[k];
+        const float e_z = state_2[k];
+        const float e_s = state_3[k];
+        const float d1_x = increments_0[k];
+        const float d1_y = increments_1[k];
+        const float d1_z = increments_2[k];
+        const float d2_x = increments_3[k];
+        const float d2_y = increments_4[k];
+        const float d2_z = increments_5[k];
+        /* the angle increment of the whole step */
+        const float sigma_x = d1_x + d2_x;
+        const float sigma_y = d1_y + d2_y;
+        const float sigma_z = d1_z + d2_z;
+        /* first half minus second half */
+        const float delta_x = d1_x - d2_x;
+        const float delta_y = d1_y - d2_y;
+        const float delta_z = d1_z - d2_z;
+        const float delta_cross_sigma_x = delta_y * sigma_z - delta_z * sigma_y;
+        const float delta_cross_sigma_y = delta_z * sigma_x - delta_x * sigma_z;
+        const float delta_cross_sigma_z = delta_x * sigma_y - delta_y * sigma_x;
+        const float delta_dot_delta = delta_x * delta_x + delta_y * delta_y + delta_z * delta_z;
+        const float sigma_dot_sigma = sigma_x * sigma_x + sigma_y * sigma_y + sigma_z * sigma_z;
+        /* weight of sigma in p */
+        const float p_sigma = 0.5f - 0.083333336f * delta_dot_delta
+            - 0.020833334f * sigma_dot_sigma;
+        const float sigma_dot_delta = sigma_x * delta_x + sigma_y * delta_y + sigma_z * delta_z;
+        /* weight of delta in p */
+        const float p_delta = 0.16666667f * sigma_dot_delta;
+        /* the step applied to the identity: its vector part */
+        const float p_x = p_sigma * sigma_x + p_delta * delta_x + 0.16666667f * delta_cross_sigma_x;
+        const float p_y = p_sigma * sigma_y + p_delta * delta_y + 0.16666667f * delta_cross_sigma_y;
+        const float p_z = p_sigma * sigma_z + p_delta * delta_z + 0.16666667f * delta_cross_sigma_z;
+        /* its scalar part */
+        const float p_s = 1.0f - 0.16666667f * delta_dot_delta - 0.125f * sigma_dot_sigma;
+        /* Euler parameters, body to reference, scalar last, after the step */
+        const float next_s = e_s * p_s - e_x * p_x - e_y * p_y - e_z * p_z;
+        const float next_x = e_s * p_x + e_x * p_s + e_y * p_z - e_z * p_y;
+        const float next_y = e_s * p_y - e_x * p_z + e_y * p_s + e_z * p_x;
+        const float next_z = e_s * p_z + e_x * p_y - e_y * p_x + e_z * p_s;
+        next_0[k] = next_x;
+        next_1[k] = next_y;
+        next_2[k] = next_z;
+        next_3[k] = next_s;
+    }
+}
+
+void euler_rk3_2_float_batch(size_t runs, const float *state, const float *increments, float *next)
+{
+    batch_(runs, state + 0 * runs, state + 1 * runs, state + 2 * runs, state + 3 * runs,
+        increments + 0 * runs, increments + 1 * runs, increments + 2 * runs,
+        increments + 3 * runs, increments + 4 * runs, increments + 5 * runs, next + 0 * runs,
+        next + 1 * runs, next + 2 * runs, next + 3 * runs);
 }
 
 enum { BLOCK_ = 16 };

@@ -37,12 +37,19 @@ void euler_rk4_2_float(const float state[4], const float increments[6], float ne
 void euler_rk4_2_float_array(size_t count, const float *state, const float *increments,
     float *next);
 
+/* One step of `runs` independent runs, side by side: arrays are ordered by element, so that the compiler takes several
+ * runs at once.
+ * in   state[4][runs], increments[6][runs]
+ * out  next[4][runs]; it must not overlap the inputs.
+ */
+void euler_rk4_2_float_batch(size_t runs, const float *state, const float *increments, float *next);
+
 /* A function that restores the constraint of a state, in place. */
 typedef void (*euler_rk4_2_float_orthonormalizer)(const float *, float *);
 
 /* Propagates `runs` independent runs, each of `steps` steps.
  * in   initial[runs][4]: state at the start of each run.
- * in   increments[runs][steps][6]: angle increments, as for one call; not read for 0 steps.
+ * in   increments[runs][steps][6]: as for one call; not read for 0 steps.
  * in   record_every: a record is kept every so many steps, at least 1.
  * in   orthonormalize_every: `orthonormalize` is called after every so many steps; 0 for never.
  * out  history[runs][1 + steps / record_every][4]: the initial state and the records; it must not

@@ -235,6 +235,25 @@ def test_the_pipeline_by_hand_gives_the_same_back_end(backend_name, rng):
     np.testing.assert_array_equal(built.propagate(increments), cached.propagate(increments))
 
 
+def test_a_step_from_rates_on_every_back_end(backend_name, rng):
+    kernel = strapgen.derive("dcm", "rk4", rates=True)
+    backend = strapgen.build(strapgen.generate(strapgen.lower(kernel), backend_name))
+    other = strapgen.backend("dcm", "rk4", 2, backend_name)
+    d = random_increments(rng, 40, 2)
+    # Rate extraction of two increments (thesis, chapter 3 A), at nodes 0, 1/2 and 1.
+    turns = np.stack([3 * d[:, 0] - d[:, 1], d[:, 0] + d[:, 1], 3 * d[:, 1] - d[:, 0]], axis=1)
+    states = backend.propagate(turns)
+    np.testing.assert_allclose(states, other.propagate(d), rtol=0, atol=2 * roundoff(other, 40))
+    np.testing.assert_allclose(backend.step(states[0], turns[0]), states[1], rtol=0, atol=roundoff(other, 1))
+
+
+def test_a_simulation_needs_increments(backend_name):
+    kernel = strapgen.derive("euler", "rk4", rates=True)
+    backend = strapgen.build(strapgen.generate(strapgen.lower(kernel), backend_name))
+    with pytest.raises(InputError, match="euler-rk4-rates takes turns"):
+        strapgen.simulate(backend, strapgen.motion("constant", x_deg_s=1), 1, 10)
+
+
 def test_every_orthonormalization_restores_the_constraint(make, rng):
     # What each leaves of the excess S = C'C - I (thesis, appendix B); adding the duals cancels S to first order.
     left = {

@@ -12,6 +12,7 @@ import sympy as sp
 from strapgen import derive
 from strapgen.catalogue import ALGORITHMS, METHODS, MOST_INCREMENTS
 from strapgen.catalogue.runge_kutta import increments_signal
+from strapgen.exceptions import InputError
 
 ALGORITHM = pytest.mark.parametrize("algorithm", ALGORITHMS)
 METHOD = pytest.mark.parametrize("method", METHODS)
@@ -226,3 +227,34 @@ def test_the_transition_is_a_stage_of_the_kernel(algorithm, method):
     assert step.transition in [stage.signal.name for stage in step.stages]
     assert step.name == f"{algorithm}-{method}-2"
     assert step.companions.attitude == (None if algorithm == "dcm" else f"dcm-from-{algorithm}")
+
+
+@ALGORITHM
+@METHOD
+def test_a_step_from_rates_is_the_step_from_increments_after_rate_extraction(algorithm, method):
+    from_rates = derive(algorithm, method, rates=True)
+    state, turns = from_rates.inputs
+    from_increments = derive(algorithm, method, 2)
+    names = [*state.elements, *increments_signal(2).elements]
+    ring, *generators = sp.ring(names, sp.QQ)
+    values = dict(zip(names, generators, strict=True))
+    d = np.array(generators[state.size :], dtype=object).reshape(2, 3)
+    node = {"0": "begin", "1_2": "middle", "1": "end"}
+    for row in range(turns.shape[0]):
+        elements = turns.elements[3 * row : 3 * row + 3]
+        weights = EXTRACTION[2][node[elements[0].removeprefix("turn_").removesuffix("_x")]]
+        turn = sum(c * x for c, x in zip(weights, d, strict=True))
+        values |= dict(zip(elements, turn, strict=True))
+    given = from_rates.expand({name: values[name] for name in (*state.elements, *turns.elements)})
+    expected = from_increments.polynomials()
+    assert [ring(x) for x in given["next"]] == expected["next"]
+
+
+def test_rates_are_named_after_their_nodes():
+    kernel = derive("dcm", "rk3", rates=True)
+    assert kernel.name == "dcm-rk3-rates"
+    assert kernel.arguments == "dcm --method rk3 --rates"
+    assert kernel.inputs[1].shape == (3, 3)
+    assert "nodes 0, 1/2, 1" in kernel.inputs[1].meaning
+    with pytest.raises(InputError, match="increments or rates, not both"):
+        derive("dcm", "rk3", 2, rates=True)

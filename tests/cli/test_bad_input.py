@@ -38,6 +38,10 @@ BAD = {
     "derive euler --show html": "show 'html' is not known; allowed: text, latex, operations",
     "derive euler --format csv": "format 'csv' is not known; allowed: text, json",
     "derive euler-product --method rk4": "kernel euler-product takes no method (got rk4)",
+    "derive euler --rates --increments 2": "a step takes increments or rates, not both",
+    "derive euler-product --rates": "kernel euler-product takes no rates",
+    "generate --all --rates": "--rates does not go with it",
+    "simulate euler --rates --motion constant": "No such option: --rates",
     "derive euler-product --increments 2": "kernel euler-product takes no increments (got 2)",
     # generate
     "generate": "an algorithm is needed, or --all",
@@ -254,7 +258,7 @@ def test_errors_of_our_own_are_not_hidden(capsys, monkeypatch):
     """What is no bad input keeps its traceback."""
     from strapgen import pipeline
 
-    def broken(*_: object) -> None:
+    def broken(*_: object, **__: object) -> None:
         raise AssertionError("a fault in strapgen")
 
     monkeypatch.setattr(pipeline, "derive", broken)

@@ -93,8 +93,10 @@ class Backend(ABC):
         Name of the kernel that it runs.
     dtype : dtype
         Type of the numbers that it computes with.
+    takes : str
+        What a step takes: "increments", or "turns": rates at the nodes times the step length.
     increments : int
-        Angle increments a step.
+        How many of them a step takes.
     state_shape : tuple of int
         Shape of the state.
     elements : tuple of str
@@ -114,10 +116,11 @@ class Backend(ABC):
         companions = sources.companions
         if companions is None:
             raise InputError(f"kernel {sources.kernel} is no attitude step; back ends are built from steps")
-        state, increments = sources.function.inputs
+        state, samples = sources.function.inputs
         self.name = sources.target
         self.kernel = sources.kernel
-        self.increments = increments.shape[0]
+        self.takes = samples.name
+        self.increments = samples.shape[0]
         self.state_shape = state.shape
         self.elements = state.elements
         self.attitude = companions.attitude
@@ -129,6 +132,19 @@ class Backend(ABC):
         self.identity: Array = np.array([float(x) for x in companions.identity], self.dtype).reshape(
             state.shape
         )
+
+    def need_increments(self) -> None:
+        """Check that steps take angle increments.
+
+        Raises
+        ------
+        InputError
+            If they take something else.
+        """
+        if self.takes != "increments":
+            raise InputError(
+                f"kernel {self.kernel} takes {self.takes}; a step that takes increments is needed"
+            )
 
     def step(self, state: Any, increments: Any) -> Array:
         """Advance the state by one step.

@@ -7,13 +7,14 @@ from typing import Annotated
 import typer
 
 from strapgen import checks
-from strapgen.cli.options import Algorithm, Format, Increments, Method, check_format, print_json, whole
+from strapgen.cli.options import Algorithm, Format, Increments, Method, Rates, check_format, print_json, whole
 
 
 def derive(
     algorithm: Algorithm,
     method: Method = None,
     increments: Increments = None,
+    rates: Rates = False,
     show: Annotated[str, typer.Option("--show", help="text, latex or operations.")] = "text",
     format: Format = "text",
 ) -> None:
@@ -25,7 +26,7 @@ def derive(
     checks.choice("show", show, ("text", "latex", "operations"))
     from strapgen import formulas, pipeline
 
-    kernel = pipeline.derive(algorithm, method, whole("increments", increments))
+    kernel = pipeline.derive(algorithm, method, whole("increments", increments), rates=rates)
     program = pipeline.lower(kernel)
     if format == "json":
         data = formulas.as_data(kernel, program)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from strapgen.cli.options import Format, Increments, Method, check_format, print_json, whole
+from strapgen.cli.options import Format, Increments, Method, Rates, check_format, print_json, whole
 from strapgen.cli.progress import track
 from strapgen.exceptions import InputError
 
@@ -18,6 +18,7 @@ def generate(
     ] = None,
     method: Method = None,
     increments: Increments = None,
+    rates: Rates = False,
     target: Annotated[
         str | None,
         typer.Option("--target", help="numpy, c or c-float.  [default: numpy]", show_default=False),
@@ -46,6 +47,7 @@ def generate(
             ("an algorithm", algorithm),
             ("--method", method),
             ("--increments", increments),
+            ("--rates", rates or None),
             ("--target", target),
         ):
             if value is not None:
@@ -58,7 +60,7 @@ def generate(
     from strapgen.targets import TARGETS
 
     target = checks.choice("target", "numpy" if target is None else target, TARGETS)
-    program = pipeline.lower(pipeline.derive(algorithm, method, whole("increments", increments)))
+    program = pipeline.lower(pipeline.derive(algorithm, method, whole("increments", increments), rates=rates))
     sources = pipeline.generate(program, target)
     written = output.write_files(out or Path(), sources.files)
     operations = sources.operations

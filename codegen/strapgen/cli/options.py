@@ -24,6 +24,10 @@ Increments = Annotated[
         "--increments", metavar="N", help="Angle increments a step, 1 to 8.  [default: 2]", show_default=False
     ),
 ]
+Rates = Annotated[
+    bool,
+    typer.Option("--rates", help="The step takes the rate at the method's nodes, times the step length."),
+]
 Format = Annotated[str, typer.Option("--format", help="text or json.")]
 
 

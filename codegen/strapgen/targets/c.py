@@ -104,13 +104,14 @@ def emit(program: Program, target: str = "c") -> Sources:
         "command": f"strapgen generate {program.arguments} --target {real.target}",
         "real": real,
         "state": program.inputs[0],
+        "samples": program.inputs[-1],
         "parameters": _parameters(program, real),
         "names": ", ".join(s.name for s in (*program.inputs, *(r.signal for r in program.outputs))),
         "arrays": _arrays(program, real),
         "calls": _calls(program),
         "unused": [s.name for s in program.inputs if not program.used() & set(s.elements)],
         "code": _code(program, printer),
-        "loop": _loop(program, printer) if program.companions else None,
+        "propagation": _loop(program, printer) if program.companions else None,
         "uses_math": any(
             node.kind in _FUNCTIONS and node.kind not in ("at_least", "select") for node in nodes
         ),
@@ -180,12 +181,19 @@ def _loop(program: Program, printer: CPrinter) -> dict[str, object]:
     """Return the statements of a step in a loop, cut where the state comes in."""
     ahead, behind = program.split()
     (increments,), (prepared,) = ahead.inputs, ahead.outputs
+    signals = [(signal, "const ") for signal in program.inputs]
+    signals += [(result.signal, "") for result in program.outputs]
+    rows = [(signal, constant, number) for signal, constant in signals for number in range(signal.size)]
+    name = printer.real.name
     return {
         "block": _BLOCK,
         "prepared": prepared.signal.size,
         "stack": _BLOCK * (prepared.signal.size + increments.size) * printer.real.bytes,
         "ahead": _code(ahead, printer, {increments.name: "_by_element[{}][k]", "prepared": "[{}][k]"}, 2),
         "behind": _code(behind, printer, {"prepared": "[{}][k]"}),
+        "rows": ", ".join(f"{constant}{name} *restrict {s.name}_{k}" for s, constant, k in rows),
+        "row_arguments": ", ".join(f"{s.name} + {k} * runs" for s, _, k in rows),
+        "batch": _code(program, printer, {signal.name: "_{}[k]" for signal, _ in signals}, 2),
     }
 
 
