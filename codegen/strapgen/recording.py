@@ -276,8 +276,8 @@ def propagate(
     Raises
     ------
     InputError
-        If the algorithm takes no increments, the recording is shorter than a step, a time is no multiple of the step, or the attitude leaves
-        the range of the back end's numbers.
+        If the algorithm takes no increments, the recording is shorter than a step, a time is no multiple of
+        the step, or the attitude leaves the range of the back end's numbers.
 
     Examples
     --------

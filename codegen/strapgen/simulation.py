@@ -124,8 +124,8 @@ def simulate(
     Raises
     ------
     InputError
-        If the algorithm takes no increments, a time is not finite, not positive, or no multiple of the step, or the attitude leaves the range
-        of the back end's numbers.
+        If the algorithm takes no increments, a time is not finite, not positive, or no multiple of the step,
+        or the attitude leaves the range of the back end's numbers.
 
     Examples
     --------

@@ -211,6 +211,25 @@ static inline void finish_(const double state[9], double prepared[6][BLOCK_], si
     next[8] = next_33;
 }
 
+/* Steps `first` to `last` - 1 of a block, recorded one by one unless `record` is null. The state is a copy, so that it
+ * stays in registers from step to step.
+ */
+static void advance_(size_t first, size_t last, double prepared[6][BLOCK_],
+    double state[9], double *record)
+{
+    double own[9];
+    for (size_t j = 0; j < 9; ++j)
+        own[j] = state[j];
+    for (size_t k = first; k < last; ++k) {
+        finish_(own, prepared, k, own);
+        if (record)
+            for (size_t j = 0; j < 9; ++j)
+                *record++ = own[j];
+    }
+    for (size_t j = 0; j < 9; ++j)
+        state[j] = own[j];
+}
+
 int dcm_rk1_2_propagate(size_t runs, size_t steps, size_t record_every, size_t orthonormalize_every,
     dcm_rk1_2_orthonormalizer orthonormalize, const double *initial,
     const double *increments, double *history)
@@ -220,21 +239,32 @@ int dcm_rk1_2_propagate(size_t runs, size_t steps, size_t record_every, size_t o
     for (size_t run = 0; run < runs; ++run) {
         double state[9];
         size_t until_record = record_every, until_orthonormalize = orthonormalize_every;
-        for (size_t k = 0; k < 9; ++k)
-            state[k] = *history++ = *initial++;
+        for (size_t j = 0; j < 9; ++j)
+            state[j] = *history++ = *initial++;
         for (size_t step = 0; step < steps;) {
             double prepared[6][BLOCK_];
             const size_t count = steps - step < BLOCK_ ? steps - step : (size_t)BLOCK_;
             prepare_(count, increments, prepared);
             increments += 6 * count;
             step += count;
-            for (size_t k = 0; k < count; ++k) {
-                finish_(state, prepared, k, state);
-                if (orthonormalize_every && !--until_orthonormalize) {
+            for (size_t k = 0; k < count;) {
+                size_t ahead = count - k;
+                if (orthonormalize_every && until_orthonormalize < ahead)
+                    ahead = until_orthonormalize;
+                if (record_every > 1 && until_record < ahead)
+                    ahead = until_record;
+                advance_(k, k + ahead, prepared, state, record_every > 1 ? 0 : history);
+                k += ahead;
+                if (record_every == 1)
+                    history += 9 * ahead;
+                if (orthonormalize_every && !(until_orthonormalize -= ahead)) {
                     orthonormalize(state, state);
                     until_orthonormalize = orthonormalize_every;
+                    if (record_every == 1)
+                        for (size_t j = 0; j < 9; ++j)
+                            (history - 9)[j] = state[j];
                 }
-                if (!--until_record) {
+                if (record_every > 1 && !(until_record -= ahead)) {
                     for (size_t j = 0; j < 9; ++j)
                         *history++ = state[j];
                     until_record = record_every;

@@ -194,6 +194,25 @@ static inline void finish_(const float state[4], float prepared[4][BLOCK_], size
     next[3] = next_z;
 }
 
+/* Steps `first` to `last` - 1 of a block, recorded one by one unless `record` is null. The state is a copy, so that it
+ * stays in registers from step to step.
+ */
+static void advance_(size_t first, size_t last, float prepared[4][BLOCK_],
+    float state[4], float *record)
+{
+    float own[4];
+    for (size_t j = 0; j < 4; ++j)
+        own[j] = state[j];
+    for (size_t k = first; k < last; ++k) {
+        finish_(own, prepared, k, own);
+        if (record)
+            for (size_t j = 0; j < 4; ++j)
+                *record++ = own[j];
+    }
+    for (size_t j = 0; j < 4; ++j)
+        state[j] = own[j];
+}
+
 int cayley_klein_rk4_2_float_propagate(size_t runs, size_t steps, size_t record_every, size_t orthonormalize_every,
     cayley_klein_rk4_2_float_orthonormalizer orthonormalize, const float *initial,
     const float *increments, float *history)
@@ -203,21 +222,32 @@ int cayley_klein_rk4_2_float_propagate(size_t runs, size_t steps, size_t record_
     for (size_t run = 0; run < runs; ++run) {
         float state[4];
         size_t until_record = record_every, until_orthonormalize = orthonormalize_every;
-        for (size_t k = 0; k < 4; ++k)
-            state[k] = *history++ = *initial++;
+        for (size_t j = 0; j < 4; ++j)
+            state[j] = *history++ = *initial++;
         for (size_t step = 0; step < steps;) {
             float prepared[4][BLOCK_];
             const size_t count = steps - step < BLOCK_ ? steps - step : (size_t)BLOCK_;
             prepare_(count, increments, prepared);
             increments += 6 * count;
             step += count;
-            for (size_t k = 0; k < count; ++k) {
-                finish_(state, prepared, k, state);
-                if (orthonormalize_every && !--until_orthonormalize) {
+            for (size_t k = 0; k < count;) {
+                size_t ahead = count - k;
+                if (orthonormalize_every && until_orthonormalize < ahead)
+                    ahead = until_orthonormalize;
+                if (record_every > 1 && until_record < ahead)
+                    ahead = until_record;
+                advance_(k, k + ahead, prepared, state, record_every > 1 ? 0 : history);
+                k += ahead;
+                if (record_every == 1)
+                    history += 4 * ahead;
+                if (orthonormalize_every && !(until_orthonormalize -= ahead)) {
                     orthonormalize(state, state);
                     until_orthonormalize = orthonormalize_every;
+                    if (record_every == 1)
+                        for (size_t j = 0; j < 4; ++j)
+                            (history - 4)[j] = state[j];
                 }
-                if (!--until_record) {
+                if (record_every > 1 && !(until_record -= ahead)) {
                     for (size_t j = 0; j < 4; ++j)
                         *history++ = state[j];
                     until_record = record_every;

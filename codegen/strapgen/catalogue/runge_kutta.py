@@ -62,33 +62,13 @@ def step(kinematics: Kinematics, tableau: Tableau, increments: int | None) -> Ke
     """
     build = KernelBuilder()
     state = build.input(kinematics.state)
-    nodes = tuple(dict.fromkeys(tableau.nodes))
-    samples = build.input(turns_signal(nodes) if increments is None else increments_signal(increments))
-    turns: dict[Fraction, sp.Matrix] = {}
-    for place, node in enumerate(nodes):
-        if increments is None:
-            weights = [sp.Integer(k == place) for k in range(len(nodes))]
-        else:
-            weights = extraction(increments, node)
-        turns[node] = _turn(build, kinematics, samples, weights, node)
-    slopes: list[sp.Matrix] = []
-    for number, (node, row) in enumerate(zip(tableau.nodes, tableau.matrix, strict=True), 1):
-        point = kinematics.identity + _combination(row, slopes, kinematics.identity)
-        if any(row):
-            point = build.stage(
-                _like(kinematics, f"point_{number}", f"argument of slope {number}, from the identity"), point
-            )
-        slope = kinematics.derivative(point, turns[node])
-        signal = _like(kinematics, f"slope_{number}", f"derivative times the step at stage {number}")
-        slopes.append(build.stage(signal, slope))
-    transition = build.stage(
-        kinematics.transition,
-        kinematics.identity + _combination(tableau.weights, slopes, kinematics.identity),
-    )
+    turns = _turns(build, kinematics, tableau, increments)
+    end = advance(build, kinematics, tableau, turns, kinematics.identity, "the identity")
+    transition = build.stage(kinematics.transition, end)
     build.output(kinematics.next, kinematics.product(state, transition))
     if increments is None:
         given, taken, option = (
-            f"the rate at {len(nodes)} {'node' if len(nodes) == 1 else 'nodes'}",
+            f"the rate at {len(turns)} {'node' if len(turns) == 1 else 'nodes'}",
             "rates",
             "--rates",
         )
@@ -112,6 +92,56 @@ def step(kinematics: Kinematics, tableau: Tableau, increments: int | None) -> Ke
     )
 
 
+def staged_step(kinematics: Kinematics, tableau: Tableau, increments: int | None) -> Kernel:
+    """Write one integration step as textbooks do: slopes of the state itself, no transition.
+
+    `step` is the same polynomial of its inputs. This form is for comparison.
+
+    Parameters
+    ----------
+    kinematics, tableau, increments
+        As for `step`.
+    """
+    build = KernelBuilder()
+    state = build.input(kinematics.state)
+    turns = _turns(build, kinematics, tableau, increments)
+    build.output(kinematics.next, advance(build, kinematics, tableau, turns, state, "the state"))
+    return build.kernel(
+        f"{kinematics.name}-{tableau.name}-{increments or 'rates'}-staged",
+        f"{kinematics.title}: staged step by {tableau.title}",
+        f"{kinematics.source}; {tableau.title}: {tableau.source}",
+    )
+
+
+def advance(
+    build: KernelBuilder,
+    kinematics: Kinematics,
+    tableau: Tableau,
+    turns: dict[Fraction, sp.Matrix],
+    start: sp.Matrix,
+    origin: str,
+) -> sp.Matrix:
+    """Write the stages of a method from a start, called `origin` in their meanings, and return where they lead.
+
+    Parameters
+    ----------
+    turns : dict of Fraction to Matrix
+        The generator at each node, times the step length.
+    start : Matrix
+        A state, of numbers or symbols.
+    """
+    slopes: list[sp.Matrix] = []
+    for number, (node, row) in enumerate(zip(tableau.nodes, tableau.matrix, strict=True), 1):
+        point = start + _combination(row, slopes, start)
+        if any(row):
+            signal = _like(kinematics, f"point_{number}", f"argument of slope {number}, from {origin}")
+            point = build.stage(signal, point)
+        slope = kinematics.derivative(point, turns[node])
+        signal = _like(kinematics, f"slope_{number}", f"derivative times the step at stage {number}")
+        slopes.append(build.stage(signal, slope))
+    return start + _combination(tableau.weights, slopes, start)
+
+
 def product(name: str) -> Kernel:
     """Return the kernel that advances a state by a transition, and a transition by the one that follows it.
 
@@ -125,6 +155,22 @@ def product(name: str) -> Kernel:
     state, transition = build.input(kinematics.state), build.input(kinematics.transition)
     build.output(kinematics.next, kinematics.product(state, transition))
     return build.kernel(f"{name}-product", f"{kinematics.title}: state after a transition", kinematics.source)
+
+
+def _turns(
+    build: KernelBuilder, kinematics: Kinematics, tableau: Tableau, increments: int | None
+) -> dict[Fraction, sp.Matrix]:
+    """Declare the samples and name the generator, times the step length, at every node."""
+    nodes = tuple(dict.fromkeys(tableau.nodes))
+    samples = build.input(turns_signal(nodes) if increments is None else increments_signal(increments))
+    turns: dict[Fraction, sp.Matrix] = {}
+    for place, node in enumerate(nodes):
+        if increments is None:
+            weights = [sp.Integer(k == place) for k in range(len(nodes))]
+        else:
+            weights = extraction(increments, node)
+        turns[node] = _turn(build, kinematics, samples, weights, node)
+    return turns
 
 
 def _turn(

@@ -1,0 +1,41 @@
+"""strapgen itself."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from generators import Case
+
+LANGUAGE = "c"
+
+_ADAPTOR = """#include "{name}.c"
+#define HAS_LOOPS
+static inline void step(const double *state, const double *samples, double *next) {{ one_(state, samples, next); }}
+static inline void loop(size_t steps, const double *samples, const double *state, double *history)
+{{
+    {name}_propagate(1, steps, steps, 0, 0, state, samples, history);
+}}
+static inline void batch(size_t runs, const double *states, const double *samples, double *next)
+{{
+    {name}_batch(runs, states, samples, next);
+}}
+"""
+
+
+def version() -> str:
+    """Return the version of the generator."""
+    import strapgen
+
+    return strapgen.__version__
+
+
+def write(case: Case, folder: Path) -> None:
+    """Write the step of a case into a folder."""
+    import strapgen
+
+    rates = case.samples == "rates"
+    kernel = strapgen.derive(case.algorithm, "rk4", None if rates else 2, rates=rates)
+    sources = strapgen.generate(strapgen.lower(kernel), "c")
+    for name, text in sources.files.items():
+        (folder / name).write_text(text)
+    (folder / "step.inc").write_text(_ADAPTOR.format(name=sources.function.name))

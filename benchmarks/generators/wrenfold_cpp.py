@@ -1,0 +1,51 @@
+"""wrenfold: its C++ generator, on scalars."""
+
+from __future__ import annotations
+
+import inspect
+from pathlib import Path
+from typing import Any
+
+from generators import Case, formulas
+
+LANGUAGE = "c++"
+
+
+def version() -> str:
+    """Return the version of the generator."""
+    import wrenfold
+
+    return str(wrenfold.__version__)
+
+
+def write(case: Case, folder: Path) -> None:
+    """Write the step of a case into a folder."""
+    import wrenfold
+    from wrenfold import sym
+
+    kernel = formulas.kernel(case)
+    state, samples = formulas.inputs(kernel)
+
+    def step_of(*symbols: Any) -> list[Any]:
+        values = dict(zip((*state, *samples), symbols, strict=True))
+        results = formulas.translated(kernel, values, sym.rational)
+        return [wrenfold.OutputArg(result, name=f"out_{k}") for k, result in enumerate(results)]
+
+    def bound(**symbols: Any) -> list[Any]:
+        return step_of(*symbols.values())
+
+    kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
+    parameters = [inspect.Parameter(n, kind, annotation=wrenfold.FloatScalar) for n in (*state, *samples)]
+    bound.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    bound.__annotations__ = {n: wrenfold.FloatScalar for n in (*state, *samples)}
+    text = wrenfold.generate_function(bound, generator=wrenfold.CppGenerator(), name="step_of")
+    arguments = [f"state[{k}]" for k in range(len(state))] + [f"samples[{k}]" for k in range(len(samples))]
+    arguments += [f"out[{k}]" for k in range(len(kernel.outputs[0].expressions))]
+    count = len(kernel.outputs[0].expressions)
+    (folder / "step.inc").write_text(
+        f"#include <cmath>\n{text}\n"
+        "static inline void step(const double *state, const double *samples, double *next)\n{\n"
+        f"    double out[{count}];\n    step_of<double>({', '.join(arguments)});\n"
+        + "".join(f"    next[{k}] = out[{k}];\n" for k in range(count))
+        + "}\n"
+    )
