@@ -291,8 +291,8 @@ def report(cases: dict[str, list[Contender]], options: argparse.Namespace) -> st
         "- *code*: floating-point instructions in the disassembly of one step; packed ones, and those of loops, once.",
         "- *chained*: one step after the other on the same state. *independent*: one step each of "
         f"{RUNS} states. Medians of {options.rounds} interleaved rounds, nanoseconds a step.",
-        "- *derivation*: from symbols to source text. *process*: the same as a whole process, start of Python and",
-        f"  imports included. Medians of {options.process_rounds} interleaved rounds.",
+        "- *derivation*: from symbols to source text, in a fresh process after its imports. *process*: the whole",
+        f"  of it, start of Python and imports included. Medians of {options.process_rounds} interleaved rounds.",
         "",
     ]
     for title, contenders in cases.items():

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+from fractions import Fraction
 
 import pytest
 import sympy as sp
@@ -86,3 +88,24 @@ def test_data_reads_back(kernel):
         for name, expression in zip(stage.signal.elements, stage.expressions, strict=True):
             read = sp.sympify(described["expressions"][name], locals=names)
             assert sp.simplify(read - expression) == 0 or sp.sstr(read) == sp.sstr(expression)
+
+
+def test_a_program_reads_back_as_the_kernel():
+    # What is printed, evaluated line by line by Python on exact numbers, is the step itself.
+    kernel = pipeline.derive("dcm", "rk4", 2)
+    program = pipeline.lower(kernel)
+    names = [name for signal in kernel.inputs for name in signal.elements]
+    values = {name: Fraction(k + 1, 7 * k + 30) for k, name in enumerate(names)}
+    expected = kernel.expand({name: sp.Rational(x.numerator, x.denominator) for name, x in values.items()})
+    text = formulas.program_as_text(program)
+    assert text.splitlines()[1] == "operations: 63 add, 74 multiply; 36 temporaries"
+    for line in text.splitlines():
+        if " = " in line and "#" not in line:
+            name, expression = line.strip().split(" = ")
+            exact = re.sub(r"\((\d+)/(\d+)\)", r"Fraction(\1, \2)", expression)
+            values[name] = eval(exact, {"Fraction": Fraction}, values)
+            assert formulas.program_as_data(program)[name] == expression
+    found = [
+        sp.Rational(values[n].numerator, values[n].denominator) for n in kernel.outputs[0].signal.elements
+    ]
+    assert found == expected["next"]

@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import casadi
+
 from generators import Case, formulas
 
 LANGUAGE = "c"
@@ -12,15 +14,11 @@ LANGUAGE = "c"
 
 def version() -> str:
     """Return the version of the generator."""
-    import casadi
-
     return str(casadi.__version__)
 
 
 def write(case: Case, folder: Path) -> None:
     """Write the step of a case into a folder."""
-    import casadi
-
     kernel = formulas.kernel(case)
     names = formulas.inputs(kernel)
     vectors = [casadi.SX.sym(word, len(group)) for word, group in zip(("x", "d"), names, strict=True)]

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import strapgen
+import strapgen.catalogue.runge_kutta
+import strapgen.lowering
+import strapgen.targets.rendering
 from generators import Case
 
 LANGUAGE = "c"
@@ -24,15 +28,11 @@ static inline void batch(size_t runs, const double *states, const double *sample
 
 def version() -> str:
     """Return the version of the generator."""
-    import strapgen
-
     return strapgen.__version__
 
 
 def write(case: Case, folder: Path) -> None:
     """Write the step of a case into a folder."""
-    import strapgen
-
     rates = case.samples == "rates"
     kernel = strapgen.derive(case.algorithm, "rk4", None if rates else 2, rates=rates)
     sources = strapgen.generate(strapgen.lower(kernel), "c")

@@ -6,27 +6,26 @@ import os
 import tempfile
 from pathlib import Path
 
-from generators import Case, formulas
+import symforce
+
+symforce.set_epsilon_to_number()
+
+import symforce.symbolic as sf  # noqa: E402
+from symforce.codegen import Codegen, CppConfig  # noqa: E402
+from symforce.values import Values  # noqa: E402
+
+from generators import Case, formulas  # noqa: E402
 
 LANGUAGE = "c++"
 
 
 def version() -> str:
     """Return the version of the generator."""
-    import symforce
-
     return str(symforce.__version__)
 
 
 def write(case: Case, folder: Path) -> None:
     """Write the step of a case into a folder."""
-    import symforce
-
-    symforce.set_epsilon_to_number()
-    import symforce.symbolic as sf
-    from symforce.codegen import Codegen, CppConfig
-    from symforce.values import Values
-
     kernel = formulas.kernel(case)
     state, samples = formulas.inputs(kernel)
     symbols = {name: sf.Symbol(name) for name in (*state, *samples)}

@@ -6,6 +6,9 @@ import inspect
 from pathlib import Path
 from typing import Any
 
+import wrenfold
+from wrenfold import sym
+
 from generators import Case, formulas
 
 LANGUAGE = "c++"
@@ -13,16 +16,11 @@ LANGUAGE = "c++"
 
 def version() -> str:
     """Return the version of the generator."""
-    import wrenfold
-
     return str(wrenfold.__version__)
 
 
 def write(case: Case, folder: Path) -> None:
     """Write the step of a case into a folder."""
-    import wrenfold
-    from wrenfold import sym
-
     kernel = formulas.kernel(case)
     state, samples = formulas.inputs(kernel)
 

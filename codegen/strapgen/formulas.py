@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
+from fractions import Fraction
 from typing import Any
 
 import sympy as sp
 
 from strapgen.kernel import Kernel, Stage
 from strapgen.program import Program
+from strapgen.targets.printer import Printer, operations_text
 
 
 def as_text(kernel: Kernel) -> str:
@@ -30,6 +32,33 @@ def as_text(kernel: Kernel) -> str:
             for name, expression in zip(stage.signal.elements, stage.expressions, strict=True)
         ]
     return "\n".join(lines)
+
+
+class _ExactPrinter(Printer):
+    """Prints constants as fractions."""
+
+    def constant(self, value: Fraction) -> str:
+        return str(value) if value.denominator == 1 else f"({value})"
+
+    def function(self, kind: str, arguments: list[str]) -> str:
+        return f"{kind}({', '.join(arguments)})"
+
+
+def program_as_text(program: Program) -> str:
+    """Return the straight-line code of a program with exact constants."""
+    printer = _ExactPrinter()
+    lines = [program.title, f"operations: {operations_text(program)}"]
+    for assignment in program.body:
+        if assignment.meaning:
+            lines += ["", f"  # {assignment.meaning}"]
+        lines.append(f"  {assignment.name} = {printer.text(assignment.value)}")
+    return "\n".join(lines)
+
+
+def program_as_data(program: Program) -> dict[str, str]:
+    """Return the straight-line code of a program by the names that it assigns, in order, with exact constants."""
+    printer = _ExactPrinter()
+    return {assignment.name: printer.text(assignment.value) for assignment in program.body}
 
 
 def as_latex(kernel: Kernel) -> str:

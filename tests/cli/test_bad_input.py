@@ -35,7 +35,7 @@ BAD = {
     "derive euler --increments 9": "increments is 9; a whole number from 1 to 8 is needed",
     "derive euler --increments -1": "increments is -1; a whole number from 1 to 8 is needed",
     "derive euler --increments two": "increments is 'two'; a whole number is needed",
-    "derive euler --show html": "show 'html' is not known; allowed: text, latex, operations",
+    "derive euler --show html": "show 'html' is not known; allowed: text, latex, program, operations",
     "derive euler --format csv": "format 'csv' is not known; allowed: text, json",
     "derive euler-product --method rk4": "kernel euler-product takes no method (got rk4)",
     "derive euler --rates --increments 2": "a step takes increments or rates, not both",

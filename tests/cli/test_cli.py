@@ -128,7 +128,12 @@ def test_derive_operations(strapgen_says):
     assert shown == program.operations | {"temporaries": program.temporaries}
 
 
-@pytest.mark.parametrize("show", ["text", "latex", "operations"])
+def test_derive_program(strapgen_says):
+    program = pipeline.lower(pipeline.derive("dcm", rates=True))
+    assert strapgen_says("derive dcm --rates --show program") == formulas.program_as_text(program) + "\n"
+
+
+@pytest.mark.parametrize("show", ["text", "latex", "program", "operations"])
 def test_derive_json(show, strapgen_says):
     data = json.loads(strapgen_says(f"derive euler --show {show} --format json"))
     wanted = [
@@ -142,7 +147,7 @@ def test_derive_json(show, strapgen_says):
         "operations",
         "temporaries",
     ]
-    assert list(data) == wanted + ["latex"] * (show == "latex")
+    assert list(data) == wanted + [show] * (show in ("latex", "program"))
     assert data["kernel"] == "euler-rk4-2"
     assert [signal["name"] for signal in data["inputs"]] == ["state", "increments"]
 

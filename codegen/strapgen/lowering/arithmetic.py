@@ -13,6 +13,9 @@ from strapgen.program import Constant, Node, Operation
 #: A node and whether it is added or subtracted.
 Term = tuple[bool, Node]
 
+#: Horner's scheme tries every equally good factor of polynomials with at most so many terms.
+_MOST_TRIED = 10
+
 
 def chain(kind: str, nodes: list[Node]) -> Node:
     """Apply an operation from left to right."""
@@ -81,7 +84,7 @@ def horner(polynomial: Polynomial, node: Callable[[Any], Node]) -> Term:
     """Write a polynomial by Horner's scheme in several variables.
 
     The atom that occurs in most terms is taken out of them, and so on for what it multiplies and for the
-    rest. Of atoms that occur equally often every one is tried, and the fewest operations win.
+    rest. Of atoms that occur equally often, in a short polynomial, every one is tried, and the fewest operations win.
 
     Parameters
     ----------
@@ -114,6 +117,8 @@ def horner(polynomial: Polynomial, node: Callable[[Any], Node]) -> Term:
             factors = ((c, chain("multiply", [node(name) for name in m])) for m, c in sorted(p.items()))
             return gathered(factors)
         candidates = sorted(name for name in counts if counts[name] == most or (most < 2 and name in powers))
+        if len(p) > _MOST_TRIED:
+            del candidates[1:]
         tried = (take_out(p, name) for name in candidates)
         return min(tried, key=lambda found: sum(operation_count(tree) + 1 for _, tree in found))
 

@@ -270,10 +270,10 @@ def _axes(symmetric: Coefficients) -> list[int]:
 
 
 def without_triples(decomposition: Decomposition) -> list[Decomposition]:
-    """Return a decomposition and its equals by the relation between symmetrized triple products.
+    """Return those with the fewest axes of a decomposition and its equals by the relation of triple products.
 
     u1 (u2 x u3)' + u2 (u3 x u1)' + u3 (u1 x u2)', symmetrized, is twice the triple product times the unit
-    matrix: any one of the three can be exchanged for the others.
+    matrix: any one of the three can be exchanged for the others. An axis is a first factor of outer products.
     """
     variants = [decomposition]
     for covariant, coefficient in decomposition.symmetric.items():
@@ -289,4 +289,5 @@ def without_triples(decomposition: Decomposition) -> list[Decomposition]:
         symmetric[()] = add(symmetric.get((), {}), triple, -2 * factor)
         symmetric = {c: p for c, p in symmetric.items() if p}
         variants.append(Decomposition(None, decomposition.vector, symmetric))
-    return variants
+    fewest = min(len(_axes(variant.symmetric)) for variant in variants)
+    return [variant for variant in variants if len(_axes(variant.symmetric)) == fewest]

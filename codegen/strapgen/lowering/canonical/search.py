@@ -23,12 +23,14 @@ from strapgen.lowering.polynomials import Polynomial, atoms
 
 #: How many bases that look cheap are planned in every way.
 _PLANNED = 30
-#: Most bases that are looked at.
-_BASES = 400
+#: Most products of vectors that are expanded to look at bases.
+_EXPANSIONS = 300_000
+#: A decomposition with more terms gains nothing over the stages.
+_MOST_TERMS = 300
 
 
 def plans(core: Core, decomposition: Decomposition) -> list[Plan]:
-    """Return plans for a transition, the one that looks cheapest first.
+    """Return plans for a transition, the one that looks cheapest first; none where the stages must be cheaper.
 
     Parameters
     ----------
@@ -38,10 +40,14 @@ def plans(core: Core, decomposition: Decomposition) -> list[Plan]:
     """
     base = core.base()
     count = len(base)
+    terms = [monomial for p in decomposition.coefficients() for monomial in p]
+    if len(terms) > _MOST_TERMS:
+        return []
+    expansions = sum(count ** sum(map(len, monomial)) for monomial in terms)
     forms, names = _candidates(core)
     found: list[tuple[int, tuple[Form, ...], Decomposition]] = []
     choices = (c for c in itertools.combinations(forms, count) if len(independent(c)) == count)
-    for basis in itertools.islice(choices, _BASES):
+    for basis in itertools.islice(choices, 1 + _EXPANSIONS // expansions):
         moved = transform(decomposition, [components(form, basis) for form in base])
         found.append((_outlook(moved) + 3 * sum(map(_terms, basis)), basis, moved))
     found.sort(key=lambda entry: entry[0])
