@@ -16,9 +16,10 @@ ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text()
 
 
-def test_api_page():
-    result = doctest.testfile(str(ROOT / "docs" / "python-api.md"), module_relative=False)
-    assert result.attempted > 10
+@pytest.mark.parametrize("page", ["python-api", "canonical-form"])
+def test_page(page):
+    result = doctest.testfile(str(ROOT / "docs" / f"{page}.md"), module_relative=False)
+    assert result.attempted >= 10
     assert result.failed == 0
 
 

@@ -479,7 +479,7 @@ def test_full_disk(command):
 
 
 def test_interruption(capsys, monkeypatch):
-    def interrupted(*_: object) -> None:
+    def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(pipeline, "derive", interrupted)

@@ -10,13 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import count
 
-from strapgen.kernel import Kernel
+from strapgen.kernel import Kernel, Stage
 from strapgen.lowering import canonical
 from strapgen.lowering.gate import gate
 from strapgen.lowering.passes import PASSES, cost, optimize
+from strapgen.lowering.passes.rewriting import rewritten
 from strapgen.lowering.share import share
-from strapgen.program import Program, Reference, Result
+from strapgen.program import Assignment, Node, Program, Reference, Result
 
 __all__ = ["PASSES", "candidates", "lower"]
 
@@ -45,8 +47,9 @@ def lower(kernel: Kernel) -> Program:
     (38, 30)
     """
     core = canonical.extract_core(kernel)
-    program = min(map(optimize, candidates(kernel, core)), key=cost)
-    if core is not None:
+    programs = [optimize(program) for program in candidates(kernel, core)]
+    program = min(programs, key=cost)
+    if core is not None and program is not programs[0]:
         canonical.verify(core, program)
     return program
 
@@ -57,8 +60,40 @@ def candidates(kernel: Kernel, core: canonical.Core | None) -> Iterator[Program]
     if core is None:
         yield gate(kernel, share(kernel, common=False))
         return
-    update = replace(kernel, inputs=(kernel.inputs[0], core.transition), stages=(), transition=None)
+    update = replace(
+        kernel, inputs=(*kernel.inputs, core.transition), stages=_behind(kernel, core), transition=None
+    )
     after = gate(update, share(update))
     transition = Result(core.transition, tuple(map(Reference, core.transition.elements)))
-    for body in canonical.forms(core):
+    taken = {name for signal in kernel.inputs for name in signal.elements} | {a.name for a in after.body}
+    for form in canonical.forms(core):
+        body = _renamed(form, taken)
         yield replace(after, inputs=kernel.inputs, body=(*body, *after.body), transition=transition)
+
+
+def _behind(kernel: Kernel, core: canonical.Core) -> tuple[Stage, ...]:
+    """Return the stages that the outputs need beside the transition."""
+    wanted = {symbol.name for stage in kernel.outputs for e in stage.expressions for symbol in e.free_symbols}
+    wanted -= set(core.transition.elements)
+    needed: list[Stage] = []
+    for stage in reversed(kernel.stages):
+        if stage.signal.name != kernel.transition and wanted & set(stage.signal.elements):
+            needed.insert(0, stage)
+            wanted |= {symbol.name for e in stage.expressions for symbol in e.free_symbols}
+            wanted -= set(core.transition.elements)
+    return tuple(needed)
+
+
+def _renamed(body: list[Assignment], taken: set[str]) -> tuple[Assignment, ...]:
+    """Give names that the kernel itself uses for something else another ending."""
+    names = {a.name for a in body}
+    new: dict[str, str] = {}
+    for name in sorted(names & taken):
+        new[name] = next(n for k in count(2) if (n := f"{name}_{k}") not in names | taken)
+    if not new:
+        return tuple(body)
+
+    def rule(node: Node) -> Node:
+        return Reference(new.get(node.name, node.name)) if isinstance(node, Reference) else node
+
+    return tuple(replace(a, name=new.get(a.name, a.name), value=rewritten(a.value, rule)) for a in body)

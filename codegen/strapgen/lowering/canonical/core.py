@@ -28,11 +28,14 @@ class Core:
         Elements, meaning, and coefficients along the inputs, of the vectors that the transition needs.
     stages : list of Stage
         From these vectors to the transition, which is the last.
+    in_time : bool
+        Whether the inputs are the increments of one step, in the order of time.
     """
 
     inputs: list[str]
     vectors: dict[str, tuple[Signal, Form]]
     stages: list[Stage]
+    in_time: bool = False
 
     @property
     def transition(self) -> Signal:
@@ -83,8 +86,6 @@ def extract(kernel: Kernel) -> Core:
             vectors[stage.signal.name] = stage.signal, form
         if stage.signal.name == kernel.transition:
             break
-    if not stages or (not vectors and not inputs):
-        raise NotCovariantError(f"{kernel.name} has no transition")
     labels = {element.rsplit("_", 1)[-1] for element in stages[-1].signal.elements}
     if stages[-1].signal.shape != (3, 3) and labels != set("xyzs"):
         raise NotCovariantError(f"the transition of {kernel.name} is neither a quaternion nor a matrix")
@@ -92,11 +93,18 @@ def extract(kernel: Kernel) -> Core:
     for k, (name, vector) in enumerate(inputs.items()):
         if used & {column[k] for column in columns}:
             vectors[name] = vector, tuple(Fraction(int(j == k)) for j in range(len(inputs)))
-    return Core(list(inputs), vectors, stages)
+    needed = {symbol.name for symbol in used}
+    vectors = {name: (s, form) for name, (s, form) in vectors.items() if needed & set(s.elements)}
+    if not vectors:
+        raise NotCovariantError(f"the transition of {kernel.name} is always the same")
+    in_time = len(kernel.inputs) == 2 and kernel.inputs[1].name == "increments"
+    return Core(list(inputs), vectors, stages, in_time)
 
 
 def decompose(core: Core) -> Decomposition:
     """Return the covariant decomposition of a core's transition in the vectors of its base.
+
+    It is found in a rotated frame and checked in all coordinates.
 
     Raises
     ------
@@ -105,23 +113,20 @@ def decompose(core: Core) -> Decomposition:
     """
     base = core.base()
     frame = Frame(len(base))
-    values: dict[str, Any] = {}
-    for signal, form in core.vectors.values():
-        along = components(form, base)
-        for axis, element in enumerate(signal.elements):
-            terms = (
-                u[axis] * sp.Rational(x.numerator, x.denominator)
-                for x, u in zip(along, frame.vectors, strict=True)
-            )
-            values[element] = sum(terms, frame.ring.zero)
-    try:
-        elements = [frame.ring(element) for element in core.evaluate(values)]
-    except (TypeError, ValueError):  # SymPy's errors where a ring element meets what is no polynomial
-        raise NotCovariantError("the transition is no polynomial") from None
+    elements = _transition(core, base, frame.ring, frame.vectors)
     if core.transition.shape == (3, 3):
-        return frame.matrix(elements)
-    by_label = dict(zip((e[-1] for e in core.transition.elements), elements, strict=True))
-    return frame.quaternion([by_label[axis] for axis in "xyz"], by_label["s"])
+        found = frame.matrix(elements)
+    else:
+        by_label = dict(zip((e[-1] for e in core.transition.elements), elements, strict=True))
+        found = frame.quaternion([by_label[axis] for axis in "xyz"], by_label["s"])
+    ring, vectors = _coordinates(len(base))
+    expected = _transition(core, base, ring, vectors)
+    values = found.evaluate(vectors)
+    if found.scalar is not None:
+        values = [dict(zip("xyzs", values, strict=True))[e[-1]] for e in core.transition.elements]
+    if [ring(value) for value in values] != expected:
+        raise NotCovariantError("the transition does not turn with its vectors")
+    return found
 
 
 def verify(core: Core, program: Program) -> None:
@@ -139,23 +144,47 @@ def verify(core: Core, program: Program) -> None:
     units = [tuple(Fraction(int(j == k)) for j in range(count)) for k in range(count)]
     base = [*core.base(), *units]
     base = [base[k] for k in independent(base)]
-    ring, *generators = sp.ring([f"y{k}_{axis}" for k in range(count) for axis in "xyz"], sp.QQ)
+    ring, vectors = _coordinates(count)
     values: dict[str, Any] = {}
-    forms = [*((n, unit) for n, unit in zip(core.inputs, units, strict=True))]
-    forms += [(signal.elements[0].removesuffix("_x"), form) for signal, form in core.vectors.values()]
-    for name, form in forms:
-        along = components(form, base)
-        for axis, label in enumerate("xyz"):
-            terms = (
-                generators[3 * k + axis] * sp.Rational(x.numerator, x.denominator)
-                for k, x in enumerate(along)
-            )
-            values[f"{name}_{label}"] = sum(terms, ring.zero)
+    for name, unit in zip(core.inputs, units, strict=True):
+        vector = _combined(components(unit, base), ring, vectors)
+        values |= dict(zip(Signal.vector(name, name).elements, vector, strict=True))
     (computed,) = program.transition_program().run(values).values()
-    if [ring(element) for element in computed] != [ring(element) for element in core.evaluate(values)]:
+    if [ring(element) for element in computed] != _transition(core, base, ring, vectors):
         raise ArithmeticError(
             f"{program.name}: the canonical form differs from the transition it was derived from"
         )
+
+
+def _coordinates(count: int) -> tuple[Any, list[list[Any]]]:
+    """Return a ring of polynomials in the coordinates of so many vectors, and the vectors."""
+    ring, *generators = sp.ring([f"y{k}_{axis}" for k in range(count) for axis in "xyz"], sp.QQ)
+    return ring, [generators[3 * k : 3 * k + 3] for k in range(count)]
+
+
+def _combined(coefficients: list[Fraction], ring: Any, vectors: list[list[Any]]) -> list[Any]:
+    return [
+        sum(
+            (
+                u[axis] * sp.Rational(x.numerator, x.denominator)
+                for x, u in zip(coefficients, vectors, strict=True)
+            ),
+            ring.zero,
+        )
+        for axis in range(3)
+    ]
+
+
+def _transition(core: Core, base: list[Form], ring: Any, vectors: list[list[Any]]) -> list[Any]:
+    """Evaluate a core where the vectors of a base have given coordinates."""
+    values: dict[str, Any] = {}
+    for signal, form in core.vectors.values():
+        vector = _combined(components(form, base), ring, vectors)
+        values |= dict(zip(signal.elements, vector, strict=True))
+    try:
+        return [ring(element) for element in core.evaluate(values)]
+    except (TypeError, ValueError):  # SymPy's errors where a ring element meets what is no polynomial
+        raise NotCovariantError("the transition is no polynomial") from None
 
 
 def _linear(stage: Stage, columns: list[list[sp.Symbol]]) -> Form | None:

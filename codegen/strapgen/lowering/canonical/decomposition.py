@@ -29,6 +29,9 @@ Coefficients = dict[Covariant, Polynomial]
 
 _Degree = tuple[int, ...]
 
+#: The unit matrix as the elements xx, xy, xz, yy, yz, zz.
+_UNIT = [1, 0, 0, 1, 0, 1]
+
 
 class NotCovariantError(ValueError):
     """A transition does not turn with its inputs."""
@@ -56,6 +59,36 @@ class Decomposition:
         """Return all polynomials."""
         own = [] if self.scalar is None else [self.scalar]
         return [*own, *self.vector.values(), *self.symmetric.values()]
+
+    def evaluate(self, vectors: list[list[Any]]) -> list[Any]:
+        """Return the transition's elements, x, y, z, scalar or row by row, for vectors of numbers or polynomials."""
+
+        def value(polynomial: Polynomial) -> Any:
+            total: Any = 0
+            for monomial, coefficient in polynomial.items():
+                product: Any = sp.Rational(coefficient.numerator, coefficient.denominator)
+                for i, j, *k in monomial:
+                    other = _cross(vectors[j], vectors[k[0]]) if k else vectors[j]
+                    product = _dot(vectors[i], other) * product
+                total = product + total
+            return total
+
+        v: list[Any] = [0, 0, 0]
+        for (i, *j), polynomial in self.vector.items():
+            vector = _cross(vectors[i], vectors[j[0]]) if j else vectors[i]
+            v = [a + b * value(polynomial) for a, b in zip(v, vector, strict=True)]
+        if self.scalar is not None:
+            return [*v, value(self.scalar)]
+        s: list[Any] = [0] * 6
+        for covariant, polynomial in self.symmetric.items():
+            product = _UNIT
+            if covariant:
+                i, j, *k = covariant
+                product = _symmetrized(vectors[i], _cross(vectors[j], vectors[k[0]]) if k else vectors[j])
+            s = [a + b * value(polynomial) for a, b in zip(s, product, strict=True)]
+        xx, xy, xz, yy, yz, zz = s
+        x, y, z = v
+        return [xx, xy - z, xz + y, xy + z, yy, yz - x, xz - y, yz + x, zz]
 
 
 class Frame:
@@ -119,7 +152,7 @@ class Frame:
 
     def _symmetrics(self, degree: _Degree) -> Iterator[tuple[Covariant, list[Any], _Degree]]:
         # Products with the first vector come first: where several sums are equal, they are preferred.
-        u, one, zero = self.vectors, self.ring.one, self.ring.zero
+        u = self.vectors
         for i in range(self.count):
             if sum(degree) % 2:
                 for j, k in itertools.combinations(range(self.count), 2):
@@ -127,7 +160,7 @@ class Frame:
             else:
                 for j in range(i, self.count):
                     yield (i, j), _symmetrized(u[i], u[j]), _less(degree, i, j)
-        yield (), [one, zero, zero, one, zero, one], degree
+        yield (), [self.ring(number) for number in _UNIT], degree
 
     def _solve(
         self, elements: list[Any], ansatz: Callable[[_Degree], Iterator[tuple[Covariant, list[Any], _Degree]]]

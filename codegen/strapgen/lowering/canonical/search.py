@@ -78,9 +78,9 @@ def _candidates(core: Core) -> tuple[list[Form], dict[Form, tuple[str, str]]]:
 
     for k, name in enumerate(core.inputs):
         offer(tuple(Fraction(int(j == k)) for j in range(count)), name)
-    if count > 1 and core.inputs[0].startswith("d"):
+    if count > 1 and core.in_time:
         offer((Fraction(1),) * count, "sigma", "the angle increment of the whole step")
-    if count == 2:
+    if count == 2 and core.in_time:
         offer((Fraction(1), Fraction(-1)), "delta", "first half minus second half")
     for name, (signal, form) in core.vectors.items():
         offer(form, name, signal.meaning)

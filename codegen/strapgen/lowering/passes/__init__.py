@@ -27,6 +27,10 @@ PASSES: tuple[Pass, ...] = (
 )
 
 
+#: What a division, a root or a function costs beyond a sum.
+_LONG = 9
+
+
 def optimize(program: Program) -> Program:
     """Run all passes, again and again while that saves operations; a pass that would cost some is left out."""
     while True:
@@ -40,6 +44,10 @@ def optimize(program: Program) -> Program:
 
 
 def cost(program: Program) -> tuple[int, int]:
-    """Return what is to be small: all operations, and of these the multiplications."""
+    """Return what is to be small: all operations, and of these the multiplications.
+
+    A division, root or function takes a processor as long as several sums and products.
+    """
     operations = program.operations
-    return sum(operations.values()), operations["multiply"]
+    long = sum(operations[kind] for kind in ("divide", "sqrt", "function"))
+    return sum(operations.values()) + _LONG * long, operations["multiply"]

@@ -28,8 +28,8 @@ def absorb_negations(program: Program) -> Program:
     results = {
         node.name for result in program.results for node in result.nodes if isinstance(node, Reference)
     }
-    for assignment in program.body:
-        name, inner = assignment.name, _inside(assignment.value)
+    for place in range(len(program.body)):
+        name, inner = program.body[place].name, _inside(program.body[place].value)
         if inner is None or not is_unnamed(name) or name in results:
             continue
 

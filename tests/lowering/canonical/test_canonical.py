@@ -1,0 +1,128 @@
+"""Canonical forms of the catalogue's steps: exact, short, readable and found quickly."""
+
+from functools import cache
+from time import perf_counter
+
+import pytest
+import sympy as sp
+
+from strapgen import catalogue
+from strapgen.catalogue import ALGORITHMS, METHODS, Choice
+from strapgen.kernel import Kernel
+from strapgen.lowering import candidates, canonical, lower
+from strapgen.lowering.passes import optimize
+from strapgen.program import Program
+
+STEPS = [Choice(a, m, n) for a in ALGORITHMS for m in METHODS for n in (1, 2, 3, 4, 5, None)]
+EVERY = pytest.mark.parametrize("choice", STEPS, ids=lambda choice: choice.kernel)
+
+
+@cache
+def kernel(choice: Choice) -> Kernel:
+    return catalogue.derive(choice)
+
+
+@cache
+def program(choice: Choice) -> Program:
+    return lower(kernel(choice))
+
+
+def is_the_kernel(made: Program, choice: Choice) -> bool:
+    """Tell whether a program's next state is the kernel's, as polynomials of state and increments."""
+    names = [name for signal in made.inputs for name in signal.elements]
+    ring, *generators = sp.ring(names, sp.QQ)
+    results = made.run(dict(zip(names, generators, strict=True)))
+    elements = {name: [ring(element) for element in found] for name, found in results.items()}
+    return elements == kernel(choice).polynomials()
+
+
+@EVERY
+def test_the_transition_is_that_of_the_stages(choice):
+    core, made = canonical.extract_core(kernel(choice)), program(choice)
+    canonical.verify(core, made)
+    # Another way to the same: through all stages, in the elements of the inputs themselves.
+    assert is_the_kernel(made, choice)
+    assert not any(made.operations[kind] for kind in ("divide", "sqrt", "select", "function"))
+    # Where scalars and vectors have names nothing is left to be found that has none.
+    unnamed = [a.name for a in made.body if a.name.startswith(("shared_", "factor_"))]
+    assert choice.name == "dcm" or not unnamed
+
+
+@pytest.mark.parametrize(
+    "choice",
+    [
+        Choice("euler", "rk4", 2),
+        Choice("cayley-klein", "rk3", 3),
+        Choice("dcm", "rk3", 3),
+        Choice("dcm", "rk4", 2),
+    ],
+    ids=lambda choice: choice.kernel,
+)
+def test_every_candidate_is_exact_not_only_the_one_that_is_taken(choice):
+    core = canonical.extract_core(kernel(choice))
+    made = list(candidates(kernel(choice), core))
+    assert len(made) == 1 + len(canonical.forms(core)) > 3
+    for candidate in made:
+        canonical.verify(core, candidate)
+        assert is_the_kernel(candidate, choice)
+
+
+@pytest.mark.parametrize(
+    ("choice", "multiplications", "additions"),
+    [
+        # The product with the state takes 16 and 12 of them, or 27 and 18.
+        (Choice("euler", "rk4", 1), 25, 17),
+        (Choice("euler", "rk4", 2), 38, 30),
+        (Choice("cayley-klein", "rk4", 2), 38, 30),
+        (Choice("euler", "rk4", 3), 58, 49),
+        (Choice("dcm", "rk4", 1), 45, 32),
+        (Choice("dcm", "rk4", 2), 75, 66),
+        (Choice("dcm", "rk4", 3), 96, 88),
+    ],
+    ids=lambda value: value.kernel if isinstance(value, Choice) else str(value),
+)
+def test_operations_of_the_fourth_order_step(choice, multiplications, additions):
+    operations = program(choice).operations
+    assert operations["multiply"] <= multiplications
+    assert operations["add"] <= additions
+
+
+def test_the_canonical_form_is_shorter_than_the_stages():
+    for choice, share in ((Choice("euler", "rk4", 2), 0.5), (Choice("dcm", "rk4", 2), 0.7)):
+        staged = optimize(next(candidates(kernel(choice), canonical.extract_core(kernel(choice)))))
+        assert sum(program(choice).operations.values()) < share * sum(staged.operations.values())
+
+
+def test_names_and_meanings_are_those_of_the_field():
+    made = program(Choice("euler", "rk4", 2))
+    names = {a.name for a in made.body}
+    assert {"sigma_x", "sigma_dot_sigma", "p_x", "p_s"} <= names
+    meanings = {a.name: a.meaning for a in made.body if a.meaning}
+    assert meanings["sigma_x"] == "the angle increment of the whole step"
+    # It is said once for a vector, where it begins.
+    assert not {"sigma_y", "sigma_z", "p_y"} & meanings.keys()
+
+
+def test_a_transition_depends_on_nothing_but_the_increments():
+    for choice in (Choice("euler", "rk4", 3), Choice("dcm", "rk4", 3)):
+        made = program(choice).transition_program()
+        assert [signal.name for signal in made.inputs] == ["increments"]
+        assert made.operations["multiply"] == program(choice).operations["multiply"] - (
+            27 if choice.name == "dcm" else 16
+        )
+
+
+@pytest.mark.parametrize(
+    ("choice", "seconds"),
+    [(Choice(a, m, 2), 0.5) for a in ALGORITHMS for m in METHODS]
+    + [(Choice(a, "rk4", 4), 3) for a in ALGORITHMS],
+    ids=lambda value: value.kernel if isinstance(value, Choice) else f"{value}s",
+)
+def test_deriving_and_lowering_take_little_time(choice, seconds):
+    taken = []
+    # The best of three, since other work on the machine takes its time too.
+    while len(taken) < 3 and not any(t < seconds for t in taken):
+        start = perf_counter()
+        lower(catalogue.derive(choice))
+        taken.append(perf_counter() - start)
+    assert min(taken) < seconds
