@@ -81,10 +81,11 @@ class Decomposition:
             return [*v, value(self.scalar)]
         s: list[Any] = [0] * 6
         for covariant, polynomial in self.symmetric.items():
-            product = _UNIT
+            product: list[Any] = list(_UNIT)
             if covariant:
-                i, j, *k = covariant
-                product = _symmetrized(vectors[i], _cross(vectors[j], vectors[k[0]]) if k else vectors[j])
+                first, *rest = covariant
+                other = _cross(vectors[rest[0]], vectors[rest[1]]) if len(rest) == 2 else vectors[rest[0]]
+                product = _symmetrized(vectors[first], other)
             s = [a + b * value(polynomial) for a, b in zip(s, product, strict=True)]
         xx, xy, xz, yy, yz, zz = s
         x, y, z = v
