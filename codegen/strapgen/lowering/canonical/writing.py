@@ -181,7 +181,7 @@ class Writer:
 
     def _product_node(self, factor: tuple[str, ...]) -> Node:
         name = "_dot_".join(factor[:2]) + "".join(f"_cross_{n}" for n in factor[2:])
-        if f"{name}" not in self._names:
+        if name not in self._names:
             if len(factor) == 3:
                 crosses = [d for d in self._plan.definitions if isinstance(d, Cross)]
                 for k in range(3):
