@@ -11,29 +11,24 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from derived import programs
 
 from strapgen import catalogue, resources, standard_tree
 from strapgen.cli import main
-from strapgen.program import Program
 
 CHECK = ["generate", "--all", "--check", "--out"]
 
 
 @cache
-def programs() -> tuple[Program, ...]:
-    return tuple(standard_tree.programs())
-
-
-@cache
 def files() -> dict[str, str]:
-    return standard_tree.tree(programs())
+    return standard_tree.tree(programs().values())
 
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Return a folder with the tree, and spare the command line the derivation."""
     lowered = programs()  # before its source is replaced
-    monkeypatch.setattr(standard_tree, "programs", lambda: iter(lowered))
+    monkeypatch.setattr(standard_tree, "programs", lambda: iter(lowered.values()))
     standard_tree.write(tmp_path / "tree", files())
     return tmp_path / "tree"
 
@@ -54,8 +49,10 @@ def test_checked_in_tree_is_in_step():
 
 
 def test_tree_holds_every_kernel_for_every_target():
-    names = [program.name for program in programs()]
-    assert [program.kernel for program in programs()] == [choice.kernel for choice in catalogue.standard()]
+    names = [program.name for program in programs().values()]
+    assert [program.kernel for program in programs().values()] == [
+        choice.kernel for choice in catalogue.standard()
+    ]
     wanted = {"README.md", *(f"numpy/{name}.py" for name in names)}
     wanted |= {f"c/{name}.{ending}" for name in names for ending in "ch"}
     wanted |= {f"c_float/{name}_float.{ending}" for name in names for ending in "ch"}
@@ -78,7 +75,7 @@ def test_readme_lists_the_operations():
         if line.startswith("| `")
         for cells in [[cell.strip(" `") for cell in line.strip("|").split("|")]]
     }
-    for program in programs():
+    for program in programs().values():
         counts = [program.operations[kind] for kind in ("add", "multiply", "divide", "sqrt")]
         assert rows[program.name] == [str(number) for number in (*counts, program.temporaries)]
 

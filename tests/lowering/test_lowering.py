@@ -6,32 +6,22 @@ import sys
 from collections import Counter
 from dataclasses import replace
 from fractions import Fraction
-from functools import cache
 from random import Random
 
 import mpmath
 import pytest
 import sympy as sp
+from derived import kernel, program
 
 from strapgen import catalogue, derive
 from strapgen.catalogue import METHODS, Choice
 from strapgen.kernel import Kernel
-from strapgen.lowering import candidates, canonical, lower
+from strapgen.lowering import candidates, canonical
 from strapgen.lowering.passes import PASSES, cost, optimize, remove_unused
 from strapgen.program import Assignment, Constant, Node, Operation, Program, Reference, walk
 
 STANDARD = catalogue.standard()
 EVERY = pytest.mark.parametrize("choice", STANDARD, ids=lambda choice: choice.kernel)
-
-
-@cache
-def kernel(choice: Choice) -> Kernel:
-    return catalogue.derive(choice)
-
-
-@cache
-def program(choice: Choice) -> Program:
-    return lower(kernel(choice))
 
 
 def input_names(made: Kernel | Program) -> list[str]:

@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 import pytest
 from cffi import FFI
+from derived import programs
 from hypothesis import example, given
 from hypothesis import strategies as st
 from pycparser import c_ast, c_parser
 
-from strapgen import standard_tree
 from strapgen.catalogue import standard
 from strapgen.compilation import C_FLAGS
 from strapgen.program import Program
@@ -35,11 +35,6 @@ TARGETS = ("c", "c-float")
 DTYPES = {"c": np.float64, "c-float": np.float32}
 KERNELS = [choice.kernel for choice in standard()]
 STEPS = ["dcm-rk1-2", "dcm-rk4-2", "euler-rk1-2", "euler-rk4-2", "cayley-klein-rk4-2"]
-
-
-@cache
-def programs() -> dict[str, Program]:
-    return {program.kernel: program for program in standard_tree.programs()}
 
 
 @cache

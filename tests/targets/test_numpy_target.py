@@ -9,19 +9,15 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from derived import programs
 
-from strapgen import compilation, standard_tree
+from strapgen import compilation
 from strapgen.catalogue import standard
 from strapgen.program import Program
 from strapgen.targets import Sources, emit
 
 KERNELS = [choice.kernel for choice in standard()]
 STEPS = [kernel for kernel in KERNELS if "-rk" in kernel]
-
-
-@cache
-def programs() -> dict[str, Program]:
-    return {program.kernel: program for program in standard_tree.programs()}
 
 
 @cache

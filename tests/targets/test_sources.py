@@ -5,23 +5,17 @@ from __future__ import annotations
 import json
 import re
 import shlex
-from functools import cache
 
 import pytest
+from derived import programs
 
-from strapgen import pipeline, standard_tree
+from strapgen import pipeline
 from strapgen.catalogue import standard
 from strapgen.cli import main
 from strapgen.exceptions import InputError
-from strapgen.program import Program
 from strapgen.targets import TARGETS, Sources, emit
 
 KERNELS = [choice.kernel for choice in standard()]
-
-
-@cache
-def programs() -> dict[str, Program]:
-    return {program.kernel: program for program in standard_tree.programs()}
 
 
 @pytest.mark.parametrize("target", TARGETS)

@@ -1,30 +1,19 @@
 """Canonical forms of the catalogue's steps: exact, short, readable and found quickly."""
 
-from functools import cache
 from time import perf_counter
 
 import pytest
 import sympy as sp
+from derived import kernel, program
 
 from strapgen import catalogue
 from strapgen.catalogue import ALGORITHMS, METHODS, Choice
-from strapgen.kernel import Kernel
 from strapgen.lowering import candidates, canonical, lower
 from strapgen.lowering.passes import optimize
 from strapgen.program import Program
 
 STEPS = [Choice(a, m, n) for a in ALGORITHMS for m in METHODS for n in (1, 2, 3, 4, 5, None)]
 EVERY = pytest.mark.parametrize("choice", STEPS, ids=lambda choice: choice.kernel)
-
-
-@cache
-def kernel(choice: Choice) -> Kernel:
-    return catalogue.derive(choice)
-
-
-@cache
-def program(choice: Choice) -> Program:
-    return lower(kernel(choice))
 
 
 def is_the_kernel(made: Program, choice: Choice) -> bool:
