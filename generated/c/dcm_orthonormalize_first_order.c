@@ -25,10 +25,10 @@ static inline void one_(const double computed[9], double orthonormalized[9])
     const double excess_33 = C_13 * C_13 + C_23 * C_23 + C_33 * C_33 - 1.0;
     /* inverse root of C' C to first order */
     const double root_11 = 1.0 - 0.5 * excess_11;
-    const double root_12 = -(0.5 * excess_12);
-    const double root_13 = -(0.5 * excess_13);
+    const double root_12 = -0.5 * excess_12;
+    const double root_13 = -0.5 * excess_13;
     const double root_22 = 1.0 - 0.5 * excess_22;
-    const double root_23 = -(0.5 * excess_23);
+    const double root_23 = -0.5 * excess_23;
     const double root_33 = 1.0 - 0.5 * excess_33;
     /* direction cosine matrix, body to reference, orthonormalized */
     const double next_11 = C_11 * root_11 + C_12 * root_12 + C_13 * root_13;

@@ -27,13 +27,13 @@ static inline void one_(const double state[9], const double increments[6], doubl
     const double d2_y = increments[4];
     const double d2_z = increments[5];
     /* rate times the step, at node 0, times 1/3 */
-    const double turn_0_times_1_3_x = d1_x - 0.3333333333333333 * d2_x;
-    const double turn_0_times_1_3_y = d1_y - 0.3333333333333333 * d2_y;
-    const double turn_0_times_1_3_z = d1_z - 0.3333333333333333 * d2_z;
+    const double turn_0_scaled_x = d1_x - 0.3333333333333333 * d2_x;
+    const double turn_0_scaled_y = d1_y - 0.3333333333333333 * d2_y;
+    const double turn_0_scaled_z = d1_z - 0.3333333333333333 * d2_z;
     /* rate times the step, at node 1, times -1/3 */
-    const double minus_turn_1_times_1_3_x = 0.3333333333333333 * d1_x - d2_x;
-    const double minus_turn_1_times_1_3_y = 0.3333333333333333 * d1_y - d2_y;
-    const double minus_turn_1_times_1_3_z = 0.3333333333333333 * d1_z - d2_z;
+    const double turn_1_scaled_x = 0.3333333333333333 * d1_x - d2_x;
+    const double turn_1_scaled_y = 0.3333333333333333 * d1_y - d2_y;
+    const double turn_1_scaled_z = 0.3333333333333333 * d1_z - d2_z;
     /* the angle increment of the whole step */
     const double sigma_x = d1_x + d2_x;
     const double sigma_y = d1_y + d2_y;
@@ -42,24 +42,23 @@ static inline void one_(const double state[9], const double increments[6], doubl
     const double skew_x = sigma_x;
     const double skew_y = sigma_y;
     const double skew_z = sigma_z;
-    /* left of turn_0_times_1_3 in an outer product */
-    const double partner_left_x = -(4.5 * minus_turn_1_times_1_3_x);
-    const double partner_left_y = -(4.5 * minus_turn_1_times_1_3_y);
-    const double partner_left_z = -(4.5 * minus_turn_1_times_1_3_z);
-    const double turn_0_times_1_3_dot_minus_turn_1_times_1_3 = turn_0_times_1_3_x * minus_turn_1_times_1_3_x
-        + turn_0_times_1_3_y * minus_turn_1_times_1_3_y
-        + turn_0_times_1_3_z * minus_turn_1_times_1_3_z;
+    /* left of turn_0_scaled in an outer product */
+    const double partner_left_x = -4.5 * turn_1_scaled_x;
+    const double partner_left_y = -4.5 * turn_1_scaled_y;
+    const double partner_left_z = -4.5 * turn_1_scaled_z;
+    const double turn_0_scaled_dot_turn_1_scaled = turn_0_scaled_x * turn_1_scaled_x
+        + turn_0_scaled_y * turn_1_scaled_y + turn_0_scaled_z * turn_1_scaled_z;
     /* multiple of the unit matrix */
-    const double diagonal = 4.5 * turn_0_times_1_3_dot_minus_turn_1_times_1_3 + 1.0;
-    const double A_11 = turn_0_times_1_3_x * partner_left_x + diagonal;
-    const double A_22 = turn_0_times_1_3_y * partner_left_y + diagonal;
-    const double A_33 = turn_0_times_1_3_z * partner_left_z + diagonal;
-    const double A_12 = turn_0_times_1_3_y * partner_left_x - skew_z;
-    const double A_21 = turn_0_times_1_3_x * partner_left_y + skew_z;
-    const double A_23 = turn_0_times_1_3_z * partner_left_y - skew_x;
-    const double A_32 = turn_0_times_1_3_y * partner_left_z + skew_x;
-    const double A_31 = turn_0_times_1_3_x * partner_left_z - skew_y;
-    const double A_13 = turn_0_times_1_3_z * partner_left_x + skew_y;
+    const double diagonal = 4.5 * turn_0_scaled_dot_turn_1_scaled + 1.0;
+    const double A_11 = turn_0_scaled_x * partner_left_x + diagonal;
+    const double A_22 = turn_0_scaled_y * partner_left_y + diagonal;
+    const double A_33 = turn_0_scaled_z * partner_left_z + diagonal;
+    const double A_12 = turn_0_scaled_y * partner_left_x - skew_z;
+    const double A_21 = turn_0_scaled_x * partner_left_y + skew_z;
+    const double A_23 = turn_0_scaled_z * partner_left_y - skew_x;
+    const double A_32 = turn_0_scaled_y * partner_left_z + skew_x;
+    const double A_31 = turn_0_scaled_x * partner_left_z - skew_y;
+    const double A_13 = turn_0_scaled_z * partner_left_x + skew_y;
     /* direction cosine matrix, body to reference, after the step */
     const double next_11 = A_11 * C_11 + A_21 * C_12 + A_31 * C_13;
     const double next_12 = A_12 * C_11 + A_22 * C_12 + A_32 * C_13;
@@ -123,13 +122,13 @@ static void batch_(size_t runs, const double *restrict state_0, const double *re
         const double d2_y = increments_4[k];
         const double d2_z = increments_5[k];
         /* rate times the step, at node 0, times 1/3 */
-        const double turn_0_times_1_3_x = d1_x - 0.3333333333333333 * d2_x;
-        const double turn_0_times_1_3_y = d1_y - 0.3333333333333333 * d2_y;
-        const double turn_0_times_1_3_z = d1_z - 0.3333333333333333 * d2_z;
+        const double turn_0_scaled_x = d1_x - 0.3333333333333333 * d2_x;
+        const double turn_0_scaled_y = d1_y - 0.3333333333333333 * d2_y;
+        const double turn_0_scaled_z = d1_z - 0.3333333333333333 * d2_z;
         /* rate times the step, at node 1, times -1/3 */
-        const double minus_turn_1_times_1_3_x = 0.3333333333333333 * d1_x - d2_x;
-        const double minus_turn_1_times_1_3_y = 0.3333333333333333 * d1_y - d2_y;
-        const double minus_turn_1_times_1_3_z = 0.3333333333333333 * d1_z - d2_z;
+        const double turn_1_scaled_x = 0.3333333333333333 * d1_x - d2_x;
+        const double turn_1_scaled_y = 0.3333333333333333 * d1_y - d2_y;
+        const double turn_1_scaled_z = 0.3333333333333333 * d1_z - d2_z;
         /* the angle increment of the whole step */
         const double sigma_x = d1_x + d2_x;
         const double sigma_y = d1_y + d2_y;
@@ -138,24 +137,23 @@ static void batch_(size_t runs, const double *restrict state_0, const double *re
         const double skew_x = sigma_x;
         const double skew_y = sigma_y;
         const double skew_z = sigma_z;
-        /* left of turn_0_times_1_3 in an outer product */
-        const double partner_left_x = -(4.5 * minus_turn_1_times_1_3_x);
-        const double partner_left_y = -(4.5 * minus_turn_1_times_1_3_y);
-        const double partner_left_z = -(4.5 * minus_turn_1_times_1_3_z);
-        const double turn_0_times_1_3_dot_minus_turn_1_times_1_3 = turn_0_times_1_3_x * minus_turn_1_times_1_3_x
-            + turn_0_times_1_3_y * minus_turn_1_times_1_3_y
-            + turn_0_times_1_3_z * minus_turn_1_times_1_3_z;
+        /* left of turn_0_scaled in an outer product */
+        const double partner_left_x = -4.5 * turn_1_scaled_x;
+        const double partner_left_y = -4.5 * turn_1_scaled_y;
+        const double partner_left_z = -4.5 * turn_1_scaled_z;
+        const double turn_0_scaled_dot_turn_1_scaled = turn_0_scaled_x * turn_1_scaled_x
+            + turn_0_scaled_y * turn_1_scaled_y + turn_0_scaled_z * turn_1_scaled_z;
         /* multiple of the unit matrix */
-        const double diagonal = 4.5 * turn_0_times_1_3_dot_minus_turn_1_times_1_3 + 1.0;
-        const double A_11 = turn_0_times_1_3_x * partner_left_x + diagonal;
-        const double A_22 = turn_0_times_1_3_y * partner_left_y + diagonal;
-        const double A_33 = turn_0_times_1_3_z * partner_left_z + diagonal;
-        const double A_12 = turn_0_times_1_3_y * partner_left_x - skew_z;
-        const double A_21 = turn_0_times_1_3_x * partner_left_y + skew_z;
-        const double A_23 = turn_0_times_1_3_z * partner_left_y - skew_x;
-        const double A_32 = turn_0_times_1_3_y * partner_left_z + skew_x;
-        const double A_31 = turn_0_times_1_3_x * partner_left_z - skew_y;
-        const double A_13 = turn_0_times_1_3_z * partner_left_x + skew_y;
+        const double diagonal = 4.5 * turn_0_scaled_dot_turn_1_scaled + 1.0;
+        const double A_11 = turn_0_scaled_x * partner_left_x + diagonal;
+        const double A_22 = turn_0_scaled_y * partner_left_y + diagonal;
+        const double A_33 = turn_0_scaled_z * partner_left_z + diagonal;
+        const double A_12 = turn_0_scaled_y * partner_left_x - skew_z;
+        const double A_21 = turn_0_scaled_x * partner_left_y + skew_z;
+        const double A_23 = turn_0_scaled_z * partner_left_y - skew_x;
+        const double A_32 = turn_0_scaled_y * partner_left_z + skew_x;
+        const double A_31 = turn_0_scaled_x * partner_left_z - skew_y;
+        const double A_13 = turn_0_scaled_z * partner_left_x + skew_y;
         /* direction cosine matrix, body to reference, after the step */
         const double next_11 = A_11 * C_11 + A_21 * C_12 + A_31 * C_13;
         const double next_12 = A_12 * C_11 + A_22 * C_12 + A_32 * C_13;
@@ -207,13 +205,13 @@ static void prepare_(size_t count, const double *increments, double prepared[9][
         const double d2_y = increments_by_element[4][k];
         const double d2_z = increments_by_element[5][k];
         /* rate times the step, at node 0, times 1/3 */
-        const double turn_0_times_1_3_x = d1_x - 0.3333333333333333 * d2_x;
-        const double turn_0_times_1_3_y = d1_y - 0.3333333333333333 * d2_y;
-        const double turn_0_times_1_3_z = d1_z - 0.3333333333333333 * d2_z;
+        const double turn_0_scaled_x = d1_x - 0.3333333333333333 * d2_x;
+        const double turn_0_scaled_y = d1_y - 0.3333333333333333 * d2_y;
+        const double turn_0_scaled_z = d1_z - 0.3333333333333333 * d2_z;
         /* rate times the step, at node 1, times -1/3 */
-        const double minus_turn_1_times_1_3_x = 0.3333333333333333 * d1_x - d2_x;
-        const double minus_turn_1_times_1_3_y = 0.3333333333333333 * d1_y - d2_y;
-        const double minus_turn_1_times_1_3_z = 0.3333333333333333 * d1_z - d2_z;
+        const double turn_1_scaled_x = 0.3333333333333333 * d1_x - d2_x;
+        const double turn_1_scaled_y = 0.3333333333333333 * d1_y - d2_y;
+        const double turn_1_scaled_z = 0.3333333333333333 * d1_z - d2_z;
         /* the angle increment of the whole step */
         const double sigma_x = d1_x + d2_x;
         const double sigma_y = d1_y + d2_y;
@@ -222,24 +220,23 @@ static void prepare_(size_t count, const double *increments, double prepared[9][
         const double skew_x = sigma_x;
         const double skew_y = sigma_y;
         const double skew_z = sigma_z;
-        /* left of turn_0_times_1_3 in an outer product */
-        const double partner_left_x = -(4.5 * minus_turn_1_times_1_3_x);
-        const double partner_left_y = -(4.5 * minus_turn_1_times_1_3_y);
-        const double partner_left_z = -(4.5 * minus_turn_1_times_1_3_z);
-        const double turn_0_times_1_3_dot_minus_turn_1_times_1_3 = turn_0_times_1_3_x * minus_turn_1_times_1_3_x
-            + turn_0_times_1_3_y * minus_turn_1_times_1_3_y
-            + turn_0_times_1_3_z * minus_turn_1_times_1_3_z;
+        /* left of turn_0_scaled in an outer product */
+        const double partner_left_x = -4.5 * turn_1_scaled_x;
+        const double partner_left_y = -4.5 * turn_1_scaled_y;
+        const double partner_left_z = -4.5 * turn_1_scaled_z;
+        const double turn_0_scaled_dot_turn_1_scaled = turn_0_scaled_x * turn_1_scaled_x
+            + turn_0_scaled_y * turn_1_scaled_y + turn_0_scaled_z * turn_1_scaled_z;
         /* multiple of the unit matrix */
-        const double diagonal = 4.5 * turn_0_times_1_3_dot_minus_turn_1_times_1_3 + 1.0;
-        const double A_11 = turn_0_times_1_3_x * partner_left_x + diagonal;
-        const double A_22 = turn_0_times_1_3_y * partner_left_y + diagonal;
-        const double A_33 = turn_0_times_1_3_z * partner_left_z + diagonal;
-        const double A_12 = turn_0_times_1_3_y * partner_left_x - skew_z;
-        const double A_21 = turn_0_times_1_3_x * partner_left_y + skew_z;
-        const double A_23 = turn_0_times_1_3_z * partner_left_y - skew_x;
-        const double A_32 = turn_0_times_1_3_y * partner_left_z + skew_x;
-        const double A_31 = turn_0_times_1_3_x * partner_left_z - skew_y;
-        const double A_13 = turn_0_times_1_3_z * partner_left_x + skew_y;
+        const double diagonal = 4.5 * turn_0_scaled_dot_turn_1_scaled + 1.0;
+        const double A_11 = turn_0_scaled_x * partner_left_x + diagonal;
+        const double A_22 = turn_0_scaled_y * partner_left_y + diagonal;
+        const double A_33 = turn_0_scaled_z * partner_left_z + diagonal;
+        const double A_12 = turn_0_scaled_y * partner_left_x - skew_z;
+        const double A_21 = turn_0_scaled_x * partner_left_y + skew_z;
+        const double A_23 = turn_0_scaled_z * partner_left_y - skew_x;
+        const double A_32 = turn_0_scaled_y * partner_left_z + skew_x;
+        const double A_31 = turn_0_scaled_x * partner_left_z - skew_y;
+        const double A_13 = turn_0_scaled_z * partner_left_x + skew_y;
         prepared[0][k] = A_11;
         prepared[1][k] = A_22;
         prepared[2][k] = A_33;

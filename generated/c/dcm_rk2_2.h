@@ -6,7 +6,7 @@
  * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter 2,
  *     equation (2.1): dC/dt = C skew(w); rate extraction chapter 3 A; Heun's method: thesis,
  *     chapter 3 B.
- * Operations of one call: 39 add, 49 multiply, 3 negate; 26 temporaries.
+ * Operations of one call: 39 add, 49 multiply; 26 temporaries.
  *
  * No heap, no global state, reentrant. In one call every input is read before any output is written: an
  * output may be the same memory as an input. Matrices are stored by rows.

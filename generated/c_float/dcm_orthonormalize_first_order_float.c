@@ -25,10 +25,10 @@ static inline void one_(const float computed[9], float orthonormalized[9])
     const float excess_33 = C_13 * C_13 + C_23 * C_23 + C_33 * C_33 - 1.0f;
     /* inverse root of C' C to first order */
     const float root_11 = 1.0f - 0.5f * excess_11;
-    const float root_12 = -(0.5f * excess_12);
-    const float root_13 = -(0.5f * excess_13);
+    const float root_12 = -0.5f * excess_12;
+    const float root_13 = -0.5f * excess_13;
     const float root_22 = 1.0f - 0.5f * excess_22;
-    const float root_23 = -(0.5f * excess_23);
+    const float root_23 = -0.5f * excess_23;
     const float root_33 = 1.0f - 0.5f * excess_33;
     /* direction cosine matrix, body to reference, orthonormalized */
     const float next_11 = C_11 * root_11 + C_12 * root_12 + C_13 * root_13;

@@ -6,7 +6,7 @@
  * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), appendix B,
  *     equation (B.4) in terms of the computed matrix.
  * Made for a matrix near a rotation: all products of its transpose and itself near the identity.
- * Operations of one call: 36 add, 51 multiply, 3 negate; 12 temporaries.
+ * Operations of one call: 36 add, 51 multiply; 12 temporaries.
  *
  * No heap, no global state, reentrant. In one call every input is read before any output is written: an
  * output may be the same memory as an input. Matrices are stored by rows.

@@ -27,13 +27,13 @@ static inline void one_(const float state[9], const float increments[6], float n
     const float d2_y = increments[4];
     const float d2_z = increments[5];
     /* rate times the step, at node 0, times 1/3 */
-    const float turn_0_times_1_3_x = d1_x - 0.33333334f * d2_x;
-    const float turn_0_times_1_3_y = d1_y - 0.33333334f * d2_y;
-    const float turn_0_times_1_3_z = d1_z - 0.33333334f * d2_z;
+    const float turn_0_scaled_x = d1_x - 0.33333334f * d2_x;
+    const float turn_0_scaled_y = d1_y - 0.33333334f * d2_y;
+    const float turn_0_scaled_z = d1_z - 0.33333334f * d2_z;
     /* rate times the step, at node 1, times -1/3 */
-    const float minus_turn_1_times_1_3_x = 0.33333334f * d1_x - d2_x;
-    const float minus_turn_1_times_1_3_y = 0.33333334f * d1_y - d2_y;
-    const float minus_turn_1_times_1_3_z = 0.33333334f * d1_z - d2_z;
+    const float turn_1_scaled_x = 0.33333334f * d1_x - d2_x;
+    const float turn_1_scaled_y = 0.33333334f * d1_y - d2_y;
+    const float turn_1_scaled_z = 0.33333334f * d1_z - d2_z;
     /* the angle increment of the whole step */
     const float sigma_x = d1_x + d2_x;
     const float sigma_y = d1_y + d2_y;
@@ -42,24 +42,23 @@ static inline void one_(const float state[9], const float increments[6], float n
     const float skew_x = sigma_x;
     const float skew_y = sigma_y;
     const float skew_z = sigma_z;
-    /* left of turn_0_times_1_3 in an outer product */
-    const float partner_left_x = -(4.5f * minus_turn_1_times_1_3_x);
-    const float partner_left_y = -(4.5f * minus_turn_1_times_1_3_y);
-    const float partner_left_z = -(4.5f * minus_turn_1_times_1_3_z);
-    const float turn_0_times_1_3_dot_minus_turn_1_times_1_3 = turn_0_times_1_3_x * minus_turn_1_times_1_3_x
-        + turn_0_times_1_3_y * minus_turn_1_times_1_3_y
-        + turn_0_times_1_3_z * minus_turn_1_times_1_3_z;
+    /* left of turn_0_scaled in an outer product */
+    const float partner_left_x = -4.5f * turn_1_scaled_x;
+    const float partner_left_y = -4.5f * turn_1_scaled_y;
+    const float partner_left_z = -4.5f * turn_1_scaled_z;
+    const float turn_0_scaled_dot_turn_1_scaled = turn_0_scaled_x * turn_1_scaled_x
+        + turn_0_scaled_y * turn_1_scaled_y + turn_0_scaled_z * turn_1_scaled_z;
     /* multiple of the unit matrix */
-    const float diagonal = 4.5f * turn_0_times_1_3_dot_minus_turn_1_times_1_3 + 1.0f;
-    const float A_11 = turn_0_times_1_3_x * partner_left_x + diagonal;
-    const float A_22 = turn_0_times_1_3_y * partner_left_y + diagonal;
-    const float A_33 = turn_0_times_1_3_z * partner_left_z + diagonal;
-    const float A_12 = turn_0_times_1_3_y * partner_left_x - skew_z;
-    const float A_21 = turn_0_times_1_3_x * partner_left_y + skew_z;
-    const float A_23 = turn_0_times_1_3_z * partner_left_y - skew_x;
-    const float A_32 = turn_0_times_1_3_y * partner_left_z + skew_x;
-    const float A_31 = turn_0_times_1_3_x * partner_left_z - skew_y;
-    const float A_13 = turn_0_times_1_3_z * partner_left_x + skew_y;
+    const float diagonal = 4.5f * turn_0_scaled_dot_turn_1_scaled + 1.0f;
+    const float A_11 = turn_0_scaled_x * partner_left_x + diagonal;
+    const float A_22 = turn_0_scaled_y * partner_left_y + diagonal;
+    const float A_33 = turn_0_scaled_z * partner_left_z + diagonal;
+    const float A_12 = turn_0_scaled_y * partner_left_x - skew_z;
+    const float A_21 = turn_0_scaled_x * partner_left_y + skew_z;
+    const float A_23 = turn_0_scaled_z * partner_left_y - skew_x;
+    const float A_32 = turn_0_scaled_y * partner_left_z + skew_x;
+    const float A_31 = turn_0_scaled_x * partner_left_z - skew_y;
+    const float A_13 = turn_0_scaled_z * partner_left_x + skew_y;
     /* direction cosine matrix, body to reference, after the step */
     const float next_11 = A_11 * C_11 + A_21 * C_12 + A_31 * C_13;
     const float next_12 = A_12 * C_11 + A_22 * C_12 + A_32 * C_13;
@@ -122,13 +121,13 @@ static void batch_(size_t runs, const float *restrict state_0, const float *rest
         const float d2_y = increments_4[k];
         const float d2_z = increments_5[k];
         /* rate times the step, at node 0, times 1/3 */
-        const float turn_0_times_1_3_x = d1_x - 0.33333334f * d2_x;
-        const float turn_0_times_1_3_y = d1_y - 0.33333334f * d2_y;
-        const float turn_0_times_1_3_z = d1_z - 0.33333334f * d2_z;
+        const float turn_0_scaled_x = d1_x - 0.33333334f * d2_x;
+        const float turn_0_scaled_y = d1_y - 0.33333334f * d2_y;
+        const float turn_0_scaled_z = d1_z - 0.33333334f * d2_z;
         /* rate times the step, at node 1, times -1/3 */
-        const float minus_turn_1_times_1_3_x = 0.33333334f * d1_x - d2_x;
-        const float minus_turn_1_times_1_3_y = 0.33333334f * d1_y - d2_y;
-        const float minus_turn_1_times_1_3_z = 0.33333334f * d1_z - d2_z;
+        const float turn_1_scaled_x = 0.33333334f * d1_x - d2_x;
+        const float turn_1_scaled_y = 0.33333334f * d1_y - d2_y;
+        const float turn_1_scaled_z = 0.33333334f * d1_z - d2_z;
         /* the angle increment of the whole step */
         const float sigma_x = d1_x + d2_x;
         const float sigma_y = d1_y + d2_y;
@@ -137,24 +136,23 @@ static void batch_(size_t runs, const float *restrict state_0, const float *rest
         const float skew_x = sigma_x;
         const float skew_y = sigma_y;
         const float skew_z = sigma_z;
-        /* left of turn_0_times_1_3 in an outer product */
-        const float partner_left_x = -(4.5f * minus_turn_1_times_1_3_x);
-        const float partner_left_y = -(4.5f * minus_turn_1_times_1_3_y);
-        const float partner_left_z = -(4.5f * minus_turn_1_times_1_3_z);
-        const float turn_0_times_1_3_dot_minus_turn_1_times_1_3 = turn_0_times_1_3_x * minus_turn_1_times_1_3_x
-            + turn_0_times_1_3_y * minus_turn_1_times_1_3_y
-            + turn_0_times_1_3_z * minus_turn_1_times_1_3_z;
+        /* left of turn_0_scaled in an outer product */
+        const float partner_left_x = -4.5f * turn_1_scaled_x;
+        const float partner_left_y = -4.5f * turn_1_scaled_y;
+        const float partner_left_z = -4.5f * turn_1_scaled_z;
+        const float turn_0_scaled_dot_turn_1_scaled = turn_0_scaled_x * turn_1_scaled_x
+            + turn_0_scaled_y * turn_1_scaled_y + turn_0_scaled_z * turn_1_scaled_z;
         /* multiple of the unit matrix */
-        const float diagonal = 4.5f * turn_0_times_1_3_dot_minus_turn_1_times_1_3 + 1.0f;
-        const float A_11 = turn_0_times_1_3_x * partner_left_x + diagonal;
-        const float A_22 = turn_0_times_1_3_y * partner_left_y + diagonal;
-        const float A_33 = turn_0_times_1_3_z * partner_left_z + diagonal;
-        const float A_12 = turn_0_times_1_3_y * partner_left_x - skew_z;
-        const float A_21 = turn_0_times_1_3_x * partner_left_y + skew_z;
-        const float A_23 = turn_0_times_1_3_z * partner_left_y - skew_x;
-        const float A_32 = turn_0_times_1_3_y * partner_left_z + skew_x;
-        const float A_31 = turn_0_times_1_3_x * partner_left_z - skew_y;
-        const float A_13 = turn_0_times_1_3_z * partner_left_x + skew_y;
+        const float diagonal = 4.5f * turn_0_scaled_dot_turn_1_scaled + 1.0f;
+        const float A_11 = turn_0_scaled_x * partner_left_x + diagonal;
+        const float A_22 = turn_0_scaled_y * partner_left_y + diagonal;
+        const float A_33 = turn_0_scaled_z * partner_left_z + diagonal;
+        const float A_12 = turn_0_scaled_y * partner_left_x - skew_z;
+        const float A_21 = turn_0_scaled_x * partner_left_y + skew_z;
+        const float A_23 = turn_0_scaled_z * partner_left_y - skew_x;
+        const float A_32 = turn_0_scaled_y * partner_left_z + skew_x;
+        const float A_31 = turn_0_scaled_x * partner_left_z - skew_y;
+        const float A_13 = turn_0_scaled_z * partner_left_x + skew_y;
         /* direction cosine matrix, body to reference, after the step */
         const float next_11 = A_11 * C_11 + A_21 * C_12 + A_31 * C_13;
         const float next_12 = A_12 * C_11 + A_22 * C_12 + A_32 * C_13;
@@ -206,13 +204,13 @@ static void prepare_(size_t count, const float *increments, float prepared[9][BL
         const float d2_y = increments_by_element[4][k];
         const float d2_z = increments_by_element[5][k];
         /* rate times the step, at node 0, times 1/3 */
-        const float turn_0_times_1_3_x = d1_x - 0.33333334f * d2_x;
-        const float turn_0_times_1_3_y = d1_y - 0.33333334f * d2_y;
-        const float turn_0_times_1_3_z = d1_z - 0.33333334f * d2_z;
+        const float turn_0_scaled_x = d1_x - 0.33333334f * d2_x;
+        const float turn_0_scaled_y = d1_y - 0.33333334f * d2_y;
+        const float turn_0_scaled_z = d1_z - 0.33333334f * d2_z;
         /* rate times the step, at node 1, times -1/3 */
-        const float minus_turn_1_times_1_3_x = 0.33333334f * d1_x - d2_x;
-        const float minus_turn_1_times_1_3_y = 0.33333334f * d1_y - d2_y;
-        const float minus_turn_1_times_1_3_z = 0.33333334f * d1_z - d2_z;
+        const float turn_1_scaled_x = 0.33333334f * d1_x - d2_x;
+        const float turn_1_scaled_y = 0.33333334f * d1_y - d2_y;
+        const float turn_1_scaled_z = 0.33333334f * d1_z - d2_z;
         /* the angle increment of the whole step */
         const float sigma_x = d1_x + d2_x;
         const float sigma_y = d1_y + d2_y;
@@ -221,24 +219,23 @@ static void prepare_(size_t count, const float *increments, float prepared[9][BL
         const float skew_x = sigma_x;
         const float skew_y = sigma_y;
         const float skew_z = sigma_z;
-        /* left of turn_0_times_1_3 in an outer product */
-        const float partner_left_x = -(4.5f * minus_turn_1_times_1_3_x);
-        const float partner_left_y = -(4.5f * minus_turn_1_times_1_3_y);
-        const float partner_left_z = -(4.5f * minus_turn_1_times_1_3_z);
-        const float turn_0_times_1_3_dot_minus_turn_1_times_1_3 = turn_0_times_1_3_x * minus_turn_1_times_1_3_x
-            + turn_0_times_1_3_y * minus_turn_1_times_1_3_y
-            + turn_0_times_1_3_z * minus_turn_1_times_1_3_z;
+        /* left of turn_0_scaled in an outer product */
+        const float partner_left_x = -4.5f * turn_1_scaled_x;
+        const float partner_left_y = -4.5f * turn_1_scaled_y;
+        const float partner_left_z = -4.5f * turn_1_scaled_z;
+        const float turn_0_scaled_dot_turn_1_scaled = turn_0_scaled_x * turn_1_scaled_x
+            + turn_0_scaled_y * turn_1_scaled_y + turn_0_scaled_z * turn_1_scaled_z;
         /* multiple of the unit matrix */
-        const float diagonal = 4.5f * turn_0_times_1_3_dot_minus_turn_1_times_1_3 + 1.0f;
-        const float A_11 = turn_0_times_1_3_x * partner_left_x + diagonal;
-        const float A_22 = turn_0_times_1_3_y * partner_left_y + diagonal;
-        const float A_33 = turn_0_times_1_3_z * partner_left_z + diagonal;
-        const float A_12 = turn_0_times_1_3_y * partner_left_x - skew_z;
-        const float A_21 = turn_0_times_1_3_x * partner_left_y + skew_z;
-        const float A_23 = turn_0_times_1_3_z * partner_left_y - skew_x;
-        const float A_32 = turn_0_times_1_3_y * partner_left_z + skew_x;
-        const float A_31 = turn_0_times_1_3_x * partner_left_z - skew_y;
-        const float A_13 = turn_0_times_1_3_z * partner_left_x + skew_y;
+        const float diagonal = 4.5f * turn_0_scaled_dot_turn_1_scaled + 1.0f;
+        const float A_11 = turn_0_scaled_x * partner_left_x + diagonal;
+        const float A_22 = turn_0_scaled_y * partner_left_y + diagonal;
+        const float A_33 = turn_0_scaled_z * partner_left_z + diagonal;
+        const float A_12 = turn_0_scaled_y * partner_left_x - skew_z;
+        const float A_21 = turn_0_scaled_x * partner_left_y + skew_z;
+        const float A_23 = turn_0_scaled_z * partner_left_y - skew_x;
+        const float A_32 = turn_0_scaled_y * partner_left_z + skew_x;
+        const float A_31 = turn_0_scaled_x * partner_left_z - skew_y;
+        const float A_13 = turn_0_scaled_z * partner_left_x + skew_y;
         prepared[0][k] = A_11;
         prepared[1][k] = A_22;
         prepared[2][k] = A_33;

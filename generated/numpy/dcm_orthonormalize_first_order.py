@@ -14,7 +14,7 @@ import numpy as np
 def dcm_orthonormalize_first_order(computed, out=None):
     """Direction cosine matrix: the nearest rotation to first order in C'C - I.
 
-    Operations: 36 add, 51 multiply, 3 negate; 12 temporaries.
+    Operations: 36 add, 51 multiply; 12 temporaries.
 
     Parameters
     ----------
@@ -50,10 +50,10 @@ def dcm_orthonormalize_first_order(computed, out=None):
     excess_33 = C_13 * C_13 + C_23 * C_23 + C_33 * C_33 - 1.0
     # inverse root of C' C to first order
     root_11 = 1.0 - 0.5 * excess_11
-    root_12 = -(0.5 * excess_12)
-    root_13 = -(0.5 * excess_13)
+    root_12 = -0.5 * excess_12
+    root_13 = -0.5 * excess_13
     root_22 = 1.0 - 0.5 * excess_22
-    root_23 = -(0.5 * excess_23)
+    root_23 = -0.5 * excess_23
     root_33 = 1.0 - 0.5 * excess_33
     # direction cosine matrix, body to reference, orthonormalized
     next_11 = C_11 * root_11 + C_12 * root_12 + C_13 * root_13

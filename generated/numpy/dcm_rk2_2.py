@@ -14,7 +14,7 @@ import numpy as np
 def dcm_rk2_2(state, increments, out=None):
     """Direction cosine matrix: step by Heun's method from 2 angle increments.
 
-    Operations: 39 add, 49 multiply, 3 negate; 26 temporaries.
+    Operations: 39 add, 49 multiply; 26 temporaries.
 
     Parameters
     ----------
@@ -53,13 +53,13 @@ def dcm_rk2_2(state, increments, out=None):
     d2_y = increments[..., 1, 1]
     d2_z = increments[..., 1, 2]
     # rate times the step, at node 0, times 1/3
-    turn_0_times_1_3_x = d1_x - 0.3333333333333333 * d2_x
-    turn_0_times_1_3_y = d1_y - 0.3333333333333333 * d2_y
-    turn_0_times_1_3_z = d1_z - 0.3333333333333333 * d2_z
+    turn_0_scaled_x = d1_x - 0.3333333333333333 * d2_x
+    turn_0_scaled_y = d1_y - 0.3333333333333333 * d2_y
+    turn_0_scaled_z = d1_z - 0.3333333333333333 * d2_z
     # rate times the step, at node 1, times -1/3
-    minus_turn_1_times_1_3_x = 0.3333333333333333 * d1_x - d2_x
-    minus_turn_1_times_1_3_y = 0.3333333333333333 * d1_y - d2_y
-    minus_turn_1_times_1_3_z = 0.3333333333333333 * d1_z - d2_z
+    turn_1_scaled_x = 0.3333333333333333 * d1_x - d2_x
+    turn_1_scaled_y = 0.3333333333333333 * d1_y - d2_y
+    turn_1_scaled_z = 0.3333333333333333 * d1_z - d2_z
     # the angle increment of the whole step
     sigma_x = d1_x + d2_x
     sigma_y = d1_y + d2_y
@@ -68,25 +68,25 @@ def dcm_rk2_2(state, increments, out=None):
     skew_x = sigma_x
     skew_y = sigma_y
     skew_z = sigma_z
-    # left of turn_0_times_1_3 in an outer product
-    partner_left_x = -(4.5 * minus_turn_1_times_1_3_x)
-    partner_left_y = -(4.5 * minus_turn_1_times_1_3_y)
-    partner_left_z = -(4.5 * minus_turn_1_times_1_3_z)
-    turn_0_times_1_3_dot_minus_turn_1_times_1_3 = (
-        turn_0_times_1_3_x * minus_turn_1_times_1_3_x + turn_0_times_1_3_y * minus_turn_1_times_1_3_y
-        + turn_0_times_1_3_z * minus_turn_1_times_1_3_z
+    # left of turn_0_scaled in an outer product
+    partner_left_x = -4.5 * turn_1_scaled_x
+    partner_left_y = -4.5 * turn_1_scaled_y
+    partner_left_z = -4.5 * turn_1_scaled_z
+    turn_0_scaled_dot_turn_1_scaled = (
+        turn_0_scaled_x * turn_1_scaled_x + turn_0_scaled_y * turn_1_scaled_y
+        + turn_0_scaled_z * turn_1_scaled_z
     )
     # multiple of the unit matrix
-    diagonal = 4.5 * turn_0_times_1_3_dot_minus_turn_1_times_1_3 + 1.0
-    A_11 = turn_0_times_1_3_x * partner_left_x + diagonal
-    A_22 = turn_0_times_1_3_y * partner_left_y + diagonal
-    A_33 = turn_0_times_1_3_z * partner_left_z + diagonal
-    A_12 = turn_0_times_1_3_y * partner_left_x - skew_z
-    A_21 = turn_0_times_1_3_x * partner_left_y + skew_z
-    A_23 = turn_0_times_1_3_z * partner_left_y - skew_x
-    A_32 = turn_0_times_1_3_y * partner_left_z + skew_x
-    A_31 = turn_0_times_1_3_x * partner_left_z - skew_y
-    A_13 = turn_0_times_1_3_z * partner_left_x + skew_y
+    diagonal = 4.5 * turn_0_scaled_dot_turn_1_scaled + 1.0
+    A_11 = turn_0_scaled_x * partner_left_x + diagonal
+    A_22 = turn_0_scaled_y * partner_left_y + diagonal
+    A_33 = turn_0_scaled_z * partner_left_z + diagonal
+    A_12 = turn_0_scaled_y * partner_left_x - skew_z
+    A_21 = turn_0_scaled_x * partner_left_y + skew_z
+    A_23 = turn_0_scaled_z * partner_left_y - skew_x
+    A_32 = turn_0_scaled_y * partner_left_z + skew_x
+    A_31 = turn_0_scaled_x * partner_left_z - skew_y
+    A_13 = turn_0_scaled_z * partner_left_x + skew_y
     # direction cosine matrix, body to reference, after the step
     next_11 = A_11 * C_11 + A_21 * C_12 + A_31 * C_13
     next_12 = A_12 * C_11 + A_22 * C_12 + A_32 * C_13
@@ -115,7 +115,7 @@ def dcm_rk2_2(state, increments, out=None):
 def dcm_rk2_2_transition(increments, out=None):
     """Direction cosine matrix: step by Heun's method from 2 angle increments: its transition.
 
-    Operations: 21 add, 22 multiply, 3 negate; 17 temporaries.
+    Operations: 21 add, 22 multiply; 17 temporaries.
 
     Parameters
     ----------
@@ -140,13 +140,13 @@ def dcm_rk2_2_transition(increments, out=None):
     d2_y = increments[..., 1, 1]
     d2_z = increments[..., 1, 2]
     # rate times the step, at node 0, times 1/3
-    turn_0_times_1_3_x = d1_x - 0.3333333333333333 * d2_x
-    turn_0_times_1_3_y = d1_y - 0.3333333333333333 * d2_y
-    turn_0_times_1_3_z = d1_z - 0.3333333333333333 * d2_z
+    turn_0_scaled_x = d1_x - 0.3333333333333333 * d2_x
+    turn_0_scaled_y = d1_y - 0.3333333333333333 * d2_y
+    turn_0_scaled_z = d1_z - 0.3333333333333333 * d2_z
     # rate times the step, at node 1, times -1/3
-    minus_turn_1_times_1_3_x = 0.3333333333333333 * d1_x - d2_x
-    minus_turn_1_times_1_3_y = 0.3333333333333333 * d1_y - d2_y
-    minus_turn_1_times_1_3_z = 0.3333333333333333 * d1_z - d2_z
+    turn_1_scaled_x = 0.3333333333333333 * d1_x - d2_x
+    turn_1_scaled_y = 0.3333333333333333 * d1_y - d2_y
+    turn_1_scaled_z = 0.3333333333333333 * d1_z - d2_z
     # the angle increment of the whole step
     sigma_x = d1_x + d2_x
     sigma_y = d1_y + d2_y
@@ -155,25 +155,25 @@ def dcm_rk2_2_transition(increments, out=None):
     skew_x = sigma_x
     skew_y = sigma_y
     skew_z = sigma_z
-    # left of turn_0_times_1_3 in an outer product
-    partner_left_x = -(4.5 * minus_turn_1_times_1_3_x)
-    partner_left_y = -(4.5 * minus_turn_1_times_1_3_y)
-    partner_left_z = -(4.5 * minus_turn_1_times_1_3_z)
-    turn_0_times_1_3_dot_minus_turn_1_times_1_3 = (
-        turn_0_times_1_3_x * minus_turn_1_times_1_3_x + turn_0_times_1_3_y * minus_turn_1_times_1_3_y
-        + turn_0_times_1_3_z * minus_turn_1_times_1_3_z
+    # left of turn_0_scaled in an outer product
+    partner_left_x = -4.5 * turn_1_scaled_x
+    partner_left_y = -4.5 * turn_1_scaled_y
+    partner_left_z = -4.5 * turn_1_scaled_z
+    turn_0_scaled_dot_turn_1_scaled = (
+        turn_0_scaled_x * turn_1_scaled_x + turn_0_scaled_y * turn_1_scaled_y
+        + turn_0_scaled_z * turn_1_scaled_z
     )
     # multiple of the unit matrix
-    diagonal = 4.5 * turn_0_times_1_3_dot_minus_turn_1_times_1_3 + 1.0
-    A_11 = turn_0_times_1_3_x * partner_left_x + diagonal
-    A_22 = turn_0_times_1_3_y * partner_left_y + diagonal
-    A_33 = turn_0_times_1_3_z * partner_left_z + diagonal
-    A_12 = turn_0_times_1_3_y * partner_left_x - skew_z
-    A_21 = turn_0_times_1_3_x * partner_left_y + skew_z
-    A_23 = turn_0_times_1_3_z * partner_left_y - skew_x
-    A_32 = turn_0_times_1_3_y * partner_left_z + skew_x
-    A_31 = turn_0_times_1_3_x * partner_left_z - skew_y
-    A_13 = turn_0_times_1_3_z * partner_left_x + skew_y
+    diagonal = 4.5 * turn_0_scaled_dot_turn_1_scaled + 1.0
+    A_11 = turn_0_scaled_x * partner_left_x + diagonal
+    A_22 = turn_0_scaled_y * partner_left_y + diagonal
+    A_33 = turn_0_scaled_z * partner_left_z + diagonal
+    A_12 = turn_0_scaled_y * partner_left_x - skew_z
+    A_21 = turn_0_scaled_x * partner_left_y + skew_z
+    A_23 = turn_0_scaled_z * partner_left_y - skew_x
+    A_32 = turn_0_scaled_y * partner_left_z + skew_x
+    A_31 = turn_0_scaled_x * partner_left_z - skew_y
+    A_13 = turn_0_scaled_z * partner_left_x + skew_y
     batch = np.broadcast_shapes(increments.shape[:-2])
     dtype = np.result_type(increments.dtype, np.float32)
     transition = np.empty((*batch, 3, 3), dtype) if out is None else out

@@ -10,6 +10,7 @@ from strapgen import catalogue
 from strapgen.catalogue import ALGORITHMS, METHODS, Choice
 from strapgen.lowering import candidates, canonical, lower
 from strapgen.lowering.passes import optimize
+from strapgen.lowering.passes.rewriting import UNNAMED
 from strapgen.program import Program
 
 STEPS = [Choice(a, m, n) for a in ALGORITHMS for m in METHODS for n in (1, 2, 3, 4, 5, None)]
@@ -99,6 +100,13 @@ def test_a_transition_depends_on_nothing_but_the_increments():
         assert made.operations["multiply"] == program(choice).operations["multiply"] - (
             27 if choice.name == "dcm" else 16
         )
+
+
+@EVERY
+def test_values_are_named_after_what_they_are(choice):
+    # Only partial sums and factors that a pass shares have no meaning: few in a matrix, none in a quaternion.
+    unnamed = [a.name for a in program(choice).body if a.name.startswith(UNNAMED)]
+    assert len(unnamed) <= (3 if choice.name == "dcm" else 0)
 
 
 @pytest.mark.parametrize(

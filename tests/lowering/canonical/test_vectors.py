@@ -221,13 +221,13 @@ def test_what_has_a_name_in_the_field_gets_it():
 
 def test_a_multiple_of_what_has_a_name_says_so():
     made = pool(2, {form(3, -1): ("turn_0", "rate at the start")})
-    assert made.define(form(3, -1)) == ("turn_0_times_1_3", 3)
-    assert made.vectors["turn_0_times_1_3"].meaning == "rate at the start, times 1/3"
-    assert made.vectors["turn_0_times_1_3"].form == form(1, Fraction(-1, 3))
+    assert made.define(form(3, -1)) == ("turn_0_scaled", 3)
+    assert made.vectors["turn_0_scaled"].meaning == "rate at the start, times 1/3"
+    assert made.vectors["turn_0_scaled"].form == form(1, Fraction(-1, 3))
 
 
 def test_combinations_without_a_name_say_whether_they_are_even_or_odd():
     made = pool(4)
-    for whole, name in (((1, 3, 3, 1), "even_1"), ((1, 5, 5, 1), "even_2"), ((1, 3, -3, -1), "odd_1")):
+    for whole, name in (((1, 3, 3, 1), "even"), ((1, 5, 5, 1), "even_2"), ((1, 3, -3, -1), "odd")):
         assert made.define(form(*whole))[0] == name
-    assert made.define(form(1, 2, 3, 4))[0] == "mixed_1"
+    assert made.define(form(1, 2, 3, 4))[0] == "mixed"

@@ -44,6 +44,22 @@ def test_a_difference_turns_round(parse, show, before, after):
 @pytest.mark.parametrize(
     ("before", "after"),
     [
+        ("y = -(3 * a)", "y = -3 * a"),
+        ("y = -(3 * a + 2 * b)", "y = -3 * a - 2 * b"),
+        ("y = -(a + 2 * b + c)", "y = -2 * b - a - c"),
+        ("y = a - 3 * b", "y = a - 3 * b"),
+        ("y = c - (3 * a + 2 * b)", "y = c - (3 * a + 2 * b)"),
+        ("y = -(a * 3)", "y = -(a * 3)"),  # constants stand first, which is another pass's work
+        ("y = -(a + b)", "y = -(a + b)"),
+    ],
+)
+def test_a_constant_takes_the_sign_that_no_sum_takes(parse, show, before, after):
+    assert show(absorb_negations(parse(before))) == after
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
         ("y = -a * b", "y = -(a * b)"),
         ("y = a * -b", "y = -(a * b)"),
         ("y = -a * -b", "y = a * b"),

@@ -217,9 +217,7 @@ class Pool:
             if factor is None:
                 continue
             if factor != 1:
-                sign = "minus_" if factor < 0 else ""
-                times = str(abs(factor)).replace("/", "_")
-                name = f"{sign}{name}" + (f"_times_{times}" if abs(factor) != 1 else "")
+                name = f"minus_{name}" if factor == -1 else f"{name}_scaled"
                 meaning = f"{meaning}, times {factor}" if meaning else ""
             if name not in self.vectors:
                 return name, meaning
@@ -232,7 +230,6 @@ class Pool:
             (k for k, s in (("even", 1), ("odd", -1)) if form == tuple(s * x for x in mirrored(form))),
             "mixed",
         )
-        number = 1 + sum(name.startswith(f"{kind}_") for name in self.vectors)
-        return f"{kind}_{number}", "a combination of the inputs" + (
-            "" if kind == "mixed" else f", {kind} in time"
-        )
+        number = 1 + sum(name.split("_")[0] == kind for name in self.vectors)
+        name = kind if number == 1 else f"{kind}_{number}"
+        return name, "a combination of the inputs" + ("" if kind == "mixed" else f", {kind} in time")

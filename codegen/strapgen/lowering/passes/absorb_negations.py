@@ -11,7 +11,7 @@ _EVEN = ("cos", "sinc")
 
 
 def absorb_negations(program: Program) -> Program:
-    """Move signs up the trees until a sum takes them in; drop those of names that stand for nothing.
+    """Move signs up the trees until a sum or a constant takes them in; drop those of names that stand for nothing.
 
     Examples
     --------
@@ -40,12 +40,33 @@ def absorb_negations(program: Program) -> Program:
             replace(a, value=inner if a.name == name else rewritten(a.value, rule)) for a in program.body
         )
         program = replace(program, body=body)
-    return program
+    return with_values(program, _with_signed_constant)
 
 
 def _inside(node: Node) -> Node | None:
     """Return what a negation negates."""
     return node.arguments[0] if isinstance(node, Operation) and node.kind == "negate" else None
+
+
+def _with_signed_constant(value: Node) -> Node:
+    """Give a sign that no sum takes in to a constant factor, if there is one that can carry it."""
+    inner = _inside(value)
+    return (_by_constant(inner) or value) if inner is not None else value
+
+
+def _by_constant(node: Node) -> Node | None:
+    """Return the negative of a node without a further operation, the sign in a constant factor."""
+    if not isinstance(node, Operation):
+        return None
+    left, *rest = node.arguments
+    if node.kind == "multiply" and isinstance(left, Constant):
+        return Operation("multiply", (Constant(-left.value), *rest))
+    if node.kind == "add":
+        for one, other in (node.arguments, node.arguments[::-1]):
+            found = _by_constant(one)
+            if found is not None:
+                return Operation("subtract", (found, other))
+    return None
 
 
 def _negated(node: Node) -> Node:
