@@ -11,7 +11,7 @@ help:
 	@echo "make demo      set up, regenerate the code, build it, print the five tables on every back end"
 	@echo "make test      set up, run the whole test suite"
 	@echo "make check     generated code in step, ruff, mypy"
-	@echo "make bench     measure against other code generators, and the back ends; about ten minutes"
+	@echo "make bench     measure against other code generators, and the back ends; about a quarter of an hour"
 	@echo "make generate  rebuild generated/"
 	@echo "make clean     remove .venv and what tools left behind"
 

@@ -34,7 +34,9 @@ TITLES = {
     "euler-rates": "Euler parameters, three rate vectors",
     "dcm-rates": "Direction cosines, three rate vectors",
 }
-STEPS, RUNS = 512, 250  # no power of two: arrays by element would meet in the same lines of the cache
+#: Steps of a chain, runs side by side, and steps of a timed call, a multiple of both. None is a power of two: arrays
+#: by element would meet in the same lines of the cache.
+STEPS, RUNS, TIMED = 500, 250, 20_000
 OURS = "strapgen"
 
 
@@ -52,6 +54,7 @@ class Contender:
     instructions: dict[str, int] = field(default_factory=dict)
     calls: dict[str, Callable[[], None]] = field(default_factory=dict)
     times: dict[str, list[float]] = field(default_factory=dict)
+    results: dict[str, np.ndarray] = field(default_factory=dict)
 
     def add(self, what: str, seconds: float) -> None:
         """Keep a measured time."""
@@ -131,7 +134,7 @@ def instructions(library: Path) -> dict[str, int]:
 
 
 def prepare(contender: Contender, library: Path, state: int, samples: int) -> None:
-    """Load a library and keep what is to be timed, each call about STEPS or RUNS steps times a factor."""
+    """Load a library and keep what is to be timed, each call TIMED steps."""
     loaded = ctypes.CDLL(str(library))
     rng = np.random.default_rng(1969)
     identity = np.eye(3).ravel() if state == 9 else np.array([0.0, 0.0, 0.0, 1.0])
@@ -151,18 +154,18 @@ def prepare(contender: Contender, library: Path, state: int, samples: int) -> No
     for name, (count, *arrays) in plans.items():
         function, inputs = getattr(loaded, name), [*arrays, ends[name]]
         call(function, 1, count, inputs)
-        contender.calls[name] = lambda f=function, c=count, a=inputs: call(f, 20480 // c, c, a)
-    contender.results = ends  # type: ignore[attr-defined]
+        contender.calls[name] = lambda f=function, c=count, a=inputs: call(f, TIMED // c, c, a)
+    contender.results = ends
 
 
 def check(contenders: list[Contender]) -> None:
     """Compare what the contenders of one case computed: they must differ by round-off alone."""
-    expected = next(c.results for c in contenders if c.name == OURS)  # type: ignore[attr-defined]
+    expected = next(c.results for c in contenders if c.name == OURS)
     np.testing.assert_array_equal(expected["chained_loop"], expected["chained"])
     np.testing.assert_array_equal(expected["independent_loop"].T, expected["independent"])
     for contender in contenders:
         for name in ("chained", "independent"):
-            result = contender.results[name]  # type: ignore[attr-defined]
+            result = contender.results[name]
             # A few units in the last place a step, of numbers up to 1.
             np.testing.assert_allclose(result, expected[name], rtol=0, atol=STEPS * 1e-15)
 
@@ -203,7 +206,7 @@ def measured(options: argparse.Namespace, folder: Path) -> dict[str, list[Conten
                 start = time.perf_counter()
                 call()
                 if number:  # the first round warms up
-                    contender.add(name, (time.perf_counter() - start) / 20480)
+                    contender.add(name, (time.perf_counter() - start) / TIMED)
         print(f"\rtiming: round {number} of {options.rounds}        ", end="", file=sys.stderr, flush=True)
     print(file=sys.stderr)
     return cases

@@ -141,3 +141,23 @@ def test_evaluate_does_not_rearrange():
 def test_evaluate_needs_every_symbol():
     with pytest.raises(KeyError, match="y"):
         evaluate(sp.Symbol("x") + sp.Symbol("y"), {"x": 1})
+
+
+def test_evaluation_asks_what_stands_for_a_number():
+    # Values of other systems need not know SymPy's numbers.
+    x = sp.Symbol("x")
+    asked = []
+
+    def number(r):
+        asked.append(r)
+        return Fraction(int(r.p), int(r.q))
+
+    assert evaluate(x / 3 + sp.Rational(1, 2), {"x": Fraction(1, 7)}, number) == Fraction(23, 42)
+    assert set(asked) == {sp.Rational(1, 3), sp.Rational(1, 2)}
+
+
+def test_cross_and_dot_take_any_numbers():
+    u, v = [Fraction(1, 2), 3, -1], [2, Fraction(1, 3), 5]
+    assert algebra.cross_elements(u, v) == [Fraction(46, 3), Fraction(-9, 2), Fraction(-35, 6)]
+    assert algebra.dot(u, v) == -3
+    assert algebra.dot(algebra.cross_elements(u, v), u) == 0

@@ -33,13 +33,9 @@ def write(case: Case, folder: Path) -> None:
         function.generate("generated.c")
     finally:
         os.chdir(before)
-    (folder / "step.inc").write_text(
-        '#include "generated.c"\n'
-        "static inline void step(const double *state, const double *samples, double *next)\n{\n"
-        f"    double out[{len(results)}];\n"
+    call = (
         "    const double *arguments[2] = {state, samples};\n"
         "    double *results[1] = {out};\n"
         "    casadi_f0(arguments, results, 0, 0, 0);\n"
-        + "".join(f"    next[{k}] = out[{k}];\n" for k in range(len(results)))
-        + "}\n"
     )
+    (folder / "step.inc").write_text('#include "generated.c"\n' + formulas.calling(call, len(results)))

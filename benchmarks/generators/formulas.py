@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import sympy as sp
-
 from generators import Case
 from strapgen.catalogue.kinematics import KINEMATICS
 from strapgen.catalogue.runge_kutta import staged_step, step
@@ -37,25 +35,8 @@ def translated(kernel: Kernel, values: dict[str, Any], number: Callable[[int, in
     number : callable
         ``number(p, q)``: p/q in the other system.
     """
-
-    def value(expression: sp.Expr) -> Any:
-        if expression.is_Symbol:
-            return known[expression.name]
-        if expression.is_Rational:
-            return number(int(expression.p), int(expression.q))
-        if expression.is_Pow:
-            assert expression.exp == 2
-            return value(expression.base) * value(expression.base)
-        total = value(expression.args[0])
-        for argument in expression.args[1:]:
-            total = total + value(argument) if expression.is_Add else total * value(argument)
-        return total
-
-    known = dict(values)
-    for stage in (*kernel.stages, *kernel.outputs):
-        for name, expression in zip(stage.signal.elements, stage.expressions, strict=True):
-            known[name] = value(expression)
-    return [known[name] for name in kernel.outputs[0].signal.elements]
+    (elements,) = kernel.expand(values, lambda r: number(int(r.p), int(r.q))).values()
+    return elements
 
 
 def loads(kernel: Kernel) -> str:
@@ -66,3 +47,16 @@ def loads(kernel: Kernel) -> str:
         for k, name in enumerate(names)
     ]
     return "\n".join(lines)
+
+
+def definition(body: str) -> str:
+    """Return C of the step with a given body."""
+    return (
+        f"static inline void step(const double *state, const double *samples, double *next)\n{{\n{body}}}\n"
+    )
+
+
+def calling(call: str, elements: int) -> str:
+    """Return C of the step by a call that leaves its results in `out`."""
+    stores = "".join(f"    next[{k}] = out[{k}];\n" for k in range(elements))
+    return definition(f"    double out[{elements}];\n{call}{stores}")

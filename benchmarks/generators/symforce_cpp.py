@@ -38,9 +38,5 @@ def write(case: Case, folder: Path) -> None:
         text = Path(header).read_text().replace("#include <Eigen/Core>", "#include <cmath>")
     arguments = [f"state[{k}]" for k in range(len(state))] + [f"samples[{k}]" for k in range(len(samples))]
     arguments += [f"&out[{k}]" for k in range(len(results))]
-    (folder / "step.inc").write_text(
-        f"{text}\nstatic inline void step(const double *state, const double *samples, double *next)\n{{\n"
-        f"    double out[{len(results)}];\n    sym::StepOf<double>({', '.join(arguments)});\n"
-        + "".join(f"    next[{k}] = out[{k}];\n" for k in range(len(results)))
-        + "}\n"
-    )
+    call = f"    sym::StepOf<double>({', '.join(arguments)});\n"
+    (folder / "step.inc").write_text(f"{text}\n{formulas.calling(call, len(results))}")

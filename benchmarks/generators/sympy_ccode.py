@@ -24,7 +24,5 @@ def write(case: Case, folder: Path) -> None:
     common, results = sp.cse(results)
     lines = [f"    const double {symbol} = {sp.ccode(expression)};" for symbol, expression in common]
     lines += [f"    next[{k}] = {sp.ccode(expression)};" for k, expression in enumerate(results)]
-    text = "static inline void step(const double *state, const double *samples, double *next)\n{\n"
-    (folder / "step.inc").write_text(
-        "#include <math.h>\n" + text + formulas.loads(kernel) + "\n" + "\n".join(lines) + "\n}\n"
-    )
+    body = "\n".join([formulas.loads(kernel), *lines, ""])
+    (folder / "step.inc").write_text("#include <math.h>\n" + formulas.definition(body))

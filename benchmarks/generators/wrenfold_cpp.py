@@ -38,12 +38,6 @@ def write(case: Case, folder: Path) -> None:
     bound.__annotations__ = {n: wrenfold.FloatScalar for n in (*state, *samples)}
     text = wrenfold.generate_function(bound, generator=wrenfold.CppGenerator(), name="step_of")
     arguments = [f"state[{k}]" for k in range(len(state))] + [f"samples[{k}]" for k in range(len(samples))]
-    arguments += [f"out[{k}]" for k in range(len(kernel.outputs[0].expressions))]
-    count = len(kernel.outputs[0].expressions)
-    (folder / "step.inc").write_text(
-        f"#include <cmath>\n{text}\n"
-        "static inline void step(const double *state, const double *samples, double *next)\n{\n"
-        f"    double out[{count}];\n    step_of<double>({', '.join(arguments)});\n"
-        + "".join(f"    next[{k}] = out[{k}];\n" for k in range(count))
-        + "}\n"
-    )
+    arguments += [f"out[{k}]" for k in range(len(state))]
+    call = f"    step_of<double>({', '.join(arguments)});\n"
+    (folder / "step.inc").write_text(f"#include <cmath>\n{text}\n{formulas.calling(call, len(state))}")

@@ -6,7 +6,7 @@ But for `rotation`, everything is built from sums and products alone and also ho
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import sympy as sp
@@ -31,18 +31,28 @@ def skew(v: sp.Matrix) -> sp.Matrix:
     [ z,  0, -x],
     [-y,  x,  0]])
     """
-    x, y, z = v
-    return sp.Matrix([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    columns = [cross_elements(v, [int(axis == k) for k in range(3)]) for axis in range(3)]
+    return sp.Matrix(columns).T
+
+
+#: The cross product u x v has the elements u[i] v[j] - u[j] v[i], for these i and j.
+CROSS = ((1, 2), (2, 0), (0, 1))
+
+
+def cross_elements(u: Sequence[Any], v: Sequence[Any]) -> list[Any]:
+    """Return the elements of the cross product of two 3-vectors of symbols, polynomials or numbers."""
+    return [u[i] * v[j] - u[j] * v[i] for i, j in CROSS]
 
 
 def cross(u: sp.Matrix, v: sp.Matrix) -> sp.Matrix:
     """Return the cross product of two 3-vectors."""
-    return skew(u) * v
+    return sp.Matrix(cross_elements(u, v))
 
 
-def dot(u: sp.Matrix, v: sp.Matrix) -> sp.Expr:
-    """Return the sum of products of the elements of two vectors of any length."""
-    return sp.Add(*(a * b for a, b in zip(u, v, strict=True)))
+def dot(u: Sequence[Any], v: Sequence[Any]) -> Any:
+    """Return the sum of products of the elements of two vectors of any length: symbols, polynomials or numbers."""
+    first, *rest = (a * b for a, b in zip(u, v, strict=True))
+    return sum(rest, first)
 
 
 def quaternion_product(p: sp.Matrix, q: sp.Matrix) -> sp.Matrix:
@@ -139,10 +149,12 @@ def rotation(v: sp.Matrix) -> sp.Matrix:
 def adjugate(A: sp.Matrix) -> sp.Matrix:
     """Return the adjugate of a 3 x 3 matrix, from cross products of its columns."""
     a, b, c = A[:, 0], A[:, 1], A[:, 2]
-    return sp.Matrix.vstack(cross(b, c).T, cross(c, a).T, cross(a, b).T)
+    return sp.Matrix([cross_elements(b, c), cross_elements(c, a), cross_elements(a, b)])
 
 
-def evaluate(expression: sp.Expr, values: Mapping[str, Any]) -> Any:
+def evaluate(
+    expression: sp.Expr, values: Mapping[str, Any], number: Callable[[sp.Rational], Any] | None = None
+) -> Any:
     """Evaluate an expression with the given values for its symbols.
 
     Unlike `subs` this never rearranges: sums and products are carried out with the values' own operators,
@@ -152,6 +164,8 @@ def evaluate(expression: sp.Expr, values: Mapping[str, Any]) -> Any:
     ----------
     expression : Expr
     values : mapping of str to number, polynomial or Expr
+    number : callable, optional
+        What stands for a rational number where the values do not combine with those of SymPy.
 
     Returns
     -------
@@ -171,8 +185,8 @@ def evaluate(expression: sp.Expr, values: Mapping[str, Any]) -> Any:
     if expression.is_Symbol:
         return values[expression.name]
     if expression.is_Rational:
-        return expression
-    arguments = [evaluate(argument, values) for argument in expression.args]
+        return number(expression) if number else expression
+    arguments = [evaluate(argument, values, number) for argument in expression.args]
     if expression.is_Add or expression.is_Mul:
         result = arguments[0]
         for argument in arguments[1:]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -31,6 +31,30 @@ class Stage:
 
     signal: Signal
     expressions: tuple[sp.Expr, ...]
+
+
+def evaluate_stages(
+    stages: Iterable[Stage], values: Mapping[str, Any], number: Callable[[sp.Rational], Any] | None = None
+) -> dict[str, Any]:
+    """Return the given values and those of all elements of stages, each of which may use what stands before it.
+
+    Parameters
+    ----------
+    stages : iterable of Stage
+    values : mapping of str to number or ring element
+        A value for every symbol that no stage defines.
+    number : callable, optional
+        What stands for a rational number, see `algebra.evaluate`.
+
+    Returns
+    -------
+    dict of str to number or ring element
+    """
+    known = dict(values)
+    for stage in stages:
+        for name, expression in zip(stage.signal.elements, stage.expressions, strict=True):
+            known[name] = evaluate(expression, known, number)
+    return known
 
 
 @dataclass(frozen=True)
@@ -77,7 +101,9 @@ class Kernel:
         """The name in generated code."""
         return self.name.replace("-", "_")
 
-    def expand(self, values: Mapping[str, Any] | None = None) -> dict[str, list[Any]]:
+    def expand(
+        self, values: Mapping[str, Any] | None = None, number: Callable[[sp.Rational], Any] | None = None
+    ) -> dict[str, list[Any]]:
         """Evaluate the outputs with all stages substituted.
 
         Parameters
@@ -85,6 +111,8 @@ class Kernel:
         values : mapping of str to number or ring element, optional
             A value for every input element: numbers, polynomials or symbols. By default the inputs' own
             symbols, which gives each output as one expression of the inputs.
+        number : callable, optional
+            What stands for a rational number, see `algebra.evaluate`.
 
         Returns
         -------
@@ -93,10 +121,7 @@ class Kernel:
         """
         if values is None:
             values = {n: sp.Symbol(n, real=True) for signal in self.inputs for n in signal.elements}
-        known = dict(values)
-        for stage in (*self.stages, *self.outputs):
-            for name, expression in zip(stage.signal.elements, stage.expressions, strict=True):
-                known[name] = evaluate(expression, known)
+        known = evaluate_stages((*self.stages, *self.outputs), values, number)
         return {stage.signal.name: [known[n] for n in stage.signal.elements] for stage in self.outputs}
 
     def polynomials(self) -> dict[str, list[Any]]:

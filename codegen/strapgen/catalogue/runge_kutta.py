@@ -28,11 +28,10 @@ def increments_signal(count: int) -> Signal:
 
 def turns_signal(nodes: tuple[Fraction, ...]) -> Signal:
     """Return the signal of the body rates of one step, each times the step length, in the order of the nodes."""
-    labels = [str(node).replace("/", "_") for node in nodes]
     return Signal(
         "turns",
         (len(nodes), 3),
-        tuple(f"turn_{label}_{axis}" for label in labels for axis in "xyz"),
+        tuple(f"turn_{label}_{axis}" for label in map(_label, nodes) for axis in "xyz"),
         unit="rad",
         meaning=f"body rate times the step length, body axes, at nodes {', '.join(map(str, nodes))} of the step",
         bound=Fraction(1),
@@ -67,18 +66,13 @@ def step(kinematics: Kinematics, tableau: Tableau, increments: int | None) -> Ke
     transition = build.stage(kinematics.transition, end)
     build.output(kinematics.next, kinematics.product(state, transition))
     if increments is None:
-        given, taken, option = (
-            f"the rate at {len(turns)} {'node' if len(turns) == 1 else 'nodes'}",
-            "rates",
-            "--rates",
-        )
-        extracted = ""
+        given = f"the rate at {len(turns)} {'node' if len(turns) == 1 else 'nodes'}"
+        option, extracted = "--rates", ""
     else:
         given = f"{increments} angle {'increment' if increments == 1 else 'increments'}"
-        taken, option = str(increments), f"--increments {increments}"
-        extracted = "rate extraction chapter 3 A; "
+        option, extracted = f"--increments {increments}", "rate extraction chapter 3 A; "
     return build.kernel(
-        f"{kinematics.name}-{tableau.name}-{taken}",
+        f"{kinematics.name}-{tableau.name}-{increments or 'rates'}",
         f"{kinematics.title}: step by {tableau.title} from {given}",
         f"{kinematics.source}; {extracted}{tableau.title}: {tableau.source}",
         transition=kinematics.transition.name,
@@ -182,7 +176,6 @@ def _turn(
 ) -> sp.Matrix:
     """Name the generator at a node: the rate times the step, scaled for the kinematics."""
     half = "half_" if kinematics.scale == sp.Rational(1, 2) else ""
-    label = str(node).replace("/", "_")
     turn = [
         kinematics.scale * sp.Add(*(weight * samples[k, axis] for k, weight in enumerate(weights)))
         for axis in range(3)
@@ -190,9 +183,13 @@ def _turn(
     if all(element.is_Symbol for element in turn):  # an input itself
         return sp.Matrix(turn)
     meaning = f"{half.replace('_', ' the ')}rate times the step, at node {node}"
-    return build.stage(
-        Signal.vector(f"{half}turn_{label}", f"{half}turn_{label}", unit="rad", meaning=meaning), turn
-    )
+    name = f"{half}turn_{_label(node)}"
+    return build.stage(Signal.vector(name, name, unit="rad", meaning=meaning), turn)
+
+
+def _label(node: Fraction) -> str:
+    """Return a node as part of a name."""
+    return str(node).replace("/", "_")
 
 
 def _combination(coefficients: tuple[Fraction, ...], slopes: list[sp.Matrix], like: sp.Matrix) -> sp.Matrix:

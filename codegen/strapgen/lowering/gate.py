@@ -13,6 +13,7 @@ from sympy.core.relational import GreaterThan, LessThan, StrictGreaterThan, Stri
 
 from strapgen.kernel import Kernel
 from strapgen.lowering.arithmetic import chain, gathered, plain, with_constant
+from strapgen.lowering.names import FACTOR
 from strapgen.lowering.share import Shared
 from strapgen.program import Assignment, Constant, Node, Operation, Program, Reference, Result
 from strapgen.signal import Signal
@@ -136,7 +137,7 @@ class _Writer:
             if assignment.value == node:
                 return Reference(assignment.name)
         self._powers += 1
-        name = f"factor_{self._powers}"
+        name = f"{FACTOR}{self._powers}"
         self.body.append(Assignment(name, node))
         return Reference(name)
 

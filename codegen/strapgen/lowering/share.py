@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import sympy as sp
 
 from strapgen.kernel import Kernel
-
-_PREFIX = "shared_"
+from strapgen.lowering.names import SHARED
 
 
 @dataclass(frozen=True)
@@ -63,7 +62,7 @@ def share(kernel: Kernel, common: bool = True) -> Shared:
                 meaning = ""
     if not common:
         return Shared(definitions, values)
-    names = sp.numbered_symbols(_PREFIX, start=1, real=True)
+    names = sp.numbered_symbols(SHARED, start=1, real=True)
     found, reduced = sp.cse([d.expression for d in definitions], symbols=names, order="canonical")
     # A condition is no value that a program could hold: it goes back to where it is used.
     conditions = {symbol: expression for symbol, expression in found if expression.is_Relational}
@@ -73,7 +72,7 @@ def share(kernel: Kernel, common: bool = True) -> Shared:
 
     def needed(expression: sp.Expr) -> Iterator[Definition]:
         for symbol in sorted(
-            expression.free_symbols & pending.keys(), key=lambda s: int(s.name[len(_PREFIX) :])
+            expression.free_symbols & pending.keys(), key=lambda s: int(s.name[len(SHARED) :])
         ):
             if symbol in pending:
                 definition = pending.pop(symbol)

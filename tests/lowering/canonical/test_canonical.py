@@ -9,8 +9,8 @@ from derived import kernel, program
 from strapgen import catalogue
 from strapgen.catalogue import ALGORITHMS, METHODS, Choice
 from strapgen.lowering import candidates, canonical, lower
+from strapgen.lowering.names import is_unnamed
 from strapgen.lowering.passes import optimize
-from strapgen.lowering.passes.rewriting import UNNAMED
 from strapgen.program import Program
 
 STEPS = [Choice(a, m, n) for a in ALGORITHMS for m in METHODS for n in (1, 2, 3, 4, 5, None)]
@@ -105,7 +105,7 @@ def test_a_transition_depends_on_nothing_but_the_increments():
 @EVERY
 def test_values_are_named_after_what_they_are(choice):
     # Only partial sums and factors that a pass shares have no meaning: few in a matrix, none in a quaternion.
-    unnamed = [a.name for a in program(choice).body if a.name.startswith(UNNAMED)]
+    unnamed = [a.name for a in program(choice).body if is_unnamed(a.name)]
     assert len(unnamed) <= (3 if choice.name == "dcm" else 0)
 
 

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from strapgen.lowering.names import FACTOR, SHARED, is_unnamed
 from strapgen.lowering.passes import PASSES, cost, optimize, remove_unused
 from strapgen.program import (
     Assignment,
@@ -22,13 +23,12 @@ from strapgen.program import (
 from strapgen.signal import Signal
 
 INPUTS = ("x", "y", "z")
-UNNAMED = ("shared_", "factor_")
 EVERY = pytest.mark.parametrize("run", PASSES, ids=lambda run: run.__name__)
 SETTINGS = settings(max_examples=100, derandomize=True, database=None, deadline=None)
 
 KINDS = 2 * ("add", "subtract", "multiply", "negate") + ("scale", "divide", "select", "maximum")
 #: What the name of a value begins with; a value without a name is written out wherever it is used.
-PREFIXES = ("", "", "shared_", "shared_", "factor_", "part_")
+PREFIXES = ("", "", SHARED, SHARED, FACTOR, "part_")
 #: Trees can grow twofold with every instruction: larger ones get a name.
 LARGEST = 8
 
@@ -60,9 +60,9 @@ def programs(draw: st.DrawFn) -> Program:
             case _:
                 node = Operation(kind, (a, constant if first == second else b))
         if not prefix and sum(1 for _ in walk(node)) > LARGEST:
-            prefix = "shared_"
+            prefix = SHARED
         if prefix:
-            body.append(Assignment(f"{prefix}{k}", node, "" if prefix in UNNAMED else "a stage"))
+            body.append(Assignment(f"{prefix}{k}", node, "" if is_unnamed(prefix) else "a stage"))
             node = Reference(f"{prefix}{k}")
         known.append(node)
     if isinstance(known[-1], Operation):
@@ -88,7 +88,7 @@ def results(program: Program, point: dict[str, Fraction]) -> dict[str, list[Frac
 
 
 def named(program: Program) -> list[Assignment]:
-    return [assignment for assignment in program.body if not assignment.name.startswith(UNNAMED)]
+    return [assignment for assignment in program.body if not is_unnamed(assignment.name)]
 
 
 def stages(program: Program, point: dict[str, Fraction]) -> dict[str, list[Fraction]]:
@@ -148,7 +148,7 @@ def test_all_passes_together_invent_no_meanings(program):
     assert after.items() <= before.items()
     # What a result refers to by a name that means something is still called so.
     held = {name for r in program.results for node in r.nodes for name in references(node)} & before.keys()
-    assert {name for name in held if not name.startswith(UNNAMED)} <= after.keys()
+    assert {name for name in held if not is_unnamed(name)} <= after.keys()
 
 
 def test_cost_counts_all_operations_and_of_these_the_multiplications(parse):

@@ -8,8 +8,7 @@ from typing import Any
 
 import sympy as sp
 
-from strapgen.algebra import evaluate
-from strapgen.kernel import Kernel, Stage
+from strapgen.kernel import Kernel, Stage, evaluate_stages
 from strapgen.lowering.canonical.decomposition import Decomposition, Frame, NotCovariantError
 from strapgen.lowering.canonical.vectors import Form, components, independent
 from strapgen.program import Program
@@ -44,10 +43,7 @@ class Core:
 
     def evaluate(self, values: dict[str, Any]) -> list[Any]:
         """Return the transition's elements from values for the elements of the vectors."""
-        known = dict(values)
-        for stage in self.stages:
-            for name, expression in zip(stage.signal.elements, stage.expressions, strict=True):
-                known[name] = evaluate(expression, known)
+        known = evaluate_stages(self.stages, values)
         return [known[name] for name in self.transition.elements]
 
     def base(self) -> list[Form]:

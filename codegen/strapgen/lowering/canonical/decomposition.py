@@ -19,6 +19,7 @@ from typing import Any
 import sympy as sp
 from sympy.polys.matrices import DomainMatrix
 
+from strapgen.algebra import cross_elements, dot
 from strapgen.lowering.polynomials import Monomial, Polynomial, add, substitute
 
 #: What a coefficient belongs to: () a scalar or the unit matrix; (i,) vector i; (i, j) the cross product i x j in
@@ -68,14 +69,14 @@ class Decomposition:
             for monomial, coefficient in polynomial.items():
                 product: Any = sp.Rational(coefficient.numerator, coefficient.denominator)
                 for i, j, *k in monomial:
-                    other = _cross(vectors[j], vectors[k[0]]) if k else vectors[j]
-                    product = _dot(vectors[i], other) * product
+                    other = cross_elements(vectors[j], vectors[k[0]]) if k else vectors[j]
+                    product = dot(vectors[i], other) * product
                 total = product + total
             return total
 
         v: list[Any] = [0, 0, 0]
         for (i, *j), polynomial in self.vector.items():
-            vector = _cross(vectors[i], vectors[j[0]]) if j else vectors[i]
+            vector = cross_elements(vectors[i], vectors[j[0]]) if j else vectors[i]
             v = [a + b * value(polynomial) for a, b in zip(v, vector, strict=True)]
         if self.scalar is not None:
             return [*v, value(self.scalar)]
@@ -84,7 +85,9 @@ class Decomposition:
             product: list[Any] = list(_UNIT)
             if covariant:
                 first, *rest = covariant
-                other = _cross(vectors[rest[0]], vectors[rest[1]]) if len(rest) == 2 else vectors[rest[0]]
+                other = (
+                    cross_elements(vectors[rest[0]], vectors[rest[1]]) if len(rest) == 2 else vectors[rest[0]]
+                )
                 product = _symmetrized(vectors[first], other)
             s = [a + b * value(polynomial) for a, b in zip(s, product, strict=True)]
         xx, xy, xz, yy, yz, zz = s
@@ -149,7 +152,7 @@ class Frame:
                 yield (i,), u[i], _less(degree, i)
         else:
             for i, j in itertools.combinations(range(self.count), 2):
-                yield (i, j), _cross(u[i], u[j]), _less(degree, i, j)
+                yield (i, j), cross_elements(u[i], u[j]), _less(degree, i, j)
 
     def _symmetrics(self, degree: _Degree) -> Iterator[tuple[Covariant, list[Any], _Degree]]:
         # Products with the first vector come first: where several sums are equal, they are preferred.
@@ -157,7 +160,7 @@ class Frame:
         for i in range(self.count):
             if sum(degree) % 2:
                 for j, k in itertools.combinations(range(self.count), 2):
-                    yield (i, j, k), _symmetrized(u[i], _cross(u[j], u[k])), _less(degree, i, j, k)
+                    yield (i, j, k), _symmetrized(u[i], cross_elements(u[j], u[k])), _less(degree, i, j, k)
             else:
                 for j in range(i, self.count):
                     yield (i, j), _symmetrized(u[i], u[j]), _less(degree, i, j)
@@ -205,8 +208,8 @@ class Frame:
     def _value(self, monomial: Monomial) -> Any:
         if monomial not in self._values:
             i, j, *k = monomial[0]
-            other = _cross(self.vectors[j], self.vectors[k[0]]) if k else self.vectors[j]
-            self._values[monomial] = _dot(self.vectors[i], other) * self._value(monomial[1:])
+            other = cross_elements(self.vectors[j], self.vectors[k[0]]) if k else self.vectors[j]
+            self._values[monomial] = dot(self.vectors[i], other) * self._value(monomial[1:])
         return self._values[monomial]
 
 
@@ -242,14 +245,6 @@ def _less(degree: _Degree, *vectors: int) -> _Degree:
     for k in vectors:
         rest[k] -= 1
     return tuple(rest)
-
-
-def _dot(a: list[Any], b: list[Any]) -> Any:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def _cross(a: list[Any], b: list[Any]) -> list[Any]:
-    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
 def _symmetrized(a: list[Any], b: list[Any]) -> list[Any]:

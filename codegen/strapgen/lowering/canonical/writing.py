@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from fractions import Fraction
 
+from strapgen.algebra import CROSS
 from strapgen.lowering.arithmetic import (
     Term,
     chain,
@@ -147,7 +148,8 @@ class Writer:
             meaning = ""
 
     def _cross(self, definition: Cross) -> None:
-        for a, b, axis in (("y", "z", "x"), ("z", "x", "y"), ("x", "y", "z")):
+        for axis, (i, j) in zip("xyz", CROSS, strict=True):
+            a, b = "xyz"[i], "xyz"[j]
             products = (
                 _product(f"{definition.left}_{a}", f"{definition.right}_{b}"),
                 _product(f"{definition.left}_{b}", f"{definition.right}_{a}"),

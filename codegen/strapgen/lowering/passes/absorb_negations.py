@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from strapgen.lowering.passes.rewriting import is_unnamed, rewritten, with_values
+from strapgen.lowering.names import is_unnamed
+from strapgen.lowering.passes.rewriting import rewritten, with_values
 from strapgen.program import Constant, Node, Operation, Program, Reference
 
 _EVEN = ("cos", "sinc")

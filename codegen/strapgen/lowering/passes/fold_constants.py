@@ -11,7 +11,8 @@ from collections import defaultdict
 from dataclasses import replace
 from fractions import Fraction
 
-from strapgen.lowering.passes.rewriting import is_unnamed, rewritten, uses, with_values
+from strapgen.lowering.names import is_unnamed
+from strapgen.lowering.passes.rewriting import rewritten, uses, with_values
 from strapgen.program import OPERATIONS, Constant, Node, Operation, Program, Reference, references, walk
 
 _EXACT = ("add", "subtract", "multiply", "divide", "negate")

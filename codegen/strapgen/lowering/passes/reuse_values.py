@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
-from itertools import count
 
+from strapgen.lowering.names import shared_names
 from strapgen.program import Assignment, Node, Operation, Program, Reference
 
 
@@ -27,8 +27,7 @@ def reuse_values(program: Program) -> Program:
     1
     """
     occurrences = _occurrences(program)
-    taken = {assignment.name for assignment in program.body}
-    names = (name for k in count(1) if (name := f"shared_{k}") not in taken)
+    names = shared_names(program)
     known: dict[Node, Reference] = {}
     body: list[Assignment] = []
 

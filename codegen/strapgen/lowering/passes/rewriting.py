@@ -8,14 +8,6 @@ from dataclasses import replace
 
 from strapgen.program import Node, Operation, Program, references
 
-#: How names begin that stand for no quantity of the algorithm: passes may drop, split or change what they hold.
-UNNAMED = ("shared_", "factor_")
-
-
-def is_unnamed(name: str) -> bool:
-    """Tell whether a name stands for no quantity of the algorithm."""
-    return name.startswith(UNNAMED)
-
 
 def rewritten(node: Node, rule: Callable[[Node], Node]) -> Node:
     """Return a node with a rule applied to everything in it, arguments before what they belong to."""

@@ -9,10 +9,11 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import combinations, count
+from itertools import combinations
 
 from strapgen.lowering.arithmetic import Term, chain, plain, signed_sum
-from strapgen.lowering.passes.rewriting import is_unnamed, rewritten, uses
+from strapgen.lowering.names import is_unnamed, shared_names
+from strapgen.lowering.passes.rewriting import rewritten, uses
 from strapgen.program import Assignment, Node, Operation, Program, Reference, references
 
 #: A pair of members and whether their signs are equal; products have no signs.
@@ -43,8 +44,7 @@ def share_pairs(program: Program) -> Program:
     3
     """
     inlined = _inlined(program)
-    taken = {assignment.name for assignment in inlined.body}
-    names = (name for k in count(1) if (name := f"shared_{k}") not in taken)
+    names = shared_names(inlined)
     trees = [(assignment, _flat(assignment.value)) for assignment in inlined.body]
     while pair := _most_frequent(tree for _, tree in trees):
         name = next(names)
