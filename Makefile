@@ -5,11 +5,12 @@ BIN := .venv/bin
 READY := .venv/.ready
 BENCH := .venv-bench/.ready
 
-.PHONY: help demo test check bench generate clean
+.PHONY: help demo test test-long check bench generate clean
 
 help:
 	@echo "make demo      set up, regenerate the code, build it, print the five tables on every back end"
-	@echo "make test      set up, run the whole test suite"
+	@echo "make test      set up, run the test suite"
+	@echo "make test-long the tests that take long: every word, rounding and residual on every kernel"
 	@echo "make check     generated code in step, ruff, mypy"
 	@echo "make bench     measure against other code generators, and the back ends; about a quarter of an hour"
 	@echo "make generate  rebuild generated/"
@@ -28,7 +29,10 @@ demo: $(READY)
 	$(BIN)/strapgen tables
 
 test: $(READY)
-	$(BIN)/python -m pytest -n auto --dist worksteal
+	$(BIN)/python -m pytest -n auto --dist worksteal -m "not long"
+
+test-long: $(READY)
+	$(BIN)/python -m pytest -n auto --dist worksteal -m long
 
 check: $(READY)
 	$(BIN)/strapgen generate --all --check
@@ -49,6 +53,7 @@ $(BENCH): pyproject.toml
 
 bench: $(BENCH)
 	.venv-bench/bin/python benchmarks/compare.py
+	.venv-bench/bin/python benchmarks/fixed_point.py
 	.venv-bench/bin/python benchmarks/backends.py
 
 generate: $(READY)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from functools import cache
 
-from strapgen import catalogue, lower, standard_tree
+from strapgen import catalogue, generate, lower, standard_tree
+from strapgen.backends import BACKENDS, fitted
 from strapgen.catalogue import Choice
 from strapgen.kernel import Kernel
 from strapgen.program import Program
+from strapgen.targets import Sources
 
 
 @cache
@@ -24,3 +26,8 @@ def program(choice: Choice) -> Program:
 def programs() -> dict[str, Program]:
     """Return the standard catalogue by the names of its kernels."""
     return {made.kernel: made for made in standard_tree.programs()}
+
+
+def generated(program: Program, backend_name: str) -> Sources:
+    """Return the sources that a back end by this name runs."""
+    return generate(program, BACKENDS[backend_name].target, fitted(backend_name, None))

@@ -9,15 +9,17 @@ from __future__ import annotations
 
 import cmath
 import math
+from fractions import Fraction
 
 import numpy as np
 import pytest
+from tolerances import certified, roundoff
 
 import strapgen
+from strapgen.exceptions import InputError
 from strapgen.simulation import simulate
 
 ORDERS = (1, 2, 3, 4)
-UNITS_A_STEP = 16  # of round-off, as in the test of the back ends
 
 
 def lost(order: int, x: float, algorithm: str) -> float:
@@ -35,11 +37,35 @@ def final_angle(run) -> float:
 def spin(make, algorithm: str, order: int, x: float, steps: int, axes: str = "y", **options):
     """Simulate a constant rate of x rad a step on the given axes; the step is 1/8 s."""
     motion = strapgen.motion("constant", **{f"{axis}_rad_s": x * 8 for axis in axes})
-    return simulate(make(algorithm, f"rk{order}"), motion, "0.125", steps / 8, **options)
+    return run_within(fit(make, algorithm, order, x), motion, "0.125", steps / 8, **options)
+
+
+def fit(make, algorithm: str, order: int, x: float, **rest: object):
+    """Make a back end for steps of x rad, in fixed point with residuals: the claims are about truncation.
+
+    To a power of two, so that few have to be compiled.
+    """
+    largest = 2.0 ** math.ceil(math.log2(x / 2))
+    return make(algorithm, f"rk{order}", largest=largest, carry="full", **rest)
+
+
+def run_within(backend, motion, step, duration, **options):
+    """Simulate; a run that fixed point refuses must have left the range of its state in double too."""
+    try:
+        return simulate(backend, motion, step, duration, **options)
+    except InputError as error:
+        assert "refuses its input in step" in str(error)
+        algorithm, method, increments = backend.kernel.rsplit("-", 2)
+        double = strapgen.backend(algorithm, method, int(increments), "numpy")
+        steps = round(float(duration) / float(step))
+        states = double.propagate(motion.increments(Fraction(step), steps, 2))
+        assert np.abs(states).max() > float(backend.interface.inputs[0].high * backend.unit)
+        return None
 
 
 def tolerance(backend, steps: int) -> float:
-    return UNITS_A_STEP * steps * float(np.finfo(backend.dtype).eps) / 2
+    """Bound of the rounding in a drift; in fixed point the certified one of a state, which a drift is twice off by."""
+    return roundoff(backend, steps) * (1 if backend.rounding_bound(1) is None else 2)
 
 
 @pytest.mark.parametrize("order", ORDERS)
@@ -47,35 +73,44 @@ def test_1_constant_rate_errors_grow_linearly(make, algorithm, order):
     steps = 50
     x = {1: 0.042, 2: 0.15, 3: 0.35, 4: 0.5}[order]
     run = spin(make, algorithm, order, x, steps)
+    noise = tolerance(fit(make, algorithm, order, x), steps)
     share = run.time / run.time[-1]
     size = np.abs(run.error).max()
-    allowed = size**2 + tolerance(make(algorithm), steps)
-    assert size < 0.05, "the claim is about small errors"
+    allowed = size**2 + noise
+    assert size < 0.05 + noise, "the claim is about small errors"
     np.testing.assert_allclose(run.drift[:, 1], run.drift[-1, 1] * share, rtol=0, atol=allowed)
     np.testing.assert_allclose(run.scale, run.scale[-1] * share[:, None], rtol=0, atol=allowed)
-    np.testing.assert_allclose(run.skew, 0, atol=tolerance(make(algorithm), steps))
-    assert abs(run.drift[-1, 1]) > 5 * tolerance(make(algorithm), steps)
+    np.testing.assert_allclose(run.skew, 0, atol=noise)
+    assert abs(run.drift[-1, 1]) > 5 * noise or noise > 1e-3, (
+        "the drift must be seen, but for words of 16 bits"
+    )
 
 
 @pytest.mark.parametrize("x", [0.3, 0.6])
 @pytest.mark.parametrize("order", ORDERS)
 def test_2_drift_of_euler_parameters_and_direction_cosines(make, order, x):
     steps = 20
-    angle = {a: final_angle(spin(make, a, order, x, steps)) for a in ("dcm", "euler")}
+    runs = {a: spin(make, a, order, x, steps) for a in ("dcm", "euler")}
+    noise = tolerance(fit(make, "dcm", order, x), steps)
+    angle = {a: final_angle(run) for a, run in runs.items() if run is not None}
+    assert len(angle) == 2 or order < 3, "only low orders grow out of a format"
     for algorithm, value in angle.items():
         wanted = math.remainder(steps * lost(order, x, algorithm), 2 * math.pi)
-        assert value == pytest.approx(wanted, abs=2 * tolerance(make("dcm"), steps))
+        assert value == pytest.approx(wanted, abs=2 * noise)
     # To leading order the ratio is 1/4 or 1/16; its next term is below x^2/2 of it.
-    if order > 1:  # first order has turned too far here for a ratio of final angles
+    if order > 1 and len(angle) == 2:  # first order has turned too far here for a ratio of final angles
         leading = 1 / 4 if order == 2 else 1 / 16
-        noise = 4 * tolerance(make("dcm"), steps) / abs(angle["dcm"])
-        assert angle["euler"] / angle["dcm"] == pytest.approx(leading, rel=x**2 / 2, abs=noise)
+        allowed = 4 * noise / abs(angle["dcm"])
+        assert angle["euler"] / angle["dcm"] == pytest.approx(leading, rel=x**2 / 2, abs=allowed)
 
 
 def test_2_first_order_at_a_small_angle(make):
     steps, x = 200, 0.05
-    dcm, euler = (final_angle(spin(make, a, 1, x, steps)) for a in ("dcm", "euler"))
-    noise = 4 * tolerance(make("dcm"), steps) / dcm
+    runs = [spin(make, a, 1, x, steps) for a in ("dcm", "euler")]
+    if None in runs:
+        return
+    dcm, euler = map(final_angle, runs)
+    noise = 4 * tolerance(fit(make, "dcm", 1, x), steps) / dcm
     assert euler / dcm == pytest.approx(1 / 4 + 9 * x**2 / 80, abs=noise + x**4)
 
 
@@ -83,8 +118,11 @@ def test_2_first_order_at_a_small_angle(make):
 @pytest.mark.parametrize(("high", "low", "ratio"), [(2, 1, -1 / 2), (4, 3, -1 / 4)])
 def test_3_even_orders_drift_the_other_way(make, algorithm, high, low, ratio):
     steps, x = 100, (0.1 if low == 1 else 0.4)
-    upper, lower = (final_angle(spin(make, algorithm, order, x, steps)) for order in (high, low))
-    noise = 4 * tolerance(make("dcm"), steps) / abs(lower)
+    runs = [spin(make, algorithm, order, x, steps) for order in (high, low)]
+    if None in runs:
+        return
+    upper, lower = map(final_angle, runs)
+    noise = 4 * tolerance(fit(make, "dcm", low, x), steps) / abs(lower)
     assert upper / lower == pytest.approx(ratio, rel=x**2, abs=noise)
 
 
@@ -96,20 +134,25 @@ def test_4_three_equal_rates(make):
     angles = {}
     for axes, settings in motion.items():
         for order in (1, 4):
-            backend = make("dcm", f"rk{order}", orthonormalization="dcm-orthonormalize-optimal")
-            run = simulate(backend, strapgen.motion("constant", **settings), "0.125", steps / 8, "0.125")
+            backend = fit(make, "dcm", order, x, orthonormalization="dcm-orthonormalize-optimal")
+            turning = strapgen.motion("constant", **settings)
+            run = run_within(backend, turning, "0.125", steps / 8, orthonormalize="0.125")
+            if run is None:
+                assert order == 1, "only first order grows out of a format"
+                return
             angles[axes, order] = math.asin(np.linalg.norm(run.drift[-1])) / math.sqrt(len(axes))
             wanted = steps * lost(order, x * math.sqrt(len(axes)), "dcm") / math.sqrt(len(axes))
+            noise = tolerance(backend, steps) + certified(backend, 0, steps)
             # Twice the bound: the orthonormalization rounds too. The sine of angles up to 0.6 rad is inverted.
-            assert angles[axes, order] == pytest.approx(abs(wanted), abs=4 * tolerance(backend, steps))
+            assert angles[axes, order] == pytest.approx(abs(wanted), abs=4 * noise)
     ratio = angles["xyz", 4] / angles["xyz", 1] / (angles["y", 4] / angles["y", 1])
-    noise = 8 * tolerance(make("dcm"), steps) / angles["y", 4]
-    assert ratio == pytest.approx(3, rel=x**2 + noise)
+    assert ratio == pytest.approx(3, rel=x**2 + 8 * noise / angles["y", 4])
 
 
 def test_4_at_the_thesis_rate(backend_name, make):
-    if make("dcm").dtype != np.float64:
-        # In single precision round-off hides the fourth order at this rate: the claim on it is the test of the tables.
+    if make("dcm").unit > 1e-15:
+        # In single precision and in fixed point round-off hides the fourth order at this rate: the claim on it is the
+        # test of the tables.
         assert tolerance(make("dcm"), 1440) > 1440 * lost(4, math.radians(10) / 8, "dcm")
         return
     x = math.radians(10) / 8
@@ -128,22 +171,27 @@ def sinusoid(make, algorithm: str, order: int, turn: float, periods: int = 2):
     steps = round(2 * math.pi / turn) * periods
     b = 2 * math.pi * periods / steps
     motion = strapgen.motion("sinusoidal", a_rad_s=b, b_rad_s=b)
-    return simulate(make(algorithm, f"rk{order}"), motion, 1, steps), steps // periods
+    return run_within(fit(make, algorithm, order, b), motion, 1, steps), steps // periods
 
 
 @pytest.mark.parametrize("algorithm", ["dcm", "euler"])
 @pytest.mark.parametrize(("order", "power"), [(1, 1), (2, 2), (3, 4), (4, 4)])
 def test_5_sinusoid_drift_is_bounded_periodic_and_grows_as_a_power(make, algorithm, order, power):
     # Order 3 grows as b^4 as order 4 does: the thesis guesses b^3 and is wrong.
-    eps = np.finfo(make("dcm").dtype).eps
-    turn = float(eps) ** (1 / 16)  # 0.1 in double, 0.37 in single: truncation stays above round-off
+    # 0.1 in double, 0.37 in single, 0.27 and 0.55 in fixed point: truncation stays above round-off.
+    turn = make("dcm").unit ** (1 / 16)
     angles = []
     for size in (turn, turn / 2):
         run, period = sinusoid(make, algorithm, order, size)
+        if run is None:
+            assert order < 3, "only low orders grow out of a format"
+            return
         angle = np.arctan2(run.drift[:, 1], 1 + run.scale[:, 0])
-        noise = tolerance(make("dcm"), len(run.time))
+        noise = tolerance(fit(make, "dcm", order, size), len(run.time))
         np.testing.assert_allclose(angle[period:], angle[: period + 1], rtol=0, atol=2 * noise)
         angles.append(np.abs(angle).max())
+    if noise > angles[1] / 2 and make("dcm").unit > 1e-5:
+        return  # words of 16 bits do not show it
     # Two neighbouring terms of the series in (b h)^2, and the round-off of the smaller drift.
     allowed = 0.2 + turn**2 + 2 * min(1, noise / angles[1])
     assert math.log2(angles[0] / angles[1]) == pytest.approx(power, abs=allowed)
@@ -151,26 +199,29 @@ def test_5_sinusoid_drift_is_bounded_periodic_and_grows_as_a_power(make, algorit
 
 def test_6_orthonormalization_removes_scale_and_skew_and_leaves_drift(make, algorithm):
     motion = strapgen.motion("coning", a_deg_s=40, b_deg_s=40, g_deg_s=40)
-    backend = make(algorithm, "rk2")
+    backend = fit(make, algorithm, 2, math.radians(15))
     plain = simulate(backend, motion, "0.125", 10)
     restored = simulate(backend, motion, "0.125", 10, 10)
     size = np.abs(plain.error).max()
-    noise = tolerance(backend, 80)
+    noise = tolerance(backend, 80) + certified(backend, 0, 1)
     assert np.abs(restored.scale[-1]).max() <= size**2 + noise
     assert np.abs(restored.skew[-1]).max() <= size**2 + noise
     np.testing.assert_allclose(restored.drift[-1], plain.drift[-1], rtol=0, atol=size**2 + noise)
-    assert np.abs(plain.drift[-1]).max() > 10 * (size**2 + noise), "the drift that is left must be seen"
+    seen = np.abs(plain.drift[-1]).max() > 10 * (size**2 + noise)
+    assert seen or noise > 1e-3, "the drift that is left must be seen, but for words of 16 bits"
 
 
 def test_6_with_a_large_scale_error_it_improves_drift(make):
     motion = strapgen.motion("constant", x_deg_s=10, y_deg_s=10, z_deg_s=10)
-    backend = make("dcm", "rk1")
-    drifts = [
-        math.degrees(simulate(backend, motion, "0.125", 180, every, 5).drift_by_axis.max())
-        for every in (None, 5)
-    ]
-    assert drifts[0] == pytest.approx(2.391, abs=5e-4 + math.degrees(3 * tolerance(backend, 1440)))
-    assert drifts[1] == pytest.approx(0.856, abs=5e-4 + math.degrees(tolerance(backend, 1440)))
+    backend = fit(make, "dcm", 1, math.radians(10) / 8)
+    plain, restored = (
+        run_within(backend, motion, "0.125", 180, orthonormalize=every, record=5) for every in (None, 5)
+    )
+    if plain is not None:
+        noise = math.degrees(3 * tolerance(backend, 1440))
+        assert math.degrees(plain.drift_by_axis.max()) == pytest.approx(2.391, abs=5e-4 + noise)
+    noise = math.degrees(tolerance(backend, 1440) + certified(backend, 0, 36))
+    assert math.degrees(restored.drift_by_axis.max()) == pytest.approx(0.856, abs=5e-4 + noise)
 
 
 @pytest.mark.parametrize("order", ORDERS)

@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text()
 
 
-@pytest.mark.parametrize("page", ["python-api", "canonical-form"])
+@pytest.mark.parametrize("page", ["python-api", "canonical-form", "fixed-point"])
 def test_page(page):
     result = doctest.testfile(str(ROOT / "docs" / f"{page}.md"), module_relative=False)
     assert result.attempted >= 10
@@ -34,7 +34,7 @@ def commands() -> list[str]:
 
 def test_readme_shows_every_command():
     shown = {shlex.split(command)[1] for command in commands()}
-    assert shown == {"list", "derive", "generate", "simulate"}
+    assert shown == {"list", "derive", "generate", "simulate", "compare", "study"}
     assert "`strapgen tables`" in README
 
 
@@ -48,7 +48,7 @@ def test_readme_command(command, tmp_path, monkeypatch, capsys):
 
 
 def cells(line: str) -> list[str]:
-    return line.replace("*", " * ").split()
+    return re.sub(r"(?<=\d)([*r])", r" \1 ", line).split()
 
 
 def test_readme_tables_are_the_command_s(capsys):

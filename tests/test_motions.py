@@ -7,6 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from scipy.integrate import quad
+from tolerances import roundoff
 
 import strapgen
 from strapgen.exceptions import InputError
@@ -36,8 +37,8 @@ def test_a_fine_run_meets_the_truth(name, backend_name):
     motion = strapgen.motion(name, **MOTIONS[name])
     backend = strapgen.backend("euler", "rk4", 2, backend_name)
     run = strapgen.simulate(backend, motion, Fraction(1, 200), 4)
-    # Truncation at this step is below 1e-12; 800 steps of 16 units of round-off, doubled by the conversion.
-    assert np.abs(run.error).max() <= 1e-12 + 800 * 16 * np.finfo(backend.dtype).eps
+    # Truncation at this step is below 1e-12; 800 steps of round-off, doubled by the conversion.
+    assert np.abs(run.error).max() <= 1e-12 + 2 * roundoff(backend, 800)
 
 
 @pytest.mark.parametrize("name", MOTIONS)

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
+from tolerances import certified
 
 import strapgen
 from strapgen import recording
@@ -81,12 +82,15 @@ def loaded(name: str) -> Recording:
 
 @pytest.mark.parametrize("name", ["increments.csv", "rates_even.csv", "rates_uneven.csv"])
 def test_recordings_lead_to_the_true_attitude(name, make):
-    history = propagate(make("euler"), loaded(name))
+    backend = make("euler", largest=0.01, carry="full")
+    history = propagate(backend, loaded(name))
     assert history.time[0] == pytest.approx(0, abs=1e-12)
     assert history.time[-1] == pytest.approx(4, abs=1e-9)
     error = Rotation.from_quat(history.states[-1]) * truth(4.0).inv()
     # Noise of 0.05 deg/s in 400 samples of 0.01 s walks 0.01 deg on each axis; increments hardly walk.
-    assert math.degrees(error.magnitude()) < (1e-3 if name == "increments.csv" else 0.06)
+    noise = 1e-3 if name == "increments.csv" else 0.06
+    steps = len(history.time) - 1
+    assert math.degrees(error.magnitude()) < noise + math.degrees(2 * certified(backend, steps))
 
 
 # What a file may look like
@@ -412,8 +416,12 @@ def test_interval_measured_from_a_file_is_matched_to_a_hundredth(even):
 @pytest.mark.filterwarnings("error")
 def test_attitude_that_overflows_is_refused(make, even):
     large = Recording(even.start, even.interval, np.full((24, 3), 1e30))
-    with np.errstate(all="ignore"), pytest.raises(InputError, match=r"^the attitude is not finite from 1\d"):
-        propagate(make("dcm"), large)
+    backend = make("dcm")
+    said = r"^the attitude is not finite from 1\d"
+    if backend.rounding_bound(1) is not None:
+        said = r"^increments holds 1e\+30; the formats of dcm-rk4-2 were chosen for at most 0.125"
+    with np.errstate(all="ignore"), pytest.raises(InputError, match=said):
+        propagate(backend, large)
 
 
 def test_units_have_their_factors():

@@ -15,6 +15,7 @@ from derived import programs
 
 from strapgen import catalogue, resources, standard_tree
 from strapgen.cli import main
+from strapgen.fixedpoint import can_lower
 
 CHECK = ["generate", "--all", "--check", "--out"]
 
@@ -56,6 +57,9 @@ def test_tree_holds_every_kernel_for_every_target():
     wanted = {"README.md", *(f"numpy/{name}.py" for name in names)}
     wanted |= {f"c/{name}.{ending}" for name in names for ending in "ch"}
     wanted |= {f"c_float/{name}_float.{ending}" for name in names for ending in "ch"}
+    lowered = [program.name for program in programs().values() if can_lower(program)]
+    assert len(lowered) > len(names) / 2
+    wanted |= {f"c_fixed/{name}_q31.{ending}" for name in lowered for ending in "ch"}
     assert files().keys() == wanted
     for algorithm in catalogue.ALGORITHMS:
         stem = algorithm.replace("-", "_")

@@ -14,20 +14,24 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:
     from strapgen.backends import backend as backend
     from strapgen.backends import evaluator as evaluator
+    from strapgen.fixedpoint import Settings as Settings
     from strapgen.motions import motion as motion
     from strapgen.pipeline import build as build
     from strapgen.pipeline import derive as derive
     from strapgen.pipeline import generate as generate
     from strapgen.pipeline import lower as lower
+    from strapgen.pipeline import quantize as quantize
     from strapgen.simulation import simulate as simulate
 
 _EXPORTS = {
     "derive": "pipeline",
     "lower": "pipeline",
+    "quantize": "pipeline",
     "generate": "pipeline",
     "build": "pipeline",
     "simulate": "simulation",
     "motion": "motions",
+    "Settings": "fixedpoint",
     "backend": "backends",
     "evaluator": "backends",
 }

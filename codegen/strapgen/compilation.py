@@ -11,11 +11,13 @@ import importlib.util
 import json
 import os
 import platform
+import re
 import shlex
 import shutil
 import subprocess
 import sys
 import sysconfig
+import tempfile
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -40,7 +42,7 @@ def load(sources: Sources) -> Any:
     Returns
     -------
     module
-        For numpy the generated module; for C a cffi module with ``ffi`` and ``lib``.
+        For Python the generated module; for C a cffi module with ``ffi`` and ``lib``.
 
     Raises
     ------
@@ -49,7 +51,7 @@ def load(sources: Sources) -> Any:
     """
     key = cache.digest([sources.target, *sources.files, *sources.files.values()])
     if key not in _loaded:
-        _loaded[key] = _import_text(sources) if sources.target == "numpy" else _compiled(sources)
+        _loaded[key] = _compiled(sources) if sources.target.startswith("c") else _import_text(sources)
     return _loaded[key]
 
 
@@ -110,6 +112,31 @@ def _compiled(sources: Sources) -> Any:
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
+
+
+def code_size(sources: Sources) -> int | None:
+    """Return the bytes of code and constants that a C source compiles to; None where nobody can tell.
+
+    Parameters
+    ----------
+    sources : Sources
+        Of any target; Python has no object code.
+    """
+    if not any(name.endswith(".c") for name in sources.files):
+        return None
+    path, counter = compiler(), shutil.which("size")
+    if counter is None:
+        return None
+    with tempfile.TemporaryDirectory() as folder:
+        for name, text in sources.files.items():
+            (Path(folder) / name).write_text(text)
+        code = next(name for name in sources.files if name.endswith(".c"))
+        command = [*shlex.split(_chosen_compiler() or path), *C_FLAGS, "-c", code, "-o", "code.o"]
+        if subprocess.run(command, cwd=folder, capture_output=True, check=False).returncode:
+            return None
+        said = subprocess.run([counter, "code.o"], cwd=folder, capture_output=True, text=True, check=False)
+    found = re.match(r"\s*(\d+)\s", said.stdout.partition("\n")[2])
+    return int(found[1]) if found else None
 
 
 def _cffi_version() -> str:

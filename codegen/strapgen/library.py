@@ -11,10 +11,11 @@ from pathlib import Path
 
 from strapgen import cache
 from strapgen.catalogue import Choice, derive
+from strapgen.fixedpoint import Settings
 from strapgen.targets import Sources, emit
 
 
-def sources(choice: Choice, target: str) -> Sources:
+def sources(choice: Choice, target: str, settings: Settings | None = None) -> Sources:
     """Return the generated sources of a kernel of the catalogue.
 
     Parameters
@@ -23,6 +24,8 @@ def sources(choice: Choice, target: str) -> Sources:
         What `strapgen.catalogue.choose` returned.
     target : str
         A key of `strapgen.targets.TARGETS`.
+    settings : Settings, optional
+        What fixed point is made for.
 
     Returns
     -------
@@ -33,12 +36,13 @@ def sources(choice: Choice, target: str) -> Sources:
         # Imported here: with the sources in the cache, SymPy and Jinja stay unloaded.
         from strapgen.lowering import lower
 
-        made = emit(lower(derive(choice)), target)
+        made = emit(lower(derive(choice)), target, settings)
         for name, text in made.files.items():
             (draft / name).write_text(text)
         (draft / "interface.json").write_text(json.dumps(made.interface()))
 
-    key = cache.digest([cache.generator_digest(), choice.kernel, target])
+    asked = json.dumps(settings.as_dict(), sort_keys=True) if settings else ""
+    key = cache.digest([cache.generator_digest(), choice.kernel, target, asked])
     folder = cache.entry("sources", key, fill)
     interface = json.loads((folder / "interface.json").read_text())
     return Sources.restore(interface, {name: (folder / name).read_text() for name in interface["files"]})

@@ -5,6 +5,8 @@ algorithm, method, increments
 Kernel
     | lower       straight-line code
 Program
+    | quantize    for fixed point alone: integers, with ranges and error bounds
+FixedProgram
     | generate    source text
 Sources
     | build       compiled, callable
@@ -17,7 +19,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from strapgen import catalogue, targets
+from strapgen import catalogue, fixedpoint, targets
+from strapgen.fixedpoint import FixedProgram, Settings
 
 if TYPE_CHECKING:
     from strapgen.backends import Backend
@@ -88,14 +91,44 @@ def lower(kernel: Kernel) -> Program:
     return lower_kernel(kernel)
 
 
-def generate(program: Program, target: str) -> Sources:
-    """Turn a program into source text.
+def quantize(program: Program, settings: Settings | None = None) -> FixedProgram:
+    """Lower a program to integers: formats from proved ranges, an error bound for every value.
 
     Parameters
     ----------
     program : Program
+    settings : Settings, optional
+        Word, largest increment, rounding and what else a user states; by default 32 bits and 1/8 rad.
+
+    Returns
+    -------
+    FixedProgram
+
+    Raises
+    ------
+    InputError
+        If an input has no known range, a format that is asked for does not hold its values, or the word is too short.
+
+    Examples
+    --------
+    >>> fixed = quantize(lower(derive("euler")))
+    >>> str(fixed.formats["state"]), float(fixed.error_bounds["next"] * 2**30) < 1
+    ('Q1.30', True)
+    """
+    return fixedpoint.quantize(program, settings or Settings())
+
+
+def generate(program: Program | FixedProgram, target: str, settings: Settings | None = None) -> Sources:
+    """Turn a program into source text.
+
+    Parameters
+    ----------
+    program : Program or FixedProgram
+        A fixed-point target takes either; a program is quantized first.
     target : str
-        "numpy", "c" or "c-float".
+        "numpy", "c", "c-float", "c-fixed" or "fixed-model".
+    settings : Settings, optional
+        What fixed point is made for, where the program is not quantized yet.
 
     Returns
     -------
@@ -105,14 +138,14 @@ def generate(program: Program, target: str) -> Sources:
     Raises
     ------
     InputError
-        If the target is unknown.
+        If the target is unknown, or does not go with the program or the settings.
 
     Examples
     --------
     >>> sorted(generate(lower(derive("euler")), "c").files)
     ['euler_rk4_2.c', 'euler_rk4_2.h']
     """
-    return targets.emit(program, target)
+    return targets.emit(program, target, settings)
 
 
 def build(sources: Sources) -> Backend:

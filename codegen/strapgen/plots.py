@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from strapgen.exceptions import InputError, MissingExtraError
 from strapgen.recording import History
 from strapgen.reports import AXES, SKEW_PLANES
 from strapgen.simulation import Run
+from strapgen.study import Outcome
 
 _COLOURS = ("#1f5f8b", "#b5562b", "#3d7a4f")
 
@@ -125,3 +127,111 @@ def history_image(history: History, elements: Sequence[str], title: str, path: s
         axes.set_xlabel("time, s")
     figure.suptitle(title.encode(errors="replace").decode(), fontsize=12)
     return _image(figure, path)
+
+
+def study_image(outcomes: Sequence[Outcome], path: str | Path) -> bytes:
+    """Return drift against word length: a panel for each method, step and pulse, a line for each rounding and carry.
+
+    Dotted, in the colour of its line, the certified bound of the rounding, on top of what else moves the drift; dashed
+    the floor of the method, and where gyro pulses set a higher one, that.
+
+    Parameters
+    ----------
+    outcomes : sequence of Outcome
+    path : path
+        File for the image; its ending says which kind.
+
+    Returns
+    -------
+    bytes
+        The content of the file.
+
+    Raises
+    ------
+    MissingExtraError
+        If matplotlib is not installed.
+    InputError
+        If the kind of image is unknown.
+    """
+    pyplot = _pyplot()
+    panels: dict[tuple[str, str, str], list[Outcome]] = {}
+    for outcome in outcomes:
+        case = outcome.case
+        panels.setdefault((case.method, case.step, case.pulse_arcsec), []).append(outcome)
+    columns = min(3, len(panels))
+    rows = -(-len(panels) // columns)
+    figure, grid = pyplot.subplots(
+        rows,
+        columns,
+        figsize=(2.6 + 4.6 * columns, 0.9 + 3.9 * rows),
+        sharex=True,
+        sharey=True,
+        layout="constrained",
+        squeeze=False,
+    )
+    for axes, ((method, step, pulse), group) in zip(grid.flat, panels.items(), strict=False):
+        _study_panel(axes, group)
+        pulses = "" if float(pulse) == 0 else f", pulses of {pulse}\u2033"
+        axes.set_title(f"{method}, step {step} s{pulses}", loc="left", fontsize=10)
+    for axes in list(grid.flat)[len(panels) :]:
+        axes.set_visible(False)
+    for axes in grid[-1]:
+        axes.set_xlabel("word, bits")
+    for axes in grid[:, 0]:
+        axes.set_ylabel("largest drift of the run, deg")
+    found: dict[str, Any] = {}
+    for axes in list(grid.flat)[: len(panels)]:
+        handles, labels = axes.get_legend_handles_labels()
+        found |= dict(zip(labels, handles, strict=True))
+    figure.legend(found.values(), found.keys(), loc="outside right center", frameon=False, fontsize=9)
+    case = outcomes[0].case
+    words = ", ".join(f"{key}={value}" for key, value in case.settings)
+    title = f"{case.algorithm}: drift against word length\n{case.duration} s of {case.motion} motion, {words}"
+    figure.suptitle(title, fontsize=11, x=0.01, ha="left")
+    return _image(figure, path)
+
+
+def _study_panel(axes: Any, group: Sequence[Outcome]) -> None:
+    """Draw the outcomes of one method, step and pulse."""
+    lines: dict[tuple[str, str], list[Outcome]] = {}
+    for outcome in group:
+        lines.setdefault((outcome.case.rounding, outcome.case.carry), []).append(outcome)
+    for number, ((rounding, carry), line) in enumerate(lines.items()):
+        ordered = sorted(line, key=lambda outcome: outcome.case.word)
+        words = [outcome.case.word for outcome in ordered]
+        drifts = [math.nan if outcome.drift_deg is None else outcome.drift_deg for outcome in ordered]
+        certified = [
+            math.nan if o.bound_deg is None else o.bound_deg + o.truncation_deg + o.quantization_deg
+            for o in ordered
+        ]
+        colour = _COLOURS[number % len(_COLOURS)]
+        kept = {"none": "no residuals", "state": "residuals of the state", "full": "all residuals"}[carry]
+        label = kept if rounding == "nearest" else f"{kept}, {rounding}"
+        # Lines that fall together stay apart by their markers.
+        style = {"marker": "osD^v<>"[number % 7], "markersize": 7 - 1.5 * (number % 3), "fillstyle": "none"}
+        axes.plot(words, drifts, color=colour, linewidth=1.4, label=label, **style)
+        axes.plot(
+            words,
+            certified,
+            color=colour,
+            linewidth=1.0,
+            linestyle=":",
+            alpha=0.9,
+            label=f"{label}: certified",
+        )
+    first = group[0]
+    axes.axhline(
+        first.truncation_deg, color="0.35", linewidth=1.0, linestyle="--", label="floor of the method"
+    )
+    longest = max(group, key=lambda outcome: outcome.case.word)
+    if float(longest.case.pulse_arcsec) and longest.quantization_deg > first.truncation_deg:
+        axes.axhline(
+            longest.quantization_deg, color="0.35", linewidth=1.0, linestyle="-.", label="floor of the pulses"
+        )
+    axes.set_xticks(sorted({outcome.case.word for outcome in group}))
+    axes.set_yscale("log")
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid(alpha=0.25, linewidth=0.6)
+    # More than half a turn is as wrong as can be.
+    low = min((o.truncation_deg for o in group if o.truncation_deg), default=1e-12)
+    axes.set_ylim(low / 10, 360)

@@ -183,7 +183,9 @@ class Program:
         held = {node.name for result in self.outputs for node in result.nodes if isinstance(node, Reference)}
         return sum(assignment.name not in held for assignment in self.body)
 
-    def run(self, values: Mapping[str, Any]) -> dict[str, list[Any]]:
+    def run(
+        self, values: Mapping[str, Any], number: Callable[[Fraction], Any] | None = None
+    ) -> dict[str, list[Any]]:
         """Execute the program on numbers of any kind.
 
         Sums, products and quotients are the numbers' own, exact for `Fraction`; roots and functions are
@@ -193,6 +195,8 @@ class Program:
         ----------
         values : mapping of str to number
             A value for every input element.
+        number : callable, optional
+            What stands for a constant; by default the exact rational itself.
 
         Returns
         -------
@@ -203,7 +207,7 @@ class Program:
 
         def value(node: Node) -> Any:
             if isinstance(node, Constant):
-                return node.value
+                return node.value if number is None else number(node.value)
             if isinstance(node, Reference):
                 return known[node.name]
             return OPERATIONS[node.kind](*map(value, node.arguments))

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from strapgen import checks
 from strapgen.backends import Backend
 from strapgen.exceptions import InputError
+from strapgen.gyro import pulses
 from strapgen.simulation import require_finite
 
 Array = NDArray[np.float64]
@@ -46,6 +47,11 @@ class Recording:
     start: float
     interval: float
     increments: Array
+
+    @property
+    def largest(self) -> float:
+        """Largest magnitude of an element of the increments, in rad."""
+        return float(np.abs(self.increments).max())
 
 
 @dataclass(frozen=True)
@@ -257,6 +263,7 @@ def propagate(
     recording: Recording,
     orthonormalize: float | str | None = None,
     record: float | str | None = None,
+    pulse: float | str | None = None,
 ) -> History:
     """Run an algorithm over recorded increments, from zero rotation.
 
@@ -268,6 +275,8 @@ def propagate(
     orthonormalize, record : number, optional
         Time in s from orthonormalization to orthonormalization (never by default) and from record to record
         (every step by default), multiples of the step to a hundredth of a step.
+    pulse : number, optional
+        Angle of a gyro pulse in rad, see `gyro.pulses`; by default increments are not quantized.
 
     Returns
     -------
@@ -299,7 +308,10 @@ def propagate(
     if record_every > steps:
         raise InputError(f"record {record} s is longer than the recording, {steps * step:.6g} s")
     used = recording.increments[: steps * backend.increments]
-    states = backend.propagate(used.reshape(steps, backend.increments, 3), record_every, every)
+    given = used.reshape(steps, backend.increments, 3)
+    if pulse is not None:
+        given = pulses(given, pulse)
+    states = backend.propagate(given, record_every, every)
     time: Array = recording.start + step * record_every * np.arange(len(states), dtype=np.float64)
     require_finite(states, time)
     return History(time, states, step, unused)

@@ -27,6 +27,9 @@ class Signal:
         What it is, in the field's terms, with its frame.
     bound : Fraction or None
         Largest magnitude of an element in proper use; None where the algorithm sets no limit.
+    constraint : str
+        What holds between the elements in proper use: "unit" (a vector of length 1), "rotation" (a rotation
+        matrix), or nothing.
 
     Examples
     --------
@@ -40,6 +43,7 @@ class Signal:
     unit: str = "1"
     meaning: str = ""
     bound: Fraction | None = None
+    constraint: str = ""
 
     def __post_init__(self) -> None:
         if math.prod(self.shape) != len(self.elements):

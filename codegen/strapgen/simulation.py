@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from strapgen import checks
 from strapgen.backends import Backend, evaluator
 from strapgen.exceptions import InputError
+from strapgen.gyro import pulses
 from strapgen.motions import Motion
 
 Array = NDArray[np.float64]
@@ -73,6 +74,23 @@ def attitude(backend: Backend, states: Any) -> Array:
     return result
 
 
+def drift_between(computed: Any, other: Any) -> Array:
+    """Return the drift vectors between attitudes.
+
+    Parameters
+    ----------
+    computed, other : array_like, (..., 3, 3)
+        Direction cosine matrices.
+
+    Returns
+    -------
+    array, (..., 3)
+        In rad, reference axes; the length of each is the angle between the attitudes, to first order.
+    """
+    drift: Array = evaluator("error-matrix")(computed, other)[3]
+    return drift
+
+
 def require_finite(states: Any, time: Array) -> None:
     """Refuse a run whose numbers have left the range of its back end.
 
@@ -94,6 +112,31 @@ def require_finite(states: Any, time: Array) -> None:
         )
 
 
+def largest_increment(
+    motion: Motion,
+    step: float | str | Fraction,
+    duration: float | str | Fraction,
+    samples: int,
+    pulse: float | str | Fraction | None = None,
+) -> float:
+    """Return the largest element of an angle increment that a simulation feeds to its algorithm, in rad.
+
+    Parameters
+    ----------
+    motion : Motion
+    step, duration, pulse : number
+        As for `simulate`.
+    samples : int
+        Increments a step.
+    """
+    h = checks.number("step", step, positive=True)
+    steps = checks.multiple("duration", checks.number("duration", duration, positive=True), "step", h)
+    increments = motion.increments(h, steps, samples)
+    if pulse is not None:
+        increments = pulses(increments, pulse)
+    return float(np.abs(increments).max())
+
+
 def simulate(
     backend: Backend,
     motion: Motion,
@@ -101,6 +144,7 @@ def simulate(
     duration: float | str | Fraction,
     orthonormalize: float | str | Fraction | None = None,
     record: float | str | Fraction | None = None,
+    pulse: float | str | Fraction | None = None,
 ) -> Run:
     """Run an algorithm on a motion with a known attitude.
 
@@ -116,6 +160,8 @@ def simulate(
         Time from orthonormalization to orthonormalization in s, a multiple of the step; never by default.
     record : number, optional
         Time from record to record in s, a multiple of the step; by default every step is recorded.
+    pulse : number, optional
+        Angle of a gyro pulse in rad, see `gyro.pulses`; by default increments are not quantized.
 
     Returns
     -------
@@ -147,7 +193,10 @@ def simulate(
     if record_every > steps:
         raise InputError(f"record {float(interval):g} s is longer than the duration {float(total):g} s")
     checks.multiple("duration", total, "record interval", interval)
-    states = backend.propagate(motion.increments(h, steps, backend.increments), record_every, every)
+    increments = motion.increments(h, steps, backend.increments)
+    if pulse is not None:
+        increments = pulses(increments, pulse)
+    states = backend.propagate(increments, record_every, every)
     time: Array = np.arange(len(states), dtype=np.float64) * float(interval)
     require_finite(states, time)
     true = motion.attitude(time)

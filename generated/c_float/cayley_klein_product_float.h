@@ -23,7 +23,7 @@ extern "C" {
  * in   state[4]: Cayley-Klein parameters, body to reference, scalar first; unit 1; a_s, a_x, a_y,
  *      a_z; any finite number; at most 1 in magnitude in proper use.
  * in   transition[4]: the step applied to the identity; unit 1; p_s, p_x, p_y, p_z; any finite
- *      number.
+ *      number; at most 1 in magnitude in proper use.
  * out  next[4]: Cayley-Klein parameters, body to reference, scalar first, after the step; unit 1;
  *      next_s, next_x, next_y, next_z.
  */

@@ -22,7 +22,8 @@ extern "C" {
 /* One call.
  * in   state[9]: direction cosine matrix, body to reference; unit 1; C_11, ..., C_33; any finite
  *      number; at most 1 in magnitude in proper use.
- * in   transition[9]: the step applied to the identity; unit 1; A_11, ..., A_33; any finite number.
+ * in   transition[9]: the step applied to the identity; unit 1; A_11, ..., A_33; any finite number;
+ *      at most 1 in magnitude in proper use.
  * out  next[9]: direction cosine matrix, body to reference, after the step; unit 1; next_11, ...,
  *      next_33.
  */

@@ -23,7 +23,7 @@ extern "C" {
  * in   state[4]: Euler parameters, body to reference, scalar last; unit 1; e_x, e_y, e_z, e_s; any
  *      finite number; at most 1 in magnitude in proper use.
  * in   transition[4]: the step applied to the identity; unit 1; p_x, p_y, p_z, p_s; any finite
- *      number.
+ *      number; at most 1 in magnitude in proper use.
  * out  next[4]: Euler parameters, body to reference, scalar last, after the step; unit 1; next_x,
  *      next_y, next_z, next_s.
  */

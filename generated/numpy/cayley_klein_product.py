@@ -22,7 +22,8 @@ def cayley_klein_product(state, transition, out=None):
         1 in magnitude in proper use.
         Elements: a_s, a_x, a_y, a_z.
     transition : array, (..., 4)
-        the step applied to the identity, unit 1; any finite number.
+        the step applied to the identity, unit 1; any finite number; at most 1 in magnitude in
+        proper use.
         Elements: p_s, p_x, p_y, p_z.
     out : array, optional
         Where the result is stored; it may be an input.

@@ -22,7 +22,8 @@ def dcm_product(state, transition, out=None):
         magnitude in proper use.
         Elements: C_11, ..., C_33.
     transition : array, (..., 3, 3)
-        the step applied to the identity, unit 1; any finite number.
+        the step applied to the identity, unit 1; any finite number; at most 1 in magnitude in
+        proper use.
         Elements: A_11, ..., A_33.
     out : array, optional
         Where the result is stored; it may be an input.

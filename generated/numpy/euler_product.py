@@ -22,7 +22,8 @@ def euler_product(state, transition, out=None):
         magnitude in proper use.
         Elements: e_x, e_y, e_z, e_s.
     transition : array, (..., 4)
-        the step applied to the identity, unit 1; any finite number.
+        the step applied to the identity, unit 1; any finite number; at most 1 in magnitude in
+        proper use.
         Elements: p_x, p_y, p_z, p_s.
     out : array, optional
         Where the result is stored; it may be an input.

@@ -3,40 +3,89 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from importlib import import_module
 from typing import NamedTuple
 
 from strapgen import catalogue, checks, library
 from strapgen.backends.protocol import Backend, Evaluator
-from strapgen.targets import Sources
+from strapgen.exceptions import InputError
+from strapgen.fixedpoint import Settings
+from strapgen.targets import FIXED, Sources
 
-__all__ = ["BACKENDS", "Backend", "Entry", "Evaluator", "backend", "build", "evaluator"]
+__all__ = ["BACKENDS", "Backend", "Entry", "Evaluator", "backend", "build", "evaluator", "fitted"]
 
 
 class Entry(NamedTuple):
-    """A back end: what it is, and the module and classes of this package that run it."""
+    """A back end: what it is, the target that it runs, the module and classes of this package that run it.
+
+    `word` is the length of word in fixed point, None where it is the user's choice or there is none.
+    """
 
     title: str
+    target: str
     module: str
     evaluator: str
     backend: str
+    word: int | None = None
 
 
-#: Back ends by name; each runs the target of the same name.
+#: Back ends by name.
 BACKENDS = {
-    "numpy": Entry("generated numpy code in double", "numpy", "NumpyEvaluator", "NumpyBackend"),
-    "c": Entry("generated C in double, compiled", "c", "CEvaluator", "CBackend"),
-    "c-float": Entry("generated C in float, compiled", "c", "CEvaluator", "CBackend"),
+    "numpy": Entry("generated numpy code in double", "numpy", "numpy", "NumpyEvaluator", "NumpyBackend"),
+    "c": Entry("generated C in double, compiled", "c", "c", "CEvaluator", "CBackend"),
+    "c-float": Entry("generated C in float, compiled", "c-float", "c", "CEvaluator", "CBackend"),
+    "c-q31": Entry(
+        "generated C in 32-bit fixed point, compiled",
+        "c-fixed",
+        "fixed",
+        "CFixedEvaluator",
+        "CFixedBackend",
+        32,
+    ),
+    "c-q15": Entry(
+        "generated C in 16-bit fixed point, compiled",
+        "c-fixed",
+        "fixed",
+        "CFixedEvaluator",
+        "CFixedBackend",
+        16,
+    ),
+    "fixed-model": Entry(
+        "integer model of the fixed-point C in Python, any word",
+        "fixed-model",
+        "fixed",
+        "ModelEvaluator",
+        "ModelBackend",
+    ),
 }
 
 
+def fitted(backend: str, settings: Settings | None) -> Settings | None:
+    """Return the settings that a back end runs with: its own word, and defaults where none are given.
+
+    Raises
+    ------
+    InputError
+        If the back end takes no settings.
+    """
+    entry = BACKENDS[checks.choice("backend", backend, BACKENDS)]
+    if entry.target not in FIXED:
+        if settings is not None:
+            takers = ", ".join(name for name, other in BACKENDS.items() if other.target in FIXED)
+            raise InputError(f"backend {backend} takes no fixed-point settings; these do: {takers}")
+        return None
+    settings = settings or Settings()
+    return settings if entry.word is None else replace(settings, word=entry.word)
+
+
 def _loaded(target: str) -> tuple[type[Evaluator], type[Backend]]:
-    entry = BACKENDS[target]
+    entry = next(entry for entry in BACKENDS.values() if entry.target == target)
     module = import_module(f"{__name__}.{entry.module}")
     return getattr(module, entry.evaluator), getattr(module, entry.backend)
 
 
-def evaluator(kernel: str, backend: str = "numpy") -> Evaluator:
+def evaluator(kernel: str, backend: str = "numpy", settings: Settings | None = None) -> Evaluator:
     """Return a kernel of the catalogue that takes no method as a callable.
 
     Parameters
@@ -45,6 +94,8 @@ def evaluator(kernel: str, backend: str = "numpy") -> Evaluator:
         Name of the kernel, for instance "dcm-from-euler".
     backend : str, optional
         A key of `BACKENDS`.
+    settings : Settings, optional
+        What fixed point is made for.
 
     Returns
     -------
@@ -66,7 +117,8 @@ def evaluator(kernel: str, backend: str = "numpy") -> Evaluator:
     """
     checks.choice("backend", backend, BACKENDS)
     checks.choice("kernel", kernel, catalogue.KERNELS)
-    return _evaluator(library.sources(catalogue.choose(kernel), backend))
+    chosen = fitted(backend, settings)
+    return _evaluator(library.sources(catalogue.choose(kernel), BACKENDS[backend].target, chosen))
 
 
 def backend(
@@ -75,6 +127,7 @@ def backend(
     increments: int | None = None,
     backend: str = "numpy",
     orthonormalization: str | None = None,
+    settings: Settings | None = None,
 ) -> Backend:
     """Return an attitude algorithm as a back end, generated and compiled if it is not in the cache.
 
@@ -90,6 +143,9 @@ def backend(
         A key of `BACKENDS`.
     orthonormalization : str, optional
         Kernel that orthonormalizes, for instance "dcm-orthonormalize-optimal"; by default the thesis's.
+    settings : Settings, optional
+        What fixed point is made for: largest increment, rounding, residuals, and the word of "fixed-model". By default
+        increments of up to 1/8 rad.
 
     Returns
     -------
@@ -112,7 +168,8 @@ def backend(
     if orthonormalization is not None:
         checks.choice("orthonormalization", orthonormalization, catalogue.orthonormalizations(algorithm))
     choice = catalogue.choose(algorithm, method, increments)
-    return build(library.sources(choice, backend), orthonormalization)
+    chosen = fitted(backend, settings)
+    return build(library.sources(choice, BACKENDS[backend].target, chosen), orthonormalization)
 
 
 def build(sources: Sources, orthonormalization: str | None = None) -> Backend:
@@ -137,7 +194,10 @@ def build(sources: Sources, orthonormalization: str | None = None) -> Backend:
     """
 
     def evaluate(kernel: str) -> Evaluator:
-        return _evaluator(sources) if kernel == sources.kernel else evaluator(kernel, sources.target)
+        if kernel == sources.kernel:
+            return _evaluator(sources)
+        settings = sources.fixed.companion_settings if sources.fixed else None
+        return _evaluator(library.sources(catalogue.choose(kernel), sources.target, settings))
 
     make = _loaded(sources.target)[1]
     return make(sources, evaluate, orthonormalization)

@@ -105,6 +105,10 @@ class Backend(ABC):
         The state of zero rotation.
     attitude : str or None
         Kernel that turns a state into a direction cosine matrix; None where the state is one.
+    unit : float
+        Unit of the last place of a state's element near 1.
+    sources : Sources
+        What it was made of.
     """
 
     def __init__(
@@ -117,6 +121,7 @@ class Backend(ABC):
         if companions is None:
             raise InputError(f"kernel {sources.kernel} is no attitude step; back ends are built from steps")
         state, samples = sources.function.inputs
+        self.sources = sources
         self.name = sources.target
         self.kernel = sources.kernel
         self.takes = samples.name
@@ -132,6 +137,39 @@ class Backend(ABC):
         self.identity: Array = np.array([float(x) for x in companions.identity], self.dtype).reshape(
             state.shape
         )
+        self.unit = float(np.finfo(self.dtype).eps)
+
+    def rounding_bound(self, steps: int, rounded_inputs: bool = False) -> float | None:
+        """Return a certified bound of what rounding does to a run without orthonormalization.
+
+        Parameters
+        ----------
+        steps : int
+        rounded_inputs : bool, optional
+            Whether increments that are no integers of the input's format are counted too.
+
+        Returns
+        -------
+        float or None
+            Bound of the distance from the same algorithm in exact arithmetic, as the length of the difference of two
+            states, or of two rows of matrices; None where nothing is certified, as in floating point.
+        """
+        return None
+
+    def representable(self, increments: Any) -> Array:
+        """Return increments rounded to what the back end takes: in floating point, as they are."""
+        return np.asarray(increments, self.dtype)
+
+    def prepared(self, increments: Any) -> Callable[[], Any]:
+        """Return a call that propagates from zero rotation, keeping all states, with every conversion done: for timing.
+
+        Parameters
+        ----------
+        increments : array_like, (N, K, 3)
+            Angle increments in rad.
+        """
+        ready = np.ascontiguousarray(increments, self.dtype)
+        return lambda: self.propagate(ready)
 
     def need_increments(self) -> None:
         """Check that steps take angle increments.

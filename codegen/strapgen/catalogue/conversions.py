@@ -9,14 +9,23 @@ from strapgen.catalogue.kinematics import CAYLEY_KLEIN, DCM, EULER, THESIS, Kine
 from strapgen.kernel import Kernel, KernelBuilder
 from strapgen.signal import Signal
 
-_CONVERTED = Signal.matrix("attitude", "C", meaning=DCM.state.meaning, bound=DCM.state.bound)
+_CONVERTED = Signal.matrix(
+    "attitude", "C", meaning=DCM.state.meaning, bound=DCM.state.bound, constraint="rotation"
+)
 
 
 def _result(kinematics: Kinematics) -> Signal:
     """Return the state of an algorithm as the result of a conversion."""
     state = kinematics.state
     elements = tuple(f"next_{element.split('_')[1]}" for element in state.elements)
-    return Signal("converted", state.shape, elements, meaning=state.meaning, bound=state.bound)
+    return Signal(
+        "converted",
+        state.shape,
+        elements,
+        meaning=state.meaning,
+        bound=state.bound,
+        constraint=state.constraint,
+    )
 
 
 def dcm_from_euler() -> Kernel:

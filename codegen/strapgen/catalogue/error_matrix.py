@@ -22,8 +22,12 @@ def error_matrix() -> Kernel:
         ``drift`` (3,), the last two in rad, each in the order x, y, z.
     """
     build = KernelBuilder()
-    computed = build.input(Signal.matrix("computed", "C", meaning=f"{DCM_MEANING}, computed", bound=UNIT))
-    truth = build.input(Signal.matrix("truth", "T", meaning=f"{DCM_MEANING}, true", bound=UNIT))
+    computed = build.input(
+        Signal.matrix("computed", "C", meaning=f"{DCM_MEANING}, computed", bound=UNIT, constraint="rotation")
+    )
+    truth = build.input(
+        Signal.matrix("truth", "T", meaning=f"{DCM_MEANING}, true", bound=UNIT, constraint="rotation")
+    )
     E = build.output(
         Signal.matrix("error", "E", meaning="error matrix, reference axes"),
         computed * truth.T - sp.eye(3),

@@ -9,8 +9,12 @@ from strapgen.catalogue.kinematics import CAYLEY_KLEIN, DCM_MEANING, EULER, THES
 from strapgen.kernel import Kernel, KernelBuilder
 from strapgen.signal import Signal
 
-_COMPUTED = Signal.matrix("computed", "C", meaning=f"{DCM_MEANING}, as computed", bound=UNIT)
-_RESULT = Signal.matrix("orthonormalized", "next", meaning=f"{DCM_MEANING}, orthonormalized", bound=UNIT)
+_COMPUTED = Signal.matrix(
+    "computed", "C", meaning=f"{DCM_MEANING}, as computed", bound=UNIT, constraint="rotation"
+)
+_RESULT = Signal.matrix(
+    "orthonormalized", "next", meaning=f"{DCM_MEANING}, orthonormalized", bound=UNIT, constraint="rotation"
+)
 _NEAR = "Made for a matrix near a rotation: all products of its transpose and itself near the identity."
 
 

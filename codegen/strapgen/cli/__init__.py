@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import typer
 
-from strapgen.cli import derive, generate, listing, simulate, tables, version
+from strapgen.cli import compare, derive, generate, listing, simulate, study, tables, version
 from strapgen.exceptions import StrapgenError
 
 app = typer.Typer(
@@ -23,7 +23,9 @@ app.command("list")(listing.list_names)
 app.command("derive")(derive.derive)
 app.command("generate")(generate.generate)
 app.command("simulate")(simulate.simulate)
+app.command("compare")(compare.compare)
 app.command("tables")(tables.tables)
+app.add_typer(study.app, name="study")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -54,8 +56,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if explain is None:
             raise
         said = explain() or "a command is needed"
-        if said.startswith("No such command"):
-            said += f" Allowed: {', '.join(str(command.name) for command in app.registered_commands)}."
+        if said.startswith(("No such command", "Missing command")):
+            context = getattr(error, "ctx", None)
+            known = getattr(context and context.command, "commands", {})
+            said += f" Allowed: {', '.join(known)}."
         _fail(said)
     sys.exit(status if isinstance(status, int) else 0)
 

@@ -7,6 +7,18 @@ from typing import Annotated
 
 import typer
 
+from strapgen.cli.fixed import (
+    Allowance,
+    Carry,
+    Fixes,
+    MaxAngle,
+    MaxRate,
+    Ranges,
+    Rounding,
+    Step,
+    Word,
+    read_settings,
+)
 from strapgen.cli.options import Format, Increments, Method, Rates, check_format, print_json, whole
 from strapgen.cli.progress import track
 from strapgen.exceptions import InputError
@@ -21,7 +33,11 @@ def generate(
     rates: Rates = False,
     target: Annotated[
         str | None,
-        typer.Option("--target", help="numpy, c or c-float.  [default: numpy]", show_default=False),
+        typer.Option(
+            "--target",
+            help="numpy, c, c-float, c-fixed or fixed-model.  [default: numpy]",
+            show_default=False,
+        ),
     ] = None,
     out: Annotated[
         Path | None,
@@ -33,15 +49,46 @@ def generate(
     check: Annotated[
         bool, typer.Option("--check", help="With --all: write nothing, exit 1 with a diff if out of step.")
     ] = False,
+    word: Word = None,
+    max_rate_deg_s: MaxRate = None,
+    step: Step = None,
+    max_angle_rad: MaxAngle = None,
+    rounding: Rounding = None,
+    carry: Carry = None,
+    drift_allowance: Allowance = None,
+    ranges: Ranges = None,
+    fix: Fixes = None,
     format: Format = "text",
 ) -> None:
     """Generate source code for an algorithm, or for the standard catalogue.
 
-    Example: strapgen generate euler --method rk4 --increments 2 --target c --out firmware
-    """
+    Fixed point is made for a largest increment: state the largest rate and the step.
+
+    Example:
+
+    \b
+      strapgen generate euler --method rk4 --increments 2 --target c --out firmware
+
+    \b
+      strapgen generate euler --target c-fixed --word 32 \\
+        --max-rate-deg-s 400 --step 0.01 --out firmware
+    """  # noqa: D301
     check_format(format)
     if check and not all_:
         raise InputError("--check goes with --all")
+    count = whole("increments", increments)
+    settings = read_settings(
+        1 if rates else 2 if count is None else max(1, count),
+        word=word,
+        max_rate_deg_s=max_rate_deg_s,
+        step=step,
+        max_angle_rad=max_angle_rad,
+        rounding=rounding,
+        carry=carry,
+        drift_allowance=drift_allowance,
+        ranges=ranges,
+        formats=fix,
+    )
     if all_:
         for name, value in (
             ("an algorithm", algorithm),
@@ -49,6 +96,7 @@ def generate(
             ("--increments", increments),
             ("--rates", rates or None),
             ("--target", target),
+            ("a fixed-point option", settings),
         ):
             if value is not None:
                 raise InputError(f"--all generates the whole catalogue; {name} does not go with it")
@@ -57,28 +105,40 @@ def generate(
     if algorithm is None:
         raise InputError("an algorithm is needed, or --all; strapgen list shows them")
     from strapgen import checks, output, pipeline
-    from strapgen.targets import TARGETS
+    from strapgen.targets import FIXED, TARGETS
 
     target = checks.choice("target", "numpy" if target is None else target, TARGETS)
-    program = pipeline.lower(pipeline.derive(algorithm, method, whole("increments", increments), rates=rates))
-    sources = pipeline.generate(program, target)
+    if settings is not None and target not in FIXED:
+        raise InputError(
+            f"the options of fixed point go with --target {' or '.join(FIXED)}, not with {target}"
+        )
+    kernel = pipeline.derive(algorithm, method, count, rates=rates)
+    program = pipeline.lower(kernel)
+    fixed = pipeline.quantize(program, settings) if target in FIXED else None
+    sources = pipeline.generate(fixed or program, target)
     written = output.write_files(out or Path(), sources.files)
     operations = sources.operations
     if format == "json":
-        print_json(
-            {
-                "kernel": sources.kernel,
-                "target": target,
-                "files": [str(path) for path in written],
-                "operations": {kind: operations[kind] for kind in ("add", "multiply", "divide", "sqrt")},
-                "temporaries": sources.temporaries,
-            }
-        )
+        data = {
+            "kernel": sources.kernel,
+            "target": target,
+            "files": [str(path) for path in written],
+            "operations": {kind: operations[kind] for kind in ("add", "multiply", "divide", "sqrt")},
+            "temporaries": sources.temporaries,
+        }
+        print_json(data | (fixed.as_data() if fixed else {}))
         return
     counts = ", ".join(f"{number} {kind}" for kind, number in operations.items() if number) or "no operations"
     typer.echo(f"{sources.kernel} for {target}: {counts}, {sources.temporaries} temporaries")
     for path in written:
         typer.echo(f"  {path}")
+    if fixed is not None:
+        for name, bound in fixed.error_bounds.items():
+            format_ = fixed.formats[name]
+            places = float(bound / format_.unit)
+            typer.echo(
+                f"  {name}: {format_}, error at most {float(bound):.4g}, {places:.4f} of the last place"
+            )
 
 
 def _generate_all(out: Path | None, check: bool, format: str) -> None:

@@ -10,6 +10,28 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from strapgen.catalogue import ALGORITHMS, MOTIONS
+from strapgen.cli.fixed import (
+    Allowance,
+    Carry,
+    MaxRate,
+    Rounding,
+    Word,
+    settings_for_run,
+)
+from strapgen.cli.inputs import (
+    Duration,
+    IncrementsFile,
+    MotionName,
+    MotionSettings,
+    Pulse,
+    RatesFile,
+    RateUnit,
+    ResampleHz,
+    RunStep,
+    arcseconds,
+    check_source,
+    pairs,
+)
 from strapgen.cli.options import Increments, Method, check_format, whole
 from strapgen.exceptions import InputError
 
@@ -23,19 +45,13 @@ def simulate(
     algorithm: Annotated[str, typer.Argument(help="dcm, euler or cayley-klein.")],
     method: Method = None,
     increments: Increments = None,
-    backend: Annotated[str, typer.Option("--backend", help="numpy, c or c-float.")] = "numpy",
-    motion: Annotated[
-        _Text,
-        typer.Option("--motion", help="constant, sinusoidal, coning or polynomial.", show_default=False),
-    ] = None,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE...", help="Parameters of the motion; see strapgen list."),
-    ] = None,
-    step: Annotated[_Text, typer.Option("--step", metavar="S", help="Step in s.", show_default=False)] = None,
-    duration: Annotated[
-        _Text, typer.Option("--duration", metavar="S", help="Duration in s.", show_default=False)
-    ] = None,
+    backend: Annotated[
+        str, typer.Option("--backend", help="numpy, c, c-float, c-q31, c-q15 or fixed-model.")
+    ] = "numpy",
+    motion: MotionName = None,
+    settings: MotionSettings = None,
+    step: RunStep = None,
+    duration: Duration = None,
     orthonormalize: Annotated[
         _Text,
         typer.Option(
@@ -60,30 +76,16 @@ def simulate(
             show_default=False,
         ),
     ] = None,
-    increments_csv: Annotated[
-        Path | None,
-        typer.Option(
-            "--increments-csv", help="Propagate recorded increments: columns t, dx, dy, dz; s, rad."
-        ),
-    ] = None,
-    rates_csv: Annotated[
-        Path | None,
-        typer.Option(
-            "--rates-csv", help="Propagate recorded rates: first four columns time in s, three rates."
-        ),
-    ] = None,
-    rate_unit: Annotated[
-        _Text, typer.Option("--rate-unit", help="deg/s or rad/s, for --rates-csv.", show_default=False)
-    ] = None,
-    resample_hz: Annotated[
-        _Text,
-        typer.Option(
-            "--resample-hz",
-            metavar="HZ",
-            help="Integrate uneven recorded rates over an even grid.",
-            show_default=False,
-        ),
-    ] = None,
+    increments_csv: IncrementsFile = None,
+    rates_csv: RatesFile = None,
+    rate_unit: RateUnit = None,
+    resample_hz: ResampleHz = None,
+    pulse_arcsec: Pulse = None,
+    word: Word = None,
+    max_rate_deg_s: MaxRate = None,
+    rounding: Rounding = None,
+    carry: Carry = None,
+    drift_allowance: Allowance = None,
     out: Annotated[
         Path | None,
         typer.Option("--out", help="File for the output.  [default: the terminal]", show_default=False),
@@ -106,6 +108,8 @@ def simulate(
     Recorded times that are not even are refused unless --resample-hz is given; then intervals of up to ten times the
     median are bridged by a straight line.
 
+    Formats of fixed point are chosen for the increments of the run, or for --max-rate-deg-s.
+
     Example:
 
     \b
@@ -119,17 +123,9 @@ def simulate(
     """  # noqa: D301
     samples = whole("increments", increments)
     _check_names(algorithm, method, samples, backend, motion, format)
-    sources = {"--motion": motion, "--increments-csv": increments_csv, "--rates-csv": rates_csv}
-    chosen = [name for name, value in sources.items() if value is not None]
-    if len(chosen) != 1:
-        raise InputError(f"one of {', '.join(sources)} is needed; {' and '.join(chosen) or 'none'} given")
-    if motion is None:
-        given = {"--set": settings, "--step": step, "--duration": duration, "--matrices": matrices or None}
-        _refuse(given, "--motion", chosen[0])
-    if rates_csv is None:
-        _refuse({"--rate-unit": rate_unit, "--resample-hz": resample_hz}, "--rates-csv", chosen[0])
-    elif rate_unit is None:
-        raise InputError("--rates-csv needs --rate-unit deg/s or rad/s")
+    check_source(motion, settings, step, duration, increments_csv, rates_csv, rate_unit, resample_hz)
+    if motion is None and matrices:
+        raise InputError("--matrices goes with --motion")
     if matrices and format != "json":
         raise InputError("--matrices goes with --format json; --format csv has the matrices")
     if out is not None and plot is not None and out.resolve() == plot.resolve():
@@ -140,26 +136,35 @@ def simulate(
     from strapgen import output
     from strapgen.backends import backend as make_backend
 
-    def ready() -> Backend:
-        return make_backend(algorithm, method, samples, backend, scheme)
+    stated = {
+        "word": word,
+        "max_rate_deg_s": max_rate_deg_s,
+        "rounding": rounding,
+        "carry": carry,
+        "drift_allowance": drift_allowance,
+    }
+    _check_fixed(backend, stated)
+    pulse = arcseconds(pulse_arcsec)
+
+    def ready(seconds: float, largest: Callable[[], float]) -> Backend:
+        settings = settings_for_run(backend, samples, stated, seconds, largest)
+        return make_backend(algorithm, method, samples, backend, scheme, settings)
 
     with np.errstate(all="ignore"):  # numbers that overflow are refused, in one line
         if motion is not None:
-            for name, value in (("--step", step), ("--duration", duration)):
-                if value is None:
-                    raise InputError(f"--motion needs {name} in s")
-            times = (str(step), str(duration), orthonormalize, record)
+            times = (str(step), str(duration), orthonormalize, record, pulse)
             text, image = _on_motion(
-                ready, motion, _pairs(settings or []), times, format or "text", plot, matrices
+                ready, motion, pairs(settings or []), times, format or "text", plot, matrices, samples or 2
             )
         else:
             text, image = _on_recording(
                 ready,
                 increments_csv,
                 (rates_csv, rate_unit, resample_hz),
-                (orthonormalize, record),
+                (orthonormalize, record, pulse),
                 format or "csv",
                 plot,
+                samples or 2,
             )
     text = text.rstrip("\n")
     files: dict[str, str | bytes] = {}
@@ -170,6 +175,15 @@ def simulate(
     output.write_files(Path(), files)
     if out is None:
         typer.echo(text)
+
+
+def _check_fixed(backend: str, stated: dict[str, _Text]) -> None:
+    from strapgen.backends import BACKENDS
+    from strapgen.targets import FIXED
+
+    for name, value in stated.items():
+        if value is not None and BACKENDS[backend].target not in FIXED:
+            raise InputError(f"--{name.replace('_', '-')} is for fixed-point back ends, not for {backend}")
 
 
 def _check_names(
@@ -193,47 +207,32 @@ def _check_names(
         check_format(format, "csv")
 
 
-def _refuse(options: dict[str, Any], owner: str, chosen: str) -> None:
-    for name, value in options.items():
-        if value is not None:
-            raise InputError(f"{name} goes with {owner}, not with {chosen}")
-
-
-def _pairs(settings: list[str]) -> dict[str, str]:
-    pairs: dict[str, str] = {}
-    for setting in settings:
-        key, equals, value = setting.partition("=")
-        if not equals or not key:
-            raise InputError(f"--set {setting!r} is no setting; key=value is needed")
-        if key in pairs:
-            raise InputError(f"--set {key} is given twice")
-        pairs[key] = value
-    return pairs
-
-
 def _named(ready: Backend) -> dict[str, Any]:
     algorithm, method, increments = ready.kernel.rsplit("-", 2)
     return {"algorithm": algorithm, "method": method, "increments": int(increments), "backend": ready.name}
 
 
 def _on_motion(
-    make: Callable[[], Backend],
+    make: Callable[[float, Callable[[], float]], Backend],
     motion: str,
     settings: dict[str, str],
-    times: tuple[str, str, str | None, str | None],
+    times: tuple[str, str, str | None, str | None, float | None],
     format: str,
     plot: Path | None,
     matrices: bool,
+    samples: int,
 ) -> tuple[str, bytes | None]:
     """Simulate; return the output and, if one is wanted, the image."""
     from strapgen import checks, plots, reports
     from strapgen.motions import motion as make_motion
+    from strapgen.simulation import largest_increment
     from strapgen.simulation import simulate as run_simulation
 
     profile = make_motion(motion, **settings)
-    ready = make()
+    step, duration, _, _, pulse = times
+    length = float(checks.number("step", step, positive=True))
+    ready = make(length, lambda: largest_increment(profile, step, duration, samples, pulse))
     run = run_simulation(ready, profile, *times)
-    step, duration, _, _ = times
     title = f"{ready.kernel}, {ready.name}: {profile.name} motion, step {step} s"
     image = None if plot is None else plots.run_image(run, title, plot)
     if format == "csv":
@@ -250,12 +249,13 @@ def _on_motion(
 
 
 def _on_recording(
-    make: Callable[[], Backend],
+    make: Callable[[float, Callable[[], float]], Backend],
     increments_csv: Path | None,
     rates: tuple[Path | None, str | None, str | None],
-    times: tuple[str | None, str | None],
+    times: tuple[str | None, str | None, float | None],
     format: str,
     plot: Path | None,
+    samples: int,
 ) -> tuple[str, bytes | None]:
     """Propagate recorded data; return the output and, if one is wanted, the image."""
     from strapgen import plots, recording, reports
@@ -265,7 +265,7 @@ def _on_recording(
         data = recording.read_increments(increments_csv)
     else:
         data = recording.read_rates(rates_csv or "", unit or "", resample_hz)
-    ready = make()
+    ready = make(data.interval * samples, lambda: data.largest + (times[2] or 0.0))
     history = recording.propagate(ready, data, *times)
     source = increments_csv or rates_csv or Path()
     title = f"{ready.kernel}, {ready.name}: attitude along {source.name}"

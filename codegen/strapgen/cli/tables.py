@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from strapgen.cli.fixed import Carry, Rounding, read_settings
 from strapgen.cli.options import Format, check_format, print_json
 from strapgen.cli.progress import track
 
@@ -16,24 +17,36 @@ if TYPE_CHECKING:
 
 def tables(
     backend: Annotated[
-        str | None, typer.Option("--backend", help="numpy, c or c-float.  [default: all]", show_default=False)
+        str | None,
+        typer.Option(
+            "--backend",
+            help="numpy, c, c-float, c-q31, c-q15 or fixed-model.  [default: all but the model]",
+            show_default=False,
+        ),
     ] = None,
+    rounding: Rounding = None,
+    carry: Carry = None,
     format: Format = "text",
 ) -> None:
     """Run the five tables of the thesis and print them beside its figures.
 
-    Example: strapgen tables --backend c
+    Example: strapgen tables --backend c-q31 --carry full
     """
     check_format(format)
     from strapgen import checks
     from strapgen.backends import BACKENDS
+    from strapgen.exceptions import InputError
     from strapgen.tables import ALGORITHMS, ORDERS, TABLES, build_all, run_tables
+    from strapgen.targets import FIXED
 
     names = _runnable() if backend is None else (checks.choice("backend", backend, BACKENDS),)
+    settings = read_settings(2, rounding=rounding, carry=carry)
+    if settings is not None and not any(BACKENDS[name].target in FIXED for name in names):
+        raise InputError(f"--rounding and --carry are for fixed-point back ends, not for {', '.join(names)}")
     cases = len(names) * len(ALGORITHMS) * len(ORDERS)
-    for _ in track(build_all(names), "building", cases):
+    for _ in track(build_all(names, settings), "building", cases):
         pass
-    entries = list(track(run_tables(names), "simulating", cases * len(TABLES)))
+    entries = list(track(run_tables(names, settings), "simulating", cases * len(TABLES)))
     if format == "json":
         print_json([entry.as_dict() for entry in entries])
         return
@@ -44,15 +57,20 @@ def tables(
 def _runnable() -> tuple[str, ...]:
     """Return all back ends, or, with a word on stderr, those that need no compiler if there is none."""
     from strapgen import compilation
-    from strapgen.backends import BACKENDS
     from strapgen.exceptions import CompilerError
+    from strapgen.tables import DEFAULT_BACKENDS
 
     try:
         compilation.compiler()
     except CompilerError as error:
         typer.echo(f"strapgen: only numpy is shown: {error}", err=True)
         return ("numpy",)
-    return tuple(BACKENDS)
+    return DEFAULT_BACKENDS
+
+
+def _mark(entry: Entry) -> str:
+    """Return what stands behind a figure: round-off says more than that the figure is not the thesis's."""
+    return "r" if entry.roundoff_dominates else "" if entry.agrees else "*"
 
 
 _NAMES = {"dcm": "direction cosines", "euler": "Euler parameters"}
@@ -76,13 +94,15 @@ def _print_table(table: Table, entries: list[Entry]) -> None:
         )
         for backend in dict.fromkeys(entry.backend for entry in entries):
             cells = [
-                f"{e.drift_deg:>11.4g}{e.normalised:>11.4g}{' ' if e.agrees else '*'} "
+                f"{e.drift_deg:>11.4g}{e.normalised:>11.4g}{_mark(e):<2}"
                 for e in entries
                 if (e.backend, e.algorithm) == (backend, algorithm)
             ]
             lines.append(f"    {backend:<10}" + "".join(cells))
     if not all(entry.agrees for entry in entries):
         lines.append("  * not the thesis's figure in its printed digits")
+    if any(entry.roundoff_dominates for entry in entries):
+        lines.append("  r round-off dominates: over half of what the method itself loses")
     for note in dict.fromkeys(entry.note for entry in entries if entry.note):
         lines += [f"  {line}" for line in textwrap.wrap(note, 90)]
     typer.echo("\n".join(line.rstrip() for line in lines) + "\n")

@@ -6,10 +6,12 @@ from importlib import import_module
 from typing import NamedTuple
 
 from strapgen import checks
+from strapgen.exceptions import InputError
+from strapgen.fixedpoint import FixedProgram, Settings
 from strapgen.program import Program
 from strapgen.targets.sources import Function, Sources
 
-__all__ = ["TARGETS", "Function", "Sources", "Target", "emit"]
+__all__ = ["FIXED", "TARGETS", "Function", "Sources", "Target", "emit"]
 
 
 class Target(NamedTuple):
@@ -24,17 +26,24 @@ TARGETS = {
     "numpy": Target("numpy, vectorised over leading axes", "numpy"),
     "c": Target("C99 in double", "c"),
     "c-float": Target("C99 in float", "c"),
+    "c-fixed": Target("C99 in fixed point: integers alone, error bounds certified", "c_fixed"),
+    "fixed-model": Target("Python on integers, bit for bit what the fixed-point C computes", "fixed_model"),
 }
 
+#: Targets that are made for settings: word, ranges, rounding.
+FIXED = ("c-fixed", "fixed-model")
 
-def emit(program: Program, target: str) -> Sources:
+
+def emit(program: Program | FixedProgram, target: str, settings: Settings | None = None) -> Sources:
     """Generate source text for a program.
 
     Parameters
     ----------
-    program : Program
+    program : Program or FixedProgram
     target : str
         A key of `TARGETS`.
+    settings : Settings, optional
+        What fixed point is made for; it goes with the targets of `FIXED` alone.
 
     Returns
     -------
@@ -43,8 +52,15 @@ def emit(program: Program, target: str) -> Sources:
     Raises
     ------
     InputError
-        If the target is unknown.
+        If the target is unknown or takes no settings, or the program cannot be lowered to integers.
     """
     module = import_module(f"{__name__}.{TARGETS[checks.choice('target', target, TARGETS)].module}")
+    if target in FIXED:
+        made: Sources = module.emit(program, target, settings)
+        return made
+    if isinstance(program, FixedProgram):
+        raise InputError(f"target {target} does not take fixed-point programs; these do: {', '.join(FIXED)}")
+    if settings is not None:
+        raise InputError(f"target {target} takes no fixed-point settings; these do: {', '.join(FIXED)}")
     sources: Sources = module.emit(program, target)
     return sources

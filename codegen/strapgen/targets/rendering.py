@@ -8,6 +8,7 @@ from typing import Any
 import jinja2
 
 from strapgen import resources
+from strapgen.targets import fixed_text
 from strapgen.targets.printer import elements_text, fill, fill_arguments, operations_text, range_text
 
 
@@ -26,6 +27,11 @@ def _environment() -> jinja2.Environment:
         range=range_text,
         elements=elements_text,
         operations=operations_text,
+        argument_text=fixed_text.argument_text,
+        fixed_command=fixed_text.command,
+        accumulation_text=fixed_text.accumulation_text,
+        residuals_text=fixed_text.residuals_text,
+        guards_text=fixed_text.guards_text,
     )
     return environment
 

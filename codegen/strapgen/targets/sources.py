@@ -7,6 +7,7 @@ from fractions import Fraction
 from typing import Any
 
 from strapgen.companions import Companions
+from strapgen.fixedpoint import Interface
 from strapgen.signal import Signal
 
 
@@ -37,6 +38,8 @@ class Sources:
         Intermediate values of one call.
     companions : Companions or None
         What belongs to an attitude step; None for every other kernel.
+    fixed : Interface or None
+        Formats, ranges and error bounds of fixed-point code; None for every other target.
     """
 
     kernel: str
@@ -46,6 +49,7 @@ class Sources:
     operations: dict[str, int]
     temporaries: int
     companions: Companions | None
+    fixed: Interface | None = None
 
     def interface(self) -> dict[str, Any]:
         """Return everything but the text as plain JSON data."""
@@ -68,6 +72,7 @@ class Sources:
                 "attitude": companions.attitude,
                 "identity": [str(element) for element in companions.identity],
             },
+            "fixed": self.fixed and self.fixed.as_dict(),
         }
 
     @classmethod
@@ -89,4 +94,5 @@ class Sources:
             interface["operations"],
             interface["temporaries"],
             companions,
+            interface["fixed"] and Interface.from_dict(interface["fixed"]),
         )

@@ -1,0 +1,330 @@
+"""The fixed-point back ends: generated C on integers, and the integer model in Python.
+
+Both turn numbers into integers at the door, and refuse those that the formats were not chosen for.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from strapgen import compilation
+from strapgen.backends.protocol import Array, Backend, Evaluator
+from strapgen.exceptions import InputError
+from strapgen.fixedpoint.code import Argument, Interface
+from strapgen.targets import Sources
+
+
+class FixedEvaluator(Evaluator):
+    """A generated fixed-point function.
+
+    Attributes
+    ----------
+    interface : Interface
+        Formats, ranges and error bounds.
+    """
+
+    def __init__(self, sources: Sources) -> None:
+        assert sources.fixed is not None, "fixed-point sources tell their formats"
+        super().__init__(sources.function, np.float64)
+        self.kernel = sources.kernel
+        self.interface: Interface = sources.fixed
+        self.integer_type: Any = object if self.interface.settings.word > 32 else np.int64
+
+    def integers(self, argument: Argument, values: Any) -> Array:
+        """Return numbers as the integers of an input, rounded to the nearest.
+
+        Raises
+        ------
+        InputError
+            If one lies outside the input's range.
+        """
+        scaled = np.rint(np.ldexp(np.asarray(values, np.float64), argument.format.fraction))
+        outside = (scaled < argument.low) | (scaled > argument.high)
+        if outside.any():
+            worst = float(np.asarray(values)[outside].flat[0])
+            limit = float(argument.high * argument.format.unit)
+            raise InputError(
+                f"{argument.signal.name} holds {worst:.9g}; the formats of {self.kernel} were chosen for at most "
+                f"{limit:.9g} in magnitude"
+            )
+        whole = scaled.astype(np.int64)
+        return whole.astype(object) if self.integer_type is object else whole
+
+    def numbers(self, argument: Argument, integers: Any) -> Array:
+        """Return integers of an output as numbers."""
+        return np.ldexp(np.asarray(integers).astype(np.float64), -argument.format.fraction)
+
+    def _call(self, arrays: list[Array], batch: tuple[int, ...]) -> tuple[Array, ...]:
+        count = int(np.prod(batch, dtype=int))
+        inputs = []
+        for argument, array in zip(self.interface.inputs, arrays, strict=True):
+            shape = argument.signal.shape
+            whole = np.broadcast_to(array, batch + shape).reshape(count, argument.signal.size)
+            inputs.append(self.integers(argument, whole))
+        outputs, _ = self.run(inputs, self.fresh(count))
+        return tuple(
+            self.numbers(argument, output).reshape(batch + argument.signal.shape)
+            for argument, output in zip(self.interface.outputs, outputs, strict=True)
+        )
+
+    def fresh(self, count: int) -> Array:
+        """Return the residuals of so many fresh starts, (count, number of residuals)."""
+        words = np.array([residual.fresh for residual in self.interface.residuals], self.integer_type)
+        return np.tile(words, (count, 1))
+
+    @abstractmethod
+    def run(self, inputs: Sequence[Array], residuals: Array) -> tuple[tuple[Array, ...], Array]:
+        """Call the function on integers.
+
+        Parameters
+        ----------
+        inputs : sequence of array, (count, size)
+        residuals : array, (count, number of residuals)
+
+        Returns
+        -------
+        outputs : tuple of array, (count, size)
+        residuals : array, (count, number of residuals)
+
+        Raises
+        ------
+        InputError
+            If the function refuses a call.
+        """
+
+    def refused(self, status: int, where: str = "") -> InputError:
+        """Return the error that stands for a status of the generated code."""
+        if status == 1:
+            limits = ", ".join(
+                f"{a.signal.name} up to {float(a.high * a.format.unit):.6g}" for a in self.interface.inputs
+            )
+            return InputError(f"{self.kernel} refuses its input{where}: its formats were chosen for {limits}")
+        return InputError(f"{self.kernel} refuses its input{where}: it is too far from a proper one")
+
+
+class CFixedEvaluator(FixedEvaluator):
+    """A generated C function on integers."""
+
+    def __init__(self, sources: Sources) -> None:
+        super().__init__(sources)
+        word = self.interface.settings.word
+        self.word_type, self.residual_type = np.dtype(f"int{word}"), np.dtype(f"uint{word}")
+        self.module = compilation.load(sources)
+        self._array = getattr(self.module.lib, f"{sources.function.name}_array")
+
+    def run(self, inputs: Sequence[Array], residuals: Array) -> tuple[tuple[Array, ...], Array]:
+        """Call the function on integers."""
+        count = len(residuals)
+        given = [np.ascontiguousarray(array, self.word_type) for array in inputs]
+        kept = np.array(residuals, self.residual_type)
+        outputs = tuple(np.empty((count, a.signal.size), self.word_type) for a in self.interface.outputs)
+        status = self.module.ffi.new("int *")
+        arrays = [*given, *([kept] if self.interface.residuals else []), *outputs]
+        done = self._array(count, status, *(self.pointer(array) for array in arrays))
+        if status[0]:
+            raise self.refused(status[0], f" (sample {done})" if count > 1 else "")
+        return outputs, kept
+
+    def pointer(self, array: Array) -> Any:
+        """Return the C pointer to a contiguous array's first element."""
+        return self.module.ffi.from_buffer(f"{array.dtype.name}_t[]", array)
+
+    def address(self) -> int:
+        """Return the address of the function on one sample."""
+        ffi = self.module.ffi
+        return int(ffi.cast("uintptr_t", ffi.addressof(self.module.lib, self.function.name)))
+
+
+class ModelEvaluator(FixedEvaluator):
+    """A generated Python function on integers, checked on the way."""
+
+    def __init__(self, sources: Sources) -> None:
+        super().__init__(sources)
+        module = compilation.load(sources)
+        self.generated: Callable[..., Any] = getattr(module, sources.function.name)
+        self.out_of_range: type[Exception] = module.OutOfRange
+
+    def run(self, inputs: Sequence[Array], residuals: Array) -> tuple[tuple[Array, ...], Array]:
+        """Call the function on integers."""
+        arguments = [list(np.moveaxis(array, -1, 0)) for array in inputs]
+        if self.interface.residuals:
+            arguments.append(list(np.moveaxis(residuals, -1, 0)))
+        results = list(self.step(*arguments))
+        kept = residuals
+        if self.interface.residuals:
+            kept = np.stack(np.broadcast_arrays(*results.pop()), axis=-1)
+        count = len(residuals)
+        outputs = tuple(
+            np.stack(
+                [np.broadcast_to(np.asarray(element, self.integer_type), (count,)) for element in result],
+                axis=-1,
+            )
+            for result in results
+        )
+        return outputs, kept
+
+    def step(self, *arguments: Any, where: str = "") -> Any:
+        """Call the generated function; what it refuses is told as the error of a user's input."""
+        try:
+            return self.generated(*arguments)
+        except self.out_of_range as error:
+            raise InputError(f"{self.kernel} refuses its input{where}: {error}") from None
+
+
+class FixedBackend(Backend):
+    """Runs a step in fixed point."""
+
+    def __init__(
+        self,
+        sources: Sources,
+        evaluate: Callable[[str], Evaluator],
+        orthonormalization: str | None = None,
+    ) -> None:
+        super().__init__(sources, evaluate, orthonormalization)
+        assert isinstance(self._step, FixedEvaluator)
+        self.evaluator: FixedEvaluator = self._step
+        self.interface = self.evaluator.interface
+        self.unit = float(self.interface.outputs[0].format.unit)
+
+    def rounding_bound(self, steps: int, rounded_inputs: bool = False) -> float:
+        """Return the certified bound of a run's rounding, see `Backend.rounding_bound`."""
+        assert self.interface.accumulation is not None
+        return self.interface.accumulation.bound(steps, rounded_inputs)
+
+    def representable(self, increments: Any) -> Array:
+        """Return increments rounded to what the back end takes."""
+        argument = self.interface.inputs[1]
+        return self.evaluator.numbers(argument, self.evaluator.integers(argument, increments))
+
+    def prepared(self, increments: Any) -> Callable[[], Any]:
+        """Return a call that propagates integers, see `Backend.prepared`."""
+        state, samples = self.interface.inputs
+        rows = np.asarray(increments).reshape(1, -1, samples.signal.size)
+        given = self.evaluator.integers(samples, rows)
+        start = self.evaluator.integers(state, self.identity.reshape(1, -1))
+        return lambda: self.propagate_integers(given, 1, 0, start)
+
+    def _propagate(
+        self, increments: Array, record_every: int, orthonormalize_every: int, initial: Array
+    ) -> Array:
+        runs, steps = increments.shape[:2]
+        state, samples = self.interface.inputs
+        history = self.propagate_integers(
+            self.evaluator.integers(samples, increments.reshape(runs, steps, samples.signal.size)),
+            record_every,
+            orthonormalize_every,
+            self.evaluator.integers(state, initial.reshape(runs, state.signal.size)),
+        )
+        return self.evaluator.numbers(state, history).reshape(*history.shape[:2], *self.state_shape)
+
+    @abstractmethod
+    def propagate_integers(
+        self, increments: Array, record_every: int, orthonormalize_every: int, initial: Array
+    ) -> Array:
+        """Propagate integers.
+
+        Parameters
+        ----------
+        increments : array, (runs, N, elements of the increments)
+        record_every, orthonormalize_every : int
+            As for `propagate`; 0 for never.
+        initial : array, (runs, elements of the state)
+
+        Returns
+        -------
+        array, (runs, 1 + N // record_every, elements of the state)
+        """
+
+
+class CFixedBackend(FixedBackend):
+    """Runs generated fixed-point C."""
+
+    def __init__(
+        self,
+        sources: Sources,
+        evaluate: Callable[[str], Evaluator],
+        orthonormalization: str | None = None,
+    ) -> None:
+        super().__init__(sources, evaluate, orthonormalization)
+        self.name = f"c-q{self.interface.settings.word - 1}"
+        step = self.evaluator
+        assert isinstance(step, CFixedEvaluator)
+        self._c = step
+        self._function = sources.function.name
+        self._generated = getattr(step.module.lib, f"{self._function}_propagate")
+
+    def propagate_integers(
+        self, increments: Array, record_every: int, orthonormalize_every: int, initial: Array
+    ) -> Array:
+        """Propagate integers in C."""
+        runs, steps = increments.shape[:2]
+        ffi, kind = self._c.module.ffi, self._c.word_type
+        given = [np.ascontiguousarray(array, kind) for array in (initial, increments)]
+        residuals = self.evaluator.fresh(runs).astype(self._c.residual_type)
+        history = np.empty((runs, 1 + steps // record_every, initial.shape[-1]), kind)
+        orthonormalizer = ffi.NULL
+        if orthonormalize_every:
+            made = self._evaluate(self._orthonormalization)
+            assert isinstance(made, CFixedEvaluator)
+            orthonormalizer = ffi.cast(f"{self._function}_orthonormalizer", made.address())
+        stopped = ffi.new("size_t[2]")
+        arrays = [*given, *([residuals] if self.interface.residuals else []), history]
+        status = self._generated(
+            runs,
+            steps,
+            record_every,
+            orthonormalize_every,
+            orthonormalizer,
+            *(self._c.pointer(array) for array in arrays),
+            stopped,
+        )
+        if status:
+            where = f" in step {stopped[1] + 1}" + (f" of run {stopped[0] + 1}" if runs > 1 else "")
+            raise self.evaluator.refused(status, where)
+        return history
+
+
+class ModelBackend(FixedBackend):
+    """Runs the integer model: independent runs side by side, one run on Python's own integers."""
+
+    def propagate_integers(
+        self, increments: Array, record_every: int, orthonormalize_every: int, initial: Array
+    ) -> Array:
+        """Propagate integers in Python."""
+        step = self.evaluator
+        assert isinstance(step, ModelEvaluator)
+        normalize = self._evaluate(self._orthonormalization) if orthonormalize_every else None
+        runs, steps = increments.shape[:2]
+        single = runs == 1
+        fresh = self.evaluator.fresh(runs)
+        kept: list[Any] = fresh[0].tolist()
+        if single:
+            state, samples = initial[0].tolist(), increments[0].tolist()
+        else:
+            state = list(np.moveaxis(initial, -1, 0))
+            samples = np.moveaxis(increments, 0, -1)
+            kept = list(np.moveaxis(fresh, -1, 0))
+        records = [state]
+        for number in range(steps):
+            where = f" in step {number + 1}"
+            if kept:
+                state, kept = step.step(state, list(samples[number]), kept, where=where)
+            else:
+                (state,) = step.step(state, list(samples[number]), where=where)
+            if normalize is not None and (number + 1) % orthonormalize_every == 0:
+                assert isinstance(normalize, ModelEvaluator)
+                count = len(normalize.interface.residuals)
+                if count:
+                    state, left = normalize.step(state, kept[:count], where=where)
+                    kept = [*left, *kept[count:]]
+                else:
+                    (state,) = normalize.step(state, where=where)
+            if (number + 1) % record_every == 0:
+                records.append(state)
+        if single:
+            return np.array(records, step.integer_type)[None]
+        return np.stack([np.stack(np.broadcast_arrays(*record), axis=-1) for record in records], axis=1)

@@ -1,0 +1,48 @@
+"""Fixed point: a program lowered to integers, with proved ranges and certified error bounds."""
+
+from strapgen.fixedpoint.code import FixedProgram, Interface
+from strapgen.fixedpoint.formats import Format
+from strapgen.fixedpoint.settings import Settings
+from strapgen.program import Operation, Program, walk
+
+__all__ = ["OPERATIONS", "FixedProgram", "Format", "Interface", "Settings", "can_lower", "quantize"]
+
+
+def quantize(program: Program, settings: Settings) -> FixedProgram:
+    """Lower a program to integers.
+
+    Parameters
+    ----------
+    program : Program
+    settings : Settings
+
+    Returns
+    -------
+    FixedProgram
+
+    Raises
+    ------
+    InputError
+        If an input has no known range, a format that is asked for does not hold its values, or the word is too short.
+    """
+    from strapgen.fixedpoint.integers import lowered  # numpy and the proofs are loaded when they are needed
+
+    return lowered(program, settings)
+
+
+#: Operations that fixed point has.
+OPERATIONS = frozenset(
+    (
+        *("add", "subtract", "multiply", "divide", "negate", "sqrt", "maximum", "select", "at_least"),
+        *("sin", "cos", "sinc", "atan2"),
+    )
+)
+
+
+def can_lower(program: Program) -> bool:
+    """Tell whether a program needs no word of a user: its operations are known here, and the ranges of all inputs."""
+    known = ("increments", "turns") if program.companions else ()
+    nodes = (node for assignment in program.body for node in walk(assignment.value))
+    return all(signal.bound is not None or signal.name in known for signal in program.inputs) and all(
+        node.kind in OPERATIONS for node in nodes if isinstance(node, Operation)
+    )

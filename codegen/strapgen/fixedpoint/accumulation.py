@@ -1,0 +1,237 @@
+"""How the rounding of one step adds up over a run.
+
+The computed state obeys x' = x T + x d + r: T the exact transition, d the error of the computed one, r the rounding of
+the state. A step stretches an error by at most the norm of T. With residuals, what is rounded off in one step is added
+in the next: then r is paid once, beside the residual times T - 1 in every step; and of the rounding of T, summed by
+parts, only its product with T - 1 is left.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from itertools import product
+
+from strapgen.fixedpoint import quantities as exact
+from strapgen.fixedpoint.code import Accumulation, Argument, Sum, Value
+from strapgen.fixedpoint.formats import ROUNDINGS
+from strapgen.fixedpoint.intervals import Interval
+from strapgen.fixedpoint.settings import Settings
+from strapgen.program import Constant, Node, Operation, Program, Reference
+
+#: Polynomial of the inputs: coefficients by degree and by sorted names.
+_Polynomial = dict[int, dict[tuple[str, ...], Fraction]]
+#: Largest number of inputs for which the norm of the transition is expanded.
+_MOST_INPUTS = 9
+
+
+def accumulation(
+    program: Program,
+    settings: Settings,
+    made: exact.Quantities,
+    values: Mapping[str, Value],
+    inputs: Sequence[Argument],
+    outputs: Sequence[Argument],
+) -> Accumulation:
+    """Return how the errors of a step add up.
+
+    Lengths are those of a state, or of a row of a matrix: the norm in which a transition stretches least.
+    """
+    (result,) = outputs
+    state = program.inputs[0]
+    rows = state.shape[0] if len(state.shape) == 2 else 1
+    width = state.size // rows
+    limit = made.items[state.elements[0]].range.magnitude
+    length = limit * _root(Fraction(width))
+    carry, half = settings.carry, ROUNDINGS[settings.rounding]
+
+    assert program.transition is not None, "a step has a transition"
+    held = [name for name in made.results[program.transition.signal.name] if isinstance(name, str)]
+    inner, kept, away = [], [], []
+    for name in held:
+        if name not in values:
+            continue
+        value = values[name]
+        rounding = half / Fraction(2) ** value.fraction
+        rounded = value.definition
+        carried = isinstance(rounded, Sum) and rounded.residual is not None
+        inner.append(value.error - (2 * rounding if carried else 0))
+        kept.append(rounding if carried else Fraction(0))
+        away.append(made.distance(name))
+    away_norm = _norm(away)
+
+    rounding = half * result.format.unit
+    local, left = [], Fraction(0)
+    for name in result.values:
+        value = values[name]
+        definition = made.items[name].definition
+        assert isinstance(definition, exact.Sum)
+        through = sum(
+            abs(coefficient) * made.items[factor].range.magnitude * values[other].error
+            for monomial, coefficient in definition.terms
+            if len(monomial) == 2
+            for factor, other in (monomial, monomial[::-1])
+            if other in held and factor not in held
+        )
+        own = value.error - through
+        lowered = value.definition
+        if isinstance(lowered, Sum) and lowered.residual is not None:
+            own -= 2 * rounding
+            left = rounding
+        local.append(own)
+    own_norm = max(_norm(local[k : k + width]) for k in range(0, len(local), width))
+    left_norm = left * _root(Fraction(width))
+    kept_norm = _norm(kept)
+    per_step = own_norm + length * _norm(inner)
+    once = Fraction(0)
+    if carry != "none":
+        per_step += left_norm * away_norm
+        once += 2 * left_norm
+    if any(kept):
+        per_step += 2 * kept_norm * (length * away_norm + left_norm)
+        once += 2 * length * kept_norm
+    moved = _moved(made, {a.signal.name: a.format.unit / 2 for a in inputs[1:]})
+    input_rounding = length * _norm([moved[name] for name in held])
+    return Accumulation(once, per_step, input_rounding, _growth(program, made, width))
+
+
+def _moved(made: exact.Quantities, by: Mapping[str, Fraction]) -> dict[str, Fraction]:
+    """Return how far every quantity can move when the elements of inputs, by name, move by so much."""
+    moved: dict[str, Fraction] = {}
+    for name, quantity in made.items.items():
+        definition = quantity.definition
+        if isinstance(definition, exact.Given):
+            moved[name] = by.get(definition.signal, Fraction(0))
+        elif isinstance(definition, exact.Sum):
+            total = Fraction(0)
+            for monomial, coefficient in definition.terms:
+                sizes = [made.items[factor].range.magnitude for factor in monomial]
+                moves = [moved[factor] for factor in monomial]
+                if len(monomial) == 1:
+                    total += abs(coefficient) * moves[0]
+                elif monomial:
+                    (a, b), (da, db) = sizes, moves
+                    total += abs(coefficient) * (a * db + b * da + da * db)
+            moved[name] = total + sum(abs(c) * moved[m[0]] for m, c in quantity.beside)
+        else:
+            raise NotImplementedError(f"{name} is no sum of products")
+    return moved
+
+
+def _norm(values: Sequence[Fraction]) -> Fraction:
+    """Return a length that is not below that of a vector."""
+    return _root(sum((value * value for value in values), Fraction(0)))
+
+
+def _root(value: Fraction) -> Fraction:
+    return Interval.of(value).sqrt().highest
+
+
+def _growth(program: Program, made: exact.Quantities, width: int) -> Fraction:
+    """Return a number that is not below the norm of any transition.
+
+    With the transition expanded in its inputs, T T' - 1 is exact up to the degree of T and one more, where the terms
+    cancel that a rotation does not have; the terms above are bounded one by one.
+    """
+    assert program.transition is not None
+    inputs = [name for signal in program.inputs[1:] for name in signal.elements]
+    sizes = {name: made.items[name].range.magnitude for name in inputs}
+    if len(inputs) <= _MOST_INPUTS:
+        elements = _expanded(program)
+        if elements is not None:
+            rows = [elements[k : k + width] for k in range(0, len(elements), width)]
+            largest = max(
+                sum(
+                    (_product_bound(one, other, sizes, is_one=one is other) for other in rows),
+                    Fraction(0),
+                )
+                for one in rows
+            )
+            return _root(1 + largest)
+    # Without it: the identity, and the length of what is added to it.
+    held = made.results[program.transition.signal.name]
+    away = [made.distance(name) for name in held if isinstance(name, str)]
+    return 1 + _norm(away)
+
+
+def _expanded(program: Program) -> list[_Polynomial] | None:
+    """Return the elements of the transition as polynomials, by degree."""
+    assert program.transition is not None
+    known: dict[str, _Polynomial] = {
+        name: {1: {(name,): Fraction(1)}} for signal in program.inputs[1:] for name in signal.elements
+    }
+    needed = program.used([program.transition])
+
+    def value(node: Node) -> _Polynomial:
+        if isinstance(node, Constant):
+            return {0: {(): node.value}} if node.value else {}
+        if isinstance(node, Reference):
+            return known[node.name]
+        assert isinstance(node, Operation)
+        arguments = [value(argument) for argument in node.arguments]
+        if node.kind == "negate":
+            return _sum({}, arguments[0], -1)
+        if node.kind in ("add", "subtract"):
+            return _sum(arguments[0], arguments[1], 1 if node.kind == "add" else -1)
+        if node.kind == "multiply":
+            total: _Polynomial = {}
+            for (a, one), (b, other) in product(arguments[0].items(), arguments[1].items()):
+                total = _sum(total, {a + b: _times(one, other)}, 1)
+            return total
+        raise NotImplementedError(node.kind)
+
+    try:
+        for assignment in program.body:
+            if assignment.name in needed:
+                known[assignment.name] = value(assignment.value)
+        return [value(node) for node in program.transition.nodes]
+    except NotImplementedError:
+        return None
+
+
+def _product_bound(
+    one: list[_Polynomial], other: list[_Polynomial], sizes: Mapping[str, Fraction], is_one: bool
+) -> Fraction:
+    """Return a bound of the scalar product of two rows, less 1 for a row and itself."""
+    top = max((degree for element in (*one, *other) for degree in element), default=0)
+    total: _Polynomial = {0: {(): Fraction(-1)}} if is_one else {}
+    rest = Fraction(0)
+    for left, right in zip(one, other, strict=True):
+        for (a, first), (b, second) in product(left.items(), right.items()):
+            if a + b <= top + 1:
+                total = _sum(total, {a + b: _times(first, second)}, 1)
+            else:
+                rest += _size(first, sizes) * _size(second, sizes)
+    return rest + sum((_size(part, sizes) for part in total.values()), Fraction(0))
+
+
+def _size(part: dict[tuple[str, ...], Fraction], sizes: Mapping[str, Fraction]) -> Fraction:
+    return sum(
+        (abs(c) * math.prod((sizes[name] for name in names), start=Fraction(1)) for names, c in part.items()),
+        Fraction(0),
+    )
+
+
+def _times(
+    one: dict[tuple[str, ...], Fraction], other: dict[tuple[str, ...], Fraction]
+) -> dict[tuple[str, ...], Fraction]:
+    total: dict[tuple[str, ...], Fraction] = {}
+    for left, a in one.items():
+        for right, b in other.items():
+            key = tuple(sorted(left + right))
+            total[key] = total.get(key, Fraction(0)) + a * b
+    return total
+
+
+def _sum(one: _Polynomial, other: _Polynomial, sign: int) -> _Polynomial:
+    total = {degree: dict(part) for degree, part in one.items()}
+    for degree, part in other.items():
+        into = total.setdefault(degree, {})
+        for names, coefficient in part.items():
+            value = into.get(names, Fraction(0)) + sign * coefficient
+            if value:
+                into[names] = value
+            else:
+                into.pop(names, None)
+    return {degree: part for degree, part in total.items() if part}

@@ -1,0 +1,107 @@
+"""Fixed-point formats: words, fractions, and how a format is written."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from fractions import Fraction
+
+from strapgen import checks
+from strapgen.exceptions import InputError
+
+#: Rounding of a value to its format, and its largest error in units of the last place.
+ROUNDINGS = {"nearest": Fraction(1, 2), "truncation": Fraction(1)}
+
+SHORTEST_WORD, LONGEST_WORD = 8, 64
+
+
+@dataclass(frozen=True)
+class Format:
+    """A signed binary fixed-point format.
+
+    Parameters
+    ----------
+    word : int
+        Length of the word in bits, the sign among them.
+    fraction : int
+        Fraction bits: the integer n stands for n 2**-fraction. It may exceed the word or be negative.
+
+    Examples
+    --------
+    >>> str(Format(32, 30)), Format(32, 30).unit, Format.parse("Q-5.36", 32).fraction
+    ('Q1.30', Fraction(1, 1073741824), 36)
+    """
+
+    word: int
+    fraction: int
+
+    @classmethod
+    def parse(cls, text: str, word: int) -> Format:
+        """Read Qm.n: m integer bits without the sign and n fraction bits, m + n + 1 = word.
+
+        Raises
+        ------
+        InputError
+            If the text is no format of the word.
+        """
+        found = re.fullmatch(r"Q(-?\d{1,4})\.(-?\d{1,4})", text)
+        if found is None:
+            raise InputError(f"format {text!r} is not known; Qm.n is needed, as in Q1.{word - 2}")
+        whole, fraction = map(int, found.groups())
+        if whole + fraction + 1 != word:
+            raise InputError(
+                f"format {text} has {whole + fraction + 1} bits with its sign; {word} are needed, as in "
+                f"Q{whole}.{word - 1 - whole}"
+            )
+        return cls(word, fraction)
+
+    @property
+    def unit(self) -> Fraction:
+        """The unit of the last place."""
+        return Fraction(2) ** -self.fraction
+
+    @property
+    def largest(self) -> int:
+        """The largest integer that a word holds."""
+        return (1 << (self.word - 1)) - 1
+
+    def __str__(self) -> str:
+        return f"Q{self.word - 1 - self.fraction}.{self.fraction}"
+
+
+def finest(largest: Fraction, word: int) -> int:
+    """Return the most fraction bits with which a word holds a magnitude."""
+    top = (1 << (word - 1)) - 1
+    if not largest:
+        return word - 1
+    bits = largest.numerator.bit_length() - largest.denominator.bit_length()
+    fraction = word - bits + 1
+    while largest * Fraction(2) ** fraction > top:
+        fraction -= 1
+    return fraction
+
+
+def check_word(word: int) -> int:
+    """Return a length of word that the integer model knows.
+
+    Raises
+    ------
+    InputError
+        If it is none.
+    """
+    if isinstance(word, bool) or not isinstance(word, int) or not SHORTEST_WORD <= word <= LONGEST_WORD:
+        raise InputError(
+            f"word is {word!r}; a whole number of bits from {SHORTEST_WORD} to {LONGEST_WORD} is needed"
+        )
+    return word
+
+
+def check_rounding(rounding: str) -> str:
+    """Return the name of a rounding.
+
+    Raises
+    ------
+    InputError
+        If it is not known.
+    """
+    return checks.choice("rounding", rounding, ROUNDINGS)

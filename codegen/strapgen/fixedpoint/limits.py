@@ -1,0 +1,91 @@
+"""Ranges and formats of the inputs, as the user states them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+
+from strapgen.exceptions import InputError
+from strapgen.fixedpoint.formats import Format, finest
+from strapgen.fixedpoint.intervals import Interval
+from strapgen.fixedpoint.settings import Settings
+from strapgen.program import Program
+from strapgen.signal import Signal
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Range of one input as the user states it, and its finest format."""
+
+    signal: Signal
+    largest: Fraction
+    fraction: int
+    fixed: bool
+
+    def places(self, guard_bits: int) -> int:
+        """Return the fraction bits of the input when sums of inputs are given so many bits more."""
+        return self.fraction if self.fixed or self.signal.constraint else self.fraction - guard_bits
+
+    def largest_integer(self, guard_bits: int) -> int:
+        """Return the largest integer that is accepted: that of an attitude rounded down, of any other input up."""
+        scaled = self.largest * Fraction(2) ** self.places(guard_bits)
+        return math.floor(scaled) if self.signal.constraint else math.ceil(scaled)
+
+    def range(self, guard_bits: int) -> Interval:
+        """Return the range of what is accepted."""
+        return Interval.symmetric(self.largest_integer(guard_bits) / Fraction(2) ** self.places(guard_bits))
+
+
+def limits(program: Program, settings: Settings) -> list[Limit]:
+    """Return range and finest format of every input of a program.
+
+    Raises
+    ------
+    InputError
+        If an input has no known range, or a format that is asked for does not hold it.
+    """
+    unknown = set(settings.ranges) - {signal.name for signal in program.inputs}
+    if unknown:
+        names = ", ".join(signal.name for signal in program.inputs)
+        raise InputError(f"{program.kernel} has no input {sorted(unknown)[0]!r}; its inputs are: {names}")
+    word, made = settings.word, []
+    for signal in program.inputs:
+        largest = _largest(program, signal, settings)
+        text = asked(settings, signal)
+        if text is not None:
+            fraction = Format.parse(text, word).fraction
+            if largest * Fraction(2) ** fraction > Format(word, fraction).largest:
+                raise InputError(
+                    f"format {text} of {signal.name} does not hold its range of +-{float(largest):.6g}"
+                )
+        elif signal.constraint:
+            fraction = state_fraction(word, largest)
+        else:
+            fraction = finest(largest, word)
+        made.append(Limit(signal, largest, fraction, text is not None))
+    return made
+
+
+def asked(settings: Settings, signal: Signal) -> str | None:
+    """Return the format that is asked for an argument; "state" stands for every attitude."""
+    return settings.formats.get(signal.name, settings.formats.get("state") if signal.constraint else None)
+
+
+def state_fraction(word: int, largest: Fraction) -> int:
+    """Return the fraction bits of a state: room up to 2, which no step inside the allowance can leave."""
+    return min(word - 2, finest(largest, word))
+
+
+def _largest(program: Program, signal: Signal, settings: Settings) -> Fraction:
+    if signal.name in settings.ranges:
+        return settings.ranges[signal.name]
+    if signal.name in ("increments", "turns") and program.companions:
+        return settings.largest_angle
+    if signal.constraint:
+        return (signal.bound or Fraction(1)) + settings.allowance
+    if signal.bound is not None:
+        return signal.bound
+    raise InputError(
+        f"{program.kernel}: the range of input {signal.name} is not known; state its largest magnitude"
+    )

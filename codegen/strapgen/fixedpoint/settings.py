@@ -1,0 +1,166 @@
+"""Settings of a fixed-point program: what the user states, from which everything else is derived."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from typing import Any
+
+from strapgen import checks
+from strapgen.exceptions import InputError
+from strapgen.fixedpoint.formats import Format, check_rounding, check_word
+
+#: What is kept of rounding from step to step.
+CARRIES = {
+    "none": "nothing",
+    "state": "the rounding of the state",
+    "full": "the rounding of the state and of the transition",
+}
+
+#: Largest angle increment for which formats are chosen when none is stated, in rad.
+DEFAULT_ANGLE = Fraction(1, 8)
+DEFAULT_ALLOWANCE = Fraction(1, 16)
+
+#: A rational above pi/180, by less than 1e-18.
+_DEGREE = Fraction(math.ceil(Fraction(3141592653589793239, 180) * 10**3), 10**21)
+#: Stated limits are rounded up to whole multiples of this.
+_LIMIT_UNIT = 1 << 60
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What a fixed-point program is made for.
+
+    Parameters
+    ----------
+    word : int
+        Bits of a word; products have twice as many.
+    largest_angle : Fraction
+        Largest magnitude of an element of an angle increment, in rad.
+    rounding : str
+        "nearest" (halves up) or "truncation" (down).
+    carry : str
+        Rounding residuals kept from call to call: "none", "state", or "full": of state and transition.
+    allowance : Fraction
+        By how much an element of a state may exceed 1 in magnitude.
+    ranges : mapping of str to Fraction
+        Largest magnitude of the elements of other inputs, by the signal's name.
+    formats : mapping of str to str
+        Formats that are not to be chosen, as Qm.n, by the name of a value or of an input or output.
+    stated : str
+        How the user said what the largest angle is, in the words of the command line; "" where it is said itself.
+
+    Raises
+    ------
+    InputError
+        If a value is not allowed.
+
+    Examples
+    --------
+    >>> Settings.of(word=16, max_rate_deg_s=12, step="0.125", increments=2).largest_angle < Fraction(1, 76)
+    True
+    """
+
+    word: int = 32
+    largest_angle: Fraction = DEFAULT_ANGLE
+    rounding: str = "nearest"
+    carry: str = "none"
+    allowance: Fraction = DEFAULT_ALLOWANCE
+    ranges: Mapping[str, Fraction] = field(default_factory=dict, hash=False)
+    formats: Mapping[str, str] = field(default_factory=dict, hash=False)
+    stated: str = field(default="", compare=False)
+
+    def __post_init__(self) -> None:
+        check_word(self.word)
+        check_rounding(self.rounding)
+        checks.choice("carry", self.carry, CARRIES)
+        if not 0 < self.largest_angle <= 4:
+            raise InputError(
+                f"largest angle increment is {float(self.largest_angle):g} rad; more than 0 and at most 4 is needed"
+            )
+        if not 0 < self.allowance <= Fraction(1, 2):
+            raise InputError(
+                f"drift allowance is {float(self.allowance):g}; more than 0 and at most 0.5 is needed"
+            )
+        for name, largest in self.ranges.items():
+            if largest <= 0:
+                raise InputError(f"range of {name} is {float(largest):g}; a number above 0 is needed")
+        for text in self.formats.values():
+            Format.parse(text, self.word)
+
+    @classmethod
+    def of(
+        cls,
+        *,
+        word: int = 32,
+        max_rate_deg_s: Any = None,
+        step: Any = None,
+        increments: int = 1,
+        largest_angle: Any = None,
+        **rest: Any,
+    ) -> Settings:
+        """Return settings from what a user states: rates and times as numbers or decimals.
+
+        Parameters
+        ----------
+        max_rate_deg_s, step : number, optional
+            Largest body rate on an axis, in deg/s, and the step in s: their product, divided by the number of
+            `increments` a step, bounds an angle increment.
+        largest_angle : number, optional
+            That bound itself, in rad.
+        """
+        if (max_rate_deg_s is None) != (step is None):
+            missing = "step" if step is None else "max-rate-deg-s"
+            raise InputError(f"max-rate-deg-s and step go together; {missing} is missing")
+        if max_rate_deg_s is not None and largest_angle is not None:
+            raise InputError("the largest angle and the largest rate are both given; one is needed")
+        angle = DEFAULT_ANGLE
+        if largest_angle is not None:
+            angle = checks.number("largest angle", largest_angle, positive=True)
+        elif max_rate_deg_s is not None:
+            rate = checks.number("max-rate-deg-s", max_rate_deg_s, positive=True)
+            angle = rate * checks.number("step", step, positive=True) * _DEGREE / increments
+        stated = "" if max_rate_deg_s is None else f"--max-rate-deg-s {max_rate_deg_s} --step {step}"
+        return cls(word, Fraction(math.ceil(angle * _LIMIT_UNIT), _LIMIT_UNIT), **rest, stated=stated)
+
+    def fitted(self, largest: float) -> Settings:
+        """Return the settings with a largest angle that holds what is known to come, and up to an eighth more.
+
+        Examples
+        --------
+        >>> float(Settings().fitted(0.0131).largest_angle)
+        0.013671875
+        """
+        if not 0 < largest <= 4:
+            # Nothing turns, or too much for any format: what then comes is refused where it is read.
+            return self
+        exponent = math.frexp(largest)[1] - 4
+        angle = Fraction(2) ** exponent * math.ceil(math.ldexp(largest, -exponent))
+        return replace(self, largest_angle=angle, stated="")
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the settings as plain JSON data."""
+        return {
+            "word": self.word,
+            "largest_angle": str(self.largest_angle),
+            "rounding": self.rounding,
+            "carry": self.carry,
+            "allowance": str(self.allowance),
+            "ranges": {name: str(value) for name, value in self.ranges.items()},
+            "formats": dict(self.formats),
+            "stated": self.stated,
+        }
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Settings:
+        """Rebuild settings from `as_dict`."""
+        return cls(
+            **{
+                **data,
+                "largest_angle": Fraction(data["largest_angle"]),
+                "allowance": Fraction(data["allowance"]),
+                "ranges": {name: Fraction(value) for name, value in data["ranges"].items()},
+            }
+        )

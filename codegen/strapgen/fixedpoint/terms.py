@@ -1,0 +1,77 @@
+"""Terms of sums as integers: brought to one place, with the bound of their partial sums and what shifts lose."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+from strapgen.fixedpoint.code import Term, Value
+from strapgen.fixedpoint.intervals import GRID
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A term that is not shifted yet.
+
+    Parameters
+    ----------
+    term : Term
+    place : int
+        Its fraction bits.
+    error : Fraction
+        Bound of its distance from the exact term.
+    """
+
+    term: Term
+    place: int
+    error: Fraction
+
+
+def nearest(value: Fraction) -> int:
+    """Return the nearest integer, halves up."""
+    return math.floor(value + Fraction(1, 2))
+
+
+def up(value: Fraction) -> Fraction:
+    """Round a bound up to the grid of the intervals, so that numbers stay short."""
+    return Fraction(-((-value.numerator << GRID) // value.denominator), 1 << GRID)
+
+
+def bound(term: Term, values: Mapping[str, Value]) -> int:
+    """Return the largest magnitude of an integer term, before it is shifted down."""
+    size = abs(term.factor)
+    for name in term.names:
+        size *= values[name].magnitude
+    return size << term.shift if term.shift > 0 else size
+
+
+def aligned(
+    terms: Iterable[Placed], place: int, values: Mapping[str, Value]
+) -> tuple[tuple[Term, ...], int, Fraction]:
+    """Return terms at one place, the bound of their partial sums, and their error with what shifts lose."""
+    made: list[Term] = []
+    peak, error = 0, Fraction(0)
+    for item in terms:
+        term, wrong = item.term, item.error
+        shift = place - item.place
+        if not term.names and shift < 0:  # a constant: rounded here
+            exact = term.factor * Fraction(2) ** shift
+            integer = nearest(exact)
+            error += wrong + abs(integer - exact) / Fraction(2) ** place
+            if not integer:
+                continue
+            made.append(Term((), integer))
+        else:
+            made.append(replace(term, shift=shift))
+            error += wrong + (Fraction(2) ** -place if shift < 0 else 0)
+        size = bound(made[-1], values)
+        peak += (size >> -shift) + 1 if shift < 0 and term.names else size
+    return tuple(made), peak, up(error)
+
+
+def fits(terms: Iterable[Term], peak: int, word: int, values: Mapping[str, Value]) -> bool:
+    """Tell whether every term, and every partial sum up to a bound, fits into a wide number."""
+    room = (1 << (2 * word - 1)) - 1
+    return peak <= room and all(bound(term, values) <= room for term in terms)

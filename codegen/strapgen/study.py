@@ -1,0 +1,300 @@
+"""The word-length study: what rounding, quantization and truncation each add to the drift of an algorithm."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict, dataclass, fields
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from strapgen import cache, checks
+from strapgen.backends import backend
+from strapgen.comparison import certified_angle
+from strapgen.exceptions import InputError
+from strapgen.fixedpoint import Settings
+from strapgen.gyro import pulses
+from strapgen.motions import Motion, motion
+from strapgen.simulation import attitude, drift_between
+
+#: Most cases of one study.
+_MOST_CASES = 5000
+
+
+@dataclass(frozen=True)
+class Case:
+    """One run of a study.
+
+    Parameters
+    ----------
+    algorithm, method : str
+    increments : int
+        Increments a step.
+    word : int
+        Bits of a word.
+    rounding, carry : str
+        See `Settings`.
+    step, duration : str
+        In s.
+    pulse_arcsec : str
+        Angle of a gyro pulse in arc seconds; "0" for none: then increments are rounded to their format alone.
+    motion : str
+    settings : tuple of (str, str)
+        Parameters of the motion.
+    """
+
+    algorithm: str
+    method: str
+    increments: int
+    word: int
+    rounding: str
+    carry: str
+    step: str
+    duration: str
+    pulse_arcsec: str
+    motion: str
+    settings: tuple[tuple[str, str], ...]
+
+    @property
+    def profile(self) -> Motion:
+        """The motion with its parameters."""
+        return motion(self.motion, **dict(self.settings))
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a case showed, all angles in degrees, the largest of the run.
+
+    Parameters
+    ----------
+    case : Case
+    drift_deg : float or None
+        Drift from the truth; None if the run left the range of its format.
+    rounding_deg : float or None
+        What the arithmetic adds: the angle from the same algorithm in double on the same rounded increments.
+    quantization_deg : float
+        What rounded increments add: the angle between the runs in double on those and on the exact ones.
+    truncation_deg : float
+        Drift of the run in double on exact increments: the floor of the method.
+    bound_deg : float or None
+        Certified bound of `rounding_deg`; None where no bound of use is known.
+    """
+
+    case: Case
+    drift_deg: float | None
+    rounding_deg: float | None
+    quantization_deg: float
+    truncation_deg: float
+    bound_deg: float | None
+
+    @property
+    def dominates(self) -> str:
+        """What adds most to the drift: "rounding", "quantization" or "truncation"; "range" if the run left it."""
+        if self.rounding_deg is None:
+            return "range"
+        parts = {
+            "rounding": self.rounding_deg,
+            "quantization": self.quantization_deg,
+            "truncation": self.truncation_deg,
+        }
+        return max(parts, key=lambda name: parts[name])
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return case and outcome as one flat object of plain JSON data."""
+        data = asdict(self.case) | {"settings": dict(self.case.settings)}
+        rest = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "case"}
+        return data | rest | {"dominates": self.dominates}
+
+
+def cases(
+    *,
+    algorithm: str = "euler",
+    methods: Sequence[str] = ("rk4",),
+    increments: int = 2,
+    words: Sequence[int] = (8, 10, 12, 14, 16, 18, 20, 24, 28, 32),
+    roundings: Sequence[str] = ("nearest",),
+    carries: Sequence[str] = ("none", "state", "full"),
+    steps: Sequence[str] = ("0.125",),
+    duration: str = "180",
+    pulses_arcsec: Sequence[str] = ("0",),
+    motion_name: str = "coning",
+    settings: dict[str, str] | None = None,
+) -> list[Case]:
+    """Return every combination of the given values, checked.
+
+    Raises
+    ------
+    InputError
+        If a value is not allowed, or there are too many combinations.
+    """
+    parameters = tuple((settings or {"a_deg_s": "10", "b_deg_s": "10", "g_deg_s": "10"}).items())
+    made = [
+        Case(
+            algorithm,
+            method,
+            increments,
+            word,
+            rounding,
+            carry,
+            step,
+            duration,
+            pulse,
+            motion_name,
+            parameters,
+        )
+        for method, step, pulse, rounding, carry, word in product(
+            methods, steps, pulses_arcsec, roundings, carries, words
+        )
+    ]
+    if not 0 < len(made) <= _MOST_CASES:
+        raise InputError(f"the study has {len(made)} cases; 1 to {_MOST_CASES} are allowed")
+    total = checks.number("duration", duration, positive=True)
+    for step in steps:
+        checks.multiple("duration", total, "step", checks.number("step", step, positive=True))
+    for pulse in pulses_arcsec:
+        if checks.number("pulse-arcsec", pulse) < 0:
+            raise InputError(f"pulse-arcsec is {pulse}; 0 for none, or a number above 0 is needed")
+    for case in made:
+        Settings(case.word, rounding=case.rounding, carry=case.carry)
+    return made
+
+
+def run_case(case: Case) -> Outcome:
+    """Run one case, or read what it showed from the cache: a study that was stopped goes on where it was.
+
+    Parameters
+    ----------
+    case : Case
+
+    Returns
+    -------
+    Outcome
+    """
+
+    def fill(draft: Path) -> None:
+        outcome = _run(case)
+        (draft / "outcome.json").write_text(
+            json.dumps({f.name: getattr(outcome, f.name) for f in fields(outcome) if f.name != "case"})
+        )
+
+    key = cache.digest([cache.generator_digest(), json.dumps(asdict(case), sort_keys=True)])
+    folder = cache.entry("studies", key, fill)
+    return Outcome(case, **json.loads((folder / "outcome.json").read_text()))
+
+
+def _run(case: Case) -> Outcome:
+    h = checks.number("step", case.step, positive=True)
+    steps = checks.multiple("duration", checks.number("duration", case.duration, positive=True), "step", h)
+    exact = case.profile.increments(h, steps, case.increments)
+    pulse = float(checks.number("pulse-arcsec", case.pulse_arcsec)) / 3600
+    given = pulses(exact, math.radians(pulse)) if pulse else exact
+    settings = Settings(case.word, rounding=case.rounding, carry=case.carry)
+    settings = settings.fitted(float(np.abs(given).max()))
+    double = backend(case.algorithm, case.method, case.increments, "numpy")
+    fixed = backend(case.algorithm, case.method, case.increments, "fixed-model", settings=settings)
+    # A gyro's counter is as long as it must be: pulses reach the algorithm exactly, in the unit of its format.
+    rounded = fixed.representable(given)
+    truth = case.profile.attitude(np.arange(1 + steps) * float(h))
+    plain, same = double.propagate(exact), double.propagate(rounded)
+    plain_attitude, same_attitude = attitude(double, plain), attitude(double, same)
+
+    def largest(computed: Any, other: Any) -> float:
+        return math.degrees(float(np.linalg.norm(drift_between(computed, other), axis=-1).max()))
+
+    drift = rounding = None
+    try:
+        states = attitude(fixed, fixed.propagate(rounded))
+        drift, rounding = largest(states, truth), largest(states, same_attitude)
+    except InputError:  # a short word without residuals: the state leaves its range
+        pass
+    bound = certified_angle(fixed, rounded, same)
+    return Outcome(
+        case,
+        drift,
+        rounding,
+        largest(same_attitude, plain_attitude),
+        largest(plain_attitude, truth),
+        None if bound is None else math.degrees(bound),
+    )
+
+
+def run(planned: Sequence[Case], jobs: int | None = None) -> Iterator[Outcome]:
+    """Run cases side by side and yield the outcomes as they come.
+
+    Parameters
+    ----------
+    planned : sequence of Case
+    jobs : int, optional
+        Processes; by default one for every processor.
+
+    Yields
+    ------
+    Outcome
+    """
+    workers = min(len(planned), jobs or os.cpu_count() or 1)
+    if workers == 1:
+        yield from map(run_case, planned)
+        return
+    with ProcessPoolExecutor(workers) as pool:
+        pending = [pool.submit(run_case, case) for case in planned]
+        try:
+            for done in as_completed(pending):
+                yield done.result()
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def as_csv(outcomes: Sequence[Outcome]) -> str:
+    """Return outcomes as comma-separated values."""
+    buffer = io.StringIO()
+    rows = [outcome.as_dict() for outcome in outcomes]
+    for row in rows:
+        row["settings"] = " ".join(f"{key}={value}" for key, value in row["settings"].items())
+    writer = csv.DictWriter(buffer, rows[0].keys(), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows({key: "" if value is None else value for key, value in row.items()} for row in rows)
+    return buffer.getvalue()
+
+
+def as_text(outcomes: Sequence[Outcome]) -> str:
+    """Return outcomes as tables for a reader: one for each method, step and pulse, a row for each word and carry."""
+    lines: list[str] = []
+    groups: dict[tuple[str, str, str], list[Outcome]] = {}
+    for outcome in outcomes:
+        case = outcome.case
+        groups.setdefault((case.method, case.step, case.pulse_arcsec), []).append(outcome)
+    for (method, step, pulse), group in groups.items():
+        case, first = group[0].case, group[0]
+        words = ", ".join(f"{key}={value}" for key, value in case.settings)
+        gyro = "increments rounded to their format" if float(pulse) == 0 else f"pulses of {pulse} arcsec"
+        lines += [
+            f"{case.algorithm} {method}, step {step} s, {case.duration} s of {case.motion} motion ({words}), {gyro}",
+            f"the method itself drifts by {first.truncation_deg:.3g} deg",
+            "",
+            f"{'word':>6}  {'rounding':<11}{'carry':<7}{'drift':>10}{'arithmetic':>12}{'certified':>11}"
+            f"{'increments':>12}  most from",
+        ]
+        for outcome in group:
+            lines.append(
+                f"{outcome.case.word:>6}  {outcome.case.rounding:<11}{outcome.case.carry:<7}"
+                f"{_angle(outcome.drift_deg):>10}{_angle(outcome.rounding_deg):>12}"
+                f"{_angle(outcome.bound_deg):>11}{_angle(outcome.quantization_deg):>12}  {outcome.dominates}"
+            )
+        lines.append("")
+    lines.append(
+        "all angles in deg, the largest of the run; -: the state leaves its range, or no bound is known"
+    )
+    return "\n".join(lines)
+
+
+def _angle(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3g}"

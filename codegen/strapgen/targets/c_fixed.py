@@ -1,0 +1,323 @@
+"""The fixed-point C target.
+
+Integers alone, no undefined or implementation-defined behaviour, an error code for input that the formats were not
+chosen for.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from strapgen.exceptions import InputError
+from strapgen.fixedpoint import FixedProgram, Settings, quantize
+from strapgen.fixedpoint.code import Choice, Largest, Quotient, Root, Scaled, Sum, Term, Value, used_by
+from strapgen.program import Program
+from strapgen.targets.printer import fill_expression
+from strapgen.targets.rendering import render
+from strapgen.targets.sources import Function, Sources
+
+
+@dataclass(frozen=True)
+class Word:
+    """The integer types of a length of word.
+
+    Parameters
+    ----------
+    bits : int
+    type, residual : str
+        Type of a word in memory, and of one without a sign.
+    fast : str
+        Type of a word in a calculation: at least as long, whatever the processor is fastest with.
+    wide, magnitude : str
+        Type of a product, and of a magnitude of one.
+    """
+
+    bits: int
+    type: str
+    residual: str
+    fast: str
+    wide: str
+    magnitude: str
+
+
+WORDS = {
+    16: Word(16, "int16_t", "uint16_t", "int", "int32_t", "uint32_t"),
+    32: Word(32, "int32_t", "uint32_t", "int_fast32_t", "int64_t", "uint64_t"),
+    64: Word(64, "int64_t", "uint64_t", "int64_t", "wide_", "magnitude_"),
+}
+
+
+def emit(program: Program | FixedProgram, target: str, settings: Settings | None = None) -> Sources:
+    """Generate a C header and source for a program.
+
+    Parameters
+    ----------
+    program : Program or FixedProgram
+    target : str
+        "c-fixed".
+    settings : Settings, optional
+        What the program is quantized for, if it is not yet.
+
+    Returns
+    -------
+    Sources
+        Two files. The function ``<name>`` works on one sample, ``<name>_array`` on many; a step has
+        ``<name>_propagate`` too, the loop over runs and steps.
+
+    Raises
+    ------
+    InputError
+        If C has no such word.
+    """
+    chosen = program.interface.settings if isinstance(program, FixedProgram) else settings or Settings()
+    if chosen.word not in WORDS:
+        allowed = ", ".join(map(str, WORDS))
+        raise InputError(f"word is {chosen.word}; in C it is {allowed} bits; the integer model takes any")
+    fixed = program if isinstance(program, FixedProgram) else quantize(program, chosen)
+    interface, word = fixed.interface, WORDS[chosen.word]
+    printer = _Printer(fixed, word)
+    name = fixed.name
+    signals = [(a.signal, "const ") for a in interface.inputs] + [(a.signal, "") for a in interface.outputs]
+    residuals = len(interface.residuals)
+    pieces = [f"{constant}{word.type} {s.name}[{s.size}]" for s, constant in signals]
+    inner = [f"{constant}{word.type} {printer.memory(s.name)}[{s.size}]" for s, constant in signals]
+    arrays = [f"{constant}{word.type} *{s.name}" for s, constant in signals]
+    calls = [f"{s.name} + {s.size} * k" for s, _ in signals]
+    names = [s.name for s, _ in signals]
+    if residuals:
+        place = len(interface.inputs)
+        pieces.insert(place, f"{word.residual} residuals[{residuals}]")
+        inner.insert(place, f"{word.residual} *restrict residuals")
+        arrays.insert(place, f"{word.residual} *residuals")
+        calls.insert(place, f"residuals + {residuals} * k")
+        names.insert(place, "residuals")
+    definitions = [value.definition for value in fixed.body]
+    values = {
+        "fixed": fixed,
+        "program": fixed.program,
+        "interface": interface,
+        "name": name,
+        "guard": f"{name}_h".upper(),
+        "word": word,
+        "state": interface.inputs[0].signal,
+        "samples": interface.inputs[-1].signal,
+        "residuals": residuals,
+        "parameters": ", ".join(pieces),
+        "inner_parameters": ", ".join(inner),
+        "arrays": ", ".join(arrays),
+        "calls": ", ".join(calls),
+        "names": ", ".join(names),
+        "code": printer.code(),
+        "counts": ", ".join(f"{number} {kind}" for kind, number in fixed.operations.items() if number),
+        "nearest": chosen.rounding == "nearest",
+        "fresh": dict.fromkeys(printer.constant(residual.fresh) for residual in interface.residuals),
+        "uses_shift": printer.uses_shift,
+        "uses_root": any(isinstance(d, Root) for d in definitions),
+        "uses_quotient": any(isinstance(d, Quotient) for d in definitions),
+        "guarded": tuple(value for value in fixed.body if value.guarded),
+    }
+    files = {
+        f"{name}.h": render("c_fixed/header.h.j2", **values),
+        f"{name}.c": render("c_fixed/source.c.j2", **values),
+    }
+    function = Function(
+        name, *(tuple(a.signal for a in side) for side in (interface.inputs, interface.outputs))
+    )
+    return Sources(
+        fixed.program.kernel,
+        target,
+        files,
+        function,
+        fixed.operations,
+        fixed.temporaries,
+        fixed.program.companions,
+        interface,
+    )
+
+
+class _Printer:
+    """Prints the values of a fixed-point program as C statements."""
+
+    def __init__(self, fixed: FixedProgram, word: Word) -> None:
+        self.fixed, self.word = fixed, word
+        self.uses_shift = False
+        self.wide_names = {value.name for value in fixed.body if value.wide}
+        self.places = {residual.name: k for k, residual in enumerate(fixed.interface.residuals)}
+        self.nearest = fixed.interface.settings.rounding == "nearest"
+        self.names = {value.name for value in fixed.body}
+        self.names |= {name for argument in fixed.interface.inputs for name in argument.signal.elements}
+
+    def memory(self, name: str) -> str:
+        """Return the name of an argument's memory; that of a scalar is not the name of its value."""
+        return f"{name}_words" if name in self.names else name
+
+    def code(self) -> dict[str, list[str]]:
+        """Return the statements of one call: loads, checks of the inputs, the body, stores."""
+        interface, kind = self.fixed.interface, self.word.fast
+        used = {name for value in self.fixed.body for name in used_by(value)}
+        loads, checks = [], []
+        for argument in interface.inputs:
+            assert argument.low == -argument.high, "inputs have symmetric ranges"
+            limit = self.constant(argument.high)
+            for number, element in enumerate(argument.signal.elements):
+                source = f"{self.memory(argument.signal.name)}[{number}]"
+                if element in used:
+                    loads.append(f"const {kind} {element} = {source};")
+                    source = element
+                checks.append(f"outside_({source}, {limit})")
+        body = [line for value in self.fixed.body for line in self.statements(value)]
+        stores = [
+            f"{self.memory(argument.signal.name)}[{number}] = ({self.word.type}){name};"
+            for argument in interface.outputs
+            for number, name in enumerate(argument.values)
+        ]
+        return {"loads": loads, "checks": checks, "body": body, "stores": stores}
+
+    def statements(self, value: Value) -> list[str]:
+        """Return the statements that compute a value."""
+        lines = [f"/* {value.meaning} */"] if value.meaning else []
+        kind = self.word.wide if value.wide else self.word.fast
+        definition, name = value.definition, value.name
+        if isinstance(definition, Sum):
+            lines += self._sum(value, definition, kind)
+        elif isinstance(definition, Quotient):
+            lines += self._narrow(
+                value, kind, f"quotient_({self.scaled(definition.numerator)}, {definition.denominator})"
+            )
+        elif isinstance(definition, Root):
+            lines.append(
+                f"const {kind} {name} = root_(({self.word.magnitude})({self.scaled(definition.argument)}));"
+            )
+        elif isinstance(definition, Largest):
+            lines.append(f"{kind} {name} = {self.cast(self.scaled(definition.arguments[0]), value)};")
+            for argument in definition.arguments[1:]:
+                text = self.scaled(argument)
+                lines.append(f"if ({text} > {name})\n        {name} = {self.cast(text, value)};")
+        else:
+            assert isinstance(definition, Choice)
+            text = self.scaled(definition.otherwise)
+            for left, right, chosen in reversed(definition.cases):
+                text = (
+                    f"{self.scaled(left)} >= {self.scaled(right)} ? {self.scaled(chosen)}\n        : {text}"
+                )
+            lines.append(f"const {kind} {name} = {self.cast(f'({text})', value)};")
+        if value.guarded and not (isinstance(definition, Sum) and not value.wide):
+            lines.append(self._guard(name, value))
+        return lines
+
+    def _guard(self, name: str, value: Value) -> str:
+        limits = self.constant(value.low), self.constant(value.high)
+        return f"if ({name} < {limits[0]}\n        || {name} > {limits[1]})\n        return 2;"
+
+    def _narrow(self, value: Value, kind: str, text: str) -> list[str]:
+        return [f"const {kind} {value.name} = {self.cast(text, value)};"]
+
+    def cast(self, text: str, value: Value) -> str:
+        """Return an expression of a wide number as one of the value's type."""
+        return text if value.wide else f"({self.word.fast})({text})"
+
+    def _sum(self, value: Value, definition: Sum, kind: str) -> list[str]:
+        name, wide = value.name, self.word.wide
+        fine = self._joined([self.term(term) for term in definition.fine])
+        coarse = [self.term(term) for term in definition.coarse]
+        if not definition.shift:
+            total = self._joined(
+                [*coarse, *([] if not definition.fine else [self.term(t) for t in definition.fine])]
+            )
+            return self._result(value, kind, total or "0")
+        residual, lines = definition.residual, []
+        if residual is None:
+            half = f" + {self.constant(1 << (definition.shift - 1), wide=True)}" if self.nearest else ""
+            rounded = self._shifted(fine + half, -definition.shift)
+        else:
+            place = f"residuals[{self.places[residual.name]}]"
+            kept = self._scaled_text(f"({wide}){place}", residual.shift)
+            before = self._shifted(fine, -definition.drop) if definition.drop else fine
+            lines.append(_declared(wide, f"{name}_sum", f"{before} + {kept}"))
+            left = (
+                f"({self.word.magnitude}){name}_sum << {-residual.shift}" if residual.shift else f"{name}_sum"
+            )
+            lines.append(f"{place} = ({self.word.residual})({left});")
+            rounded = self._shifted(f"{name}_sum", -definition.shift)
+        terms = [*coarse[:1], f"+{rounded}", *coarse[1:]]
+        return lines + self._result(value, kind, self._joined(terms))
+
+    def _result(self, value: Value, kind: str, text: str) -> list[str]:
+        """Return the statement that keeps a sum; a checked word is checked before it is narrowed."""
+        if value.guarded and not value.wide:
+            name = f"{value.name}_unchecked"
+            return [
+                _declared(self.word.wide, name, text),
+                self._guard(name, value),
+                _declared(kind, value.name, f"({kind}){name}"),
+            ]
+        if value.wide:
+            return [_declared(kind, value.name, text)]
+        return [_declared(kind, value.name, f"({kind})({text})")]
+
+    @staticmethod
+    def _joined(terms: list[str]) -> str:
+        """Return signed terms as a sum."""
+        text = ""
+        for term in terms:
+            sign, rest = (term[0], term[1:]) if term[:1] in "+-" else ("+", term)
+            text += f" {sign} {rest}" if text else (f"-{rest}" if sign == "-" else rest)
+        return text
+
+    def term(self, term: Term) -> str:
+        """Return a term as an expression of a wide number, its sign in front."""
+        wide = self.word.wide
+        sign = "-" if term.factor < 0 else "+"
+        if not term.names:
+            value = term.factor << term.shift if term.shift > 0 else term.factor
+            return sign + self.constant(abs(value), wide=True)
+        first, *others = term.names
+        start = first if first in self.wide_names else f"({wide}){first}"
+        negative = term.shift < 0 and term.factor < 0  # what is shifted down is the signed product
+        parts = [f"-{start}" if negative else start, *others]
+        if abs(term.factor) != 1:
+            parts.append(self.constant(abs(term.factor)))
+        text = self._scaled_text(" * ".join(parts), term.shift)
+        return f"+{text}" if negative else sign + text
+
+    def _scaled_text(self, text: str, shift: int) -> str:
+        """Return an expression times a power of two."""
+        if not shift:
+            return text
+        return f"{text} * {self._power(shift)}" if shift > 0 else self._shifted(text, shift)
+
+    def _power(self, shift: int) -> str:
+        return self.constant(1 << shift, wide=True)
+
+    def _shifted(self, text: str, shift: int) -> str:
+        self.uses_shift = True
+        return f"shifted_({text}, {-shift})"
+
+    def scaled(self, scaled: Scaled) -> str:
+        """Return a scaled value as an expression of a wide number."""
+        if isinstance(scaled.value, int):
+            return self.constant(
+                scaled.value << scaled.shift if scaled.shift > 0 else scaled.value, wide=True
+            )
+        name = scaled.value
+        return self._scaled_text(
+            name if name in self.wide_names else f"({self.word.wide}){name}", scaled.shift
+        )
+
+    def constant(self, value: int, wide: bool = False) -> str:
+        """Return an integer as a constant expression that holds it, of a wide number where that is asked."""
+        if value < 0:
+            return f"(-{self.constant(-value, wide)})"
+        if value < 1 << 15:
+            return f"({self.word.wide}){value}" if wide and self.word.bits == 64 else str(value)
+        if value < 1 << 31:
+            return f"INT32_C({value})"
+        if value < 1 << 63:
+            return f"INT64_C({value})"
+        high, low = divmod(value, 1 << 62)
+        text = f"({self.word.wide}){self.constant(high)} * INT64_C({1 << 62})"
+        return f"({text} + INT64_C({low}))" if low else f"({text})"
+
+
+def _declared(kind: str, name: str, text: str) -> str:
+    return fill_expression(f"const {kind} {name} = {text};", " " * 8, 100)

@@ -1,0 +1,128 @@
+"""The fixed-model target: a Python module on integers, the reference for the fixed-point C."""
+
+from __future__ import annotations
+
+from strapgen.fixedpoint import FixedProgram, Settings, quantize
+from strapgen.fixedpoint.code import Choice, Largest, Quotient, Root, Scaled, Sum, Term, Value
+from strapgen.program import Program
+from strapgen.targets.rendering import render
+from strapgen.targets.sources import Function, Sources
+
+
+def emit(program: Program | FixedProgram, target: str, settings: Settings | None = None) -> Sources:
+    """Generate a Python module for a program.
+
+    Parameters
+    ----------
+    program : Program or FixedProgram
+    target : str
+        "fixed-model".
+    settings : Settings, optional
+        What the program is quantized for, if it is not yet.
+
+    Returns
+    -------
+    Sources
+        One file. The function ``<name>`` takes and returns integers, or arrays of them.
+    """
+    fixed = program if isinstance(program, FixedProgram) else quantize(program, settings or Settings())
+    interface = fixed.interface
+    text = render(
+        "fixed_model/module.py.j2",
+        fixed=fixed,
+        program=fixed.program,
+        interface=interface,
+        statements=[statement for value in fixed.body for statement in _statements(value, fixed)],
+        nearest=interface.settings.rounding == "nearest",
+        fresh=[_fresh(residual.name) for residual in interface.residuals],
+    )
+    function = Function(
+        fixed.name,
+        tuple(argument.signal for argument in interface.inputs),
+        tuple(argument.signal for argument in interface.outputs),
+    )
+    return Sources(
+        fixed.program.kernel,
+        target,
+        {f"{fixed.name}.py": text},
+        function,
+        fixed.operations,
+        fixed.temporaries,
+        fixed.program.companions,
+        interface,
+    )
+
+
+def _fresh(name: str) -> str:
+    return f"next_{name}"
+
+
+def _statements(value: Value, fixed: FixedProgram) -> list[str]:
+    """Return the lines that compute a value and check it on the way."""
+    name, definition = value.name, value.definition
+    lines = [f"# {value.meaning}"] if value.meaning else []
+    if isinstance(definition, Sum):
+        lines += _sum(value, definition, fixed)
+    else:
+        if isinstance(definition, Quotient):
+            text = f"_quotient({_scaled(definition.numerator)}, {definition.denominator})"
+        elif isinstance(definition, Root):
+            text = f"_root({_scaled(definition.argument)})"
+        elif isinstance(definition, Largest):
+            text = _scaled(definition.arguments[0])
+            for argument in definition.arguments[1:]:
+                text = f"_larger({text}, {_scaled(argument)})"
+        else:
+            assert isinstance(definition, Choice)
+            text = _scaled(definition.otherwise)
+            for left, right, chosen in reversed(definition.cases):
+                text = f"_chosen({_scaled(left)} >= {_scaled(right)}, {_scaled(chosen)}, {text})"
+        lines.append(f"{name} = {text}")
+    check = "_require" if value.guarded else "_within"
+    lines.append(f'{check}("{name}", {name}, {value.low}, {value.high})')
+    return lines
+
+
+def _sum(value: Value, definition: Sum, fixed: FixedProgram) -> list[str]:
+    name = value.name
+    fine = [_term(term) for term in definition.fine]
+    coarse = [_term(term) for term in definition.coarse]
+    if not definition.shift:
+        return [f'{name} = _total("{name}", {value.peak}, {", ".join([*coarse, *fine]) or 0})']
+    residual, lines = definition.residual, []
+    if residual is not None and definition.drop:
+        lines.append(f'{name}_kept = _total("{name}", {value.peak}, {", ".join(fine)}) >> {definition.drop}')
+        fine = [f"{name}_kept"]
+    if residual is not None:
+        fine.append(_shifted(residual.name, residual.shift))
+    elif fixed.interface.settings.rounding == "nearest":
+        fine.append(str(1 << (definition.shift - 1)))
+    lines.append(f'{name}_sum = _total("{name}", {value.peak}, {", ".join(fine)})')
+    if residual is not None:
+        mask = (1 << fixed.word) - 1
+        lines.append(f"{_fresh(residual.name)} = {_shifted(f'{name}_sum', -residual.shift)} & {mask}")
+    rounded = _shifted(f"{name}_sum", -definition.shift)
+    lines.append(f'{name} = _total("{name}", {value.peak}, {", ".join([rounded, *coarse])})')
+    return lines
+
+
+def _shifted(text: str, shift: int) -> str:
+    if not shift:
+        return text
+    return f"({text} << {shift})" if shift > 0 else f"({text} >> {-shift})"
+
+
+def _scaled(scaled: Scaled) -> str:
+    if isinstance(scaled.value, int):
+        return str(scaled.value << scaled.shift if scaled.shift > 0 else scaled.value)
+    return _shifted(scaled.value, scaled.shift)
+
+
+def _term(term: Term) -> str:
+    if not term.names:
+        return str(term.factor << term.shift if term.shift > 0 else term.factor)
+    factor = [] if abs(term.factor) == 1 else [str(abs(term.factor))]
+    text = " * ".join([*term.names, *factor])
+    if term.factor < 0:
+        text = f"-{text}"
+    return _shifted(f"({text})" if not text.isidentifier() else text, term.shift)

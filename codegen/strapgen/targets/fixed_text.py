@@ -1,0 +1,80 @@
+"""What headers and docstrings of fixed-point code say about arguments."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from strapgen.fixedpoint import FixedProgram
+from strapgen.fixedpoint.code import Accumulation, Argument, Residual, Value
+from strapgen.fixedpoint.settings import DEFAULT_ALLOWANCE, DEFAULT_ANGLE
+from strapgen.program import Program
+
+
+def argument_text(argument: Argument) -> str:
+    """Return format, unit, range and error bound of an argument in words."""
+    unit = argument.format.unit
+    parts = [
+        f"format {argument.format}, unit {_power(argument.format.fraction, argument.signal.unit)}",
+        f"range {argument.low} to {argument.high} ({_number(argument.low * unit)} to {_number(argument.high * unit)})",
+    ]
+    worst = max(argument.errors)
+    if worst:
+        parts.append(f"error at most {_number(worst)}, {float(worst / unit):.4f} of the last place")
+    elif any(name not in argument.signal.elements for name in argument.values):
+        parts.append("exact")
+    return "; ".join(parts)
+
+
+def command(fixed: FixedProgram, target: str) -> str:
+    """Return the command that generates a fixed-point program."""
+    settings = fixed.interface.settings
+    words = [f"strapgen generate {fixed.program.arguments} --target {target} --word {settings.word}"]
+    if settings.stated:
+        words.append(settings.stated)
+    elif settings.largest_angle != DEFAULT_ANGLE:
+        words.append(f"--max-angle-rad {settings.largest_angle}")
+    if settings.rounding != "nearest":
+        words.append(f"--rounding {settings.rounding}")
+    if settings.carry != "none":
+        words.append(f"--carry {settings.carry}")
+    if settings.allowance != DEFAULT_ALLOWANCE:
+        words.append(f"--drift-allowance {settings.allowance}")
+    words += [f"--range {name}={value}" for name, value in settings.ranges.items()]
+    words += [f"--fix {name}={value}" for name, value in settings.formats.items()]
+    return " ".join(words)
+
+
+def _power(fraction: int, unit: str) -> str:
+    return f"2^{-fraction}" if unit == "1" else f"2^{-fraction} {unit}"
+
+
+def _number(value: Fraction) -> str:
+    return f"{float(value):.6g}"
+
+
+def accumulation_text(accumulation: Accumulation, program: Program) -> str:
+    """Return the bound of a run of N steps in words."""
+    what = "in the length of a row" if len(program.inputs[0].shape) == 2 else "in the length of the state"
+    growth = accumulation.growth - 1
+    stretched = f", times exp({_number(growth)} N)" if growth else ""
+    once = f"{_number(accumulation.once)} + " if accumulation.once else ""
+    return f"({once}{_number(accumulation.per_step)} N){stretched}, {what}"
+
+
+def residuals_text(residuals: tuple[Residual, ...]) -> str:
+    """Return the residuals with their formats in words."""
+    parts = []
+    for fraction in dict.fromkeys(residual.fraction for residual in residuals):
+        names = [residual.name for residual in residuals if residual.fraction == fraction]
+        parts.append(f"{', '.join(names)} in units of 2^{-fraction}")
+    return "; ".join(parts)
+
+
+def guards_text(values: tuple[Value, ...]) -> str:
+    """Return the values that are checked on the way, with their limits, in words."""
+    names: dict[tuple[str, str], list[str]] = {}
+    for value in values:
+        unit = Fraction(2) ** -value.fraction
+        limits = _number(value.offset + value.low * unit), _number(value.offset + value.high * unit)
+        names.setdefault(limits, []).append(value.name)
+    return "; ".join(f"{', '.join(held)} from {low} to {high}" for (low, high), held in names.items())

@@ -1,0 +1,70 @@
+"""What the tests of fixed point share: inputs over the whole range, and what exact arithmetic makes of them."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import numpy as np
+
+from strapgen.backends.fixed import FixedEvaluator
+from strapgen.fixedpoint import FixedProgram
+from strapgen.program import OPERATIONS, Constant, Program, Reference
+
+
+def corners_and_random(evaluator: FixedEvaluator, count: int, rng: np.random.Generator) -> list[np.ndarray]:
+    """Return integers for every input: corners of the range, edges, the neighbourhood of zero, and any others."""
+    inputs = []
+    for argument in evaluator.interface.inputs:
+        shape = (count, argument.signal.size)
+        made = rng.integers(argument.low, argument.high, size=shape, endpoint=True)
+        part = count // 5
+        made[:part] = rng.choice([argument.low, argument.high], size=(part, argument.signal.size))
+        made[part : 2 * part] = rng.choice(
+            [argument.low, argument.low + 1, -1, 0, 1, argument.high - 1, argument.high],
+            size=(part, argument.signal.size),
+        )
+        if argument.signal.constraint == "unit":  # attitudes, to the place
+            part = count // 2
+            vectors = rng.normal(size=(count - part, argument.signal.size))
+            vectors /= np.linalg.norm(vectors, axis=1, keepdims=True)
+            made[part:] = np.rint(vectors / float(argument.format.unit)).astype(np.int64)
+        elif argument.signal.constraint == "rotation":
+            part = count // 2
+            matrices = np.linalg.qr(rng.normal(size=(count - part, 3, 3)))[0]
+            matrices *= np.sign(np.linalg.det(matrices))[:, None, None]
+            made[part:] = np.rint(matrices.reshape(-1, 9) / float(argument.format.unit)).astype(np.int64)
+        inputs.append(made.astype(evaluator.integer_type))
+    return inputs
+
+
+def exactly(fixed: FixedProgram, inputs: list[list[int]]) -> dict[str, Fraction]:
+    """Return every value of the program that was lowered, in exact arithmetic on the integers of one sample.
+
+    Roots are rounded at 200 binary places.
+    """
+    known: dict[str, Fraction] = {}
+    for argument, integers in zip(fixed.interface.inputs, inputs, strict=True):
+        for name, integer in zip(argument.signal.elements, integers, strict=True):
+            known[name] = int(integer) * argument.format.unit
+
+    def value(node):
+        if isinstance(node, Constant):
+            return node.value
+        if isinstance(node, Reference):
+            return known[node.name]
+        arguments = [value(argument) for argument in node.arguments]
+        if node.kind == "sqrt":
+            return Fraction(math.isqrt(int(arguments[0] * 4**200)), 2**200)
+        return OPERATIONS[node.kind](*arguments)
+
+    for assignment in fixed.program.body:
+        known[assignment.name] = value(assignment.value)
+    for argument, result in zip(fixed.interface.outputs, fixed.program.outputs, strict=True):
+        known |= zip(argument.values, map(value, result.nodes), strict=True)
+    return known
+
+
+def in_double(program: Program, inputs: dict[str, np.ndarray]) -> dict[str, list[np.ndarray]]:
+    """Return the outputs of a program of sums and products on arrays of doubles."""
+    return program.run(inputs, float)

@@ -1,0 +1,299 @@
+"""Ranges and error bounds: never exceeded, value by value, call by call, run by run; and not far above the worst."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from functools import cache
+
+import numpy as np
+import pytest
+from derived import program
+from evidence import corners_and_random, exactly, in_double
+from scipy.spatial.transform import Rotation
+
+import strapgen
+from strapgen import build, exact, generate, quantize
+from strapgen.backends import backend as make_backend
+from strapgen.backends import evaluator as make_evaluator
+from strapgen.backends.fixed import ModelEvaluator
+from strapgen.catalogue import Choice, standard
+from strapgen.fixedpoint import Settings, can_lower
+from strapgen.fixedpoint.code import Sum
+
+STEPS = [choice for choice in standard() if choice.method]
+OTHERS = [choice for choice in standard() if not choice.method and can_lower(program(choice))]
+
+
+@cache
+def lowered(choice: Choice, settings: Settings):
+    return quantize(program(choice), settings)
+
+
+def evaluator_of(fixed) -> ModelEvaluator:
+    return ModelEvaluator(generate(fixed, "fixed-model"))
+
+
+def spied(fixed):
+    """Return the model's function, and the dictionary into which it puts the integer of every value."""
+    (text,) = generate(fixed, "fixed-model").files.values()
+    seen: dict[str, int] = {}
+    text = text.replace(
+        "def _within(name, value, low, high):\n",
+        "def _within(name, value, low, high):\n    SEEN[name] = value\n",
+    )
+    text = text.replace(
+        "def _require(name, value, low, high):\n",
+        "def _require(name, value, low, high):\n    SEEN[name] = value\n",
+    )
+    space: dict = {"SEEN": seen}
+    exec(compile(text, "model", "exec"), space)
+    return space[fixed.name], seen
+
+
+@pytest.mark.parametrize(
+    ("word", "rounding"),
+    [
+        (32, "nearest"),
+        (16, "truncation"),
+        *(
+            pytest.param(word, rounding, marks=pytest.mark.long)
+            for word in (8, 16, 24, 32, 64)
+            for rounding in ("nearest", "truncation")
+            if (word, rounding) not in ((32, "nearest"), (16, "truncation"))
+        ),
+    ],
+)
+@pytest.mark.parametrize("choice", STEPS + OTHERS, ids=lambda choice: choice.kernel)
+def test_every_value_keeps_its_range_and_its_error_bound(choice, word, rounding, rng):
+    fixed = lowered(choice, Settings(word, Fraction(1, 60), rounding))
+    function, seen = spied(fixed)
+    inputs = corners_and_random(evaluator_of(fixed), 25, rng)
+    compared = 0
+    for sample in zip(*(array.tolist() for array in inputs), strict=True):
+        try:
+            function(*sample)  # asserts ranges and partial sums
+        except ValueError as error:
+            assert "lies outside" in str(error)  # far from a proper input
+            continue
+        known = exactly(fixed, sample)
+        # The eigenvalues of the nearest rotation follow from an angle that no word holds well: what comes after it
+        # keeps its range, but only the result has a bound.
+        outputs = {name for argument in fixed.interface.outputs for name in argument.values}
+        loose = choice.name == "dcm-orthonormalize-optimal"
+        for value in fixed.body:
+            if loose and value.name not in outputs:
+                continue
+            if value.name not in known or value.name not in seen:
+                continue
+            computed = value.offset + seen[value.name] * Fraction(2) ** -value.fraction
+            assert abs(computed - known[value.name]) <= value.error, value.name
+            compared += 1
+    assert compared > (5 * len(fixed.body) if not loose else 0)
+
+
+@pytest.mark.parametrize("word", [16, 32])
+@pytest.mark.parametrize("algorithm", ["euler", "dcm"])
+def test_the_bound_of_a_step_is_near_the_worst_of_many(algorithm, word, rng):
+    settings = Settings.of(word=word, max_rate_deg_s=400, step="0.01", increments=2)
+    fixed = lowered(Choice(algorithm, "rk4", 2), settings)
+    model = evaluator_of(fixed)
+    inputs = corners_and_random(model, 100_000, rng)
+    (computed,), _ = model.run(inputs, model.fresh(len(inputs[0])))
+    doubles = {
+        name: array[:, k].astype(float) * float(argument.format.unit)
+        for argument, array in zip(fixed.interface.inputs, inputs, strict=True)
+        for k, name in enumerate(argument.signal.elements)
+    }
+    (wanted,) = in_double(fixed.program, doubles).values()
+    (result,) = fixed.interface.outputs
+    for k, bound in enumerate(result.errors):
+        worst = np.abs(computed[:, k] * float(result.format.unit) - wanted[k]).max()
+        # Doubles round at 1e-16 of the value, a ten-millionth of the bound at 32 bits.
+        assert worst <= float(bound) * (1 + 1e-6)
+        assert float(bound) <= 1.6 * worst
+
+
+@pytest.mark.parametrize("carry", ["none", "state", "full"])
+@pytest.mark.parametrize("rounding", ["nearest", pytest.param("truncation", marks=pytest.mark.long)])
+@pytest.mark.parametrize("word", [12, 32, pytest.param(16, marks=pytest.mark.long)])
+@pytest.mark.parametrize("algorithm", ["dcm", "euler", "cayley-klein"])
+def test_the_bound_of_a_run_holds_along_it(algorithm, word, rounding, carry, rng):
+    settings = Settings(word, Fraction(1, 60), rounding, carry)
+    made = make_backend(algorithm, "rk4", 2, "fixed-model", settings=settings)
+    # A steady turn with noise on it: some errors repeat from step to step, others do not.
+    increments = rng.uniform(-1, 1, (1, 1, 3)) / 80 + rng.normal(scale=1e-3, size=(200, 2, 3))
+    given = made.representable(np.clip(increments, -1 / 60, 1 / 60))
+    double = make_backend(algorithm, "rk4", 2, "numpy")
+    apart = made.propagate(given) - double.propagate(given)
+    lengths = np.linalg.norm(apart, axis=-1)
+    lengths = lengths if lengths.ndim == 1 else lengths.max(axis=-1)
+    bounds = np.array([made.rounding_bound(n) for n in range(201)])
+    assert np.all(lengths[1:] <= bounds[1:] * (1 + 1e-6) + 1e-13)
+    exact_inputs = double.propagate(increments.clip(-1 / 60, 1 / 60))
+    apart = np.linalg.norm(made.propagate(increments.clip(-1 / 60, 1 / 60)) - exact_inputs, axis=-1)
+    apart = apart if apart.ndim == 1 else apart.max(axis=-1)
+    assert np.all(apart[1:] <= [made.rounding_bound(n, True) + 1e-13 for n in range(1, 201)])
+
+
+@pytest.mark.parametrize("choice", STEPS, ids=lambda choice: choice.kernel)
+def test_no_transition_stretches_more_than_the_bound_says(choice, rng):
+    angle = 1 / 40
+    fixed = lowered(choice, Settings(32, Fraction(1, 40)))
+    growth = float(fixed.interface.accumulation.growth)
+    part = program(choice).transition_program()
+    rows = [*rng.choice([-angle, angle], size=(64, 6)), *rng.uniform(-angle, angle, (200, 6))]
+    largest = 0.0
+    for row in rows:
+        (elements,) = part.run(dict(zip(part.inputs[0].elements, row.tolist(), strict=True)), float).values()
+        array = np.array(elements, float)
+        norm = np.linalg.norm(array.reshape(3, 3), ord=2) if len(array) == 9 else np.linalg.norm(array)
+        largest = max(largest, float(norm))
+    assert largest <= growth * (1 + 1e-12)
+    assert growth - 1 <= {"rk1": 0.03, "rk2": 0.03, "rk3": 0.01, "rk4": 1e-4}[choice.method]
+
+
+# What the formats are for: the figures that a long run keeps.
+
+
+def three_axes():
+    motion = strapgen.motion("constant", x_deg_s=10, y_deg_s=10, z_deg_s=10)
+    return motion.increments(Fraction(1, 8), 1440, 2)
+
+
+def angles_apart(made, increments) -> np.ndarray:
+    """Return the rotation in deg, about each axis, between a run and the exact one on the same increments."""
+    given = made.representable(increments)
+    wanted = exact.propagate(program(Choice("euler", "rk4", 2)), given)
+    apart = Rotation.from_quat(made.propagate(given)) * Rotation.from_quat(wanted).inv()
+    return np.degrees(apart.as_rotvec())
+
+
+@pytest.mark.parametrize(
+    ("name", "carry", "limit"),
+    [
+        ("c-q31", "none", 2e-6),
+        ("c-q31", "state", 2e-6),
+        ("c-q31", "full", 1e-7),
+        ("c-q15", "none", 0.3),
+        ("c-q15", "state", 0.04),
+        ("c-q15", "full", 0.008),
+    ],
+)
+def test_a_turn_about_three_axes(name, carry, limit):
+    settings = Settings.of(max_rate_deg_s=12, step="0.125", increments=2, carry=carry)
+    made = make_backend("euler", "rk4", 2, name, settings=settings)
+    angles = angles_apart(made, three_axes())
+    assert np.linalg.norm(angles[-1]) < limit, "what has accumulated after 180 s"
+    assert np.abs(angles).max() < limit, "on each axis all along the run"
+    assert np.linalg.norm(angles, axis=1).max() <= np.degrees(2 * made.rounding_bound(1440)) * (1 + 1e-6)
+
+
+def classical_coning(steps: int) -> np.ndarray:
+    """Increments of a cone of 1 deg at 10 Hz in steps of 2 ms: the exact integrals of its rate."""
+    frequency, angle, h = 2 * np.pi * 10, np.radians(1), 0.002
+    phase = frequency * np.arange(2 * steps + 1) * h / 2
+    x = np.sin(angle) * np.diff(np.cos(phase))
+    y = np.sin(angle) * np.diff(np.sin(phase))
+    z = np.full(2 * steps, 2 * frequency * np.sin(angle / 2) ** 2 * h / 2)
+    return np.stack([x, y, z], axis=-1).reshape(steps, 2, 3)
+
+
+def in_many_places(increments: np.ndarray, places: int = 128) -> np.ndarray:
+    """Run Euler parameters on integers of many places: as exact as is needed, and faster than any library.
+
+    Increments of doubles above 2**-60 are integers there; a million steps of rounding at 2**-128 cannot be seen.
+    """
+    split = program(Choice("euler", "rk4", 2)).transition_program()
+    (transition,) = split.outputs
+
+    class Many(int):
+        def __add__(self, other):
+            return Many(int(self) + int(other))
+
+        def __sub__(self, other):
+            return Many(int(self) - int(other))
+
+        def __mul__(self, other):
+            return Many(int(self) * int(other) >> places)
+
+        def __neg__(self):
+            return Many(-int(self))
+
+    def number(value: Fraction):
+        return Many((value.numerator << places) // value.denominator)
+
+    names, cache_ = split.inputs[0].elements, {}
+    x, y, z, s = 0, 0, 0, 1 << places
+    states = [(x, y, z, s)]
+    for row in increments.reshape(len(increments), -1):
+        key = row.tobytes()
+        if key not in cache_:
+            values = {
+                n: Many(int(v * 2.0**60) << (places - 60)) for n, v in zip(names, row.tolist(), strict=True)
+            }
+            cache_[key] = [int(v) for v in split.run(values, number)[transition.signal.name]]
+        px, py, pz, ps = cache_[key]
+        x, y, z, s = (
+            (s * px + x * ps + y * pz - z * py) >> places,
+            (s * py - x * pz + y * ps + z * px) >> places,
+            (s * pz + x * py - y * px + z * ps) >> places,
+            (s * ps - x * px - y * py - z * pz) >> places,
+        )
+        states.append((x, y, z, s))
+    return np.array([[value / 2**places for value in state] for state in states])
+
+
+@pytest.mark.parametrize(
+    ("steps", "limits"),
+    [
+        (100_000, {"none": 400, "full": 4}),
+        pytest.param(1_000_000, {"full": 10}, marks=pytest.mark.long),
+    ],
+)
+def test_coning_for_long(steps, limits):
+    increments, wanted = classical_coning(steps), None
+    for carry, limit in limits.items():
+        settings = Settings.of(max_rate_deg_s=100, step="0.002", increments=2, carry=carry)
+        made = make_backend("euler", "rk4", 2, "c-q31", settings=settings)
+        given = made.representable(increments)
+        if wanted is None:
+            wanted = in_many_places(given)
+        apart = np.abs(made.propagate(given) - wanted).max()
+        assert made.unit == 2.0**-30
+        assert apart < limit * made.unit
+        assert apart <= made.rounding_bound(steps)
+
+
+def test_the_reference_in_many_places_is_that_of_mpmath():
+    made = make_backend(
+        "euler", "rk4", 2, "c-q31", settings=Settings.of(max_rate_deg_s=100, step="0.002", increments=2)
+    )
+    given = made.representable(classical_coning(300))
+    wanted = exact.propagate(program(Choice("euler", "rk4", 2)), given)
+    np.testing.assert_allclose(in_many_places(given), wanted, rtol=0, atol=3e-16)
+
+
+def test_a_transition_kept_beside_the_increments_needs_no_residual():
+    # With the state's residuals alone, the transition is split: its rounding is that of its terms of higher order.
+    fixed = lowered(Choice("euler", "rk4", 2), Settings(16, Fraction(1, 76), carry="state"))
+    (rest,) = (value for value in fixed.body if value.name == "p_x")
+    plain = lowered(Choice("euler", "rk4", 2), Settings(16, Fraction(1, 76)))
+    (whole,) = (value for value in plain.body if value.name == "p_x")
+    assert rest.error < whole.error / 15
+    assert isinstance(rest.definition, Sum) and rest.definition.residual is None
+
+
+def test_guards_refuse_what_is_too_far_from_a_proper_input():
+    normalize = make_evaluator("euler-normalize", "fixed-model")
+    unit = 2.0**-30
+    half = np.array([0.3, 0.4, 0.5, 0.6])
+    assert abs(np.linalg.norm(normalize(half / np.linalg.norm(half))) - 1) < 4 * unit
+    with pytest.raises(strapgen.exceptions.InputError, match="refuses its input"):
+        normalize(half / 10)
+
+
+def test_a_back_end_is_built_from_a_quantized_program():
+    fixed = lowered(Choice("euler", "rk4", 2), Settings(16, Fraction(1, 76)))
+    for target in ("c-fixed", "fixed-model"):
+        made = build(generate(fixed, target))
+        assert made.unit == 2.0**-14

@@ -1,0 +1,204 @@
+"""Quantities and integers: what is chosen, what a user may fix, what is refused."""
+
+from __future__ import annotations
+
+import json
+from fractions import Fraction
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from derived import program
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from strapgen import generate, quantize
+from strapgen.backends.fixed import ModelEvaluator
+from strapgen.catalogue import Choice
+from strapgen.exceptions import InputError
+from strapgen.fixedpoint import Settings
+from strapgen.fixedpoint.code import Sum
+from strapgen.fixedpoint.derivation import quantities
+from strapgen.fixedpoint.intervals import Interval
+from strapgen.program import Assignment, Constant, Operation, Program, Reference, Result
+from strapgen.signal import Signal
+
+EULER = Choice("euler", "rk4", 2)
+
+
+def hand_made(body: dict[str, object], *outputs: str, bound: object = 1) -> Program:
+    """Return a program of three inputs up to a bound."""
+    x = Signal("x", (3,), ("x_1", "x_2", "x_3"), bound=Fraction(bound))
+    y = Signal("y", (len(outputs),), tuple(f"y_{k}" for k in range(len(outputs))))
+    assignments = tuple(Assignment(name, value) for name, value in body.items())
+    return Program(
+        "made",
+        "made",
+        "Made by hand",
+        "",
+        "made",
+        (),
+        (x,),
+        assignments,
+        (Result(y, tuple(map(Reference, outputs))),),
+    )
+
+
+def op(kind, *arguments):
+    return Operation(kind, tuple(Reference(a) if isinstance(a, str) else a for a in arguments))
+
+
+def number(value):
+    return Constant(Fraction(value))
+
+
+@st.composite
+def polynomials(draw):
+    """Programs of sums and products, of up to six assignments."""
+    names = ["x_1", "x_2", "x_3"]
+    body = {}
+    for k in range(draw(st.integers(1, 6))):
+
+        def leaf():
+            if draw(st.integers(0, 4)) == 0:
+                return Constant(draw(st.fractions(min_value=-2, max_value=2, max_denominator=48)))
+            return Reference(draw(st.sampled_from(names)))
+
+        def tree(depth):
+            if depth == 0:
+                return leaf()
+            kind = draw(st.sampled_from(["add", "subtract", "multiply"]))
+            return Operation(kind, (tree(depth - 1), tree(draw(st.integers(0, depth - 1)))))
+
+        body[f"v_{k}"] = tree(draw(st.integers(1, 2)))
+        names.append(f"v_{k}")
+    return hand_made(body, names[-1])
+
+
+@settings(max_examples=60, deadline=None)
+@given(polynomials(), st.sampled_from([8, 16, 32, 64]), st.sampled_from(["nearest", "truncation"]), st.data())
+def test_any_polynomial_keeps_its_bound(made, word, rounding, data):
+    try:
+        fixed = quantize(made, Settings(word, rounding=rounding))
+    except InputError as error:
+        assert word == 8 and "too short" in str(error)
+        return
+    model = ModelEvaluator(generate(fixed, "fixed-model"))
+    (given_,), (result,) = fixed.interface.inputs, fixed.interface.outputs
+    for _ in range(5):
+        integers = [data.draw(st.integers(given_.low, given_.high)) for _ in range(3)]
+        (computed,) = model.step(integers)
+        values = {n: i * given_.format.unit for n, i in zip(given_.signal.elements, integers, strict=True)}
+        (wanted,) = made.run(values).values()
+        assert abs(computed[0] * result.format.unit - wanted[0]) <= result.errors[0]
+
+
+def test_what_stays_near_a_constant_is_kept_as_its_distance():
+    box = {name: Interval.symmetric(Fraction(1, 8)) for name in ("x_1", "x_2", "x_3")}
+    body = {
+        "near": op("subtract", number(1), op("multiply", "x_1", "x_2")),
+        "y": op("multiply", "near", "x_3"),
+    }
+    made = quantities(hand_made(body, "y"), box).items
+    assert made["near"].offset == 1
+    assert made["near"].range.magnitude == Fraction(1, 64)
+    # 1 x_3 exactly, and a product.
+    assert dict(made["y"].definition.terms) == {("x_3",): 1, ("near", "x_3"): 1}
+
+
+def test_ranges_are_tighter_than_plain_intervals():
+    box = {name: Interval.symmetric(1) for name in ("x_1", "x_2", "x_3")}
+    body = {
+        "sum": op("add", "x_1", "x_2"),
+        "back": op("subtract", "sum", "x_2"),  # x_1: plain intervals give 3
+        "square": op("multiply", "sum", "sum"),  # not negative
+        "cubic": op("multiply", op("multiply", "x_1", "x_1"), op("subtract", "x_1", number(1))),
+        "last": op("add", op("add", "back", "square"), "cubic"),
+    }
+    made = quantities(hand_made(body, "last"), box).items
+    assert made["back"].range == Interval.symmetric(1)
+    assert made["square"].range == Interval.of(0, 4)
+
+
+def test_a_cut_of_the_box_saves_a_bit():
+    # x (1 - x) on [0, 1] is at most 1/4; an interval of the product alone gives 1, of the expansion 1.
+    box = {name: Interval.of(0, 1) for name in ("x_1", "x_2", "x_3")}
+    body = {
+        "rest": op("subtract", number(1), "x_1"),
+        "cube": op("multiply", op("multiply", "x_1", "rest"), op("multiply", "x_1", "rest")),
+        "y": op("add", "cube", "x_2"),
+    }
+    made = quantities(hand_made(body, "y"), box).items
+    product = next(q for name, q in made.items() if name.startswith("cube_factor"))
+    assert product.range.magnitude <= Fraction(1, 2)
+
+
+def test_sums_of_increments_are_exact():
+    for count in (2, 3, 4):
+        fixed = quantize(program(Choice("euler", "rk2", count)), Settings(16))
+        for value in fixed.body:
+            if value.name in ("sigma_x", "sigma_y", "sigma_z"):
+                assert value.error == 0 and value.definition.shift == 0
+
+
+def test_a_user_fixes_formats():
+    settings_ = Settings(32, formats={"increments": "Q0.31", "p_x": "Q0.31", "state": "Q2.29"})
+    fixed = quantize(program(EULER), settings_)
+    formats = {name: str(format_) for name, format_ in fixed.formats.items()}
+    assert formats["increments"] == formats["p_x"] == "Q0.31"
+    assert formats["state"] == formats["next"] == "Q2.29"
+    assert formats["p_y"] != "Q0.31"
+
+
+@pytest.mark.parametrize(
+    ("formats", "said"),
+    [
+        ({"increments": "Q-9.40"}, "format Q-9.40 of increments does not hold its range of \\+-0.125"),
+        ({"p_x": "Q-9.40"}, "format Q-9.40 of p_x does not hold its range"),
+        ({"q_x": "Q0.31"}, "has no value 'q_x'; its values are: state, increments"),
+        ({"d1_x": "Q0.31"}, "give the format of the whole input"),
+        ({"state": "Q0.31"}, "format Q0.31 of state does not hold its range of \\+-1.0625"),
+    ],
+)
+def test_formats_that_do_not_hold_their_values(formats, said):
+    with pytest.raises(InputError, match=said):
+        quantize(program(EULER), Settings(32, formats=formats))
+
+
+def test_ranges_of_inputs_must_be_known():
+    with pytest.raises(InputError, match="constant-increments: the range of input middle is not known"):
+        quantize(program(Choice("constant-increments")), Settings())
+    with pytest.raises(InputError, match="has no input 'speed'; its inputs are: state, increments"):
+        quantize(program(EULER), Settings(ranges={"speed": Fraction(1)}))
+
+
+def test_products_meet_at_one_place_where_that_costs_nothing():
+    fixed = quantize(program(EULER), Settings.of(max_rate_deg_s=12, step="0.125", increments=2))
+    values = {value.name: value for value in fixed.body}
+    for name in ("p_x", "p_y", "p_z"):
+        definition = values[name].definition
+        assert isinstance(definition, Sum)
+        assert all(term.shift >= 0 for term in definition.fine)
+    assert fixed.error_bounds["next"] < Fraction(52, 100) * Fraction(1, 2**30)
+
+
+def test_longer_words_have_smaller_bounds():
+    bounds = [quantize(program(EULER), Settings(word)).error_bounds["next"] for word in range(8, 65, 4)]
+    assert all(a > b for a, b in pairwise(bounds))
+    assert bounds[0] / bounds[-1] > 2**55
+
+
+def test_interfaces_survive_json():
+    fixed = quantize(program(EULER), Settings(16, carry="full"))
+    data = json.loads(json.dumps(fixed.interface.as_dict()))
+    assert type(fixed.interface).from_dict(data) == fixed.interface
+    assert len(fixed.interface.residuals) == 8
+
+
+def test_a_constant_output_and_a_repeated_one():
+    body = {"one": number(1), "twice": op("multiply", number(2), "x_1")}
+    fixed = quantize(hand_made(body, "one", "twice", "twice"), Settings(16))
+    (result,) = fixed.interface.outputs
+    assert result.errors == (0, 0, 0)
+    assert len(set(result.values)) == 3
+    assert np.isfinite(float(result.format.unit))

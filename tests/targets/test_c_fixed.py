@@ -1,0 +1,319 @@
+"""Fixed-point C: bit for bit the integer model, no undefined behaviour, an error code for what is out of range."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from fractions import Fraction
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from derived import program
+from evidence import corners_and_random
+
+from strapgen import build, generate, quantize
+from strapgen.backends.fixed import CFixedEvaluator, ModelEvaluator
+from strapgen.catalogue import Choice, standard
+from strapgen.exceptions import InputError
+from strapgen.fixedpoint import Settings, can_lower
+
+LOWERED = [choice for choice in standard() if can_lower(program(choice))]
+STRICT = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror"]
+EULER = Choice("euler", "rk4", 2)
+
+
+@cache
+def pair(choice: Choice, settings: Settings) -> tuple[CFixedEvaluator, ModelEvaluator]:
+    fixed = quantize(program(choice), settings)
+    return CFixedEvaluator(generate(fixed, "c-fixed")), ModelEvaluator(generate(fixed, "fixed-model"))
+
+
+def results(evaluator, inputs, residuals):
+    """Return outputs and residuals, or what was said of a refusal."""
+    try:
+        outputs, kept = evaluator.run(inputs, residuals)
+    except InputError as error:
+        return str(error).split(":")[0].split(" (")[0]
+    return [array.tolist() for array in outputs], kept.tolist()
+
+
+@pytest.mark.parametrize(
+    ("word", "carry"),
+    [
+        (32, "full"),
+        *(
+            pytest.param(word, carry, marks=pytest.mark.long)
+            for word in (16, 32, 64)
+            for carry in ("none", "full")
+            if (word, carry) != (32, "full")
+        ),
+    ],
+)
+@pytest.mark.parametrize("choice", LOWERED, ids=lambda choice: choice.kernel)
+def test_c_and_model_agree_bit_for_bit(choice, word, carry, rng):
+    in_c, model = pair(choice, Settings(word, Fraction(1, 60), carry=carry))
+    inputs = corners_and_random(model, 400, rng)
+    residuals = rng.integers(0, 2**word - 1, size=(400, len(model.interface.residuals)), dtype=np.uint64)
+    residuals = residuals.astype(object if word == 64 else np.int64)
+    for k in range(400):  # one by one: each may be refused
+        rows = [array[k : k + 1] for array in inputs]
+        assert results(in_c, rows, residuals[k : k + 1]) == results(model, rows, residuals[k : k + 1])
+
+
+@pytest.mark.parametrize(
+    "settings", [Settings(16), Settings(32), Settings(32, rounding="truncation", carry="full")]
+)
+@pytest.mark.parametrize("choice", [EULER, Choice("dcm", "rk4", 2)], ids=lambda choice: choice.kernel)
+def test_a_million_random_inputs(choice, settings, rng):
+    in_c, model = pair(choice, settings)
+    inputs = corners_and_random(model, 1_000_000, rng)
+    residuals = rng.integers(0, 2**settings.word, size=(1_000_000, len(model.interface.residuals)))
+    (computed,), kept = in_c.run(inputs, residuals)
+    (wanted,), left = model.run(inputs, residuals)
+    np.testing.assert_array_equal(computed, wanted)
+    np.testing.assert_array_equal(kept, left)
+
+
+@pytest.mark.parametrize(
+    ("word", "carry"),
+    [
+        (16, "full"),
+        *(pytest.param(32, carry, marks=pytest.mark.long) for carry in ("none", "state", "full")),
+        *(pytest.param(16, carry, marks=pytest.mark.long) for carry in ("none", "state")),
+    ],
+)
+@pytest.mark.parametrize("choice", [c for c in LOWERED if c.method], ids=lambda choice: choice.kernel)
+def test_whole_runs_agree_bit_for_bit(choice, word, carry, rng):
+    fixed = quantize(program(choice), Settings(word, Fraction(1, 60), carry=carry))
+    in_c, model = (build(generate(fixed, target)) for target in ("c-fixed", "fixed-model"))
+    increments = rng.uniform(-1 / 60, 1 / 60, (150, 2, 3))
+    np.testing.assert_array_equal(in_c.propagate(increments, 3, 10), model.propagate(increments, 3, 10))
+
+
+def test_a_long_run_agrees_bit_for_bit(rng):
+    fixed = quantize(program(EULER), Settings(32, Fraction(1, 60), carry="full"))
+    in_c, model = (build(generate(fixed, target)) for target in ("c-fixed", "fixed-model"))
+    increments = rng.uniform(-1 / 60, 1 / 60, (20_000, 2, 3))
+    np.testing.assert_array_equal(in_c.propagate(increments), model.propagate(increments))
+
+
+# The contract of the C
+
+
+def test_a_widened_input_is_refused_and_nothing_is_touched():
+    in_c, _ = pair(EULER, Settings(32, Fraction(1, 60), carry="full"))
+    ffi, lib = in_c.module.ffi, in_c.module.lib
+    call = getattr(lib, in_c.function.name)
+    limits = {argument.signal.name: argument.high for argument in in_c.interface.inputs}
+    for name, size in (("state", 4), ("increments", 6)):
+        for place in range(size):
+            for value in (
+                limits[name],
+                -limits[name],
+                limits[name] + 1,
+                -limits[name] - 1,
+                2**31 - 1,
+                -(2**31),
+            ):
+                state = ffi.new("int32_t[4]", [0, 0, 0, 1 << 30])
+                increments = ffi.new("int32_t[6]")
+                residuals = ffi.new("uint32_t[8]", [7] * 8)
+                out = ffi.new("int32_t[4]", [5] * 4)
+                (state if name == "state" else increments)[place] = value
+                status = call(state, increments, residuals, out)
+                refused = abs(value) > limits[name]
+                assert status == (1 if refused else 0)
+                assert (list(out) == [5] * 4 and list(residuals) == [7] * 8) == refused
+
+
+def test_an_output_may_be_the_input():
+    in_c, _ = pair(EULER, Settings(32, Fraction(1, 60)))
+    ffi, call = in_c.module.ffi, getattr(in_c.module.lib, in_c.function.name)
+    increments = ffi.new("int32_t[6]", [10**6 * k for k in range(6)])
+    state, out = ffi.new("int32_t[4]", [1, 2, 3, 1 << 30]), ffi.new("int32_t[4]")
+    assert call(state, increments, out) == 0
+    assert call(state, increments, state) == 0
+    assert list(state) == list(out)
+
+
+def test_arrays_stop_at_the_first_refusal():
+    in_c, _ = pair(EULER, Settings(32, Fraction(1, 60)))
+    states = np.array([[0, 0, 0, 1 << 30]] * 5)
+    increments = np.zeros((5, 6), int)
+    increments[3, 2] = 2**31 - 1
+    with pytest.raises(
+        InputError, match=r"refuses its input \(sample 3\): its formats were chosen for state up to"
+    ):
+        in_c.run([states, increments], in_c.fresh(5))
+
+
+def test_a_run_says_where_it_was_refused():
+    fixed = quantize(program(Choice("dcm", "rk1", 2)), Settings(32, Fraction(1, 8)))
+    for target in ("c-fixed", "fixed-model"):
+        made = build(generate(fixed, target))
+        with pytest.raises(InputError, match="dcm-rk1-2 refuses its input in step 11"):
+            made.propagate(np.full((20, 2, 3), 0.05))
+    with pytest.raises(
+        InputError, match=r"increments holds 0\.2; the formats of dcm-rk1-2 were chosen for at most 0\.125"
+    ):
+        made.propagate(np.full((20, 2, 3), 0.2))
+
+
+def test_loops_refuse_bad_arguments():
+    fixed = quantize(program(EULER), Settings(32))
+    made = build(generate(fixed, "c-fixed"))
+    propagate, ffi = made._generated, made._c.module.ffi
+    array, history = ffi.new("int32_t[6]"), ffi.new("int32_t[8]", [9] * 8)
+    null = ffi.NULL
+    assert propagate(1, 1, 0, 0, null, array, array, history, null) == 4
+    assert propagate(1, 1, 1, 1, null, array, array, history, null) == 4
+    assert propagate(1, 1, 1, 0, null, null, array, history, null) == 4
+    assert propagate(1, 1, 1, 0, null, array, null, history, null) == 4
+    assert propagate(1, 1, 1, 0, null, array, array, null, null) == 4
+    assert list(history) == [9] * 8
+
+
+@pytest.mark.parametrize(
+    "word", [32, pytest.param(16, marks=pytest.mark.long), pytest.param(64, marks=pytest.mark.long)]
+)
+@pytest.mark.parametrize("choice", LOWERED, ids=lambda choice: choice.kernel)
+def test_strict_compilers_are_silent(choice, word, tmp_path):
+    sources = generate(quantize(program(choice), Settings(word, carry="full")), "c-fixed")
+    for name, text in sources.files.items():
+        (tmp_path / name).write_text(text)
+    (code,) = (name for name in sources.files if name.endswith(".c"))
+    for command in (["cc", *STRICT], ["c++", "-x", "c++", "-std=c++17", "-Wall", "-Wextra", "-Werror"]):
+        done = subprocess.run(
+            [*command, "-O2", "-c", code, "-o", "x.o"], cwd=tmp_path, capture_output=True, text=True
+        )
+        assert not done.returncode, done.stderr
+
+
+def test_the_source_is_integers_alone():
+    for choice in LOWERED:
+        for text in generate(quantize(program(choice), Settings(16)), "c-fixed").files.values():
+            code = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
+            assert not re.search(r"\b(float|double|math\.h|sqrt|\d+\.\d)", code)
+
+
+def test_the_header_states_format_unit_range_and_error():
+    fixed = quantize(program(EULER), Settings.of(max_rate_deg_s=400, step="0.01", increments=2, carry="full"))
+    header = generate(fixed, "c-fixed").files["euler_rk4_2_q31.h"]
+    text = re.sub(r"\s+\*?\s*", " ", header)
+    for argument in (*fixed.interface.inputs, *fixed.interface.outputs):
+        unit = f"2^-{argument.format.fraction}" + (" rad" if argument.signal.unit == "rad" else "")
+        assert f"{argument.signal.name}[{argument.signal.size}]: {argument.signal.meaning};" in text
+        assert f"format {argument.format}, unit {unit}; range {argument.low} to {argument.high} (" in text
+    worst = float(fixed.error_bounds["next"])
+    assert f"error at most {worst:.6g}, {worst * 2**30:.4f} of the last place" in text
+    accumulation = fixed.interface.accumulation
+    assert f"({float(accumulation.once):.6g} + {float(accumulation.per_step):.6g} N)" in text
+    assert "--max-rate-deg-s 400 --step 0.01 --carry full" in text
+
+
+# Sanitizers and other semantics of overflow
+
+_HARNESS = """
+#include <stdio.h>
+#include <stdlib.h>
+#include "{name}.c"
+
+int main(void)
+{{
+    {word} in[{inputs}], out[{outputs}];
+    {residual} kept[{kept} + 1];
+    long long value;
+    for (;;) {{
+        for (int k = 0; k < {inputs}; ++k) {{
+            if (scanf("%lld", &value) != 1)
+                return 0;
+            in[k] = ({word})value;
+        }}
+        for (int k = 0; k < {kept}; ++k) {{
+            if (scanf("%lld", &value) != 1)
+                return 1;
+            kept[k] = ({residual})value;
+        }}
+        for (int k = 0; k < {outputs}; ++k)
+            out[k] = 0;
+        printf("%d", {name}({arguments}));
+        for (int k = 0; k < {outputs}; ++k)
+            printf(" %lld", (long long)out[k]);
+        for (int k = 0; k < {kept}; ++k)
+            printf(" %llu", (unsigned long long)kept[k]);
+        puts("");
+    }}
+}}
+"""
+
+BUILDS = {
+    "plain": ["-O2"],
+    "sanitized": ["-O1", "-g", "-fsanitize=undefined,address", "-fno-sanitize-recover=all"],
+    "wrapping": ["-O2", "-fwrapv"],
+    "trapping": ["-O2", "-ftrapv"],
+}
+
+
+def built(folder: Path, sources, flags: list[str]) -> Path:
+    interface, name = sources.fixed, sources.function.name
+    word = interface.settings.word
+    places, offset = [], 0
+    for argument in interface.inputs:
+        places.append(f"in + {offset}")
+        offset += argument.signal.size
+    arguments = [*places, *(["kept"] if interface.residuals else [])]
+    size = 0
+    for argument in interface.outputs:
+        arguments.append(f"out + {size}")
+        size += argument.signal.size
+    for file, text in sources.files.items():
+        (folder / file).write_text(text)
+    (folder / "main.c").write_text(
+        _HARNESS.format(
+            name=name,
+            word=f"int{word}_t",
+            residual=f"uint{word}_t",
+            inputs=offset,
+            outputs=size,
+            kept=len(interface.residuals),
+            arguments=", ".join(arguments),
+        )
+    )
+    program_file = folder / "main"
+    done = subprocess.run(
+        ["cc", "-std=c99", *flags, "main.c", "-o", program_file], cwd=folder, capture_output=True, text=True
+    )
+    assert not done.returncode, done.stderr
+    return program_file
+
+
+@pytest.mark.parametrize("word", [32, pytest.param(16, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "choice",
+    [choice for choice in LOWERED if choice.method in (None, "rk3", "rk4")],
+    ids=lambda choice: choice.kernel,
+)
+def test_no_undefined_behaviour_under_any_semantics(choice, word, tmp_path, rng):
+    sources = generate(quantize(program(choice), Settings(word, Fraction(1, 60), carry="full")), "c-fixed")
+    model = ModelEvaluator(
+        generate(quantize(program(choice), Settings(word, Fraction(1, 60), carry="full")), "fixed-model")
+    )
+    inputs = np.hstack(corners_and_random(model, 300, rng))
+    # Some far outside: any integer of the word is a lawful argument.
+    inputs[::10] = rng.integers(-(2 ** (word - 1)), 2 ** (word - 1), size=inputs[::10].shape)
+    kept = rng.integers(0, 2**word, size=(300, len(model.interface.residuals)))
+    given = "\n".join(" ".join(map(str, row)) for row in np.hstack([inputs, kept]).tolist())
+    said = {}
+    for name, flags in BUILDS.items():
+        folder = tmp_path / name
+        folder.mkdir()
+        done = subprocess.run(
+            [built(folder, sources, flags)], input=given, capture_output=True, text=True, check=False
+        )
+        assert not done.returncode and not done.stderr, (name, done.stderr[:500])
+        said[name] = done.stdout
+    assert said["plain"].count("\n") == 300
+    assert "\n1 " in said["plain"] and "\n0 " in said["plain"]
+    assert set(said.values()) == {said["plain"]}

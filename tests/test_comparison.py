@@ -1,0 +1,103 @@
+"""Back ends side by side: what is measured, and that the certified bound holds."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+
+import numpy as np
+import pytest
+
+import strapgen
+from strapgen import comparison
+from strapgen.backends import BACKENDS
+from strapgen.exceptions import InputError
+from strapgen.fixedpoint import Settings
+
+FIXED_NAMES = ("c-q31", "c-q15", "fixed-model")
+
+
+@pytest.fixture
+def increments(rng):
+    return rng.uniform(-1, 1, (1, 1, 3)) / 100 + rng.normal(scale=2e-3, size=(120, 2, 3))
+
+
+@pytest.mark.parametrize("reference", ["numpy", "exact", "c-float"])
+def test_every_back_end_against_every_kind_of_reference(algorithm, reference, increments):
+    rows = comparison.compare(algorithm, "rk4", 2, list(BACKENDS), increments, reference=reference)
+    assert [row.backend for row in rows] == list(BACKENDS)
+    for row in rows:
+        assert 0 <= row.rms_rad <= row.max_abs_rad
+        assert row.ns_per_step > 0
+        assert (row.bytes is None) == (row.backend in ("numpy", "fixed-model"))
+        assert (row.bound_rad is None) == (row.backend not in FIXED_NAMES)
+        assert row.drift_deg <= math.degrees(row.max_abs_rad) * math.sqrt(3) * (1 + 1e-9)
+        if row.backend == reference:
+            assert row.max_abs_rad <= 1e-15 and row.max_ulp == 0
+        if row.backend in FIXED_NAMES and reference != "c-float":
+            assert 0 < row.max_abs_rad <= row.bound_rad
+    by_name = {row.backend: row for row in rows}
+    model, in_c = by_name["fixed-model"], by_name["c-q31"]
+    assert (model.max_abs_rad, model.bound_rad) == (in_c.max_abs_rad, in_c.bound_rad)
+    if reference == "exact":
+        # Doubles round at 2**-53, singles at 2**-24.
+        assert by_name["c"].max_abs_rad < 1e-13 < by_name["c-float"].max_abs_rad
+
+
+@pytest.mark.parametrize("carry", ["none", "state", "full"])
+def test_the_bound_counts_the_rounding_of_increments_only_where_there_is_one(increments, carry):
+    settings = Settings(largest_angle=strapgen.fixedpoint.settings.Fraction(1, 60), carry=carry)
+    made = strapgen.backend("euler", backend="c-q31", settings=settings)
+
+    def bound(given):
+        (row,) = comparison.compare("euler", "rk4", 2, ["c-q31"], given, reference="exact", settings=settings)
+        assert row.max_abs_rad <= row.bound_rad
+        return row.bound_rad
+
+    assert bound(made.representable(increments)) < bound(increments)
+
+
+def test_drift_is_that_from_the_truth_where_it_is_known():
+    motion = strapgen.motion("constant", y_deg_s=10)
+    given = motion.increments(strapgen.fixedpoint.settings.Fraction(1, 8), 80, 2)
+    truth = motion.attitude(np.arange(81) / 8)
+    (row,) = comparison.compare("dcm", "rk2", 2, ["numpy"], given, truth=truth)
+    run = strapgen.simulate(strapgen.backend("dcm", "rk2"), motion, "0.125", 10)
+    assert row.drift_deg == pytest.approx(math.degrees(run.mean_drift), rel=1e-9)
+    assert row.max_abs_rad == 0
+
+
+def test_a_motion_that_a_back_end_cannot_follow_is_refused():
+    with pytest.raises(InputError, match="dcm-rk1-2 refuses its input in step"):
+        comparison.compare("dcm", "rk1", 2, ["c-q31"], np.full((200, 2, 3), 0.05))
+
+
+@pytest.mark.parametrize(
+    ("backends", "reference", "said"),
+    [
+        (["fortran"], "numpy", "backend 'fortran'"),
+        (["c"], "truth", "reference 'truth'"),
+        ([], "numpy", "no back end"),
+    ],
+)
+def test_names_that_cannot_be_used(backends, reference, said):
+    with pytest.raises(InputError, match=said):
+        comparison.compare("euler", "rk4", 2, backends, np.zeros((2, 2, 3)), reference=reference)
+
+
+def test_the_three_forms_say_the_same(increments):
+    rows = comparison.compare("euler", "rk4", 2, ["numpy", "c-q15"], increments)
+    data = json.loads(comparison.as_json(rows))
+    assert [list(row)[:8] for row in data] == [
+        ["backend", "max_abs_rad", "rms_rad", "max_ulp", "bound_rad", "drift_deg", "ns_per_step", "bytes"]
+    ] * 2
+    table = list(csv.DictReader(io.StringIO(comparison.as_csv(rows))))
+    for plain, cells in zip(data, table, strict=True):
+        for key, value in plain.items():
+            if key != "operations":
+                assert cells[key] == ("" if value is None else str(value))
+        assert cells["multiply"] == str(plain["operations"]["multiply"])
+    text = comparison.as_text(rows, "title", "numpy", "drift")
+    assert text.splitlines()[-1].startswith("c-q15") and f"{rows[1].bound_rad:.3g}" in text
