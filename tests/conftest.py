@@ -13,7 +13,6 @@ from strapgen.catalogue import ALGORITHMS
 from strapgen.fixedpoint import Settings
 from strapgen.targets import FIXED
 
-
 #: The back ends; that with short words has the code of the other one in fixed point, and runs with the long tests.
 BACKEND_NAMES = [pytest.param(name, marks=pytest.mark.long) if name == "c-q15" else name for name in BACKENDS]
 

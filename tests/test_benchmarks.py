@@ -63,3 +63,17 @@ def test_versions_and_machine_are_named(report):
     end = report.split("## Versions and machine")[1]
     assert f"strapgen {strapgen.__version__}" in end
     assert "gcc" in end and "processors" in end
+
+
+def test_the_fixed_point_step_is_timed_against_one_written_out(tmp_path):
+    out = tmp_path / "FIXED_POINT.md"
+    command = [sys.executable, "fixed_point.py", "--rounds", "2", "--out", str(out)]
+    subprocess.run(command, cwd=FOLDER, check=True, capture_output=True)  # compares all results first
+    timed = dict(re.findall(r"^\| (.+?) \| +([\d.]+) \|", out.read_text(), flags=re.MULTILINE))
+    words = [
+        f"{word} bits, {kept}"
+        for word in (32, 16)
+        for kept in ("no residuals", "residuals of the state", "all residuals")
+    ]
+    assert list(timed) == ["double, staged, written out", "double, strapgen", *words]
+    assert all(float(time) > 0 for time in timed.values())

@@ -17,6 +17,7 @@ from strapgen.backends import backend as make_backend
 from strapgen.backends import evaluator as make_evaluator
 from strapgen.backends.fixed import ModelEvaluator
 from strapgen.catalogue import Choice, standard
+from strapgen.exceptions import InputError
 from strapgen.fixedpoint import Settings, can_lower
 from strapgen.fixedpoint.code import Sum
 
@@ -65,6 +66,11 @@ def spied(fixed):
 )
 @pytest.mark.parametrize("choice", STEPS + OTHERS, ids=lambda choice: choice.kernel)
 def test_every_value_keeps_its_range_and_its_error_bound(choice, word, rounding, rng):
+    loose = choice.name == "dcm-orthonormalize-optimal"
+    if loose and word == 8:
+        with pytest.raises(InputError, match="words of 8 bits are too short"):
+            lowered(choice, Settings(word, Fraction(1, 60), rounding))
+        return
     fixed = lowered(choice, Settings(word, Fraction(1, 60), rounding))
     function, seen = spied(fixed)
     inputs = corners_and_random(evaluator_of(fixed), 25, rng)
@@ -79,7 +85,6 @@ def test_every_value_keeps_its_range_and_its_error_bound(choice, word, rounding,
         # The eigenvalues of the nearest rotation follow from an angle that no word holds well: what comes after it
         # keeps its range, but only the result has a bound.
         outputs = {name for argument in fixed.interface.outputs for name in argument.values}
-        loose = choice.name == "dcm-orthonormalize-optimal"
         for value in fixed.body:
             if loose and value.name not in outputs:
                 continue
@@ -288,7 +293,7 @@ def test_guards_refuse_what_is_too_far_from_a_proper_input():
     unit = 2.0**-30
     half = np.array([0.3, 0.4, 0.5, 0.6])
     assert abs(np.linalg.norm(normalize(half / np.linalg.norm(half))) - 1) < 4 * unit
-    with pytest.raises(strapgen.exceptions.InputError, match="refuses its input"):
+    with pytest.raises(InputError, match="refuses its input"):
         normalize(half / 10)
 
 

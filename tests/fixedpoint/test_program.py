@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 
 from strapgen import generate, quantize
 from strapgen.backends.fixed import ModelEvaluator
-from strapgen.catalogue import Choice
+from strapgen.catalogue import Choice, standard
 from strapgen.exceptions import InputError
-from strapgen.fixedpoint import Settings
+from strapgen.fixedpoint import Settings, can_lower
 from strapgen.fixedpoint.code import Sum
 from strapgen.fixedpoint.derivation import quantities
 from strapgen.fixedpoint.intervals import Interval
@@ -186,6 +186,37 @@ def test_longer_words_have_smaller_bounds():
     bounds = [quantize(program(EULER), Settings(word)).error_bounds["next"] for word in range(8, 65, 4)]
     assert all(a > b for a, b in pairwise(bounds))
     assert bounds[0] / bounds[-1] > 2**55
+
+
+@pytest.mark.parametrize("word", [8, 16, 32, 64])
+@pytest.mark.parametrize("choice", [c for c in standard() if can_lower(program(c))], ids=lambda c: c.kernel)
+def test_no_value_and_no_partial_sum_leaves_its_type(choice, word):
+    for carry in ("none", "state", "full"):
+        for angle in (Fraction(1, 1000), Fraction(1, 8), Fraction(1)):
+            if word == 8 and choice.name == "dcm-orthonormalize-optimal":
+                with pytest.raises(InputError, match="words of 8 bits are too short"):
+                    quantize(program(choice), Settings(word, angle, carry=carry))
+                continue
+            fixed = quantize(program(choice), Settings(word, angle, carry=carry))
+            for value in fixed.body:
+                bits = word * (1 + value.wide)
+                assert -(2 ** (bits - 1)) <= value.low <= value.high < 2 ** (bits - 1), value.name
+                assert value.peak < 2 ** (2 * word - 1), value.name
+
+
+def test_large_terms_that_cancel_are_refused():
+    # The sum is proved to be small; what is added up on the way is not.
+    large = number(2**40)
+    body = {
+        "sum": op("add", "x_1", "x_2"),
+        "kept": op("multiply", "sum", "x_3"),
+        "less": op("subtract", op("multiply", large, "sum"), op("multiply", large, "x_1")),
+        "y": op("add", op("subtract", "less", op("multiply", large, "x_2")), "x_3"),
+    }
+    made = hand_made(body, "kept", "y")
+    assert quantize(made, Settings(64)).ranges["y"][1] < 2
+    with pytest.raises(InputError, match="words of 16 bits are too short for y"):
+        quantize(made, Settings(16))
 
 
 def test_interfaces_survive_json():

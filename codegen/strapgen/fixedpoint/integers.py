@@ -350,6 +350,11 @@ class _Quantization:
         coarse = [item for item in terms if item.place <= fraction]
         fine = [item for item in terms if item.place > fraction]
         added, coarse_peak, coarse_error = aligned(coarse, fraction, self.values)
+        short = InputError(
+            f"{self.program.kernel}: words of {self.word} bits are too short for {quantity.name}"
+        )
+        if not fits(added, coarse_peak, self.word, self.values):
+            raise short
         if not fine:
             error = coarse_error
             return self._value(quantity, code.Sum(added), fraction, False, error, coarse_peak), None
@@ -359,9 +364,7 @@ class _Quantization:
         while True:
             shift = places - fraction
             if shift < 1:
-                raise InputError(
-                    f"{self.program.kernel}: words of {self.word} bits are too short for {quantity.name}"
-                )
+                raise short
             made, peak, error = aligned(fine, places, self.values)
             extra = 1 << (shift - 1) if self.settings.rounding == "nearest" else 0
             if residual is not None:
@@ -379,6 +382,8 @@ class _Quantization:
         error += coarse_error + (2 * rounding if residual is not None else rounding)
         definition = code.Sum(made, shift - drop, added, kept, drop)
         low_level = max(peak + extra, coarse_peak + ((peak + extra) >> shift) + 1)
+        if not fits(added, low_level, self.word, self.values):
+            raise short
         value = self._value(quantity, definition, fraction, False, error, low_level)
         if kept is not None:  # whatever integer a caller hands over as a residual
             value = replace(value, low=value.low - 1, high=value.high + 1)
