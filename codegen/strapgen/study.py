@@ -6,7 +6,9 @@ import csv
 import io
 import json
 import math
+import multiprocessing
 import os
+import signal
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, fields
@@ -243,14 +245,19 @@ def run(planned: Sequence[Case], jobs: int | None = None) -> Iterator[Outcome]:
     if workers == 1:
         yield from map(run_case, planned)
         return
-    with ProcessPoolExecutor(workers) as pool:
-        pending = [pool.submit(run_case, case) for case in planned]
-        try:
-            for done in as_completed(pending):
-                yield done.result()
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    others = set(multiprocessing.active_children())
+    # An interrupt is for this process: it stops the others.
+    pool = ProcessPoolExecutor(workers, initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN))
+    pending = [pool.submit(run_case, case) for case in planned]
+    try:
+        for done in as_completed(pending):
+            yield done.result()
+    except BaseException:
+        pool.shutdown(wait=False, cancel_futures=True)
+        for child in set(multiprocessing.active_children()) - others:
+            child.terminate()
+        raise
+    pool.shutdown()
 
 
 def as_csv(outcomes: Sequence[Outcome]) -> str:
@@ -290,9 +297,10 @@ def as_text(outcomes: Sequence[Outcome]) -> str:
                 f"{_angle(outcome.bound_deg):>11}{_angle(outcome.quantization_deg):>12}  {outcome.dominates}"
             )
         lines.append("")
-    lines.append(
-        "all angles in deg, the largest of the run; -: the state leaves its range, or no bound is known"
-    )
+    lines += [
+        "all angles in deg, the largest along the run: lengths of the drift vector, where a mean drift adds up what is",
+        "largest on each axis; -: the state leaves its range, or no bound is known",
+    ]
     return "\n".join(lines)
 
 

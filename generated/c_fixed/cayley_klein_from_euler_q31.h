@@ -33,7 +33,8 @@ extern "C" {
  */
 int cayley_klein_from_euler_q31(const int32_t state[4], int32_t converted[4]);
 
-/* `count` calls on arrays of samples, one after the other, up to the first that is refused.
+/* `count` calls on arrays of samples, one after the other, up to the first that is refused: every array holds `count`
+ * times what one call takes.
  * An output may be the same memory as an input whose samples have the same size; otherwise they must not overlap.
  * Returns how many calls were done, and in `status` what the last one returned.
  */

@@ -55,12 +55,12 @@ static inline int one_(const int32_t state[4], int32_t next[4])
         || outside_(a_y, INT32_C(1140850688))
         || outside_(a_z, INT32_C(1140850688)))
         return 1;
-    const int64_t inverse_norm_square = (int64_t)a_s * a_s + (int64_t)a_x * a_x + (int64_t)a_y * a_y
+    const int64_t inverse_norm_radicand = (int64_t)a_s * a_s + (int64_t)a_x * a_x + (int64_t)a_y * a_y
         + (int64_t)a_z * a_z;
-    if (inverse_norm_square < INT64_C(576460752303423488)
-        || inverse_norm_square > INT64_C(2305843009213693952))
+    if (inverse_norm_radicand < INT64_C(576460752303423488)
+        || inverse_norm_radicand > INT64_C(2305843009213693952))
         return 2;
-    const int_fast32_t inverse_norm_root = root_((uint64_t)(shifted_(inverse_norm_square, 2)));
+    const int_fast32_t inverse_norm_root = root_((uint64_t)(shifted_(inverse_norm_radicand, 2)));
     /* 1/|state| */
     const int_fast32_t inverse_norm = (int_fast32_t)(quotient_(INT64_C(576460752303423488), inverse_norm_root));
     /* Cayley-Klein parameters, body to reference, scalar first, after the step */

@@ -116,14 +116,14 @@ static inline int one_(const int32_t computed[9], int32_t orthonormalized[9])
     const int_fast32_t half_determinant = (int_fast32_t)(shifted_((int64_t)deviator_11 * half_determinant_factor
         + (int64_t)gram_12 * half_determinant_factor_2
         + (int64_t)gram_13 * half_determinant_factor_3 + INT64_C(2147483648), 32));
-    const int_fast32_t angle_angle_argument_square_largest_argument_factor = (int_fast32_t)(shifted_((int64_t)spread * spread
+    const int_fast32_t angle_angle_argument_radicand_largest_argument_factor = (int_fast32_t)(shifted_((int64_t)spread * spread
         + INT32_C(1073741824), 31));
-    const int64_t angle_angle_argument_square_largest_argument = shifted_((int64_t)angle_angle_argument_square_largest_argument_factor * spread, 1)
+    const int64_t angle_angle_argument_radicand_largest_argument = shifted_((int64_t)angle_angle_argument_radicand_largest_argument_factor * spread, 1)
         - (int64_t)half_determinant * half_determinant * 2;
-    int64_t angle_angle_argument_square_largest = 0;
-    if (angle_angle_argument_square_largest_argument > angle_angle_argument_square_largest)
-        angle_angle_argument_square_largest = angle_angle_argument_square_largest_argument;
-    const int_fast32_t angle_angle_argument_root = root_((uint64_t)(shifted_(angle_angle_argument_square_largest, 1)));
+    int64_t angle_angle_argument_radicand_largest = 0;
+    if (angle_angle_argument_radicand_largest_argument > angle_angle_argument_radicand_largest)
+        angle_angle_argument_radicand_largest = angle_angle_argument_radicand_largest_argument;
+    const int_fast32_t angle_angle_argument_root = root_((uint64_t)(shifted_(angle_angle_argument_radicand_largest, 1)));
     const int_fast32_t angle_angle_taken = (int_fast32_t)(((int64_t)angle_angle_argument_root >= INT32_C(880607856) ? INT32_C(880607856)
         : (int64_t)angle_angle_argument_root));
     const int_fast32_t angle_angle_taken_2 = (int_fast32_t)(((int64_t)half_determinant >= INT32_C(1399979002) ? INT32_C(1399979002)
@@ -220,25 +220,25 @@ static inline int one_(const int32_t computed[9], int32_t orthonormalized[9])
     const int_fast32_t across_factor = (int_fast32_t)(shifted_((int64_t)across_root * radius
         + INT32_C(536870912), 30));
     const int64_t across = (int64_t)across_factor * across_sine;
-    const int64_t stretch_1_square = along * 4 + shifted_(mean, 2);
-    if (stretch_1_square < INT64_C(288230376151711744)
-        || stretch_1_square > INT64_C(1152921504606846976))
+    const int64_t stretch_1_radicand = along * 4 + shifted_(mean, 2);
+    if (stretch_1_radicand < INT64_C(288230376151711744)
+        || stretch_1_radicand > INT64_C(1152921504606846976))
         return 2;
     /* singular value 1 of C */
-    const int_fast32_t stretch_1 = root_((uint64_t)(shifted_(stretch_1_square, 1)));
+    const int_fast32_t stretch_1 = root_((uint64_t)(shifted_(stretch_1_radicand, 1)));
     const int64_t shared_10 = along * 2 + shifted_(-mean, 2);
-    const int64_t stretch_2_square = across + shifted_(-shared_10, 1);
-    if (stretch_2_square < INT64_C(144115188075855872)
-        || stretch_2_square > INT64_C(576460752303423488))
+    const int64_t stretch_2_radicand = across + shifted_(-shared_10, 1);
+    if (stretch_2_radicand < INT64_C(144115188075855872)
+        || stretch_2_radicand > INT64_C(576460752303423488))
         return 2;
     /* singular value 2 of C */
-    const int_fast32_t stretch_2 = root_((uint64_t)(stretch_2_square));
-    const int64_t stretch_3_square = -across + shifted_(-shared_10, 1);
-    if (stretch_3_square < INT64_C(144115188075855872)
-        || stretch_3_square > INT64_C(576460752303423488))
+    const int_fast32_t stretch_2 = root_((uint64_t)(stretch_2_radicand));
+    const int64_t stretch_3_radicand = -across + shifted_(-shared_10, 1);
+    if (stretch_3_radicand < INT64_C(144115188075855872)
+        || stretch_3_radicand > INT64_C(576460752303423488))
         return 2;
     /* singular value 3 of C */
-    const int_fast32_t stretch_3 = root_((uint64_t)(stretch_3_square));
+    const int_fast32_t stretch_3 = root_((uint64_t)(stretch_3_radicand));
     const int_fast32_t shared_1 = (int_fast32_t)((int64_t)stretch_1 + (int64_t)stretch_2);
     /* invariants of (C' C)^(1/2) */
     const int_fast32_t invariant_1 = (int_fast32_t)(shifted_((int64_t)shared_1 + (int64_t)stretch_3

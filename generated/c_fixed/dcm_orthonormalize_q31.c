@@ -72,12 +72,12 @@ static inline int one_(const int32_t computed[9], int32_t orthonormalized[9])
         - (int64_t)C_21 * C_33 + (int64_t)C_23 * C_31 + INT32_C(1073741824), 31));
     const int_fast32_t row_1_z = (int_fast32_t)(shifted_((int64_t)C_13 * INT32_C(1073741824)
         + (int64_t)C_21 * C_32 - (int64_t)C_22 * C_31 + INT32_C(1073741824), 31));
-    const int64_t inverse_length_1_square = shifted_((int64_t)row_1_x * row_1_x, 1)
+    const int64_t inverse_length_1_radicand = shifted_((int64_t)row_1_x * row_1_x, 1)
         + shifted_((int64_t)row_1_y * row_1_y, 1) + shifted_((int64_t)row_1_z * row_1_z, 1);
-    if (inverse_length_1_square < INT64_C(288230378825580548)
-        || inverse_length_1_square > INT64_C(1152921501932978172))
+    if (inverse_length_1_radicand < INT64_C(288230378825580548)
+        || inverse_length_1_radicand > INT64_C(1152921501932978172))
         return 2;
-    const int_fast32_t inverse_length_1_root = root_((uint64_t)(inverse_length_1_square * 2));
+    const int_fast32_t inverse_length_1_root = root_((uint64_t)(inverse_length_1_radicand * 2));
     /* 1/|row 1| */
     const int_fast32_t inverse_length_1 = (int_fast32_t)(quotient_(INT64_C(1152921504606846976), inverse_length_1_root));
     /* row 2 and its dual, added */
@@ -87,12 +87,12 @@ static inline int one_(const int32_t computed[9], int32_t orthonormalized[9])
         + (int64_t)C_11 * C_33 - (int64_t)C_13 * C_31 + INT32_C(1073741824), 31));
     const int_fast32_t row_2_z = (int_fast32_t)(shifted_((int64_t)C_23 * INT32_C(1073741824)
         - (int64_t)C_11 * C_32 + (int64_t)C_12 * C_31 + INT32_C(1073741824), 31));
-    const int64_t inverse_length_2_square = shifted_((int64_t)row_2_x * row_2_x, 1)
+    const int64_t inverse_length_2_radicand = shifted_((int64_t)row_2_x * row_2_x, 1)
         + shifted_((int64_t)row_2_y * row_2_y, 1) + shifted_((int64_t)row_2_z * row_2_z, 1);
-    if (inverse_length_2_square < INT64_C(288230378825580548)
-        || inverse_length_2_square > INT64_C(1152921501932978172))
+    if (inverse_length_2_radicand < INT64_C(288230378825580548)
+        || inverse_length_2_radicand > INT64_C(1152921501932978172))
         return 2;
-    const int_fast32_t inverse_length_2_root = root_((uint64_t)(inverse_length_2_square * 2));
+    const int_fast32_t inverse_length_2_root = root_((uint64_t)(inverse_length_2_radicand * 2));
     /* 1/|row 2| */
     const int_fast32_t inverse_length_2 = (int_fast32_t)(quotient_(INT64_C(1152921504606846976), inverse_length_2_root));
     /* row 3 and its dual, added */
@@ -102,12 +102,12 @@ static inline int one_(const int32_t computed[9], int32_t orthonormalized[9])
         - (int64_t)C_11 * C_23 + (int64_t)C_13 * C_21 + INT32_C(1073741824), 31));
     const int_fast32_t row_3_z = (int_fast32_t)(shifted_((int64_t)C_33 * INT32_C(1073741824)
         + (int64_t)C_11 * C_22 - (int64_t)C_12 * C_21 + INT32_C(1073741824), 31));
-    const int64_t inverse_length_3_square = shifted_((int64_t)row_3_x * row_3_x, 1)
+    const int64_t inverse_length_3_radicand = shifted_((int64_t)row_3_x * row_3_x, 1)
         + shifted_((int64_t)row_3_y * row_3_y, 1) + shifted_((int64_t)row_3_z * row_3_z, 1);
-    if (inverse_length_3_square < INT64_C(288230378825580548)
-        || inverse_length_3_square > INT64_C(1152921501932978172))
+    if (inverse_length_3_radicand < INT64_C(288230378825580548)
+        || inverse_length_3_radicand > INT64_C(1152921501932978172))
         return 2;
-    const int_fast32_t inverse_length_3_root = root_((uint64_t)(inverse_length_3_square * 2));
+    const int_fast32_t inverse_length_3_root = root_((uint64_t)(inverse_length_3_radicand * 2));
     /* 1/|row 3| */
     const int_fast32_t inverse_length_3 = (int_fast32_t)(quotient_(INT64_C(1152921504606846976), inverse_length_3_root));
     /* direction cosine matrix, body to reference, orthonormalized */

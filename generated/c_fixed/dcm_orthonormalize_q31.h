@@ -32,13 +32,14 @@ extern "C" {
  *         1.0625); error at most 1.43336e-08, 15.3906 of the last place.
  * Returns 0; or, with the outputs left alone, 1 if an input lies outside its range,
  * 2 if it is too far from a proper one, so that something leaves its limits:
- *   inverse_length_1_square, inverse_length_2_square, inverse_length_3_square from 2 to 8;
+ *   inverse_length_1_radicand, inverse_length_2_radicand, inverse_length_3_radicand from 2 to 8;
  *   next_11, next_12, next_13, next_21, next_22, next_23, next_31, next_32, next_33 from -1.0625
  *   to 1.0625.
  */
 int dcm_orthonormalize_q31(const int32_t computed[9], int32_t orthonormalized[9]);
 
-/* `count` calls on arrays of samples, one after the other, up to the first that is refused.
+/* `count` calls on arrays of samples, one after the other, up to the first that is refused: every array holds `count`
+ * times what one call takes.
  * An output may be the same memory as an input whose samples have the same size; otherwise they must not overlap.
  * Returns how many calls were done, and in `status` what the last one returned.
  */

@@ -14,8 +14,8 @@
  * No heap, no global state, no floating point, reentrant. In one call every input is read before any
  * output is written: an output may be the same memory as an input. Matrices are stored by rows.
  *
- * Over a run of N steps the distance from exact arithmetic on the same increments is at most
- * (1.8561e-09 N), times exp(0.414214 N), in the length of a row.
+ * Over a run of N steps without orthonormalization the distance from exact arithmetic on the same
+ * increments is at most (1.8561e-09 N), times exp(0.414214 N), in the length of a row.
  */
 #ifndef DCM_RK1_2_Q31_H
 #define DCM_RK1_2_Q31_H
@@ -42,7 +42,8 @@ extern "C" {
  */
 int dcm_rk1_2_q31(const int32_t state[9], const int32_t increments[6], int32_t next[9]);
 
-/* `count` calls on arrays of samples, one after the other, up to the first that is refused.
+/* `count` calls on arrays of samples, one after the other, up to the first that is refused: every array holds `count`
+ * times what one call takes.
  * An output may be the same memory as an input whose samples have the same size; otherwise they must not overlap.
  * Returns how many calls were done, and in `status` what the last one returned.
  */

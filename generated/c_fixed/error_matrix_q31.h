@@ -46,7 +46,8 @@ extern "C" {
 int error_matrix_q31(const int32_t computed[9], const int32_t truth[9], int32_t error[9],
     int32_t scale[3], int32_t skew[3], int32_t drift[3]);
 
-/* `count` calls on arrays of samples, one after the other, up to the first that is refused.
+/* `count` calls on arrays of samples, one after the other, up to the first that is refused: every array holds `count`
+ * times what one call takes.
  * An output may be the same memory as an input whose samples have the same size; otherwise they must not overlap.
  * Returns how many calls were done, and in `status` what the last one returned.
  */

@@ -31,12 +31,13 @@ extern "C" {
  *         next_z, next_s; format Q1.30, unit 2^-30; range -1613406519 to 1613406519 (-1.5026 to
  *         1.5026); error at most 2.93949e-09, 3.1563 of the last place.
  * Returns 0; or, with the outputs left alone, 1 if an input lies outside its range,
- * 2 if it is too far from a proper one, so that something leaves its limits: inverse_norm_square
+ * 2 if it is too far from a proper one, so that something leaves its limits: inverse_norm_radicand
  *   from 0.5 to 2.
  */
 int euler_normalize_q31(const int32_t state[4], int32_t next[4]);
 
-/* `count` calls on arrays of samples, one after the other, up to the first that is refused.
+/* `count` calls on arrays of samples, one after the other, up to the first that is refused: every array holds `count`
+ * times what one call takes.
  * An output may be the same memory as an input whose samples have the same size; otherwise they must not overlap.
  * Returns how many calls were done, and in `status` what the last one returned.
  */

@@ -6,8 +6,10 @@ import csv
 import io
 import json
 import math
+import os
 import re
 import shlex
+import signal
 import subprocess
 import sys
 import time
@@ -496,6 +498,36 @@ def test_study_word_length(strapgen_says, tmp_path):
     assert (tmp_path / "study.png").read_bytes().startswith(b"\x89PNG")
     assert strapgen_says(f"{command} --format csv").count("\n") == 5
     assert "the method itself drifts by" in strapgen_says(command)
+
+
+def test_an_interrupt_stops_a_study_at_once(tmp_path):
+    # Cases that take minutes each, in two processes.
+    words = [
+        "study",
+        "word-length",
+        "--words",
+        "17,21",
+        "--duration",
+        "3600",
+        "--steps",
+        "0.005",
+        "--jobs",
+        "2",
+    ]
+    environment = os.environ | {"STRAPGEN_CACHE_DIR": str(tmp_path / "cache")}
+    process = subprocess.Popen(
+        [sys.executable, "-m", "strapgen", *words, "--out", str(tmp_path / "out.txt")],
+        stderr=subprocess.PIPE,
+        env=environment,
+        text=True,
+    )
+    time.sleep(6)
+    assert process.poll() is None
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=10)
+    assert process.returncode == 130
+    assert "Traceback" not in said
+    assert not (tmp_path / "out.txt").exists()
 
 
 # tables

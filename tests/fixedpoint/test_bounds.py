@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 from functools import cache
 
@@ -138,6 +139,23 @@ def test_the_bound_of_a_run_holds_along_it(algorithm, word, rounding, carry, rng
     apart = np.linalg.norm(made.propagate(increments.clip(-1 / 60, 1 / 60)) - exact_inputs, axis=-1)
     apart = apart if apart.ndim == 1 else apart.max(axis=-1)
     assert np.all(apart[1:] <= [made.rounding_bound(n, True) + 1e-13 for n in range(1, 201)])
+
+
+@pytest.mark.parametrize("rounding", ["nearest", "truncation"])
+@pytest.mark.parametrize("angle", [Fraction(1, 10**6), Fraction(1, 10**4), Fraction(1, 600)])
+def test_small_increments_keep_the_bound_in_c(angle, rounding, rng):
+    # What is far below the last place is shifted out: by no more bits than a number has.
+    size = float(angle)
+    increments = rng.uniform(-size, size, (100, 2, 3))
+    for name, carry in (("c-q15", "full"), ("c-q31", "state"), ("c-q15", "none")):
+        settings = Settings(32, angle, rounding, carry)
+        made = make_backend("euler", "rk4", 2, name, settings=settings)
+        given = made.representable(increments)
+        apart = made.propagate(given) - make_backend("euler", "rk4", 2, "numpy").propagate(given)
+        assert np.linalg.norm(apart, axis=-1).max() <= made.rounding_bound(100) * (1 + 1e-6) + 1e-13
+        settings = replace(settings, word=made.interface.settings.word)
+        model = make_backend("euler", "rk4", 2, "fixed-model", settings=settings)
+        np.testing.assert_array_equal(model.propagate(given), made.propagate(given))
 
 
 @pytest.mark.parametrize("choice", STEPS, ids=lambda choice: choice.kernel)

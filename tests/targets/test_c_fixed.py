@@ -128,6 +128,19 @@ def test_a_widened_input_is_refused_and_nothing_is_touched():
                 assert (list(out) == [5] * 4 and list(residuals) == [7] * 8) == refused
 
 
+def test_what_is_refused_on_the_way_leaves_outputs_and_residuals_alone(rng):
+    in_c, _ = pair(Choice("dcm-orthonormalize-second-order"), Settings(16, carry="full"))
+    ffi, call = in_c.module.ffi, getattr(in_c.module.lib, in_c.function.name)
+    (argument,) = in_c.interface.inputs
+    refused = 0
+    for row in rng.integers(argument.low, argument.high, size=(2000, 9), endpoint=True).tolist():
+        residuals, out = ffi.new("uint16_t[9]", [7] * 9), ffi.new("int16_t[9]", [5] * 9)
+        if call(ffi.new("int16_t[9]", row), residuals, out):
+            refused += 1
+            assert list(residuals) == [7] * 9 and list(out) == [5] * 9
+    assert refused > 200
+
+
 def test_an_output_may_be_the_input():
     in_c, _ = pair(EULER, Settings(32, Fraction(1, 60)))
     ffi, call = in_c.module.ffi, getattr(in_c.module.lib, in_c.function.name)

@@ -102,7 +102,10 @@ class FixedEvaluator(Evaluator):
             limits = ", ".join(
                 f"{a.signal.name} up to {float(a.high * a.format.unit):.6g}" for a in self.interface.inputs
             )
-            return InputError(f"{self.kernel} refuses its input{where}: its formats were chosen for {limits}")
+            return InputError(
+                f"{self.kernel} refuses its input{where}: its formats were chosen for {limits}; orthonormalize more "
+                "often, or allow for a larger drift or rate"
+            )
         return InputError(f"{self.kernel} refuses its input{where}: it is too far from a proper one")
 
 

@@ -87,7 +87,7 @@ def compare(
     checks.choice("algorithm", algorithm, catalogue.ALGORITHMS)
     choice = catalogue.choose(algorithm, method, whole("increments", increments))
     samples = choice.increments or 2
-    names = [name.strip() for name in backends.split(",") if name.strip()]
+    names = list(dict.fromkeys(name.strip() for name in backends.split(",") if name.strip()))
     for name in names:
         checks.choice("backend", name, BACKENDS)
     if not names:
@@ -108,6 +108,13 @@ def compare(
                 raise InputError(
                     f"--{option.replace('_', '-')} is for fixed-point back ends, and none is named"
                 )
+
+    if word is not None and "fixed-model" not in (*names, reference):
+        raise InputError(
+            "--word is for the back end fixed-model, which is not named; the others have their own"
+        )
+    if limit is not None and limit < 0:
+        raise InputError(f"fail-above is {fail_above}; a number that is not below 0 is needed")
 
     import numpy as np
 

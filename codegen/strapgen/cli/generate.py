@@ -114,7 +114,15 @@ def generate(
         )
     kernel = pipeline.derive(algorithm, method, count, rates=rates)
     program = pipeline.lower(kernel)
+    if program.companions is None and (max_rate_deg_s or step or max_angle_rad):
+        raise InputError(
+            f"kernel {program.kernel} takes no increments; a largest rate or angle does not go with it"
+        )
     fixed = pipeline.quantize(program, settings) if target in FIXED else None
+    if carry not in (None, "none") and fixed is not None and not fixed.interface.residuals:
+        raise InputError(
+            f"kernel {program.kernel} rounds no state that goes on to the next step; --carry keeps nothing"
+        )
     sources = pipeline.generate(fixed or program, target)
     written = output.write_files(out or Path(), sources.files)
     operations = sources.operations

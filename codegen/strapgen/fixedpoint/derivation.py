@@ -264,7 +264,7 @@ class _Derivation:
         self._other(name, Quotient(top, below), enclosure, meaning)
 
     def _sqrt(self, name: str, node: Operation, meaning: str) -> None:
-        argument = self._operand(node.arguments[0], f"{_stem(name)}_square")
+        argument = self._operand(node.arguments[0], f"{_stem(name)}_radicand")
         if isinstance(argument, Fraction):
             root = Interval.of(argument).sqrt()
             held = Sum((((), root.lowest),))

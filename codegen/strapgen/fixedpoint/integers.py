@@ -333,7 +333,7 @@ class _Quantization:
     def _wide(self, quantity: exact.Quantity, terms: list[Placed], fraction: int) -> None:
         """Keep a sum that is only added, compared or drawn a root from at full precision."""
         while True:
-            made, peak, error = aligned(terms, fraction, self.values)
+            made, peak, error = aligned(terms, fraction, self.word, self.values)
             if fits(made, peak, self.word, self.values):
                 break
             fraction -= 1
@@ -349,7 +349,7 @@ class _Quantization:
         """Return a sum as a word."""
         coarse = [item for item in terms if item.place <= fraction]
         fine = [item for item in terms if item.place > fraction]
-        added, coarse_peak, coarse_error = aligned(coarse, fraction, self.values)
+        added, coarse_peak, coarse_error = aligned(coarse, fraction, self.word, self.values)
         short = InputError(
             f"{self.program.kernel}: words of {self.word} bits are too short for {quantity.name}"
         )
@@ -365,7 +365,7 @@ class _Quantization:
             shift = places - fraction
             if shift < 1:
                 raise short
-            made, peak, error = aligned(fine, places, self.values)
+            made, peak, error = aligned(fine, places, self.word, self.values)
             extra = 1 << (shift - 1) if self.settings.rounding == "nearest" else 0
             if residual is not None:
                 finer = fraction + self.word
@@ -374,7 +374,7 @@ class _Quantization:
                 extra = 1 << shift
                 drop = max(0, places - finer)
                 error += Fraction(2) ** -min(finer, places)
-            if fits(made, peak + extra, self.word, self.values):
+            if shift < 2 * self.word - 1 and fits(made, peak + extra, self.word, self.values):
                 break
             places -= 1
         rounding = self.half / Fraction(2) ** fraction

@@ -79,6 +79,10 @@ def state_fraction(word: int, largest: Fraction) -> int:
 
 def _largest(program: Program, signal: Signal, settings: Settings) -> Fraction:
     if signal.name in settings.ranges:
+        if signal.constraint or signal.name in ("increments", "turns"):
+            raise InputError(
+                f"the range of {signal.name} follows from the drift allowance and the largest angle; it takes no other"
+            )
         return settings.ranges[signal.name]
     if signal.name in ("increments", "turns") and program.companions:
         return settings.largest_angle

@@ -21,6 +21,8 @@ CARRIES = {
 
 #: Largest angle increment for which formats are chosen when none is stated, in rad.
 DEFAULT_ANGLE = Fraction(1, 8)
+#: Increments that formats are chosen for, in rad: from the earth's rate in a microsecond to over half a turn.
+SMALLEST_ANGLE, LARGEST_ANGLE = Fraction(1, 10**11), 4
 DEFAULT_ALLOWANCE = Fraction(1, 16)
 
 #: A rational above pi/180, by less than 1e-18.
@@ -76,9 +78,11 @@ class Settings:
         check_word(self.word)
         check_rounding(self.rounding)
         checks.choice("carry", self.carry, CARRIES)
-        if not 0 < self.largest_angle <= 4:
+        if not SMALLEST_ANGLE <= self.largest_angle <= LARGEST_ANGLE:
+            how = f" ({self.stated})" if self.stated else ""
             raise InputError(
-                f"largest angle increment is {float(self.largest_angle):g} rad; more than 0 and at most 4 is needed"
+                f"largest angle increment is {float(self.largest_angle):g} rad{how}; "
+                f"from {float(SMALLEST_ANGLE):g} to {LARGEST_ANGLE} is needed"
             )
         if not 0 < self.allowance <= Fraction(1, 2):
             raise InputError(
@@ -133,7 +137,7 @@ class Settings:
         >>> float(Settings().fitted(0.0131).largest_angle)
         0.013671875
         """
-        if not 0 < largest <= 4:
+        if not SMALLEST_ANGLE * 2 < largest <= LARGEST_ANGLE:
             # Nothing turns, or too much for any format: what then comes is refused where it is read.
             return self
         exponent = math.frexp(largest)[1] - 4

@@ -48,16 +48,19 @@ def bound(term: Term, values: Mapping[str, Value]) -> int:
 
 
 def aligned(
-    terms: Iterable[Placed], place: int, values: Mapping[str, Value]
+    terms: Iterable[Placed], place: int, word: int, values: Mapping[str, Value]
 ) -> tuple[tuple[Term, ...], int, Fraction]:
-    """Return terms at one place, the bound of their partial sums, and their error with what shifts lose."""
+    """Return terms at one place, the bound of their partial sums, and their error with what shifts lose.
+
+    A shift by all bits of a wide number but one leaves 0 or -1, as every longer one would.
+    """
     made: list[Term] = []
     peak, error = 0, Fraction(0)
     for item in terms:
         term, wrong = item.term, item.error
-        shift = place - item.place
+        shift = max(place - item.place, 1 - 2 * word)
         if not term.names and shift < 0:  # a constant: rounded here
-            exact = term.factor * Fraction(2) ** shift
+            exact = term.factor * Fraction(2) ** (place - item.place)
             integer = nearest(exact)
             error += wrong + abs(integer - exact) / Fraction(2) ** place
             if not integer:

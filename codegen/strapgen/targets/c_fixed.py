@@ -110,7 +110,7 @@ def emit(program: Program | FixedProgram, target: str, settings: Settings | None
         "code": printer.code(),
         "counts": ", ".join(f"{number} {kind}" for kind, number in fixed.operations.items() if number),
         "nearest": chosen.rounding == "nearest",
-        "fresh": dict.fromkeys(printer.constant(residual.fresh) for residual in interface.residuals),
+        "fresh": dict.fromkeys(f"UINT{chosen.word}_C({r.fresh})" for r in interface.residuals),
         "uses_shift": printer.uses_shift,
         "uses_root": any(isinstance(d, Root) for d in definitions),
         "uses_quotient": any(isinstance(d, Quotient) for d in definitions),
@@ -143,6 +143,7 @@ class _Printer:
         self.uses_shift = False
         self.wide_names = {value.name for value in fixed.body if value.wide}
         self.places = {residual.name: k for k, residual in enumerate(fixed.interface.residuals)}
+        self.checks = any(value.guarded for value in fixed.body)
         self.nearest = fixed.interface.settings.rounding == "nearest"
         self.names = {value.name for value in fixed.body}
         self.names |= {name for argument in fixed.interface.inputs for name in argument.signal.elements}
@@ -171,6 +172,8 @@ class _Printer:
             for argument in interface.outputs
             for number, name in enumerate(argument.values)
         ]
+        if self.checks:
+            stores += [f"residuals[{k}] = next_{r.name};" for k, r in enumerate(interface.residuals)]
         return {"loads": loads, "checks": checks, "body": body, "stores": stores}
 
     def statements(self, value: Value) -> list[str]:
@@ -237,7 +240,11 @@ class _Printer:
             left = (
                 f"({self.word.magnitude}){name}_sum << {-residual.shift}" if residual.shift else f"{name}_sum"
             )
-            lines.append(f"{place} = ({self.word.residual})({left});")
+            word = self.word.residual
+            if self.checks:  # what is refused later must not have touched it
+                lines.append(f"const {word} next_{residual.name} = ({word})({left});")
+            else:
+                lines.append(f"{place} = ({word})({left});")
             rounded = self._shifted(f"{name}_sum", -definition.shift)
         terms = [*coarse[:1], f"+{rounded}", *coarse[1:]]
         return lines + self._result(value, kind, self._joined(terms))
