@@ -13,8 +13,12 @@ from strapgen.catalogue import ALGORITHMS
 from strapgen.fixedpoint import Settings
 from strapgen.targets import FIXED
 
-#: The back ends; that with short words has the code of the other one in fixed point, and runs with the long tests.
-BACKEND_NAMES = [pytest.param(name, marks=pytest.mark.long) if name == "c-q15" else name for name in BACKENDS]
+#: The back ends. Short words have the code of long ones, and the integer model gives the bits of the C: both run with
+#: the long tests.
+BACKEND_NAMES = [
+    pytest.param(name, marks=pytest.mark.long) if name in ("c-q15", "fixed-model") else name
+    for name in BACKENDS
+]
 
 
 @pytest.fixture(params=BACKEND_NAMES)

@@ -28,9 +28,11 @@ def files() -> dict[str, str]:
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Return a folder with the tree, and spare the command line the derivation."""
-    lowered = programs()  # before its source is replaced
+    lowered, made = programs(), files()  # before their sources are replaced
     monkeypatch.setattr(standard_tree, "programs", lambda: iter(lowered.values()))
-    standard_tree.write(tmp_path / "tree", files())
+    # The texts of the same programs are made once; that they are those of the checked-in tree has a test of its own.
+    monkeypatch.setattr(standard_tree, "tree", lambda programs: made if list(programs) else {})
+    standard_tree.write(tmp_path / "tree", made)
     return tmp_path / "tree"
 
 

@@ -185,7 +185,7 @@ def test_error_stays_below_its_bound(case, word, rounding):
         assert bound <= 3 * worst
 
 
-@pytest.mark.parametrize("rounding", ["nearest", "truncation"])
+@pytest.mark.parametrize("rounding", ["nearest", pytest.param("truncation", marks=pytest.mark.long)])
 @pytest.mark.parametrize("word", C_WORDS)
 @pytest.mark.parametrize("case", CASES)
 def test_c_computes_what_the_model_does(case, word, rounding):
@@ -408,6 +408,7 @@ def sources(name: str, word: int) -> Any:
     return emit(programs()[name], "c-fixed", Settings(word=word))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("word", C_WORDS)
 @pytest.mark.parametrize("name", [*CASES, *MOTIONS, "dcm-orthonormalize-optimal"])
 def test_c_compiles_without_a_warning(name, word, tmp_path):
@@ -449,6 +450,7 @@ int main(void)
 """
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("word", C_WORDS)
 @pytest.mark.parametrize("name", [*CASES, *MOTIONS, "dcm-orthonormalize-optimal"])
 def test_c_has_no_undefined_behaviour(name, word, tmp_path):
