@@ -10,6 +10,8 @@ import pytest
 
 import strapgen
 
+pytestmark = pytest.mark.long
+
 FOLDER = Path(__file__).resolve().parents[1] / "benchmarks"
 
 

@@ -247,6 +247,7 @@ def test_generated_files_are_recognised_as_such(folder):
     assert contents(folder) == few
 
 
+@pytest.mark.long
 def test_output_is_the_same_under_every_hash_seed(tmp_path):
     made = []
     for seed in ("0", "1", "4711"):

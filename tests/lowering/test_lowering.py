@@ -289,6 +289,7 @@ def test_stages_keep_their_names_and_meanings():
     assert "scalar part" in said["p_s"]
 
 
+@pytest.mark.long
 def test_programs_do_not_depend_on_the_hash_seed():
     code = (
         "import hashlib; from strapgen import catalogue; from strapgen.lowering import lower;"
