@@ -120,8 +120,7 @@ def compare(
     if not backends:
         raise InputError("no back end is named; at least one is needed")
     d = np.asarray(increments, np.float64)
-    fitted = (settings or Settings()).fitted(float(np.abs(d).max(initial=0.0)))
-    chosen = fitted if settings is None or settings.largest_angle == Settings().largest_angle else settings
+    chosen = (settings or Settings()).for_increments(float(np.abs(d).max(initial=0.0)))
 
     def make(name: str) -> Backend:
         own = chosen if BACKENDS[name].target in FIXED else None

@@ -190,10 +190,8 @@ def table_settings(table: Table, backend_name: str, settings: Settings | None) -
     """Return what a table's runs are made for in fixed point, its own increments; None for other back ends."""
     if BACKENDS[backend_name].target not in FIXED:
         return None
-    if settings is not None and settings.largest_angle != Settings().largest_angle:
-        return settings
     profile = motion(table.motion, **table.settings)
-    return (settings or Settings()).fitted(largest_increment(profile, STEP, DURATION, 2))
+    return (settings or Settings()).for_increments(largest_increment(profile, STEP, DURATION, 2))
 
 
 def entries(table: Table, backend_name: str, settings: Settings | None = None) -> Iterator[Entry]:

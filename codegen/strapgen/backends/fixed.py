@@ -304,9 +304,9 @@ class ModelBackend(FixedBackend):
         runs, steps = increments.shape[:2]
         single = runs == 1
         fresh = self.evaluator.fresh(runs)
-        kept: list[Any] = fresh[0].tolist()
+        kept: list[Any]
         if single:
-            state, samples = initial[0].tolist(), increments[0].tolist()
+            state, samples, kept = initial[0].tolist(), increments[0].tolist(), fresh[0].tolist()
         else:
             state = list(np.moveaxis(initial, -1, 0))
             samples = np.moveaxis(increments, 0, -1)

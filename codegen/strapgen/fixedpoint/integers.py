@@ -15,9 +15,9 @@ from strapgen.fixedpoint.alignment import aligning
 from strapgen.fixedpoint.formats import ROUNDINGS, Format, finest
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.fixedpoint.limits import Limit, asked, limits, state_fraction
-from strapgen.fixedpoint.quantities import is_dyadic, is_power_of_two
+from strapgen.fixedpoint.quantities import exponent, is_dyadic, is_power_of_two
 from strapgen.fixedpoint.settings import Settings
-from strapgen.fixedpoint.terms import Placed, aligned, fits, nearest, up
+from strapgen.fixedpoint.terms import Placed, aligned, fits, largest_wide, nearest, up
 from strapgen.program import Program
 from strapgen.signal import Signal
 
@@ -174,10 +174,7 @@ class _Quantization:
                 isinstance(self.exact.items[m[0]].definition, exact.Given) for m, _ in definition.terms
             ):
                 continue
-            needed = max(
-                self.values[m[0]].fraction - (abs(c).numerator.bit_length() - abs(c).denominator.bit_length())
-                for m, c in definition.terms
-            )
+            needed = max(self.values[m[0]].fraction - exponent(c) for m, c in definition.terms)
             if needed > finest(quantity.range.magnitude, self.word):
                 return False
         return True
@@ -295,8 +292,7 @@ class _Quantization:
             places = sum(value.fraction for value in values)
             if is_power_of_two(coefficient):
                 sign = 1 if coefficient > 0 else -1
-                power = abs(coefficient).numerator.bit_length() - abs(coefficient).denominator.bit_length()
-                terms.append(Placed(code.Term(names, sign), places - power, up(error)))
+                terms.append(Placed(code.Term(names, sign), places - exponent(coefficient), up(error)))
                 continue
             factor, bits = self._constant(coefficient)
             wrong = abs(Fraction(factor, 1) / Fraction(2) ** bits - coefficient)
@@ -521,7 +517,7 @@ class _Quantization:
         for operand in operands:
             if isinstance(operand, Fraction):
                 places.append(operand.denominator.bit_length() - 1 if is_dyadic(operand) else self.word)
-        room = (1 << (2 * self.word - 1)) - 1
+        room = largest_wide(self.word)
         fraction = max(places)
 
         def size(operand: exact.Operand) -> int:
@@ -657,7 +653,7 @@ class _Quantization:
         least = min(abs(below.low), abs(below.high))
         while True:
             shift = fraction + below.fraction - top_fraction
-            room = (1 << (2 * self.word - 1)) - 1 - below.magnitude
+            room = largest_wide(self.word) - below.magnitude
             error = (top_error + quantity.range.magnitude * below.error) / (
                 Fraction(least) / Fraction(2) ** below.fraction
             )

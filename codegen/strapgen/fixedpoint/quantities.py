@@ -177,6 +177,17 @@ def is_power_of_two(value: Fraction) -> bool:
     return top & (top - 1) == 0 and bottom & (bottom - 1) == 0
 
 
+def exponent(value: Fraction) -> int:
+    """Return the exponent of a power of two or its negative.
+
+    Examples
+    --------
+    >>> exponent(Fraction(-1, 8))
+    -3
+    """
+    return abs(value.numerator).bit_length() - value.denominator.bit_length()
+
+
 def is_dyadic(value: Fraction) -> bool:
     """Tell whether a number has a finite binary expansion."""
     return value.denominator & (value.denominator - 1) == 0

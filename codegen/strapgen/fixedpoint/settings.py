@@ -144,6 +144,10 @@ class Settings:
         angle = Fraction(2) ** exponent * math.ceil(math.ldexp(largest, -exponent))
         return replace(self, largest_angle=angle, stated="")
 
+    def for_increments(self, largest: float) -> Settings:
+        """Return the settings for a run whose largest increment is known: themselves if a largest angle is stated."""
+        return self if self.largest_angle != DEFAULT_ANGLE else self.fitted(largest)
+
     def as_dict(self) -> dict[str, Any]:
         """Return the settings as plain JSON data."""
         return {

@@ -29,6 +29,11 @@ class Placed:
     error: Fraction
 
 
+def largest_wide(word: int) -> int:
+    """Return the largest integer that a wide number holds."""
+    return (1 << (2 * word - 1)) - 1
+
+
 def nearest(value: Fraction) -> int:
     """Return the nearest integer, halves up."""
     return math.floor(value + Fraction(1, 2))
@@ -76,5 +81,5 @@ def aligned(
 
 def fits(terms: Iterable[Term], peak: int, word: int, values: Mapping[str, Value]) -> bool:
     """Tell whether every term, and every partial sum up to a bound, fits into a wide number."""
-    room = (1 << (2 * word - 1)) - 1
+    room = largest_wide(word)
     return peak <= room and all(bound(term, values) <= room for term in terms)
