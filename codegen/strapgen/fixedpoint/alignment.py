@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Container, Iterator
+from collections.abc import Container, Iterable, Iterator, Mapping
 from fractions import Fraction
 
-from strapgen.fixedpoint.code import FixedProgram, Sum, Value, used_by
+from strapgen.fixedpoint.code import Sum, Value, used_by
 
 #: Bits below the last place of a sum down to which its products are kept.
 _BELOW = 8
@@ -14,13 +14,15 @@ _BELOW = 8
 _PART = Fraction(1, 16)
 
 
-def aligning(program: FixedProgram, kept: Container[str]) -> dict[str, int]:
+def aligning(body: Iterable[Value], values: Mapping[str, Value], kept: Container[str]) -> dict[str, int]:
     """Return, by name, the most fraction bits of values that are finer than the sums that use them can tell.
 
     Parameters
     ----------
-    program : FixedProgram
-        The program with every value in its finest format.
+    body : iterable of Value
+        The code, with every value in its finest format.
+    values : mapping of str to Value
+        The same by name, and the elements of the inputs.
     kept : container of str
         Values whose format must stay.
 
@@ -28,26 +30,9 @@ def aligning(program: FixedProgram, kept: Container[str]) -> dict[str, int]:
     -------
     dict of str to int
     """
-    values = {value.name: value for value in program.body}
-    for argument in program.interface.inputs:
-        for name in argument.signal.elements:
-            values.setdefault(
-                name,
-                Value(
-                    name,
-                    Sum(()),
-                    argument.format.fraction,
-                    False,
-                    argument.low,
-                    argument.high,
-                    Fraction(0),
-                    Fraction(0),
-                    0,
-                ),
-            )
     wanted: dict[str, int] = {}
     allowed: dict[str, int] = {}
-    for value in program.body:
+    for value in body:
         for name, want, most in _uses(value, values):
             wanted[name] = max(want, wanted.get(name, 0))
             allowed[name] = min(most, allowed.get(name, most))
@@ -61,7 +46,7 @@ def aligning(program: FixedProgram, kept: Container[str]) -> dict[str, int]:
     return coarser
 
 
-def _uses(value: Value, values: dict[str, Value]) -> Iterator[tuple[str, int, int]]:
+def _uses(value: Value, values: Mapping[str, Value]) -> Iterator[tuple[str, int, int]]:
     """Yield the values that another is computed from: by how many bits each should be coarser, and may be."""
     definition = value.definition
     if not isinstance(definition, Sum) or value.wide or not definition.shift:

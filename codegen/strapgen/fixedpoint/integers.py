@@ -61,7 +61,8 @@ def lowered(program: Program, settings: Settings) -> code.FixedProgram:
     )
     made, guard_bits = finest.exact, finest.guard_bits
     plain = finest.run()
-    shorter = _Quantization(program, settings, plan, made, guard_bits, aligning(plain, finest.forced))
+    most = aligning(finest.body, finest.values, finest.forced)
+    shorter = _Quantization(program, settings, plan, made, guard_bits, most)
     aligned = shorter.run()
     # Shorter where that costs no more than a hundredth in error.
     worse = any(
