@@ -22,6 +22,8 @@ def folder(name: str) -> Path:
 
 def package_files() -> list[Path]:
     """Return every file whose content decides what is generated, in a fixed order."""
-    code = [path for path in _PACKAGE.rglob("*.py") if _INSTALLED not in path.parents]
+    code = [
+        path for kind in ("*.py", "*.toml") for path in _PACKAGE.rglob(kind) if _INSTALLED not in path.parents
+    ]
     templates = [path for path in folder("templates").rglob("*") if path.is_file()]
     return sorted(code) + sorted(templates)

@@ -10,12 +10,12 @@ import pytest
 import sympy as sp
 
 from strapgen import derive
-from strapgen.catalogue import ALGORITHMS, METHODS, MOST_INCREMENTS
+from strapgen.catalogue import ALGORITHMS, MOST_INCREMENTS, STANDARD_METHODS
 from strapgen.catalogue.runge_kutta import increments_signal
 from strapgen.exceptions import InputError
 
 ALGORITHM = pytest.mark.parametrize("algorithm", ALGORITHMS)
-METHOD = pytest.mark.parametrize("method", METHODS)
+METHOD = pytest.mark.parametrize("method", STANDARD_METHODS)
 
 # The rate times the step at the beginning, the middle and the end, from the increments oldest first. For two
 # increments as printed; for three from the differences of a cubic, f'(0) = (-11 f0 + 18 f1 - 9 f2 + 2 f3)/6 and

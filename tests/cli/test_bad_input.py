@@ -30,7 +30,7 @@ BAD = {
     "simulate": "Missing argument",
     # derive
     "derive eulr": "algorithm 'eulr' is not known; allowed: dcm, euler, cayley-klein, ",
-    "derive euler --method rk5": "method 'rk5' is not known; allowed: rk1, rk2, rk3, rk4",
+    "derive euler --method rk5": "method 'rk5' is not known; allowed: rk1, rk2, midpoint, ralston2, rk3, ",
     "derive euler --increments 0": "increments is 0; a whole number from 1 to 8 is needed",
     "derive euler --increments 9": "increments is 9; a whole number from 1 to 8 is needed",
     "derive euler --increments -1": "increments is -1; a whole number from 1 to 8 is needed",

@@ -10,7 +10,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, NamedTuple
 
 from strapgen import checks
-from strapgen.catalogue.tableaux import TABLEAUX
+from strapgen.catalogue.tableaux import TABLEAUX, TITLES
 from strapgen.exceptions import InputError
 
 if TYPE_CHECKING:
@@ -24,7 +24,10 @@ ALGORITHMS = {
 }
 
 #: Integration methods.
-METHODS = {name: tableau.title for name, tableau in TABLEAUX.items()}
+METHODS = TITLES
+
+#: The thesis's methods, which the checked-in sources are generated for.
+STANDARD_METHODS = ("rk1", "rk2", "rk3", "rk4")
 
 #: Most angle increments that one step may take.
 MOST_INCREMENTS = 8
@@ -150,8 +153,8 @@ def orthonormalizations(algorithm: str) -> list[str]:
 
 
 def standard() -> list[Choice]:
-    """Return the standard catalogue: every algorithm by every method on two increments, and all else."""
-    steps = [Choice(algorithm, method, 2) for algorithm in ALGORITHMS for method in METHODS]
+    """Return the standard catalogue: every algorithm by the thesis's methods on two increments, and all else."""
+    steps = [Choice(algorithm, method, 2) for algorithm in ALGORITHMS for method in STANDARD_METHODS]
     return steps + [Choice(name) for name in KERNELS]
 
 

@@ -6,6 +6,7 @@ from fractions import Fraction
 
 import sympy as sp
 
+from strapgen.catalogue.coefficients import Number
 from strapgen.catalogue.kinematics import KINEMATICS, Kinematics
 from strapgen.catalogue.rates import extraction
 from strapgen.catalogue.tableaux import Tableau
@@ -26,12 +27,12 @@ def increments_signal(count: int) -> Signal:
     )
 
 
-def turns_signal(nodes: tuple[Fraction, ...]) -> Signal:
+def turns_signal(nodes: tuple[Number, ...]) -> Signal:
     """Return the signal of the body rates of one step, each times the step length, in the order of the nodes."""
     return Signal(
         "turns",
         (len(nodes), 3),
-        tuple(f"turn_{label}_{axis}" for label in map(_label, nodes) for axis in "xyz"),
+        tuple(f"turn_{label}_{axis}" for label in _labels(nodes).values() for axis in "xyz"),
         unit="rad",
         meaning=f"body rate times the step length, body axes, at nodes {', '.join(map(str, nodes))} of the step",
         bound=Fraction(1),
@@ -111,7 +112,7 @@ def advance(
     build: KernelBuilder,
     kinematics: Kinematics,
     tableau: Tableau,
-    turns: dict[Fraction, sp.Matrix],
+    turns: dict[Number, sp.Matrix],
     start: sp.Matrix,
     origin: str,
 ) -> sp.Matrix:
@@ -119,7 +120,7 @@ def advance(
 
     Parameters
     ----------
-    turns : dict of Fraction to Matrix
+    turns : dict of Fraction or Expr to Matrix
         The generator at each node, times the step length.
     start : Matrix
         A state, of numbers or symbols.
@@ -153,17 +154,18 @@ def product(name: str) -> Kernel:
 
 def _turns(
     build: KernelBuilder, kinematics: Kinematics, tableau: Tableau, increments: int | None
-) -> dict[Fraction, sp.Matrix]:
+) -> dict[Number, sp.Matrix]:
     """Declare the samples and name the generator, times the step length, at every node."""
     nodes = tuple(dict.fromkeys(tableau.nodes))
     samples = build.input(turns_signal(nodes) if increments is None else increments_signal(increments))
-    turns: dict[Fraction, sp.Matrix] = {}
+    turns: dict[Number, sp.Matrix] = {}
+    labels = _labels(nodes)
     for place, node in enumerate(nodes):
         if increments is None:
             weights = [sp.Integer(k == place) for k in range(len(nodes))]
         else:
             weights = extraction(increments, node)
-        turns[node] = _turn(build, kinematics, samples, weights, node)
+        turns[node] = _turn(build, kinematics, samples, weights, node, labels[node])
     return turns
 
 
@@ -171,8 +173,9 @@ def _turn(
     build: KernelBuilder,
     kinematics: Kinematics,
     samples: sp.Matrix,
-    weights: list[sp.Rational],
-    node: Fraction,
+    weights: list[sp.Expr],
+    node: Number,
+    label: str,
 ) -> sp.Matrix:
     """Name the generator at a node: the rate times the step, scaled for the kinematics."""
     half = "half_" if kinematics.scale == sp.Rational(1, 2) else ""
@@ -183,19 +186,23 @@ def _turn(
     if all(element.is_Symbol for element in turn):  # an input itself
         return sp.Matrix(turn)
     meaning = f"{half.replace('_', ' the ')}rate times the step, at node {node}"
-    name = f"{half}turn_{_label(node)}"
+    name = f"{half}turn_{label}"
     return build.stage(Signal.vector(name, name, unit="rad", meaning=meaning), turn)
 
 
-def _label(node: Fraction) -> str:
-    """Return a node as part of a name."""
-    return str(node).replace("/", "_")
+def _labels(nodes: tuple[Number, ...]) -> dict[Number, str]:
+    """Return nodes as parts of names: short fractions as they are, others by their place among the nodes."""
+    labels = {}
+    for place, node in enumerate(nodes, 1):
+        text = str(node).replace("/", "_").replace("-", "minus_")
+        labels[node] = text if isinstance(node, Fraction) and len(text) < 12 else f"n{place}"
+    return labels
 
 
-def _combination(coefficients: tuple[Fraction, ...], slopes: list[sp.Matrix], like: sp.Matrix) -> sp.Matrix:
+def _combination(coefficients: tuple[Number, ...], slopes: list[sp.Matrix], like: sp.Matrix) -> sp.Matrix:
     total = sp.zeros(*like.shape)
     for coefficient, slope in zip(coefficients, slopes, strict=True):
-        total += sp.Rational(coefficient.numerator, coefficient.denominator) * slope
+        total += sp.sympify(coefficient) * slope
     return total
 
 

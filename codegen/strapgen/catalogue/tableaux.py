@@ -1,18 +1,40 @@
-"""Butcher tableaux of explicit Runge-Kutta methods."""
+"""Butcher tableaux of explicit Runge-Kutta methods: data in files, those of `methods/` and a user's own."""
 
 from __future__ import annotations
 
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
+from strapgen.catalogue import coefficients, order_conditions
+from strapgen.exceptions import InputError
 
-def _row(text: str) -> tuple[Fraction, ...]:
-    return tuple(Fraction(word) for word in text.split())
+if TYPE_CHECKING:
+    from strapgen.catalogue.coefficients import Number
+
+#: Keys of a file, and those of them that may be left out.
+KEYS = ("name", "source", "order", "nodes", "matrix", "weights", "embedded_weights", "tolerance")
+OPTIONAL = ("embedded_weights", "tolerance")
+
+#: No method of a higher order is known with so few stages, and trees grow nearly threefold from order to order.
+MOST_ORDER = 10
+MOST_STAGES = 20
+
+#: Largest tolerance of a user's file: rounding to double precision leaves less than this, a wrong coefficient more.
+MOST_TOLERANCE = Fraction(1, 10**12)
+
+#: Bytes of the largest file; twenty stages of long expressions take far less.
+MOST_BYTES = 200_000
 
 
 @dataclass(frozen=True)
 class Tableau:
-    """An explicit Runge-Kutta method in exact rationals.
+    """An explicit Runge-Kutta method in exact numbers.
 
     Parameters
     ----------
@@ -20,12 +42,16 @@ class Tableau:
         Name on the command line, name in the literature, citation.
     order : int
         Classical order of the method.
-    nodes : tuple of Fraction
-        c_i, in steps.
-    matrix : tuple of tuple of Fraction
+    nodes : tuple of Fraction or sympy.Expr
+        c_i, in steps. A number is an expression only where it is irrational.
+    matrix : tuple of tuple of Fraction or sympy.Expr
         a_ij below the diagonal, the first row empty.
-    weights : tuple of Fraction
+    weights : tuple of Fraction or sympy.Expr
         b_i.
+    embedded_weights : tuple of Fraction or sympy.Expr, optional
+        Weights of a second method on the same stages.
+    tolerance : Fraction
+        Largest residual of a condition that the rounding of published coefficients explains; 0: they are exact.
 
     Examples
     --------
@@ -37,35 +63,248 @@ class Tableau:
     title: str
     source: str
     order: int
-    nodes: tuple[Fraction, ...]
-    matrix: tuple[tuple[Fraction, ...], ...]
-    weights: tuple[Fraction, ...]
+    nodes: tuple[Number, ...]
+    matrix: tuple[tuple[Number, ...], ...]
+    weights: tuple[Number, ...]
+    embedded_weights: tuple[Number, ...] | None = None
+    tolerance: Fraction = Fraction(0)
+
+    @property
+    def rational(self) -> bool:
+        """Whether every coefficient is a fraction."""
+        rows = (self.nodes, self.weights, self.embedded_weights or (), *self.matrix)
+        return all(isinstance(value, Fraction) for row in rows for value in row)
+
+    @cached_property
+    def largest_residual(self) -> Number:
+        """The largest residual of row sums and order conditions: 0, or what rounded coefficients leave."""
+        return order_conditions.largest_residual(self)
 
 
-TABLEAUX = {
-    tableau.name: tableau
-    for tableau in (
-        Tableau("rk1", "Euler's method", "thesis, chapter 3 B", 1, _row("0"), ((),), _row("1")),
-        Tableau(
-            "rk2", "Heun's method", "thesis, chapter 3 B", 2, _row("0 1"), ((), _row("1")), _row("1/2 1/2")
-        ),
-        Tableau(
-            "rk3",
-            "Kutta's third-order method",
-            "W. Kutta, Z. Math. Phys. 46 (1901) 435-453",
-            3,
-            _row("0 1/2 1"),
-            ((), _row("1/2"), _row("-1 2")),
-            _row("1/6 2/3 1/6"),
-        ),
-        Tableau(
-            "rk4",
-            "classical fourth-order Runge-Kutta method",
-            "thesis, chapter 3 B",
-            4,
-            _row("0 1/2 1/2 1"),
-            ((), _row("1/2"), _row("0 1/2"), _row("0 0 1")),
-            _row("1/6 1/3 1/3 1/6"),
-        ),
+class _BuiltIn(Mapping[str, Tableau]):
+    """The tableaux of a folder by name; a file is read when its tableau is asked for.
+
+    The order is that of the methods, the thesis's own first among equals. The files are not verified here: tests do.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._tableaux: dict[str, Tableau] = {}
+
+    @cached_property
+    def titles(self) -> dict[str, str]:
+        """Name in the literature, by name: without a coefficient read."""
+        files = {path.stem: tomllib.loads(path.read_text("utf-8")) for path in self._folder.glob("*.toml")}
+
+        def place(name: str) -> tuple[int, bool, int, str]:
+            return files[name]["order"], not name.startswith("rk"), len(files[name]["nodes"]), name
+
+        return {name: files[name]["name"] for name in sorted(files, key=place)}
+
+    def __getitem__(self, name: str) -> Tableau:
+        if name not in self._tableaux:
+            if name not in self.titles:
+                raise KeyError(name)
+            path = self._folder / f"{name}.toml"
+            self._tableaux[name] = _tableau(tomllib.loads(path.read_text("utf-8")), name)
+        return self._tableaux[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.titles)
+
+    def __len__(self) -> int:
+        return len(self.titles)
+
+
+_BUILT_IN = _BuiltIn(Path(__file__).resolve().parent / "methods")
+
+#: The tableaux that come with the package, by name.
+TABLEAUX: Mapping[str, Tableau] = _BUILT_IN
+
+#: Their names in the literature.
+TITLES: Mapping[str, str] = _BUILT_IN.titles
+
+
+def read(path: str | Path) -> Tableau:
+    """Read a tableau from a file and verify it: it is explicit, its rows sum to its nodes, its order is the stated one.
+
+    Parameters
+    ----------
+    path : path
+        A TOML file with the keys of `KEYS`; every number is a whole number or a string, see `coefficients.number`.
+
+    Returns
+    -------
+    Tableau
+        Named after its key `name`, in lower case with hyphens.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, a key or number is wrong, or a condition does not hold; the message names it.
+    """
+    try:
+        try:
+            with Path(path).open("rb") as file:
+                content = file.read(MOST_BYTES + 1)
+        except OSError as error:
+            raise InputError(f"cannot be read ({error.strerror})") from None
+        if len(content) > MOST_BYTES:
+            raise InputError(f"is over {MOST_BYTES} bytes long; a tableau is shorter")
+        try:
+            data = tomllib.loads(content.decode("utf-8-sig").replace("\r\n", "\n"))
+        except UnicodeDecodeError as error:
+            raise InputError(f"is not UTF-8 (byte {error.start})") from None
+        except (ValueError, RecursionError) as error:
+            raise InputError(f"is not TOML ({error})") from None
+    except InputError as error:
+        raise InputError(f"{path} {error}") from None
+    try:
+        _check_keys(data)
+        tableau = _tableau(data, _slug(data["name"]))
+        verify(tableau)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    return tableau
+
+
+def _check_keys(data: Mapping[str, Any]) -> None:
+    for key in data:
+        if key not in KEYS:
+            raise InputError(f"key {key!r} is not known; allowed: {', '.join(KEYS)}")
+    for key in KEYS:
+        if key not in data and key not in OPTIONAL:
+            raise InputError(
+                f"key {key} is missing; needed: {', '.join(k for k in KEYS if k not in OPTIONAL)}"
+            )
+    for key in ("name", "source"):
+        value = data[key]
+        if not isinstance(value, str) or not value.strip() or not value.isprintable() or len(value) > 500:
+            raise InputError(f"{key} is no text of one line and at most 500 characters")
+    order = data["order"]
+    if not isinstance(order, int) or isinstance(order, bool) or not 1 <= order <= MOST_ORDER:
+        raise InputError(
+            f"order is {str(order)[:40]}; a whole number from 1 to {MOST_ORDER} is needed, "
+            "beyond it there are too many conditions to check"
+        )
+
+
+def _slug(title: str) -> str:
+    """Return a title as a name on the command line.
+
+    Examples
+    --------
+    >>> _slug("Bogacki & Shampine 3(2)")
+    'bogacki-shampine-3-2'
+    """
+    name = re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-")
+    if not name[:1].isalpha():
+        raise InputError(f"name {title!r} must begin with a letter from a to z, for its name in code")
+    return name
+
+
+def _tableau(data: Mapping[str, Any], name: str) -> Tableau:
+    """Return a tableau from the content of a file whose keys are there; its numbers and its shape are checked."""
+    nodes = _numbers("nodes", _list("nodes", data["nodes"]))
+    stages = len(nodes)
+    if not 1 <= stages <= MOST_STAGES:
+        raise InputError(f"nodes has {stages} entries; from 1 to {MOST_STAGES} are allowed")
+    rows = _list("matrix", data["matrix"])
+    if len(rows) != stages:
+        raise InputError(f"matrix has {len(rows)} rows; as many as nodes are needed: {stages}")
+    for number, row in enumerate(rows, 1):
+        entries = len(_list(f"matrix row {number}", row))
+        if entries != number - 1:
+            why = "not explicit, " if entries >= number else ""
+            raise InputError(
+                f"matrix row {number} has {entries} entries: {why}{number - 1} are needed, left of the diagonal"
+            )
+    embedded = data.get("embedded_weights")
+    tableau = Tableau(
+        name,
+        data["name"],
+        data["source"],
+        data["order"],
+        nodes,
+        tuple(_numbers(f"matrix row {number}", row) for number, row in enumerate(rows, 1)),
+        _weights("weights", data["weights"], stages),
+        None if embedded is None else _weights("embedded_weights", embedded, stages),
+        _tolerance(data.get("tolerance", 0)),
     )
-}
+    if not tableau.rational:
+        _check_roots(tableau)
+    return tableau
+
+
+def _list(what: str, value: Any) -> list[Any]:
+    if not isinstance(value, list):
+        raise InputError(f"{what} is of type {type(value).__name__}; a list is needed")
+    return value
+
+
+def _numbers(what: str, values: list[Any]) -> tuple[Number, ...]:
+    return tuple(coefficients.number(f"{what}, entry {k}", value) for k, value in enumerate(values, 1))
+
+
+def _weights(what: str, value: Any, stages: int) -> tuple[Number, ...]:
+    weights = _numbers(what, _list(what, value))
+    if len(weights) != stages:
+        raise InputError(f"{what} has {len(weights)} entries; as many as nodes are needed: {stages}")
+    return weights
+
+
+def _tolerance(value: Any) -> Fraction:
+    tolerance = coefficients.number("tolerance", value)
+    if not isinstance(tolerance, Fraction) or not 0 <= tolerance <= MOST_TOLERANCE:
+        raise InputError(
+            f"tolerance is {value}; from 0 to {float(MOST_TOLERANCE):g} is needed: "
+            "it explains the rounding of published coefficients, no more"
+        )
+    return tolerance
+
+
+def _check_roots(tableau: Tableau) -> None:
+    if tableau.tolerance:
+        raise InputError("tolerance is for rounded fractions; a tableau with square roots is exact")
+    rows = (tableau.nodes, tableau.weights, tableau.embedded_weights or (), *tableau.matrix)
+    irrational = [value for row in rows for value in row if not isinstance(value, Fraction)]
+    if coefficients.degree_bound(irrational) > coefficients.MOST_DEGREE:
+        raise InputError("its numbers hold too many different square roots; at most three are allowed")
+
+
+def verify(tableau: Tableau) -> None:
+    """Check row sums and order conditions exactly.
+
+    Raises
+    ------
+    InputError
+        If one does not hold; the message names the first.
+    """
+    for number, residual in enumerate(order_conditions.row_residuals(tableau), 1):
+        if residual != 0 and not (tableau.tolerance and abs(residual) <= tableau.tolerance):
+            node = tableau.nodes[number - 1]
+            raise InputError(
+                f"matrix row {number} sums to {_shown(node + residual)}; its node is {_shown(node)}"
+            )
+    for order in range(1, tableau.order + 1):
+        failure = order_conditions.first_failure(tableau, order)
+        if failure:
+            tree, residual = failure
+            needed = Fraction(1, order_conditions.density(tree))
+            raise InputError(
+                f"order {order}: {order_conditions.weight_text(tree)} = {_shown(needed + residual)}, "
+                f"{needed} is needed (off by {_shown(residual)})"
+            )
+    if tableau.embedded_weights is not None and order_conditions.embedded_order(tableau) < 1:
+        total = sum(tableau.embedded_weights)
+        raise InputError(f"embedded_weights sum to {_shown(total)}; 1 is needed, that they have an order")
+
+
+def _shown(value: Number) -> str:
+    """Return a number exactly if that is short, otherwise rounded."""
+    if not isinstance(value, Fraction):
+        import sympy as sp
+
+        value = sp.expand(value)
+    exact = coefficients.text(value)
+    return exact if len(exact) <= 40 else f"about {float(value):.9g}"

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import typer
 
-from strapgen.cli import compare, derive, generate, listing, simulate, study, tables, version
+from strapgen.cli import compare, derive, generate, listing, simulate, study, tableau, tables, version
 from strapgen.exceptions import StrapgenError
 
 app = typer.Typer(
@@ -20,6 +20,7 @@ app = typer.Typer(
 )
 app.callback()(version.options)
 app.command("list")(listing.list_names)
+app.command("tableau")(tableau.tableau)
 app.command("derive")(derive.derive)
 app.command("generate")(generate.generate)
 app.command("simulate")(simulate.simulate)

@@ -16,7 +16,9 @@ Algorithm = Annotated[
 ]
 Method = Annotated[
     str | None,
-    typer.Option("--method", help="Integration method, rk1 to rk4.  [default: rk4]", show_default=False),
+    typer.Option(
+        "--method", help="Integration method; see strapgen list.  [default: rk4]", show_default=False
+    ),
 ]
 Increments = Annotated[
     str | None,

@@ -7,13 +7,13 @@ import sympy as sp
 from derived import kernel, program
 
 from strapgen import catalogue
-from strapgen.catalogue import ALGORITHMS, METHODS, Choice
+from strapgen.catalogue import ALGORITHMS, STANDARD_METHODS, Choice
 from strapgen.lowering import candidates, canonical, lower
 from strapgen.lowering.names import is_unnamed
 from strapgen.lowering.passes import optimize
 from strapgen.program import Program
 
-STEPS = [Choice(a, m, n) for a in ALGORITHMS for m in METHODS for n in (1, 2, 3, 4, 5, None)]
+STEPS = [Choice(a, m, n) for a in ALGORITHMS for m in STANDARD_METHODS for n in (1, 2, 3, 4, 5, None)]
 EVERY = pytest.mark.parametrize("choice", STEPS, ids=lambda choice: choice.kernel)
 
 
@@ -111,7 +111,7 @@ def test_values_are_named_after_what_they_are(choice):
 
 @pytest.mark.parametrize(
     ("choice", "seconds"),
-    [(Choice(a, m, 2), 0.5) for a in ALGORITHMS for m in METHODS]
+    [(Choice(a, m, 2), 0.5) for a in ALGORITHMS for m in STANDARD_METHODS]
     + [(Choice(a, "rk4", 4), 3) for a in ALGORITHMS],
     ids=lambda value: value.kernel if isinstance(value, Choice) else f"{value}s",
 )

@@ -1,0 +1,242 @@
+"""Coefficients as text, read exactly: fractions, decimals, and expressions with square roots.
+
+A rational is a `Fraction`; anything else is a SymPy expression. SymPy is loaded when the first irrational appears,
+so that rational tableaux are read, and all of them listed, without it.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+import re
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from strapgen.exceptions import InputError
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+#: An exact number.
+Number: TypeAlias = "Fraction | sp.Expr"
+
+#: Characters of the longest text, and the largest exponent in it. Far beyond any coefficient that was published.
+MOST_CHARACTERS = 1000
+MOST_EXPONENT = 100
+
+#: Binary digits of the longest numerator or denominator.
+MOST_BITS = 2048
+
+#: Degree of the largest field: three square roots, beside or inside each other. A product in it takes 0.1 ms.
+MOST_DEGREE = 8
+
+_CHARACTERS = re.compile(r"[0-9a-z+\-*/(). ]*", re.IGNORECASE)
+_LITERAL = re.compile(r"(\d+\.?\d*|\.\d+)(e([+-]?\d+))?", re.IGNORECASE)
+
+
+class _NotAllowedError(Exception):
+    """What is wrong with a text, in words."""
+
+
+def number(what: str, value: Any) -> Number:
+    """Read an exact number.
+
+    Parameters
+    ----------
+    what : str
+        Its name in an error message.
+    value : str or int
+        A whole number, a fraction, a decimal, which is taken exactly, or an expression of such with + - * /,
+        parentheses, whole powers (``**``) and ``sqrt``.
+
+    Returns
+    -------
+    Fraction or sympy.Expr
+        The latter if it is irrational, as a sum of multiples of square roots.
+
+    Raises
+    ------
+    InputError
+        If it is no such number, is not real, or is out of all proportion.
+
+    Examples
+    --------
+    >>> number("node", "9/44")
+    Fraction(9, 44)
+    >>> number("weight", "(18-sqrt(21))/180")
+    1/10 - sqrt(21)/180
+    """
+    if isinstance(value, float):
+        raise InputError(
+            f'{what} is {value!r}, which is not exact; a string such as "9/44" or "0.5" is needed'
+        )
+    if isinstance(value, int) and not isinstance(value, bool):
+        if value.bit_length() > MOST_BITS:
+            raise InputError(f"{what}: numbers of over {MOST_BITS} binary digits are not allowed")
+        return Fraction(value)
+    if not isinstance(value, str):
+        raise InputError(f'{what} is of type {type(value).__name__}; a string such as "9/44" is needed')
+    try:
+        return _settled(_value(_parsed(value), value))
+    except _NotAllowedError as error:
+        raise InputError(f"{what} is {_shown(value)}: {error}") from None
+    except RecursionError:
+        raise InputError(f"{what} is {_shown(value)}: it is nested too deeply") from None
+
+
+def text(value: Number) -> str:
+    """Return a number as text that `number` reads.
+
+    Examples
+    --------
+    >>> text(Fraction(-9, 44))
+    '-9/44'
+    """
+    return str(value)
+
+
+def _shown(value: str) -> str:
+    shown = repr(value)
+    return shown if len(shown) <= 60 else f"{shown[:50]}..., {len(shown)} characters long"
+
+
+def _parsed(source: str) -> ast.expr:
+    if len(source) > MOST_CHARACTERS:
+        raise _NotAllowedError(f"at most {MOST_CHARACTERS} characters are allowed")
+    try:
+        if not _CHARACTERS.fullmatch(source):
+            raise SyntaxError
+        return ast.parse(source.strip(), mode="eval").body
+    # What is nested too deeply is a MemoryError or a RecursionError, depending on the release of Python.
+    except (SyntaxError, ValueError, MemoryError, RecursionError):
+        raise _NotAllowedError('a number such as "9/44", "-0.5" or "(18-sqrt(21))/180" is needed') from None
+
+
+def _value(node: ast.expr, source: str) -> Number:
+    """Evaluate an expression; only what stands here can be in it."""
+    match node:
+        case ast.Constant():
+            return _literal(ast.get_source_segment(source.strip(), node) or "")
+        case ast.UnaryOp(op=ast.UAdd() | ast.USub()):
+            value = _value(node.operand, source)
+            return value if isinstance(node.op, ast.UAdd) else -value
+        case ast.BinOp(op=ast.Pow()):
+            return _power(_value(node.left, source), _value(node.right, source))
+        case ast.BinOp(op=ast.Add() | ast.Sub() | ast.Mult() | ast.Div()):
+            return _operation(node.op, _value(node.left, source), _value(node.right, source))
+        case ast.Call(func=ast.Name(id="sqrt"), args=[argument], keywords=[]):
+            return _root(_settled(_value(argument, source)))
+    raise _NotAllowedError("numbers, + - * /, parentheses, whole powers with ** and sqrt are allowed")
+
+
+def _literal(source: str) -> Fraction:
+    found = _LITERAL.fullmatch(source)
+    if not found:
+        raise _NotAllowedError(f"{source!r} is no number")
+    if found[3] and abs(int(found[3])) > MOST_EXPONENT:
+        raise _NotAllowedError(f"an exponent is at most {MOST_EXPONENT}")
+    return _bounded(Fraction(source))
+
+
+def _operation(operator: ast.operator, left: Number, right: Number) -> Number:
+    if isinstance(operator, ast.Div):
+        right = _inverse(right)
+    if not (isinstance(left, Fraction) and isinstance(right, Fraction)):
+        left, right = _expression(left), _expression(right)
+    if isinstance(operator, ast.Add):
+        result = left + right
+    elif isinstance(operator, ast.Sub):
+        result = left - right
+    else:
+        result = left * right
+    if isinstance(result, Fraction):
+        return _bounded(result)
+    # A product of many sums has to be multiplied out as it grows, or it takes for ever.
+    return _settled(result) if isinstance(operator, ast.Mult) else result
+
+
+def _power(base: Number, exponent: Number) -> Number:
+    if not isinstance(exponent, Fraction) or exponent.denominator != 1:
+        raise _NotAllowedError("a power must be whole; roots are written as sqrt")
+    if abs(exponent) > MOST_EXPONENT:
+        raise _NotAllowedError(f"a power is at most {MOST_EXPONENT}")
+    base = _settled(base)
+    if exponent < 0:
+        base, exponent = _inverse(base), -exponent
+    if isinstance(base, Fraction):
+        if max(base.numerator.bit_length(), base.denominator.bit_length()) * exponent > 2 * MOST_BITS:
+            raise _NotAllowedError(f"numbers of over {MOST_BITS} binary digits are not allowed")
+        return _bounded(Fraction(base ** int(exponent)))
+    return _settled(base ** int(exponent))
+
+
+def _inverse(value: Number) -> Number:
+    """Return one over a number, irrational ones without roots below the line: SymPy would hide a zero in those."""
+    value = _settled(value)
+    if value == 0:
+        raise _NotAllowedError("it divides by zero")
+    if isinstance(value, Fraction):
+        return 1 / value
+    from sympy.polys.constructor import construct_domain
+
+    domain, (element,) = construct_domain([value], extension=True)
+    return _settled(domain.to_sympy(domain.one / element))
+
+
+def _root(square: Number) -> Number:
+    """Return the root of a settled number."""
+    if (square if isinstance(square, Fraction) else square.evalf(50)) < 0:
+        raise _NotAllowedError("it holds the root of a negative number")
+    if isinstance(square, Fraction):
+        root = Fraction(math.isqrt(square.numerator), math.isqrt(square.denominator))
+        if root * root == square:
+            return root
+    import sympy as sp
+
+    # Without this, sqrt(3 + 2 sqrt(2)) and 1 + sqrt(2) would be two nodes.
+    return sp.sqrtdenest(sp.sqrt(_expression(square)))
+
+
+def _expression(value: Number) -> sp.Expr:
+    import sympy as sp
+
+    return sp.Rational(value.numerator, value.denominator) if isinstance(value, Fraction) else value
+
+
+def _bounded(value: Fraction) -> Fraction:
+    if max(value.numerator.bit_length(), value.denominator.bit_length()) > MOST_BITS:
+        raise _NotAllowedError(f"numbers of over {MOST_BITS} binary digits are not allowed")
+    return value
+
+
+def _settled(value: Number) -> Number:
+    """Return a rational as a `Fraction`, anything else as a sum of multiples of roots: both decided exactly."""
+    if isinstance(value, Fraction):
+        return value
+    import sympy as sp
+    from sympy.polys.constructor import construct_domain
+
+    if degree_bound([value]) > MOST_DEGREE:
+        raise _NotAllowedError("at most three different square roots are allowed")
+    value = sp.expand(value)
+    powers = value.atoms(sp.Pow)
+    # With one root of a rational, 1 and the root are independent: nothing can hide.
+    if any(not power.base.is_Rational for power in powers) or len(powers) > 1:
+        domain, (element,) = construct_domain([value], extension=True)
+        value = sp.expand(domain.to_sympy(element))
+    for rational in value.atoms(sp.Rational):
+        _bounded(Fraction(rational.p, rational.q))
+    return Fraction(value.p, value.q) if value.is_Rational else value
+
+
+def degree_bound(values: list[Any]) -> int:
+    """Return a bound of the degree of the field that expressions lie in: every root doubles it at most."""
+    import sympy as sp
+
+    roots = {
+        (p.base, p.exp.q)
+        for value in values
+        for p in value.atoms(sp.Pow)
+        if p.exp.is_Rational and p.exp.q > 1
+    }
+    return math.prod(q for _, q in roots)
