@@ -9,7 +9,7 @@ from fractions import Fraction
 import pytest
 import sympy as sp
 
-from strapgen import formulas, pipeline
+from strapgen import catalogue, formulas, pipeline
 from strapgen.catalogue import standard
 
 SOME = [
@@ -20,7 +20,7 @@ SOME += [choice for choice in standard() if choice.method is None]
 
 @pytest.fixture(params=SOME, ids=lambda choice: choice.kernel)
 def kernel(request):
-    return pipeline.derive(*request.param)
+    return catalogue.derive(request.param)
 
 
 def stages(kernel):

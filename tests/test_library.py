@@ -29,7 +29,7 @@ def test_a_second_use_loads_neither_sympy_nor_jinja_nor_a_compiler():
 def test_sources_are_those_of_the_pipeline():
     choice = catalogue.choose("dcm", "rk2", 3)
     for target in strapgen.targets.TARGETS:
-        made = strapgen.generate(strapgen.lower(strapgen.derive(*choice)), target)
+        made = strapgen.generate(strapgen.lower(catalogue.derive(choice)), target)
         assert library.sources(choice, target) == made
 
 

@@ -7,15 +7,19 @@ from typing import Any
 
 from generators import Case
 from strapgen.catalogue.kinematics import KINEMATICS
-from strapgen.catalogue.runge_kutta import staged_step, step
+from strapgen.catalogue.runge_kutta import method, staged_step
+from strapgen.catalogue.steps import step
 from strapgen.catalogue.tableaux import TABLEAUX
 from strapgen.kernel import Kernel
 
 
 def kernel(case: Case) -> Kernel:
     """Return the fourth-order step of a case, before any lowering."""
-    function = {"staged": staged_step, "transition": step}[case.form]
-    return function(KINEMATICS[case.algorithm], TABLEAUX["rk4"], 2 if case.samples == "increments" else None)
+    kinematics, tableau = KINEMATICS[case.algorithm], TABLEAUX["rk4"]
+    increments = 2 if case.samples == "increments" else None
+    if case.form == "staged":
+        return staged_step(kinematics, tableau, increments)
+    return step(kinematics, method(tableau), increments)
 
 
 def inputs(kernel: Kernel) -> tuple[list[str], list[str]]:

@@ -1,15 +1,22 @@
 """Exact algebra of rotations: skew matrices, quaternions, Pauli matrices, on SymPy expressions.
 
 Vectors are 3 x 1 matrices. Quaternions are 4 x 1 matrices with the scalar **last**, as the Euler parameters.
-But for `rotation`, everything is built from sums and products alone and also holds for polynomials and numbers.
+But for `rotation` and `quaternion`, everything is built from sums and products alone and also holds for
+polynomials and numbers.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from fractions import Fraction
 from typing import Any
 
 import sympy as sp
+
+
+def exact(number: Fraction | sp.Expr) -> sp.Expr:
+    """Return a fraction as SymPy's number; other exact numbers as they are."""
+    return sp.Rational(number.numerator, number.denominator) if isinstance(number, Fraction) else number
 
 
 def skew(v: sp.Matrix) -> sp.Matrix:
@@ -144,6 +151,23 @@ def rotation(v: sp.Matrix) -> sp.Matrix:
     angle = sp.sqrt(dot(v, v))
     K = skew(v)
     return sp.eye(3) + sp.sinc(angle) * K + sp.sinc(angle / 2) ** 2 / 2 * K * K
+
+
+def quaternion(v: sp.Matrix) -> sp.Matrix:
+    """Return the unit quaternion of the rotation by the rotation vector v, without a singularity at v = 0.
+
+    Parameters
+    ----------
+    v : Matrix, 3 x 1
+        Rotation vector in rad.
+
+    Returns
+    -------
+    Matrix, 4 x 1
+        Scalar last.
+    """
+    half = sp.sqrt(dot(v, v)) / 2
+    return sp.Matrix([*(sp.sinc(half) / 2 * v), sp.cos(half)])
 
 
 def adjugate(A: sp.Matrix) -> sp.Matrix:

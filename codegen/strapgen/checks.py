@@ -65,17 +65,17 @@ def number(what: str, value: str | float | Fraction, *, positive: bool = False) 
     return exact
 
 
-def count(what: str, value: Any, *, largest: int | None = None) -> int:
-    """Return `value` as a whole number from 1 to `largest`.
+def count(what: str, value: Any, *, smallest: int = 1, largest: int | None = None) -> int:
+    """Return `value` as a whole number from `smallest` to `largest`.
 
     Raises
     ------
     InputError
         If it is not one.
     """
-    limit = "at least 1" if largest is None else f"from 1 to {largest}"
+    limit = f"at least {smallest}" if largest is None else f"from {smallest} to {largest}"
     whole = isinstance(value, Integral) and not isinstance(value, bool)
-    if not whole or value < 1 or (largest is not None and value > largest):
+    if not whole or value < smallest or (largest is not None and value > largest):
         raise InputError(f"{what} is {value!r}; a whole number {limit} is needed")
     return int(value)
 

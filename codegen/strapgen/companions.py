@@ -12,17 +12,21 @@ class Companions:
 
     Parameters
     ----------
-    product : str
-        Kernel that advances a state by a transition, and one transition by the next.
-    orthonormalize : str
-        Kernel that restores the state's norm or orthogonality.
+    product : str or None
+        Kernel that advances a state by a transition, and one transition by the next; None for a step that is not
+        linear in the state.
+    orthonormalize : str or None
+        Kernel that restores the state's norm or orthogonality; None where nothing has to be restored.
     attitude : str or None
         Kernel that turns the state into a direction cosine matrix; None where the state is one.
     identity : tuple of Fraction
         The state of zero rotation, row-major.
+    previous : int
+        How many of the increments that a step takes are those before it, kept from earlier steps.
     """
 
-    product: str
-    orthonormalize: str
+    product: str | None
+    orthonormalize: str | None
     attitude: str | None
     identity: tuple[Fraction, ...]
+    previous: int = 0

@@ -15,7 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapgen import catalogue, checks, compilation, exact, pipeline
-from strapgen.backends import BACKENDS, Backend, backend
+from strapgen.backends import BACKENDS, Backend, of
+from strapgen.catalogue import Choice
+from strapgen.catalogue.tableaux import Tableau
 from strapgen.exceptions import InputError
 from strapgen.fixedpoint import Settings
 from strapgen.simulation import attitude, drift_between, require_finite
@@ -72,7 +74,7 @@ class Comparison:
 
 def compare(
     algorithm: str,
-    method: str | None,
+    method: str | Tableau | None,
     samples: int | None,
     backends: Sequence[str],
     increments: Any,
@@ -80,13 +82,14 @@ def compare(
     reference: str = "numpy",
     truth: Array | None = None,
     settings: Settings | None = None,
+    previous: int = 0,
 ) -> list[Comparison]:
     """Run an algorithm on several back ends and hold each against a reference.
 
     Parameters
     ----------
-    algorithm, method, samples
-        As for `strapgen.backend`.
+    algorithm, method, samples, previous
+        As for `strapgen.backend`; samples are the increments of a step.
     backends : sequence of str
         Keys of `BACKENDS`.
     increments : array_like, (N, K, 3)
@@ -114,6 +117,20 @@ def compare(
     >>> [row.backend for row in rows], rows[0].max_abs_rad
     (['numpy', 'c'], 0.0)
     """
+    choice = catalogue.choose_step(algorithm, method, samples, previous=previous)
+    return compare_choice(choice, backends, increments, reference=reference, truth=truth, settings=settings)
+
+
+def compare_choice(
+    choice: Choice,
+    backends: Sequence[str],
+    increments: Any,
+    *,
+    reference: str = "numpy",
+    truth: Array | None = None,
+    settings: Settings | None = None,
+) -> list[Comparison]:
+    """Run a chosen attitude step on several back ends; parameters and errors are those of `compare`."""
     for name in backends:
         checks.choice("backend", name, BACKENDS)
     checks.choice("reference", reference, [*BACKENDS, EXACT])
@@ -124,20 +141,17 @@ def compare(
 
     def make(name: str) -> Backend:
         own = chosen if BACKENDS[name].target in FIXED else None
-        return backend(algorithm, method, samples, name, settings=own)
+        return of(choice, name, settings=own)
 
-    wanted = _reference(make, algorithm, method, samples, reference, d)
+    wanted = _reference(make, choice, reference, d)
     matrices = attitude(make("numpy"), wanted)
     return [_compared(make(name), d, wanted, matrices, truth) for name in backends]
 
 
-def _reference(
-    make: Any, algorithm: str, method: str | None, samples: int | None, reference: str, increments: Array
-) -> Array:
+def _reference(make: Any, choice: Choice, reference: str, increments: Array) -> Array:
     """Return the states of the reference, in double."""
     if reference == EXACT:
-        kernel = catalogue.derive(catalogue.choose(algorithm, method, samples))
-        return exact.propagate(pipeline.lower(kernel), increments)
+        return exact.propagate(pipeline.lower(catalogue.derive(choice)), increments)
     states: Array = make(reference).propagate(increments).astype(np.float64)
     require_finite(states, np.arange(len(states), dtype=np.float64))
     return states

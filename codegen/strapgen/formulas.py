@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -13,15 +14,24 @@ from strapgen.program import Program
 from strapgen.targets.printer import Printer, operations_text
 
 
-def as_text(kernel: Kernel) -> str:
-    """Return a kernel's formulas as text, stage by stage."""
+def as_text(kernel: Kernel, notes: Sequence[str] | None = None) -> str:
+    """Return a kernel's formulas as text, stage by stage.
+
+    Parameters
+    ----------
+    kernel : Kernel
+    notes : sequence of str, optional
+        Remarks, by default the kernel's own.
+    """
     lines = [kernel.title, f"source: {kernel.source}", ""]
     for signal in kernel.inputs:
         shape = " x ".join(map(str, signal.shape)) or "scalar"
         lines.append(f"in   {signal.name} ({shape}, unit {signal.unit}): {signal.meaning}")
     for stage in kernel.outputs:
         lines.append(f"out  {stage.signal.name} (unit {stage.signal.unit}): {stage.signal.meaning}")
-    lines += [f"note {note}" for note in kernel.notes]
+    if kernel.order is not None:
+        lines.append(f"order {kernel.order.step}: {kernel.order}")
+    lines += [f"note {note}" for note in (kernel.notes if notes is None else notes)]
     for stage in (*kernel.stages, *kernel.outputs):
         lines += [
             "",

@@ -1,4 +1,4 @@
-"""The gyro as a stage between motion and algorithm: angle increments as whole numbers of pulses."""
+"""The gyro between motion and algorithm: increments as whole numbers of pulses, increments kept for later steps."""
 
 from __future__ import annotations
 
@@ -15,7 +15,36 @@ from strapgen.exceptions import InputError
 _MOST_PULSES = 2**53
 
 
-def pulses(increments: Any, size: float | str | Fraction) -> NDArray[np.float64]:
+def windows(increments: Any, count: int, previous: int = 0) -> NDArray[np.float64]:
+    """Cut increments in a row into what each step takes.
+
+    Parameters
+    ----------
+    increments : array_like, (previous + N count, 3)
+        Angle increments in rad, body axes.
+    count : int
+        Increments that belong to a step.
+    previous : int, optional
+        Increments before the step that it takes too.
+
+    Returns
+    -------
+    array, (N, previous + count, 3)
+
+    Examples
+    --------
+    >>> windows(np.arange(15.0).reshape(5, 3), 2, previous=1)[:, :, 0]
+    array([[ 0.,  3.,  6.],
+           [ 6.,  9., 12.]])
+    """
+    row = np.ascontiguousarray(increments, np.float64)
+    if not previous:
+        return row.reshape(-1, count, 3)
+    overlapping = np.lib.stride_tricks.sliding_window_view(row, previous + count, axis=0)[::count]
+    return np.ascontiguousarray(np.moveaxis(overlapping, -1, 1))
+
+
+def pulses(increments: Any, size: float | str | Fraction, previous: int = 0) -> NDArray[np.float64]:
     """Return increments as a gyro that counts pulses gives them: what makes no whole pulse is carried on.
 
     The angle since the start is rounded to the nearest pulse, and differences are taken: no angle is ever lost, each
@@ -27,6 +56,8 @@ def pulses(increments: Any, size: float | str | Fraction) -> NDArray[np.float64]
         Angle increments of N steps in rad, body axes; leading axes are independent runs.
     size : number
         Angle of a pulse in rad.
+    previous : int, optional
+        How many of the K increments of a step are those before it, which `windows` repeats.
 
     Returns
     -------
@@ -45,6 +76,10 @@ def pulses(increments: Any, size: float | str | Fraction) -> NDArray[np.float64]
     """
     pulse = float(checks.number("pulse", size, positive=True))
     d = np.asarray(increments, np.float64)
+    if previous:
+        (steps, taken), count = d.shape[:2], d.shape[1] - previous
+        row = np.concatenate([d[0, :previous], d[:, previous:].reshape(-1, 3)])
+        return windows(pulses(row[:, None], size)[:, 0], count, previous).reshape(steps, taken, 3)
     flat = d.reshape(*d.shape[:-3], -1, 3)
     angle = np.cumsum(flat, axis=-2) / pulse
     if not np.abs(angle).max(initial=0.0) < _MOST_PULSES:

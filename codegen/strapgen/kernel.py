@@ -10,6 +10,7 @@ import sympy as sp
 
 from strapgen.algebra import evaluate
 from strapgen.companions import Companions
+from strapgen.order import Order
 from strapgen.signal import Signal
 
 
@@ -79,6 +80,10 @@ class Kernel:
         Name of the stage on which the state's update depends linearly, see `Program.transition`.
     companions : Companions or None
         What belongs to an attitude step.
+    order : Order or None
+        Order of an attitude step.
+    own : tuple of Kernel
+        Kernels that its companions name and the catalogue does not have.
     arguments : str
         Name and options on the command line; by default the name alone.
     notes : tuple of str
@@ -93,6 +98,8 @@ class Kernel:
     stages: tuple[Stage, ...] = ()
     transition: str | None = None
     companions: Companions | None = None
+    order: Order | None = None
+    own: tuple[Kernel, ...] = ()
     arguments: str = ""
     notes: tuple[str, ...] = field(default=())
 

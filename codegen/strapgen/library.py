@@ -42,7 +42,7 @@ def sources(choice: Choice, target: str, settings: Settings | None = None) -> So
         (draft / "interface.json").write_text(json.dumps(made.interface()))
 
     asked = json.dumps(settings.as_dict(), sort_keys=True) if settings else ""
-    key = cache.digest([cache.generator_digest(), choice.kernel, target, asked])
+    key = cache.digest([cache.generator_digest(), choice.identity, target, asked])
     folder = cache.entry("sources", key, fill)
     interface = json.loads((folder / "interface.json").read_text())
     return Sources.restore(interface, {name: (folder / name).read_text() for name in interface["files"]})

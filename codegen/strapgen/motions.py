@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from strapgen import catalogue, checks
 from strapgen.backends import evaluator
 from strapgen.exceptions import InputError
+from strapgen.gyro import windows
 
 Array = NDArray[np.float64]
 
@@ -53,7 +54,7 @@ class Motion:
     name: str
     parameters: dict[str, float]
 
-    def increments(self, step: Fraction, steps: int, samples: int) -> Array:
+    def increments(self, step: Fraction, steps: int, samples: int, previous: int = 0) -> Array:
         """Return the exact angle increments.
 
         Parameters
@@ -64,16 +65,18 @@ class Motion:
             Number of steps from t = 0.
         samples : int
             Increments a step.
+        previous : int, optional
+            Increments before the step that it takes too; the first are those of the motion before t = 0.
 
         Returns
         -------
-        array, (steps, samples, 3)
+        array, (steps, previous + samples, 3)
             Integrals of the body rate in rad, body axes.
         """
         width = step / samples
-        middles = (2 * np.arange(steps * samples) + 1) * float(width / 2)
+        middles = (2 * np.arange(-previous, steps * samples) + 1) * float(width / 2)
         values: Array = evaluator(f"{self.name}-increments")(middles, float(width), *self.parameters.values())
-        return values.reshape(steps, samples, 3)
+        return windows(values, samples, previous)
 
     def attitude(self, time: Any) -> Array:
         """Return the true attitude.

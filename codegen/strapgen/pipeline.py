@@ -24,13 +24,19 @@ from strapgen.fixedpoint import FixedProgram, Settings
 
 if TYPE_CHECKING:
     from strapgen.backends import Backend
+    from strapgen.catalogue.tableaux import Tableau
     from strapgen.kernel import Kernel
     from strapgen.program import Program
     from strapgen.targets import Sources
 
 
 def derive(
-    algorithm: str, method: str | None = None, increments: int | None = None, *, rates: bool = False
+    algorithm: str,
+    method: str | Tableau | None = None,
+    increments: int | None = None,
+    *,
+    rates: bool = False,
+    previous: int = 0,
 ) -> Kernel:
     """Derive an algorithm exactly.
 
@@ -38,13 +44,16 @@ def derive(
     ----------
     algorithm : str
         An attitude algorithm ("dcm", "euler", "cayley-klein") or another kernel of the catalogue.
-    method : str, optional
-        Integration method, "rk1" to "rk4" (default), of an attitude algorithm.
+    method : str or Tableau, optional
+        Integration method of an attitude algorithm: a name that ``strapgen list`` shows, or a tableau; by default
+        "rk4".
     increments : int, optional
         Angle increments a step, 1 to 8 (default 2), of an attitude algorithm.
     rates : bool, optional
         Whether the step is given the body rate at every node of its method, times the step length, in place
         of increments.
+    previous : int, optional
+        Increments before the step that it takes too, 0 to 3 (default 0): a fit of higher degree for a slow gyro.
 
     Returns
     -------
@@ -62,7 +71,7 @@ def derive(
     >>> derive("euler", method="rk4", rates=True).inputs[1].elements[:4]
     ('turn_0_x', 'turn_0_y', 'turn_0_z', 'turn_1_2_x')
     """
-    return catalogue.derive(catalogue.choose(algorithm, method, increments, rates))
+    return catalogue.derive(catalogue.choose(algorithm, method, increments, rates, previous))
 
 
 def lower(kernel: Kernel) -> Program:

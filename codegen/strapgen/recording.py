@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from strapgen import checks
 from strapgen.backends import Backend
 from strapgen.exceptions import InputError
-from strapgen.gyro import pulses
+from strapgen.gyro import pulses, windows
 from strapgen.simulation import require_finite
 
 Array = NDArray[np.float64]
@@ -267,6 +267,8 @@ def propagate(
 ) -> History:
     """Run an algorithm over recorded increments, from zero rotation.
 
+    An algorithm that takes increments from before its step starts after the first ones.
+
     Parameters
     ----------
     backend : Backend
@@ -298,21 +300,22 @@ def propagate(
     """
     backend.need_increments()
     step = recording.interval * backend.increments
-    steps, unused = divmod(len(recording.increments), backend.increments)
+    steps, unused = divmod(max(0, len(recording.increments) - backend.previous), backend.increments)
     if steps < 1:
         raise InputError(
-            f"the recording holds {len(recording.increments)} increments; a step needs {backend.increments}"
+            f"the recording holds {len(recording.increments)} increments; a step needs {backend.samples}"
         )
     record_every = 1 if record is None else _multiple("record", record, step)
     every = None if orthonormalize is None else _multiple("orthonormalize", orthonormalize, step)
     if record_every > steps:
         raise InputError(f"record {record} s is longer than the recording, {steps * step:.6g} s")
-    used = recording.increments[: steps * backend.increments]
-    given = used.reshape(steps, backend.increments, 3)
+    used = recording.increments[: backend.previous + steps * backend.increments]
+    given = windows(used, backend.increments, backend.previous)
     if pulse is not None:
-        given = pulses(given, pulse)
+        given = pulses(given, pulse, backend.previous)
     states = backend.propagate(given, record_every, every)
-    time: Array = recording.start + step * record_every * np.arange(len(states), dtype=np.float64)
+    start = recording.start + recording.interval * backend.previous
+    time: Array = start + step * record_every * np.arange(len(states), dtype=np.float64)
     require_finite(states, time)
     return History(time, states, step, unused)
 

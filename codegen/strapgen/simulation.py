@@ -118,6 +118,7 @@ def largest_increment(
     duration: float | str | Fraction,
     samples: int,
     pulse: float | str | Fraction | None = None,
+    previous: int = 0,
 ) -> float:
     """Return the largest element of an angle increment that a simulation feeds to its algorithm, in rad.
 
@@ -126,14 +127,14 @@ def largest_increment(
     motion : Motion
     step, duration, pulse : number
         As for `simulate`.
-    samples : int
-        Increments a step.
+    samples, previous : int
+        Increments a step, and those before it that it takes too.
     """
     h = checks.number("step", step, positive=True)
     steps = checks.multiple("duration", checks.number("duration", duration, positive=True), "step", h)
-    increments = motion.increments(h, steps, samples)
+    increments = motion.increments(h, steps, samples, previous)
     if pulse is not None:
-        increments = pulses(increments, pulse)
+        increments = pulses(increments, pulse, previous)
     return float(np.abs(increments).max())
 
 
@@ -193,9 +194,9 @@ def simulate(
     if record_every > steps:
         raise InputError(f"record {float(interval):g} s is longer than the duration {float(total):g} s")
     checks.multiple("duration", total, "record interval", interval)
-    increments = motion.increments(h, steps, backend.increments)
+    increments = motion.increments(h, steps, backend.increments, backend.previous)
     if pulse is not None:
-        increments = pulses(increments, pulse)
+        increments = pulses(increments, pulse, backend.previous)
     states = backend.propagate(increments, record_every, every)
     time: Array = np.arange(len(states), dtype=np.float64) * float(interval)
     require_finite(states, time)

@@ -44,7 +44,7 @@ static inline void one_(const double computed[9], double orthonormalized[9])
         - half_determinant * half_determinant)), half_determinant);
     const double radius = sqrt(spread);
     const double along = radius * cos(angle);
-    const double across = sqrt(3.0) * radius * sin(angle);
+    const double across = 1.7320508075688772 * (radius * sin(angle));
     /* singular value 1 of C */
     const double stretch_1 = sqrt(2.0 * along + mean);
     const double shared_10 = along - mean;

@@ -201,8 +201,6 @@ static inline int one_(const int32_t computed[9], int32_t orthonormalized[9])
         + shifted_(-(int64_t)along_cosine_square * INT64_C(4294967296)
         + shifted_((int64_t)along_cosine_square * along_cosine_bend, 2) + INT64_C(4294967296), 33));
     const int64_t along = (int64_t)along_cosine * radius;
-    const int_fast32_t across_root = (int_fast32_t)(shifted_(INT64_C(998459311558907194)
-        + INT32_C(268435456), 29));
     const int_fast32_t across_sine_series = (int_fast32_t)(shifted_(shifted_((int64_t)along_cosine_square * INT32_C(1481185359), 5)
         - INT64_C(7753252009628663808) + INT64_C(2147483648), 32));
     const int_fast32_t across_sine_series_2 = (int_fast32_t)(shifted_(shifted_((int64_t)along_cosine_square * across_sine_series, 5)
@@ -217,9 +215,9 @@ static inline int one_(const int32_t computed[9], int32_t orthonormalized[9])
         + INT32_C(536870912), 30));
     const int_fast32_t across_sine = (int_fast32_t)((int64_t)along_cosine_taken * 2
         + shifted_((int64_t)along_cosine_taken * across_sine_bend + INT64_C(2147483648), 32));
-    const int_fast32_t across_factor = (int_fast32_t)(shifted_((int64_t)across_root * radius
+    const int_fast32_t across_product = (int_fast32_t)(shifted_((int64_t)across_sine * radius
         + INT32_C(536870912), 30));
-    const int64_t across = (int64_t)across_factor * across_sine;
+    const int64_t across = (int64_t)across_product * INT32_C(1859775393);
     const int64_t stretch_1_radicand = along * 4 + shifted_(mean, 2);
     if (stretch_1_radicand < INT64_C(288230376151711744)
         || stretch_1_radicand > INT64_C(1152921504606846976))

@@ -7,7 +7,8 @@
  *     equation (B.1).
  * The determinant of the matrix must be above 0. Round-off grows with the fourth power of its
  * condition.
- * Integer operations of one call: 202 add, 154 multiply, 189 shift, 2 divide, 5 sqrt, 15 compare; 123 temporaries.
+ * Irrational constants are rounded to 80 digits, and once more to the format of the target.
+ * Integer operations of one call: 201 add, 154 multiply, 188 shift, 2 divide, 5 sqrt, 15 compare; 122 temporaries.
  *
  * A number in format Qm.n is an integer times 2^-n. Rounding: nearest. No sum or product on the way
  * can overflow for input inside the ranges below, which every call checks; an error is the

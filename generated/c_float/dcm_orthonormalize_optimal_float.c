@@ -44,7 +44,7 @@ static inline void one_(const float computed[9], float orthonormalized[9])
         - half_determinant * half_determinant)), half_determinant);
     const float radius = sqrtf(spread);
     const float along = radius * cosf(angle);
-    const float across = sqrtf(3.0f) * radius * sinf(angle);
+    const float across = 1.7320508f * (radius * sinf(angle));
     /* singular value 1 of C */
     const float stretch_1 = sqrtf(2.0f * along + mean);
     const float shared_10 = along - mean;

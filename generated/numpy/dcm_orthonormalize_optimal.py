@@ -7,6 +7,7 @@ Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (
     equation (B.1)
 The determinant of the matrix must be above 0. Round-off grows with the fourth power of its
 condition.
+Irrational constants are rounded to 80 digits, and once more to the format of the target.
 """
 
 import numpy as np
@@ -15,7 +16,7 @@ import numpy as np
 def dcm_orthonormalize_optimal(computed, out=None):
     """Direction cosine matrix: the nearest rotation, least sum of squared differences.
 
-    Operations: 85 add, 128 multiply, 1 divide, 6 sqrt, 1 negate, 1 select, 3 function; 54 temporaries.
+    Operations: 85 add, 128 multiply, 1 divide, 5 sqrt, 1 negate, 1 select, 3 function; 54 temporaries.
 
     Parameters
     ----------
@@ -73,7 +74,7 @@ def dcm_orthonormalize_optimal(computed, out=None):
     )
     radius = np.sqrt(spread)
     along = radius * np.cos(angle)
-    across = np.sqrt(3.0) * radius * np.sin(angle)
+    across = 1.7320508075688772 * (radius * np.sin(angle))
     # singular value 1 of C
     stretch_1 = np.sqrt(2.0 * along + mean)
     shared_10 = along - mean

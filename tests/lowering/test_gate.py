@@ -119,7 +119,6 @@ def test_roots_and_functions():
     assert tree(sp.cos(X)) == operation("cos", x)
     assert tree(sp.sinc(X)) == operation("sinc", x)
     assert tree(sp.atan2(Y, X)) == operation("atan2", y, x)
-    assert tree(sp.sqrt(3) * X) == operation("multiply", operation("sqrt", constant(3)), x)
 
 
 def test_what_needs_no_computation_is_referred_to():

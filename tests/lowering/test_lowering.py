@@ -17,6 +17,7 @@ from strapgen import catalogue, derive
 from strapgen.catalogue import STANDARD_METHODS, Choice
 from strapgen.kernel import Kernel
 from strapgen.lowering import candidates, canonical
+from strapgen.lowering.irrational import rationalized
 from strapgen.lowering.passes import PASSES, cost, optimize, remove_unused
 from strapgen.program import Assignment, Constant, Node, Operation, Program, Reference, walk
 
@@ -165,7 +166,8 @@ def test_passes_leave_the_values(choice):
 
 @EVERY
 def test_the_cheapest_candidate_is_taken(choice):
-    made = candidates(kernel(choice), canonical.extract_core(kernel(choice)))
+    rational = rationalized(kernel(choice))
+    made = candidates(rational, canonical.extract_core(rational))
     assert cost(program(choice)) == min(map(cost, map(optimize, made)))
 
 

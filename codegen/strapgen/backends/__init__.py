@@ -9,11 +9,13 @@ from typing import NamedTuple
 
 from strapgen import catalogue, checks, library
 from strapgen.backends.protocol import Backend, Evaluator
+from strapgen.catalogue import Choice
+from strapgen.catalogue.tableaux import Tableau
 from strapgen.exceptions import InputError
 from strapgen.fixedpoint import Settings
 from strapgen.targets import FIXED, Sources
 
-__all__ = ["BACKENDS", "Backend", "Entry", "Evaluator", "backend", "build", "evaluator", "fitted"]
+__all__ = ["BACKENDS", "Backend", "Entry", "Evaluator", "backend", "build", "evaluator", "fitted", "of"]
 
 
 class Entry(NamedTuple):
@@ -116,27 +118,30 @@ def evaluator(kernel: str, backend: str = "numpy", settings: Settings | None = N
            [ 0.,  0.,  1.]])
     """
     checks.choice("backend", backend, BACKENDS)
-    checks.choice("kernel", kernel, catalogue.KERNELS)
+    if kernel not in catalogue.user.KERNELS:
+        checks.choice("kernel", kernel, catalogue.KERNELS)
     chosen = fitted(backend, settings)
     return _evaluator(library.sources(catalogue.choose(kernel), BACKENDS[backend].target, chosen))
 
 
 def backend(
     algorithm: str,
-    method: str | None = None,
+    method: str | Tableau | None = None,
     increments: int | None = None,
     backend: str = "numpy",
     orthonormalization: str | None = None,
     settings: Settings | None = None,
+    *,
+    previous: int = 0,
 ) -> Backend:
     """Return an attitude algorithm as a back end, generated and compiled if it is not in the cache.
 
     Parameters
     ----------
     algorithm : str
-        "dcm", "euler" or "cayley-klein".
-    method : str, optional
-        "rk1" to "rk4"; by default "rk4".
+        "dcm", "euler" or "cayley-klein"; a Python file, or the entry point of a user's algorithm.
+    method : str or Tableau, optional
+        A name that ``strapgen list`` shows, or a tableau; by default "rk4".
     increments : int, optional
         Angle increments a step, 1 to 8; by default 2.
     backend : str, optional
@@ -146,6 +151,8 @@ def backend(
     settings : Settings, optional
         What fixed point is made for: largest increment, rounding, residuals, and the word of "fixed-model". By default
         increments of up to 1/8 rad.
+    previous : int, optional
+        Increments before the step that it takes too, 0 to 3; by default 0.
 
     Returns
     -------
@@ -164,10 +171,20 @@ def backend(
     2
     """
     checks.choice("backend", backend, BACKENDS)
-    checks.choice("algorithm", algorithm, catalogue.ALGORITHMS)
+    choice = catalogue.choose_step(algorithm, method, increments, previous=previous)
+    return of(choice, backend, orthonormalization, settings)
+
+
+def of(
+    choice: Choice,
+    backend: str = "numpy",
+    orthonormalization: str | None = None,
+    settings: Settings | None = None,
+) -> Backend:
+    """Return a chosen attitude step as a back end; parameters and errors are those of `backend`."""
+    checks.choice("backend", backend, BACKENDS)
     if orthonormalization is not None:
-        checks.choice("orthonormalization", orthonormalization, catalogue.orthonormalizations(algorithm))
-    choice = catalogue.choose(algorithm, method, increments)
+        checks.choice("orthonormalization", orthonormalization, catalogue.orthonormalizations(choice.name))
     chosen = fitted(backend, settings)
     return build(library.sources(choice, BACKENDS[backend].target, chosen), orthonormalization)
 

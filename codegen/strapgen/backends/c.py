@@ -59,9 +59,13 @@ class CBackend(Backend):
         self._module, self._pointer = step.module, step.pointer
         name = sources.function.name
         self._generated_propagate = getattr(self._module.lib, f"{name}_propagate")
-        orthonormalizer = evaluate(self._orthonormalization)
-        assert isinstance(orthonormalizer, CEvaluator)
-        self._orthonormalizer = self._module.ffi.cast(f"{name}_orthonormalizer", orthonormalizer.address())
+        self._orthonormalizer = self._module.ffi.NULL
+        if self._orthonormalization is not None:
+            orthonormalizer = evaluate(self._orthonormalization)
+            assert isinstance(orthonormalizer, CEvaluator)
+            self._orthonormalizer = self._module.ffi.cast(
+                f"{name}_orthonormalizer", orthonormalizer.address()
+            )
 
     def _propagate(
         self, increments: Array, record_every: int, orthonormalize_every: int, initial: Array

@@ -193,10 +193,10 @@ class FixedBackend(Backend):
         self.interface = self.evaluator.interface
         self.unit = float(self.interface.outputs[0].format.unit)
 
-    def rounding_bound(self, steps: int, rounded_inputs: bool = False) -> float:
-        """Return the certified bound of a run's rounding, see `Backend.rounding_bound`."""
-        assert self.interface.accumulation is not None
-        return self.interface.accumulation.bound(steps, rounded_inputs)
+    def rounding_bound(self, steps: int, rounded_inputs: bool = False) -> float | None:
+        """Return the certified bound of a run's rounding, see `Backend.rounding_bound`; None without transition."""
+        adds_up = self.interface.accumulation
+        return None if adds_up is None else adds_up.bound(steps, rounded_inputs)
 
     def representable(self, increments: Any) -> Array:
         """Return increments rounded to what the back end takes."""
@@ -271,7 +271,7 @@ class CFixedBackend(FixedBackend):
         history = np.empty((runs, 1 + steps // record_every, initial.shape[-1]), kind)
         orthonormalizer = ffi.NULL
         if orthonormalize_every:
-            made = self._evaluate(self._orthonormalization)
+            made = self._evaluate(self._need_orthonormalization())
             assert isinstance(made, CFixedEvaluator)
             orthonormalizer = ffi.cast(f"{self._function}_orthonormalizer", made.address())
         stopped = ffi.new("size_t[2]")
@@ -300,7 +300,7 @@ class ModelBackend(FixedBackend):
         """Propagate integers in Python."""
         step = self.evaluator
         assert isinstance(step, ModelEvaluator)
-        normalize = self._evaluate(self._orthonormalization) if orthonormalize_every else None
+        normalize = self._evaluate(self._need_orthonormalization()) if orthonormalize_every else None
         runs, steps = increments.shape[:2]
         single = runs == 1
         fresh = self.evaluator.fresh(runs)

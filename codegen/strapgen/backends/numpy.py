@@ -46,14 +46,16 @@ class NumpyBackend(Backend):
         orthonormalization: str | None = None,
     ) -> None:
         super().__init__(sources, evaluate, orthonormalization)
-        name = f"{sources.function.name}_transition"
-        self._transition: Callable[..., Array] = getattr(compilation.load(sources), name)
-        product = evaluate(self._product)
-        assert isinstance(product, NumpyEvaluator)
-        self._generated_product: Callable[..., Array] = product._generated
-        orthonormalizer = evaluate(self._orthonormalization)
-        assert isinstance(orthonormalizer, NumpyEvaluator)
-        self._orthonormalize: Callable[..., Array] = orthonormalizer._generated
+        if self._product is not None:
+            name = f"{sources.function.name}_transition"
+            self._transition: Callable[..., Array] = getattr(compilation.load(sources), name)
+            product = evaluate(self._product)
+            assert isinstance(product, NumpyEvaluator)
+            self._generated_product: Callable[..., Array] = product._generated
+        if self._orthonormalization is not None:
+            orthonormalizer = evaluate(self._orthonormalization)
+            assert isinstance(orthonormalizer, NumpyEvaluator)
+            self._orthonormalize: Callable[..., Array] = orthonormalizer._generated
         self._elements = self.identity.size
 
     def _propagate(
@@ -63,6 +65,9 @@ class NumpyBackend(Backend):
         history = np.empty((runs, 1 + steps // record_every, *self.state_shape))
         history[:, 0] = initial
         state = initial
+        if self._product is None:
+            self._run_in_turn(increments, record_every, orthonormalize_every, history)
+            return history
         for first, length, segments in _spans(steps, orthonormalize_every, max(1, _SPAN // max(runs, 1))):
             span = increments[:, first : first + length * segments]
             complete = orthonormalize_every and (first + length) % orthonormalize_every == 0
@@ -74,6 +79,20 @@ class NumpyBackend(Backend):
                 place = (first + offset) // record_every
                 history[:, place : place + recorded.shape[1]] = recorded
         return history
+
+    def _run_in_turn(
+        self, increments: Array, record_every: int, orthonormalize_every: int, history: Array
+    ) -> None:
+        """Run step after step, all runs side by side: what a step that is not linear in the state needs."""
+        step = self._step
+        assert isinstance(step, NumpyEvaluator)
+        state = history[:, 0]
+        for number in range(increments.shape[1]):
+            state = step._generated(state, increments[:, number])
+            if orthonormalize_every and (number + 1) % orthonormalize_every == 0:
+                state = self._orthonormalize(state)
+            if (number + 1) % record_every == 0:
+                history[:, (number + 1) // record_every] = state
 
     def _run_span(
         self, increments: Array, length: int, segments: int, orthonormalize: bool, state: Array
@@ -122,12 +141,12 @@ class NumpyBackend(Backend):
         Steps beyond the end have zero increments, so that their transition is the identity.
         """
         runs, steps = increments.shape[:2]
-        whole = np.zeros((runs, segments * length, self.increments * 3))
+        whole = np.zeros((runs, segments * length, self.samples * 3))
         whole[:, :steps] = increments.reshape(runs, steps, -1)
-        padded = np.zeros((runs, segments, blocks * depth, self.increments * 3))
+        padded = np.zeros((runs, segments, blocks * depth, self.samples * 3))
         padded[:, :, :length] = whole.reshape(runs, segments, length, -1)
         split = padded.reshape(runs, segments, blocks, depth, -1).transpose(4, 3, 2, 0, 1)
-        split = np.ascontiguousarray(split).reshape(self.increments, 3, -1)
+        split = np.ascontiguousarray(split).reshape(self.samples, 3, -1)
         result = np.empty((self._elements, split.shape[-1]))
         for k in range(0, split.shape[-1], _PASS):
             part = np.moveaxis(split[:, :, k : k + _PASS], -1, 0)

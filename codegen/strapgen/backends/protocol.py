@@ -95,8 +95,10 @@ class Backend(ABC):
         Type of the numbers that it computes with.
     takes : str
         What a step takes: "increments", or "turns": rates at the nodes times the step length.
-    increments : int
-        How many of them a step takes.
+    increments, previous : int
+        How many of them belong to a step, and how many from before it that it takes too.
+    samples : int
+        How many a step takes, both together.
     state_shape : tuple of int
         Shape of the state.
     elements : tuple of str
@@ -125,7 +127,9 @@ class Backend(ABC):
         self.name = sources.target
         self.kernel = sources.kernel
         self.takes = samples.name
-        self.increments = samples.shape[0]
+        self.samples = samples.shape[0]
+        self.previous = companions.previous
+        self.increments = self.samples - self.previous
         self.state_shape = state.shape
         self.elements = state.elements
         self.attitude = companions.attitude
@@ -191,8 +195,8 @@ class Backend(ABC):
         ----------
         state : array_like, (..., state shape)
             Body-to-reference attitude.
-        increments : array_like, (..., K, 3)
-            Angle increments of the step in rad, body axes, oldest first.
+        increments : array_like, (..., samples, 3)
+            Angle increments of the step in rad, body axes, oldest first, after those from before it.
 
         Returns
         -------
@@ -217,8 +221,14 @@ class Backend(ABC):
         -------
         array, (..., state shape)
         """
-        result: Array = self._evaluate(self._orthonormalization)(state)
+        result: Array = self._evaluate(self._need_orthonormalization())(state)
         return result
+
+    def _need_orthonormalization(self) -> str:
+        """Return the kernel that orthonormalizes, if there is one."""
+        if self._orthonormalization is None:
+            raise InputError(f"kernel {self.kernel} has nothing to orthonormalize its state with")
+        return self._orthonormalization
 
     def propagate(
         self,
@@ -231,8 +241,9 @@ class Backend(ABC):
 
         Parameters
         ----------
-        increments : array_like, (..., N, K, 3)
-            Angle increments of N steps in rad, body axes; leading axes are independent runs.
+        increments : array_like, (..., N, samples, 3)
+            Angle increments of N steps in rad, body axes; leading axes are independent runs. `gyro.windows` makes them
+            of increments in a row.
         record_every : int, optional
             Steps from record to record.
         orthonormalize_every : int, optional
@@ -258,12 +269,13 @@ class Backend(ABC):
         >>> backend("euler", backend="numpy").propagate(turn)[-1].round(6)
         array([0.      , 0.      , 0.707107, 0.707107])
         """
-        d = checks.real_array("increments", increments, (self.increments, 3), self.dtype)
+        d = checks.real_array("increments", increments, (self.samples, 3), self.dtype)
         if d.ndim < 3:
-            raise InputError(f"increments has shape {d.shape}; (..., steps, {self.increments}, 3) is needed")
+            raise InputError(f"increments has shape {d.shape}; (..., steps, {self.samples}, 3) is needed")
         checks.count("record_every", record_every, largest=checks.MOST)
         if orthonormalize_every is not None:
             checks.count("orthonormalize_every", orthonormalize_every, largest=checks.MOST)
+            self._need_orthonormalization()
         start = self.identity if initial is None else initial
         start = checks.real_array("initial", start, self.state_shape, self.dtype)
         batch, steps = d.shape[:-3], d.shape[-3]
@@ -277,7 +289,7 @@ class Backend(ABC):
         if not runs:
             return np.empty((*batch, 1 + steps // record_every, *self.state_shape), self.dtype)
         history = self._propagate(
-            d.reshape(runs, steps, self.increments, 3),
+            d.reshape(runs, steps, self.samples, 3),
             record_every,
             orthonormalize_every or 0,
             np.ascontiguousarray(start).reshape(runs, *self.state_shape),

@@ -7,13 +7,15 @@ loaded when it is derived.
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from strapgen import checks
-from strapgen.catalogue.tableaux import TABLEAUX, TITLES
+from strapgen.catalogue import user
+from strapgen.catalogue.tableaux import TABLEAUX, TITLES, Tableau
 from strapgen.exceptions import InputError
 
 if TYPE_CHECKING:
+    from strapgen.catalogue.steps import Method
     from strapgen.kernel import Kernel
 
 #: Attitude algorithms, by the state they integrate.
@@ -23,14 +25,40 @@ ALGORITHMS = {
     "cayley-klein": "Cayley-Klein parameters, scalar first",
 }
 
-#: Integration methods.
-METHODS = TITLES
 
-#: The thesis's methods, which the checked-in sources are generated for.
+class Integrator(NamedTuple):
+    """A method without tableau: a module of this package whose ``method(order)`` makes it."""
+
+    title: str
+    module: str
+    order: int
+    takes_rates: bool = True
+
+
+#: Integration methods that have no tableau.
+INTEGRATORS = {
+    **{
+        f"taylor{order}": Integrator(
+            f"Taylor series of order {order} of the transition", "taylor", order, False
+        )
+        for order in range(1, 21)
+    },
+    **{
+        f"magnus{order}": Integrator(f"Magnus series of order {order}", "magnus", order)
+        for order in (2, 4, 6)
+    },
+    "munthe-kaas4": Integrator("Runge-Kutta-Munthe-Kaas method of order 4", "munthe_kaas", 4),
+}
+
+#: Integration methods.
+METHODS = {**TITLES, **{name: integrator.title for name, integrator in INTEGRATORS.items()}}
+
+#: Methods of the standard catalogue: the thesis's.
 STANDARD_METHODS = ("rk1", "rk2", "rk3", "rk4")
 
-#: Most angle increments that one step may take.
+#: Most angle increments that one step may take, and most that it may keep from the steps before.
 MOST_INCREMENTS = 8
+MOST_PREVIOUS = 3
 
 #: Motions with a closed-form attitude, and the unit of each of their parameters.
 MOTIONS = {
@@ -53,9 +81,7 @@ class Recipe(NamedTuple):
 #: Kernels that take no method.
 KERNELS = {
     **{
-        f"{algorithm}-product": Recipe(
-            f"{title}: state after a transition", "runge_kutta", "product", (algorithm,)
-        )
+        f"{algorithm}-product": Recipe(f"{title}: state after a transition", "steps", "product", (algorithm,))
         for algorithm, title in ALGORITHMS.items()
     },
     "dcm-orthonormalize": Recipe(
@@ -97,25 +123,56 @@ KERNELS = {
 
 
 class Choice(NamedTuple):
-    """A kernel of the catalogue: its name, and method and increments where it is an attitude step.
+    """A kernel of the catalogue: its name, and method and samples where it is an attitude step.
 
-    A step without increments is given the body rate at every node of its method.
+    A step without increments is given the body rate at every node of its method; `previous` counts increments before
+    the step that it takes too.
     """
 
     name: str
-    method: str | None = None
+    method: str | Tableau | None = None
     increments: int | None = None
+    previous: int = 0
+
+    @property
+    def method_name(self) -> str | None:
+        """Name of the method."""
+        return self.method.name if isinstance(self.method, Tableau) else self.method
 
     @property
     def kernel(self) -> str:
         """Name of the kernel."""
-        return self.name if self.method is None else f"{self.name}-{self.method}-{self.increments or 'rates'}"
+        if self.method is None:
+            return self.name
+        kept = f"-previous{self.previous}" if self.previous else ""
+        return f"{self.name}-{self.method_name}-{self.increments or 'rates'}{kept}"
+
+    @property
+    def identity(self) -> str:
+        """What tells this choice from every other one: its kernel's name, and what a user made it of."""
+        if self.name in user.KERNELS:
+            return f"{self.kernel} {user.KERNELS[self.name]!r}"
+        return f"{self.kernel} {self.method!r}" if isinstance(self.method, Tableau) else self.kernel
 
 
 def choose(
-    name: str, method: str | None = None, increments: int | None = None, rates: bool = False
+    name: str,
+    method: str | Tableau | None = None,
+    increments: int | None = None,
+    rates: bool = False,
+    previous: int = 0,
 ) -> Choice:
     """Check a choice of kernel and fill in the defaults: fourth order, two increments.
+
+    Parameters
+    ----------
+    name : str
+        A name of the catalogue, a user's Python file, or the entry point of one.
+    method : str or Tableau, optional
+    increments, previous : int, optional
+        Increments of a step, and increments before it that it takes too.
+    rates : bool, optional
+        Whether the step takes the rate at the nodes of its method instead.
 
     Raises
     ------
@@ -128,22 +185,89 @@ def choose(
     >>> choose("euler").kernel
     'euler-rk4-2'
     """
-    checks.choice("algorithm", name, [*ALGORITHMS, *KERNELS])
+    if name in user.KERNELS and method is None and increments is None:
+        return Choice(name)
+    if name.endswith(".py") or (name not in ALGORITHMS and name not in KERNELS and name in user.installed()):
+        return _choose_own(name, method, increments, rates, previous)
+    if name not in ALGORITHMS and name not in KERNELS:
+        raise InputError(f"algorithm {name!r} is not known; allowed: {_allowed(*KERNELS)}")
     if name in KERNELS:
-        for option, value in (("method", method), ("increments", increments), ("rates", rates or None)):
+        given = {
+            "method": method,
+            "increments": increments,
+            "rates": rates or None,
+            "previous": previous or None,
+        }
+        for option, value in given.items():
             if value is not None:
                 takers = ", ".join(ALGORITHMS)
                 raise InputError(f"kernel {name} takes no {option} (got {value}); these do: {takers}")
         return Choice(name)
-    method = checks.choice("method", "rk4" if method is None else method, METHODS)
+    if not isinstance(method, Tableau):
+        method = checks.choice("method", "rk4" if method is None else method, METHODS)
+    previous = checks.count("previous", previous, smallest=0, largest=MOST_PREVIOUS)
     if rates:
-        if increments is not None:
-            raise InputError(
-                f"a step takes increments or rates, not both (got {increments} increments and rates)"
-            )
+        if increments is not None or previous:
+            what = f"{increments} increments" if increments is not None else f"{previous} previous ones"
+            raise InputError(f"a step takes increments or rates, not both (got {what} and rates)")
+        if method in INTEGRATORS and not INTEGRATORS[method].takes_rates:
+            raise InputError(f"method {method} takes increments; rates at nodes do not go with it")
         return Choice(name, method)
     increments = checks.count("increments", 2 if increments is None else increments, largest=MOST_INCREMENTS)
-    return Choice(name, method, increments)
+    return Choice(name, method, increments, previous)
+
+
+def _choose_own(
+    name: str, method: str | Tableau | None, increments: int | None, rates: bool, previous: int
+) -> Choice:
+    """Load a user's algorithm with the options that are given."""
+    if rates:
+        raise InputError(f"{name}: an algorithm of a user takes increments, not rates")
+    options: dict[str, Any] = {}
+    if method is not None:
+        options["method"] = method if isinstance(method, Tableau) else TABLEAUX[_tableau_name(method)]
+    if increments is not None:
+        options["increments"] = checks.count("increments", increments, largest=MOST_INCREMENTS)
+    if previous:
+        options["previous"] = checks.count("previous", previous, smallest=0, largest=MOST_PREVIOUS)
+    return Choice(user.load(name, frozenset([*ALGORITHMS, *KERNELS]), **options).name)
+
+
+def _allowed(*more: str) -> str:
+    return f"{', '.join([*ALGORITHMS, *user.installed(), *more])}, or a Python file"
+
+
+def _tableau_name(method: str) -> str:
+    return checks.choice("method", method, TABLEAUX)
+
+
+def choose_step(
+    name: str,
+    method: str | Tableau | None = None,
+    increments: int | None = None,
+    rates: bool = False,
+    previous: int = 0,
+) -> Choice:
+    """Check a choice of attitude step; parameters and errors are those of `choose`."""
+    if name in KERNELS:
+        raise InputError(f"algorithm {name!r} is no attitude step; allowed: {_allowed()}")
+    return choose(name, method, increments, rates, previous)
+
+
+def increments(choice: Choice) -> int:
+    """Return how many increments belong to a step: 1 for one that takes rates, each over a whole step."""
+    if choice.name in user.KERNELS:
+        kernel = user.KERNELS[choice.name]
+        return kernel.inputs[1].shape[0] - (kernel.companions.previous if kernel.companions else 0)
+    return choice.increments or 1
+
+
+def previous(choice: Choice) -> int:
+    """Return how many increments before it a step takes too."""
+    if choice.name in user.KERNELS:
+        companions = user.KERNELS[choice.name].companions
+        return companions.previous if companions else 0
+    return choice.previous
 
 
 def orthonormalizations(algorithm: str) -> list[str]:
@@ -166,12 +290,27 @@ def derive(choice: Choice) -> Kernel:
     choice : Choice
         What `choose` returned.
     """
+    if choice.name in user.KERNELS:
+        return user.KERNELS[choice.name]
     if choice.method is None:
         recipe = KERNELS[choice.name]
         function = getattr(import_module(f"{__name__}.{recipe.module}"), recipe.function)
         kernel: Kernel = function(*recipe.arguments)
         return kernel
     from strapgen.catalogue.kinematics import KINEMATICS
-    from strapgen.catalogue.runge_kutta import step
+    from strapgen.catalogue.steps import step
 
-    return step(KINEMATICS[choice.name], TABLEAUX[choice.method], choice.increments)
+    return step(KINEMATICS[choice.name], _method(choice.method), choice.increments, choice.previous)
+
+
+def _method(method: str | Tableau) -> Method:
+    """Load a method by its name, or make one of a tableau."""
+    from strapgen.catalogue import runge_kutta
+
+    if isinstance(method, Tableau):
+        return runge_kutta.method(method)
+    if method in TABLEAUX:
+        return runge_kutta.method(TABLEAUX[method])
+    family = INTEGRATORS[method]
+    made: Method = import_module(f"{__name__}.{family.module}").method(family.order)
+    return made

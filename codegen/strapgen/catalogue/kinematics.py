@@ -41,6 +41,8 @@ class Kinematics:
         ``derivative(x, g)``: dx/dt for the generator g, bilinear.
     product : callable
         ``product(x, p)``: the state x after the transition p, bilinear.
+    exponential : callable
+        ``exponential(v)``: the transition of the rotation by the rotation vector v.
     orthonormalize, attitude : str, str or None
         Names of the kernels that restore the state's constraint and that turn it into a direction
         cosine matrix.
@@ -56,6 +58,7 @@ class Kinematics:
     scale: sp.Rational
     derivative: Callable[[sp.Matrix, sp.Matrix], sp.Matrix]
     product: Callable[[sp.Matrix, sp.Matrix], sp.Matrix]
+    exponential: Callable[[sp.Matrix], sp.Matrix]
     orthonormalize: str
     attitude: str | None
 
@@ -69,6 +72,10 @@ def cayley_klein_derivative(a: sp.Matrix, g: sp.Matrix) -> sp.Matrix:
 def cayley_klein_product(a: sp.Matrix, p: sp.Matrix) -> sp.Matrix:
     """Return the parameters of the matrix product P U, P the transition and U the state."""
     return algebra.cayley_klein_parameters(algebra.cayley_klein_matrix(p) * algebra.cayley_klein_matrix(a))
+
+
+def _scalar_first(q: sp.Matrix) -> list[sp.Expr]:
+    return [q[3], *q[:3]]
 
 
 UNIT = Fraction(1)
@@ -91,6 +98,7 @@ DCM = Kinematics(
     scale=sp.Integer(1),
     derivative=lambda C, g: C * algebra.skew(g),
     product=lambda C, A: C * A,
+    exponential=algebra.rotation,
     orthonormalize="dcm-orthonormalize",
     attitude=None,
 )
@@ -110,6 +118,7 @@ EULER = Kinematics(
     scale=sp.Rational(1, 2),
     derivative=lambda e, g: algebra.quaternion_product(e, sp.Matrix([*g, 0])),
     product=algebra.quaternion_product,
+    exponential=algebra.quaternion,
     orthonormalize="euler-normalize",
     attitude="dcm-from-euler",
 )
@@ -134,6 +143,7 @@ CAYLEY_KLEIN = Kinematics(
     scale=sp.Rational(1, 2),
     derivative=cayley_klein_derivative,
     product=cayley_klein_product,
+    exponential=lambda v: sp.Matrix(_scalar_first(algebra.quaternion(v))),
     orthonormalize="cayley-klein-normalize",
     attitude="dcm-from-cayley-klein",
 )

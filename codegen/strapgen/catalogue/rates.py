@@ -1,75 +1,135 @@
-"""Rate extraction: the body rate from the angle increments of one step."""
+"""Rate extraction: the body rate over one step, as the polynomial that fits its samples."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache
 
 import sympy as sp
 
-from strapgen.catalogue.coefficients import Number
+from strapgen.algebra import exact
+
+#: Coefficients of a polynomial of time, in steps from the beginning of the step, the constant one first.
+Coefficients = tuple[sp.Expr, ...]
 
 
-def extraction(increments: int, node: Number) -> list[sp.Expr]:
-    """Return the weights of the increments in the body rate at a node of the step.
+@dataclass(frozen=True)
+class Fit:
+    """The body rate times the step length as a polynomial of time that is linear in the samples.
 
-    The increments are differences of the integrated rate at equally spaced samples; the polynomial of
-    degree `increments` through those samples is differentiated (thesis, chapter 3 A, for two increments).
+    Parameters
+    ----------
+    basis : tuple of tuple of Expr
+        For every sample the coefficients of its polynomial; time is 0 at the beginning of the step and 1 at its end.
+
+    Examples
+    --------
+    >>> fit = from_increments(2)
+    >>> fit.at(Fraction(0)), fit.moment(0), fit.moment(1)
+    ([3, -1], [1, 1], [-1/6, 1/6])
+    """
+
+    basis: tuple[Coefficients, ...]
+
+    def at(self, node: Fraction | sp.Expr) -> list[sp.Expr]:
+        """Return the weights of the samples in the rate at a node."""
+        t = exact(node)
+        return [_reduced(sum((c * t**k for k, c in enumerate(row)), sp.Integer(0))) for row in self.basis]
+
+    def taylor(self, power: int) -> list[sp.Expr]:
+        """Return the weights of the samples in the coefficient of a power of time."""
+        return [row[power] if power < len(row) else sp.Integer(0) for row in self.basis]
+
+    def moment(self, power: int) -> list[sp.Expr]:
+        """Return the weights of the samples in the integral over the step of the rate times (t - 1/2)^power."""
+        half = sp.Rational(1, 2)
+        weights = []
+        for row in self.basis:
+            total = sp.Integer(0)
+            for k, c in enumerate(row):
+                for j in range(power + 1):  # (t - 1/2)^power, multiplied out
+                    total += c * sp.binomial(power, j) * (-half) ** (power - j) / (k + j + 1)
+            weights.append(_reduced(total))
+        return weights
+
+
+def from_increments(increments: int, previous: int = 0) -> Fit:
+    """Fit angle increments: the polynomial through the samples of the integrated rate, differentiated.
+
+    Thesis, chapter 3 A, has it for two increments.
 
     Parameters
     ----------
     increments : int
-        Number of equally spaced increments d_1, ..., d_K in the step.
-    node : Fraction or Expr
-        Where the rate is wanted, in steps: 0 the beginning, 1 the end.
+        Number of equally spaced increments in the step.
+    previous : int, optional
+        Number of increments before the step that are fitted too.
+    """
+    times = [sp.Rational(k, increments) for k in range(-previous, increments + 1)]
+    cardinal = _lagrange(times)
+    basis = []
+    for first in range(1, len(times)):  # an increment raises the integral at every later sample
+        column = [sum((c[k] for c in cardinal[first:]), sp.Integer(0)) for k in range(len(times))]
+        basis.append(tuple(k * c for k, c in enumerate(column) if k))
+    return Fit(tuple(basis))
 
-    Returns
-    -------
-    list of Expr
-        Weights v with w(t + node h) = (v_1 d_1 + ... + v_K d_K) / h: rational where the node is.
+
+def from_rates(nodes: Sequence[Fraction | sp.Expr]) -> Fit:
+    """Fit rates at distinct nodes of the step.
+
+    Parameters
+    ----------
+    nodes : sequence of Fraction or Expr
+    """
+    return Fit(tuple(_lagrange([exact(node) for node in nodes])))
+
+
+def step_order(increments: int, previous: int = 0) -> int:
+    """Return the order to which a step can be exact that knows the rate from its increments alone.
+
+    The fit of n = increments + previous increments errs by h^n e(t), where the integral of e over the step is zero:
+    what is left is the commutator of e and the rate, whose first term is the integral of the sample polynomial
+    prod (t - t_k), t_k the times of the samples, over the step. That integral is zero for an even number of
+    increments without previous ones, as in Simpson's rule.
+
+    Parameters
+    ----------
+    increments : int
+    previous : int, optional
 
     Examples
     --------
-    >>> extraction(2, Fraction(0))
-    [3, -1]
-    >>> extraction(1, Fraction(1, 2))
-    [1]
+    >>> [step_order(count) for count in range(1, 9)]
+    [2, 4, 4, 6, 6, 8, 8, 10]
+    >>> step_order(1, previous=2)
+    4
     """
-    return [sp.sympify(_at(polynomial, node)) for polynomial in _weights(increments)]
+    integral = [Fraction(1)]
+    for k in range(-previous, increments + 1):
+        time = Fraction(k, increments)
+        shifted = [Fraction(0), *integral]
+        integral = [a - time * b for a, b in zip(shifted, [*integral, Fraction(0)], strict=True)]
+    total = sum((c / (k + 1) for k, c in enumerate(integral)), Fraction(0))
+    return increments + previous + (1 if total else 2)
 
 
-@cache
-def _weights(increments: int) -> tuple[tuple[Fraction, ...], ...]:
-    """Return the weights of the increments as polynomials of the node, constant terms first.
-
-    The angle up to sample k is the sum of the first k increments, so an increment's weight is the sum of the
-    derivatives of Lagrange's polynomials of all samples behind it.
-    """
-    samples = [Fraction(k, increments) for k in range(increments + 1)]
-    slopes = [_derivative(_lagrange(samples, k)) for k in range(increments + 1)]
-    return tuple(
-        tuple(sum(column, Fraction(0)) for column in zip(*slopes[k:], strict=True))
-        for k in range(1, increments + 1)
-    )
-
-
-def _lagrange(samples: list[Fraction], own: int) -> list[Fraction]:
-    """Return the polynomial that is 1 at one sample and 0 at the others."""
-    polynomial = [Fraction(1)]
-    for place, sample in enumerate(samples):
-        if place != own:
-            scale = 1 / (samples[own] - sample)
-            shifted, here = [Fraction(0), *polynomial], [*polynomial, Fraction(0)]
-            polynomial = [scale * (x - sample * y) for x, y in zip(shifted, here, strict=True)]
-    return polynomial
+def _lagrange(nodes: list[sp.Expr]) -> list[Coefficients]:
+    """Return the polynomials that are 1 at one of the nodes and 0 at the others."""
+    found = []
+    for j, own in enumerate(nodes):
+        coefficients: list[sp.Expr] = [sp.Integer(1)]
+        for k, other in enumerate(nodes):
+            if k != j:
+                raised = [sp.Integer(0), *coefficients]
+                kept = [*coefficients, sp.Integer(0)]
+                coefficients = [
+                    _reduced((a - other * b) / (own - other)) for a, b in zip(raised, kept, strict=True)
+                ]
+        found.append(tuple(coefficients))
+    return found
 
 
-def _derivative(polynomial: list[Fraction]) -> list[Fraction]:
-    return [power * coefficient for power, coefficient in enumerate(polynomial)][1:]
-
-
-def _at(polynomial: tuple[Fraction, ...], node: Number) -> Number:
-    if isinstance(node, Fraction):
-        return sum((coefficient * node**power for power, coefficient in enumerate(polynomial)), Fraction(0))
-    terms = (sp.Rational(c.numerator, c.denominator) * node**power for power, c in enumerate(polynomial))
-    return sp.expand(sp.Add(*terms))
+def _reduced(number: sp.Expr) -> sp.Expr:
+    """Return a number with roots multiplied out and taken from below the line."""
+    return number if number.is_Rational else sp.radsimp(sp.expand(number))

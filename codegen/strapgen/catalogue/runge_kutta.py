@@ -1,106 +1,78 @@
-"""Runge-Kutta attitude steps: kinematics + tableau + rate extraction, fused, in transition form."""
+"""Explicit Runge-Kutta methods: the stages of a tableau on any differential equation."""
 
 from __future__ import annotations
 
-from fractions import Fraction
+from collections.abc import Callable, Mapping
 
 import sympy as sp
 
 from strapgen.catalogue.coefficients import Number
-from strapgen.catalogue.kinematics import KINEMATICS, Kinematics
-from strapgen.catalogue.rates import extraction
-from strapgen.catalogue.tableaux import Tableau
-from strapgen.companions import Companions
+from strapgen.catalogue.kinematics import Kinematics
+from strapgen.catalogue.order_conditions import attitude_order
+from strapgen.catalogue.steps import Method, Samples, combination
+from strapgen.catalogue.tableaux import TABLEAUX, Tableau
 from strapgen.kernel import Kernel, KernelBuilder
 from strapgen.signal import Signal
 
 
-def increments_signal(count: int) -> Signal:
-    """Return the signal of the angle increments of one step, oldest first."""
-    return Signal(
-        "increments",
-        (count, 3),
-        tuple(f"d{k}_{axis}" for k in range(1, count + 1) for axis in "xyz"),
-        unit="rad",
-        meaning="angle increments of the step, body axes, oldest first: exact integrals of the body rate",
-        bound=Fraction(1),
-    )
-
-
-def turns_signal(nodes: tuple[Number, ...]) -> Signal:
-    """Return the signal of the body rates of one step, each times the step length, in the order of the nodes."""
-    return Signal(
-        "turns",
-        (len(nodes), 3),
-        tuple(f"turn_{label}_{axis}" for label in _labels(nodes).values() for axis in "xyz"),
-        unit="rad",
-        meaning=f"body rate times the step length, body axes, at nodes {', '.join(map(str, nodes))} of the step",
-        bound=Fraction(1),
-    )
-
-
-def step(kinematics: Kinematics, tableau: Tableau, increments: int | None) -> Kernel:
-    """Derive one integration step from angle increments, or from rates, to the next state.
-
-    The method is applied to the identity, which gives the transition: the step is linear in the state. The
-    step length cancels, since increments and rates differ by it alone.
+def method(tableau: Tableau) -> Method:
+    """Return the method of a tableau.
 
     Parameters
     ----------
-    kinematics : Kinematics
-        The attitude representation.
     tableau : Tableau
-        The integration method.
-    increments : int or None
-        Angle increments a step, 1 to 8; None for a step that is given the rate at every node.
-
-    Returns
-    -------
-    Kernel
-        Inputs ``state`` and ``increments`` (increments, 3) in rad, or ``turns`` (nodes, 3) in rad: the rates
-        times the step length; output ``next``.
     """
-    build = KernelBuilder()
-    state = build.input(kinematics.state)
-    turns = _turns(build, kinematics, tableau, increments)
-    end = advance(build, kinematics, tableau, turns, kinematics.identity, "the identity")
-    transition = build.stage(kinematics.transition, end)
-    build.output(kinematics.next, kinematics.product(state, transition))
-    if increments is None:
-        given = f"the rate at {len(turns)} {'node' if len(turns) == 1 else 'nodes'}"
-        option, extracted = "--rates", ""
-    else:
-        given = f"{increments} angle {'increment' if increments == 1 else 'increments'}"
-        option, extracted = f"--increments {increments}", "rate extraction chapter 3 A; "
-    return build.kernel(
-        f"{kinematics.name}-{tableau.name}-{increments or 'rates'}",
-        f"{kinematics.title}: step by {tableau.title} from {given}",
-        f"{kinematics.source}; {extracted}{tableau.title}: {tableau.source}",
-        transition=kinematics.transition.name,
-        companions=Companions(
-            f"{kinematics.name}-product",
-            kinematics.orthonormalize,
-            kinematics.attitude,
-            tuple(Fraction(int(x)) for x in kinematics.identity),
-        ),
-        arguments=f"{kinematics.name} --method {tableau.name} {option}",
+
+    def transition(build: KernelBuilder, kinematics: Kinematics, samples: Samples) -> sp.Matrix:
+        turns = {node: samples.turn(node, kinematics.scale) for node in _nodes(tableau)}
+        return advance(
+            build,
+            tableau,
+            turns,
+            kinematics.identity,
+            kinematics.derivative,
+            like=kinematics.transition,
+            origin="the identity",
+        )
+
+    return Method(
+        tableau.name,
+        tableau.title,
+        tableau.source,
+        tableau.order,
+        transition,
+        nodes=_nodes(tableau),
+        attitude_order=lambda degree: attitude_order(tableau, degree),
+        option=f"--method {tableau.name}" if tableau.name in TABLEAUX else "--tableau FILE.toml",
     )
 
 
 def staged_step(kinematics: Kinematics, tableau: Tableau, increments: int | None) -> Kernel:
     """Write one integration step as textbooks do: slopes of the state itself, no transition.
 
-    `step` is the same polynomial of its inputs. This form is for comparison.
+    The step from `method` is the same polynomial of its inputs. This form is for comparison.
 
     Parameters
     ----------
-    kinematics, tableau, increments
-        As for `step`.
+    kinematics : Kinematics
+    tableau : Tableau
+    increments : int or None
+        Angle increments a step; None for a step that is given the rate at every node.
     """
     build = KernelBuilder()
     state = build.input(kinematics.state)
-    turns = _turns(build, kinematics, tableau, increments)
-    build.output(kinematics.next, advance(build, kinematics, tableau, turns, state, "the state"))
+    samples = Samples(build, increments, nodes=_nodes(tableau))
+    turns = {node: samples.turn(node, kinematics.scale) for node in _nodes(tableau)}
+    end = advance(
+        build,
+        tableau,
+        turns,
+        state,
+        kinematics.derivative,
+        like=kinematics.transition,
+        origin="the state",
+    )
+    build.output(kinematics.next, end)
     return build.kernel(
         f"{kinematics.name}-{tableau.name}-{increments or 'rates'}-staged",
         f"{kinematics.title}: staged step by {tableau.title}",
@@ -110,103 +82,52 @@ def staged_step(kinematics: Kinematics, tableau: Tableau, increments: int | None
 
 def advance(
     build: KernelBuilder,
-    kinematics: Kinematics,
     tableau: Tableau,
-    turns: dict[Number, sp.Matrix],
+    turns: Mapping[Number, sp.Matrix],
     start: sp.Matrix,
+    derivative: Callable[[sp.Matrix, sp.Matrix], sp.Matrix],
+    *,
+    like: Signal,
     origin: str,
 ) -> sp.Matrix:
-    """Write the stages of a method from a start, called `origin` in their meanings, and return where they lead.
+    """Write the stages of a tableau into a kernel under construction and return where they lead.
 
     Parameters
     ----------
-    turns : dict of Fraction or Expr to Matrix
-        The generator at each node, times the step length.
+    build : KernelBuilder
+    tableau : Tableau
+    turns : mapping of node to Matrix
+        What the derivative needs at each node, the body rate for one, times the step length.
     start : Matrix
         A state, of numbers or symbols.
+    derivative : callable
+        ``derivative(x, turn)``: dx/dt times the step length.
+    like : Signal
+        The state: its shape and the labels of its elements are those of the stages.
+    origin : str
+        What the start is called in the meanings of the stages.
+
+    Returns
+    -------
+    Matrix
     """
+
+    def named(name: str, meaning: str) -> Signal:
+        elements = tuple(f"{name}_{element.rsplit('_', 1)[1]}" for element in like.elements)
+        return Signal(name, like.shape, elements, meaning=meaning)
+
     slopes: list[sp.Matrix] = []
     for number, (node, row) in enumerate(zip(tableau.nodes, tableau.matrix, strict=True), 1):
-        point = start + _combination(row, slopes, start)
+        point = start + combination(row, slopes, start)
         if any(row):
-            signal = _like(kinematics, f"point_{number}", f"argument of slope {number}, from {origin}")
-            point = build.stage(signal, point)
-        slope = kinematics.derivative(point, turns[node])
-        signal = _like(kinematics, f"slope_{number}", f"derivative times the step at stage {number}")
-        slopes.append(build.stage(signal, slope))
-    return start + _combination(tableau.weights, slopes, start)
+            point = build.stage(named(f"point_{number}", f"argument of slope {number}, from {origin}"), point)
+        slope = derivative(point, turns[node])
+        slopes.append(
+            build.stage(named(f"slope_{number}", f"derivative times the step at stage {number}"), slope)
+        )
+    return start + combination(tableau.weights, slopes, start)
 
 
-def product(name: str) -> Kernel:
-    """Return the kernel that advances a state by a transition, and a transition by the one that follows it.
-
-    Parameters
-    ----------
-    name : str
-        Name of the attitude algorithm.
-    """
-    kinematics = KINEMATICS[name]
-    build = KernelBuilder()
-    state, transition = build.input(kinematics.state), build.input(kinematics.transition)
-    build.output(kinematics.next, kinematics.product(state, transition))
-    return build.kernel(f"{name}-product", f"{kinematics.title}: state after a transition", kinematics.source)
-
-
-def _turns(
-    build: KernelBuilder, kinematics: Kinematics, tableau: Tableau, increments: int | None
-) -> dict[Number, sp.Matrix]:
-    """Declare the samples and name the generator, times the step length, at every node."""
-    nodes = tuple(dict.fromkeys(tableau.nodes))
-    samples = build.input(turns_signal(nodes) if increments is None else increments_signal(increments))
-    turns: dict[Number, sp.Matrix] = {}
-    labels = _labels(nodes)
-    for place, node in enumerate(nodes):
-        if increments is None:
-            weights = [sp.Integer(k == place) for k in range(len(nodes))]
-        else:
-            weights = extraction(increments, node)
-        turns[node] = _turn(build, kinematics, samples, weights, node, labels[node])
-    return turns
-
-
-def _turn(
-    build: KernelBuilder,
-    kinematics: Kinematics,
-    samples: sp.Matrix,
-    weights: list[sp.Expr],
-    node: Number,
-    label: str,
-) -> sp.Matrix:
-    """Name the generator at a node: the rate times the step, scaled for the kinematics."""
-    half = "half_" if kinematics.scale == sp.Rational(1, 2) else ""
-    turn = [
-        kinematics.scale * sp.Add(*(weight * samples[k, axis] for k, weight in enumerate(weights)))
-        for axis in range(3)
-    ]
-    if all(element.is_Symbol for element in turn):  # an input itself
-        return sp.Matrix(turn)
-    meaning = f"{half.replace('_', ' the ')}rate times the step, at node {node}"
-    name = f"{half}turn_{label}"
-    return build.stage(Signal.vector(name, name, unit="rad", meaning=meaning), turn)
-
-
-def _labels(nodes: tuple[Number, ...]) -> dict[Number, str]:
-    """Return nodes as parts of names: short fractions as they are, others by their place among the nodes."""
-    labels = {}
-    for place, node in enumerate(nodes, 1):
-        text = str(node).replace("/", "_").replace("-", "minus_")
-        labels[node] = text if isinstance(node, Fraction) and len(text) < 12 else f"n{place}"
-    return labels
-
-
-def _combination(coefficients: tuple[Number, ...], slopes: list[sp.Matrix], like: sp.Matrix) -> sp.Matrix:
-    total = sp.zeros(*like.shape)
-    for coefficient, slope in zip(coefficients, slopes, strict=True):
-        total += sp.sympify(coefficient) * slope
-    return total
-
-
-def _like(kinematics: Kinematics, name: str, meaning: str) -> Signal:
-    """Return a signal of the state's shape whose elements carry the state's labels."""
-    elements = tuple(f"{name}_{element.rsplit('_', 1)[1]}" for element in kinematics.transition.elements)
-    return Signal(name, kinematics.transition.shape, elements, meaning=meaning)
+def _nodes(tableau: Tableau) -> tuple[Number, ...]:
+    """Return the distinct nodes of a tableau."""
+    return tuple(dict.fromkeys(tableau.nodes))

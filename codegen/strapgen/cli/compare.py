@@ -22,14 +22,24 @@ from strapgen.cli.inputs import (
     check_source,
     read_inputs,
 )
-from strapgen.cli.options import Increments, Method, check_format, whole
+from strapgen.cli.options import (
+    Increments,
+    Method,
+    Previous,
+    StepAlgorithm,
+    TableauFile,
+    check_format,
+    chosen,
+)
 from strapgen.exceptions import InputError
 
 
 def compare(
-    algorithm: Annotated[str, typer.Argument(help="dcm, euler or cayley-klein.")],
+    algorithm: StepAlgorithm,
     method: Method = None,
+    tableau: TableauFile = None,
     increments: Increments = None,
+    previous: Previous = None,
     backends: Annotated[
         str, typer.Option("--backends", metavar="NAME,...", help="Back ends to compare; see strapgen list.")
     ] = "numpy,c,c-float,c-q31,c-q15",
@@ -84,9 +94,8 @@ def compare(
     from strapgen.backends import BACKENDS
     from strapgen.targets import FIXED
 
-    checks.choice("algorithm", algorithm, catalogue.ALGORITHMS)
-    choice = catalogue.choose(algorithm, method, whole("increments", increments))
-    samples = choice.increments or 2
+    choice = chosen(algorithm, method, tableau, increments, previous)
+    samples = catalogue.increments(choice)
     names = list(dict.fromkeys(name.strip() for name in backends.split(",") if name.strip()))
     for name in names:
         checks.choice("backend", name, BACKENDS)
@@ -132,12 +141,11 @@ def compare(
             rate_unit,
             resample_hz,
             arcseconds(pulse_arcsec),
+            catalogue.previous(choice),
         )
         length = None if max_rate_deg_s is None else repr(inputs.step)
-        rows = comparison.compare(
-            algorithm,
-            choice.method,
-            samples,
+        rows = comparison.compare_choice(
+            choice,
             names,
             inputs.increments,
             reference=reference,

@@ -7,13 +7,26 @@ from typing import Annotated
 import typer
 
 from strapgen import checks
-from strapgen.cli.options import Algorithm, Format, Increments, Method, Rates, check_format, print_json, whole
+from strapgen.cli.options import (
+    Algorithm,
+    Format,
+    Increments,
+    Method,
+    Previous,
+    Rates,
+    TableauFile,
+    check_format,
+    chosen,
+    print_json,
+)
 
 
 def derive(
     algorithm: Algorithm,
     method: Method = None,
+    tableau: TableauFile = None,
     increments: Increments = None,
+    previous: Previous = None,
     rates: Rates = False,
     show: Annotated[str, typer.Option("--show", help="text, latex, program or operations.")] = "text",
     format: Format = "text",
@@ -24,9 +37,10 @@ def derive(
     """
     check_format(format)
     checks.choice("show", show, ("text", "latex", "program", "operations"))
-    from strapgen import formulas, pipeline
+    choice = chosen(algorithm, method, tableau, increments, previous, rates, step=False)
+    from strapgen import catalogue, formulas, pipeline
 
-    kernel = pipeline.derive(algorithm, method, whole("increments", increments), rates=rates)
+    kernel = catalogue.derive(choice)
     program = pipeline.lower(kernel)
     if format == "json":
         data = formulas.as_data(kernel, program)
@@ -36,7 +50,7 @@ def derive(
             data["program"] = formulas.program_as_data(program)
         print_json(data)
     elif show == "text":
-        typer.echo(formulas.as_text(kernel))
+        typer.echo(formulas.as_text(kernel, program.notes))
     elif show == "latex":
         typer.echo(formulas.as_latex(kernel))
     elif show == "program":

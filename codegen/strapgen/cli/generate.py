@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -19,17 +19,32 @@ from strapgen.cli.fixed import (
     Word,
     read_settings,
 )
-from strapgen.cli.options import Format, Increments, Method, Rates, check_format, print_json, whole
+from strapgen.cli.options import (
+    Format,
+    Increments,
+    Method,
+    Previous,
+    Rates,
+    TableauFile,
+    check_format,
+    chosen,
+    print_json,
+)
 from strapgen.cli.progress import track
 from strapgen.exceptions import InputError
 
 
 def generate(
     algorithm: Annotated[
-        str | None, typer.Argument(help="dcm, euler, cayley-klein, or another kernel; see strapgen list.")
+        str | None,
+        typer.Argument(
+            help="dcm, euler, cayley-klein, another kernel of strapgen list, or your own Python file."
+        ),
     ] = None,
     method: Method = None,
+    tableau: TableauFile = None,
     increments: Increments = None,
+    previous: Previous = None,
     rates: Rates = False,
     target: Annotated[
         str | None,
@@ -76,27 +91,27 @@ def generate(
     check_format(format)
     if check and not all_:
         raise InputError("--check goes with --all")
-    count = whole("increments", increments)
-    settings = read_settings(
-        1 if rates else 2 if count is None else max(1, count),
-        word=word,
-        max_rate_deg_s=max_rate_deg_s,
-        step=step,
-        max_angle_rad=max_angle_rad,
-        rounding=rounding,
-        carry=carry,
-        drift_allowance=drift_allowance,
-        ranges=ranges,
-        formats=fix,
-    )
+    stated: dict[str, Any] = {
+        "word": word,
+        "max_rate_deg_s": max_rate_deg_s,
+        "step": step,
+        "max_angle_rad": max_angle_rad,
+        "rounding": rounding,
+        "carry": carry,
+        "drift_allowance": drift_allowance,
+        "ranges": ranges,
+        "formats": fix,
+    }
     if all_:
         for name, value in (
             ("an algorithm", algorithm),
             ("--method", method),
+            ("--tableau", tableau),
             ("--increments", increments),
+            ("--previous", previous),
             ("--rates", rates or None),
             ("--target", target),
-            ("a fixed-point option", settings),
+            ("a fixed-point option", next(filter(None, stated.values()), None)),
         ):
             if value is not None:
                 raise InputError(f"--all generates the whole catalogue; {name} does not go with it")
@@ -104,16 +119,17 @@ def generate(
         return
     if algorithm is None:
         raise InputError("an algorithm is needed, or --all; strapgen list shows them")
-    from strapgen import checks, output, pipeline
+    from strapgen import catalogue, checks, output, pipeline
     from strapgen.targets import FIXED, TARGETS
 
+    choice = chosen(algorithm, method, tableau, increments, previous, rates, step=False)
+    settings = read_settings(catalogue.increments(choice), **stated)
     target = checks.choice("target", "numpy" if target is None else target, TARGETS)
     if settings is not None and target not in FIXED:
         raise InputError(
             f"the options of fixed point go with --target {' or '.join(FIXED)}, not with {target}"
         )
-    kernel = pipeline.derive(algorithm, method, count, rates=rates)
-    program = pipeline.lower(kernel)
+    program = pipeline.lower(catalogue.derive(choice))
     if program.companions is None and (max_rate_deg_s or step or max_angle_rad):
         raise InputError(
             f"kernel {program.kernel} takes no increments; a largest rate or angle does not go with it"

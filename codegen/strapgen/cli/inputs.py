@@ -146,8 +146,9 @@ def read_inputs(
     rate_unit: _Text,
     resample_hz: _Text,
     pulse: float | None,
+    previous: int = 0,
 ) -> Inputs:
-    """Return the increments that the options of a command stand for, `samples` of them a step."""
+    """Return the increments that the options of a command stand for, `samples` of them a step and those before it."""
     import numpy as np
 
     from strapgen import checks, gyro, recording
@@ -160,7 +161,7 @@ def read_inputs(
         steps = checks.multiple(
             "duration", checks.number("duration", duration or "", positive=True), "step", h
         )
-        increments, length = profile.increments(h, steps, samples), float(h)
+        increments, length = profile.increments(h, steps, samples, previous), float(h)
         truth = profile.attitude(np.arange(1 + steps) * length)
         title = f"{motion} motion, {steps} steps of {step} s"
     else:
@@ -168,12 +169,14 @@ def read_inputs(
             data = recording.read_increments(increments_csv)
         else:
             data = recording.read_rates(rates_csv or "", rate_unit or "", resample_hz)
-        steps = len(data.increments) // samples
+        steps = max(0, len(data.increments) - previous) // samples
         if steps < 1:
-            raise InputError(f"the recording holds {len(data.increments)} increments; a step needs {samples}")
-        increments = data.increments[: steps * samples].reshape(steps, samples, 3)
+            raise InputError(
+                f"the recording holds {len(data.increments)} increments; a step needs {samples + previous}"
+            )
+        increments = gyro.windows(data.increments[: previous + steps * samples], samples, previous)
         length = data.interval * samples
         title = f"{(increments_csv or rates_csv or Path()).name}, {steps} steps of {length:.6g} s"
     if pulse is not None:
-        increments = gyro.pulses(increments, pulse)
+        increments = gyro.pulses(increments, pulse, previous)
     return Inputs(increments, truth, length, title)

@@ -4,20 +4,49 @@ from __future__ import annotations
 
 import json
 import sys
-from typing import Annotated, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from strapgen import checks
 from strapgen.exceptions import InputError
 
+if TYPE_CHECKING:
+    from strapgen.catalogue import Choice
+    from strapgen.catalogue.tableaux import Tableau
+
 Algorithm = Annotated[
-    str, typer.Argument(help="dcm, euler, cayley-klein, or another kernel; see strapgen list.")
+    str,
+    typer.Argument(
+        help="dcm, euler, cayley-klein, another kernel of strapgen list, or your own Python file."
+    ),
+]
+StepAlgorithm = Annotated[
+    str, typer.Argument(help="dcm, euler or cayley-klein, or a Python file with an algorithm of your own.")
 ]
 Method = Annotated[
     str | None,
     typer.Option(
-        "--method", help="Integration method; see strapgen list.  [default: rk4]", show_default=False
+        "--method", help="Integration method; strapgen list shows all.  [default: rk4]", show_default=False
+    ),
+]
+TableauFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--tableau",
+        metavar="FILE",
+        help="A method of your own: a Butcher tableau in TOML.",
+        show_default=False,
+    ),
+]
+Previous = Annotated[
+    str | None,
+    typer.Option(
+        "--previous",
+        metavar="N",
+        help="Increments before the step that it takes too, 0 to 3.  [default: 0]",
+        show_default=False,
     ),
 ]
 Increments = Annotated[
@@ -31,6 +60,30 @@ Rates = Annotated[
     typer.Option("--rates", help="The step takes the rate at the method's nodes, times the step length."),
 ]
 Format = Annotated[str, typer.Option("--format", help="text or json.")]
+
+
+def chosen(
+    algorithm: str,
+    method: str | None,
+    tableau: Path | None,
+    increments: str | None,
+    previous: str | None,
+    rates: bool = False,
+    step: bool = True,
+) -> Choice:
+    """Return the kernel that options choose; with `step` it must be an attitude step."""
+    from strapgen import catalogue
+    from strapgen.catalogue import tableaux
+
+    chosen_method: str | Tableau | None = method
+    if tableau is not None:
+        if method is not None:
+            raise InputError(f"--method {method} and --tableau {tableau} are both given; one is needed")
+        chosen_method = tableaux.read(tableau)
+    choose = catalogue.choose_step if step else catalogue.choose
+    return choose(
+        algorithm, chosen_method, whole("increments", increments), rates, whole("previous", previous) or 0
+    )
 
 
 def check_format(value: str, *more: str) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from strapgen.catalogue import ALGORITHMS, MOTIONS
+from strapgen.catalogue import MOTIONS
 from strapgen.cli.fixed import (
     Allowance,
     Carry,
@@ -32,19 +32,30 @@ from strapgen.cli.inputs import (
     check_source,
     pairs,
 )
-from strapgen.cli.options import Increments, Method, check_format, whole
+from strapgen.cli.options import (
+    Increments,
+    Method,
+    Previous,
+    StepAlgorithm,
+    TableauFile,
+    check_format,
+    chosen,
+)
 from strapgen.exceptions import InputError
 
 if TYPE_CHECKING:
     from strapgen.backends import Backend
+    from strapgen.catalogue import Choice
 
 _Text = str | None
 
 
 def simulate(
-    algorithm: Annotated[str, typer.Argument(help="dcm, euler or cayley-klein.")],
+    algorithm: StepAlgorithm,
     method: Method = None,
+    tableau: TableauFile = None,
     increments: Increments = None,
+    previous: Previous = None,
     backend: Annotated[
         str, typer.Option("--backend", help="numpy, c, c-float, c-q31, c-q15 or fixed-model.")
     ] = "numpy",
@@ -121,8 +132,8 @@ def simulate(
       strapgen simulate dcm --backend c --rates-csv gyro.csv \\
         --rate-unit deg/s --resample-hz 100 --out attitude.csv
     """  # noqa: D301
-    samples = whole("increments", increments)
-    _check_names(algorithm, method, samples, backend, motion, format)
+    choice = chosen(algorithm, method, tableau, increments, previous)
+    _check_names(backend, motion, format)
     check_source(motion, settings, step, duration, increments_csv, rates_csv, rate_unit, resample_hz)
     if motion is None and matrices:
         raise InputError("--matrices goes with --motion")
@@ -133,8 +144,10 @@ def simulate(
 
     import numpy as np
 
-    from strapgen import output
-    from strapgen.backends import backend as make_backend
+    from strapgen import catalogue, output
+    from strapgen.backends import of as make_backend
+
+    samples = catalogue.increments(choice), catalogue.previous(choice)
 
     stated = {
         "word": word,
@@ -147,24 +160,25 @@ def simulate(
     pulse = arcseconds(pulse_arcsec)
 
     def ready(seconds: float, largest: Callable[[], float]) -> Backend:
-        settings = settings_for_run(backend, samples, stated, seconds, largest)
-        return make_backend(algorithm, method, samples, backend, scheme, settings)
+        settings = settings_for_run(backend, samples[0], stated, seconds, largest)
+        return make_backend(choice, backend, scheme, settings)
 
     with np.errstate(all="ignore"):  # numbers that overflow are refused, in one line
         if motion is not None:
             times = (str(step), str(duration), orthonormalize, record, pulse)
             text, image = _on_motion(
-                ready, motion, pairs(settings or []), times, format or "text", plot, matrices, samples or 2
+                ready, choice, motion, pairs(settings or []), times, format or "text", plot, matrices, samples
             )
         else:
             text, image = _on_recording(
                 ready,
+                choice,
                 increments_csv,
                 (rates_csv, rate_unit, resample_hz),
                 (orthonormalize, record, pulse),
                 format or "csv",
                 plot,
-                samples or 2,
+                samples[0],
             )
     text = text.rstrip("\n")
     files: dict[str, str | bytes] = {}
@@ -186,20 +200,10 @@ def _check_fixed(backend: str, stated: dict[str, _Text]) -> None:
             raise InputError(f"--{name.replace('_', '-')} is for fixed-point back ends, not for {backend}")
 
 
-def _check_names(
-    algorithm: str,
-    method: str | None,
-    increments: int | None,
-    backend: str,
-    motion: str | None,
-    format: str | None,
-) -> None:
+def _check_names(backend: str, motion: str | None, format: str | None) -> None:
     from strapgen import checks
     from strapgen.backends import BACKENDS
-    from strapgen.catalogue import choose
 
-    checks.choice("algorithm", algorithm, ALGORITHMS)
-    choose(algorithm, method, increments)
     checks.choice("backend", backend, BACKENDS)
     if motion is not None:
         checks.choice("motion", motion, MOTIONS)
@@ -207,20 +211,23 @@ def _check_names(
         check_format(format, "csv")
 
 
-def _named(ready: Backend) -> dict[str, Any]:
-    algorithm, method, increments = ready.kernel.rsplit("-", 2)
-    return {"algorithm": algorithm, "method": method, "increments": int(increments), "backend": ready.name}
+def _named(ready: Backend, choice: Choice) -> dict[str, Any]:
+    named = {"algorithm": choice.name, "method": choice.method_name, "increments": ready.increments}
+    if ready.previous:
+        named["previous"] = ready.previous
+    return named | {"backend": ready.name}
 
 
 def _on_motion(
     make: Callable[[float, Callable[[], float]], Backend],
+    choice: Choice,
     motion: str,
     settings: dict[str, str],
     times: tuple[str, str, str | None, str | None, float | None],
     format: str,
     plot: Path | None,
     matrices: bool,
-    samples: int,
+    samples: tuple[int, int],
 ) -> tuple[str, bytes | None]:
     """Simulate; return the output and, if one is wanted, the image."""
     from strapgen import checks, plots, reports
@@ -231,13 +238,13 @@ def _on_motion(
     profile = make_motion(motion, **settings)
     step, duration, _, _, pulse = times
     length = float(checks.number("step", step, positive=True))
-    ready = make(length, lambda: largest_increment(profile, step, duration, samples, pulse))
+    ready = make(length, lambda: largest_increment(profile, step, duration, samples[0], pulse, samples[1]))
     run = run_simulation(ready, profile, *times)
     title = f"{ready.kernel}, {ready.name}: {profile.name} motion, step {step} s"
     image = None if plot is None else plots.run_image(run, title, plot)
     if format == "csv":
         return reports.run_csv(run), image
-    named = _named(ready) | {
+    named = _named(ready, choice) | {
         "motion": profile.name,
         "step_s": float(checks.number("step", step)),
         "duration_s": float(checks.number("duration", duration)),
@@ -250,6 +257,7 @@ def _on_motion(
 
 def _on_recording(
     make: Callable[[float, Callable[[], float]], Backend],
+    choice: Choice,
     increments_csv: Path | None,
     rates: tuple[Path | None, str | None, str | None],
     times: tuple[str | None, str | None, float | None],
@@ -270,7 +278,7 @@ def _on_recording(
     source = increments_csv or rates_csv or Path()
     title = f"{ready.kernel}, {ready.name}: attitude along {source.name}"
     image = None if plot is None else plots.history_image(history, ready.elements, title, plot)
-    named = _named(ready) | {"source": str(source)}
+    named = _named(ready, choice) | {"source": str(source)}
     if format == "csv":
         return reports.history_csv(history, ready.elements), image
     if format == "text":

@@ -71,7 +71,7 @@ def lowered(program: Program, settings: Settings) -> code.FixedProgram:
         for k in range(len(old.errors))
     )
     work, chosen = (finest, plain) if worse else (shorter, aligned)
-    if program.companions is None:
+    if program.companions is None or program.transition is None:
         return chosen
     adds_up = accumulation(
         program, settings, made, work.values, chosen.interface.inputs, chosen.interface.outputs

@@ -15,6 +15,7 @@ from itertools import count
 from strapgen.kernel import Kernel, Stage
 from strapgen.lowering import canonical
 from strapgen.lowering.gate import gate
+from strapgen.lowering.irrational import rationalized
 from strapgen.lowering.passes import PASSES, cost, optimize
 from strapgen.lowering.passes.rewriting import rewritten
 from strapgen.lowering.share import share
@@ -46,7 +47,13 @@ def lower(kernel: Kernel) -> Program:
     >>> program.operations["multiply"], program.operations["add"]
     (38, 30)
     """
-    core = canonical.extract_core(kernel)
+    rational = rationalized(kernel)
+    # Rounded constants would leave terms that cancel exactly: such a transition is not expanded.
+    core = canonical.extract_core(kernel) if rational is kernel else None
+    kernel = rational
+    if core is not None and (reason := canonical.expansion(core)):
+        core = None
+        kernel = replace(kernel, notes=(*kernel.notes, reason))
     programs = [optimize(program) for program in candidates(kernel, core)]
     program = min(programs, key=cost)
     if core is not None and program is not programs[0]:

@@ -71,6 +71,7 @@ class Sources:
                 "orthonormalize": companions.orthonormalize,
                 "attitude": companions.attitude,
                 "identity": [str(element) for element in companions.identity],
+                "previous": companions.previous,
             },
             "fixed": self.fixed and self.fixed.as_dict(),
         }

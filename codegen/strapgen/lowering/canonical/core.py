@@ -16,6 +16,22 @@ from strapgen.signal import Signal
 
 
 @dataclass(frozen=True)
+class _Degree:
+    """The degree of a polynomial, where only that is looked at."""
+
+    value: int
+
+    def __add__(self, other: _Degree) -> _Degree:
+        return max(self, other, key=lambda degree: degree.value)
+
+    def __mul__(self, other: _Degree) -> _Degree:
+        return _Degree(self.value + other.value)
+
+    def __pow__(self, exponent: int) -> _Degree:
+        return _Degree(self.value * exponent)
+
+
+@dataclass(frozen=True)
 class Core:
     """A transition as a function of vectors.
 
@@ -27,14 +43,14 @@ class Core:
         Elements, meaning, and coefficients along the inputs, of the vectors that the transition needs.
     stages : list of Stage
         From these vectors to the transition, which is the last.
-    in_time : bool
-        Whether the inputs are the increments of one step, in the order of time.
+    whole : Form or None
+        The sum of the increments of the step, where the inputs are increments in the order of time.
     """
 
     inputs: list[str]
     vectors: dict[str, tuple[Signal, Form]]
     stages: list[Stage]
-    in_time: bool = False
+    whole: Form | None = None
 
     @property
     def transition(self) -> Signal:
@@ -45,6 +61,21 @@ class Core:
         """Return the transition's elements from values for the elements of the vectors."""
         known = evaluate_stages(self.stages, values)
         return [known[name] for name in self.transition.elements]
+
+    def degree(self) -> int:
+        """Return a bound of the degree of the transition in the vectors.
+
+        Raises
+        ------
+        NotCovariantError
+            If the transition is no polynomial.
+        """
+        vectors = {name: _Degree(1) for signal, _ in self.vectors.values() for name in signal.elements}
+        try:
+            known = evaluate_stages(self.stages, vectors, lambda number: _Degree(0))
+            return max(int(known[name].value) for name in self.transition.elements)
+        except (AttributeError, TypeError, ValueError):  # SymPy's errors where no sum or product is left
+            raise NotCovariantError("the transition is no polynomial") from None
 
     def base(self) -> list[Form]:
         """Return vectors that are independent and span the others."""
@@ -93,8 +124,11 @@ def extract(kernel: Kernel) -> Core:
     vectors = {name: (s, form) for name, (s, form) in vectors.items() if needed & set(s.elements)}
     if not vectors:
         raise NotCovariantError(f"the transition of {kernel.name} is always the same")
-    in_time = len(kernel.inputs) == 2 and kernel.inputs[1].name == "increments"
-    return Core(list(inputs), vectors, stages, in_time)
+    whole = None
+    if len(kernel.inputs) == 2 and kernel.inputs[1].name == "increments":
+        previous = kernel.companions.previous if kernel.companions else 0
+        whole = tuple(Fraction(int(k >= previous)) for k in range(len(inputs)))
+    return Core(list(inputs), vectors, stages, whole)
 
 
 def decompose(core: Core) -> Decomposition:

@@ -26,7 +26,7 @@ _PLANNED = 30
 #: Most products of vectors that are expanded to look at bases.
 _EXPANSIONS = 300_000
 #: A decomposition with more terms gains nothing over the stages.
-_MOST_TERMS = 300
+_MOST_TERMS = 500
 
 
 def plans(core: Core, decomposition: Decomposition) -> list[Plan]:
@@ -78,9 +78,9 @@ def _candidates(core: Core) -> tuple[list[Form], dict[Form, tuple[str, str]]]:
 
     for k, name in enumerate(core.inputs):
         offer(tuple(Fraction(int(j == k)) for j in range(count)), name)
-    if count > 1 and core.in_time:
-        offer((Fraction(1),) * count, "sigma", "the angle increment of the whole step")
-    if count == 2 and core.in_time:
+    if core.whole is not None and sum(core.whole) > 1:
+        offer(core.whole, "sigma", "the angle increment of the whole step")
+    if count == 2 and core.whole and all(core.whole):
         offer((Fraction(1), Fraction(-1)), "delta", "first half minus second half")
     for name, (signal, form) in core.vectors.items():
         offer(form, name, signal.meaning)

@@ -1,0 +1,245 @@
+"""Attitude steps: kinematics + method + what is known of the rate, fused, in transition form."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+import sympy as sp
+
+from strapgen.algebra import exact
+from strapgen.catalogue import rates
+from strapgen.catalogue.coefficients import Number
+from strapgen.catalogue.kinematics import KINEMATICS, Kinematics
+from strapgen.companions import Companions
+from strapgen.kernel import Kernel, KernelBuilder
+from strapgen.order import Order
+from strapgen.signal import Signal
+
+
+def increments_signal(count: int, previous: int = 0) -> Signal:
+    """Return the signal of the angle increments that a step takes, oldest first.
+
+    Parameters
+    ----------
+    count : int
+        Increments of the step itself.
+    previous : int, optional
+        Increments before the step.
+    """
+    names = [f"past{k}" for k in range(previous, 0, -1)] + [f"d{k}" for k in range(1, count + 1)]
+    kept = f"; the first {previous} are those before the step" if previous else ""
+    return Signal(
+        "increments",
+        (previous + count, 3),
+        tuple(f"{name}_{axis}" for name in names for axis in "xyz"),
+        unit="rad",
+        meaning=f"angle increments of the step, body axes, oldest first: exact integrals of the body rate{kept}",
+        bound=Fraction(1),
+    )
+
+
+def turns_signal(nodes: Sequence[Number]) -> Signal:
+    """Return the signal of the body rates of one step, each times the step length, in the order of the nodes."""
+    return Signal(
+        "turns",
+        (len(nodes), 3),
+        tuple(f"turn_{label(node)}_{axis}" for node in nodes for axis in "xyz"),
+        unit="rad",
+        meaning=f"body rate times the step length, body axes, at nodes {', '.join(map(str, nodes))} of the step",
+        bound=Fraction(1),
+    )
+
+
+def label(node: Number) -> str:
+    """Return a node as part of a name: a short fraction with its numbers, another number with four decimals."""
+    text = str(node)
+    if not isinstance(node, Fraction) or len(text) > 11:
+        text = f"{float(node):.4f}"
+    return text.replace("/", "_").replace(".", "_").replace("-", "minus_")
+
+
+class Samples:
+    """What a step is given, and the rate that it knows from that.
+
+    Parameters
+    ----------
+    build : KernelBuilder
+        The kernel under construction; samples are declared as its input.
+    increments : int or None
+        Angle increments a step; None for rates at nodes.
+    previous : int
+        Increments before the step.
+    nodes : sequence of Fraction or Expr
+        Nodes at which rates are given where there are no increments.
+    """
+
+    def __init__(
+        self,
+        build: KernelBuilder,
+        increments: int | None,
+        previous: int = 0,
+        nodes: Sequence[Number] = (),
+    ) -> None:
+        self._build = build
+        if increments is None:
+            signal, self.fit = turns_signal(nodes), rates.from_rates(nodes)
+        else:
+            signal = increments_signal(increments, previous)
+            self.fit = rates.from_increments(increments, previous)
+        self._symbols = build.input(signal)
+
+    def turn(self, node: Number, scale: sp.Expr = sp.S.One) -> sp.Matrix:
+        """Name the rate times the step at a node, times `scale`, which is 1 or 1/2."""
+        half = "half_" if scale == sp.Rational(1, 2) else ""
+        meaning = f"{half.replace('_', ' the ')}rate times the step, at node {node}"
+        return self.combination(f"{half}turn_{label(node)}", self.fit.at(node), meaning, scale)
+
+    def combination(
+        self, name: str, weights: Sequence[sp.Expr], meaning: str, scale: sp.Expr = sp.S.One
+    ) -> sp.Matrix:
+        """Name a vector that is linear in the samples.
+
+        Parameters
+        ----------
+        name, meaning : str
+        weights : sequence of Expr
+            A weight for every sample.
+        scale : Expr, optional
+            Factor of all weights.
+
+        Returns
+        -------
+        Matrix, 3 x 1
+        """
+        vector = [
+            scale * sp.Add(*(weight * self._symbols[k, axis] for k, weight in enumerate(weights)))
+            for axis in range(3)
+        ]
+        if all(element.is_Symbol for element in vector):  # an input itself
+            return sp.Matrix(vector)
+        return self._build.stage(Signal.vector(name, name, unit="rad", meaning=meaning), vector)
+
+
+@dataclass(frozen=True)
+class Method:
+    """A method of integrating the attitude over one step.
+
+    Parameters
+    ----------
+    name, title, source : str
+        Name on the command line, name in the literature, citation.
+    order : int
+        Classical order.
+    transition : callable
+        ``transition(build, kinematics, samples)`` writes the stages of the method into a kernel under construction and
+        returns the transition.
+    nodes : tuple of Fraction or Expr
+        Distinct nodes at which the method needs the rate; empty if it needs increments.
+    attitude_order : callable, optional
+        ``attitude_order(degree)``: order on the kinematics of the attitude for a rate that is a polynomial of at
+        most this degree, None for any; by default the classical order.
+    option : str
+        How the command line names it.
+    """
+
+    name: str
+    title: str
+    source: str
+    order: int
+    transition: Callable[[KernelBuilder, Kinematics, Samples], sp.Matrix]
+    nodes: tuple[Number, ...] = ()
+    attitude_order: Callable[[int | None], int] | None = None
+    option: str = ""
+
+    def step_order(self, increments: int | None, previous: int = 0) -> Order:
+        """Return the order of the step from so many increments, None for rates at the nodes."""
+        of = self.attitude_order or (lambda degree: self.order)
+        attitude = of(None)
+        if increments is None:
+            return Order(self.order, attitude, None, attitude)
+        count = increments + previous
+        step = min(of(count - 1), rates.step_order(increments, previous))
+        return Order(self.order, attitude, count, step)
+
+
+def step(kinematics: Kinematics, method: Method, increments: int | None, previous: int = 0) -> Kernel:
+    """Derive one integration step from angle increments, or from rates, to the next state.
+
+    The method is applied to the identity, which gives the transition: the step is linear in the state. The
+    step length cancels, since increments and rates differ by it alone.
+
+    Parameters
+    ----------
+    kinematics : Kinematics
+        The attitude representation.
+    method : Method
+        The integration method.
+    increments : int or None
+        Angle increments a step, 1 to 8; None for a step that is given the rate at every node.
+    previous : int, optional
+        Increments before the step from which the rate is extracted too, 0 to 3.
+
+    Returns
+    -------
+    Kernel
+        Inputs ``state`` and ``increments`` (previous + increments, 3) in rad, or ``turns`` (nodes, 3) in rad: the
+        rates times the step length; output ``next``.
+    """
+    build = KernelBuilder()
+    state = build.input(kinematics.state)
+    samples = Samples(build, increments, previous, method.nodes)
+    transition = build.stage(kinematics.transition, method.transition(build, kinematics, samples))
+    build.output(kinematics.next, kinematics.product(state, transition))
+    name = f"{kinematics.name}-{method.name}-{increments or 'rates'}"
+    option = method.option or f"--method {method.name}"
+    if increments is None:
+        given = f"the rate at {len(method.nodes)} {'node' if len(method.nodes) == 1 else 'nodes'}"
+        option, extracted = f"{option} --rates", ""
+    else:
+        given = f"{increments} angle {'increment' if increments == 1 else 'increments'}"
+        option, extracted = f"{option} --increments {increments}", "rate extraction chapter 3 A; "
+    if previous:
+        name, option = f"{name}-previous{previous}", f"{option} --previous {previous}"
+        given += f" and {previous} before {'it' if increments == 1 else 'them'}"
+    order = method.step_order(increments, previous)
+    return build.kernel(
+        name,
+        f"{kinematics.title}: step by {method.title} from {given}",
+        f"{kinematics.source}; {extracted}{method.title}: {method.source}",
+        transition=kinematics.transition.name,
+        companions=Companions(
+            f"{kinematics.name}-product",
+            kinematics.orthonormalize,
+            kinematics.attitude,
+            tuple(Fraction(int(x)) for x in kinematics.identity),
+            previous,
+        ),
+        order=order,
+        arguments=f"{kinematics.name} {option}",
+        notes=(str(order).capitalize() + ".",) if order.limited else (),
+    )
+
+
+def product(name: str) -> Kernel:
+    """Return the kernel that advances a state by a transition, and a transition by the one that follows it.
+
+    Parameters
+    ----------
+    name : str
+        Name of the attitude algorithm.
+    """
+    kinematics = KINEMATICS[name]
+    build = KernelBuilder()
+    state, transition = build.input(kinematics.state), build.input(kinematics.transition)
+    build.output(kinematics.next, kinematics.product(state, transition))
+    return build.kernel(f"{name}-product", f"{kinematics.title}: state after a transition", kinematics.source)
+
+
+def combination(coefficients: Sequence[Number], terms: Sequence[sp.Matrix], like: sp.Matrix) -> sp.Matrix:
+    """Return the sum of terms, each times its coefficient; zero of the shape of `like` if there are none."""
+    total = sp.zeros(*like.shape)
+    for coefficient, term in zip(coefficients, terms, strict=True):
+        total += exact(coefficient) * term
+    return total

@@ -1,0 +1,56 @@
+"""Irrational constants: rounded once, to so many digits that no target sees it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import sympy as sp
+
+from strapgen.kernel import Kernel, Stage
+
+#: Decimal digits that are kept: twice those of the arithmetic that programs are compared with.
+DIGITS = 80
+
+
+def rationalized(kernel: Kernel) -> Kernel:
+    """Return a kernel whose constants are rational; the kernel itself if they are.
+
+    Parameters
+    ----------
+    kernel : Kernel
+
+    Examples
+    --------
+    >>> from strapgen.kernel import KernelBuilder
+    >>> from strapgen.signal import Signal
+    >>> build = KernelBuilder()
+    >>> x = build.scalar(Signal.scalar("x"))
+    >>> _ = build.output(Signal.scalar("y"), [sp.sqrt(2) * x + 1])
+    >>> rounded = rationalized(build.kernel("root", "Root", "none"))
+    >>> rounded.outputs[0].expressions[0].subs(x, 1).is_Rational
+    True
+    """
+    stages, outputs = (tuple(map(_rounded_stage, group)) for group in (kernel.stages, kernel.outputs))
+    if stages == kernel.stages and outputs == kernel.outputs:
+        return kernel
+    note = f"Irrational constants are rounded to {DIGITS} digits, and once more to the format of the target."
+    return replace(kernel, stages=stages, outputs=outputs, notes=(*kernel.notes, note))
+
+
+def _rounded_stage(stage: Stage) -> Stage:
+    return replace(stage, expressions=tuple(map(_rounded, stage.expressions)))
+
+
+def _rounded(expression: sp.Expr) -> sp.Expr:
+    """Return an expression with its irrational numbers rounded."""
+    if expression.is_Atom or not any(
+        power.is_number and not power.is_Rational for power in expression.atoms(sp.Pow)
+    ):
+        return expression
+    if expression.is_number:
+        return sp.Rational(sp.N(expression, DIGITS))
+    if expression.is_Mul:  # its numbers together are one constant
+        numbers, rest = expression.as_independent(*expression.free_symbols, as_Add=False)
+        if numbers != 1:
+            return sp.Mul(_rounded(numbers), _rounded(rest))
+    return expression.func(*map(_rounded, expression.args))
