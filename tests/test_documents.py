@@ -34,7 +34,7 @@ def commands() -> list[str]:
 
 def test_readme_shows_every_command():
     shown = {shlex.split(command)[1] for command in commands()}
-    assert shown == {"list", "derive", "generate", "simulate", "compare", "study"}
+    assert shown == {"list", "tableau", "derive", "generate", "simulate", "compare", "study"}
     assert "`strapgen tables`" in README
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from strapgen import resources
+from strapgen.catalogue import METHODS
 
 pytestmark = pytest.mark.long
 
@@ -46,6 +47,7 @@ def test_templates_and_generated_sources_are_in_the_wheel(wheel):
         assert shipped
         assert shipped <= names
     assert "strapgen/cli/generate.py" in names
+    assert {f"strapgen/catalogue/methods/{method}.toml" for method in METHODS} <= names
     assert not any("__pycache__" in name or name.startswith(("tests/", "codegen/")) for name in names)
 
 

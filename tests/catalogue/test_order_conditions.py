@@ -213,6 +213,7 @@ def test_words_of_an_order(p):
     found = words(p)
     assert len(found) == len(set(found)) == 2 ** (p - 1)
     assert all(sum(word) + len(word) == p for word in found)
+    assert set(words(p, 1)) == {word for word in found if max(word) <= 1}
 
 
 @pytest.mark.parametrize("word", [word for p in range(1, 6) for word in words(p)])
@@ -317,6 +318,14 @@ def test_the_attitude_order_can_exceed_the_classical_one():
     failing = [weight_text(tree) for tree, residual in residuals(LINEAR, 5) if residual]
     assert failing == ["sum b_i a_ij c_j a_ik c_k"]
     assert order_in_series(LINEAR, 7, 6, "general") == 5
+
+
+def test_a_constant_rate_can_be_followed_to_a_higher_order():
+    # Jameson's three stages: the exponential to third order, quadrature to second.
+    rows = map(fractions, ("", "1/3", "0 1/2"))
+    low = Tableau("low3", "-", "-", 2, fractions("0 1/3 1/2"), tuple(rows), fractions("0 0 1"))
+    assert [attitude_order(low, k) for k in (None, 0, 1, 2)] == [2, 3, 2, 2]
+    assert [order_in_series(low, 4, k, "general") for k in (0, 1, 2)] == [3, 2, 2]
 
 
 def test_only_trees_without_two_branches_are_words():

@@ -4,6 +4,7 @@ from fractions import Fraction
 from itertools import pairwise
 
 import pytest
+import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -60,6 +61,19 @@ def test_every_count_is_exact_at_the_nodes_of_the_methods(count):
     coefficients = [Fraction((-1) ** k * (k + 2), k + 1) for k in range(count)]
     for node in (Fraction(0), Fraction(1, 2), Fraction(1)):
         assert extracted(coefficients, count, node, Fraction(1, 8)) == rate(coefficients, node / 8)
+
+
+@pytest.mark.parametrize("count", range(1, MOST_INCREMENTS + 1))
+def test_an_irrational_node_is_exact_too(count):
+    node = sp.Rational(1, 2) + sp.sqrt(21) / 14
+    coefficients = [sp.Rational((-1) ** k * (k + 2), k + 1) for k in range(count)]
+    angles = [
+        sum(c * sp.Rational(j, count) ** (k + 1) / (k + 1) for k, c in enumerate(coefficients))
+        for j in range(count + 1)
+    ]
+    increments = [after - before for before, after in pairwise(angles)]
+    found = sum(w * d for w, d in zip(from_increments(count).at(node), increments, strict=True))
+    assert sp.expand(found - sum(c * node**k for k, c in enumerate(coefficients))) == 0
 
 
 @pytest.mark.parametrize("count", range(1, MOST_INCREMENTS + 1))

@@ -11,7 +11,10 @@ import sympy as sp
 
 from strapgen import derive
 from strapgen.catalogue import ALGORITHMS, MOST_INCREMENTS, STANDARD_METHODS
-from strapgen.catalogue.steps import increments_signal
+from strapgen.catalogue.kinematics import KINEMATICS
+from strapgen.catalogue.runge_kutta import method
+from strapgen.catalogue.steps import increments_signal, step
+from strapgen.catalogue.tableaux import TABLEAUX
 from strapgen.exceptions import InputError
 
 ALGORITHM = pytest.mark.parametrize("algorithm", ALGORITHMS)
@@ -248,6 +251,33 @@ def test_a_step_from_rates_is_the_step_from_increments_after_rate_extraction(alg
     given = from_rates.expand({name: values[name] for name in (*state.elements, *turns.elements)})
     expected = from_increments.polynomials()
     assert [ring(x) for x in given["next"]] == expected["next"]
+
+
+@pytest.mark.parametrize("increments", [None, 3])
+def test_irrational_coefficients_stay_exact_and_their_nodes_have_names(increments):
+    tableau = TABLEAUX["cooper-verner8"]
+    kernel = step(KINEMATICS["euler"], method(tableau), increments)
+    names = [signal.name for signal in (*kernel.inputs, *(stage.signal for stage in kernel.stages))]
+    elements = [n for s in (*kernel.inputs, *(stage.signal for stage in kernel.stages)) for n in s.elements]
+    assert all(name.isidentifier() for name in names + elements)
+    assert len(set(elements)) == len(elements)
+    assert ("turn_0_1727_x" if increments is None else "half_turn_0_1727_x") in elements
+    assert not any(e.has(sp.Float) for stage in kernel.stages for e in stage.expressions)
+    assert any(e.has(sp.sqrt(21)) for stage in kernel.stages for e in stage.expressions)
+
+
+def test_a_step_with_irrational_coefficients_has_its_order():
+    # A constant rate about one axis: cos + i sin of half the angle, up to the eighth power.
+    x = sp.Symbol("x")
+    kernel = step(KINEMATICS["euler"], method(TABLEAUX["cooper-verner8"]), 1)
+    state, increments = kernel.inputs
+    values = dict(zip(state.elements, kernel.companions.identity, strict=True))
+    values |= dict(zip(increments.elements, (x, sp.Integer(0), sp.Integer(0)), strict=True))
+    result = [sp.expand(element) for element in kernel.expand(values)["next"]]
+    exponential = sum((sp.I * x / 2) ** k / sp.factorial(k) for k in range(9))
+    difference = sp.expand(result[3] + sp.I * result[0] - exponential)
+    assert all(sp.Poly(difference, x).coeff_monomial(x**k) == 0 for k in range(9))
+    assert result[1] == result[2] == 0
 
 
 def test_rates_are_named_after_their_nodes():

@@ -28,6 +28,15 @@ BAD = {
     "list --format yaml": "format 'yaml' is not known; allowed: text, json",
     "derive": "Missing argument",
     "simulate": "Missing argument",
+    # tableau
+    "tableau": "Missing argument",
+    "tableau rk9": "method 'rk9' is not known; allowed: rk1, rk2, midpoint, ",
+    "tableau rk4 --format csv": "format 'csv' is not known; allowed: text, json",
+    "tableau none.toml": "none.toml cannot be read (No such file or directory)",
+    "tableau ./file": "./file is not TOML (",
+    "tableau .toml": ".toml cannot be read (No such file or directory)",
+    "tableau heun.toml": "heun.toml: order 3: sum b_i c_i^2 = 1/2, 1/3 is needed (off by 1/6)",
+    "tableau implicit.toml": "implicit.toml: matrix row 1 has 1 entries: not explicit, 0 are needed",
     # derive
     "derive eulr": "algorithm 'eulr' is not known; allowed: dcm, euler, cayley-klein, ",
     "derive euler --method rk5": "method 'rk5' is not known; allowed: rk1, rk2, midpoint, ralston2, rk3, ",
@@ -225,6 +234,8 @@ BAD = {
 
 FILES = {
     "file": "mine",
+    "heun.toml": 'name="Heun"\nsource="-"\norder=3\nnodes=[0, 1]\nmatrix=[[], [1]]\nweights=["1/2", "1/2"]\n',
+    "implicit.toml": 'name="Euler"\nsource="-"\norder=1\nnodes=[1]\nmatrix=[[1]]\nweights=[1]\n',
     "nan.csv": "t,dx,dy,dz\n0.01,0,0,0\n0.02,0,nan,0\n0.03,0,0,0\n",
     "gap.csv": "t,dx,dy,dz\n0.01,0,0,0\n0.02,0,0,0\n0.03,0,0,0\n1,0,0,0\n1.01,0,0,0\n1.02,0,0,0\n",
     "large.csv": "t,dx,dy,dz\n" + "".join(f"0.{k},1e300,1e300,1e300\n" for k in range(1, 10)),

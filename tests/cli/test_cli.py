@@ -22,6 +22,8 @@ from tolerances import certified
 import strapgen
 from strapgen import catalogue, formulas, pipeline
 from strapgen.backends import BACKENDS, fitted
+from strapgen.catalogue import coefficients
+from strapgen.catalogue.tableaux import TABLEAUX
 from strapgen.cli import main
 from strapgen.motions import motion as make_motion
 from strapgen.simulation import largest_increment
@@ -30,7 +32,7 @@ from strapgen.targets import FIXED, TARGETS
 
 pytestmark = pytest.mark.filterwarnings("error")
 
-COMMANDS = ("list", "derive", "generate", "simulate", "compare", "tables", "study word-length")
+COMMANDS = ("list", "tableau", "derive", "generate", "simulate", "compare", "tables", "study word-length")
 DATA = Path(__file__).resolve().parents[1] / "data"
 CONING = "--motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 --step 0.125 --duration 5"
 
@@ -83,7 +85,7 @@ def test_examples_of_the_help_run(command, strapgen_says, tmp_path):
         strapgen_says("", *words)
 
 
-@pytest.mark.parametrize("command", ["list", "derive", "generate", "simulate", "tables"])
+@pytest.mark.parametrize("command", ["list", "tableau", "derive", "generate", "simulate", "tables"])
 def test_help_says_what_the_format_may_be(command, strapgen_says):
     assert "--format" in strapgen_says(f"{command} --help")
 
@@ -116,6 +118,70 @@ def test_list(strapgen_says):
         assert title in lines
         for name, meaning in part.items():
             assert any(line.split() == [name, *meaning.split()] for line in lines)
+
+
+# tableau
+
+
+@pytest.mark.parametrize("name", TABLEAUX)
+def test_tableau_json(name, strapgen_says):
+    data = json.loads(strapgen_says(f"tableau {name} --format json"))
+    tableau = TABLEAUX[name]
+    facts = [
+        "name",
+        "title",
+        "source",
+        "stages",
+        "order",
+        "attitude_order",
+        "conditions",
+        "principal_error_norm",
+    ]
+    more = [
+        "embedded_order",
+        "tolerance",
+        "largest_residual",
+        "nodes",
+        "matrix",
+        "weights",
+        "embedded_weights",
+    ]
+    assert list(data) == facts + more
+    assert (data["name"], data["title"], data["source"]) == (name, tableau.title, tableau.source)
+    assert data["order"] == data["attitude_order"] == tableau.order
+    assert data["largest_residual"] <= data["tolerance"] == float(tableau.tolerance)
+    read = [coefficients.number("weight", weight) for weight in data["weights"]]
+    assert tuple(read) == tableau.weights
+    assert (data["embedded_order"] is None) == (data["embedded_weights"] is None)
+
+
+def test_tableau_text(strapgen_says):
+    said = strapgen_says("tableau fehlberg4")
+    assert said.startswith("fehlberg4: Fehlberg's fourth-order method, 4(5)\nsource: E. Fehlberg, ")
+    assert "\nprincipal error norm           0.0018392\norder of the embedded weights  5\n" in said
+    rows = [line.split() for line in said.split("\n\n")[-1].splitlines()]
+    assert rows[2] == ["3/8", "|", "3/32", "9/32"]
+    assert rows[-2:] == [
+        ["|", *map(str, row)] for row in (TABLEAUX["fehlberg4"].weights, TABLEAUX["fehlberg5"].weights)
+    ]
+
+
+def test_tableau_too_wide_for_a_table(strapgen_says):
+    said = strapgen_says("tableau dormand-prince8")
+    assert "largest residual               1.04e-17, tolerance 1.1e-17\n" in said
+    assert re.search(r"^c_11 +1201146811/1299019798$", said, flags=re.MULTILINE)
+    assert re.search(r"^a_13,1 +403863854/491063109$", said, flags=re.MULTILINE)
+    assert said.endswith("\ne: the embedded weights\n") and max(map(len, said.splitlines())) <= 120
+
+
+def test_tableau_of_a_file(strapgen_says, tmp_path):
+    text = (Path(catalogue.__file__).parent / "methods" / "ralston3.toml").read_text()
+    (tmp_path / "folder").mkdir()
+    for name in ("mine.toml", "folder/mine"):
+        (tmp_path / name).write_text(text)
+        assert strapgen_says(f"tableau {name}").startswith(
+            "ralston-s-third-order-method: Ralston's third-order method\n"
+        )
 
 
 # derive
@@ -601,6 +667,7 @@ def test_help_is_quick():
 def test_quick_answers_load_no_heavy_library(words):
     code = f"""
 import sys
+from strapgen.catalogue.tableaux import TABLEAUX
 from strapgen.cli import main
 try:
     main({words!r})
@@ -618,6 +685,7 @@ def test_simulation_loads_no_computer_algebra():
     assert started(*command).returncode == 0
     code = f"""
 import sys
+from strapgen.catalogue.tableaux import TABLEAUX
 from strapgen.cli import main
 try:
     main({command!r})

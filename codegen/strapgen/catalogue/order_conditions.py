@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from functools import cache, lru_cache
-from itertools import combinations_with_replacement, count, groupby, product
+from itertools import combinations_with_replacement, groupby, product
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 if TYPE_CHECKING:
@@ -126,19 +126,20 @@ def weight_text(tree: Tree) -> str:
 # Words
 
 
-def words(order: int) -> list[Word]:
-    """Return the products of derivatives of A(t) of an order.
+def words(order: int, derivatives: int | None = None) -> list[Word]:
+    """Return the products of derivatives of A(t) of an order, with no derivative above `derivatives` if that is given.
 
     Examples
     --------
     >>> words(3)
     [(2,), (1, 0), (0, 1), (0, 0, 0)]
+    >>> words(3, derivatives=0)
+    [(0, 0, 0)]
     """
-    found = [
-        (last - 1, *word)
-        for last in range(order, 0, -1)
-        for word in (words(order - last) if order > last else [()])
-    ]
+    if order == 0:
+        return [()]
+    highest = order - 1 if derivatives is None else min(derivatives, order - 1)
+    found = [(k, *rest) for k in range(highest, -1, -1) for rest in words(order - 1 - k, derivatives)]
     return sorted(found, key=len)
 
 
@@ -303,13 +304,16 @@ def attitude_order(tableau: Tableau, derivatives: int | None = None) -> int:
     (4, 5)
     """
     stages = _stages(tableau)
-    # It ends: no power of A above the number of stages can be matched.
+    # With s stages the word (0, ..., 0) of order s + 1 has no weight at all, so no order is above s.
+    most = len(tableau.nodes)
     return next(
-        p - 1
-        for p in count(1)
-        for word in words(p)
-        if (derivatives is None or max(word) <= derivatives)
-        and not _holds(tableau, stages.word_residual(word))
+        (
+            p - 1
+            for p in range(1, most + 1)
+            for word in words(p, derivatives)
+            if not _holds(tableau, stages.word_residual(word))
+        ),
+        most,
     )
 
 

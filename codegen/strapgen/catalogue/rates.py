@@ -27,7 +27,7 @@ class Fit:
     --------
     >>> fit = from_increments(2)
     >>> fit.at(Fraction(0)), fit.moment(0), fit.moment(1)
-    ([3, -1], [1, 1], [-1/6, 1/6])
+    ([3, -1], [1, 1], [-1/3, 1/3])
     """
 
     basis: tuple[Coefficients, ...]

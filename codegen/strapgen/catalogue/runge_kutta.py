@@ -117,7 +117,11 @@ def advance(
         return Signal(name, like.shape, elements, meaning=meaning)
 
     slopes: list[sp.Matrix] = []
+    used = _used(tableau)
     for number, (node, row) in enumerate(zip(tableau.nodes, tableau.matrix, strict=True), 1):
+        if number - 1 not in used:
+            slopes.append(sp.zeros(*start.shape))
+            continue
         point = start + combination(row, slopes, start)
         if any(row):
             point = build.stage(named(f"point_{number}", f"argument of slope {number}, from {origin}"), point)
@@ -129,5 +133,16 @@ def advance(
 
 
 def _nodes(tableau: Tableau) -> tuple[Number, ...]:
-    """Return the distinct nodes of a tableau."""
-    return tuple(dict.fromkeys(tableau.nodes))
+    """Return the distinct nodes at which the result needs the rate."""
+    used = _used(tableau)
+    return tuple(dict.fromkeys(node for place, node in enumerate(tableau.nodes) if place in used))
+
+
+def _used(tableau: Tableau) -> set[int]:
+    """Return the stages that the result depends on: some serve the embedded weights alone."""
+    used: set[int] = set()
+    for place in reversed(range(len(tableau.nodes))):
+        behind = (tableau.matrix[later][place] for later in used)
+        if tableau.weights[place] or any(behind):
+            used.add(place)
+    return used
