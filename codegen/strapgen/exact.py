@@ -1,17 +1,88 @@
-"""Runs of an algorithm in arithmetic so long that its rounding cannot be seen: the reference for all others."""
+"""Programs and runs in arithmetic so long that its rounding cannot be seen: the reference for all others."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
+import mpmath
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen.program import Program
+from strapgen.program import OPERATIONS, Program
 
 #: Decimal digits: a million steps lose six of them.
 DIGITS = 40
+
+_FUNCTIONS: dict[str, Callable[..., Any]] = {
+    **OPERATIONS,
+    "sqrt": mpmath.sqrt,
+    "sin": mpmath.sin,
+    "cos": mpmath.cos,
+    "sinc": mpmath.sinc,
+    "atan2": mpmath.atan2,
+}
+
+
+def number(value: Fraction) -> Any:
+    """Return a fraction in many digits."""
+    return mpmath.mpf(value.numerator) / value.denominator
+
+
+class Interpreter:
+    """A program on numbers of mpmath, whose precision the caller sets.
+
+    Parameters
+    ----------
+    program : Program
+
+    Examples
+    --------
+    >>> from strapgen import derive, lower
+    >>> with mpmath.workdps(DIGITS):
+    ...     state = Interpreter(lower(derive("euler-normalize")))([mpmath.mpf(x) for x in (1, 2, 4, 2)])
+    >>> float(state[2])
+    0.8
+    """
+
+    def __init__(self, program: Program) -> None:
+        self.program = program
+        self._constants: dict[Fraction, Any] = {}
+
+    def __call__(self, *inputs: Iterable[Any]) -> list[Any]:
+        """Return the elements of the last output, from the elements of every input."""
+        values: dict[str, Any] = {}
+        for signal, elements in zip(self.program.inputs, inputs, strict=True):
+            values |= zip(signal.elements, elements, strict=True)
+        return list(self._run(values).values())[-1]
+
+    def _run(self, values: Mapping[str, Any]) -> dict[str, list[Any]]:
+        return self.program.run(values, self._constant, _FUNCTIONS)
+
+    def _constant(self, value: Fraction) -> Any:
+        if value not in self._constants:
+            self._constants[value] = number(value)
+        return self._constants[value]
+
+
+def states(program: Program, increments: Iterable[Sequence[Any]], initial: Sequence[Any]) -> list[list[Any]]:
+    """Return all states of a run in many digits, the initial one first.
+
+    Parameters
+    ----------
+    program : Program
+        An attitude step.
+    increments : iterable of sequence of mpf
+        What each step takes, row-major.
+    initial : sequence of mpf
+        The first state, row-major.
+    """
+    step = Interpreter(program)
+    found = [list(initial)]
+    for row in increments:
+        found.append(step(found[-1], row))
+    return found
 
 
 def propagate(program: Program, increments: Any, initial: Any = None) -> NDArray[np.float64]:
@@ -42,31 +113,14 @@ def propagate(program: Program, increments: Any, initial: Any = None) -> NDArray
     >>> propagate(lower(derive("euler")), np.full((2, 2, 3), 0.01))[-1].round(6)
     array([0.019996, 0.019996, 0.019996, 0.9994  ])
     """
-    import mpmath
-
     if program.companions is None:
         raise ValueError(f"{program.name} is no attitude step")
     state, samples = program.inputs
     with mpmath.workdps(DIGITS):
-
-        def number(value: Fraction) -> Any:
-            return mpmath.mpf(value.numerator) / value.denominator
-
-        constants: dict[Fraction, Any] = {}
-
-        def constant(value: Fraction) -> Any:
-            if value not in constants:
-                constants[value] = number(value)
-            return constants[value]
-
         if initial is None:
             held = [number(value) for value in program.companions.identity]
         else:
             held = [mpmath.mpf(float(value)) for value in np.ravel(initial)]
-        states = [[float(value) for value in held]]
-        for row in np.asarray(increments, np.float64).reshape(-1, samples.size).tolist():
-            values = dict(zip(state.elements, held, strict=True))
-            values |= zip(samples.elements, map(mpmath.mpf, row), strict=True)
-            (held,) = program.run(values, constant).values()
-            states.append([float(value) for value in held])
-    return np.array(states).reshape(-1, *state.shape)
+        rows = np.asarray(increments, np.float64).reshape(-1, samples.size).tolist()
+        run = states(program, ([mpmath.mpf(value) for value in row] for row in rows), held)
+        return np.array([[float(value) for value in row] for row in run]).reshape(-1, *state.shape)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from strapgen import output
+from strapgen.convergence import Convergence
 from strapgen.exceptions import InputError, MissingExtraError
 from strapgen.recording import History
 from strapgen.reports import AXES, SKEW_PLANES
@@ -189,6 +190,86 @@ def study_image(outcomes: Sequence[Outcome], path: str | Path) -> bytes:
     title = f"{case.algorithm}: drift against word length\n{case.duration} s of {case.motion} motion, {words}"
     figure.suptitle(title, fontsize=11, x=0.01, ha="left")
     return _image(figure, path)
+
+
+def convergence_image(found: Sequence[Convergence], title: str, path: str | Path) -> bytes:
+    """Return error against step, a line an algorithm, beside a line of the slope that theory says.
+
+    Parameters
+    ----------
+    found : sequence of Convergence
+    title : str
+    path : path
+        File for the image; its ending says which kind.
+
+    Returns
+    -------
+    bytes
+        The content of the file.
+
+    Raises
+    ------
+    MissingExtraError
+        If matplotlib is not installed.
+    InputError
+        If the kind of image is unknown.
+    """
+    pyplot = _pyplot()
+    figure, axes = pyplot.subplots(figsize=(8.5, 5.5), layout="constrained")
+    colours = pyplot.get_cmap("viridis")(np.linspace(0.0, 0.85, len(found)))
+    for number, (one, colour) in enumerate(zip(found, colours, strict=True)):
+        rungs = [rung for rung in one.rungs if rung.error_rad]
+        steps = [rung.step_s for rung in rungs]
+        errors = [rung.error_rad for rung in rungs]
+        slope = "order hidden" if one.observed is None else f"{one.observed:.2f}"
+        theory = "" if one.predicted is None else f", theory {one.predicted}"
+        marker = "osD^v<>p"[number % 8]
+        axes.plot(steps, errors, color=colour, linewidth=1.2, alpha=0.6)
+        for used in (True, False):  # filled where the slope is fitted
+            chosen = [k for k, rung in enumerate(rungs) if rung.used is used]
+            axes.plot(
+                [steps[k] for k in chosen],
+                [errors[k] for k in chosen],
+                linestyle="none",
+                marker=marker,
+                markersize=5.5,
+                color=colour,
+                markerfacecolor=colour if used else "white",
+                label=f"{one.kernel}: {slope}{theory}" if used else None,
+            )
+        fitted = [rung for rung in rungs if rung.used and rung.error_rad]
+        if one.predicted is not None and fitted:
+            anchor = fitted[-1]
+            wide = np.array([anchor.step_s, max(steps)])
+            line = (anchor.error_rad or 0.0) * (wide / anchor.step_s) ** one.predicted
+            axes.plot(wide, line, color=colour, linewidth=0.9, linestyle="--")
+    axes.set_xscale("log", base=2)
+    axes.set_yscale("log")
+    axes.set_ylim(top=10)
+    ticks = sorted({rung.step_s for one in found for rung in one.rungs})
+    axes.set_xticks(ticks, [_fraction(step) for step in ticks])
+    axes.minorticks_off()
+    axes.set_xlabel("step, s")
+    axes.set_ylabel("largest error, rad")
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid(alpha=0.25, linewidth=0.6)
+    axes.legend(
+        alignment="left",
+        title_fontsize=9,
+        frameon=False,
+        fontsize=9,
+        loc="upper left",
+        bbox_to_anchor=(1.0, 1.0),
+        title="order: slope of filled points;\ntheory is dashed",
+    )
+    axes.set_title(title.encode(errors="replace").decode(), loc="left", fontsize=11)
+    return _image(figure, path)
+
+
+def _fraction(number: float) -> str:
+    """Return a number as one part of a whole where it is one."""
+    parts = round(1 / number)
+    return f"1/{parts}" if parts > 1 and abs(parts * number - 1) < 1e-9 else f"{number:g}"
 
 
 def _study_panel(axes: Any, group: Sequence[Outcome]) -> None:

@@ -184,12 +184,15 @@ class Program:
         return sum(assignment.name not in held for assignment in self.body)
 
     def run(
-        self, values: Mapping[str, Any], number: Callable[[Fraction], Any] | None = None
+        self,
+        values: Mapping[str, Any],
+        number: Callable[[Fraction], Any] | None = None,
+        operations: Mapping[str, Callable[..., Any]] = OPERATIONS,
     ) -> dict[str, list[Any]]:
         """Execute the program on numbers of any kind.
 
         Sums, products and quotients are the numbers' own, exact for `Fraction`; roots and functions are
-        computed in double.
+        computed in double, unless `operations` has others.
 
         Parameters
         ----------
@@ -197,6 +200,8 @@ class Program:
             A value for every input element.
         number : callable, optional
             What stands for a constant; by default the exact rational itself.
+        operations : mapping of str to callable, optional
+            What each operation means.
 
         Returns
         -------
@@ -210,7 +215,7 @@ class Program:
                 return node.value if number is None else number(node.value)
             if isinstance(node, Reference):
                 return known[node.name]
-            return OPERATIONS[node.kind](*map(value, node.arguments))
+            return operations[node.kind](*map(value, node.arguments))
 
         for assignment in self.body:
             known[assignment.name] = value(assignment.value)

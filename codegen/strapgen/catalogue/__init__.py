@@ -6,6 +6,7 @@ loaded when it is derived.
 
 from __future__ import annotations
 
+from fractions import Fraction
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -268,6 +269,28 @@ def previous(choice: Choice) -> int:
         companions = user.KERNELS[choice.name].companions
         return companions.previous if companions else 0
     return choice.previous
+
+
+def rounding(choice: Choice) -> Fraction:
+    """Return by how much published coefficients of a chosen method may be off, which are rounded: mostly 0."""
+    method = choice.method
+    if isinstance(method, str):
+        method = TABLEAUX.get(method)
+    return Fraction(0) if method is None else method.tolerance
+
+
+def enough(method: str | Tableau) -> int:
+    """Return how many increments a step needs for the order of its method.
+
+    Examples
+    --------
+    >>> enough("rk4"), enough("butcher6")
+    (2, 4)
+    """
+    from strapgen.catalogue.rates import step_order
+
+    order = _method(method).order
+    return next(count for count in range(1, MOST_INCREMENTS + 1) if step_order(count) >= min(order, 10))
 
 
 def orthonormalizations(algorithm: str) -> list[str]:

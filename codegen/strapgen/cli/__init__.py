@@ -8,7 +8,18 @@ from collections.abc import Sequence
 
 import typer
 
-from strapgen.cli import compare, derive, generate, listing, simulate, study, tableau, tables, version
+from strapgen.cli import (
+    compare,
+    converge,
+    derive,
+    generate,
+    listing,
+    simulate,
+    study,
+    tableau,
+    tables,
+    version,
+)
 from strapgen.exceptions import StrapgenError
 
 app = typer.Typer(
@@ -25,6 +36,7 @@ app.command("derive")(derive.derive)
 app.command("generate")(generate.generate)
 app.command("simulate")(simulate.simulate)
 app.command("compare")(compare.compare)
+app.command("converge")(converge.converge)
 app.command("tables")(tables.tables)
 app.add_typer(study.app, name="study")
 

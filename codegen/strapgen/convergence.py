@@ -1,0 +1,292 @@
+"""The observed order of an algorithm: its error on a ladder of steps, and the slope of that."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from fractions import Fraction
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from strapgen import catalogue, checks, exact, pipeline
+from strapgen.backends import BACKENDS, of
+from strapgen.catalogue import Choice
+from strapgen.exceptions import InputError
+from strapgen.fixedpoint import Settings
+from strapgen.motions import Motion
+from strapgen.order import Order
+from strapgen.simulation import largest_increment, simulate
+from strapgen.targets import FIXED
+
+#: Arithmetic of many digits, where a back end is named.
+EXACT = "exact"
+#: Finest steps, of those whose error is truncation, that the slope is fitted to.
+FITTED = 3
+#: Algorithms side by side in a report.
+_COLUMNS = 4
+#: Errors beyond this are no beginning of a series, in rad.
+_MOST_ERROR = 0.3
+
+
+@dataclass(frozen=True)
+class Rung:
+    """One step length of a ladder.
+
+    Parameters
+    ----------
+    step_s : float
+        Step in s.
+    error_rad : float or None
+        Largest error over the run; None where the run left the range of the back end's numbers.
+    slope : float or None
+        Slope from the rung before.
+    used : bool
+        Whether the observed order is fitted to it.
+    """
+
+    step_s: float
+    error_rad: float | None
+    slope: float | None = None
+    used: bool = False
+
+
+@dataclass(frozen=True)
+class Convergence:
+    """The errors of an algorithm on a ladder of steps.
+
+    Parameters
+    ----------
+    kernel, backend : str
+    order : Order or None
+        What theory says; None where a user's algorithm does not.
+    rungs : tuple of Rung
+        From the longest step to the shortest.
+    observed : float or None
+        Slope of the logarithm of the error, fitted to the finest rungs whose error is truncation; None where rounding
+        hides it.
+    """
+
+    kernel: str
+    backend: str
+    order: Order | None
+    rungs: tuple[Rung, ...]
+    observed: float | None
+
+    @property
+    def predicted(self) -> int | None:
+        """Order of the step in theory."""
+        return None if self.order is None else self.order.step
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the outcome as plain JSON data."""
+        orders = {} if self.order is None else asdict(self.order)
+        return {
+            "kernel": self.kernel,
+            "backend": self.backend,
+            "method_order": orders.get("method"),
+            "attitude_order": orders.get("attitude"),
+            "extraction_order": orders.get("extraction"),
+            "predicted_order": orders.get("step"),
+            "observed_order": self.observed,
+            "rungs": [asdict(rung) for rung in self.rungs],
+        }
+
+
+def converge(
+    choice: Choice,
+    motion: Motion,
+    steps: Sequence[float | str | Fraction],
+    duration: float | str | Fraction,
+    backend: str = EXACT,
+    settings: Settings | None = None,
+) -> Convergence:
+    """Run an algorithm on a motion with a ladder of steps and fit the order.
+
+    The error is the largest distance over the run of the computed matrix from the true one, as the root of half the sum
+    of the squares of all elements: for a pure drift its angle in rad; scale and skew count too.
+
+    Parameters
+    ----------
+    choice : Choice
+        An attitude step that takes increments.
+    motion : Motion
+        A motion whose rate changes direction shows the order; on others an algorithm may do better.
+    steps : sequence of number
+        Steps in s, each a divisor of the duration.
+    duration : number
+        In s.
+    backend : str, optional
+        A key of `BACKENDS`, or "exact": arithmetic of many digits, which shows the order of any method.
+    settings : Settings, optional
+        What fixed point is made for, by default the increments of each run.
+
+    Returns
+    -------
+    Convergence
+
+    Raises
+    ------
+    InputError
+        If a name or number is not allowed, or fewer than two steps are given.
+
+    Examples
+    --------
+    >>> from strapgen import motion
+    >>> coning = motion("coning", a_rad_s=1, b_rad_s=2, g_rad_s=0.5)
+    >>> found = converge(catalogue.choose("euler", "rk2", 2), coning, ["1/8", "1/16", "1/32"], 1)
+    >>> found.predicted, round(found.observed, 1)
+    (2, 2.0)
+    """
+    checks.choice("backend", backend, [*BACKENDS, EXACT])
+    kernel = catalogue.derive(choice)
+    if kernel.companions is None or kernel.inputs[1].name != "increments":
+        raise InputError(f"kernel {kernel.name} takes no increments; a step that does is needed")
+    total = checks.number("duration", duration, positive=True)
+    lengths = sorted({checks.number("step", step, positive=True) for step in steps}, reverse=True)
+    if len(lengths) < 2:
+        raise InputError("a slope takes two steps or more; give different ones")
+    counts = [checks.multiple("duration", total, "step", length) for length in lengths]
+    if backend == EXACT:
+        measure = _exactly(choice, motion, float(catalogue.rounding(choice)))
+    else:
+        measure = _on_backend(choice, motion, total, backend, settings)
+    rungs = []
+    for length, count in zip(lengths, counts, strict=True):
+        error, floor = measure(length, count)
+        rungs.append((float(length), error, error is not None and floor < error < _MOST_ERROR))
+    return _fitted(kernel.name, backend, kernel.order, rungs)
+
+
+def _fitted(
+    kernel: str, backend: str, order: Order | None, rungs: list[tuple[float, float | None, bool]]
+) -> Convergence:
+    """Fit the slope to the finest rungs that show truncation."""
+    chosen = [k for k, (_, _, shows) in enumerate(rungs) if shows][-FITTED:]
+    slopes: list[float | None] = [None]
+    for (long, before, _), (short, after, _) in pairwise(rungs):
+        slopes.append(math.log(before / after) / math.log(long / short) if before and after else None)
+    observed = None
+    if len(chosen) > 1:
+        logs = np.array([(math.log(rungs[k][0]), math.log(rungs[k][1] or 1.0)) for k in chosen])
+        observed = float(np.polyfit(logs[:, 0], logs[:, 1], 1)[0])
+    made = tuple(Rung(length, error, slopes[k], k in chosen) for k, (length, error, _) in enumerate(rungs))
+    return Convergence(kernel, backend, order, made, observed)
+
+
+_Measure = Callable[[Fraction, int], tuple[float | None, float]]
+
+
+def _on_backend(
+    choice: Choice, motion: Motion, total: Fraction, backend: str, settings: Settings | None
+) -> _Measure:
+    """Return what measures the error of a step length on a back end, and the error that rounding may make."""
+    samples, previous = catalogue.increments(choice), catalogue.previous(choice)
+
+    def measure(length: Fraction, count: int) -> tuple[float | None, float]:
+        chosen = None
+        if BACKENDS[backend].target in FIXED:
+            largest = largest_increment(motion, length, total, samples, previous=previous)
+            chosen = (settings or Settings()).fitted(largest)
+        ready = of(choice, backend, settings=chosen)
+        try:
+            run = simulate(ready, motion, length, total)
+        except InputError:  # the state leaves the range of its numbers
+            return None, 0.0
+        distances = np.linalg.norm(run.computed - run.true, axis=(-2, -1)) / math.sqrt(2)
+        # Rounding adds up to a unit of the last place a step, in a state of a few elements.
+        return float(distances.max()), 8 * ready.unit * count
+
+    return measure
+
+
+def _exactly(choice: Choice, motion: Motion, rounding: float) -> _Measure:
+    """Return what measures the error of a step length in many digits.
+
+    Where the published coefficients of a method are rounded themselves, that is the floor.
+    """
+    import mpmath
+
+    program = pipeline.lower(catalogue.derive(choice))
+    assert program.companions is not None, "checked by the caller"
+    samples, previous = catalogue.increments(choice), catalogue.previous(choice)
+
+    def loaded(name: str) -> exact.Interpreter:
+        return exact.Interpreter(pipeline.lower(catalogue.derive(catalogue.choose(name))))
+
+    increment, truth = loaded(f"{motion.name}-increments"), loaded(f"{motion.name}-truth")
+    attitude = loaded(program.companions.attitude) if program.companions.attitude else None
+    identity = program.companions.identity
+
+    def measure(length: Fraction, count: int) -> tuple[float | None, float]:
+        with mpmath.workdps(exact.DIGITS):
+            parameters = [[mpmath.mpf(value)] for value in motion.parameters.values()]
+            width = length / samples
+            row = [
+                increment([exact.number((2 * k + 1) * width / 2)], [exact.number(width)], *parameters)
+                for k in range(-previous, count * samples)
+            ]
+            taken = (
+                [x for vector in row[k : k + previous + samples] for x in vector]
+                for k in range(0, count * samples, samples)
+            )
+            run = exact.states(program, taken, [exact.number(value) for value in identity])
+            worst = mpmath.mpf(0)
+            for place, state in enumerate(run):
+                computed = attitude(state) if attitude else state
+                true = truth([exact.number(place * length)], *parameters)
+                squares = sum((a - b) ** 2 for a, b in zip(computed, true, strict=True))
+                worst = max(worst, squares)
+            return float(mpmath.sqrt(worst / 2)), 100 * rounding + 10.0 ** (10 - exact.DIGITS)
+
+    return measure
+
+
+def as_text(found: Sequence[Convergence], title: str) -> str:
+    """Return outcomes as a report: the error and the local slope at every step, the observed and predicted orders."""
+    lines = [title, "largest error in rad; in brackets the slope from the step before; * fitted"]
+    for first in range(0, len(found), _COLUMNS):
+        lines += ["", *_table(found[first : first + _COLUMNS])]
+    notes = [f"{one.kernel}: {one.order}" for one in found if one.order is not None and one.order.limited]
+    notes += [
+        f"{one.kernel}: rounding hides the order on {one.backend}" for one in found if one.observed is None
+    ]
+    return "\n".join([*lines, *([""] if notes else []), *notes])
+
+
+def _table(found: Sequence[Convergence]) -> list[str]:
+    rows = [["step, s", *(one.kernel for one in found)]]
+    for k, rung in enumerate(found[0].rungs):
+        rows.append([f"{rung.step_s:.6g}", *(_cell(one.rungs[k]) for one in found)])
+    rows.append(["observed", *("-" if one.observed is None else f"{one.observed:.3f} " for one in found)])
+    rows.append(["predicted", *("-" if one.predicted is None else f"{one.predicted}     " for one in found)])
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return [
+        "  ".join(f"{cell:>{width}}" for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    ]
+
+
+def _cell(rung: Rung) -> str:
+    if rung.error_rad is None:
+        return "out of range "
+    slope = "" if rung.slope is None else f" ({rung.slope:.2f})"
+    return f"{rung.error_rad:.3e}{slope}{'*' if rung.used else ' '}"
+
+
+def as_csv(found: Sequence[Convergence]) -> str:
+    """Return outcomes as comma-separated values, a row for every step of every algorithm."""
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow(
+        ["kernel", "backend", "step_s", "error_rad", "slope", "used", "observed_order", "predicted_order"]
+    )
+    for one in found:
+        for rung in one.rungs:
+            row = [one.kernel, one.backend, rung.step_s, rung.error_rad, rung.slope, rung.used]
+            writer.writerow(["" if value is None else value for value in (*row, one.observed, one.predicted)])
+    return buffer.getvalue()
