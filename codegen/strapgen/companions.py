@@ -23,6 +23,8 @@ class Companions:
         The state of zero rotation, row-major.
     previous : int
         How many of the increments that a step takes are those before it, kept from earlier steps.
+    isometry : bool
+        Whether the exact transition is a rotation whatever the increments are.
     """
 
     product: str | None
@@ -30,3 +32,4 @@ class Companions:
     attitude: str | None
     identity: tuple[Fraction, ...]
     previous: int = 0
+    isometry: bool = False

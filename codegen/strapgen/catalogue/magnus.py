@@ -50,6 +50,7 @@ def method(order: int) -> Method:
         order,
         transition,
         nodes=_GAUSS[order // 2],
+        isometry=True,
     )
 
 

@@ -43,6 +43,7 @@ def method(order: int) -> Method:
         order,
         transition,
         nodes=nodes,
+        isometry=True,
     )
 
 

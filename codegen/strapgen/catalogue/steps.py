@@ -140,6 +140,8 @@ class Method:
     attitude_order : callable, optional
         ``attitude_order(degree)``: order on the kinematics of the attitude for a rate that is a polynomial of at
         most this degree, None for any; by default the classical order.
+    isometry : bool
+        Whether its transition is a rotation whatever the increments are.
     option : str
         How the command line names it.
     """
@@ -151,6 +153,7 @@ class Method:
     transition: Callable[[KernelBuilder, Kinematics, Samples], sp.Matrix]
     nodes: tuple[Number, ...] = ()
     attitude_order: Callable[[int | None], int] | None = None
+    isometry: bool = False
     option: str = ""
 
     def step_order(self, increments: int | None, previous: int = 0) -> Order:
@@ -215,6 +218,7 @@ def step(kinematics: Kinematics, method: Method, increments: int | None, previou
             kinematics.attitude,
             tuple(Fraction(int(x)) for x in kinematics.identity),
             previous,
+            method.isometry,
         ),
         order=order,
         arguments=f"{kinematics.name} {option}",

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import typer
 
 from strapgen.cli import (
+    check,
     compare,
     converge,
     derive,
@@ -37,6 +38,7 @@ app.command("generate")(generate.generate)
 app.command("simulate")(simulate.simulate)
 app.command("compare")(compare.compare)
 app.command("converge")(converge.converge)
+app.command("check")(check.check)
 app.command("tables")(tables.tables)
 app.add_typer(study.app, name="study")
 

@@ -114,9 +114,24 @@ def _moved(made: exact.Quantities, by: Mapping[str, Fraction]) -> dict[str, Frac
                     (a, b), (da, db) = sizes, moves
                     total += abs(coefficient) * (a * db + b * da + da * db)
             moved[name] = total + sum(abs(c) * moved[m[0]] for m, c in quantity.beside)
+        elif isinstance(definition, exact.Taken | exact.Nearest):
+            moved[name] = Fraction(0)  # within a function, whose slope tells what becomes of it
+        elif isinstance(definition, exact.Root):
+            moved[name] = _root(moved[definition.argument])
         else:
             raise NotImplementedError(f"{name} is no sum of products")
+        if quantity.follows is not None:
+            moved[name] += _followed(quantity.follows, moved)
     return moved
+
+
+def _followed(follows: exact.Following, moved: Mapping[str, Fraction]) -> Fraction:
+    """Return how far a function can move."""
+    total = Fraction(0)
+    for name, slope in follows.slopes:
+        if moved[name]:
+            total += follows.most if slope is None else slope * moved[name]
+    return min(total, follows.most)
 
 
 def _norm(values: Sequence[Fraction]) -> Fraction:
@@ -135,6 +150,8 @@ def _growth(program: Program, made: exact.Quantities, width: int) -> Fraction:
     cancel that a rotation does not have; the terms above are bounded one by one.
     """
     assert program.transition is not None
+    if program.companions is not None and program.companions.isometry:
+        return Fraction(1)
     inputs = [name for signal in program.inputs[1:] for name in signal.elements]
     sizes = {name: made.items[name].range.magnitude for name in inputs}
     if len(inputs) <= _MOST_INPUTS:

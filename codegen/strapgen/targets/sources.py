@@ -72,6 +72,7 @@ class Sources:
                 "attitude": companions.attitude,
                 "identity": [str(element) for element in companions.identity],
                 "previous": companions.previous,
+                "isometry": companions.isometry,
             },
             "fixed": self.fixed and self.fixed.as_dict(),
         }

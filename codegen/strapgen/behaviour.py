@@ -1,0 +1,334 @@
+"""The standard behaviour of an attitude step: what any algorithm has to do, measured."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import mpmath
+import numpy as np
+from numpy.typing import NDArray
+
+from strapgen import catalogue, exact, fixedpoint, pipeline
+from strapgen.backends import Backend, of
+from strapgen.catalogue import Choice
+from strapgen.convergence import converge
+from strapgen.exceptions import CompilerError, InputError
+from strapgen.fixedpoint import Settings
+from strapgen.motions import motion
+from strapgen.program import Program
+from strapgen.simulation import attitude, drift_between, simulate
+
+#: How far an observed order may be from the one of theory.
+ORDER_WITHIN = 0.15
+#: Largest departure from an identity that holds exactly, in arithmetic of many digits.
+_EXACTLY = 1e-25
+#: Units of the last place that rounding adds to an attitude in a step, as a bound for short formulas.
+_UNITS_A_STEP = 64
+_STEPS = 200
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One behaviour.
+
+    Parameters
+    ----------
+    name : str
+        What is looked at.
+    holds : bool or None
+        Whether it is as it must be; None where there is nothing that it must be, or it could not be looked at.
+    text : str
+        What was measured, in words.
+    measured, allowed : float or None
+        The figure, and the largest that is allowed.
+    """
+
+    name: str
+    holds: bool | None
+    text: str
+    measured: float | None = None
+    allowed: float | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the finding as plain JSON data."""
+        return asdict(self)
+
+
+def check(choice: Choice) -> Iterator[Finding]:
+    """Look at an attitude step as a user of it would, and yield what is found.
+
+    Parameters
+    ----------
+    choice : Choice
+        An attitude step that takes increments.
+
+    Yields
+    ------
+    Finding
+
+    Raises
+    ------
+    InputError
+        If the step takes no increments.
+
+    Examples
+    --------
+    >>> found = {finding.name: finding.holds for finding in check(catalogue.choose("euler"))}
+    >>> found["order"], found["at rest"]
+    (True, True)
+    """
+    kernel = catalogue.derive(choice)
+    if kernel.companions is None or kernel.inputs[1].name != "increments":
+        raise InputError(f"kernel {kernel.name} takes no increments; a step that does is needed")
+    step = _Precise(pipeline.lower(kernel))
+    yield _no_rotation(step)
+    yield _at_rest(step)
+    yield _direction(step)
+    yield _turning_frame(step)
+    yield _order(choice)
+    yield from _long_run(choice)
+    yield from _back_ends(choice, step.program)
+    yield _restoring(choice, step)
+
+
+class _Precise:
+    """A step and its attitude in many digits."""
+
+    def __init__(self, program: Program) -> None:
+        companions = program.companions
+        assert companions is not None, "checked before"
+        self.program = program
+        self.identity = companions.identity
+        self.restoring = companions.orthonormalize
+        self._attitude = None if companions.attitude is None else _loaded(companions.attitude)
+
+    def attitude(self, state: list[Any]) -> Any:
+        """Return the direction cosine matrix of a state."""
+        elements = self._attitude(state) if self._attitude else state
+        return mpmath.matrix([elements[3 * row : 3 * row + 3] for row in range(3)])
+
+    def run(self, increments: NDArray[np.float64], turn: Any = None) -> list[list[Any]]:
+        """Return the states of a run from zero rotation, all increments turned by a matrix first."""
+        rows = []
+        for vectors in increments:
+            row: list[Any] = []
+            for vector in vectors:
+                v = mpmath.matrix([mpmath.mpf(float(x)) for x in vector])
+                row += list(v if turn is None else turn * v)
+            rows.append(row)
+        return exact.states(self.program, rows, [exact.number(x) for x in self.identity])
+
+
+def _loaded(name: str) -> exact.Interpreter:
+    return exact.Interpreter(pipeline.lower(catalogue.derive(catalogue.choose(name))))
+
+
+def _samples(program: Program) -> int:
+    return program.inputs[1].shape[0]
+
+
+def _random(program: Program, steps: int, size: float = 0.02) -> NDArray[np.float64]:
+    """Return increments that an algorithm with kept samples may see too: those of a window repeat in the next."""
+    companions = program.companions
+    assert companions is not None, "checked before"
+    from strapgen.gyro import windows
+
+    previous, taken = companions.previous, _samples(program)
+    row = np.random.default_rng(1969).uniform(-size, size, (previous + steps * (taken - previous), 3))
+    return windows(row, taken - previous, previous)
+
+
+def _exact_finding(name: str, off: Any, holds: str, fails: str) -> Finding:
+    off = float(off)
+    fine = off <= _EXACTLY
+    return Finding(name, fine, holds if fine else f"{fails}, off by {off:.3g}", off, _EXACTLY)
+
+
+def _no_rotation(step: _Precise) -> Finding:
+    with mpmath.workdps(exact.DIGITS):
+        start = step.attitude([exact.number(x) for x in step.identity])
+        off = mpmath.mnorm(start - mpmath.eye(3), "f")
+    return _exact_finding(
+        "no rotation",
+        off,
+        "the identity state is the unit matrix",
+        "the attitude of the identity state is not the unit matrix",
+    )
+
+
+def _at_rest(step: _Precise) -> Finding:
+    zero = np.zeros((3, _samples(step.program), 3))
+    with mpmath.workdps(exact.DIGITS):
+        run = step.run(zero)
+        off = max(abs(a - b) for a, b in zip(run[0], run[-1], strict=True))
+    return _exact_finding(
+        "at rest",
+        off,
+        "without rotation the state stays as it is",
+        "without rotation the state moves",
+    )
+
+
+def _direction(step: _Precise) -> Finding:
+    """Compare a small rotation with the truth and with its opposite: a sign that is wrong shows here by name."""
+    taken = _samples(step.program)
+    own = taken - (step.program.companions.previous if step.program.companions else 0)
+    worst, mirrored = 0.0, math.inf
+    size = 0.01
+    with mpmath.workdps(exact.DIGITS):
+        for axis in range(3):
+            increments = np.zeros((1, taken, 3))
+            increments[..., axis] = size / own
+            matrix = step.attitude(step.run(increments)[-1])
+            i, j = (axis + 1) % 3, (axis + 2) % 3
+            turned = float(matrix[j, i] - matrix[i, j]) / 2
+            worst = max(worst, abs(turned - size))
+            mirrored = min(mirrored, abs(turned + size))
+    fine = worst < size / 10
+    text = "a rotation about each axis is that of the body in the reference frame"
+    if not fine:
+        text = "a small rotation about an axis is wrong in size or axis"
+        if mirrored < size / 10:
+            text = "rotations are those of the reference in the body: a sign, or a transposed matrix"
+    return Finding("direction", fine, text, worst, size / 10)
+
+
+def _turning_frame(step: _Precise) -> Finding:
+    """Turn all increments by a rotation: every attitude must turn with them."""
+    increments = _random(step.program, 5)
+    with mpmath.workdps(exact.DIGITS):
+        u = [mpmath.mpf(x) for x in ("0.48", "-0.6", "0.64")]  # of length 1
+        cosine, sine = mpmath.mpf(3) / 5, mpmath.mpf(4) / 5
+        cross = mpmath.matrix([[0, -u[2], u[1]], [u[2], 0, -u[0]], [-u[1], u[0], 0]])
+        turn = mpmath.eye(3) + sine * cross + (1 - cosine) * cross * cross
+        plain = step.attitude(step.run(increments)[-1])
+        turned = step.attitude(step.run(increments, turn)[-1])
+        off = mpmath.mnorm(turned - turn * plain * turn.T, "f")
+    return _exact_finding(
+        "no preferred axis",
+        off,
+        "with all increments turned the attitude turns with them",
+        "with all increments turned the attitude does not turn with them",
+    )
+
+
+def _order(choice: Choice) -> Finding:
+    profile = motion("coning", a_rad_s=1, b_rad_s=1.5, g_rad_s=0.6)
+    found = converge(choice, profile, ["1/8", "1/16", "1/32", "1/64", "1/128"], 1)
+    if found.observed is None:
+        return Finding("order", False, "no order is seen: the errors do not fall with the step")
+    if found.predicted is None:
+        text = f"observed {found.observed:.3f}; the kernel states none to compare with"
+        return Finding("order", None, text, found.observed)
+    off = abs(found.observed - found.predicted)
+    text = f"observed {found.observed:.3f}, stated {found.predicted}"
+    return Finding("order", off <= ORDER_WITHIN, text, found.observed, ORDER_WITHIN)
+
+
+def _long_run(choice: Choice) -> Iterator[Finding]:
+    """Run the thesis's coning of 10 deg/s, 180 s in steps of 1/8 s."""
+    ready = of(choice)
+    profile = motion("coning", a_deg_s=10, b_deg_s=10, g_deg_s=10)
+    try:
+        with np.errstate(all="ignore"):
+            run = simulate(ready, profile, "0.125", 180)
+    except InputError as error:
+        yield Finding("drift", False, f"coning at 10 deg/s for 180 s: {error}")
+        return
+    drift = math.degrees(run.mean_drift)
+    yield Finding("drift", None, f"coning at 10 deg/s for 180 s in steps of 1/8 s: {drift:.4g} deg", drift)
+    products = run.computed @ np.swapaxes(run.computed, -1, -2) - np.eye(3)
+    norm = float(np.abs(products).max())
+    yield Finding(
+        "norm", None, f"the same run: C C' departs from the unit matrix by at most {norm:.4g}", norm
+    )
+
+
+def _back_ends(choice: Choice, program: Program) -> Iterator[Finding]:
+    increments = _random(program, _STEPS)
+    reference = of(choice)
+    wanted = attitude(reference, exact.propagate(program, increments))
+
+    def angle(states: Any, ready: Backend) -> float:
+        return float(np.linalg.norm(drift_between(attitude(ready, states), wanted), axis=-1).max())
+
+    for name in ("numpy", "c", "c-float"):
+        try:
+            ready = of(choice, name)
+        except CompilerError as error:
+            yield Finding(f"back end {name}", None, f"not looked at: {error}")
+            continue
+        states = ready.propagate(increments)
+        off, allowed = angle(states, ready), _UNITS_A_STEP * _STEPS * ready.unit
+        text = f"{_STEPS} steps: {off:.3g} rad from exact arithmetic"
+        yield Finding(f"back end {name}", off <= allowed, text, off, allowed)
+        yield _loop(ready, increments, states)
+    yield _fixed(choice, program, increments, angle)
+
+
+def _loop(ready: Backend, increments: NDArray[np.float64], states: Any) -> Finding:
+    """Hold the loop over steps against single steps."""
+    state = ready.identity
+    off = 0.0
+    for row, looped in zip(increments[:20], states[1:], strict=False):
+        state = ready.step(state, row.astype(ready.dtype))
+        off = max(off, float(np.abs(state - looped).max()))
+    allowed = _UNITS_A_STEP * 20 * ready.unit if ready.name == "numpy" else 0.0
+    text = f"20 steps at once and one by one differ by {off:.3g}"
+    return Finding(f"loop {ready.name}", off <= allowed, text, off, allowed)
+
+
+def _fixed(
+    choice: Choice,
+    program: Program,
+    increments: NDArray[np.float64],
+    angle: Callable[[Any, Backend], float],
+) -> Finding:
+    name = "back end c-q31"
+    if not fixedpoint.can_lower(program):
+        return Finding(name, None, "no fixed point: an input has no stated bound, or an operation is unknown")
+    try:
+        settings = Settings().fitted(float(np.abs(increments).max()))
+        ready = of(choice, "c-q31", settings=settings)
+        off = angle(ready.propagate(increments), ready)
+    except (InputError, CompilerError) as error:
+        return Finding(name, None, f"no fixed point: {error}")
+    certified = ready.rounding_bound(_STEPS, True)
+    if certified is None or not math.isfinite(certified):
+        return Finding(name, None, f"{_STEPS} steps: {off:.3g} rad, without a certified bound", off)
+    # An attitude moves by at most four times its state: twice the angle, in two elements that matter.
+    allowed = 4 * certified + 8 * ready.unit
+    text = f"{_STEPS} steps: {off:.3g} rad from exact arithmetic"
+    return Finding(name, off <= allowed, text, off, allowed)
+
+
+def _restoring(choice: Choice, step: _Precise) -> Finding:
+    """Restore a disturbed state: its attitude must be a rotation, and the same one after a second time."""
+    name = "orthonormalization"
+    if step.restoring is None:
+        return Finding(name, None, "there is none")
+    ready = of(choice)
+    state = np.asarray(ready.propagate(_random(step.program, 20))[-1])
+    state = state + 1e-4 * np.random.default_rng(1984).standard_normal(state.shape)
+
+    def defect(state: Any) -> float:
+        matrix = attitude(ready, state)
+        return float(np.abs(matrix @ matrix.T - np.eye(3)).max())
+
+    # A scheme may be of first order: what it leaves is of the order of the square of the disturbance, which is 1e-4.
+    before, after, allowed = defect(state), defect(ready.orthonormalize(state)), 100 * 1e-4**2
+    text = f"C C' departs from the unit matrix by {before:.3g} before, {after:.3g} after"
+    return Finding(name, after <= max(allowed, 0.0), text, after, allowed)
+
+
+def as_text(findings: list[Finding], title: str) -> str:
+    """Return findings as a report."""
+    width = max(len(finding.name) for finding in findings)
+    words = {True: "holds", False: "FAILS", None: "-"}
+    lines = [title, ""]
+    for finding in findings:
+        lines.append(f"  {words[finding.holds]:<6}{finding.name:<{width}}  {finding.text}")
+    return "\n".join(lines)

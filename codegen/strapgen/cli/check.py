@@ -1,0 +1,57 @@
+"""strapgen check."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from strapgen.cli.options import (
+    Format,
+    Increments,
+    Method,
+    Previous,
+    TableauFile,
+    check_format,
+    chosen,
+    print_json,
+)
+
+
+def check(
+    algorithm: Annotated[
+        str, typer.Argument(help="A Python file with an algorithm of your own; or dcm, euler, cayley-klein.")
+    ],
+    method: Method = None,
+    tableau: TableauFile = None,
+    increments: Increments = None,
+    previous: Previous = None,
+    format: Format = "text",
+) -> None:
+    """Test an algorithm as the project tests its own, and show what holds; exit with 1 if something fails.
+
+    Identities are checked in arithmetic of 40 digits, the order on a ladder of steps, the back ends against exact
+    arithmetic. What stands behind a dash is measured, and yours to judge.
+
+    Example: strapgen check examples/modified_rodrigues.py
+    """
+    check_format(format)
+    choice = chosen(algorithm, method, tableau, increments, previous)
+    from strapgen import behaviour, catalogue
+
+    findings = list(behaviour.check(choice))
+    failed = [finding.name for finding in findings if finding.holds is False]
+    kernel = catalogue.derive(choice)
+    if format == "json":
+        print_json(
+            {
+                "kernel": kernel.name,
+                "holds": not failed,
+                "findings": [finding.as_dict() for finding in findings],
+            }
+        )
+    else:
+        typer.echo(behaviour.as_text(findings, f"{kernel.name}: {kernel.title}"))
+    if failed:
+        typer.echo(f"strapgen: {kernel.name} fails: {', '.join(failed)}", err=True)
+        raise typer.Exit(1)
