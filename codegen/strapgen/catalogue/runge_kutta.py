@@ -24,7 +24,7 @@ def method(tableau: Tableau) -> Method:
     """
 
     def transition(build: KernelBuilder, kinematics: Kinematics, samples: Samples) -> sp.Matrix:
-        turns = {node: samples.turn(node, kinematics.scale) for node in _nodes(tableau)}
+        turns = {node: samples.turn(node, kinematics.scale) for node in nodes(tableau)}
         return advance(
             build,
             tableau,
@@ -41,7 +41,7 @@ def method(tableau: Tableau) -> Method:
         tableau.source,
         tableau.order,
         transition,
-        nodes=_nodes(tableau),
+        nodes=nodes(tableau),
         attitude_order=lambda degree: attitude_order(tableau, degree),
         option=f"--method {tableau.name}" if tableau.name in TABLEAUX else "--tableau FILE.toml",
     )
@@ -61,8 +61,8 @@ def staged_step(kinematics: Kinematics, tableau: Tableau, increments: int | None
     """
     build = KernelBuilder()
     state = build.input(kinematics.state)
-    samples = Samples(build, increments, nodes=_nodes(tableau))
-    turns = {node: samples.turn(node, kinematics.scale) for node in _nodes(tableau)}
+    samples = Samples(build, increments, nodes=nodes(tableau))
+    turns = {node: samples.turn(node, kinematics.scale) for node in nodes(tableau)}
     end = advance(
         build,
         tableau,
@@ -132,7 +132,7 @@ def advance(
     return start + combination(tableau.weights, slopes, start)
 
 
-def _nodes(tableau: Tableau) -> tuple[Number, ...]:
+def nodes(tableau: Tableau) -> tuple[Number, ...]:
     """Return the distinct nodes at which the result needs the rate."""
     used = _used(tableau)
     return tuple(dict.fromkeys(node for place, node in enumerate(tableau.nodes) if place in used))

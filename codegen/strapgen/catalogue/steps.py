@@ -89,6 +89,15 @@ class Samples:
             signal = increments_signal(increments, previous)
             self.fit = rates.from_increments(increments, previous)
         self._symbols = build.input(signal)
+        self._counts = increments, previous
+
+    def order(self, method: int) -> Order:
+        """Return the order of a step by a method of this order on any kinematics."""
+        increments, previous = self._counts
+        if increments is None:
+            return Order(method, method, None, method)
+        limit = rates.step_order(increments, previous)
+        return Order(method, method, increments + previous, min(method, limit))
 
     def turn(self, node: Number, scale: sp.Expr = sp.S.One) -> sp.Matrix:
         """Name the rate times the step at a node, times `scale`, which is 1 or 1/2."""

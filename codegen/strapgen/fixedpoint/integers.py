@@ -144,7 +144,7 @@ class _Quantization:
             wish = asked(self.settings, result.signal) if is_output else wish
             if wish is not None:
                 fraction = Format.parse(wish, self.word).fraction
-            elif result.signal.constraint and result in self.program.outputs:
+            elif is_output and (result.signal.constraint or self.program.companions is not None):
                 fraction = self._state_like(result.signal)
             else:
                 margin = Fraction(1) + Fraction(1, 1 << (self.word - 4))
@@ -271,8 +271,11 @@ class _Quantization:
     def _limit_output(self, quantity: exact.Quantity, fraction: int) -> int | None:
         """Return the largest integer of an output whose range is known but not proved: it is checked."""
         for result in self.program.outputs:
-            if quantity.name in self.exact.results[result.signal.name] and result.signal.constraint:
-                return math.floor((Fraction(1) + self.settings.allowance) * Fraction(2) ** fraction)
+            if quantity.name in self.exact.results[result.signal.name]:
+                if result.signal.constraint:
+                    return math.floor((Fraction(1) + self.settings.allowance) * Fraction(2) ** fraction)
+                if self.program.companions is not None:  # the state of the next step
+                    return self.inputs[0].high
         return None
 
     def _integer_terms(self, quantity: exact.Quantity) -> list[Placed]:
