@@ -34,7 +34,17 @@ def commands() -> list[str]:
 
 def test_readme_shows_every_command():
     shown = {shlex.split(command)[1] for command in commands()}
-    assert shown == {"list", "tableau", "derive", "generate", "simulate", "compare", "study"}
+    assert shown == {
+        "list",
+        "tableau",
+        "derive",
+        "generate",
+        "simulate",
+        "compare",
+        "converge",
+        "check",
+        "study",
+    }
     assert "`strapgen tables`" in README
 
 
@@ -69,10 +79,42 @@ def test_readme_tables_are_the_command_s(capsys):
         assert float(ours) == pytest.approx(value, rel=1e-3 if value > 1e-3 else 0.5)
 
 
+def test_the_page_on_own_algorithms(tmp_path, monkeypatch, capsys):
+    """Its tableau and its algorithm are what it says, and its commands run."""
+    page = (ROOT / "docs" / "own-algorithms.md").read_text()
+    for kind, name in (("toml", "heun3.toml"), ("python", "two_sample.py")):
+        (block,) = re.findall(rf"```{kind}\n(.*?)```", page, flags=re.DOTALL)
+        (tmp_path / name).write_text(block)
+    monkeypatch.chdir(tmp_path)
+    shown = re.findall(r"^    (strapgen (?!: ).*)$", page, flags=re.MULTILINE)
+    commands = [command for command in shown if not command.startswith("strapgen:")]
+    assert {shlex.split(command)[1] for command in commands} == {
+        "tableau",
+        "generate",
+        "converge",
+        "check",
+        "compare",
+    }
+    for command in commands:
+        with pytest.raises(SystemExit) as stop:
+            main(shlex.split(command)[1:])
+        assert stop.value.code == 0, capsys.readouterr().err
+    (failure,) = re.findall(r"^    strapgen: heun3.toml: (.*)$", page, flags=re.MULTILINE)
+    broken = (tmp_path / "heun3.toml").read_text().replace('"1/4", "0", "3/4"', '"0", "0", "1"')
+    (tmp_path / "heun3.toml").write_text(broken)
+    capsys.readouterr()
+    with pytest.raises(SystemExit) as stop:
+        main(["tableau", "heun3.toml"])
+    assert (stop.value.code, capsys.readouterr().err) == (2, f"strapgen: heun3.toml: {failure}\n")
+
+
 @pytest.mark.parametrize("path", sorted((ROOT / "examples").glob("*.py")), ids=lambda path: path.stem)
 def test_example(path, capsys, monkeypatch):
     monkeypatch.setattr("sys.argv", [str(path)])
     namespace = runpy.run_path(str(path))
+    if "algorithm" in namespace:  # for strapgen to load, see `strapgen check`
+        assert namespace["algorithm"]().companions is not None
+        return
     if path.stem == "make_gyro_log":
         assert namespace["text"]() == (ROOT / "examples" / "gyro_log.csv").read_text()
         return

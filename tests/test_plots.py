@@ -9,7 +9,9 @@ import pytest
 
 import strapgen
 from strapgen import plots
+from strapgen.convergence import Convergence, Rung
 from strapgen.exceptions import InputError, MissingExtraError
+from strapgen.order import Order
 from strapgen.recording import History
 from strapgen.simulation import Run, simulate
 
@@ -72,6 +74,24 @@ def test_history_has_an_axis_for_each_element(shape, grid, figures, rng):
     for k, axes in enumerate(figure.axes):
         assert axes.get_title(loc="left") == f"element {k}"
         np.testing.assert_array_equal(axes.get_lines()[0].get_ydata(), states.reshape(10, -1)[:, k])
+
+
+def test_convergence_has_a_line_and_a_theory_for_each_algorithm(figures):
+    rungs = tuple(Rung(2.0**-k, 2.0 ** (-4 * k), None if k == 1 else 4.0, k > 2) for k in range(1, 6))
+    found = [
+        Convergence("euler-rk4-2", "exact", Order(4, 4, 2, 4), rungs, 4.0),
+        Convergence("mine", "exact", None, (Rung(0.5, None), *rungs[1:]), None),
+    ]
+    plots.convergence_image(found, "A title", "orders.png")
+    (figure,) = figures
+    (axes,) = figure.axes
+    curve, theory = axes.get_lines()[0], axes.get_lines()[3]
+    np.testing.assert_array_equal(curve.get_xdata(), [rung.step_s for rung in rungs])
+    # The dashed line goes through the finest fitted point with the slope of theory: here it is the curve.
+    np.testing.assert_allclose(theory.get_ydata(), theory.get_xdata() ** 4, rtol=1e-12)
+    words = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert words == ["euler-rk4-2: 4.00, theory 4", "mine: order hidden"]
+    assert next(label.get_text() for label in axes.get_xticklabels()) == "1/32"
 
 
 @pytest.mark.parametrize(

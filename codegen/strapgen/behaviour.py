@@ -318,10 +318,11 @@ def _restoring(choice: Choice, step: _Precise) -> Finding:
         matrix = attitude(ready, state)
         return float(np.abs(matrix @ matrix.T - np.eye(3)).max())
 
-    # A scheme may be of first order: what it leaves is of the order of the square of the disturbance, which is 1e-4.
-    before, after, allowed = defect(state), defect(ready.orthonormalize(state)), 100 * 1e-4**2
+    # A scheme may be of first order: what it leaves is of the order of the square of what was there.
+    before, after = defect(state), defect(ready.orthonormalize(state))
+    allowed = 2 * before**2 + _UNITS_A_STEP * ready.unit
     text = f"C C' departs from the unit matrix by {before:.3g} before, {after:.3g} after"
-    return Finding(name, after <= max(allowed, 0.0), text, after, allowed)
+    return Finding(name, after <= allowed, text, after, allowed)
 
 
 def as_text(findings: list[Finding], title: str) -> str:

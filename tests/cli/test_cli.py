@@ -32,7 +32,10 @@ from strapgen.targets import FIXED, TARGETS
 
 pytestmark = pytest.mark.filterwarnings("error")
 
-COMMANDS = ("list", "tableau", "derive", "generate", "simulate", "compare", "tables", "study word-length")
+COMMANDS = (
+    *("list", "tableau", "derive", "generate", "simulate", "compare", "converge", "check", "tables"),
+    "study word-length",
+)
 DATA = Path(__file__).resolve().parents[1] / "data"
 CONING = "--motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 --step 0.125 --duration 5"
 
@@ -79,6 +82,7 @@ def test_examples_of_the_help_run(command, strapgen_says, tmp_path):
     shown = examples(said)
     assert shown and "Example:" in said
     (tmp_path / "gyro.csv").write_text((DATA / "rates_uneven.csv").read_text())
+    (tmp_path / "examples").symlink_to(DATA.parents[1] / "examples")
     for example in shown:
         program, *words = shlex.split(example)
         assert (program, " ".join(words).startswith(command)) == ("strapgen", True)

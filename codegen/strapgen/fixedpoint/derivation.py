@@ -109,7 +109,9 @@ class _Derivation:
             for element, node in zip(result.signal.elements, result.nodes, strict=True):
                 name = node.name if isinstance(node, Reference) else ""
                 # A choice between values may be longer than a word: it is rounded to one.
-                mine = name and name not in held and not isinstance(self.items[name].definition, Given | Choice)
+                mine = (
+                    name and name not in held and not isinstance(self.items[name].definition, Given | Choice)
+                )
                 if not mine or self.items[name].offset or self.items[name].beside:
                     name = self._free(element)
                     self._store(name, self._terms(node, name), "", whole=True)
