@@ -35,7 +35,7 @@ class Series:
 
     def __init__(self, coefficients: Mapping[int, Any], top: int) -> None:
         self.top = top
-        self.coefficients = {n: c for n, c in coefficients.items() if n <= top and c != 0}
+        self.coefficients = {n: c for n, c in coefficients.items() if n <= top and c}
 
     def _other(self, other: Any) -> Mapping[int, Any]:
         return other.coefficients if isinstance(other, Series) else {0: other}
@@ -58,6 +58,9 @@ class Series:
 
     def __neg__(self) -> Series:
         return self * -1
+
+    def __truediv__(self, whole: int) -> Series:
+        return Series({n: c / whole for n, c in self.coefficients.items()}, self.top)
 
     def __sub__(self, other: Any) -> Series:
         return self + other * -1
@@ -88,10 +91,8 @@ class _Root:
 
     def even(self, first: int) -> Any:
         """Return the cosine, for first 0, or sin(x)/x, for 1."""
-        terms = (
-            self.square**k * Fraction((-1) ** k, factorial(2 * k + first)) for k in range(self.square.top)
-        )
-        return sum(terms, Series({}, self.square.top))
+        terms = (self.square**k / ((-1) ** k * factorial(2 * k + first)) for k in range(1, self.square.top))
+        return sum(terms, Series({0: 1}, self.square.top))
 
 
 def _value(expression: sp.Expr, known: Mapping[str, Any], field: Any) -> Any:
@@ -136,13 +137,15 @@ def evaluated(kernel: Kernel, values: Mapping[str, Any], wanted: str, field: Any
     raise KeyError(wanted)
 
 
-def generic_rate(degree: int, seed: int = 1969) -> Rate:
+def generic_rate(degree: int, field: Any = None) -> Rate:
     """Return a polynomial rate with random rational vectors: what holds for it by chance holds next to never."""
-    random = Random(seed)
-    return [
-        np.array([Fraction(random.randint(-9, 9) or 1, random.randint(2, 7)) for _ in range(3)], object)
-        for _ in range(degree + 1)
-    ]
+    random = Random(1969)
+
+    def number() -> Any:
+        value = Fraction(random.randint(-9, 9) or 1, random.randint(2, 7))
+        return value if field is None else field.from_sympy(sp.Rational(value.numerator, value.denominator))
+
+    return [np.array([number() for _ in range(3)], object) for _ in range(degree + 1)]
 
 
 def angle(rate: Rate, begin: Fraction, end: Fraction, top: int) -> list[Series]:
@@ -179,7 +182,7 @@ def matrix(algorithm: str, w: Sequence[Any]) -> list[list[Any]]:
         rows = [[0, z, -y, x], [-z, 0, x, y], [y, -x, 0, z], [-x, -y, -z, 0]]
     else:
         rows = [[0, -x, -y, -z], [x, 0, z, -y], [y, -z, 0, x], [z, y, -x, 0]]
-    return [[element * Fraction(1, 2) for element in row] for row in rows]
+    return [[element / 2 if isinstance(element, Series) else 0 for element in row] for row in rows]
 
 
 def rotation(algorithm: str, turn: Sequence[Sequence[Any]], top: int) -> list[Series]:
@@ -200,7 +203,7 @@ def rotation(algorithm: str, turn: Sequence[Sequence[Any]], top: int) -> list[Se
         The elements of the transition, in the order of the algorithm's state.
     """
     A = [np.array(matrix(algorithm, w), object) for w in turn]
-    zero, one = Series({}, top), Series({0: Fraction(1)}, top)
+    zero, one = Series({}, top), Series({0: 1}, top)
     if algorithm == "dcm":
         start = np.where(np.eye(3, dtype=bool), one, zero)
     else:
@@ -210,7 +213,7 @@ def rotation(algorithm: str, turn: Sequence[Sequence[Any]], top: int) -> list[Se
         integrated: dict[int, Any] = {}
         for n, X in nested.items():
             for k, a in enumerate(A):
-                term = a @ X * Fraction(1, n + k + 1)
+                term = a @ X / (n + k + 1)
                 integrated[n + k + 1] = integrated[n + k + 1] + term if n + k + 1 in integrated else term
         nested = {n: X for n, X in integrated.items() if any(x.coefficients for x in X.flat)}
         total = sum(nested.values(), total)

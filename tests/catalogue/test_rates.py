@@ -253,3 +253,12 @@ def test_step_orders_as_the_literature_has_them():
     for count in range(1, MOST_INCREMENTS + 1):
         for previous in range(1, MOST_PREVIOUS + 1):
             assert step_order(count, previous) == count + previous + 1
+
+
+@pytest.mark.parametrize("previous", range(MOST_PREVIOUS + 1))
+@pytest.mark.parametrize("count", range(1, MOST_INCREMENTS + 1))
+def test_equal_increments_give_a_constant_rate(count, previous):
+    # Methods see the samples through the fit alone, so at a constant rate none depends on how many there are.
+    fit = from_increments(count, previous)
+    assert sum(fit.taylor(0)) == count
+    assert all(sum(fit.taylor(power)) == 0 for power in range(1, count + previous))
