@@ -10,11 +10,11 @@ from random import Random
 import pytest
 import sympy as sp
 
-from strapgen import catalogue, derive
+from strapgen import catalogue, derive, lower
 from strapgen.catalogue import ALGORITHMS, INTEGRATORS, MOST_INCREMENTS, MOST_PREVIOUS
 from strapgen.catalogue.rates import step_order
-from strapgen.catalogue.steps import increments_signal, label, turns_signal
-from strapgen.catalogue.tableaux import TABLEAUX, read
+from strapgen.catalogue.steps import increments_signal, label, labels, turns_signal
+from strapgen.catalogue.tableaux import TABLEAUX, Tableau, read
 from strapgen.kernel import Kernel
 from strapgen.order import Order
 
@@ -62,6 +62,22 @@ def test_increments_before_the_step_come_first_and_the_last_of_them_is_the_lates
 )
 def test_labels_of_nodes(node, expected):
     assert label(node) == expected
+
+
+def test_nodes_that_are_nearly_the_same_are_told_apart():
+    near, nearer, root = Fraction(123456789, 10**9), Fraction(123456788, 10**9), sp.sqrt(2) / 2
+    assert labels([Fraction(0), near, root, nearer]) == {
+        Fraction(0): "0",
+        near: "0_1235",
+        root: "0_7071",
+        nearer: "0_1235_2",
+    }
+    rows = (), (near,), (nearer, Fraction(0))
+    weights = Fraction(1, 2), Fraction(1, 4), Fraction(1, 4)
+    tableau = Tableau("near", "Near", "this test", 1, (Fraction(0), near, nearer), rows, weights)
+    for chosen in ({"rates": True}, {"increments": 3}):
+        program = lower(derive("dcm", tableau, **chosen))
+        assert program.operations["multiply"] > 0
 
 
 @pytest.mark.parametrize("name", [*TABLEAUX, *(n for n, i in INTEGRATORS.items() if i.takes_rates)])
