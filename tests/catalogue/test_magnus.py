@@ -8,6 +8,7 @@ import mpmath
 import numpy as np
 import pytest
 import sympy as sp
+from derived import precisely
 from peano_baker import (
     evaluated,
     generic_rate,
@@ -113,16 +114,10 @@ def test_at_a_constant_rate_the_rotation_vector_is_the_sum_of_the_increments(ord
 
 
 def precise_transition(kernel: Kernel, values: dict[str, mpmath.mpf]) -> mpmath.matrix:
-    known = dict(values)
-    for stage in kernel.stages:
-        arguments = [sp.Symbol(name, real=True) for name in known]
-        found = sp.lambdify(arguments, list(stage.expressions), "mpmath")(*known.values())
-        known |= dict(zip(stage.signal.elements, found, strict=True))
-    shape = (3, 3) if len(stage.signal.shape) == 2 else (4, 1)
-    flat = [known[name] for name in stage.signal.elements]
-    return mpmath.matrix(shape[0], shape[1]) + mpmath.matrix(
-        [flat[k * shape[1] : (k + 1) * shape[1]] for k in range(shape[0])]
-    )
+    state = dict.fromkeys(kernel.inputs[0].elements, mpmath.mpf(0))
+    known, signal = precisely(kernel, state | values), kernel.stages[-1].signal
+    flat = [known[name] for name in signal.elements]
+    return mpmath.matrix([flat[k : k + 3] for k in (0, 3, 6)] if signal.shape == (3, 3) else flat)
 
 
 @EXPONENTIAL

@@ -8,6 +8,7 @@ from random import Random
 import mpmath
 import pytest
 import sympy as sp
+from derived import precisely
 
 from strapgen import derive, lower
 from strapgen.kernel import Kernel, KernelBuilder
@@ -37,15 +38,6 @@ def one(expression: sp.Expr) -> sp.Expr:
     return rationalized(build.kernel("one", "One", "this test")).outputs[0].expressions[0]
 
 
-def precisely(made: Kernel, values: dict[str, mpmath.mpf]) -> list[mpmath.mpf]:
-    known = dict(values)
-    for stage in (*made.stages, *made.outputs):
-        arguments = [sp.Symbol(name, real=True) for name in known]
-        found = sp.lambdify(arguments, list(stage.expressions), "mpmath")(*known.values())
-        known |= dict(zip(stage.signal.elements, found, strict=True))
-    return [mpmath.mpf(known[name]) for stage in made.outputs for name in stage.signal.elements]
-
-
 @pytest.mark.parametrize("name", IRRATIONAL)
 def test_a_rationalized_kernel_is_the_kernel_to_70_digits(name):
     exact, random = kernel(name), Random(1969)
@@ -53,9 +45,10 @@ def test_a_rationalized_kernel_is_the_kernel_to_70_digits(name):
     names = [element for signal in exact.inputs for element in signal.elements]
     with mpmath.workdps(100):
         values = {n: mpmath.mpf(random.randint(-999, 999)) / 1000 for n in names}
-        for a, b in zip(precisely(exact, values), precisely(rounded, values), strict=True):
+        found = [precisely(made, values) for made in (exact, rounded)]
+        for name in exact.outputs[0].signal.elements:
             # Some hundreds of constants below 100 in size, each off by 1e-80 of itself.
-            assert abs(a - b) < mpmath.mpf(10) ** -70
+            assert abs(found[0][name] - found[1][name]) < mpmath.mpf(10) ** -70
 
 
 @pytest.mark.parametrize("name", IRRATIONAL)

@@ -314,6 +314,13 @@ def _sine(chain: _Chain, argument: str) -> None:
 
 
 def _cosine(chain: _Chain, argument: str) -> None:
+    under_root = _under_root(chain, argument)
+    if under_root is not None and chain.range(argument).magnitude <= _UNREDUCED:
+        # Of a root it is a function of what is under it, whose slope is at most 1/2: the root is inexact near 0.
+        _finish(
+            chain, _wave_series(chain, 0, argument, chain.taken(under_root)), (under_root, Fraction(1, 2))
+        )
+        return
     _finish(chain, _wave(chain, 0, chain.taken(argument)), (argument, _ONE))
 
 

@@ -71,12 +71,17 @@ def lowered(program: Program, settings: Settings) -> code.FixedProgram:
         for k in range(len(old.errors))
     )
     work, chosen = (finest, plain) if worse else (shorter, aligned)
-    if program.companions is None or program.transition is None:
+    if program.companions is None or program.transition is None or not _is_polynomial(made):
         return chosen
     adds_up = accumulation(
         program, settings, made, work.values, chosen.interface.inputs, chosen.interface.outputs
     )
     return replace(chosen, interface=replace(chosen.interface, accumulation=adds_up))
+
+
+def _is_polynomial(made: exact.Quantities) -> bool:
+    """Tell whether all there is are sums of products: how errors add up over a run is known for these alone."""
+    return all(isinstance(item.definition, exact.Given | exact.Sum) for item in made.items.values())
 
 
 class _Quantization:
