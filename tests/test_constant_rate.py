@@ -221,6 +221,7 @@ def truncated_exponential(algorithm: str, order: int) -> list:
     return list(total.flat if algorithm == "dcm" else total[:, 3])
 
 
+#: The others have polynomials of hundreds of terms; that equal increments give a constant rate is proved for all.
 RATIONAL = [name for name in TABLEAUX if TABLEAUX[name].rational and TABLEAUX[name].order < 7]
 
 

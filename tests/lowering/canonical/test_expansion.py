@@ -77,6 +77,7 @@ def _rational(number: sp.Rational) -> object:
     return sp.QQ(int(number.p), int(number.q))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("chosen", EXPANDED)
 @ALGORITHM
 def test_an_expanded_program_is_its_kernel_exactly(algorithm, chosen):
