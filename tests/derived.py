@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
+
+import mpmath
+import sympy as sp
 
 from strapgen import catalogue, generate, lower, standard_tree
 from strapgen.backends import BACKENDS, fitted
@@ -26,6 +30,18 @@ def program(choice: Choice) -> Program:
 def programs() -> dict[str, Program]:
     """Return the standard catalogue by the names of its kernels."""
     return {made.kernel: made for made in standard_tree.programs()}
+
+
+def precisely(kernel: Kernel, values: Mapping[str, mpmath.mpf]) -> dict[str, mpmath.mpf]:
+    """Return all elements of a kernel, its inputs included, in the precision of mpmath."""
+    known = dict(values)
+    for stage in (*kernel.stages, *kernel.outputs):
+        used = {s for expression in stage.expressions for s in expression.free_symbols}
+        names = [name for name in known if sp.Symbol(name, real=True) in used]
+        arguments = [sp.Symbol(name, real=True) for name in names]
+        found = sp.lambdify(arguments, list(stage.expressions), "mpmath")(*(known[name] for name in names))
+        known |= dict(zip(stage.signal.elements, map(mpmath.mpf, found), strict=True))
+    return known
 
 
 def generated(program: Program, backend_name: str) -> Sources:

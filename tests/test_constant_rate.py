@@ -3,11 +3,13 @@
 from functools import cache
 from itertools import pairwise
 
+import numpy as np
 import pytest
 import sympy as sp
 
 from strapgen import derive
-from strapgen.catalogue import STANDARD_METHODS
+from strapgen.catalogue import MOST_INCREMENTS, STANDARD_METHODS
+from strapgen.catalogue.tableaux import TABLEAUX
 
 X = sp.Symbol("x", positive=True)
 STEP_NAMES = ("dcm", "euler")
@@ -187,3 +189,80 @@ def test_more_samples_change_nothing_at_a_constant_rate():
         for method in STANDARD_METHODS:
             turns = [transition(algorithm, method, "xyz", increments) for increments in INCREMENTS]
             assert all(before == after for before, after in pairwise(turns))
+
+
+# More samples, and other methods
+
+
+def turn_at_a_constant_rate(algorithm: str, method: str, increments: int, previous: int = 0) -> list:
+    """Return the step of the identity as polynomials of the angles that it turns by, in equal increments."""
+    step = derive(algorithm, method, increments, previous=previous)
+    state, d = step.inputs
+    ring, *angles = sp.ring("x y z", sp.QQ)
+    values = dict(zip(state.elements, map(ring, step.companions.identity), strict=True))
+    share = [angle * sp.QQ(1, increments) for angle in angles]
+    values |= dict(zip(d.elements, share * (increments + previous), strict=True))
+    return [ring(element) for element in step.expand(values)["next"]]
+
+
+def truncated_exponential(algorithm: str, order: int) -> list:
+    """Return the powers of the generator up to an order, divided by their factorials."""
+    ring, x, y, z = sp.ring("x y z", sp.QQ)
+    if algorithm == "dcm":
+        K = [[0, -z, y], [z, 0, -x], [-y, x, 0]]
+    else:
+        K = [[0, z, -y, x], [-z, 0, x, y], [y, -x, 0, z], [-x, -y, -z, 0]]
+    scale = sp.QQ(1, 1 if algorithm == "dcm" else 2)
+    K = np.array([[ring(element) * scale for element in row] for row in K], object)
+    total = power = np.array([[ring(int(j == k)) for k in range(len(K))] for j in range(len(K))], object)
+    for n in range(1, order + 1):
+        power = power @ K * sp.QQ(1, n)
+        total = total + power
+    return list(total.flat if algorithm == "dcm" else total[:, 3])
+
+
+#: The others have polynomials of hundreds of terms; that equal increments give a constant rate is proved for all.
+RATIONAL = [name for name in TABLEAUX if TABLEAUX[name].rational and TABLEAUX[name].order < 7]
+
+
+@pytest.mark.parametrize("method", [*STANDARD_METHODS, *(m for m in RATIONAL if m not in STANDARD_METHODS)])
+@pytest.mark.parametrize("algorithm", STEP_NAMES)
+def test_no_number_of_increments_changes_a_step_at_a_constant_rate(algorithm, method):
+    # On any axis: the same polynomial, so that all of the above holds for every count.
+    one = turn_at_a_constant_rate(algorithm, method, 1)
+    for increments in range(2, MOST_INCREMENTS + 1):
+        assert turn_at_a_constant_rate(algorithm, method, increments) == one
+    for increments, previous in ((1, 1), (1, 3), (2, 2), (3, 1), (8, 3)):
+        assert turn_at_a_constant_rate(algorithm, method, increments, previous) == one
+
+
+@pytest.mark.parametrize("method", [*STANDARD_METHODS, "taylor2", "taylor5", "taylor8"])
+@pytest.mark.parametrize("algorithm", STEP_NAMES)
+def test_at_a_constant_rate_a_step_is_the_exponential_cut_off(algorithm, method):
+    order = int(method.removeprefix("taylor").removeprefix("rk"))
+    expected = truncated_exponential(algorithm, order)
+    for increments, previous in ((1, 0), (3, 0), (8, 0), (2, 1)):
+        assert turn_at_a_constant_rate(algorithm, method, increments, previous) == expected
+
+
+@pytest.mark.parametrize("increments", range(3, MOST_INCREMENTS + 1))
+@pytest.mark.parametrize("algorithm", STEP_NAMES)
+def test_claims_3_and_4_with_three_to_eight_increments(algorithm, increments):
+    found = [leading(lost(algorithm, method, "y", increments)) for method in STANDARD_METHODS]
+    assert [power for _, power in found] == [3, 3, 5, 5]
+    assert found[1][0] / found[0][0] == sp.Rational(-1, 2)
+    assert found[3][0] / found[2][0] == sp.Rational(-1, 4)
+    ratios = {
+        axes: ratio(lost(algorithm, "rk4", axes, increments), lost(algorithm, "rk1", axes, increments), 7)
+        for axes in ("y", "xyz")
+    }
+    assert ratio(ratios["xyz"], ratios["y"], 1) == 3
+
+
+@pytest.mark.parametrize("increments", range(3, MOST_INCREMENTS + 1))
+def test_claim_2_with_three_to_eight_increments(increments):
+    quotients = [
+        ratio(lost("euler", method, "y", increments), lost("dcm", method, "y", increments), 1)
+        for method in STANDARD_METHODS
+    ]
+    assert quotients == [sp.Rational(1, 4), sp.Rational(1, 4), sp.Rational(1, 16), sp.Rational(1, 16)]

@@ -32,6 +32,35 @@ def test_increments_integrate_the_rate(name):
             assert increment[axis] == pytest.approx(integral, abs=error + 1e-15)
 
 
+@pytest.mark.parametrize(("count", "previous"), [(1, 1), (1, 3), (2, 2), (3, 1)])
+@pytest.mark.parametrize("name", MOTIONS)
+def test_increments_before_the_start_are_those_of_the_motion_before_it(name, count, previous):
+    motion = strapgen.motion(name, **MOTIONS[name])
+    h = Fraction(1, 4)
+    increments = motion.increments(h, 4, count, previous)
+    assert increments.shape == (4, previous + count, 3)
+    # What belongs to the steps is what they take without history.
+    np.testing.assert_array_equal(increments[:, previous:], motion.increments(h, 4, count))
+    width = float(h) / count
+    for k in range(previous):
+        span = ((k - previous) * width, (k - previous + 1) * width)
+        for axis in range(3):
+            integral, error = quad(lambda t, axis=axis: motion.rate(t)[axis], *span, epsabs=1e-15)
+            assert increments[0, k, axis] == pytest.approx(integral, abs=error + 1e-15)
+
+
+def test_previous_increments_raise_the_order_of_a_slow_gyro():
+    motion = strapgen.motion("coning", **MOTIONS["coning"])
+
+    def error(previous: int, step: Fraction) -> float:
+        backend = strapgen.backend("euler", "rk4", 1, "numpy", previous=previous)
+        return float(np.abs(strapgen.simulate(backend, motion, step, 4).error).max())
+
+    coarse, fine = Fraction(1, 10), Fraction(1, 20)
+    orders = [np.log2(error(previous, coarse) / error(previous, fine)) for previous in (0, 1, 2)]
+    assert orders == pytest.approx([2, 3, 4], abs=0.2)
+
+
 @pytest.mark.parametrize("name", MOTIONS)
 def test_a_fine_run_meets_the_truth(name, backend_name):
     motion = strapgen.motion(name, **MOTIONS[name])

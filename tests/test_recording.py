@@ -426,3 +426,41 @@ def test_attitude_that_overflows_is_refused(make, even):
 
 def test_units_have_their_factors():
     assert {"rad/s": 1.0, "deg/s": math.pi / 180} == recording.RATE_UNITS
+
+
+# Steps that keep increments
+
+
+@pytest.mark.parametrize(("count", "previous"), [(1, 1), (1, 3), (2, 2), (3, 1), (5, 3)])
+def test_the_first_increments_of_a_recording_are_those_before_the_first_step(count, previous, even):
+    backend = strapgen.backend("euler", "rk4", count, "numpy", previous=previous)
+    history = propagate(backend, even)
+    steps, unused = divmod(24 - previous, count)
+    assert (len(history.time), history.unused) == (1 + steps, unused)
+    np.testing.assert_allclose(
+        history.time, 10 + 0.125 * (previous + count * np.arange(1 + steps)), rtol=0, atol=1e-12
+    )
+    state, states = backend.identity, [backend.identity]
+    for k in range(steps):
+        state = backend.step(state, even.increments[k * count : k * count + previous + count])
+        states.append(state)
+    # Two orders of the same products of unit quaternions.
+    np.testing.assert_allclose(history.states, states, rtol=0, atol=16 * steps * 2.0**-53)
+
+
+def test_a_recording_that_is_as_long_as_a_first_step(even):
+    backend = strapgen.backend("euler", "rk4", 2, "numpy", previous=3)
+    history = propagate(backend, Recording(even.start, even.interval, even.increments[:5]))
+    assert (len(history.time), history.unused) == (2, 0)
+    short = Recording(even.start, even.interval, even.increments[:4])
+    with pytest.raises(InputError, match=r"^the recording holds 4 increments; a step needs 5$"):
+        propagate(backend, short)
+
+
+def test_pulses_of_a_recording_are_counted_once(even):
+    backend = strapgen.backend("euler", "rk4", 1, "numpy", previous=2)
+    size = 2.0**-10
+    history = propagate(backend, even, pulse=size)
+    counted = Recording(even.start, even.interval, recording.pulses(even.increments[:, None], size)[:, 0])
+    np.testing.assert_array_equal(history.states, propagate(backend, counted).states)
+    assert not np.array_equal(history.states, propagate(backend, even).states)

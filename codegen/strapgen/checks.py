@@ -16,6 +16,12 @@ if TYPE_CHECKING:
 #: Steps, samples or records of the longest run: what it holds still fits into some gigabytes.
 MOST = 20_000_000
 
+#: Characters of the longest text.
+MOST_TEXT = 500
+
+#: What would begin or end a comment or a text of generated code, or escape its end.
+_MARKS = ("/*", "*/", '"""', "\\")
+
 
 def choice(what: str, value: str, allowed: Iterable[str]) -> str:
     """Return `value` if it is one of `allowed`.
@@ -99,6 +105,27 @@ def multiple(what: str, value: Fraction, of: str, unit: Fraction) -> int:
             f"(their ratio is {float(ratio):.9g})"
         )
     return int(ratio)
+
+
+def text(what: str, value: Any) -> str:
+    """Return `value` as a text that may stand in a comment of generated code: one line, and no end of a comment.
+
+    Raises
+    ------
+    InputError
+        If it is none.
+
+    Examples
+    --------
+    >>> text("source", "W. Kutta, 1901")
+    'W. Kutta, 1901'
+    """
+    if not isinstance(value, str) or not value.isprintable() or len(value) > MOST_TEXT:
+        raise InputError(f"{what} is no text of one line and at most {MOST_TEXT} characters")
+    for mark in _MARKS:
+        if mark in value:
+            raise InputError(f"{what} holds {mark}, which has a meaning in generated code; leave it out")
+    return value
 
 
 def real_array(what: str, value: Any, tail: tuple[int, ...], dtype: Any = float) -> NDArray[Any]:

@@ -40,6 +40,8 @@ def windows(increments: Any, count: int, previous: int = 0) -> NDArray[np.float6
     row = np.ascontiguousarray(increments, np.float64)
     if not previous:
         return row.reshape(-1, count, 3)
+    if len(row) < previous + count:
+        return np.empty((0, previous + count, 3))
     overlapping = np.lib.stride_tricks.sliding_window_view(row, previous + count, axis=0)[::count]
     return np.ascontiguousarray(np.moveaxis(overlapping, -1, 1))
 
@@ -76,10 +78,11 @@ def pulses(increments: Any, size: float | str | Fraction, previous: int = 0) -> 
     """
     pulse = float(checks.number("pulse", size, positive=True))
     d = np.asarray(increments, np.float64)
-    if previous:
-        (steps, taken), count = d.shape[:2], d.shape[1] - previous
+    if previous and d.ndim > 3 and d.size:
+        return np.stack([pulses(run, size, previous) for run in d])
+    if previous and d.size:
         row = np.concatenate([d[0, :previous], d[:, previous:].reshape(-1, 3)])
-        return windows(pulses(row[:, None], size)[:, 0], count, previous).reshape(steps, taken, 3)
+        return windows(pulses(row[:, None], size)[:, 0], d.shape[1] - previous, previous)
     flat = d.reshape(*d.shape[:-3], -1, 3)
     angle = np.cumsum(flat, axis=-2) / pulse
     if not np.abs(angle).max(initial=0.0) < _MOST_PULSES:

@@ -12,6 +12,7 @@ from tolerances import one_call, roundoff
 import strapgen
 from strapgen.backends import numpy as numpy_module
 from strapgen.exceptions import InputError, InputTypeError
+from strapgen.gyro import windows
 
 STEPS = 1440
 
@@ -284,3 +285,89 @@ def test_conversions_close_on_every_back_end(backend_name, rng):
     np.testing.assert_array_equal(klein, np.roll(rounded, 1, axis=1))
     via_klein = strapgen.evaluator("dcm-from-cayley-klein", backend_name)(klein)
     np.testing.assert_array_equal(via_klein, to_dcm(e))
+
+
+# Other methods, and steps that keep increments
+
+METHODS = ("taylor4", "magnus4", "munthe-kaas4")
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "count", "previous"), [("dcm", 1, 2), ("euler", 2, 1), ("cayley-klein", 1, 3)]
+)
+def test_a_step_keeps_increments_on_every_back_end(make, algorithm, count, previous, rng):
+    backend = make(algorithm, "rk4", count, previous=previous)
+    assert (backend.increments, backend.previous, backend.samples) == (count, previous, count + previous)
+    row = random_increments(rng, previous + 60 * count)
+    increments = windows(row, count, previous)
+    wanted = strapgen.backend(algorithm, "rk4", count, "numpy", previous=previous).propagate(increments)
+    history = backend.propagate(increments)
+    both = roundoff(backend, 60) + 16 * 60 * 2.0**-53
+    assert np.abs(history - wanted).max() <= both
+    state = backend.identity
+    for step, expected in zip(increments, history[1:], strict=True):
+        state = backend.step(state, step)
+        assert np.abs(state - expected).max() <= roundoff(backend, 60)
+
+
+@pytest.mark.parametrize(("count", "previous"), [(1, 1), (2, 2)])
+def test_an_exact_fit_needs_no_more_samples(make, count, previous):
+    # A rate that rises linearly: whatever fits it gives the step of two increments.
+    backend, other = make("euler", "rk4", count, previous=previous), make("euler", "rk4", 2)
+
+    def row(samples: int, before: int) -> np.ndarray:
+        times = np.arange(-before, 20 * samples + 1)[:, None] / samples
+        angle = 0.004 * times * [1, -2, 1] + 1e-4 * times**2 * [3, 1, -1]
+        return np.diff(angle, axis=0)
+
+    found = backend.propagate(windows(row(count, previous), count, previous))
+    wanted = other.propagate(windows(row(2, 0), 2))
+    assert np.abs(found - wanted).max() <= roundoff(backend, 20) + roundoff(other, 20)
+
+
+def test_increments_that_a_step_keeps_belong_to_its_shape(make):
+    backend = make("euler", "rk4", 1, previous=2)
+    with pytest.raises(InputError, match=r"increments has shape \(4, 1, 3\); \(\.\.\., 3, 3\) is needed"):
+        backend.propagate(np.zeros((4, 1, 3)))
+
+
+@pytest.mark.parametrize(("algorithm", "previous"), [("dcm", 0), ("euler", 2), ("cayley-klein", 0)])
+@pytest.mark.parametrize("method", METHODS)
+def test_methods_without_tableau_agree_in_floating_point(method, algorithm, previous, rng):
+    increments = windows(random_increments(rng, previous + 400), 2, previous)
+    by = {
+        name: strapgen.backend(algorithm, method, 2, name, previous=previous)
+        for name in ("numpy", "c", "c-float")
+    }
+    histories = {name: backend.propagate(increments) for name, backend in by.items()}
+    for name in ("c", "c-float"):
+        allowed = roundoff(by[name], 200) + roundoff(by["numpy"], 200)
+        assert np.abs(histories[name] - histories["numpy"]).max() <= allowed
+    for name, backend in by.items():
+        state, states = backend.identity, [backend.identity]
+        for step in increments:
+            state = backend.step(state, step)
+            states.append(state)
+        assert np.abs(histories[name] - np.array(states)).max() <= roundoff(backend, 200)
+
+
+@pytest.mark.parametrize("method", ["magnus2", "magnus4", "magnus6", "munthe-kaas4"])
+def test_exponentials_stay_rotations_however_long_the_run(method, rng):
+    backend = strapgen.backend("euler", method, 2, "c")
+    states = backend.propagate(random_increments(rng, 2000, 2, size=0.5))
+    assert np.abs(np.linalg.norm(states, axis=-1) - 1).max() <= roundoff(backend, 2000)
+    # A method that is none loses the length at such increments.
+    others = strapgen.backend("euler", "rk4", 2, "c").propagate(np.full((9, 2, 3), 0.5))
+    assert np.abs(np.linalg.norm(others, axis=-1) - 1).max() > 0.01
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-300, 1e-160, 1e-9])
+@pytest.mark.parametrize("method", ["magnus4", "munthe-kaas4"])
+def test_exponentials_have_no_hole_at_zero(method, algorithm, size):
+    # The root of a square that underflows is 0, and sin(x)/x is 1 there.
+    for name in ("numpy", "c", "c-float"):
+        backend = strapgen.backend(algorithm, method, 2, name)
+        turn = np.full((3, 2, 3), size)
+        end = backend.propagate(turn)[-1]
+        wanted = strapgen.backend(algorithm, "rk4", 2, name).propagate(turn)[-1]
+        np.testing.assert_allclose(end, wanted, rtol=0, atol=roundoff(backend, 3))

@@ -2,12 +2,12 @@
 
 from fractions import Fraction
 from functools import cache
-from itertools import pairwise
 from random import Random
 
 import numpy as np
 import pytest
 import sympy as sp
+from peano_baker import generic_rate, local_error
 
 from strapgen import derive
 from strapgen.catalogue import ALGORITHMS, MOST_INCREMENTS, STANDARD_METHODS
@@ -165,53 +165,21 @@ def test_cayley_klein_equals_euler_after_renaming(method):
     assert renamed == [euler[3], *euler[:3]]
 
 
-def local_error(algorithm: str, method: str, increments: int) -> int:
-    """Return the lowest power of the step in one step's error, on a rate that is a polynomial of time."""
-    ring, h = sp.ring("h", sp.QQ)
-    random, top = Random(7), 6
-    rate = [[Fraction(random.randint(-9, 9), 7) for _ in range(3)] for _ in range(4)]  # degree 3
-
-    def truncated(p):
-        return ring.from_dict({m: c for m, c in p.items() if m[0] <= top})
-
-    # Picard's iteration on x(t) = x(0) + integral of f(x, w), each round right by one more power.
-    power = np.array([ring(0)] * 3, dtype=object)
-    for k, row in enumerate(rate):
-        power = power + np.array([ring(c) * h**k for c in row], dtype=object)
-    start = np.array(
-        [ring(c) for c in kernel(algorithm, method, increments).companions.identity], dtype=object
-    )
-    start = start.reshape(shape(algorithm))
-    x = start
-    for _ in range(top + 1):
-        slope = derivative(algorithm, x, power)
-        integral = [
-            truncated(ring.from_dict({(m[0] + 1,): c / (m[0] + 1) for m, c in ring(p).items()}))
-            for p in slope.flat
-        ]
-        x = start + np.array(integral, dtype=object).reshape(start.shape)
-    # The increments of the step are integrals over its parts.
-    angle = [ring.from_dict({(m[0] + 1,): c / (m[0] + 1) for m, c in p.items()}) for p in power]
-    samples = [[a.compose(h, h * Fraction(k, increments)) for a in angle] for k in range(increments + 1)]
-    d = [b - a for before, after in pairwise(samples) for a, b in zip(before, after, strict=True)]
-    step = kernel(algorithm, method, increments)
-    names = [name for signal in step.inputs for name in signal.elements]
-    computed = step.expand(dict(zip(names, [*start.flat, *d], strict=True)))["next"]
-    errors = [truncated(ring(c) - t) for c, t in zip(computed, x.flat, strict=True)]
-    return min(m[0] for e in errors for m in e.itermonoms())
+#: Of third degree, on which two increments are not exact.
+RATE = generic_rate(3)
 
 
 @pytest.mark.parametrize("increments", [2, 3, 5, MOST_INCREMENTS])
 @ALGORITHM
 @METHOD
 def test_the_local_error_is_one_order_above_the_method(algorithm, method, increments):
-    assert local_error(algorithm, method, increments) == int(method[2:]) + 1
+    assert local_error(kernel(algorithm, method, increments), RATE, 6) == int(method[2:]) + 1
 
 
 @pytest.mark.parametrize("method", ["rk2", "rk3", "rk4"])
 def test_one_increment_cannot_see_coning(method):
     # The commutator of rates at two instants, of power 3, is lost, whatever the method.
-    assert local_error("euler", method, 1) == 3
+    assert local_error(kernel("euler", method, 1), RATE, 6) == 3
 
 
 @pytest.mark.parametrize("count", [1, 2, 8])

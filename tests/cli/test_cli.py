@@ -300,6 +300,53 @@ def test_simulate_with_gyro_pulses(strapgen_says):
     assert 0.1 < apart.max() <= 0.5 + 1e-6
 
 
+def test_a_tableau_of_a_file_becomes_c_that_compiles(strapgen_says, tmp_path):
+    (tmp_path / "my.toml").write_text(
+        'name = "Heun of third order"\nsource = "K. Heun, 1900"\norder = 3\nnodes = [0, "1/3", "2/3"]\n'
+        'matrix = [[], ["1/3"], [0, "2/3"]]\nweights = ["1/4", 0, "3/4"]\n'
+    )
+    said = strapgen_says("generate dcm --tableau my.toml --increments 4 --target c --out firmware")
+    name = "dcm_heun_of_third_order_4"
+    assert said.startswith("dcm-heun-of-third-order-4 for c: ")
+    assert {path.name for path in (tmp_path / "firmware").iterdir()} == {f"{name}.c", f"{name}.h"}
+    header = (tmp_path / "firmware" / f"{name}.h").read_text()
+    assert "strapgen generate dcm --tableau FILE.toml --increments 4 --target c" in header
+    assert "Heun of third order: K. Heun, 1900." in " ".join(header.replace("\n *", " ").split())
+    flags = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-c"]
+    done = subprocess.run(
+        ["cc", *flags, f"firmware/{name}.c", "-o", "step.o"], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_previous_increments_on_the_command_line(strapgen_says):
+    run = f"{CONING} --format json"
+    data = json.loads(strapgen_says(f"simulate euler --increments 1 --previous 2 {run}"))
+    assert (data["increments"], data["previous"]) == (1, 2)
+    alone = json.loads(strapgen_says(f"simulate euler --increments 1 {run}"))
+    assert "previous" not in alone
+    assert data["mean_drift_deg"] < alone["mean_drift_deg"] / 100
+    rows = json.loads(
+        strapgen_says(f"compare euler --increments 1 --previous 2 --backends numpy,c,c-q31 {run}")
+    )
+    assert rows[2]["max_abs_rad"] <= rows[2]["bound_rad"]
+
+
+@pytest.mark.parametrize("method", ["taylor4", "magnus4", "munthe-kaas4"])
+def test_methods_without_tableau_on_the_command_line(method, strapgen_says):
+    data = json.loads(strapgen_says(f"simulate euler --method {method} --backend c {CONING} --format json"))
+    assert data["method"] == method
+    # Fourth order at 40 steps of about 0.04 rad.
+    assert 0 < data["mean_drift_deg"] < 1e-6
+    rows = json.loads(
+        strapgen_says(
+            f"compare dcm --method {method} --backends numpy,c --reference exact {CONING} --format json"
+        )
+    )
+    # 40 steps, each off by less than 16 units of round-off.
+    assert all(row["max_abs_rad"] < 40 * 16 * 2.0**-53 for row in rows)
+
+
 def test_generate_text(strapgen_says):
     said = strapgen_says("generate euler --target c --out out").splitlines()
     assert re.fullmatch(r"euler-rk4-2 for c: \d+ add, \d+ multiply.*, \d+ temporaries", said[0])

@@ -194,7 +194,7 @@ def choose(
         raise InputError(f"algorithm {name!r} is not known; allowed: {_allowed(*KERNELS)}")
     if name in KERNELS:
         given = {
-            "method": method,
+            "method": method.name if isinstance(method, Tableau) else method,
             "increments": increments,
             "rates": rates or None,
             "previous": previous or None,

@@ -45,7 +45,7 @@ def turns_signal(nodes: Sequence[Number]) -> Signal:
     return Signal(
         "turns",
         (len(nodes), 3),
-        tuple(f"turn_{label(node)}_{axis}" for node in nodes for axis in "xyz"),
+        tuple(f"turn_{name}_{axis}" for name in labels(nodes).values() for axis in "xyz"),
         unit="rad",
         meaning=f"body rate times the step length, body axes, at nodes {', '.join(map(str, nodes))} of the step",
         bound=Fraction(1),
@@ -60,6 +60,18 @@ def label(node: Number) -> str:
     return text.replace("/", "_").replace(".", "_").replace("-", "minus_")
 
 
+def labels(nodes: Sequence[Number]) -> dict[Number, str]:
+    """Return nodes with a label of its own for each: where two are the same, the later one gets a number."""
+    found: dict[Number, str] = {}
+    for node in dict.fromkeys(nodes):
+        name, number = label(node), 1
+        while name in found.values():
+            number += 1
+            name = f"{label(node)}_{number}"
+        found[node] = name
+    return found
+
+
 class Samples:
     """What a step is given, and the rate that it knows from that.
 
@@ -72,7 +84,7 @@ class Samples:
     previous : int
         Increments before the step.
     nodes : sequence of Fraction or Expr
-        Nodes at which rates are given where there are no increments.
+        Nodes at which the rate is needed, and given where there are no increments.
     """
 
     def __init__(
@@ -83,6 +95,7 @@ class Samples:
         nodes: Sequence[Number] = (),
     ) -> None:
         self._build = build
+        self._labels = labels(nodes)
         if increments is None:
             signal, self.fit = turns_signal(nodes), rates.from_rates(nodes)
         else:
@@ -103,7 +116,9 @@ class Samples:
         """Name the rate times the step at a node, times `scale`, which is 1 or 1/2."""
         half = "half_" if scale == sp.Rational(1, 2) else ""
         meaning = f"{half.replace('_', ' the ')}rate times the step, at node {node}"
-        return self.combination(f"{half}turn_{label(node)}", self.fit.at(node), meaning, scale)
+        return self.combination(
+            f"{half}turn_{self._labels.get(node) or label(node)}", self.fit.at(node), meaning, scale
+        )
 
     def combination(
         self, name: str, weights: Sequence[sp.Expr], meaning: str, scale: sp.Expr = sp.S.One

@@ -11,6 +11,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from strapgen import checks
 from strapgen.catalogue import coefficients, order_conditions
 from strapgen.exceptions import InputError
 
@@ -178,9 +179,8 @@ def _check_keys(data: Mapping[str, Any]) -> None:
                 f"key {key} is missing; needed: {', '.join(k for k in KEYS if k not in OPTIONAL)}"
             )
     for key in ("name", "source"):
-        value = data[key]
-        if not isinstance(value, str) or not value.strip() or not value.isprintable() or len(value) > 500:
-            raise InputError(f"{key} is no text of one line and at most 500 characters")
+        if not checks.text(key, data[key]).strip():
+            raise InputError(f"{key} is empty; a text is needed")
     order = data["order"]
     if not isinstance(order, int) or isinstance(order, bool) or not 1 <= order <= MOST_ORDER:
         raise InputError(

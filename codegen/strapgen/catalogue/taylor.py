@@ -23,18 +23,14 @@ def method(order: int) -> Method:
     """
 
     def transition(build: KernelBuilder, kinematics: Kinematics, samples: Samples) -> sp.Matrix:
-        half = "half_" if kinematics.scale == sp.Rational(1, 2) else ""
+        half, of = ("half_", "half of ") if kinematics.scale == sp.Rational(1, 2) else ("", "")
         rates: list[sp.Matrix] = []
         for power in range(order):
             weights = samples.fit.taylor(power)
             if not any(weights):
                 break
-            meaning = f"coefficient of t^{power} in{half.replace('_', ' ')} the rate times the step"
-            rates.append(
-                samples.combination(
-                    f"{half}rate_{power}", weights, meaning.replace("half", "half of"), kinematics.scale
-                )
-            )
+            meaning = f"coefficient of t^{power} in {of}the rate times the step"
+            rates.append(samples.combination(f"{half}rate_{power}", weights, meaning, kinematics.scale))
         terms = [kinematics.identity]
         for power in range(1, order + 1):
             total = sp.zeros(*kinematics.identity.shape)

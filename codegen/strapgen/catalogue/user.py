@@ -8,13 +8,17 @@ from __future__ import annotations
 
 import importlib.util
 import inspect
+import shlex
 import traceback
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from strapgen import checks
+from strapgen.catalogue.tableaux import TABLEAUX
 from strapgen.exceptions import InputError, StrapgenError
 
 if TYPE_CHECKING:
@@ -60,7 +64,8 @@ def load(name: str, catalogue: frozenset[str], **options: Any) -> Kernel:
     function = _from_file(Path(name)) if name.endswith(".py") else _guarded(name, installed()[name].load)
     if not callable(function):
         raise InputError(f"{name}: {FUNCTION} is no function; one that returns a Kernel is needed")
-    takes = [option for option in OPTIONS if option in inspect.signature(function).parameters]
+    parameters = _guarded(name, lambda: inspect.signature(function).parameters)
+    takes = [option for option in OPTIONS if option in parameters]
     for option in options:
         if option not in takes:
             raise InputError(
@@ -68,9 +73,22 @@ def load(name: str, catalogue: frozenset[str], **options: Any) -> Kernel:
             )
     kernel = _guarded(name, lambda: function(**options))
     _check(name, kernel, catalogue)
+    kernel = replace(kernel, arguments=_arguments(name, options))
     for made in (kernel, *kernel.own):
         KERNELS[made.name] = made
     return kernel  # type: ignore[no-any-return]
+
+
+def _arguments(name: str, options: dict[str, Any]) -> str:
+    """Return what makes a kernel again on the command line: file or entry point as they were given, and the options."""
+    words = [shlex.quote(checks.text("the name of the file", name))]
+    for option, value in options.items():
+        if option == "method":
+            built_in = TABLEAUX.get(value.name) == value
+            words += ["--method", value.name] if built_in else ["--tableau", "FILE.toml"]
+        else:
+            words += [f"--{option}", str(value)]
+    return " ".join(words)
 
 
 def _allowed(takes: list[str]) -> str:
@@ -99,8 +117,10 @@ def _guarded(name: str, run: Callable[[], Any]) -> Any:
     except Exception as error:
         frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename != __file__]
         own = [frame for frame in frames if Path(frame.filename).name == Path(name).name] or frames
-        where = f", line {own[-1].lineno}" if own else ""
-        raise InputError(f"{name}{where}: {type(error).__name__}: {error}") from error
+        line = error.lineno if isinstance(error, SyntaxError) else own[-1].lineno if own else None
+        where = "" if line is None else f", line {line}"
+        said = error.msg if isinstance(error, SyntaxError) else " ".join(str(error).split())
+        raise InputError(f"{name}{where}: {type(error).__name__}: {said}") from error
 
 
 def _check(name: str, kernel: Any, catalogue: frozenset[str]) -> None:
@@ -119,6 +139,17 @@ def _check(name: str, kernel: Any, catalogue: frozenset[str]) -> None:
             refuse(f"kernel {made.name!r} has no name for generated code; a-z, 0-9 and hyphens are allowed")
         if made.name in catalogue:
             refuse(f"kernel {made.name} is in the catalogue; another name is needed")
+        signals = [*made.inputs, *(stage.signal for stage in (*made.stages, *made.outputs))]
+        for signal in signals:
+            for part in (signal.name, *signal.elements):
+                if not (part.isascii() and part.isidentifier()):
+                    refuse(f"kernel {made.name}: {part!r} is no name for generated code")
+        texts = {"title": made.title, "source": made.source}
+        texts |= {f"note {number}": note for number, note in enumerate(made.notes, 1)}
+        texts |= {f"meaning of {signal.name}": signal.meaning for signal in signals}
+        texts |= {f"unit of {signal.name}": signal.unit for signal in signals}
+        for what, text in texts.items():
+            checks.text(f"{name}: kernel {made.name}: its {what}", text)
         known = {element for signal in made.inputs for element in signal.elements}
         for stage in (*made.stages, *made.outputs):
             if len(stage.expressions) != stage.signal.size:

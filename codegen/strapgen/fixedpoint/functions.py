@@ -314,13 +314,12 @@ def _sine(chain: _Chain, argument: str) -> None:
 
 
 def _cosine(chain: _Chain, argument: str) -> None:
-    """Make the cosine, of a small root from what stands under it: near 0 the root is inexact, and does not matter."""
-    reach = chain.range(argument).magnitude
-    under_root = _under_root(chain, argument) if reach <= _UNREDUCED else None
-    if under_root is not None:
-        coefficients, left_out = sine_series(0, reach, chain.tolerance)
-        value = _even_series(chain, "cosine", coefficients, chain.taken(under_root), left_out)
-        _finish(chain, value, (under_root, Fraction(1, 2)))
+    under_root = _under_root(chain, argument)
+    if under_root is not None and chain.range(argument).magnitude <= _UNREDUCED:
+        # Of a root it is a function of what is under it, whose slope is at most 1/2: the root is inexact near 0.
+        _finish(
+            chain, _wave_series(chain, 0, argument, chain.taken(under_root)), (under_root, Fraction(1, 2))
+        )
         return
     _finish(chain, _wave(chain, 0, chain.taken(argument)), (argument, _ONE))
 
