@@ -15,7 +15,7 @@
  * output is written: an output may be the same memory as an input. Matrices are stored by rows.
  *
  * Over a run of N steps without orthonormalization the distance from exact arithmetic on the same
- * increments is at most (1.80156e-09 N), times exp(0.00591195 N), in the length of a row.
+ * increments is at most (1.80156e-09 N), times exp(0.00511674 N), in the length of a row.
  */
 #ifndef DCM_RK4_2_Q31_H
 #define DCM_RK4_2_Q31_H

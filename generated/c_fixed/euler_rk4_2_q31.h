@@ -15,7 +15,7 @@
  * output is written: an output may be the same memory as an input. Matrices are stored by rows.
  *
  * Over a run of N steps without orthonormalization the distance from exact arithmetic on the same
- * increments is at most (1.22035e-09 N), times exp(0.000142707 N), in the length of the state.
+ * increments is at most (1.22035e-09 N), times exp(0.000134885 N), in the length of the state.
  */
 #ifndef EULER_RK4_2_Q31_H
 #define EULER_RK4_2_Q31_H

@@ -8,22 +8,19 @@ parts, only its product with T - 1 is left.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
-from itertools import product
 
 from strapgen.fixedpoint import quantities as exact
 from strapgen.fixedpoint.code import Accumulation, Argument, Sum, Value
 from strapgen.fixedpoint.formats import ROUNDINGS
 from strapgen.fixedpoint.intervals import Interval
+from strapgen.fixedpoint.series import Series, Truncated
 from strapgen.fixedpoint.settings import Settings
 from strapgen.program import Constant, Node, Operation, Program, Reference
 
-#: Polynomial of the inputs: coefficients by degree and by sorted names.
-_Polynomial = dict[int, dict[tuple[str, ...], Fraction]]
-#: Largest number of inputs for which the norm of the transition is expanded.
-_MOST_INPUTS = 9
+#: Terms of the longest series that the norm of the transition is expanded in.
+_MOST_TERMS = 1000
 
 
 def accumulation(
@@ -33,8 +30,8 @@ def accumulation(
     values: Mapping[str, Value],
     inputs: Sequence[Argument],
     outputs: Sequence[Argument],
-) -> Accumulation:
-    """Return how the errors of a step add up.
+) -> Accumulation | None:
+    """Return how the errors of a step add up; None where it calls more than sums, roots, sines and cosines.
 
     Lengths are those of a state, or of a row of a matrix: the norm in which a transition stretches least.
     """
@@ -92,12 +89,14 @@ def accumulation(
         per_step += 2 * kept_norm * (length * away_norm + left_norm)
         once += 2 * length * kept_norm
     moved = _moved(made, {a.signal.name: a.format.unit / 2 for a in inputs[1:]})
+    if moved is None:
+        return None
     input_rounding = length * _norm([moved[name] for name in held])
     return Accumulation(once, per_step, input_rounding, _growth(program, made, width))
 
 
-def _moved(made: exact.Quantities, by: Mapping[str, Fraction]) -> dict[str, Fraction]:
-    """Return how far every quantity can move when the elements of inputs, by name, move by so much."""
+def _moved(made: exact.Quantities, by: Mapping[str, Fraction]) -> dict[str, Fraction] | None:
+    """Return how far every quantity can move when the elements of inputs, by name, move by so much; None if unknown."""
     moved: dict[str, Fraction] = {}
     for name, quantity in made.items.items():
         definition = quantity.definition
@@ -119,7 +118,7 @@ def _moved(made: exact.Quantities, by: Mapping[str, Fraction]) -> dict[str, Frac
         elif isinstance(definition, exact.Root):
             moved[name] = _root(moved[definition.argument])
         else:
-            raise NotImplementedError(f"{name} is no sum of products")
+            return None
         if quantity.follows is not None:
             moved[name] += _followed(quantity.follows, moved)
     return moved
@@ -146,109 +145,53 @@ def _root(value: Fraction) -> Fraction:
 def _growth(program: Program, made: exact.Quantities, width: int) -> Fraction:
     """Return a number that is not below the norm of any transition.
 
-    With the transition expanded in its inputs, T T' - 1 is exact up to the degree of T and one more, where the terms
-    cancel that a rotation does not have; the terms above are bounded one by one.
+    The transition is expanded in its inputs to a degree at which it stays short, the rest bounded; in T T' - 1 the
+    terms then cancel that a rotation does not have.
     """
     assert program.transition is not None
     if program.companions is not None and program.companions.isometry:
         return Fraction(1)
     inputs = [name for signal in program.inputs[1:] for name in signal.elements]
-    sizes = {name: made.items[name].range.magnitude for name in inputs}
-    if len(inputs) <= _MOST_INPUTS:
-        elements = _expanded(program)
-        if elements is not None:
-            rows = [elements[k : k + width] for k in range(0, len(elements), width)]
-            largest = max(
-                sum(
-                    (_product_bound(one, other, sizes, is_one=one is other) for other in rows),
-                    Fraction(0),
-                )
-                for one in rows
-            )
-            return _root(1 + largest)
-    # Without it: the identity, and the length of what is added to it.
-    held = made.results[program.transition.signal.name]
-    away = [made.distance(name) for name in held if isinstance(name, str)]
-    return 1 + _norm(away)
+    series = Truncated([made.items[name].range.magnitude for name in inputs], _MOST_TERMS)
+    try:
+        elements = _expanded(program, series, inputs)
+    except NotImplementedError:  # it calls functions: the identity, and the length of what is added to it
+        held = made.results[program.transition.signal.name]
+        return 1 + _norm([made.distance(name) for name in held if isinstance(name, str)])
+    rows = [elements[k : k + width] for k in range(0, len(elements), width)]
+    one = series.constant(Fraction(1))
+    largest = Fraction(0)
+    for row in rows:
+        total = Fraction(0)
+        for other in rows:
+            product = series.dot(row, other)
+            total += series.size(series.less(product, one) if other is row else product)
+        largest = max(largest, total)
+    return _root(1 + largest)
 
 
-def _expanded(program: Program) -> list[_Polynomial] | None:
-    """Return the elements of the transition as polynomials, by degree."""
+def _expanded(program: Program, series: Truncated, inputs: Sequence[str]) -> list[Series]:
+    """Return the elements of the transition as truncated series in the inputs."""
     assert program.transition is not None
-    known: dict[str, _Polynomial] = {
-        name: {1: {(name,): Fraction(1)}} for signal in program.inputs[1:] for name in signal.elements
-    }
+    known = {name: series.variable(place) for place, name in enumerate(inputs)}
     needed = program.used([program.transition])
 
-    def value(node: Node) -> _Polynomial:
+    def value(node: Node) -> Series:
         if isinstance(node, Constant):
-            return {0: {(): node.value}} if node.value else {}
+            return series.constant(node.value)
         if isinstance(node, Reference):
             return known[node.name]
         assert isinstance(node, Operation)
+        if node.kind not in ("negate", "add", "subtract", "multiply"):
+            raise NotImplementedError(node.kind)
         arguments = [value(argument) for argument in node.arguments]
         if node.kind == "negate":
-            return _sum({}, arguments[0], -1)
-        if node.kind in ("add", "subtract"):
-            return _sum(arguments[0], arguments[1], 1 if node.kind == "add" else -1)
-        if node.kind == "multiply":
-            total: _Polynomial = {}
-            for (a, one), (b, other) in product(arguments[0].items(), arguments[1].items()):
-                total = _sum(total, {a + b: _times(one, other)}, 1)
-            return total
-        raise NotImplementedError(node.kind)
+            return series.less(series.constant(Fraction(0)), arguments[0])
+        if node.kind == "subtract":
+            return series.less(*arguments)
+        return series.sum(*arguments) if node.kind == "add" else series.product(*arguments)
 
-    try:
-        for assignment in program.body:
-            if assignment.name in needed:
-                known[assignment.name] = value(assignment.value)
-        return [value(node) for node in program.transition.nodes]
-    except NotImplementedError:
-        return None
-
-
-def _product_bound(
-    one: list[_Polynomial], other: list[_Polynomial], sizes: Mapping[str, Fraction], is_one: bool
-) -> Fraction:
-    """Return a bound of the scalar product of two rows, less 1 for a row and itself."""
-    top = max((degree for element in (*one, *other) for degree in element), default=0)
-    total: _Polynomial = {0: {(): Fraction(-1)}} if is_one else {}
-    rest = Fraction(0)
-    for left, right in zip(one, other, strict=True):
-        for (a, first), (b, second) in product(left.items(), right.items()):
-            if a + b <= top + 1:
-                total = _sum(total, {a + b: _times(first, second)}, 1)
-            else:
-                rest += _size(first, sizes) * _size(second, sizes)
-    return rest + sum((_size(part, sizes) for part in total.values()), Fraction(0))
-
-
-def _size(part: dict[tuple[str, ...], Fraction], sizes: Mapping[str, Fraction]) -> Fraction:
-    return sum(
-        (abs(c) * math.prod((sizes[name] for name in names), start=Fraction(1)) for names, c in part.items()),
-        Fraction(0),
-    )
-
-
-def _times(
-    one: dict[tuple[str, ...], Fraction], other: dict[tuple[str, ...], Fraction]
-) -> dict[tuple[str, ...], Fraction]:
-    total: dict[tuple[str, ...], Fraction] = {}
-    for left, a in one.items():
-        for right, b in other.items():
-            key = tuple(sorted(left + right))
-            total[key] = total.get(key, Fraction(0)) + a * b
-    return total
-
-
-def _sum(one: _Polynomial, other: _Polynomial, sign: int) -> _Polynomial:
-    total = {degree: dict(part) for degree, part in one.items()}
-    for degree, part in other.items():
-        into = total.setdefault(degree, {})
-        for names, coefficient in part.items():
-            value = into.get(names, Fraction(0)) + sign * coefficient
-            if value:
-                into[names] = value
-            else:
-                into.pop(names, None)
-    return {degree: part for degree, part in total.items() if part}
+    for assignment in program.body:
+        if assignment.name in needed:
+            known[assignment.name] = value(assignment.value)
+    return [value(node) for node in program.transition.nodes]

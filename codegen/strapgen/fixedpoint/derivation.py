@@ -267,7 +267,7 @@ class _Derivation:
         self._other(name, Quotient(top, below), enclosure, meaning)
 
     def _sqrt(self, name: str, node: Operation, meaning: str) -> None:
-        argument = self._operand(node.arguments[0], f"{_stem(name)}_radicand")
+        argument = self._radicand(node.arguments[0], f"{_stem(name)}_radicand")
         if isinstance(argument, Fraction):
             root = Interval.of(argument).sqrt()
             held = Sum((((), root.lowest),))
@@ -284,6 +284,20 @@ class _Derivation:
             )
         self._note(name, *(np.sqrt(np.maximum(s[argument], 0)) for s in (self.proper, self.any)))
         self._other(name, Root(argument), inside.sqrt(), meaning)
+
+    def _radicand(self, node: Node, name: str) -> Operand:
+        """Return what a root is drawn from; a sum of squares as squares of words, so that it is not below 0."""
+        squared = _squares(node)
+        if not squared or not any(self.items[n].beside or self.items[n].offset for n in squared):
+            return self._operand(node, name)
+        terms: Terms = {}
+        for factor in squared:
+            whole = self._operand(Reference(factor), f"{factor}_whole")
+            square: Terms = {(whole, whole): Fraction(1)} if isinstance(whole, str) else {(): whole * whole}
+            terms = combined(terms, square, Fraction(1))
+        free = self._free(name)
+        self._store(free, terms, "", whole=True)
+        return free
 
     def _maximum(self, name: str, node: Operation, meaning: str) -> None:
         arguments = tuple(self._operand(a, f"{name}_argument") for a in _flat("maximum", node))
@@ -410,6 +424,17 @@ class _Derivation:
         taken = self.items.keys() | {assignment.name for assignment in self.program.body}
         candidates = (name if k == 1 else f"{name}_{k}" for k in range(1, len(taken) + 2))
         return next(candidate for candidate in candidates if candidate not in taken)
+
+
+def _squares(node: Node) -> list[str]:
+    """Return the names whose squares a node is the sum of; none if it is no such sum."""
+    if not isinstance(node, Operation):
+        return []
+    if node.kind == "add":
+        parts = [_squares(argument) for argument in node.arguments]
+        return [name for part in parts for name in part] if all(parts) else []
+    left, right = node.arguments if node.kind == "multiply" else (None, None)
+    return [left.name] if isinstance(left, Reference) and left == right else []
 
 
 #: Functions on samples.
