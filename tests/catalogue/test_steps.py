@@ -197,8 +197,8 @@ def test_a_step_by_a_tableau_of_a_file_says_the_command_that_makes_it(tmp_path):
     tableau = read(tmp_path / "heun.toml")
     kernel = derive("euler", tableau, 3, previous=1)
     assert kernel.name == "euler-heun-of-third-order-3-previous1"
-    assert kernel.arguments == "euler --tableau FILE.toml --increments 3 --previous 1"
-    assert derive("dcm", tableau, rates=True).arguments == "dcm --tableau FILE.toml --rates"
+    assert kernel.arguments == f"euler --tableau {tmp_path}/heun.toml --increments 3 --previous 1"
+    assert derive("dcm", tableau, rates=True).arguments == f"dcm --tableau {tmp_path}/heun.toml --rates"
     assert kernel.source.endswith(HEUN.split('"')[3])
 
 

@@ -310,7 +310,7 @@ def test_a_tableau_of_a_file_becomes_c_that_compiles(strapgen_says, tmp_path):
     assert said.startswith("dcm-heun-of-third-order-4 for c: ")
     assert {path.name for path in (tmp_path / "firmware").iterdir()} == {f"{name}.c", f"{name}.h"}
     header = (tmp_path / "firmware" / f"{name}.h").read_text()
-    assert "strapgen generate dcm --tableau FILE.toml --increments 4 --target c" in header
+    assert "strapgen generate dcm --tableau my.toml --increments 4 --target c" in header
     assert "Heun of third order: K. Heun, 1900." in " ".join(header.replace("\n *", " ").split())
     flags = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-c"]
     done = subprocess.run(
@@ -790,3 +790,47 @@ def test_interruption(capsys, monkeypatch):
     said = capsys.readouterr()
     assert said.out == ""
     assert "Traceback" not in said.err
+
+
+def test_converge_prints_what_python_finds(strapgen_says):
+    said = strapgen_says(
+        "converge dcm --method rk1,rk2 --increments 1 --steps 1/8,1/16,1/32 --duration 1 --format json"
+    )
+    for data, method in zip(json.loads(said), ("rk1", "rk2"), strict=True):
+        assert data["kernel"] == f"dcm-{method}-1"
+        assert data["predicted_order"] == int(method[-1])
+        assert abs(data["observed_order"] - data["predicted_order"]) < 0.15
+        assert [rung["step_s"] for rung in data["rungs"]] == [0.125, 0.0625, 0.03125]
+
+
+def test_converge_takes_as_many_increments_as_the_method_needs(strapgen_says):
+    said = strapgen_says(
+        "converge euler --method rk2,butcher6 --increments enough --steps 1/8,1/16 --duration 1 --format csv"
+    )
+    assert {row["kernel"] for row in csv.DictReader(io.StringIO(said))} == {"euler-rk2-1", "euler-butcher6-4"}
+
+
+@pytest.mark.parametrize(("limit", "status"), [("0.2", 0), ("0.0000001", 1)])
+def test_converge_is_a_gate(limit, status, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(shlex.split(f"converge euler --method rk2 --steps 1/8,1/16 --duration 1 --fail-beyond {limit}"))
+    assert stop.value.code == status
+    assert capsys.readouterr().err.count("\n") == status
+
+
+def test_check_fails_with_the_names_of_what_fails(capsys, tmp_path):
+    text = (DATA / "algorithms" / "picard.py").read_text()
+    claimed = text.replace(
+        '        transition="transition",', '        transition="transition", order=Order(7, 7, 2, 7),'
+    )
+    lines = claimed.splitlines()
+    lines.insert(2, "from strapgen.order import Order")
+    (tmp_path / "wrong.py").write_text("\n".join(lines))
+    with pytest.raises(SystemExit) as stop:
+        main(["check", str(tmp_path / "wrong.py"), "--format", "json"])
+    said = capsys.readouterr()
+    assert stop.value.code == 1
+    assert said.err.startswith("strapgen: ") and "fails: order" in said.err
+    data = json.loads(said.out)
+    assert data["holds"] is False
+    assert {finding["name"] for finding in data["findings"] if finding["holds"] is False} == {"order"}

@@ -186,7 +186,15 @@ def choose(
     >>> choose("euler").kernel
     'euler-rk4-2'
     """
-    if name in user.KERNELS and method is None and increments is None:
+    if name in user.KERNELS:
+        for option, value in (
+            ("method", method),
+            ("increments", increments),
+            ("rates", rates),
+            ("previous", previous),
+        ):
+            if value:
+                raise InputError(f"kernel {name} is loaded with its options; it takes no {option}")
         return Choice(name)
     if name.endswith(".py") or (name not in ALGORITHMS and name not in KERNELS and name in user.installed()):
         return _choose_own(name, method, increments, rates, previous)

@@ -10,7 +10,7 @@ from strapgen.catalogue.coefficients import Number
 from strapgen.catalogue.kinematics import Kinematics
 from strapgen.catalogue.order_conditions import attitude_order
 from strapgen.catalogue.steps import Method, Samples, combination
-from strapgen.catalogue.tableaux import TABLEAUX, Tableau
+from strapgen.catalogue.tableaux import Tableau
 from strapgen.kernel import Kernel, KernelBuilder
 from strapgen.signal import Signal
 
@@ -43,7 +43,7 @@ def method(tableau: Tableau) -> Method:
         transition,
         nodes=nodes(tableau),
         attitude_order=lambda degree: attitude_order(tableau, degree),
-        option=f"--method {tableau.name}" if tableau.name in TABLEAUX else "--tableau FILE.toml",
+        option=tableau.option,
     )
 
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
+import shlex
 import tomllib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
@@ -53,6 +54,8 @@ class Tableau:
         Weights of a second method on the same stages.
     tolerance : Fraction
         Largest residual of a condition that the rounding of published coefficients explains; 0: they are exact.
+    file : str
+        Where it was read; empty for one of the catalogue.
 
     Examples
     --------
@@ -69,6 +72,12 @@ class Tableau:
     weights: tuple[Number, ...]
     embedded_weights: tuple[Number, ...] | None = None
     tolerance: Fraction = Fraction(0)
+    file: str = field(default="", compare=False, repr=False)
+
+    @property
+    def option(self) -> str:
+        """How the command line names it."""
+        return f"--tableau {shlex.quote(self.file)}" if self.file else f"--method {self.name}"
 
     @property
     def rational(self) -> bool:
@@ -162,7 +171,10 @@ def read(path: str | Path) -> Tableau:
         raise InputError(f"{path} {error}") from None
     try:
         _check_keys(data)
-        tableau = _tableau(data, _slug(data["name"]))
+        name = _slug(data["name"])
+        if name in TABLEAUX:
+            raise InputError(f"name {data['name']!r} is that of the method {name}; another one is needed")
+        tableau = replace(_tableau(data, name), file=checks.text("the name of the file", str(path)))
         verify(tableau)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None

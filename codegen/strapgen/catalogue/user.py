@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from strapgen import checks
-from strapgen.catalogue.tableaux import TABLEAUX
 from strapgen.exceptions import InputError, StrapgenError
 
 if TYPE_CHECKING:
@@ -84,8 +83,7 @@ def _arguments(name: str, options: dict[str, Any]) -> str:
     words = [shlex.quote(checks.text("the name of the file", name))]
     for option, value in options.items():
         if option == "method":
-            built_in = TABLEAUX.get(value.name) == value
-            words += ["--method", value.name] if built_in else ["--tableau", "FILE.toml"]
+            words.append(value.option)
         else:
             words += [f"--{option}", str(value)]
     return " ".join(words)

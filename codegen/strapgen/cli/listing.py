@@ -18,8 +18,9 @@ def list_names(format: Format = "text") -> None:
     from strapgen.motions import keys
     from strapgen.targets import TARGETS
 
-    parts = {
-        "algorithms": catalogue.ALGORITHMS,
+    installed = {name: f"from {point.value}" for name, point in catalogue.user.installed().items()}
+    parts: dict[str, dict[str, str]] = {
+        "algorithms": {**catalogue.ALGORITHMS, **installed},
         "methods": catalogue.METHODS,
         "kernels": {name: recipe.title for name, recipe in catalogue.KERNELS.items()},
         "motions": {
@@ -32,6 +33,10 @@ def list_names(format: Format = "text") -> None:
     if format == "json":
         print_json(parts)
         return
+    series = [name for name in catalogue.METHODS if name.startswith("taylor")]
+    methods = {name: title for name, title in catalogue.METHODS.items() if name not in series}
+    methods[f"{series[0]} to {series[-1]}"] = "Taylor series of the transition, of any order to 20"
+    parts["methods"] = methods
     width = max(len(name) for part in parts.values() for name in part)
     for title, part in parts.items():
         typer.echo(title)
