@@ -22,8 +22,8 @@ def findings(choice: catalogue.Choice) -> dict[str, behaviour.Finding]:
     ("method", "increments", "previous"),
     [
         ("rk4", 2, 0),
-        ("rk1", 1, 0),
-        ("magnus4", 2, 0),
+        pytest.param("rk1", 1, 0, marks=pytest.mark.long),
+        pytest.param("magnus4", 2, 0, marks=pytest.mark.long),
         pytest.param("munthe-kaas4", 1, 2, marks=pytest.mark.long),
         pytest.param("taylor6", 4, 0, marks=pytest.mark.long),
         pytest.param("dormand-prince5", 3, 1, marks=pytest.mark.long),
@@ -99,18 +99,26 @@ RIGHT = {
             ["direction", "order"],
             "a sign, or a transposed matrix",
         ),
-        ({"phi": "2 * (first + second)"}, ["direction", "order"], "wrong in size or axis"),
+        pytest.param(
+            {"phi": "2 * (first + second)"},
+            ["direction", "order"],
+            "wrong in size or axis",
+            marks=pytest.mark.long,
+        ),
         (
             {"phi": "first + second + sp.Rational(2, 3) * sp.Matrix([first[1] * second[2], 0, 0])"},
             ["no preferred axis", "order"],
             "does not turn with them",
         ),
-        (
+        pytest.param(
             {"transition": "algebra.quaternion(phi + sp.Matrix([0, 0, sp.Rational(1, 10**6)]))"},
             ["at rest", "no preferred axis"],
             "without rotation the state moves",
+            marks=pytest.mark.long,
         ),
-        ({"identity": "(0, 0, 1, 0)"}, ["no rotation"], "not the unit matrix"),
+        pytest.param(
+            {"identity": "(0, 0, 1, 0)"}, ["no rotation"], "not the unit matrix", marks=pytest.mark.long
+        ),
     ],
 )
 def test_a_fault_is_found(fault, fails, says, tmp_path):

@@ -221,11 +221,22 @@ def truncated_exponential(algorithm: str, order: int) -> list:
     return list(total.flat if algorithm == "dcm" else total[:, 3])
 
 
+#: Three and eight increments, and with the long tests what is between them.
+MORE_INCREMENTS = [
+    pytest.param(count, marks=() if count in (3, MOST_INCREMENTS) else pytest.mark.long)
+    for count in range(3, MOST_INCREMENTS + 1)
+]
 #: The others have polynomials of hundreds of terms; that equal increments give a constant rate is proved for all.
 RATIONAL = [name for name in TABLEAUX if TABLEAUX[name].rational and TABLEAUX[name].order < 7]
 
 
-@pytest.mark.parametrize("method", [*STANDARD_METHODS, *(m for m in RATIONAL if m not in STANDARD_METHODS)])
+@pytest.mark.parametrize(
+    "method",
+    [
+        *STANDARD_METHODS,
+        *(pytest.param(m, marks=pytest.mark.long) for m in RATIONAL if m not in STANDARD_METHODS),
+    ],
+)
 @pytest.mark.parametrize("algorithm", STEP_NAMES)
 def test_no_number_of_increments_changes_a_step_at_a_constant_rate(algorithm, method):
     # On any axis: the same polynomial, so that all of the above holds for every count.
@@ -245,7 +256,7 @@ def test_at_a_constant_rate_a_step_is_the_exponential_cut_off(algorithm, method)
         assert turn_at_a_constant_rate(algorithm, method, increments, previous) == expected
 
 
-@pytest.mark.parametrize("increments", range(3, MOST_INCREMENTS + 1))
+@pytest.mark.parametrize("increments", MORE_INCREMENTS)
 @pytest.mark.parametrize("algorithm", STEP_NAMES)
 def test_claims_3_and_4_with_three_to_eight_increments(algorithm, increments):
     found = [leading(lost(algorithm, method, "y", increments)) for method in STANDARD_METHODS]
@@ -259,7 +270,7 @@ def test_claims_3_and_4_with_three_to_eight_increments(algorithm, increments):
     assert ratio(ratios["xyz"], ratios["y"], 1) == 3
 
 
-@pytest.mark.parametrize("increments", range(3, MOST_INCREMENTS + 1))
+@pytest.mark.parametrize("increments", MORE_INCREMENTS)
 def test_claim_2_with_three_to_eight_increments(increments):
     quotients = [
         ratio(lost("euler", method, "y", increments), lost("dcm", method, "y", increments), 1)

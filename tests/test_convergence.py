@@ -36,13 +36,17 @@ METHODS = [
 ]
 
 
+#: One method of every family; the others with the long tests.
+QUICK = ("rk1", "rk2", "ralston3", "rk4", "taylor4", "magnus4", "munthe-kaas4")
+
+
 def order_of(name: str) -> int:
     return TABLEAUX[name].order if name in TABLEAUX else INTEGRATORS[name].order
 
 
 @pytest.mark.parametrize("algorithm", ["euler", "dcm"])
 @pytest.mark.parametrize(
-    "method", [pytest.param(m, marks=pytest.mark.long if order_of(m) > 4 else ()) for m in METHODS]
+    "method", [pytest.param(m, marks=() if m in QUICK else pytest.mark.long) for m in METHODS]
 )
 def test_every_method_has_its_order_with_enough_increments(algorithm, method, coning):
     increments = catalogue.enough(method)

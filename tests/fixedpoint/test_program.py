@@ -188,8 +188,16 @@ def test_longer_words_have_smaller_bounds():
     assert bounds[0] / bounds[-1] > 2**55
 
 
+#: Kernels for integers; the longest steps, many seconds each in all settings, with the long tests.
+LOWERED = [
+    pytest.param(c, marks=pytest.mark.long if c.kernel in ("dcm-rk3-2", "dcm-rk4-2") else (), id=c.kernel)
+    for c in standard()
+    if can_lower(program(c))
+]
+
+
 @pytest.mark.parametrize("word", [8, 16, 32, 64])
-@pytest.mark.parametrize("choice", [c for c in standard() if can_lower(program(c))], ids=lambda c: c.kernel)
+@pytest.mark.parametrize("choice", LOWERED)
 def test_no_value_and_no_partial_sum_leaves_its_type(choice, word):
     angles = [Fraction(1, 10**6), Fraction(1, 8), Fraction(1)] if choice.method else [Fraction(1, 8)]
     for carry, angle, rounding in product(("none", "state", "full"), angles, ("nearest", "truncation")):

@@ -14,7 +14,14 @@ from strapgen.lowering.passes import optimize
 from strapgen.program import Program
 
 STEPS = [Choice(a, m, n) for a in ALGORITHMS for m in STANDARD_METHODS for n in (1, 2, 3, 4, 5, None)]
-EVERY = pytest.mark.parametrize("choice", STEPS, ids=lambda choice: choice.kernel)
+#: More than three increments have no more vectors than three, but more inputs: with the long tests.
+EVERY = pytest.mark.parametrize(
+    "choice",
+    [
+        pytest.param(choice, marks=pytest.mark.long if (choice.increments or 0) > 3 else (), id=choice.kernel)
+        for choice in STEPS
+    ],
+)
 
 
 def is_the_kernel(made: Program, choice: Choice) -> bool:
