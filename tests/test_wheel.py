@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from strapgen import resources
-from strapgen.catalogue import METHODS
+from strapgen.catalogue.tableaux import TABLEAUX
 
 pytestmark = pytest.mark.long
 
@@ -47,7 +47,7 @@ def test_templates_and_generated_sources_are_in_the_wheel(wheel):
         assert shipped
         assert shipped <= names
     assert "strapgen/cli/generate.py" in names
-    assert {f"strapgen/catalogue/methods/{method}.toml" for method in METHODS} <= names
+    assert {f"strapgen/catalogue/methods/{method}.toml" for method in TABLEAUX} <= names
     assert not any("__pycache__" in name or name.startswith(("tests/", "codegen/")) for name in names)
 
 

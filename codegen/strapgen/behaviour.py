@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -11,12 +11,13 @@ import mpmath
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen import catalogue, exact, fixedpoint, pipeline
+from strapgen import exact, fixedpoint, pipeline
 from strapgen.backends import Backend, of
 from strapgen.catalogue import Choice
-from strapgen.convergence import converge
+from strapgen.convergence import GENERAL, converge, interpreter, step_of_increments
 from strapgen.exceptions import CompilerError, InputError
 from strapgen.fixedpoint import Settings
+from strapgen.gyro import windows
 from strapgen.motions import motion
 from strapgen.program import Program
 from strapgen.simulation import attitude, drift_between, simulate
@@ -80,18 +81,25 @@ def check(choice: Choice) -> Iterator[Finding]:
     >>> found["order"], found["at rest"]
     (True, True)
     """
-    kernel = catalogue.derive(choice)
-    if kernel.companions is None or kernel.inputs[1].name != "increments":
-        raise InputError(f"kernel {kernel.name} takes no increments; a step that does is needed")
-    step = _Precise(pipeline.lower(kernel))
-    yield _no_rotation(step)
-    yield _at_rest(step)
-    yield _direction(step)
-    yield _turning_frame(step)
-    yield _order(choice)
-    yield from _long_run(choice)
-    yield from _back_ends(choice, step.program)
-    yield _restoring(choice, step)
+    step = _Precise(pipeline.lower(step_of_increments(choice)))
+    looks: dict[str, Callable[[], Iterable[Finding]]] = {
+        "no rotation": lambda: [_no_rotation(step)],
+        "at rest": lambda: [_at_rest(step)],
+        "direction": lambda: [_direction(step)],
+        "no preferred axis": lambda: [_turning_frame(step)],
+        "order": lambda: [_order(choice)],
+        "drift": lambda: _long_run(choice),
+        "back ends": lambda: _back_ends(choice, step.program),
+        "orthonormalization": lambda: [_restoring(choice, step)],
+    }
+    for name, look in looks.items():
+        try:
+            yield from look()
+        except (
+            ArithmeticError,
+            ValueError,
+        ) as error:  # of the algorithm: a division by zero, a number out of range
+            yield Finding(name, False, f"it stops with {type(error).__name__}: {error or 'division by zero'}")
 
 
 class _Precise:
@@ -103,7 +111,7 @@ class _Precise:
         self.program = program
         self.identity = companions.identity
         self.restoring = companions.orthonormalize
-        self._attitude = None if companions.attitude is None else _loaded(companions.attitude)
+        self._attitude = None if companions.attitude is None else interpreter(companions.attitude)
 
     def attitude(self, state: list[Any]) -> Any:
         """Return the direction cosine matrix of a state."""
@@ -122,10 +130,6 @@ class _Precise:
         return exact.states(self.program, rows, [exact.number(x) for x in self.identity])
 
 
-def _loaded(name: str) -> exact.Interpreter:
-    return exact.Interpreter(pipeline.lower(catalogue.derive(catalogue.choose(name))))
-
-
 def _samples(program: Program) -> int:
     return program.inputs[1].shape[0]
 
@@ -134,8 +138,6 @@ def _random(program: Program, steps: int, size: float = 0.02) -> NDArray[np.floa
     """Return increments that an algorithm with kept samples may see too: those of a window repeat in the next."""
     companions = program.companions
     assert companions is not None, "checked before"
-    from strapgen.gyro import windows
-
     previous, taken = companions.previous, _samples(program)
     row = np.random.default_rng(1969).uniform(-size, size, (previous + steps * (taken - previous), 3))
     return windows(row, taken - previous, previous)
@@ -216,10 +218,9 @@ def _turning_frame(step: _Precise) -> Finding:
 
 
 def _order(choice: Choice) -> Finding:
-    profile = motion("coning", a_rad_s=1, b_rad_s=1.5, g_rad_s=0.6)
-    found = converge(choice, profile, ["1/8", "1/16", "1/32", "1/64", "1/128"], 1)
+    found = converge(choice, motion("coning", **GENERAL), ["1/8", "1/16", "1/32", "1/64", "1/128"], 1)
     if found.observed is None:
-        return Finding("order", False, "no order is seen: the errors do not fall with the step")
+        return Finding("order", False, f"no order is seen: {found.hidden}")
     if found.predicted is None:
         text = f"observed {found.observed:.3f}; the kernel states none to compare with"
         return Finding("order", None, text, found.observed)
@@ -325,11 +326,7 @@ def _restoring(choice: Choice, step: _Precise) -> Finding:
     return Finding(name, after <= allowed, text, after, allowed)
 
 
-def as_text(findings: list[Finding], title: str) -> str:
-    """Return findings as a report."""
-    width = max(len(finding.name) for finding in findings)
+def as_text(finding: Finding) -> str:
+    """Return a finding as a line of a report."""
     words = {True: "holds", False: "FAILS", None: "-"}
-    lines = [title, ""]
-    for finding in findings:
-        lines.append(f"  {words[finding.holds]:<6}{finding.name:<{width}}  {finding.text}")
-    return "\n".join(lines)
+    return f"  {words[finding.holds]:<6}{finding.name:<18}  {finding.text}"

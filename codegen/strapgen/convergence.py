@@ -16,8 +16,9 @@ import numpy as np
 from strapgen import catalogue, checks, exact, pipeline
 from strapgen.backends import BACKENDS, of
 from strapgen.catalogue import Choice
-from strapgen.exceptions import InputError
+from strapgen.exceptions import InputError, InputTypeError
 from strapgen.fixedpoint import Settings
+from strapgen.kernel import Kernel
 from strapgen.motions import Motion
 from strapgen.order import Order
 from strapgen.simulation import largest_increment, simulate
@@ -29,6 +30,8 @@ EXACT = "exact"
 FITTED = 3
 #: Algorithms side by side in a report.
 _COLUMNS = 4
+#: A motion whose rate changes direction and size, of about 1 rad/s: settings of coning.
+GENERAL = {"a_rad_s": "1", "b_rad_s": "1.5", "g_rad_s": "0.6"}
 #: Errors beyond this are no beginning of a series, in rad.
 _MOST_ERROR = 0.3
 
@@ -76,6 +79,20 @@ class Convergence:
     order: Order | None
     rungs: tuple[Rung, ...]
     observed: float | None
+
+    @property
+    def hidden(self) -> str:
+        """Why there is no observed order; "" if there is one."""
+        errors = [rung.error_rad for rung in self.rungs if rung.error_rad is not None]
+        if self.observed is not None:
+            return ""
+        if not errors:
+            return "every run leaves the range of its numbers"
+        if min(errors) > _MOST_ERROR:
+            return f"the errors are over {_MOST_ERROR} rad, too large for a slope; shorter steps are needed"
+        if max(errors) < 1e-25:
+            return "the algorithm is exact on this motion"
+        return f"rounding hides the order on {self.backend}, or too few steps show it"
 
     @property
     def predicted(self) -> int | None:
@@ -143,10 +160,10 @@ def converge(
     (2, 2.0)
     """
     checks.choice("backend", backend, [*BACKENDS, EXACT])
-    kernel = catalogue.derive(choice)
-    if kernel.companions is None or kernel.inputs[1].name != "increments":
-        raise InputError(f"kernel {kernel.name} takes no increments; a step that does is needed")
+    kernel = step_of_increments(choice)
     total = checks.number("duration", duration, positive=True)
+    if isinstance(steps, str):
+        raise InputTypeError(f"steps is {steps!r}; a sequence of step lengths is needed")
     lengths = sorted({checks.number("step", step, positive=True) for step in steps}, reverse=True)
     if len(lengths) < 2:
         raise InputError("a slope takes two steps or more; give different ones")
@@ -160,6 +177,22 @@ def converge(
         error, floor = measure(length, count)
         rungs.append((float(length), error, error is not None and floor < error < _MOST_ERROR))
     return _fitted(kernel.name, backend, kernel.order, rungs)
+
+
+def step_of_increments(choice: Choice) -> Kernel:
+    """Return the kernel of a chosen attitude step.
+
+    Raises
+    ------
+    InputError, InputTypeError
+        If it takes no increments, or no choice is given.
+    """
+    if not isinstance(choice, Choice):
+        raise InputTypeError(f"choice is {choice!r}; what catalogue.choose returns is needed")
+    kernel = catalogue.derive(choice)
+    if kernel.companions is None or kernel.inputs[1].name != "increments":
+        raise InputError(f"kernel {kernel.name} takes no increments; a step that does is needed")
+    return kernel
 
 
 def _fitted(
@@ -204,6 +237,11 @@ def _on_backend(
     return measure
 
 
+def interpreter(name: str) -> exact.Interpreter:
+    """Return a kernel by name that runs in many digits."""
+    return exact.Interpreter(pipeline.lower(catalogue.derive(catalogue.choose(name))))
+
+
 def _exactly(choice: Choice, motion: Motion, rounding: float) -> _Measure:
     """Return what measures the error of a step length in many digits.
 
@@ -215,11 +253,8 @@ def _exactly(choice: Choice, motion: Motion, rounding: float) -> _Measure:
     assert program.companions is not None, "checked by the caller"
     samples, previous = catalogue.increments(choice), catalogue.previous(choice)
 
-    def loaded(name: str) -> exact.Interpreter:
-        return exact.Interpreter(pipeline.lower(catalogue.derive(catalogue.choose(name))))
-
-    increment, truth = loaded(f"{motion.name}-increments"), loaded(f"{motion.name}-truth")
-    attitude = loaded(program.companions.attitude) if program.companions.attitude else None
+    increment, truth = interpreter(f"{motion.name}-increments"), interpreter(f"{motion.name}-truth")
+    attitude = interpreter(program.companions.attitude) if program.companions.attitude else None
     identity = program.companions.identity
 
     def measure(length: Fraction, count: int) -> tuple[float | None, float]:
@@ -252,9 +287,7 @@ def as_text(found: Sequence[Convergence], title: str) -> str:
     for first in range(0, len(found), _COLUMNS):
         lines += ["", *_table(found[first : first + _COLUMNS])]
     notes = [f"{one.kernel}: {one.order}" for one in found if one.order is not None and one.order.limited]
-    notes += [
-        f"{one.kernel}: rounding hides the order on {one.backend}" for one in found if one.observed is None
-    ]
+    notes += [f"{one.kernel}: {one.hidden}" for one in found if one.hidden]
     return "\n".join([*lines, *([""] if notes else []), *notes])
 
 

@@ -38,6 +38,12 @@ def windows(increments: Any, count: int, previous: int = 0) -> NDArray[np.float6
            [ 6.,  9., 12.]])
     """
     row = np.ascontiguousarray(increments, np.float64)
+    checks.count("count", count)
+    checks.count("previous", previous, smallest=0)
+    if row.ndim != 2 or row.shape[1] != 3 or (len(row) - previous) % count or len(row) < previous:
+        raise InputError(
+            f"increments has shape {row.shape}; ({previous} + a multiple of {count}, 3) is needed for whole steps"
+        )
     if not previous:
         return row.reshape(-1, count, 3)
     if len(row) < previous + count:

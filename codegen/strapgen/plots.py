@@ -215,7 +215,7 @@ def convergence_image(found: Sequence[Convergence], title: str, path: str | Path
         If the kind of image is unknown.
     """
     pyplot = _pyplot()
-    figure, axes = pyplot.subplots(figsize=(8.5, 5.5), layout="constrained")
+    figure, axes = pyplot.subplots(figsize=(8.0, 6.0), layout="constrained")
     colours = pyplot.get_cmap("viridis")(np.linspace(0.0, 0.85, len(found)))
     for number, (one, colour) in enumerate(zip(found, colours, strict=True)):
         rungs = [rung for rung in one.rungs if rung.error_rad]
@@ -244,8 +244,9 @@ def convergence_image(found: Sequence[Convergence], title: str, path: str | Path
             line = (anchor.error_rad or 0.0) * (wide / anchor.step_s) ** one.predicted
             axes.plot(wide, line, color=colour, linewidth=0.9, linestyle="--")
     axes.set_xscale("log", base=2)
-    axes.set_yscale("log")
-    axes.set_ylim(top=10)
+    if any(rung.error_rad for one in found for rung in one.rungs):  # else all are exact: nothing to draw
+        axes.set_yscale("log")
+        axes.set_ylim(top=10)
     ticks = sorted({rung.step_s for one in found for rung in one.rungs})
     axes.set_xticks(ticks, [_fraction(step) for step in ticks])
     axes.minorticks_off()
@@ -255,12 +256,13 @@ def convergence_image(found: Sequence[Convergence], title: str, path: str | Path
     axes.grid(alpha=0.25, linewidth=0.6)
     axes.legend(
         alignment="left",
+        title="order: slope of filled points; theory is dashed",
         title_fontsize=9,
-        frameon=False,
+        frameon=True,
+        framealpha=0.85,
+        edgecolor="none",
         fontsize=9,
-        loc="upper left",
-        bbox_to_anchor=(1.0, 1.0),
-        title="order: slope of filled points;\ntheory is dashed",
+        loc="lower right",
     )
     axes.set_title(title.encode(errors="replace").decode(), loc="left", fontsize=11)
     return _image(figure, path)

@@ -158,8 +158,8 @@ def test_square_roots_in_a_file(written):
     assert tableau.nodes == (0, sp.Rational(1, 2) + sp.sqrt(3) / 6)
 
 
-def test_an_order_may_be_stated_too_low(written):
-    assert read(written(order="1")).order == 1
+def test_an_order_that_is_stated_too_low_is_found_out(written):
+    assert read(written(order="1")).order == 2
 
 
 def test_rounded_coefficients_pass_with_a_tolerance(written):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shlex
 import subprocess
+import sys
 from fractions import Fraction
 from importlib.metadata import EntryPoint
 from pathlib import Path
@@ -19,7 +20,7 @@ from strapgen import catalogue
 from strapgen.catalogue import user
 from strapgen.catalogue.tableaux import TABLEAUX
 from strapgen.cli import main
-from strapgen.exceptions import InputError
+from strapgen.exceptions import InputError, InputTypeError
 
 FOLDER = Path(__file__).resolve().parents[1] / "data" / "algorithms"
 CONING = "--motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 --step 0.125 --duration 5"
@@ -186,7 +187,7 @@ WRONG = {
         "return 3, build.kernel(",
         "algorithm() returned tuple; a Kernel is needed",
     ),
-    "companions": (", companions=Companions", "); (Companions", "kernel mine has no companions"),
+    "companions": (", companions=Companions", "); (Companions", "kernel mine: it has no companions"),
     "name": ('kernel("mine"', 'kernel("My step"', "kernel 'My step' has no name for generated code"),
     "empty name": ('kernel("mine"', 'kernel(""', "kernel '' has no name for generated code"),
     "taken name": ('kernel("mine"', 'kernel("euler-product"', "kernel euler-product is in the catalogue"),
@@ -195,7 +196,51 @@ WRONG = {
     "meaning": ("twice the increment", "twice\\nthe", "its meaning of twice is no text of one line"),
     "element": ('"d_x"', '"d x"', "'d x' is no name for generated code"),
     "signal": ('"twice"', '"2"', "'2' is no name for generated code"),
-    "unknown": ("(1 + twice[0])", "(1 + sp.Symbol('w'))", "next uses w, not defined before it"),
+    "unknown": ("(1 + twice[0])", "(1 + sp.Symbol('w'))", "next_11 uses w, not defined before it"),
+    "float": (
+        "(1 + twice[0])",
+        "(1 + 0.45 * twice[0])",
+        "next_11 holds the inexact number 0.45, which cannot",
+    ),
+    "function": ("(1 + twice[0])", "(1 + sp.tan(twice[0]))", "next_11 holds tan, which cannot be generated"),
+    "power": ("(1 + twice[0])", "(1 + twice[0]) ** sp.Rational(1, 3)", "next_11 holds a power 1/3"),
+    "imaginary": ("(1 + twice[0])", "(1 + sp.sqrt(-2))", "holds 1 + sqrt(2)*I"),
+    "huge": ("(1 + twice[0])", "10**400", "which cannot be generated; allowed: exact numbers"),
+    "no default": (
+        "(1 + twice[0])",
+        "sp.Piecewise((1, twice[0] > 0), evaluate=False)",
+        "a Piecewise without a last case that is always true",
+    ),
+    "condition": (
+        "(1 + twice[0])",
+        "sp.Piecewise((1, sp.Eq(twice[0], 0)), (2, True))",
+        "holds the condition Eq(v_x, 0)",
+    ),
+    "twice": ('"twice", "v"', '"twice", "d"', "d_x of twice is defined twice"),
+    "of C": ('kernel("mine"', 'kernel("double"', "kernel double has a name that C or Python use themselves"),
+    "of Python": ('kernel("mine"', 'kernel("lambda"', "kernel lambda has a name that C or Python use"),
+    "of ours": (
+        'kernel("mine"',
+        'kernel("euler-rk4-2"',
+        "kernel euler-rk4-2 is in the catalogue, or looks like",
+    ),
+    "letters": ('kernel("mine"', 'kernel("naïve"', "kernel 'naïve' has no name for generated code"),
+    "identity of text": (
+        "(Fraction(0),) * 9",
+        "('a',) * 9",
+        "identity holds 'a'; whole numbers or fractions",
+    ),
+    "wrong attitude": (
+        "(None, None, None,",
+        '(None, None, "euler-normalize",',
+        "its attitude euler-normalize must",
+    ),
+    "wrong scheme": (
+        "(None, None, None,",
+        '(None, "euler-normalize", None,',
+        "its orthonormalize euler-normalize",
+    ),
+    "exit": ("    build = K", "    raise SystemExit(0)\n    build = K", "ends the program with sys.exit"),
     "too few": (
         "return build.kernel",
         "build.outputs[0] = Stage(build.outputs[0].signal, (sp.S.One,)); return build.kernel",
@@ -264,9 +309,7 @@ def test_an_attitude_kernel_must_turn_the_state_into_a_matrix(folder):
     (folder / "mrp.py").write_text(
         text.replace('Signal.matrix("attitude", "C"', 'Signal.labelled("attitude", "C", "123456789"')
     )
-    with pytest.raises(
-        InputError, match=r"dcm-from-mrp: it must turn a state \(3,\) into a matrix \(3, 3\)$"
-    ):
+    with pytest.raises(InputError, match=r"its attitude dcm-from-mrp must turn \(3,\) into \(3, 3\)$"):
         strapgen.derive("mrp.py")
     (folder / "mrp.py").write_text(text.replace('None, None, "dcm-from-mrp"', "None, None, None"))
     with pytest.raises(InputError, match=r"attitude is None, but the state is no matrix \(3, 3\)$"):
@@ -284,7 +327,7 @@ def test_an_attitude_kernel_must_turn_the_state_into_a_matrix(folder):
         ),
         ("picard.py", {"method": "rk2"}, r"picard.py: its algorithm\(\) takes no method"),
         ("picard.py", {"previous": 1}, r"picard.py: its algorithm\(\) takes no previous"),
-        ("mrp.py", {"method": "magnus4"}, "method 'magnus4' is not known; allowed: rk1, "),
+        ("mrp.py", {"method": "magnus4"}, "method 'magnus4' has no tableau; these have: rk1, "),
         ("mrp.py", {"increments": 9}, "increments is 9; a whole number from 1 to 8"),
         ("mrp.py", {"previous": 4}, "previous is 4; a whole number from 0 to 3"),
         ("mrp.py", {"rates": True}, "mrp.py: an algorithm of a user takes increments, not rates"),
@@ -391,3 +434,21 @@ def test_a_program_is_the_same_polynomial_as_a_user_s_kernel(folder):
     ring, *generators = sp.ring(names, sp.QQ)
     result = strapgen.lower(kernel).run(dict(zip(names, generators, strict=True)))
     assert [ring(element) for element in result["next"]] == kernel.polynomials()["next"]
+
+
+def test_what_lies_beside_a_file_can_be_imported_and_what_it_prints_is_no_output(tmp_path, capsys):
+    (tmp_path / "coefficients.py").write_text("FACTOR = 2\n")
+    text = STEP.replace(
+        "import sympy as sp", "import sympy as sp\nfrom coefficients import FACTOR\nprint('hello')"
+    )
+    (tmp_path / "beside.py").write_text(text.replace("2 * d)", "FACTOR * d)"))
+    before = list(sys.path)
+    assert strapgen.derive(tmp_path / "beside.py").name == "mine"
+    assert sys.path == before
+    said = capsys.readouterr()
+    assert (said.out, said.err) == ("", "hello\n")
+
+
+def test_a_name_that_is_none():
+    with pytest.raises(InputTypeError, match="algorithm is None; a name or the path"):
+        strapgen.derive(None)

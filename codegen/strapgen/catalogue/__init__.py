@@ -6,6 +6,7 @@ loaded when it is derived.
 
 from __future__ import annotations
 
+import os
 from fractions import Fraction
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -13,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from strapgen import checks
 from strapgen.catalogue import user
 from strapgen.catalogue.tableaux import TABLEAUX, TITLES, Tableau
-from strapgen.exceptions import InputError
+from strapgen.exceptions import InputError, InputTypeError
 
 if TYPE_CHECKING:
     from strapgen.catalogue.steps import Method
@@ -186,6 +187,10 @@ def choose(
     >>> choose("euler").kernel
     'euler-rk4-2'
     """
+    if isinstance(name, os.PathLike):
+        name = os.fspath(name)
+    if not isinstance(name, str):
+        raise InputTypeError(f"algorithm is {name!r}; a name or the path of a Python file is needed")
     if name in user.KERNELS:
         for option, value in (
             ("method", method),
@@ -239,14 +244,20 @@ def _choose_own(
         options["increments"] = checks.count("increments", increments, largest=MOST_INCREMENTS)
     if previous:
         options["previous"] = checks.count("previous", previous, smallest=0, largest=MOST_PREVIOUS)
-    return Choice(user.load(name, frozenset([*ALGORITHMS, *KERNELS]), **options).name)
+    return Choice(
+        user.load(
+            name, frozenset([*ALGORITHMS, *KERNELS]), lambda known: derive(Choice(known)), **options
+        ).name
+    )
 
 
 def _allowed(*more: str) -> str:
-    return f"{', '.join([*ALGORITHMS, *user.installed(), *more])}, or a Python file"
+    return f"{', '.join(dict.fromkeys([*ALGORITHMS, *user.installed(), *more]))}, or a Python file"
 
 
 def _tableau_name(method: str) -> str:
+    if method in INTEGRATORS:
+        raise InputError(f"method {method!r} has no tableau; these have: {', '.join(TABLEAUX)}")
     return checks.choice("method", method, TABLEAUX)
 
 

@@ -31,17 +31,10 @@ def method(order: int) -> Method:
     """
 
     def transition(build: KernelBuilder, kinematics: Kinematics, samples: Samples) -> sp.Matrix:
-        moments = [
-            samples.combination(f"moment_{power}", samples.fit.moment(power), _MEANINGS[power])
-            for power in range(order // 2)
-        ]
-        vector = moments[0]
-        if order > 2:
-            vector = build.stage(
-                Signal.vector("phi", "phi", unit="rad", meaning="rotation vector of the step"),
-                (_fourth if order == 4 else _sixth)(build, *moments),
-            )
-        return kinematics.exponential(vector)
+        if order == 2:
+            return kinematics.exponential(_moment(samples, 0))
+        phi = Signal.vector("phi", "phi", unit="rad", meaning="rotation vector of the step")
+        return kinematics.exponential(build.stage(phi, (_fourth if order == 4 else _sixth)(build, samples)))
 
     return Method(
         f"magnus{order}",
@@ -54,11 +47,14 @@ def method(order: int) -> Method:
     )
 
 
-_MEANINGS = (
-    "integral of the rate over the step",
-    "integral of the rate times t - 1/2, t in steps",
-    "integral of the rate times (t - 1/2)^2, t in steps",
-)
+def _moment(samples: Samples, power: int) -> sp.Matrix:
+    """Name the integral over the step of the rate times (t - 1/2)^power, t in steps."""
+    meaning = (
+        "integral of the rate over the step"
+        if power == 0
+        else "integral of the rate times t - 1/2, t in steps"
+    )
+    return samples.combination(f"moment_{power}", samples.fit.moment(power), meaning)
 
 
 def _commutator(a: sp.Matrix, b: sp.Matrix) -> sp.Matrix:
@@ -66,17 +62,32 @@ def _commutator(a: sp.Matrix, b: sp.Matrix) -> sp.Matrix:
     return algebra.cross(b, a)
 
 
-def _fourth(build: KernelBuilder, b0: sp.Matrix, b1: sp.Matrix) -> sp.Matrix:
+def _fourth(build: KernelBuilder, samples: Samples) -> sp.Matrix:
+    b0, b1 = _moment(samples, 0), _moment(samples, 1)
     return b0 - _commutator(b0, b1)
 
 
-def _sixth(build: KernelBuilder, b0: sp.Matrix, b1: sp.Matrix, b2: sp.Matrix) -> sp.Matrix:
+def _sixth(build: KernelBuilder, samples: Samples) -> sp.Matrix:
     def named(name: str, meaning: str, value: sp.Matrix) -> sp.Matrix:
         return build.stage(Signal.vector(name, name, unit="rad", meaning=meaning), value)
 
-    a1 = named("alpha_1", "rate at the middle of the step, times the step", sp.Rational(9, 4) * b0 - 15 * b2)
-    a2 = named("alpha_2", "its first derivative, times the step squared", 12 * b1)
-    a3 = named("alpha_3", "half of its second derivative, times the step cubed", 180 * b2 - 15 * b0)
+    def alpha(number: int, meaning: str, *factors: sp.Expr) -> sp.Matrix:
+        """Name a combination of the moments, which is one of the samples."""
+        moments = [samples.fit.moment(power) for power in range(3)]
+        weights = [
+            sum((f * w for f, w in zip(factors, column, strict=True)), sp.S.Zero)
+            for column in zip(*moments, strict=True)
+        ]
+        return samples.combination(f"alpha_{number}", [sp.radsimp(sp.expand(w)) for w in weights], meaning)
+
+    b0 = _moment(samples, 0)
+    a1 = alpha(
+        1, "rate at the middle of the step, times the step", sp.Rational(9, 4), sp.S.Zero, sp.Integer(-15)
+    )
+    a2 = alpha(2, "its first derivative, times the step squared", sp.S.Zero, sp.Integer(12), sp.S.Zero)
+    a3 = alpha(
+        3, "half of its second derivative, times the step cubed", sp.Integer(-15), sp.S.Zero, sp.Integer(180)
+    )
     c1 = named("commutator_1", "[alpha_1, alpha_2]", _commutator(a1, a2))
     c2 = named("commutator_2", "-[alpha_1, 2 alpha_3 + commutator_1]/60", -_commutator(a1, 2 * a3 + c1) / 60)
     left = named("left", "left side of the last commutator", c1 - 20 * a1 - a3)

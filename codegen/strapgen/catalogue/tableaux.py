@@ -176,6 +176,8 @@ def read(path: str | Path) -> Tableau:
             raise InputError(f"name {data['name']!r} is that of the method {name}; another one is needed")
         tableau = replace(_tableau(data, name), file=checks.text("the name of the file", str(path)))
         verify(tableau)
+        # A file may understate the order: what holds is what is told of it.
+        tableau = replace(tableau, order=order_conditions.order(tableau, MOST_ORDER))
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     return tableau

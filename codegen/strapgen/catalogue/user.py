@@ -6,9 +6,11 @@ are chosen by name from `OPTIONS`.
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 import inspect
 import shlex
+import sys
 import traceback
 from collections.abc import Callable
 from dataclasses import replace
@@ -39,7 +41,7 @@ def installed() -> dict[str, EntryPoint]:
     return {point.name: point for point in entry_points(group=GROUP)}
 
 
-def load(name: str, catalogue: frozenset[str], **options: Any) -> Kernel:
+def load(name: str, catalogue: frozenset[str], derived: Callable[[str], Kernel], **options: Any) -> Kernel:
     """Load an algorithm, check its kernel and remember it with the kernels of its own.
 
     Parameters
@@ -48,6 +50,8 @@ def load(name: str, catalogue: frozenset[str], **options: Any) -> Kernel:
         A Python file, or the name of an entry point.
     catalogue : frozenset of str
         Kernels that there are already.
+    derived : callable
+        Derives one of them.
     **options
         Of `OPTIONS`, those that the user chose.
 
@@ -71,7 +75,7 @@ def load(name: str, catalogue: frozenset[str], **options: Any) -> Kernel:
                 f"{name}: its {FUNCTION}({', '.join(takes)}) takes no {option}; {_allowed(takes)}"
             )
     kernel = _guarded(name, lambda: function(**options))
-    _check(name, kernel, catalogue)
+    _require(name, kernel, catalogue, derived)
     kernel = replace(kernel, arguments=_arguments(name, options))
     for made in (kernel, *kernel.own):
         KERNELS[made.name] = made
@@ -87,6 +91,19 @@ def _arguments(name: str, options: dict[str, Any]) -> str:
         else:
             words += [f"--{option}", str(value)]
     return " ".join(words)
+
+
+def _require(name: str, kernel: Any, catalogue: frozenset[str], derived: Callable[[str], Kernel]) -> None:
+    """Check what a user's function returned."""
+    from strapgen.catalogue import admission
+    from strapgen.kernel import Kernel
+
+    if not isinstance(kernel, Kernel):
+        raise InputError(f"{name}: {FUNCTION}() returned {type(kernel).__name__}; a Kernel is needed")
+    try:
+        admission.require(kernel, catalogue, derived)
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from None
 
 
 def _allowed(takes: list[str]) -> str:
@@ -107,88 +124,26 @@ def _from_file(path: Path) -> Callable[..., Any]:
 
 
 def _guarded(name: str, run: Callable[[], Any]) -> Any:
-    """Run a user's code; where it fails, say where and why in one line."""
+    """Run a user's code; where it fails, say where and why in one line.
+
+    What lies beside its file can be imported, and what it prints is no output of ours.
+    """
+    beside = [str(Path(name).resolve().parent)] if name.endswith(".py") else []
+    before = list(sys.path)
+    sys.path[:0] = beside
     try:
-        return run()
+        with contextlib.redirect_stdout(sys.stderr):
+            return run()
+    except SystemExit:
+        raise InputError(f"{name} ends the program with sys.exit; it must return a Kernel") from None
     except StrapgenError:
         raise
     except Exception as error:
-        frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename != __file__]
-        own = [frame for frame in frames if Path(frame.filename).name == Path(name).name] or frames
+        frames = traceback.extract_tb(error.__traceback__)
+        own = [frame for frame in frames if Path(frame.filename).name == Path(name).name]
         line = error.lineno if isinstance(error, SyntaxError) else own[-1].lineno if own else None
         where = "" if line is None else f", line {line}"
         said = error.msg if isinstance(error, SyntaxError) else " ".join(str(error).split())
         raise InputError(f"{name}{where}: {type(error).__name__}: {said}") from error
-
-
-def _check(name: str, kernel: Any, catalogue: frozenset[str]) -> None:
-    """Check that what a user's function returned is the kernel of an attitude step."""
-    from strapgen.kernel import Kernel
-
-    def refuse(reason: str) -> None:
-        raise InputError(f"{name}: {reason}")
-
-    if not isinstance(kernel, Kernel):
-        refuse(f"{FUNCTION}() returned {type(kernel).__name__}; a Kernel is needed")
-    if kernel.companions is None:
-        refuse(f"kernel {kernel.name} has no companions; an attitude step needs them")
-    for made in (kernel, *kernel.own):
-        if not made.name.replace("-", "_").isidentifier() or made.name != made.name.lower():
-            refuse(f"kernel {made.name!r} has no name for generated code; a-z, 0-9 and hyphens are allowed")
-        if made.name in catalogue:
-            refuse(f"kernel {made.name} is in the catalogue; another name is needed")
-        signals = [*made.inputs, *(stage.signal for stage in (*made.stages, *made.outputs))]
-        for signal in signals:
-            for part in (signal.name, *signal.elements):
-                if not (part.isascii() and part.isidentifier()):
-                    refuse(f"kernel {made.name}: {part!r} is no name for generated code")
-        texts = {"title": made.title, "source": made.source}
-        texts |= {f"note {number}": note for number, note in enumerate(made.notes, 1)}
-        texts |= {f"meaning of {signal.name}": signal.meaning for signal in signals}
-        texts |= {f"unit of {signal.name}": signal.unit for signal in signals}
-        for what, text in texts.items():
-            checks.text(f"{name}: kernel {made.name}: its {what}", text)
-        known = {element for signal in made.inputs for element in signal.elements}
-        for stage in (*made.stages, *made.outputs):
-            if len(stage.expressions) != stage.signal.size:
-                refuse(
-                    f"kernel {made.name}: {stage.signal.name} has {len(stage.expressions)} expressions for "
-                    f"{stage.signal.size} elements"
-                )
-            free = {symbol.name for e in stage.expressions for symbol in e.free_symbols}
-            if unknown := sorted(free - known):
-                refuse(
-                    f"kernel {made.name}: {stage.signal.name} uses {', '.join(unknown)}, not defined before it"
-                )
-            known.update(stage.signal.elements)
-    companions = kernel.companions
-    names = [signal.name for signal in kernel.inputs]
-    samples: tuple[int, ...] = kernel.inputs[1].shape if len(kernel.inputs) == 2 else ()
-    if names != ["state", "increments"] or len(samples) != 2 or samples[1] != 3:
-        refuse(f"kernel {kernel.name} takes {', '.join(names)}; state and increments (K, 3) are needed")
-    state = kernel.inputs[0]
-    if len(kernel.outputs) != 1 or kernel.outputs[0].signal.shape != state.shape:
-        refuse(f"kernel {kernel.name}: one output of the shape of the state, {state.shape}, is needed")
-    if len(companions.identity) != state.size:
-        refuse(
-            f"kernel {kernel.name}: identity has {len(companions.identity)} elements, the state {state.size}"
-        )
-    if not 0 <= companions.previous < samples[0]:
-        refuse(
-            f"kernel {kernel.name}: {companions.previous} of its {samples[0]} increments are previous ones"
-        )
-    if (companions.product is None) != (kernel.transition is None):
-        refuse(f"kernel {kernel.name}: a product and a transition go together")
-    own = {made.name: made for made in kernel.own}
-    for role in ("product", "orthonormalize", "attitude"):
-        companion = getattr(companions, role)
-        if companion is not None and companion not in catalogue and companion not in own:
-            refuse(f"kernel {kernel.name}: its {role} {companion!r} is neither in the catalogue nor its own")
-    attitude = own.get(companions.attitude or "")
-    if attitude and (
-        [signal.shape for signal in attitude.inputs] != [state.shape]
-        or [stage.signal.shape for stage in attitude.outputs] != [(3, 3)]
-    ):
-        refuse(f"kernel {attitude.name}: it must turn a state {state.shape} into a matrix (3, 3)")
-    if attitude is None and companions.attitude is None and state.shape != (3, 3):
-        refuse(f"kernel {kernel.name}: attitude is None, but the state is no matrix (3, 3)")
+    finally:
+        sys.path[:] = before

@@ -39,9 +39,15 @@ def check(
     choice = chosen(algorithm, method, tableau, increments, previous)
     from strapgen import behaviour, catalogue
 
-    findings = list(behaviour.check(choice))
-    failed = [finding.name for finding in findings if finding.holds is False]
     kernel = catalogue.derive(choice)
+    if format == "text":
+        typer.echo(f"{kernel.name}: {kernel.title}\n")
+    findings = []
+    for finding in behaviour.check(choice):
+        findings.append(finding)
+        if format == "text":
+            typer.echo(behaviour.as_text(finding))
+    failed = [finding.name for finding in findings if finding.holds is False]
     if format == "json":
         print_json(
             {
@@ -50,8 +56,6 @@ def check(
                 "findings": [finding.as_dict() for finding in findings],
             }
         )
-    else:
-        typer.echo(behaviour.as_text(findings, f"{kernel.name}: {kernel.title}"))
     if failed:
         typer.echo(f"strapgen: {kernel.name} fails: {', '.join(failed)}", err=True)
         raise typer.Exit(1)

@@ -19,9 +19,6 @@ if TYPE_CHECKING:
 
 _Text = str | None
 
-#: A motion whose rate changes direction and size.
-_MOTION = {"a_rad_s": "1", "b_rad_s": "1.5", "g_rad_s": "0.6"}
-
 
 def converge(
     algorithm: StepAlgorithm,
@@ -89,11 +86,9 @@ def converge(
     limit = None if fail_beyond is None else float(checks.number("fail-beyond", fail_beyond))
     if limit is not None and limit < 0:
         raise InputError(f"fail-beyond is {fail_beyond}; a number that is not below 0 is needed")
-    if motion is None:
-        given = pairs(settings) if settings else _MOTION
-    else:
+    if motion is not None:
         checks.choice("motion", motion, MOTIONS)
-        given = pairs(settings or [])
+    given = pairs(settings or [])
     if out is not None and plot is not None and out.resolve() == plot.resolve():
         raise InputError(f"--out and --plot are both {out}; two files are needed")
     names: list[_Text] = [None]
@@ -117,6 +112,8 @@ def converge(
     from strapgen import convergence, output
     from strapgen.motions import motion as make_motion
 
+    if motion is None and not settings:
+        given = convergence.GENERAL
     profile = make_motion(motion or "coning", **given)
     with np.errstate(all="ignore"):  # a step that is too long for a method is part of the picture
         runs = (convergence.converge(choice, profile, ladder, duration, backend) for choice in choices)

@@ -160,8 +160,10 @@ def generate(
         for name, bound in fixed.error_bounds.items():
             format_ = fixed.formats[name]
             places = float(bound / format_.unit)
+            useless = 2 * bound >= max(map(abs, fixed.ranges[name]))
             typer.echo(
                 f"  {name}: {format_}, error at most {float(bound):.4g}, {places:.4f} of the last place"
+                + (": of the size of the value, which certifies nothing" if useless else "")
             )
 
 

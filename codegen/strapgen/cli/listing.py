@@ -18,7 +18,11 @@ def list_names(format: Format = "text") -> None:
     from strapgen.motions import keys
     from strapgen.targets import TARGETS
 
-    installed = {name: f"from {point.value}" for name, point in catalogue.user.installed().items()}
+    installed = {
+        name: f"from {point.value}"
+        for name, point in catalogue.user.installed().items()
+        if name not in catalogue.ALGORITHMS and name not in catalogue.KERNELS
+    }
     parts: dict[str, dict[str, str]] = {
         "algorithms": {**catalogue.ALGORITHMS, **installed},
         "methods": catalogue.METHODS,

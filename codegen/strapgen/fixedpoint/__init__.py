@@ -1,5 +1,6 @@
 """Fixed point: a program lowered to integers, with proved ranges and certified error bounds."""
 
+from strapgen.exceptions import InputError
 from strapgen.fixedpoint.code import FixedProgram, Interface
 from strapgen.fixedpoint.formats import Format
 from strapgen.fixedpoint.settings import Settings
@@ -27,7 +28,12 @@ def quantize(program: Program, settings: Settings) -> FixedProgram:
     """
     from strapgen.fixedpoint.integers import lowered  # numpy and the proofs are loaded when they are needed
 
-    return lowered(program, settings)
+    try:
+        return lowered(program, settings)
+    except InputError:
+        raise
+    except (ValueError, ArithmeticError) as error:  # of the proofs: a division by what may be zero
+        raise InputError(f"{program.kernel} has no fixed point: {error}") from error
 
 
 #: Operations that fixed point has.

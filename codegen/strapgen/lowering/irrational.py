@@ -43,10 +43,9 @@ def _rounded_stage(stage: Stage) -> Stage:
 
 def _rounded(expression: sp.Expr) -> sp.Expr:
     """Return an expression with its irrational numbers rounded."""
-    if expression.is_Atom or not any(
-        power.is_number and not power.is_Rational for power in expression.atoms(sp.Pow)
-    ):
-        return expression
+    numbers = expression.atoms(sp.Pow, sp.NumberSymbol, sp.Function)
+    if not any(part.is_number and not part.is_Rational for part in numbers):
+        return expression  # as it is: written anew, SymPy might multiply it out
     if expression.is_number:
         return sp.Rational(sp.N(expression, DIGITS))
     if expression.is_Mul:  # its numbers together are one constant

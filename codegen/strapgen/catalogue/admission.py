@@ -1,0 +1,212 @@
+"""What a user's kernel must be, so that all that follows can rely on it: every refusal is one line."""
+
+from __future__ import annotations
+
+import keyword
+import re
+from collections.abc import Callable, Iterator
+
+import sympy as sp
+
+from strapgen import checks
+from strapgen.exceptions import InputError
+from strapgen.kernel import Kernel
+from strapgen.signal import Signal
+
+_NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
+#: Words of C and of its library that a function may not be called.
+_WORDS = """
+auto break case char const continue default do double else enum extern float for goto if inline int long register
+restrict return short signed sizeof static struct switch typedef union unsigned void volatile while
+main printf puts exit abort malloc free signal time clock rand
+sin cos tan sqrt exp log pow floor ceil round fabs abs asin acos atan atan2 sinh cosh tanh gamma
+"""
+_OF_C = frozenset(_WORDS.split())
+#: Functions that can be generated.
+_FUNCTIONS = (sp.sin, sp.cos, sp.sinc, sp.atan2, sp.Max, sp.Piecewise)
+_COMPARISONS = (sp.Gt, sp.Ge, sp.Lt, sp.Le)
+ALLOWED = (
+    "exact numbers, + - * /, whole powers, square roots, sin, cos, sinc, atan2, Max, "
+    "and Piecewise on < <= > >= with a last case that is always true"
+)
+
+
+def require(kernel: Kernel, catalogue: frozenset[str], derived: Callable[[str], Kernel]) -> None:
+    """Check the kernel of an attitude step, and the kernels of its own.
+
+    Parameters
+    ----------
+    kernel : Kernel
+    catalogue : frozenset of str
+        Names that are taken.
+    derived : callable
+        Derives a kernel of the catalogue.
+
+    Raises
+    ------
+    InputError
+        If something is not as it must be.
+    """
+    for made in (kernel, *kernel.own):
+        _require_names(made, catalogue)
+        _require_texts(made)
+        _require_formulas(made)
+    _require_step(kernel)
+    own = {made.name: made for made in kernel.own}
+    for role, companion in _companions(kernel):
+        if companion in own:
+            _require_shapes(kernel, role, own[companion])
+        elif companion in catalogue:
+            _require_shapes(kernel, role, derived(companion))
+        else:
+            _refuse(kernel, f"its {role} {companion!r} is neither in the catalogue nor its own")
+
+
+def _refuse(kernel: Kernel, reason: str) -> None:
+    raise InputError(f"kernel {kernel.name}: {reason}")
+
+
+def _signals(kernel: Kernel) -> list[Signal]:
+    return [*kernel.inputs, *(stage.signal for stage in (*kernel.stages, *kernel.outputs))]
+
+
+def _require_names(kernel: Kernel, catalogue: frozenset[str]) -> None:
+    name = kernel.name
+    if not isinstance(name, str) or not _NAME.fullmatch(name):
+        raise InputError(
+            f"kernel {name!r} has no name for generated code; a-z, 0-9 and hyphens between them are allowed"
+        )
+    if keyword.iskeyword(kernel.identifier) or kernel.identifier in _OF_C:
+        raise InputError(f"kernel {name} has a name that C or Python use themselves; another one is needed")
+    if name in catalogue or re.match(r"(dcm|euler|cayley-klein)-.*-(\d+|rates)(-previous\d)?$", name):
+        raise InputError(
+            f"kernel {name} is in the catalogue, or looks like one of its steps; another name is needed"
+        )
+    seen: set[str] = set()
+    for signal in _signals(kernel):
+        for part in (signal.name, *signal.elements):
+            if not (part.isascii() and part.isidentifier()):
+                _refuse(kernel, f"{part!r} is no name for generated code")
+        for element in signal.elements:
+            if element in seen:
+                _refuse(
+                    kernel,
+                    f"{element} of {signal.name} is defined twice; every element needs a name of its own",
+                )
+            seen.add(element)
+
+
+def _require_texts(kernel: Kernel) -> None:
+    texts = {"title": kernel.title, "source": kernel.source}
+    texts |= {f"note {number}": note for number, note in enumerate(kernel.notes, 1)}
+    for signal in _signals(kernel):
+        texts |= {f"meaning of {signal.name}": signal.meaning, f"unit of {signal.name}": signal.unit}
+    for what, text in texts.items():
+        checks.text(f"kernel {kernel.name}: its {what}", text)
+
+
+def _require_formulas(kernel: Kernel) -> None:
+    known = {element for signal in kernel.inputs for element in signal.elements}
+    for stage in (*kernel.stages, *kernel.outputs):
+        name = stage.signal.name
+        if len(stage.expressions) != stage.signal.size:
+            _refuse(
+                kernel, f"{name} has {len(stage.expressions)} expressions for {stage.signal.size} elements"
+            )
+        for element, expression in zip(stage.signal.elements, stage.expressions, strict=True):
+            if not isinstance(expression, sp.Expr):
+                _refuse(kernel, f"{element} is {expression!r}; an expression of SymPy is needed")
+            if unknown := sorted(
+                symbol.name for symbol in expression.free_symbols if symbol.name not in known
+            ):
+                _refuse(kernel, f"{element} uses {', '.join(unknown)}, not defined before it")
+            if fault := next(_faults(expression), ""):
+                _refuse(kernel, f"{element} holds {fault}, which cannot be generated; allowed: {ALLOWED}")
+        known.update(stage.signal.elements)
+
+
+def _faults(expression: sp.Basic) -> Iterator[str]:
+    """Yield what stands in an expression and cannot be generated."""
+    if expression.has(sp.Float):
+        yield f"the inexact number {min(map(float, expression.atoms(sp.Float)))}"
+    elif expression.is_number:
+        # What is irrational is rounded once; it has to be a number of a size that a double holds.
+        if expression.is_real is not True or not expression.is_finite or abs(sp.N(expression)) > 10**300:
+            yield str(expression)[:60]
+    elif expression.is_Symbol:
+        if expression.is_real is not True:
+            yield f"the symbol {expression}, which is not real"
+    elif isinstance(expression, sp.Pow):
+        exponent = expression.exp
+        if not (exponent.is_Integer or abs(exponent) == sp.Rational(1, 2)):
+            yield f"a power {str(exponent)[:40]}"
+        yield from _faults(expression.base)
+    elif isinstance(expression, sp.Piecewise):
+        for value, condition in expression.args:
+            yield from _faults(value)
+            if condition not in (sp.true, sp.false):
+                if not isinstance(condition, _COMPARISONS):
+                    yield f"the condition {str(condition)[:60]}"
+                else:
+                    yield from _faults(condition.lhs)
+                    yield from _faults(condition.rhs)
+        if expression.args[-1][1] != sp.true:
+            yield "a Piecewise without a last case that is always true"
+    elif expression.is_Add or expression.is_Mul or isinstance(expression, _FUNCTIONS):
+        for argument in expression.args:
+            yield from _faults(argument)
+    else:
+        yield type(expression).__name__
+
+
+def _require_step(kernel: Kernel) -> None:
+    companions = kernel.companions
+    if companions is None:
+        _refuse(kernel, "it has no companions; an attitude step needs them")
+        return
+    names = [signal.name for signal in kernel.inputs]
+    samples: tuple[int, ...] = kernel.inputs[1].shape if len(kernel.inputs) == 2 else ()
+    if names != ["state", "increments"] or len(samples) != 2 or samples[1] != 3:
+        _refuse(kernel, f"it takes {', '.join(names)}; state and increments (K, 3) are needed")
+    state = kernel.inputs[0]
+    if len(kernel.outputs) != 1 or kernel.outputs[0].signal.shape != state.shape:
+        _refuse(kernel, f"one output of the shape of the state, {state.shape}, is needed")
+    if len(companions.identity) != state.size:
+        _refuse(kernel, f"identity has {len(companions.identity)} elements, the state {state.size}")
+    for number in companions.identity:
+        if not hasattr(number, "numerator") or isinstance(number, bool):
+            _refuse(kernel, f"identity holds {number!r}; whole numbers or fractions are needed")
+    if not 0 <= companions.previous < samples[0]:
+        _refuse(kernel, f"{companions.previous} of its {samples[0]} increments are previous ones")
+    if (companions.product is None) != (kernel.transition is None):
+        _refuse(kernel, "a product and a transition go together")
+    stages = {stage.signal.name: stage.signal for stage in kernel.stages}
+    if kernel.transition is not None and kernel.transition not in stages:
+        _refuse(
+            kernel,
+            f"its transition {kernel.transition!r} is none of its stages: {', '.join(stages) or 'none'}",
+        )
+    if companions.attitude is None and state.shape != (3, 3):
+        _refuse(kernel, "attitude is None, but the state is no matrix (3, 3)")
+
+
+def _companions(kernel: Kernel) -> list[tuple[str, str]]:
+    companions = kernel.companions
+    assert companions is not None, "checked before"
+    roles = ("product", "orthonormalize", "attitude")
+    return [(role, name) for role in roles if (name := getattr(companions, role)) is not None]
+
+
+def _require_shapes(kernel: Kernel, role: str, companion: Kernel) -> None:
+    """Check that a companion takes and gives what its role asks for."""
+    state = kernel.inputs[0].shape
+    transitions = [stage.signal.shape for stage in kernel.stages if stage.signal.name == kernel.transition]
+    takes, gives = {
+        "product": ([state, *transitions], state),
+        "orthonormalize": ([state], state),
+        "attitude": ([state], (3, 3)),
+    }[role]
+    has = [signal.shape for signal in companion.inputs]
+    if has != takes or [stage.signal.shape for stage in companion.outputs] != [gives]:
+        shapes = ", ".join(map(str, takes))
+        _refuse(kernel, f"its {role} {companion.name} must turn {shapes} into {gives}")
