@@ -60,16 +60,16 @@ def test_every_method_has_its_order_with_enough_increments(algorithm, method, co
     ("method", "increments", "previous", "order"),
     [
         ("rk4", 1, 0, 2),
-        ("rk4", 3, 0, 4),
         ("butcher6", 3, 0, 4),
-        ("magnus6", 2, 0, 4),
-        ("taylor6", 5, 0, 6),
         ("rk4", 1, 1, 3),
         ("rk4", 1, 2, 4),
-        ("butcher6", 1, 3, 5),
-        ("butcher6", 2, 1, 4),
-        ("magnus6", 2, 2, 5),
-        ("butcher6", 3, 2, 6),
+        pytest.param("rk4", 3, 0, 4, marks=pytest.mark.long),
+        pytest.param("magnus6", 2, 0, 4, marks=pytest.mark.long),
+        pytest.param("taylor6", 5, 0, 6, marks=pytest.mark.long),
+        pytest.param("butcher6", 1, 3, 5, marks=pytest.mark.long),
+        pytest.param("butcher6", 2, 1, 4, marks=pytest.mark.long),
+        pytest.param("magnus6", 2, 2, 5, marks=pytest.mark.long),
+        pytest.param("butcher6", 3, 2, 6, marks=pytest.mark.long),
     ],
 )
 def test_where_the_samples_limit_the_order_it_is_seen(method, increments, previous, order, coning):
@@ -92,6 +92,7 @@ def test_rounding_that_hides_the_order_is_no_order(coning):
     assert "rounding hides the order on c-float" in convergence.as_text([found], "title")
 
 
+@pytest.mark.long
 def test_rounded_coefficients_are_the_floor(coning):
     """The published coefficients of this method leave 1e-17; without regard to that the slope would be far below 8."""
     choice = choose("euler", "dormand-prince8", 6)

@@ -61,6 +61,7 @@ def cells(line: str) -> list[str]:
     return re.sub(r"(?<=\d)([*r])", r" \1 ", line).split()
 
 
+@pytest.mark.long
 def test_readme_tables_are_the_command_s(capsys):
     with pytest.raises(SystemExit):
         main(["tables"])
@@ -108,7 +109,13 @@ def test_the_page_on_own_algorithms(tmp_path, monkeypatch, capsys):
     assert (stop.value.code, capsys.readouterr().err) == (2, f"strapgen: heun3.toml: {failure}\n")
 
 
-@pytest.mark.parametrize("path", sorted((ROOT / "examples").glob("*.py")), ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path",
+    [
+        pytest.param(path, marks=pytest.mark.long if path.stem == "word_length_study" else (), id=path.stem)
+        for path in sorted((ROOT / "examples").glob("*.py"))
+    ],
+)
 def test_example(path, capsys, monkeypatch):
     monkeypatch.setattr("sys.argv", [str(path)])
     namespace = runpy.run_path(str(path))

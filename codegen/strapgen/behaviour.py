@@ -77,7 +77,8 @@ def check(choice: Choice) -> Iterator[Finding]:
 
     Examples
     --------
-    >>> found = {finding.name: finding.holds for finding in check(catalogue.choose("euler"))}
+    >>> from strapgen.catalogue import choose
+    >>> found = {finding.name: finding.holds for finding in check(choose("euler"))}
     >>> found["order"], found["at rest"]
     (True, True)
     """

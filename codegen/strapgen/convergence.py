@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from fractions import Fraction
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,11 +18,13 @@ from strapgen.backends import BACKENDS, of
 from strapgen.catalogue import Choice
 from strapgen.exceptions import InputError, InputTypeError
 from strapgen.fixedpoint import Settings
-from strapgen.kernel import Kernel
 from strapgen.motions import Motion
 from strapgen.order import Order
 from strapgen.simulation import largest_increment, simulate
 from strapgen.targets import FIXED
+
+if TYPE_CHECKING:
+    from strapgen.kernel import Kernel
 
 #: Arithmetic of many digits, where a back end is named.
 EXACT = "exact"

@@ -6,17 +6,19 @@ import io
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from strapgen import output
-from strapgen.convergence import Convergence
 from strapgen.exceptions import InputError, MissingExtraError
 from strapgen.recording import History
 from strapgen.reports import AXES, SKEW_PLANES
 from strapgen.simulation import Run
 from strapgen.study import Outcome
+
+if TYPE_CHECKING:
+    from strapgen.convergence import Convergence
 
 _COLOURS = ("#1f5f8b", "#b5562b", "#3d7a4f")
 

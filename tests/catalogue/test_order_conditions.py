@@ -297,7 +297,14 @@ def test_the_attitude_order_is_that_of_a_step_in_exact_series(name):
         assert order_in_series(tableau, limited + 2, degree, "general") == limited
 
 
-@pytest.mark.parametrize("name", [name for name in TABLEAUX if name not in SHORT])
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.long if name == "cooper-verner8" else ())
+        for name in TABLEAUX
+        if name not in SHORT
+    ],
+)
 def test_the_attitude_order_of_high_orders(name):
     tableau = TABLEAUX[name]
     found = attitude_order(tableau)

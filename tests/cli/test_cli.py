@@ -361,6 +361,7 @@ def test_generate_writes_numpy_here_by_default(strapgen_says, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["euler_rk4_2.py"]
 
 
+@pytest.mark.long
 def test_generate_all_as_json(strapgen_says, tmp_path):
     data = json.loads(strapgen_says("generate --all --out out --format json"))
     assert list(data) == ["files"]
@@ -620,6 +621,7 @@ def test_study_word_length(strapgen_says, tmp_path):
     assert "the method itself drifts by" in strapgen_says(command)
 
 
+@pytest.mark.long
 def test_an_interrupt_stops_a_study_at_once(tmp_path):
     # Cases that take minutes each, in two processes.
     words = [
@@ -721,7 +723,6 @@ def test_help_is_quick():
 def test_quick_answers_load_no_heavy_library(words):
     code = f"""
 import sys
-from strapgen.catalogue.tableaux import TABLEAUX
 from strapgen.cli import main
 try:
     main({words!r})
@@ -739,7 +740,6 @@ def test_simulation_loads_no_computer_algebra():
     assert started(*command).returncode == 0
     code = f"""
 import sys
-from strapgen.catalogue.tableaux import TABLEAUX
 from strapgen.cli import main
 try:
     main({command!r})

@@ -196,7 +196,14 @@ LOWERED = [
 ]
 
 
-@pytest.mark.parametrize("word", [8, 16, 32, 64])
+@pytest.mark.parametrize(
+    "word",
+    [
+        pytest.param(8, marks=pytest.mark.long),
+        16,
+        *(pytest.param(w, marks=pytest.mark.long) for w in (32, 64)),
+    ],
+)
 @pytest.mark.parametrize("choice", LOWERED)
 def test_no_value_and_no_partial_sum_leaves_its_type(choice, word):
     angles = [Fraction(1, 10**6), Fraction(1, 8), Fraction(1)] if choice.method else [Fraction(1, 8)]

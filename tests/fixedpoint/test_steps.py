@@ -68,8 +68,10 @@ def test_the_bound_of_an_exponential_is_a_few_places(algorithm, method):
     assert fixed.interface.accumulation.growth == 1
 
 
-@pytest.mark.parametrize("carry", ["none", "state", "full"])
-@pytest.mark.parametrize("name", ["c-q31", "c-q15"])
+@pytest.mark.parametrize(
+    "carry", ["none", *(pytest.param(c, marks=pytest.mark.long) for c in ("state", "full"))]
+)
+@pytest.mark.parametrize("name", ["c-q31", pytest.param("c-q15", marks=pytest.mark.long)])
 @pytest.mark.parametrize(("algorithm", "method"), [("euler", "magnus4"), ("dcm", "munthe-kaas4")])
 def test_a_run_of_exponentials_is_inside_its_bound(algorithm, method, name, carry, rng):
     settings = Settings(carry=carry).fitted(0.03)
@@ -92,7 +94,7 @@ def test_an_exponential_for_increments_of_any_size(largest):
 
 
 @pytest.mark.parametrize("carry", ["none", "full"])
-@pytest.mark.parametrize("method", ["magnus4", "munthe-kaas4"])
+@pytest.mark.parametrize("method", ["magnus4", pytest.param("munthe-kaas4", marks=pytest.mark.long)])
 def test_c_gives_the_integers_of_the_model(method, carry, rng):
     increments = rng.normal(scale=0.01, size=(200, 2, 3))
     settings = Settings(carry=carry)
@@ -107,7 +109,9 @@ def test_c_gives_the_integers_of_the_model(method, carry, rng):
 
 
 @pytest.mark.parametrize("carry", ["none", "full"])
-@pytest.mark.parametrize(("algorithm", "count", "previous"), [("euler", 1, 2), ("dcm", 1, 2)])
+@pytest.mark.parametrize(
+    ("algorithm", "count", "previous"), [("euler", 1, 2), pytest.param("dcm", 1, 2, marks=pytest.mark.long)]
+)
 def test_a_run_with_previous_increments_is_inside_its_bound(algorithm, count, previous, carry, rng):
     settings = Settings(carry=carry)
     backend = strapgen.backend(algorithm, "rk4", count, "c-q31", settings=settings, previous=previous)
