@@ -24,7 +24,9 @@ def increments(rng):
     return rng.uniform(-1, 1, (1, 1, 3)) / 100 + rng.normal(scale=2e-3, size=(120, 2, 3))
 
 
-@pytest.mark.parametrize("reference", ["numpy", "exact", "c-float"])
+@pytest.mark.parametrize(
+    "reference", ["exact", *(pytest.param(r, marks=pytest.mark.long) for r in ("numpy", "c-float"))]
+)
 def test_every_back_end_against_every_kind_of_reference(algorithm, reference, increments):
     rows = comparison.compare(algorithm, "rk4", 2, list(BACKENDS), increments, reference=reference)
     assert [row.backend for row in rows] == list(BACKENDS)
