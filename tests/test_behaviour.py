@@ -22,7 +22,6 @@ def findings(choice: catalogue.Choice) -> dict[str, behaviour.Finding]:
     ("method", "increments", "previous"),
     [
         ("rk4", 2, 0),
-        pytest.param("rk1", 1, 0, marks=pytest.mark.long),
         pytest.param("magnus4", 2, 0, marks=pytest.mark.long),
         pytest.param("munthe-kaas4", 1, 2, marks=pytest.mark.long),
         pytest.param("taylor6", 4, 0, marks=pytest.mark.long),

@@ -51,7 +51,7 @@ def order_of(name: str) -> int:
 def test_every_method_has_its_order_with_enough_increments(algorithm, method, coning):
     increments = catalogue.enough(method)
     steps = LADDER if order_of(method) > 4 else SHORT
-    found = converge(choose(algorithm, method, increments), coning, steps, 2 if steps is LADDER else 1)
+    found = converge(choose(algorithm, method, increments), coning, steps, 1)
     assert found.predicted == order_of(method)
     assert found.observed == pytest.approx(found.predicted, abs=WITHIN)
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
+from functools import lru_cache
 
 from strapgen.fixedpoint import quantities as exact
 from strapgen.fixedpoint.code import Accumulation, Argument, Sum, Value
@@ -152,12 +153,24 @@ def _growth(program: Program, made: exact.Quantities, width: int) -> Fraction:
     if program.companions is not None and program.companions.isometry:
         return Fraction(1)
     inputs = [name for signal in program.inputs[1:] for name in signal.elements]
-    series = Truncated([made.items[name].range.magnitude for name in inputs], _MOST_TERMS)
     try:
-        elements = _expanded(program, series, inputs)
+        return _expanded_growth(program, tuple(made.items[name].range.magnitude for name in inputs), width)
     except NotImplementedError:  # it calls functions: the identity, and the length of what is added to it
         held = made.results[program.transition.signal.name]
         return 1 + _norm([made.distance(name) for name in held if isinstance(name, str)])
+
+
+@lru_cache(maxsize=64)
+def _expanded_growth(program: Program, sizes: tuple[Fraction, ...], width: int) -> Fraction:
+    """Return what `_growth` does, which no word and no rounding changes.
+
+    Raises
+    ------
+    NotImplementedError
+        If the transition calls functions.
+    """
+    series = Truncated(sizes, _MOST_TERMS)
+    elements = _expanded(program, series)
     rows = [elements[k : k + width] for k in range(0, len(elements), width)]
     one = series.constant(Fraction(1))
     largest = Fraction(0)
@@ -170,9 +183,10 @@ def _growth(program: Program, made: exact.Quantities, width: int) -> Fraction:
     return _root(1 + largest)
 
 
-def _expanded(program: Program, series: Truncated, inputs: Sequence[str]) -> list[Series]:
+def _expanded(program: Program, series: Truncated) -> list[Series]:
     """Return the elements of the transition as truncated series in the inputs."""
     assert program.transition is not None
+    inputs = [name for signal in program.inputs[1:] for name in signal.elements]
     known = {name: series.variable(place) for place, name in enumerate(inputs)}
     needed = program.used([program.transition])
 
