@@ -23,6 +23,9 @@ from strapgen import algebra, derive
 from strapgen.catalogue import ALGORITHMS, magnus
 from strapgen.kernel import Kernel, evaluate_stages
 
+#: Exact series of many methods: with the long tests.
+pytestmark = pytest.mark.long
+
 ALGORITHM = pytest.mark.parametrize("algorithm", ALGORITHMS)
 ORDER = pytest.mark.parametrize("order", [2, 4, 6])
 #: Methods whose transition is the exponential of a rotation vector.

@@ -11,6 +11,9 @@ from strapgen.catalogue import ALGORITHMS, munthe_kaas
 from strapgen.catalogue.munthe_kaas import bortz
 from strapgen.kernel import evaluate_stages
 
+#: Exact series of many methods: with the long tests.
+pytestmark = pytest.mark.long
+
 ALGORITHM = pytest.mark.parametrize("algorithm", ALGORITHMS)
 X = sp.Symbol("x", positive=True)
 

@@ -30,6 +30,9 @@ from strapgen.catalogue.order_conditions import (
 )
 from strapgen.catalogue.tableaux import TABLEAUX, Tableau
 
+#: Exact series of many methods: with the long tests.
+pytestmark = pytest.mark.long
+
 BUILT_IN = pytest.mark.parametrize("name", TABLEAUX)
 
 

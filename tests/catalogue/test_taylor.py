@@ -12,6 +12,9 @@ from strapgen import derive
 from strapgen.catalogue import ALGORITHMS, INTEGRATORS
 from strapgen.exceptions import InputError
 
+#: Exact series of many methods: with the long tests.
+pytestmark = pytest.mark.long
+
 ALGORITHM = pytest.mark.parametrize("algorithm", ALGORITHMS)
 
 

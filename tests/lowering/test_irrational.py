@@ -16,6 +16,9 @@ from strapgen.lowering.irrational import DIGITS, rationalized
 from strapgen.program import Constant, walk
 from strapgen.signal import Signal
 
+#: Exact series of many methods: with the long tests.
+pytestmark = pytest.mark.long
+
 #: Kernels with roots in their coefficients.
 IRRATIONAL = {
     "euler-cooper-verner8-2": ("euler", "cooper-verner8", 2, False),

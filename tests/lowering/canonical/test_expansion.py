@@ -16,6 +16,9 @@ from strapgen.kernel import evaluate_stages
 from strapgen.lowering import canonical
 from strapgen.lowering.canonical.core import decompose
 
+#: Exact series of many methods: with the long tests.
+pytestmark = pytest.mark.long
+
 #: Cayley-Klein parameters are Euler parameters by other names.
 ALGORITHM = pytest.mark.parametrize("algorithm", ["dcm", "euler"])
 EXPANDED = [
