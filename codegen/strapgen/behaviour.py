@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from strapgen import exact, fixedpoint, pipeline
 from strapgen.backends import Backend, of
 from strapgen.catalogue import Choice
+from strapgen.comparison import certified_angle
 from strapgen.convergence import GENERAL, converge, interpreter, step_of_increments
 from strapgen.exceptions import CompilerError, InputError
 from strapgen.fixedpoint import Settings
@@ -96,10 +97,8 @@ def check(choice: Choice) -> Iterator[Finding]:
     for name, look in looks.items():
         try:
             yield from look()
-        except (
-            ArithmeticError,
-            ValueError,
-        ) as error:  # of the algorithm: a division by zero, a number out of range
+        # Of the algorithm: a division by zero, a number out of range.
+        except (ArithmeticError, ValueError) as error:
             yield Finding(name, False, f"it stops with {type(error).__name__}: {error or 'division by zero'}")
 
 
@@ -251,8 +250,8 @@ def _long_run(choice: Choice) -> Iterator[Finding]:
 
 def _back_ends(choice: Choice, program: Program) -> Iterator[Finding]:
     increments = _random(program, _STEPS)
-    reference = of(choice)
-    wanted = attitude(reference, exact.propagate(program, increments))
+    exact_states = exact.propagate(program, increments)
+    wanted = attitude(of(choice), exact_states)
 
     def angle(states: Any, ready: Backend) -> float:
         return float(np.linalg.norm(drift_between(attitude(ready, states), wanted), axis=-1).max())
@@ -268,7 +267,7 @@ def _back_ends(choice: Choice, program: Program) -> Iterator[Finding]:
         text = f"{_STEPS} steps: {off:.3g} rad from exact arithmetic"
         yield Finding(f"back end {name}", off <= allowed, text, off, allowed)
         yield _loop(ready, increments, states)
-    yield _fixed(choice, program, increments, angle)
+    yield _fixed(choice, program, increments, exact_states, angle)
 
 
 def _loop(ready: Backend, increments: NDArray[np.float64], states: Any) -> Finding:
@@ -287,6 +286,7 @@ def _fixed(
     choice: Choice,
     program: Program,
     increments: NDArray[np.float64],
+    exact_states: NDArray[np.float64],
     angle: Callable[[Any, Backend], float],
 ) -> Finding:
     name = "back end c-q31"
@@ -298,17 +298,15 @@ def _fixed(
         off = angle(ready.propagate(increments), ready)
     except (InputError, CompilerError) as error:
         return Finding(name, None, f"no fixed point: {error}")
-    certified = ready.rounding_bound(_STEPS, True)
-    if certified is None or not math.isfinite(certified):
+    allowed = certified_angle(ready, increments, exact_states)
+    if allowed is None:
         return Finding(name, None, f"{_STEPS} steps: {off:.3g} rad, without a certified bound", off)
-    # An attitude moves by at most four times its state: twice the angle, in two elements that matter.
-    allowed = 4 * certified + 8 * ready.unit
     text = f"{_STEPS} steps: {off:.3g} rad from exact arithmetic"
     return Finding(name, off <= allowed, text, off, allowed)
 
 
 def _restoring(choice: Choice, step: _Precise) -> Finding:
-    """Restore a disturbed state: its attitude must be a rotation, and the same one after a second time."""
+    """Restore a disturbed state: its attitude must be a rotation again, but for the square of what was wrong."""
     name = "orthonormalization"
     if step.restoring is None:
         return Finding(name, None, "there is none")

@@ -11,6 +11,7 @@ from fractions import Fraction
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
+import mpmath
 import numpy as np
 
 from strapgen import catalogue, checks, exact, pipeline
@@ -249,8 +250,6 @@ def _exactly(choice: Choice, motion: Motion, rounding: float) -> _Measure:
 
     Where the published coefficients of a method are rounded themselves, that is the floor.
     """
-    import mpmath
-
     program = pipeline.lower(catalogue.derive(choice))
     assert program.companions is not None, "checked by the caller"
     samples, previous = catalogue.increments(choice), catalogue.previous(choice)
