@@ -177,7 +177,10 @@ def adjugate(A: sp.Matrix) -> sp.Matrix:
 
 
 def evaluate(
-    expression: sp.Expr, values: Mapping[str, Any], number: Callable[[sp.Rational], Any] | None = None
+    expression: sp.Expr,
+    values: Mapping[str, Any],
+    number: Callable[[sp.Rational], Any] | None = None,
+    function: Callable[[sp.Expr, list[Any]], Any] | None = None,
 ) -> Any:
     """Evaluate an expression with the given values for its symbols.
 
@@ -190,6 +193,9 @@ def evaluate(
     values : mapping of str to number, polynomial or Expr
     number : callable, optional
         What stands for a rational number where the values do not combine with those of SymPy.
+    function : callable, optional
+        ``function(expression, arguments)``: what stands for what is neither sum, product nor whole power, by default
+        SymPy's own.
 
     Returns
     -------
@@ -210,7 +216,7 @@ def evaluate(
         return values[expression.name]
     if expression.is_Rational:
         return number(expression) if number else expression
-    arguments = [evaluate(argument, values, number) for argument in expression.args]
+    arguments = [evaluate(argument, values, number, function) for argument in expression.args]
     if expression.is_Add or expression.is_Mul:
         result = arguments[0]
         for argument in arguments[1:]:
@@ -220,4 +226,6 @@ def evaluate(
         return result
     if expression.is_Pow and expression.exp.is_Integer and expression.exp > 0:
         return arguments[0] ** int(expression.exp)
+    if function is not None:
+        return function(expression, arguments)
     return expression.func(*(sp.sympify(argument) for argument in arguments))

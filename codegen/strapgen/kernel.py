@@ -35,7 +35,10 @@ class Stage:
 
 
 def evaluate_stages(
-    stages: Iterable[Stage], values: Mapping[str, Any], number: Callable[[sp.Rational], Any] | None = None
+    stages: Iterable[Stage],
+    values: Mapping[str, Any],
+    number: Callable[[sp.Rational], Any] | None = None,
+    function: Callable[[sp.Expr, list[Any]], Any] | None = None,
 ) -> dict[str, Any]:
     """Return the given values and those of all elements of stages, each of which may use what stands before it.
 
@@ -44,8 +47,8 @@ def evaluate_stages(
     stages : iterable of Stage
     values : mapping of str to number or ring element
         A value for every symbol that no stage defines.
-    number : callable, optional
-        What stands for a rational number, see `algebra.evaluate`.
+    number, function : callable, optional
+        What stands for a rational number and for a function, see `algebra.evaluate`.
 
     Returns
     -------
@@ -54,7 +57,7 @@ def evaluate_stages(
     known = dict(values)
     for stage in stages:
         for name, expression in zip(stage.signal.elements, stage.expressions, strict=True):
-            known[name] = evaluate(expression, known, number)
+            known[name] = evaluate(expression, known, number, function)
     return known
 
 

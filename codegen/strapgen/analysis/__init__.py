@@ -1,0 +1,1 @@
+"""Analysis: what an algorithm loses, as power series in the step length."""

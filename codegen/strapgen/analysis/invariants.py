@@ -1,0 +1,108 @@
+"""Errors in vector-invariant form: sums of vectors and cross products of the rate and its derivatives.
+
+That form is not unique: three vectors in a plane are dependent, and so are the products of four. What is found is the
+first solution in a fixed order of terms, the one of `Frame`.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from strapgen.lowering.canonical.decomposition import Coefficients, Decomposition, Frame
+
+
+@dataclass(frozen=True)
+class Invariants:
+    """The drift and the symmetric part of an error matrix at one power of the step.
+
+    Parameters
+    ----------
+    drift : Coefficients
+        Coefficients of the vectors i and of the cross products (i, j), where i is the i-th derivative of the rate; each
+        a polynomial in scalar products.
+    symmetric : Coefficients
+        Coefficients of the unit matrix () and of the symmetrized products a b' + b a': (i, j), and (i, j, k) of i and j x k.
+    """
+
+    drift: Coefficients
+    symmetric: Coefficients
+
+
+def invariants(frame: Frame, matrix: Sequence[Any]) -> Invariants:
+    """Return an error matrix, given row by row in the coordinates of a frame, in vector-invariant form."""
+    found = frame.matrix(list(matrix))
+    return Invariants(_scaled(found.vector, Fraction(-1)), found.symmetric)
+
+
+def _scaled(coefficients: Coefficients, factor: Fraction) -> Coefficients:
+    return {c: {m: factor * x for m, x in polynomial.items()} for c, polynomial in coefficients.items()}
+
+
+def matrix(found: Invariants, vectors: Sequence[Sequence[Any]]) -> list[Any]:
+    """Return the error matrix row by row for given vectors: numbers, symbols or polynomials."""
+    return Decomposition(None, _scaled(found.drift, Fraction(-1)), found.symmetric).evaluate(
+        [list(vector) for vector in vectors]
+    )
+
+
+def as_text(coefficients: Coefficients, name: str = "w", symmetric: bool = False) -> str:
+    """Return a vector or a symmetric matrix as text.
+
+    Parameters
+    ----------
+    coefficients : Coefficients
+    name : str, optional
+        Of the rate; its derivatives are numbered, |w0| is the length of the rate itself.
+    symmetric : bool, optional
+        Whether it is a matrix: then S(a, b) is a b' + b a', and 1 the unit matrix.
+
+    Examples
+    --------
+    >>> as_text({(0,): {((0, 0),): Fraction(1, 6)}, (0, 1): {(): Fraction(-1, 12)}})
+    '1/6 |w0|^2 w0 - 1/12 w0 x w1'
+    >>> as_text({(): {((0, 0),): Fraction(-1)}, (0, 0): {(): Fraction(1, 2)}}, symmetric=True)
+    '-|w0|^2 1 + 1/2 S(w0, w0)'
+    """
+    terms = []
+    for covariant in sorted(coefficients, key=lambda c: (len(c), c)):
+        polynomial = coefficients[covariant]
+        for monomial in sorted(polynomial, key=lambda m: (len(m), m)):
+            number = polynomial[monomial]
+            factors = [_number(number), *_products(monomial, name), _covariant(covariant, name, symmetric)]
+            terms.append(("-" if number < 0 else "+", " ".join(filter(None, factors))))
+    if not terms:
+        return "0"
+    (sign, first), *rest = terms
+    text = f"-{first}" if sign == "-" else first
+    return text + "".join(f" {sign} {term}" for sign, term in rest)
+
+
+def _number(number: Fraction) -> str:
+    return "" if abs(number) == 1 else str(abs(number))
+
+
+def _products(monomial: Sequence[tuple[int, ...]], name: str) -> list[str]:
+    factors = []
+    for product, power in Counter(monomial).items():
+        if len(product) == 3:
+            i, j, k = product
+            text = f"({name}{i} . {name}{j} x {name}{k})"
+        elif product[0] == product[1]:
+            text, power = f"|{name}{product[0]}|", 2 * power
+        else:
+            text = f"({name}{product[0]} . {name}{product[1]})"
+        factors.append(text if power == 1 else f"{text}^{power}")
+    return factors
+
+
+def _covariant(covariant: tuple[int, ...], name: str, symmetric: bool) -> str:
+    words = [f"{name}{i}" for i in covariant]
+    if not symmetric:
+        return " x ".join(words)
+    if not words:
+        return "1"
+    return f"S({words[0]}, {' x '.join(words[1:])})"

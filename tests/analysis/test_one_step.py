@@ -1,0 +1,124 @@
+"""The error of one step as a series: exact at a constant rate, and one step in 60 digits for a general one."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import mpmath
+import pytest
+import sympy as sp
+
+from strapgen import exact, lower
+from strapgen.analysis import invariants
+from strapgen.analysis.one_step import error_matrix
+from strapgen.catalogue import ALGORITHMS, Choice, choose, derive
+from strapgen.lowering.canonical.decomposition import Frame
+
+CASES = [
+    ("rk1", 2, 0),
+    ("rk3", 2, 0),
+    ("rk4", 2, 0),
+    ("rk4", 1, 2),
+    ("taylor4", 3, 0),
+    ("magnus4", 2, 0),
+    ("munthe-kaas4", 2, 0),
+    ("butcher6", 4, 0),
+]
+
+
+def constant(choice: Choice, top: int) -> tuple[list, list]:
+    """Return symbols w_x, w_y, w_z and the error matrix at a constant rate."""
+    ring, *w = sp.ring("w_x w_y w_z", sp.QQ)
+    return w, error_matrix(derive(choice), ring, [w], top)
+
+
+@pytest.mark.parametrize(("algorithm", "share"), [("dcm", 1), ("euler", 16), ("cayley-klein", 16)])
+def test_fourth_order_at_a_constant_rate(algorithm, share):
+    """The drift of the thesis, (x - sin x) cut at x^5, and its sixteenth."""
+    w, error = constant(choose(algorithm, "rk4", 2), 6)
+    square = sum((x * x for x in w), w[0].ring.zero)
+    for axis, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
+        drift = (error[3 * i + j] - error[3 * j + i]) * sp.Rational(1, 2)
+        assert drift.parts == {5: w[axis] * square**2 * sp.Rational(1, 120 * share)}
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+@pytest.mark.parametrize("method", ["magnus4", "magnus6", "munthe-kaas4"])
+def test_exponentials_are_exact_at_a_constant_rate(algorithm, method):
+    _, error = constant(choose(algorithm, method, 3), 9)
+    assert not any(element.parts for element in error)
+
+
+def rate(number: int) -> list[list[sp.Rational]]:
+    """Return rational vectors for a rate and its derivatives."""
+    return [
+        [sp.Rational((7 * j + 3 * axis) % 11 - 5, 6 + j + axis) for axis in range(3)] for j in range(number)
+    ]
+
+
+def one_step(choice: Choice, vectors: list[list[sp.Rational]], h: Fraction) -> list:
+    """Return the error matrix of one step of length h in the digits of mpmath."""
+    program = lower(derive(choice))
+    companions = program.companions
+    count = program.inputs[1].shape[0] - companions.previous
+
+    def angle(t):
+        return [
+            sum(
+                exact.number(Fraction(int(v[k].p), int(v[k].q))) * t ** (j + 1) / mpmath.factorial(j + 1)
+                for j, v in enumerate(vectors)
+            )
+            for k in range(3)
+        ]
+
+    times = [exact.number(h) * k / count for k in range(-companions.previous, count + 1)]
+    angles = [angle(t) for t in times]
+    taken = [b - a for before, after in zip(angles, angles[1:]) for a, b in zip(before, after)]
+    state = exact.states(program, [taken], [exact.number(x) for x in companions.identity])[-1]
+    if companions.attitude:
+        state = exact.Interpreter(lower(derive(choose(companions.attitude))))(state)
+    computed = mpmath.matrix([state[3 * i : 3 * i + 3] for i in range(3)])
+
+    # The true matrix by its own Taylor series, term after term, to 40 terms.
+    terms = [mpmath.eye(3)]
+    for n in range(40):
+        total = mpmath.zeros(3)
+        for j, v in enumerate(vectors[: n + 1]):
+            g = [exact.number(Fraction(int(x.p), int(x.q))) / mpmath.factorial(j) for x in v]
+            total += terms[n - j] * mpmath.matrix([[0, -g[2], g[1]], [g[2], 0, -g[0]], [-g[1], g[0], 0]])
+        terms.append(total / (n + 1))
+    true = sum((term * exact.number(h) ** n for n, term in enumerate(terms)), mpmath.zeros(3))
+    return list(computed * true.T - mpmath.eye(3))
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+@pytest.mark.parametrize(("method", "increments", "previous"), CASES)
+def test_two_terms_leave_an_error_of_the_square_of_the_step(algorithm, method, increments, previous):
+    """For a general rate, in vector-invariant form: held against one step in 60 digits, as the step is halved."""
+    choice = choose(algorithm, method, increments, previous=previous)
+    kernel = derive(choice)
+    lowest = kernel.order.step + 1
+    frame = Frame(lowest + 1)
+    error = error_matrix(kernel, frame.ring, frame.vectors, lowest + 1)
+    assert all(power >= lowest for element in error for power in element.parts)
+    vectors = rate(lowest + 1)
+    terms = {}
+    for power in (lowest, lowest + 1):
+        found = invariants.invariants(frame, [element.parts.get(power, frame.ring.zero) for element in error])
+        terms[power] = [sp.Rational(x) for x in invariants.matrix(found, vectors)]
+    left = []
+    with mpmath.workdps(60):
+        for h in (Fraction(1, 1000), Fraction(1, 2000)):
+            computed = one_step(choice, vectors, h)
+            predicted = [
+                sum(
+                    exact.number(Fraction(int(c[k].p), int(c[k].q))) * exact.number(h) ** p
+                    for p, c in terms.items()
+                )
+                for k in range(9)
+            ]
+            off = max(abs(a - b) for a, b in zip(computed, predicted, strict=True))
+            left.append(off / max(map(abs, computed)))
+    assert left[0] < mpmath.mpf("1e-4")
+    # Relative to the error two powers are known: what is left falls with the square of the step.
+    assert float(mpmath.log(left[0] / left[1], 2)) == pytest.approx(2, abs=0.1)
