@@ -19,8 +19,8 @@ from strapgen.kernel import Kernel, evaluate_stages
 Rate = Sequence[Sequence[Any]]
 
 
-def error_matrix(kernel: Kernel, ring: Any, rate: Rate, top: int) -> list[Powers]:
-    """Return E = computed C times true C transposed less the identity, row by row, up to a power of the step.
+def errors(kernel: Kernel, ring: Any, rate: Rate, top: int) -> dict[str, list[Powers]]:
+    """Return the error matrix of one step, and its scale, skew and drift, up to a power of the step.
 
     Parameters
     ----------
@@ -32,13 +32,41 @@ def error_matrix(kernel: Kernel, ring: Any, rate: Rate, top: int) -> list[Powers
         The rate and its derivatives at the beginning of the step; those that are left out are zero.
     top : int
         The last power that is kept.
+
+    Returns
+    -------
+    dict of str to list of Powers
+        "error", nine elements row by row, "scale", "skew" and "drift", three each: the outputs of the kernel
+        error-matrix.
     """
-    computed = computed_matrix(kernel, ring, rate, top)
-    true = true_matrix(ring, rate, top)
-    error = [
-        algebra.dot(computed[3 * i : 3 * i + 3], true[3 * j : 3 * j + 3]) for i in range(3) for j in range(3)
-    ]
-    return [element - int(place % 4 == 0) for place, element in enumerate(error)]
+    both = (computed_matrix(kernel, ring, rate, top), true_matrix(ring, rate, top))
+    split = _error_matrix()
+    values: dict[str, Any] = {}
+    for signal, elements in zip(split.inputs, both, strict=True):
+        values |= zip(signal.elements, elements, strict=True)
+
+    def number(value: sp.Rational) -> Powers:
+        return Powers(ring, {0: ring(ring.domain.from_sympy(value))}, top)
+
+    return split.expand(values, number)
+
+
+def split(error: Sequence[Any]) -> dict[str, list[Any]]:
+    """Return scale, skew and drift of an error matrix that is given row by row in expressions.
+
+    Parameters
+    ----------
+    error : sequence of Expr
+    """
+    kernel = _error_matrix()
+    computed, true = (signal.elements for signal in kernel.inputs)
+    values = dict(zip(computed, (element + int(k % 4 == 0) for k, element in enumerate(error)), strict=True))
+    values |= zip(true, (sp.Integer(int(k % 4 == 0)) for k in range(9)), strict=True)
+    return kernel.expand(values)
+
+
+def _error_matrix() -> Kernel:
+    return catalogue.derive(catalogue.choose("error-matrix"))
 
 
 def computed_matrix(kernel: Kernel, ring: Any, rate: Rate, top: int) -> list[Powers]:
