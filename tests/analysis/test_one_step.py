@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from itertools import pairwise
 
 import mpmath
 import pytest
@@ -10,7 +11,7 @@ import sympy as sp
 
 from strapgen import exact, lower
 from strapgen.analysis import invariants
-from strapgen.analysis.one_step import error_matrix
+from strapgen.analysis.one_step import errors
 from strapgen.catalogue import ALGORITHMS, Choice, choose, derive
 from strapgen.lowering.canonical.decomposition import Frame
 
@@ -29,7 +30,7 @@ CASES = [
 def constant(choice: Choice, top: int) -> tuple[list, list]:
     """Return symbols w_x, w_y, w_z and the error matrix at a constant rate."""
     ring, *w = sp.ring("w_x w_y w_z", sp.QQ)
-    return w, error_matrix(derive(choice), ring, [w], top)
+    return w, errors(derive(choice), ring, [w], top)["error"]
 
 
 @pytest.mark.parametrize(("algorithm", "share"), [("dcm", 1), ("euler", 16), ("cayley-klein", 16)])
@@ -73,7 +74,7 @@ def one_step(choice: Choice, vectors: list[list[sp.Rational]], h: Fraction) -> l
 
     times = [exact.number(h) * k / count for k in range(-companions.previous, count + 1)]
     angles = [angle(t) for t in times]
-    taken = [b - a for before, after in zip(angles, angles[1:]) for a, b in zip(before, after)]
+    taken = [b - a for pair in pairwise(angles) for a, b in zip(*pair, strict=True)]
     state = exact.states(program, [taken], [exact.number(x) for x in companions.identity])[-1]
     if companions.attitude:
         state = exact.Interpreter(lower(derive(choose(companions.attitude))))(state)
@@ -99,7 +100,7 @@ def test_two_terms_leave_an_error_of_the_square_of_the_step(algorithm, method, i
     kernel = derive(choice)
     lowest = kernel.order.step + 1
     frame = Frame(lowest + 1)
-    error = error_matrix(kernel, frame.ring, frame.vectors, lowest + 1)
+    error = errors(kernel, frame.ring, frame.vectors, lowest + 1)["error"]
     assert all(power >= lowest for element in error for power in element.parts)
     vectors = rate(lowest + 1)
     terms = {}

@@ -25,7 +25,8 @@ class Invariants:
         Coefficients of the vectors i and of the cross products (i, j), where i is the i-th derivative of the rate; each
         a polynomial in scalar products.
     symmetric : Coefficients
-        Coefficients of the unit matrix () and of the symmetrized products a b' + b a': (i, j), and (i, j, k) of i and j x k.
+        Coefficients of the unit matrix () and of the symmetrized products a b' + b a': (i, j), and (i, j, k) of i and
+        j x k.
     """
 
     drift: Coefficients

@@ -6,6 +6,7 @@ catalogue in their own symbols, where t is the time at the beginning of the step
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -126,7 +127,9 @@ def series(choice: Choice, motion: str = "general", terms: int = 2) -> ErrorSeri
     most = top + _PATIENCE
     try:
         while True:
-            found = _general(kernel, terms, top) if motion == "general" else _named(kernel, motion, terms, top)
+            found = (
+                _general(kernel, terms, top) if motion == "general" else _named(kernel, motion, terms, top)
+            )
             enough = all(len(part) >= terms for part in (found.drift, found.scale, found.skew) if part)
             if top >= most or (enough and (found.drift or found.scale)):
                 return found
@@ -173,10 +176,42 @@ def _named(kernel: Kernel, motion: str, terms: int, top: int) -> ErrorSeries:
     for name in ("drift", "scale", "skew"):
         reduced = [back(element) for element in made[name]]
         powers = sorted({power for element in reduced for power, value in element.items() if value})[:terms]
-        parts[name] = {
-            power: tuple(element.get(power, sp.S.Zero) for element in reduced) for power in powers
-        }
+        parts[name] = {power: tuple(element.get(power, sp.S.Zero) for element in reduced) for power in powers}
     return ErrorSeries(kernel.name, motion, parts["drift"], parts["scale"], parts["skew"], top)
+
+
+def as_json(found: ErrorSeries) -> str:
+    """Return a series as JSON."""
+    return json.dumps(found.as_dict(), indent=1)
+
+
+def as_report(found: ErrorSeries, latex: bool = False) -> str:
+    """Return a series as text, or as lines of LaTeX."""
+    lines = [f"{found.kernel}, {found.motion} motion: what one step of length h loses"]
+    if found.order is None:
+        return "\n".join([*lines, f"nothing, to the power {found.known} of h"])
+    lines.append(f"order {found.order}; terms to the power {found.known} of h were looked at")
+    if found.invariant and not latex:
+        lines.append(
+            "w0, w1, ... : the rate and its derivatives; a x b: cross product; S(a, b) = a b' + b a'"
+        )
+        for power, one in found.invariant.items():
+            lines += ["", f"h^{power}  drift           {as_text(one.drift)}"]
+            if one.symmetric:
+                lines.append(f"     scale and skew  {as_text(one.symmetric, symmetric=True)}")
+        return "\n".join(lines)
+    for part in ("drift", "scale", "skew"):
+        lines.append("")
+        for axis, expression in zip("xyz", found.expressions(part), strict=True):
+            shown = sp.latex(expression) if latex else sp.sstr(_by_power(expression))
+            lines.append(f"{part}_{axis} = {shown}")
+    return "\n".join(lines)
+
+
+def _by_power(expression: sp.Expr) -> sp.Expr:
+    """Return a series with every coefficient factored."""
+    terms = [sp.factor(term) for term in sp.Add.make_args(sp.collect(sp.expand(expression), STEP))]
+    return sp.Add(*terms)
 
 
 def _rate(motion: str, count: int) -> tuple[Any, list[list[Any]], Any]:
@@ -186,6 +221,8 @@ def _rate(motion: str, count: int) -> tuple[Any, list[list[Any]], Any]:
     if motion == "constant":
         ring, *w = sp.ring("w_x w_y w_z", sp.QQ)
         return ring, [w], lambda element: {p: part.as_expr() for p, part in element.parts.items()}
+    if motion == "polynomial":
+        return _polynomial_rate(count)
     time = sp.Symbol("t")
     parameters = [sp.Symbol(name) for name in catalogue.MOTIONS[motion]]
     cosine, sine = sp.symbols("cosine sine")
@@ -208,6 +245,23 @@ def _rate(motion: str, count: int) -> tuple[Any, list[list[Any]], Any]:
         return found
 
     return ring, rate, back
+
+
+def _polynomial_rate(count: int) -> tuple[Any, list[list[Any]], Any]:
+    """Return what `_rate` does: the derivatives of the one component are put in at the end, or products explode."""
+    from strapgen.catalogue.motions import MOTIONS as MODELS
+
+    time = sp.Symbol("t")
+    parameters = [sp.Symbol(name) for name in catalogue.MOTIONS["polynomial"]]
+    rate = MODELS["polynomial"].rate(time, *parameters)
+    count = min(count, len(parameters))  # the others are zero
+    ring, *r = sp.ring([f"r{j}" for j in range(count)], sp.QQ)
+    meant = {sp.Symbol(f"r{j}"): sp.diff(rate[1], time, j) for j in range(count)}
+
+    def back(element: Powers) -> dict[int, sp.Expr]:
+        return {power: sp.factor(part.as_expr()).subs(meant) for power, part in element.parts.items()}
+
+    return ring, [[ring.zero, one, ring.zero] for one in r], back
 
 
 def _powers(elements: Sequence[Powers]) -> list[int]:

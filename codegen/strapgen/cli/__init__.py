@@ -15,6 +15,7 @@ from strapgen.cli import (
     derive,
     generate,
     listing,
+    series,
     simulate,
     study,
     tableau,
@@ -38,6 +39,7 @@ app.command("generate")(generate.generate)
 app.command("simulate")(simulate.simulate)
 app.command("compare")(compare.compare)
 app.command("converge")(converge.converge)
+app.command("series")(series.series)
 app.command("check")(check.check)
 app.command("tables")(tables.tables)
 app.add_typer(study.app, name="study")
