@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from fractions import Fraction
 from itertools import pairwise
@@ -250,6 +250,34 @@ def _exactly(choice: Choice, motion: Motion, rounding: float) -> _Measure:
 
     Where the published coefficients of a method are rounded themselves, that is the floor.
     """
+    attitudes = exact_attitudes(choice, motion)
+
+    def measure(length: Fraction, count: int) -> tuple[float | None, float]:
+        with mpmath.workdps(exact.DIGITS):
+            worst = mpmath.mpf(0)
+            for computed, true in attitudes(length, count):
+                worst = max(worst, sum((a - b) ** 2 for a, b in zip(computed, true, strict=True)))
+            return float(mpmath.sqrt(worst / 2)), 100 * rounding + 10.0 ** (10 - exact.DIGITS)
+
+    return measure
+
+
+def exact_attitudes(
+    choice: Choice, motion: Motion
+) -> Callable[[Fraction, int], Iterator[tuple[list[Any], list[Any]]]]:
+    """Return what runs a step on a motion in the digits of mpmath.
+
+    Parameters
+    ----------
+    choice : Choice
+        An attitude step that takes increments.
+    motion : Motion
+
+    Returns
+    -------
+    callable
+        ``run(step, count)``: the computed and the true matrix, row by row, at time 0 and after every step.
+    """
     program = pipeline.lower(catalogue.derive(choice))
     assert program.companions is not None, "checked by the caller"
     samples, previous = catalogue.increments(choice), catalogue.previous(choice)
@@ -258,28 +286,23 @@ def _exactly(choice: Choice, motion: Motion, rounding: float) -> _Measure:
     attitude = interpreter(program.companions.attitude) if program.companions.attitude else None
     identity = program.companions.identity
 
-    def measure(length: Fraction, count: int) -> tuple[float | None, float]:
-        with mpmath.workdps(exact.DIGITS):
-            parameters = [[mpmath.mpf(value)] for value in motion.parameters.values()]
-            width = length / samples
-            row = [
-                increment([exact.number((2 * k + 1) * width / 2)], [exact.number(width)], *parameters)
-                for k in range(-previous, count * samples)
-            ]
-            taken = (
-                [x for vector in row[k : k + previous + samples] for x in vector]
-                for k in range(0, count * samples, samples)
-            )
-            run = exact.states(program, taken, [exact.number(value) for value in identity])
-            worst = mpmath.mpf(0)
-            for place, state in enumerate(run):
-                computed = attitude(state) if attitude else state
-                true = truth([exact.number(place * length)], *parameters)
-                squares = sum((a - b) ** 2 for a, b in zip(computed, true, strict=True))
-                worst = max(worst, squares)
-            return float(mpmath.sqrt(worst / 2)), 100 * rounding + 10.0 ** (10 - exact.DIGITS)
+    def run(length: Fraction, count: int) -> Iterator[tuple[list[Any], list[Any]]]:
+        parameters = [[mpmath.mpf(value)] for value in motion.parameters.values()]
+        width = length / samples
+        row = [
+            increment([exact.number((2 * k + 1) * width / 2)], [exact.number(width)], *parameters)
+            for k in range(-previous, count * samples)
+        ]
+        taken = (
+            [x for vector in row[k : k + previous + samples] for x in vector]
+            for k in range(0, count * samples, samples)
+        )
+        states = exact.states(program, taken, [exact.number(value) for value in identity])
+        for place, state in enumerate(states):
+            computed = attitude(state) if attitude else state
+            yield computed, truth([exact.number(place * length)], *parameters)
 
-    return measure
+    return run
 
 
 def as_text(found: Sequence[Convergence], title: str) -> str:

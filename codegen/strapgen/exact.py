@@ -15,7 +15,8 @@ from strapgen.program import OPERATIONS, Program
 #: Decimal digits: a million steps lose six of them.
 DIGITS = 40
 
-_FUNCTIONS: dict[str, Callable[..., Any]] = {
+#: What a program may call, on numbers of mpmath.
+FUNCTIONS: dict[str, Callable[..., Any]] = {
     **OPERATIONS,
     "sqrt": mpmath.sqrt,
     "sin": mpmath.sin,
@@ -58,7 +59,7 @@ class Interpreter:
         return list(self._run(values).values())[-1]
 
     def _run(self, values: Mapping[str, Any]) -> dict[str, list[Any]]:
-        return self.program.run(values, self._constant, _FUNCTIONS)
+        return self.program.run(values, self._constant, FUNCTIONS)
 
     def _constant(self, value: Fraction) -> Any:
         if value not in self._constants:

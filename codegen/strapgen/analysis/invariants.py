@@ -7,12 +7,18 @@ first solution in a fixed order of terms, the one of `Frame`.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+import sympy as sp
+
+from strapgen.algebra import exact
 from strapgen.lowering.canonical.decomposition import Coefficients, Decomposition, Frame
+
+#: Denominators from here on are those of rounded decimals.
+_DECIMAL = 10**16
 
 
 @dataclass(frozen=True)
@@ -33,14 +39,63 @@ class Invariants:
     symmetric: Coefficients
 
 
-def invariants(frame: Frame, matrix: Sequence[Any]) -> Invariants:
-    """Return an error matrix, given row by row in the coordinates of a frame, in vector-invariant form."""
-    found = frame.matrix(list(matrix))
-    return Invariants(_scaled(found.vector, Fraction(-1)), found.symmetric)
+def invariants(
+    frame: Frame, matrix: Sequence[Any], shown: Callable[[Fraction], Fraction] = Fraction
+) -> Invariants:
+    """Return an error matrix in vector-invariant form.
+
+    Parameters
+    ----------
+    frame : Frame
+    matrix : sequence of ring element
+        Row by row, in the coordinates of the frame; over the rational numbers or a field of roots, whose elements are
+        decomposed one power of its generator after the other.
+    shown : callable, optional
+        Rounds a rational coefficient; what it makes zero is left out.
+    """
+    domain = matrix[0].ring.domain
+    if domain == sp.QQ:
+        found = frame.matrix(list(matrix))
+        return Invariants(_scaled(_rounded(found.vector, shown), Fraction(-1)), _rounded(found.symmetric, shown))
+    drift: Coefficients = {}
+    symmetric: Coefficients = {}
+    for power in range(domain.mod.degree()):
+        share = domain.ext.as_expr() ** power
+        found = frame.matrix([_share(frame, element, power) for element in matrix])
+        _add(drift, _scaled(found.vector, -share))
+        _add(symmetric, _scaled(found.symmetric, share))
+    return Invariants(drift, symmetric)
 
 
-def _scaled(coefficients: Coefficients, factor: Fraction) -> Coefficients:
-    return {c: {m: factor * x for m, x in polynomial.items()} for c, polynomial in coefficients.items()}
+def _rounded(coefficients: Coefficients, shown: Callable[[Fraction], Fraction]) -> Coefficients:
+    rounded = {
+        c: {m: shown(x) for m, x in polynomial.items() if shown(x)} for c, polynomial in coefficients.items()
+    }
+    return {c: polynomial for c, polynomial in rounded.items() if polynomial}
+
+
+def _share(frame: Frame, element: Any, power: int) -> Any:
+    """Return the rational polynomial that belongs to a power of the generator of a field of roots."""
+    terms = {}
+    for place, number in element.terms():
+        numbers = number.to_list()[::-1]
+        if power < len(numbers) and numbers[power]:
+            terms[place] = numbers[power]
+    return frame.ring.from_dict(terms)
+
+
+def _add(total: Coefficients, more: Coefficients) -> None:
+    for covariant, polynomial in more.items():
+        sums = total.setdefault(covariant, {})
+        for monomial, number in polynomial.items():
+            sums[monomial] = sums[monomial] + number if monomial in sums else number
+
+
+def _scaled(coefficients: Coefficients, factor: Any) -> Coefficients:
+    return {
+        c: {m: x * factor if isinstance(factor, Fraction) else exact(x) * factor for m, x in polynomial.items()}
+        for c, polynomial in coefficients.items()
+    }
 
 
 def matrix(found: Invariants, vectors: Sequence[Sequence[Any]]) -> list[Any]:
@@ -72,7 +127,7 @@ def as_text(coefficients: Coefficients, name: str = "w", symmetric: bool = False
     for covariant in sorted(coefficients, key=lambda c: (len(c), c)):
         polynomial = coefficients[covariant]
         for monomial in sorted(polynomial, key=lambda m: (len(m), m)):
-            number = polynomial[monomial]
+            number = exact(polynomial[monomial])
             factors = [_number(number), *_products(monomial, name), _covariant(covariant, name, symmetric)]
             terms.append(("-" if number < 0 else "+", " ".join(filter(None, factors))))
     if not terms:
@@ -82,8 +137,13 @@ def as_text(coefficients: Coefficients, name: str = "w", symmetric: bool = False
     return text + "".join(f" {sign} {term}" for sign, term in rest)
 
 
-def _number(number: Fraction) -> str:
-    return "" if abs(number) == 1 else str(abs(number))
+def _number(number: sp.Expr) -> str:
+    size = abs(number)
+    if size == 1:
+        return ""
+    if size.is_Rational:  # as a decimal where the method's own coefficients are decimals
+        return str(size) if size.q < _DECIMAL else f"{float(size):.11e}"
+    return f"({size})"
 
 
 def _products(monomial: Sequence[tuple[int, ...]], name: str) -> list[str]:

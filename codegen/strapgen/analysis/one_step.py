@@ -6,28 +6,92 @@ The rate is w(t) = w_0 + w_1 t + w_2 t^2/2 + ..., its increments are exact, and 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
 import sympy as sp
 
 from strapgen import algebra, catalogue
 from strapgen.analysis.powers import Powers, function
-from strapgen.exceptions import InputError
+from strapgen.catalogue import Choice
+from strapgen.catalogue.coefficients import Number
+from strapgen.exceptions import InputError, InputTypeError
 from strapgen.kernel import Kernel, evaluate_stages
+
+#: Of a method whose coefficients are published with 17 digits or so: digits of its error, and what may be zero.
+_DIGITS = 12
+_LEAST = Fraction(1, 10**14)
 
 #: A vector of polynomials for every derivative of the rate.
 Rate = Sequence[Sequence[Any]]
 
 
-def errors(kernel: Kernel, ring: Any, rate: Rate, top: int) -> dict[str, list[Powers]]:
-    """Return the error matrix of one step, and its scale, skew and drift, up to a power of the step.
+@dataclass(frozen=True)
+class Step:
+    """An attitude step, and what it is to be given.
 
     Parameters
     ----------
     kernel : Kernel
-        An attitude step that takes increments.
+    nodes : tuple of number or None
+        Nodes at which it is given the rate; None for one that takes increments.
+    lowest : int
+        For a method whose published coefficients are rounded the power of the step at which its error begins but for
+        that; 0 where they are exact.
+    """
+
+    kernel: Kernel
+    nodes: tuple[Number, ...] | None
+    lowest: int = 0
+
+    def shown(self, number: Fraction) -> Fraction:
+        """Return a coefficient of the error: where those of the method are rounded, as far as it can be known."""
+        if not self.lowest:
+            return number
+        return Fraction(f"{float(number):.{_DIGITS - 1}e}") if abs(number) > _LEAST else Fraction(0)
+
+    @property
+    def domain(self) -> Any:
+        """The field of the step's numbers: the rational ones, and what roots it has."""
+        expressions = [algebra.exact(node) for node in self.nodes or ()]
+        for stage in (*self.kernel.stages, *self.kernel.outputs):
+            expressions += stage.expressions
+        found = {
+            root
+            for expression in expressions
+            for root in expression.atoms(sp.Pow)
+            if root.is_number and not root.is_Rational
+        }
+        return sp.QQ.algebraic_field(*sorted(found, key=str)) if found else sp.QQ
+
+
+def step(choice: Choice) -> Step:
+    """Return a chosen attitude step.
+
+    Raises
+    ------
+    InputError, InputTypeError
+        If it is no attitude step, or no choice is given.
+    """
+    if not isinstance(choice, Choice):
+        raise InputTypeError(f"choice is {choice!r}; what catalogue.choose returns is needed")
+    kernel = catalogue.derive(choice)
+    if kernel.companions is None:
+        raise InputError(f"kernel {kernel.name} is no attitude step")
+    nodes = None if kernel.inputs[1].name == "increments" else catalogue.nodes(choice)
+    rounded = kernel.order is not None and bool(catalogue.rounding(choice))
+    return Step(kernel, nodes, kernel.order.step + 1 if kernel.order and rounded else 0)
+
+
+def errors(taken: Step, ring: Any, rate: Rate, top: int) -> dict[str, list[Powers]]:
+    """Return the error matrix of one step from zero rotation, and its parts, up to a power of the step.
+
+    Parameters
+    ----------
+    taken : Step
     ring : PolyRing
-        Ring of the coefficients.
+        Ring of the coefficients, over the step's own field.
     rate : sequence of sequence of ring element
         The rate and its derivatives at the beginning of the step; those that are left out are zero.
     top : int
@@ -39,16 +103,33 @@ def errors(kernel: Kernel, ring: Any, rate: Rate, top: int) -> dict[str, list[Po
         "error", nine elements row by row, "scale", "skew" and "drift", three each: the outputs of the kernel
         error-matrix.
     """
-    both = (computed_matrix(kernel, ring, rate, top), true_matrix(ring, rate, top))
+    both = (computed_matrix(taken, ring, rate, top), true_matrix(ring, rate, top))
     split = _error_matrix()
     values: dict[str, Any] = {}
     for signal, elements in zip(split.inputs, both, strict=True):
         values |= zip(signal.elements, elements, strict=True)
+    made: dict[str, list[Powers]] = split.expand(values, lambda value: _number(ring, value, top))
+    if taken.lowest:
+        made = {
+            name: [
+                Powers(ring, {p: x for p, x in one.parts.items() if p >= taken.lowest}, top)
+                for one in elements
+            ]
+            for name, elements in made.items()
+        }
+    return made
 
-    def number(value: sp.Rational) -> Powers:
-        return Powers(ring, {0: ring(ring.domain.from_sympy(value))}, top)
 
-    return split.expand(values, number)
+def shown(taken: Step, element: Any) -> Any:
+    """Return a ring element with its coefficients as they are shown."""
+    if not taken.lowest:
+        return element
+    terms = {
+        place: taken.shown(Fraction(int(x.numerator), int(x.denominator))) for place, x in element.terms()
+    }
+    return element.ring.from_dict(
+        {place: sp.QQ(x.numerator, x.denominator) for place, x in terms.items() if x}
+    )
 
 
 def split(error: Sequence[Any]) -> dict[str, list[Any]]:
@@ -69,31 +150,45 @@ def _error_matrix() -> Kernel:
     return catalogue.derive(catalogue.choose("error-matrix"))
 
 
-def computed_matrix(kernel: Kernel, ring: Any, rate: Rate, top: int) -> list[Powers]:
-    """Return the direction cosine matrix after one step from zero rotation, row by row."""
-    companions = kernel.companions
-    if companions is None or kernel.inputs[1].name != "increments":
-        raise InputError(f"kernel {kernel.name} takes no increments; a step that does is needed")
+def _number(ring: Any, value: Any, top: int) -> Powers:
+    return Powers(ring, {0: ring(ring.domain.from_sympy(sp.sympify(value)))}, top)
+
+
+def computed_state(taken: Step, ring: Any, rate: Rate, top: int) -> list[Powers]:
+    """Return the state after one step from zero rotation, row by row."""
+    kernel, companions = taken.kernel, taken.kernel.companions
+    assert companions is not None, "checked by `step`"
     state, samples = kernel.inputs
-
-    def number(value: Any) -> Powers:
-        return Powers(ring, {0: ring(ring.domain.from_sympy(sp.sympify(value)))}, top)
-
     values: dict[str, Any] = {
-        name: number(sp.Rational(x.numerator, x.denominator))
+        name: _number(ring, sp.Rational(x.numerator, x.denominator), top)
         for name, x in zip(state.elements, companions.identity, strict=True)
     }
-    taken = increments(ring, rate, samples.shape[0] - companions.previous, companions.previous, top)
-    values |= dict(zip(samples.elements, taken, strict=True))
-    (result,) = kernel.outputs
-    known = evaluate_stages((*kernel.stages, result), values, number, function)
-    elements = [known[name] for name in result.signal.elements]
-    if companions.attitude is None:
+    if taken.nodes is None:
+        count, previous = samples.shape[0] - companions.previous, companions.previous
+        given = increments(ring, rate, count, previous, top)
+    else:
+        given = turns(ring, rate, taken.nodes, top)
+    values |= dict(zip(samples.elements, given, strict=True))
+    return _evaluated(kernel, values, ring, top)
+
+
+def computed_matrix(taken: Step, ring: Any, rate: Rate, top: int) -> list[Powers]:
+    """Return the direction cosine matrix after one step from zero rotation, row by row."""
+    elements = computed_state(taken, ring, rate, top)
+    companions = taken.kernel.companions
+    if companions is None or companions.attitude is None:
         return elements
     attitude = catalogue.derive(catalogue.choose(companions.attitude))
     values = dict(zip(attitude.inputs[0].elements, elements, strict=True))
-    known = evaluate_stages((*attitude.stages, *attitude.outputs), values, number, function)
-    return [known[name] for name in attitude.outputs[-1].signal.elements]
+    return _evaluated(attitude, values, ring, top)
+
+
+def _evaluated(kernel: Kernel, values: dict[str, Any], ring: Any, top: int) -> list[Powers]:
+    """Return the elements of a kernel's last output."""
+    known = evaluate_stages(
+        (*kernel.stages, *kernel.outputs), values, lambda value: _number(ring, value, top), function
+    )
+    return [known[name] for name in kernel.outputs[-1].signal.elements]
 
 
 def increments(ring: Any, rate: Rate, count: int, previous: int, top: int) -> list[Powers]:
@@ -101,14 +196,27 @@ def increments(ring: Any, rate: Rate, count: int, previous: int, top: int) -> li
     found = []
     for k in range(-previous, count):
         begin, end = sp.Rational(k, count), sp.Rational(k + 1, count)
-        for axis in range(3):
-            parts = {
-                j + 1: vector[axis]
-                * ring.domain.from_sympy((end ** (j + 1) - begin ** (j + 1)) / sp.factorial(j + 1))
-                for j, vector in enumerate(rate)
-            }
-            found.append(Powers(ring, parts, top))
+        shares = [(end ** (j + 1) - begin ** (j + 1)) / sp.factorial(j + 1) for j in range(len(rate))]
+        found += _moments(ring, rate, shares, top)
     return found
+
+
+def turns(ring: Any, rate: Rate, nodes: Sequence[Number], top: int) -> list[Powers]:
+    """Return the elements of the rate at nodes of the step, times its length, row by row."""
+    found = []
+    for node in nodes:
+        shares = [algebra.exact(node) ** j / sp.factorial(j) for j in range(len(rate))]
+        found += _moments(ring, rate, shares, top)
+    return found
+
+
+def _moments(ring: Any, rate: Rate, shares: Sequence[sp.Expr], top: int) -> list[Powers]:
+    """Return sum_j shares[j] w_j h^(j+1) for every axis."""
+    numbers = [ring.domain.from_sympy(share) for share in shares]
+    return [
+        Powers(ring, {j + 1: vector[axis] * numbers[j] for j, vector in enumerate(rate)}, top)
+        for axis in range(3)
+    ]
 
 
 def true_matrix(ring: Any, rate: Rate, top: int) -> list[Powers]:

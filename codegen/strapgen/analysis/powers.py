@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import sympy as sp
+from sympy.polys.polyerrors import CoercionFailed
 
 
 class Powers:
@@ -96,22 +97,25 @@ class Powers:
         start = self._number()
         if not start:
             raise ArithmeticError("a series that begins with 0 has no inverse")
-        rest = self * (1 / start) - 1
-        return self.composed([(-1) ** k for k in range(self.top + 1)], rest) * (1 / start)
+        rest = self * (self.ring.domain.one / start) - 1
+        return self.composed([(-1) ** k for k in range(self.top + 1)], rest) * (self.ring.domain.one / start)
 
     def root(self) -> Powers:
-        """Return the square root of a series that begins with the square of a rational number.
+        """Return the square root of a series that begins with the square of a number of the field.
 
         Raises
         ------
         ArithmeticError
             If it does not.
         """
-        start = sp.sqrt(sp.Rational(str(self._number())))
-        if not start.is_Rational or not start:
-            raise ArithmeticError(f"a series that begins with {self._number()} has no series as its root")
-        factor = self.ring.domain.from_sympy(start)
-        rest = self * (1 / (factor * factor)) - 1
+        start = self.ring.domain.to_sympy(self._number())
+        try:
+            factor = self.ring.domain.from_sympy(sp.sqrt(start)) if start > 0 else None
+        except CoercionFailed:
+            factor = None
+        if not factor:
+            raise ArithmeticError(f"a series that begins with {start} has no series as its root")
+        rest = self * (self.ring.domain.one / (factor * factor)) - 1
         coefficients = [sp.binomial(sp.Rational(1, 2), k) for k in range(self.top + 1)]
         return self.composed(coefficients, rest) * factor
 

@@ -290,6 +290,11 @@ def previous(choice: Choice) -> int:
     return choice.previous
 
 
+def nodes(choice: Choice) -> tuple[Any, ...]:
+    """Return the nodes of a chosen method, at which a step that takes rates is given them."""
+    return () if choice.method is None else tuple(_method(choice.method).nodes)
+
+
 def rounding(choice: Choice) -> Fraction:
     """Return by how much published coefficients of a chosen method may be off, which are rounded: mostly 0."""
     method = choice.method

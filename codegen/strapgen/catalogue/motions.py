@@ -32,6 +32,10 @@ class MotionModel:
         ``increment(m, d, *parameters)``: the rate's integral over [m - d/2, m + d/2] in rad.
     attitude : callable
         ``attitude(t, *parameters)``: the direction cosine matrix, the identity at t = 0.
+    turning : callable or None
+        ``turning(*parameters)``: for a rate that keeps its length and turns evenly, the constant vector n, in rad/s,
+        about which it turns: the body rate is that of time 0 turned by -n t, and the attitude is the rotation by
+        (rate at time 0 + n) t times the one by -n t. None for other motions.
     """
 
     name: str
@@ -39,6 +43,7 @@ class MotionModel:
     rate: Formula
     increment: Formula
     attitude: Formula
+    turning: Formula | None = None
 
 
 def _about_y(angle: sp.Expr) -> sp.Matrix:
@@ -74,6 +79,7 @@ MOTIONS = {
             rate=lambda t, x, y, z: sp.Matrix([x, y, z]),
             increment=lambda m, d, x, y, z: d * sp.Matrix([x, y, z]),
             attitude=lambda t, x, y, z: algebra.rotation(t * sp.Matrix([x, y, z])),
+            turning=lambda x, y, z: sp.zeros(3, 1),
         ),
         MotionModel(
             "sinusoidal",
@@ -90,6 +96,7 @@ MOTIONS = {
                 [a * _chord(m, d, b, sp.sin), g * d, a * _chord(m, d, b, sp.cos)]
             ),
             attitude=_coning_attitude,
+            turning=lambda a, b, g: sp.Matrix([0, b, 0]),
         ),
         MotionModel(
             "polynomial",

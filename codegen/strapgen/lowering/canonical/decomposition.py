@@ -19,7 +19,7 @@ from typing import Any
 import sympy as sp
 from sympy.polys.matrices import DomainMatrix
 
-from strapgen.algebra import cross_elements, dot
+from strapgen.algebra import cross_elements, dot, exact
 from strapgen.lowering.polynomials import Monomial, Polynomial, add, substitute
 
 #: What a coefficient belongs to: () a scalar or the unit matrix; (i,) vector i; (i, j) the cross product i x j in
@@ -67,7 +67,7 @@ class Decomposition:
         def value(polynomial: Polynomial) -> Any:
             total: Any = 0
             for monomial, coefficient in polynomial.items():
-                product: Any = sp.Rational(coefficient.numerator, coefficient.denominator)
+                product: Any = exact(coefficient)
                 for i, j, *k in monomial:
                     other = cross_elements(vectors[j], vectors[k[0]]) if k else vectors[j]
                     product = dot(vectors[i], other) * product

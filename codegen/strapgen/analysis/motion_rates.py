@@ -1,0 +1,108 @@
+"""The rates of the catalogue's motions and their derivatives, as polynomials that series are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import sympy as sp
+
+from strapgen import catalogue
+from strapgen.catalogue.motions import MOTIONS, MotionModel
+
+#: Time at the beginning of a step.
+TIME = sp.Symbol("t")
+#: Parameters of the motion "constant" as series show them.
+CONSTANT = sp.symbols("w_x w_y w_z")
+
+
+@dataclass(frozen=True)
+class MotionRate:
+    """The rate of a motion in a ring.
+
+    Parameters
+    ----------
+    ring : PolyRing
+    derivatives : list of list of ring element
+        The rate and its derivatives at the beginning of a step.
+    expression : callable
+        Returns a ring element as an expression in the motion's parameters and the time.
+    """
+
+    ring: Any
+    derivatives: list[list[Any]]
+    expression: Callable[[Any], sp.Expr]
+
+
+def parameters(motion: str) -> tuple[sp.Symbol, ...]:
+    """Return the symbols of a motion's parameters."""
+    return CONSTANT if motion == "constant" else tuple(map(sp.Symbol, catalogue.MOTIONS[motion]))
+
+
+def model(motion: str) -> MotionModel:
+    """Return the closed form of a motion."""
+    return MOTIONS[motion]
+
+
+def at_time(motion: str, count: int, domain: Any = sp.QQ) -> MotionRate:
+    """Return the rate of a motion and its derivatives at time t.
+
+    Parameters
+    ----------
+    motion : str
+    count : int
+        How many, with the rate itself.
+    domain : Domain, optional
+        Field of the numbers.
+    """
+    if motion == "polynomial":
+        return _polynomial(count, domain)
+    symbols = parameters(motion)
+    cosine, sine = sp.symbols("cosine sine")
+    frequency = next((p for p in symbols if p.name == "b"), None)
+    waves = {} if frequency is None else {sp.cos(frequency * TIME): cosine, sp.sin(frequency * TIME): sine}
+    ring, *_ = sp.ring([*symbols, *waves.values()], domain)
+    vector = MOTIONS[motion].rate(TIME, *symbols)
+    rate = []
+    while len(rate) < count and any(vector):
+        rate.append([ring.from_expr(sp.expand(element).subs(waves)) for element in vector])
+        vector = vector.diff(TIME)
+    unity = ring.from_expr(cosine**2 + sine**2 - 1) if waves else None
+    back = {wave: function for function, wave in waves.items()}
+
+    def expression(element: Any) -> sp.Expr:
+        # Squares of sines are written as cosines, which tells what is zero.
+        reduced = element if unity is None else element.rem([unity])
+        return _factored(reduced).subs(back)
+
+    return MotionRate(ring, rate, expression)
+
+
+def at_start(motion: str, count: int, domain: Any = sp.QQ) -> MotionRate:
+    """Return the rate of a motion and its derivatives at time 0: what `at_time` does, without waves."""
+    symbols = parameters(motion)
+    ring, *_ = sp.ring(symbols, domain)
+    vector = MOTIONS[motion].rate(TIME, *symbols)
+    rate = []
+    for _ in range(count):
+        rate.append([ring.from_expr(sp.expand(element.subs(TIME, 0))) for element in vector])
+        vector = vector.diff(TIME)
+    return MotionRate(ring, rate, _factored)
+
+
+def _polynomial(count: int, domain: Any) -> MotionRate:
+    """Return the rate about one axis; its derivatives are put in at the end, or products explode."""
+    symbols = parameters("polynomial")
+    (_, rate, _) = MOTIONS["polynomial"].rate(TIME, *symbols)
+    ring, *r = sp.ring([f"r{j}" for j in range(min(count, len(symbols)))], domain)  # the others are zero
+    meant = {sp.Symbol(f"r{j}"): sp.diff(rate, TIME, j) for j in range(len(r))}
+    return MotionRate(
+        ring, [[ring.zero, one, ring.zero] for one in r], lambda element: _factored(element).subs(meant)
+    )
+
+
+def _factored(element: Any) -> sp.Expr:
+    """Return a ring element as an expression, in factors where its numbers are rational."""
+    expression = element.as_expr()
+    return sp.factor(expression) if element.ring.domain == sp.QQ else expression

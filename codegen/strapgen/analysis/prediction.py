@@ -1,0 +1,226 @@
+"""The errors of a run as the series predict them: no step is taken."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import mpmath
+import sympy as sp
+
+from strapgen import catalogue, checks, exact
+from strapgen.analysis.accumulation import antiderivative
+from strapgen.analysis.error_rate import ErrorRate, error_rate
+from strapgen.analysis.motion_rates import TIME, parameters
+from strapgen.catalogue import Choice
+from strapgen.convergence import interpreter
+from strapgen.motions import Motion
+
+#: A 3 x 3 matrix of mpmath, and what takes it over a span of time.
+_Matrix = Any
+_Transfer = Callable[[Any, Any], _Matrix]
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Predicted errors of a run, in many digits.
+
+    Parameters
+    ----------
+    times : list of mpf
+        In s, the first one 0.
+    errors : list of list of mpf
+        Error matrices row by row, reference axes.
+    scale, skew, drift : list of list of mpf
+        Their parts on x, y, z.
+    """
+
+    times: list[Any]
+    errors: list[list[Any]]
+    scale: list[list[Any]]
+    skew: list[list[Any]]
+    drift: list[list[Any]]
+
+    @property
+    def drift_by_axis(self) -> list[float]:
+        """Largest magnitude of the drift on each axis, in rad."""
+        return [max(abs(float(row[axis])) for row in self.drift) for axis in range(3)]
+
+    @property
+    def mean_drift(self) -> float:
+        """Root of the sum of squares of `drift_by_axis`, in rad."""
+        return float(mpmath.norm(self.drift_by_axis))
+
+
+def predict(
+    choice: Choice,
+    motion: Motion,
+    step: float | str | Fraction,
+    duration: float | str | Fraction,
+    orthonormalize: float | str | Fraction | None = None,
+    record: float | str | Fraction | None = None,
+    terms: int = 2,
+) -> Prediction:
+    """Predict the errors of a run from the series of its error rate.
+
+    The computed attitude is that of a body that turns at the true rate and the error rate together, in closed form; so
+    products of errors, which matter at low orders, are in it, and so is what orthonormalization does.
+
+    Parameters
+    ----------
+    choice : Choice
+        An attitude step that is linear in its state.
+    motion : Motion
+    step, duration, orthonormalize, record : number
+        As for `simulation.simulate`; without `record` the beginning and the end are given.
+    terms : int, optional
+        Powers of the step that are kept, from the first one on.
+
+    Returns
+    -------
+    Prediction
+
+    Raises
+    ------
+    InputError
+        If the step has no closed form of a run, or a time is not allowed.
+
+    Examples
+    --------
+    >>> from strapgen.motions import motion
+    >>> found = predict(catalogue.choose("dcm", "rk1"), motion("constant", y_deg_s=10), "1/8", 180, 5)
+    >>> round(float(mpmath.degrees(found.drift[-1][1])), 4)
+    0.2855
+    """
+    h = checks.number("step", step, positive=True)
+    total = checks.number("duration", duration, positive=True)
+    checks.multiple("duration", total, "step", h)
+    interval = total if record is None else checks.number("record", record, positive=True)
+    checks.multiple("duration", total, "record interval", interval)
+    every = total + interval
+    if orthonormalize is not None:
+        every = checks.number("orthonormalize", orthonormalize, positive=True)
+        checks.multiple("orthonormalize", every, "step", h)
+    found = error_rate(choice, motion.name, terms)
+    with mpmath.workdps(exact.DIGITS):
+        return _run(choice, found, motion, h, total, every, interval)
+
+
+def _run(
+    choice: Choice,
+    found: ErrorRate,
+    motion: Motion,
+    h: Fraction,
+    total: Fraction,
+    every: Fraction,
+    interval: Fraction,
+) -> Prediction:
+    settings = [mpmath.mpf(value) for value in motion.parameters.values()]
+    truth = interpreter(f"{motion.name}-truth")
+
+    def true(time: Fraction) -> _Matrix:
+        return _matrix(truth([exact.number(time)], *([value] for value in settings)))
+
+    transfer = (_turning if found.steady else _about_an_axis)(found, settings, exact.number(h))
+    restore = _orthonormalization(choice)
+    split = interpreter_of_parts()
+    stops = sorted(
+        {k * interval for k in range(int(total / interval) + 1)}
+        | {k * every for k in range(int(total / every) + 1)}
+    )
+    # Computed matrix = product * true matrix: the error matrix and the identity.
+    product, before = mpmath.eye(3), Fraction(0)
+    prediction = Prediction([], [], [], [], [])
+    for time in stops:
+        if time > before:
+            product = product * transfer(exact.number(before), exact.number(time))
+        if time and time % every == 0:
+            product = restore(product * true(time)) * true(time).T
+        if time % interval == 0:
+            scale, skew, drift = split(product)
+            prediction.times.append(exact.number(time))
+            prediction.errors.append(list(product - mpmath.eye(3)))
+            prediction.scale.append(scale)
+            prediction.skew.append(skew)
+            prediction.drift.append(drift)
+        before = time
+    return prediction
+
+
+def _matrix(elements: list[Any]) -> _Matrix:
+    return mpmath.matrix([elements[k : k + 3] for k in (0, 3, 6)])
+
+
+def interpreter_of_parts() -> Callable[[_Matrix], tuple[list[Any], list[Any], list[Any]]]:
+    """Return what splits the identity and an error matrix into scale, skew and drift, by the kernel error-matrix."""
+    program = interpreter("error-matrix").program
+    identity = list(mpmath.eye(3))
+
+    def split(product: _Matrix) -> tuple[list[Any], list[Any], list[Any]]:
+        values: dict[str, Any] = {}
+        for signal, elements in zip(program.inputs, (list(product), identity), strict=True):
+            values |= zip(signal.elements, elements, strict=True)
+        made = program.run(values, exact.number, exact.FUNCTIONS)
+        return made["scale"], made["skew"], made["drift"]
+
+    return split
+
+
+def _sum(found: ErrorRate, matrices: dict[int, sp.Matrix], h: Any) -> Callable[..., _Matrix]:
+    """Return the sum of a series as a function of the motion's parameters, and of what else its terms depend on."""
+    symbols = [*parameters(found.motion), TIME]
+    made = {power: sp.lambdify(symbols, matrix, "mpmath") for power, matrix in matrices.items()}
+
+    def value(*arguments: Any) -> _Matrix:
+        total = mpmath.zeros(3)
+        for power, function in made.items():
+            total += h**power * function(*arguments)
+        return total
+
+    return value
+
+
+def _turning(found: ErrorRate, settings: list[Any], h: Any) -> _Transfer:
+    """Return what the product gains over a span of time where the frame turns evenly."""
+    axis = sp.lambdify(parameters(found.motion), sp.Matrix(3, 3, _skew(found.axis)), "mpmath")(*settings)
+    whole = axis + _sum(found, found.matrices, h)(*settings, mpmath.mpf(0))
+    spans: dict[Any, _Matrix] = {}
+
+    def transfer(begin: Any, end: Any) -> _Matrix:
+        span = end - begin
+        if span not in spans:
+            spans[span] = mpmath.expm(whole * span) * mpmath.expm(-axis * span)
+        turned = mpmath.expm(axis * begin)
+        return turned * spans[span] * turned.T
+
+    return transfer
+
+
+def _skew(axis: sp.Matrix) -> list[sp.Expr]:
+    from strapgen import algebra
+
+    return list(algebra.skew(axis))
+
+
+def _about_an_axis(found: ErrorRate, settings: list[Any], h: Any) -> _Transfer:
+    """Return what the product gains over a span of time where the rate keeps its axis."""
+    gained = {power: antiderivative(matrix, found) for power, matrix in found.matrices.items()}
+    value = _sum(found, gained, h)
+
+    def transfer(begin: Any, end: Any) -> _Matrix:
+        return mpmath.expm(value(*settings, end) - value(*settings, begin))
+
+    return transfer
+
+
+def _orthonormalization(choice: Choice) -> Callable[[_Matrix], _Matrix]:
+    """Return what restores a computed matrix: the scheme of the algorithm, or the normalization of its parameters."""
+    companions = catalogue.derive(choice).companions
+    assert companions is not None, "checked by error_rate"
+    if companions.attitude is not None or companions.orthonormalize is None:
+        # The matrix of parameters whose length is off is a rotation times a factor.
+        return lambda computed: computed / mpmath.cbrt(mpmath.det(computed))
+    scheme = interpreter(companions.orthonormalize)
+    return lambda computed: _matrix(scheme(list(computed)))
