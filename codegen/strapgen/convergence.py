@@ -8,6 +8,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from fractions import Fraction
+from functools import cache
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +22,7 @@ from strapgen.exceptions import InputError, InputTypeError
 from strapgen.fixedpoint import Settings
 from strapgen.motions import Motion
 from strapgen.order import Order
+from strapgen.program import Program
 from strapgen.simulation import largest_increment, simulate
 from strapgen.targets import FIXED
 
@@ -242,7 +244,12 @@ def _on_backend(
 
 def interpreter(name: str) -> exact.Interpreter:
     """Return a kernel by name that runs in many digits."""
-    return exact.Interpreter(pipeline.lower(catalogue.derive(catalogue.choose(name))))
+    return exact.Interpreter(_program(name))
+
+
+@cache
+def _program(name: str) -> Program:
+    return pipeline.lower(catalogue.derive(catalogue.choose(name)))
 
 
 def _exactly(choice: Choice, motion: Motion, rounding: float) -> _Measure:

@@ -7,7 +7,7 @@ leaves the drift as it is, to that order, and keeps scale and skew from adding u
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import sympy as sp
@@ -76,8 +76,8 @@ def accumulate(choice: Choice, motion: str, terms: int = 2) -> Accumulation:
         An attitude step that is linear in its state.
     motion : str
     terms : int, optional
-        How many powers of the step length from the first that is not zero; at a constant rate, where every other one is
-        zero for the drift, twice as many.
+        How many terms of the drift that grows and of the one that is bounded. They are looked for among the first powers
+        of the error rate, twice as many: every other one may be zero.
 
     Returns
     -------
@@ -97,10 +97,18 @@ def accumulate(choice: Choice, motion: str, terms: int = 2) -> Accumulation:
     """
     checks.choice("motion", motion, tuple(motion_rates.MOTIONS))
     checks.count("terms", terms, largest=MOST_TERMS)
-    found = error_rate(choice, motion, 2 * terms if motion == "constant" else terms)
-    if found.steady:
-        return _steady(found)
-    return _about_an_axis(found)
+    found = error_rate(choice, motion, 2 * terms)
+    made = _steady(found) if found.steady else _about_an_axis(found)
+    return replace(
+        made,
+        secular=_first(made.secular, terms),
+        bounded=_first(made.bounded, terms),
+        growth=_first(made.growth, terms),
+    )
+
+
+def _first(rows: dict[int, Any], terms: int) -> dict[int, Any]:
+    return dict(list(rows.items())[:terms])
 
 
 def _steady(found: ErrorRate) -> Accumulation:
@@ -118,8 +126,8 @@ def _steady(found: ErrorRate) -> Accumulation:
         row = (-imaginary * found.axis).applyfunc(_short)
         if any(row):
             secular[power] = row
-        if real:
-            growth[power] = _short(real)
+        if real := _short(real):
+            growth[power] = real
     bounded = {}
     # Products of two errors are of twice the first power: where that is not the second one, all of the second is there.
     known = [power for power in powers if power < 2 * powers[0]]
@@ -146,7 +154,10 @@ def _swing(drift: sp.Matrix, axis: sp.Matrix) -> sp.Matrix:
 
 
 def _short(expression: sp.Expr) -> sp.Expr:
-    return sp.factor(sp.cancel(expression)) if expression else sp.S.Zero
+    """Return an expression in lowest terms and factors; over a field of roots, where that takes long, as it is."""
+    if any(root.is_number and not root.is_Rational for root in expression.atoms(sp.Pow)):
+        return expression
+    return sp.factor(sp.cancel(expression))
 
 
 def _eigenvalue(found: ErrorRate, top: int) -> dict[int, tuple[sp.Expr, sp.Expr]]:
@@ -157,13 +168,13 @@ def _eigenvalue(found: ErrorRate, top: int) -> dict[int, tuple[sp.Expr, sp.Expr]
     """
     ring = found.ring
     first = min(found.matrices)
-    field = ring.to_field()
-    extended, y = sp.ring("y", field)
+    names = [str(symbol) for symbol in ring.symbols]
+    extended, y, half, *_ = sp.ring(["y", "half_over_S", *names], ring.domain)
 
     def lifted(element: Powers) -> Powers:
         # log(M R')/h: one power less. What lies below the first power of the error rate is zero but for rounding.
         parts = {
-            power - 1: extended(field(part))
+            power - 1: part.set_ring(extended)
             for power, part in element.parts.items()
             if power == 1 or power > first
         }
@@ -171,27 +182,25 @@ def _eigenvalue(found: ErrorRate, top: int) -> dict[int, tuple[sp.Expr, sp.Expr]
 
     m = [[lifted(element) for element in row] for row in found.raw]
     trace = m[0][0] + m[1][1] + m[2][2]
-    minors = sum(
-        (m[i][i] * m[j][j] - m[i][j] * m[j][i] for i, j in ((0, 1), (0, 2), (1, 2))),
-        Powers(extended, {}, top),
+    zero = Powers(extended, {}, top)
+    minors = sum((m[i][i] * m[j][j] - m[i][j] * m[j][i] for i, j in ((0, 1), (0, 2), (1, 2))), zero)
+    determinant = sum(
+        (m[0][i] * (m[1][j] * m[2][k] - m[1][k] * m[2][j]) for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1))),
+        zero,
     )
-    determinant = Powers(extended, {}, top)
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        determinant = determinant + m[0][i] * (m[1][j] * m[2][k] - m[1][k] * m[2][j])
-    axis = [field(ring.from_expr(sp.expand(x))) for x in found.axis]
-    square = sum((x * x for x in axis), field.zero)
-    unity = y**2 + extended(square)
+    axis = [extended.from_expr(sp.expand(x)) for x in found.axis]
+    square = sum((x * x for x in axis), extended.zero)
     value = Powers(extended, {0: y}, top)
+    known = 1 / (2 * square.as_expr())
     shifts: dict[int, tuple[sp.Expr, sp.Expr]] = {}
     for power in range(first, top + 1):
         cubic = ((value - trace) * value + minors) * value - determinant
-        rest = cubic.parts.get(power, extended.zero).rem([unity])
-        shift = rest * (1 / (2 * square))
+        shift = cubic.parts.get(power, extended.zero).rem([y**2 + square]) * half
         value = value + Powers(extended, {power: shift}, top)
-        real, imaginary = (shift.coeff(1), shift.coeff(y))
-        if shift:
-            shifts[power] = (field(real).as_expr(), field(imaginary).as_expr())
-    return shifts
+        expression = shift.as_expr().subs(sp.Symbol("half_over_S"), known)
+        imaginary = expression.coeff(sp.Symbol("y"), 1)
+        shifts[power] = (expression.subs(sp.Symbol("y"), 0), imaginary)
+    return {power: pair for power, pair in shifts.items() if any(pair)}
 
 
 def _about_an_axis(found: ErrorRate) -> Accumulation:

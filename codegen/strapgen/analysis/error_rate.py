@@ -138,20 +138,24 @@ def _steady(taken: Step, motion: str, top: int) -> ErrorRate:
     model = motion_rates.model(motion)
     assert model.turning is not None, "checked by the caller"
     turning = model.turning(*symbols)
+    error = [
+        Powers(ring, {power: one_step.shown(taken, part) for power, part in one.parts.items()}, top)
+        for one in one_step.errors(taken, ring, rate.derivatives, top)["error"]
+    ]
+    one = Powers(ring, {0: ring.one}, top)
+    step = [[x + one if i == j else x for j, x in enumerate(row)] for i, row in enumerate(_square(error))]
+    true = one_step.true_matrix(ring, rate.derivatives, top)
     back = one_step.true_matrix(ring, [[ring.from_expr(sp.expand(x)) for x in turning]], top)
-    step = _square(one_step.computed_matrix(taken, ring, rate.derivatives, top))
-    raw = _logarithm(_product(step, _square(back)))
+    raw = _logarithm(_product(step, _product(_square(true), _square(back))))
     axis = model.rate(sp.S.Zero, *symbols) + turning
     skew = algebra.skew(axis)
     matrices = {}
     for power in range(1, top):
         parts = [[element.parts.get(power + 1, ring.zero) for element in row] for row in raw]
-        if taken.lowest and power + 1 < taken.lowest:
-            continue
-        matrix = sp.Matrix([[rate.expression(one_step.shown(taken, x)) for x in row] for row in parts])
+        matrix = sp.Matrix([[rate.expression(x) for x in row] for row in parts])
         if any(matrix):
             matrices[power] = matrix
-    first = sp.Matrix([[rate.expression(x.parts.get(1, ring.zero)) for x in row] for row in raw])
+    first = sp.Matrix([[x.parts.get(1, ring.zero).as_expr() for x in row] for row in raw])
     if not (first - skew).expand().is_zero_matrix:
         raise InputError(f"kernel {taken.kernel.name} does not follow a {motion} motion: it is of order 0")
     return ErrorRate(taken.kernel.name, motion, axis, True, matrices, ring, tuple(map(tuple, raw)))

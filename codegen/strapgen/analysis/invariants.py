@@ -16,6 +16,7 @@ import sympy as sp
 
 from strapgen.algebra import exact
 from strapgen.lowering.canonical.decomposition import Coefficients, Decomposition, Frame
+from strapgen.lowering.polynomials import Polynomial
 
 #: Denominators from here on are those of rounded decimals.
 _DECIMAL = 10**16
@@ -103,6 +104,41 @@ def matrix(found: Invariants, vectors: Sequence[Sequence[Any]]) -> list[Any]:
     return Decomposition(None, _scaled(found.drift, Fraction(-1)), found.symmetric).evaluate(
         [list(vector) for vector in vectors]
     )
+
+
+def scalar(frame: Frame, element: Any) -> Polynomial:
+    """Return a scalar, given in the coordinates of a frame, as a polynomial in scalar products.
+
+    Parameters
+    ----------
+    frame : Frame
+    element : ring element
+        Over the rational numbers or a field of roots.
+    """
+    domain = element.ring.domain
+    if domain == sp.QQ:
+        return frame.quaternion([frame.ring.zero] * 3, element).scalar or {}
+    total: Coefficients = {}
+    for power in range(domain.mod.degree()):
+        found = frame.quaternion([frame.ring.zero] * 3, _share(frame, element, power)).scalar or {}
+        _add(total, _scaled({(): found}, domain.ext.as_expr() ** power))
+    return total.get((), {})
+
+
+def scalar_value(polynomial: Polynomial, vectors: Sequence[Sequence[Any]]) -> Any:
+    """Return the value of a polynomial in scalar products for given vectors: numbers, symbols or polynomials."""
+    return Decomposition(polynomial, {}, {}).evaluate([list(vector) for vector in vectors])[3]
+
+
+def scalar_as_text(polynomial: Polynomial, name: str = "w") -> str:
+    """Return a polynomial in scalar products as text.
+
+    Examples
+    --------
+    >>> scalar_as_text({((0, 0), (0, 0)): Fraction(1, 4), ((0, 2),): Fraction(-1)})
+    '-(w0 . w2) + 1/4 |w0|^4'
+    """
+    return as_text({(): polynomial}, name, symmetric=True).replace(" 1 ", " ").removesuffix(" 1")
 
 
 def as_text(coefficients: Coefficients, name: str = "w", symmetric: bool = False) -> str:

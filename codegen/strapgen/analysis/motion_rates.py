@@ -13,6 +13,8 @@ from strapgen.catalogue.motions import MOTIONS, MotionModel
 
 #: Time at the beginning of a step.
 TIME = sp.Symbol("t")
+#: Denominators from here on are those of decimals.
+_LONG = 10**15
 #: Parameters of the motion "constant" as series show them.
 CONSTANT = sp.symbols("w_x w_y w_z")
 
@@ -103,6 +105,15 @@ def _polynomial(count: int, domain: Any) -> MotionRate:
 
 
 def _factored(element: Any) -> sp.Expr:
-    """Return a ring element as an expression, in factors where its numbers are rational."""
+    """Return a ring element as an expression, in factors where its numbers are short fractions."""
     expression = element.as_expr()
-    return sp.factor(expression) if element.ring.domain == sp.QQ else expression
+    return sp.factor(expression) if is_plain(expression) else expression
+
+
+def is_plain(expression: sp.Expr) -> bool:
+    """Tell whether the numbers of an expression are fractions of whole numbers, neither roots nor long decimals.
+
+    Only such are factored: with others it takes long and shows nothing.
+    """
+    numbers = (x for x in sp.preorder_traversal(expression) if x.is_number)
+    return all(x.is_Rational and x.q < _LONG for x in numbers if not x.is_Integer)

@@ -10,7 +10,7 @@ from typing import Any
 import mpmath
 import sympy as sp
 
-from strapgen import catalogue, checks, exact
+from strapgen import algebra, catalogue, checks, exact
 from strapgen.analysis.accumulation import antiderivative
 from strapgen.analysis.error_rate import ErrorRate, error_rate
 from strapgen.analysis.motion_rates import TIME, parameters
@@ -18,9 +18,9 @@ from strapgen.catalogue import Choice
 from strapgen.convergence import interpreter
 from strapgen.motions import Motion
 
-#: A 3 x 3 matrix of mpmath, and what takes it over a span of time.
-_Matrix = Any
-_Transfer = Callable[[Any, Any], _Matrix]
+#: A 3 x 3 matrix of mpmath, and the factor that it gains over a span of time.
+Matrix = Any
+Transfer = Callable[[Fraction, Fraction], Matrix]
 
 
 @dataclass(frozen=True)
@@ -94,38 +94,61 @@ def predict(
     >>> round(float(mpmath.degrees(found.drift[-1][1])), 4)
     0.2855
     """
+    found = error_rate(choice, motion.name, terms)
+
+    def transfer(h: Fraction) -> Transfer:
+        settings = [mpmath.mpf(value) for value in motion.parameters.values()]
+        return (_turning if found.steady else _about_an_axis)(found, settings, exact.number(h))
+
+    return follow(choice, motion, transfer, step, duration, orthonormalize, record)
+
+
+def follow(
+    choice: Choice,
+    motion: Motion,
+    transfer: Callable[[Fraction], Transfer],
+    step: float | str | Fraction,
+    duration: float | str | Fraction,
+    orthonormalize: float | str | Fraction | None = None,
+    record: float | str | Fraction | None = None,
+) -> Prediction:
+    """Return the errors of a run whose error over any span of time is known, orthonormalized now and then.
+
+    Parameters
+    ----------
+    choice : Choice
+    motion : Motion
+    transfer : callable
+        For the step in s ``transfer(begin, end)``: the factor by which the product of computed and true matrix, the
+        latter transposed, grows over a span.
+    step, duration, orthonormalize, record : number
+        As for `predict`.
+    """
     h = checks.number("step", step, positive=True)
     total = checks.number("duration", duration, positive=True)
     checks.multiple("duration", total, "step", h)
     interval = total if record is None else checks.number("record", record, positive=True)
+    checks.multiple("record", interval, "step", h)
     checks.multiple("duration", total, "record interval", interval)
     every = total + interval
     if orthonormalize is not None:
         every = checks.number("orthonormalize", orthonormalize, positive=True)
         checks.multiple("orthonormalize", every, "step", h)
-    found = error_rate(choice, motion.name, terms)
     with mpmath.workdps(exact.DIGITS):
-        return _run(choice, found, motion, h, total, every, interval)
+        return _follow(choice, motion, transfer(h), total, every, interval)
 
 
-def _run(
-    choice: Choice,
-    found: ErrorRate,
-    motion: Motion,
-    h: Fraction,
-    total: Fraction,
-    every: Fraction,
-    interval: Fraction,
+def _follow(
+    choice: Choice, motion: Motion, transfer: Transfer, total: Fraction, every: Fraction, interval: Fraction
 ) -> Prediction:
-    settings = [mpmath.mpf(value) for value in motion.parameters.values()]
+    settings = [[mpmath.mpf(value)] for value in motion.parameters.values()]
     truth = interpreter(f"{motion.name}-truth")
 
-    def true(time: Fraction) -> _Matrix:
-        return _matrix(truth([exact.number(time)], *([value] for value in settings)))
+    def true(time: Fraction) -> Matrix:
+        return _matrix(truth([exact.number(time)], *settings))
 
-    transfer = (_turning if found.steady else _about_an_axis)(found, settings, exact.number(h))
     restore = _orthonormalization(choice)
-    split = interpreter_of_parts()
+    split = _parts()
     stops = sorted(
         {k * interval for k in range(int(total / interval) + 1)}
         | {k * every for k in range(int(total / every) + 1)}
@@ -135,7 +158,7 @@ def _run(
     prediction = Prediction([], [], [], [], [])
     for time in stops:
         if time > before:
-            product = product * transfer(exact.number(before), exact.number(time))
+            product = product * transfer(before, time)
         if time and time % every == 0:
             product = restore(product * true(time)) * true(time).T
         if time % interval == 0:
@@ -149,16 +172,16 @@ def _run(
     return prediction
 
 
-def _matrix(elements: list[Any]) -> _Matrix:
+def _matrix(elements: list[Any]) -> Matrix:
     return mpmath.matrix([elements[k : k + 3] for k in (0, 3, 6)])
 
 
-def interpreter_of_parts() -> Callable[[_Matrix], tuple[list[Any], list[Any], list[Any]]]:
+def _parts() -> Callable[[Matrix], tuple[list[Any], list[Any], list[Any]]]:
     """Return what splits the identity and an error matrix into scale, skew and drift, by the kernel error-matrix."""
     program = interpreter("error-matrix").program
     identity = list(mpmath.eye(3))
 
-    def split(product: _Matrix) -> tuple[list[Any], list[Any], list[Any]]:
+    def split(product: Matrix) -> tuple[list[Any], list[Any], list[Any]]:
         values: dict[str, Any] = {}
         for signal, elements in zip(program.inputs, (list(product), identity), strict=True):
             values |= zip(signal.elements, elements, strict=True)
@@ -168,12 +191,12 @@ def interpreter_of_parts() -> Callable[[_Matrix], tuple[list[Any], list[Any], li
     return split
 
 
-def _sum(found: ErrorRate, matrices: dict[int, sp.Matrix], h: Any) -> Callable[..., _Matrix]:
+def _sum(found: ErrorRate, matrices: dict[int, sp.Matrix], h: Any) -> Callable[..., Matrix]:
     """Return the sum of a series as a function of the motion's parameters, and of what else its terms depend on."""
     symbols = [*parameters(found.motion), TIME]
     made = {power: sp.lambdify(symbols, matrix, "mpmath") for power, matrix in matrices.items()}
 
-    def value(*arguments: Any) -> _Matrix:
+    def value(*arguments: Any) -> Matrix:
         total = mpmath.zeros(3)
         for power, function in made.items():
             total += h**power * function(*arguments)
@@ -182,40 +205,34 @@ def _sum(found: ErrorRate, matrices: dict[int, sp.Matrix], h: Any) -> Callable[.
     return value
 
 
-def _turning(found: ErrorRate, settings: list[Any], h: Any) -> _Transfer:
+def _turning(found: ErrorRate, settings: list[Any], h: Any) -> Transfer:
     """Return what the product gains over a span of time where the frame turns evenly."""
-    axis = sp.lambdify(parameters(found.motion), sp.Matrix(3, 3, _skew(found.axis)), "mpmath")(*settings)
+    axis = sp.lambdify(parameters(found.motion), algebra.skew(found.axis), "mpmath")(*settings)
     whole = axis + _sum(found, found.matrices, h)(*settings, mpmath.mpf(0))
-    spans: dict[Any, _Matrix] = {}
+    spans: dict[Fraction, Matrix] = {}
 
-    def transfer(begin: Any, end: Any) -> _Matrix:
-        span = end - begin
-        if span not in spans:
-            spans[span] = mpmath.expm(whole * span) * mpmath.expm(-axis * span)
-        turned = mpmath.expm(axis * begin)
-        return turned * spans[span] * turned.T
+    def transfer(begin: Fraction, end: Fraction) -> Matrix:
+        if end - begin not in spans:
+            span = exact.number(end - begin)
+            spans[end - begin] = mpmath.expm(whole * span) * mpmath.expm(-axis * span)
+        turned = mpmath.expm(axis * exact.number(begin))
+        return turned * spans[end - begin] * turned.T
 
     return transfer
 
 
-def _skew(axis: sp.Matrix) -> list[sp.Expr]:
-    from strapgen import algebra
-
-    return list(algebra.skew(axis))
-
-
-def _about_an_axis(found: ErrorRate, settings: list[Any], h: Any) -> _Transfer:
+def _about_an_axis(found: ErrorRate, settings: list[Any], h: Any) -> Transfer:
     """Return what the product gains over a span of time where the rate keeps its axis."""
     gained = {power: antiderivative(matrix, found) for power, matrix in found.matrices.items()}
     value = _sum(found, gained, h)
 
-    def transfer(begin: Any, end: Any) -> _Matrix:
-        return mpmath.expm(value(*settings, end) - value(*settings, begin))
+    def transfer(begin: Fraction, end: Fraction) -> Matrix:
+        return mpmath.expm(value(*settings, exact.number(end)) - value(*settings, exact.number(begin)))
 
     return transfer
 
 
-def _orthonormalization(choice: Choice) -> Callable[[_Matrix], _Matrix]:
+def _orthonormalization(choice: Choice) -> Callable[[Matrix], Matrix]:
     """Return what restores a computed matrix: the scheme of the algorithm, or the normalization of its parameters."""
     companions = catalogue.derive(choice).companions
     assert companions is not None, "checked by error_rate"

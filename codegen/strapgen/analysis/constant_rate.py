@@ -1,0 +1,272 @@
+"""A constant rate in closed form: what a step loses there, exactly, and the errors after any number of steps.
+
+A step by the angle x turns the plane across the axis by atan2(s, c) and stretches it by (s^2 + c^2)^(1/2), where s and
+c are what the method makes of sin x and cos x. Every step is the same and all commute: after N steps the angle lost is
+N times as large, the stretch its N-th power.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import mpmath
+import sympy as sp
+
+from strapgen import algebra, catalogue, exact
+from strapgen.analysis import one_step
+from strapgen.analysis.motion_rates import CONSTANT
+from strapgen.analysis.one_step import Step
+from strapgen.analysis.powers import Powers, function
+from strapgen.analysis.prediction import Matrix, Prediction, Transfer, follow
+from strapgen.analysis.series import PARTS, STEP
+from strapgen.catalogue import Choice
+from strapgen.kernel import Kernel
+from strapgen.motions import Motion
+
+#: The angle of a step, |w| h.
+ANGLE = sp.Symbol("x", positive=True)
+#: The number of steps.
+STEPS = sp.Symbol("N", positive=True, integer=True)
+
+
+@dataclass(frozen=True)
+class ConstantRate:
+    """What a step does at a constant rate, as functions of the angle x of the step.
+
+    Parameters
+    ----------
+    kernel : str
+    cosine, sine : Expr
+        What the method makes of cos x and sin x; for Euler and Cayley-Klein parameters of cos(x/2) and sin(x/2).
+    parameters : bool
+        Whether the state are such parameters, whose matrix is of second degree in them.
+    along : Expr
+        Factor along the axis, 1 for a rotation.
+    lowest : int
+        The first power of an error that is more than the rounding of published coefficients.
+    """
+
+    kernel: str
+    cosine: sp.Expr
+    sine: sp.Expr
+    parameters: bool
+    along: sp.Expr
+    lowest: int = 0
+
+    @property
+    def angle_lost(self) -> sp.Expr:
+        """Angle in rad by which the step stays behind: positive when the computed attitude lags."""
+        angle = ANGLE / 2 if self.parameters else ANGLE
+        if (self.cosine, self.sine) == (sp.cos(angle), sp.sin(angle)):
+            return sp.S.Zero
+        turned = sp.atan2(self.sine, self.cosine)
+        return ANGLE - (2 * turned if self.parameters else turned)
+
+    @property
+    def stretch_squared(self) -> sp.Expr:
+        """Square of the factor by which the state grows across the axis."""
+        return _square(self.cosine, self.sine)
+
+    @property
+    def stretch(self) -> sp.Expr:
+        """Factor by which the matrix grows across the axis: 1 and the scale of one step."""
+        return self.stretch_squared if self.parameters else sp.sqrt(self.stretch_squared)
+
+    def series(self, terms: int = 2) -> dict[int, sp.Rational]:
+        """Return the first terms of the angle lost in powers of x.
+
+        Examples
+        --------
+        >>> constant_rate(catalogue.choose("dcm", "rk1")).series(3)
+        {3: 1/3, 5: -1/5, 7: 1/7}
+        """
+        roots = [x for x in (self.cosine + self.sine).atoms(sp.Pow) if x.is_number and not x.is_Rational]
+        ring, _ = sp.ring("x", sp.QQ.algebraic_field(*roots) if roots else sp.QQ)
+        top = 4
+        while True:
+            top += 4
+            angle = {"x": Powers(ring, {1: ring.one}, top)}
+
+            def number(value: sp.Rational, top: int = top) -> Powers:
+                return Powers(ring, {0: ring(ring.domain.from_sympy(value))}, top)
+
+            cosine, sine = (
+                algebra.evaluate(part, angle, number, function)
+                for part in (_plain(self.cosine), _plain(self.sine))
+            )
+            # d atan2(s, c) = (c ds - s dc) / (c^2 + s^2)
+            slope = (cosine * _slope(sine) - sine * _slope(cosine)) / (cosine * cosine + sine * sine)
+            factor = 2 if self.parameters else 1
+            lost = {
+                power + 1: sp.Rational(int(power == 0))
+                - factor * ring.domain.to_sympy(slope.parts.get(power, ring.zero).LC) / (power + 1)
+                for power in range(top - 1)
+            }
+            found = {power: value for power, value in lost.items() if value and power >= self.lowest}
+            if self.lowest:  # its coefficients are rounded: so is what follows from them
+                found = {power: sp.Rational(f"{float(value):.11e}") for power, value in found.items()}
+            if len(found) >= terms or top >= _TOP:
+                return dict(list(found.items())[:terms])
+
+    def errors(self) -> dict[str, list[sp.Expr]]:
+        """Return the nine errors after N steps without orthonormalization: "drift", "scale" and "skew", three each.
+
+        In the symbols w_x, w_y, w_z, h and N; with exact orthonormalization the factors, stretch and along, are 1.
+        """
+        return self._errors(self.stretch, self.along)
+
+    def errors_orthonormalized(self) -> dict[str, list[sp.Expr]]:
+        """Return the nine errors after N steps where the matrix is made a rotation again, as often as one likes."""
+        return self._errors(sp.S.One, sp.S.One)
+
+    def _errors(self, stretch: sp.Expr, along: sp.Expr) -> dict[str, list[sp.Expr]]:
+        rate = sp.Matrix(CONSTANT)
+        length = sp.sqrt(algebra.dot(rate, rate))
+        here = {ANGLE: length * STEP}
+        gained = _product(
+            stretch.subs(here), along.subs(here), self.angle_lost.subs(here), STEPS, *(rate / length)
+        )
+        split = one_step.split(list(gained - sp.eye(3)))
+        return {part: split[part] for part in PARTS}
+
+
+#: The last power that is looked at for an angle lost.
+_TOP = 40
+
+
+def _product(stretch: sp.Expr, along: sp.Expr, lost: sp.Expr, steps: sp.Expr, *axis: sp.Expr) -> sp.Matrix:
+    """Return the product of computed and true matrix, transposed, after a number of steps about a unit vector."""
+    u = sp.Matrix(axis)
+    projection = u * u.T
+    turned = sp.cos(steps * lost) * (sp.eye(3) - projection) - sp.sin(steps * lost) * algebra.skew(u)
+    return along**steps * projection + stretch**steps * turned
+
+
+def _square(cosine: sp.Expr, sine: sp.Expr) -> sp.Expr:
+    total = sp.expand(cosine**2 + sine**2)
+    return total if total.is_polynomial(ANGLE) else sp.simplify(total)
+
+
+def _slope(series: Powers) -> Powers:
+    """Return the derivative of a series."""
+    return Powers(
+        series.ring, {power - 1: part * power for power, part in series.parts.items() if power}, series.top - 1
+    )
+
+
+def constant_rate(choice: Choice) -> ConstantRate:
+    """Derive what a step does at a constant rate.
+
+    Parameters
+    ----------
+    choice : Choice
+        An attitude step.
+
+    Returns
+    -------
+    ConstantRate
+
+    Examples
+    --------
+    >>> constant_rate(catalogue.choose("dcm", "rk1")).angle_lost
+    x - atan(x)
+    >>> constant_rate(catalogue.choose("euler", "rk2")).stretch_squared
+    x**4/64 + 1
+    """
+    taken = one_step.step(choice)
+    kernel = taken.kernel
+    assert kernel.companions is not None, "checked by `step`"
+    state = _state(taken)
+    used = [k for k, x in enumerate(state) if x]
+    if kernel.companions.attitude is not None and len(state) == 4 and len(used) == 2:
+        identity = kernel.companions.identity
+        scalar = next(k for k, x in enumerate(identity) if x)
+        vector = next(k for k in used if k != scalar)
+        cosine, sine = state[scalar], state[vector]
+        return ConstantRate(kernel.name, cosine, sine, True, _square(cosine, sine), taken.lowest)
+    if kernel.companions.attitude is not None:
+        attitude = catalogue.derive(catalogue.choose(kernel.companions.attitude))
+        names = attitude.inputs[0].elements
+        made = _expanded(attitude, dict(zip(names, state, strict=True)))
+        state = [sp.cancel(x) for x in made]
+    return ConstantRate(kernel.name, state[0], state[3], False, state[8], taken.lowest)
+
+
+def _state(taken: Step) -> list[sp.Expr]:
+    """Return the state after one step by the angle x about z."""
+    kernel = taken.kernel
+    assert kernel.companions is not None, "checked by `step`"
+    state, samples = kernel.inputs
+    values: dict[str, Any] = {
+        name: sp.Rational(x.numerator, x.denominator)
+        for name, x in zip(state.elements, kernel.companions.identity, strict=True)
+    }
+    share = ANGLE
+    if taken.nodes is None:
+        share = ANGLE / (samples.shape[0] - kernel.companions.previous)
+    for k, name in enumerate(samples.elements):
+        values[name] = share if k % 3 == 2 else sp.S.Zero
+    return [_simple(x) for x in _expanded(kernel, values)]
+
+
+def _expanded(kernel: Kernel, values: dict[str, Any]) -> list[sp.Expr]:
+    return [sp.sympify(x) for x in kernel.expand(values)[kernel.outputs[-1].signal.name]]
+
+
+def _simple(expression: sp.Expr) -> sp.Expr:
+    if expression.is_polynomial(ANGLE):
+        return sp.expand(expression)
+    return sp.simplify(expression.rewrite(sp.sin))
+
+
+def _plain(expression: sp.Expr) -> sp.Expr:
+    """Return an expression in the plain symbol x, for evaluation by name."""
+    return expression.subs(ANGLE, sp.Symbol("x"))
+
+
+def errors_after(
+    choice: Choice,
+    motion: Motion,
+    step: float | str | Fraction,
+    duration: float | str | Fraction,
+    orthonormalize: float | str | Fraction | None = None,
+    record: float | str | Fraction | None = None,
+) -> Prediction:
+    """Return the exact errors of a run at a constant rate, by powers and no step.
+
+    Parameters
+    ----------
+    choice : Choice
+        An attitude step that is linear in its state.
+    motion : Motion
+        A constant motion.
+    step, duration, orthonormalize, record : number
+        As for `simulation.simulate`; without `record` the beginning and the end are given. The scheme is that of the
+        algorithm.
+
+    Examples
+    --------
+    >>> from strapgen.motions import motion
+    >>> found = errors_after(catalogue.choose("dcm", "rk1"), motion("constant", y_deg_s=10), "1/8", 180)
+    >>> round(float(found.scale[-1][0]), 4), round(float(found.drift[-1][1]), 6)
+    (0.4085, 0.007019)
+    """
+    found = constant_rate(choice)
+    names = sp.symbols("stretch along lost steps axis_x axis_y axis_z")
+    product = sp.lambdify(names, _product(*names), "mpmath")
+    parts = [sp.lambdify(ANGLE, part, "mpmath") for part in (found.stretch, found.along, found.angle_lost)]
+    rate = [mpmath.mpf(value) for value in motion.parameters.values()]
+
+    def transfer(h: Fraction) -> Transfer:
+        length = mpmath.norm(rate)
+        axis = [x / length for x in rate] if length else rate
+        gained = [part(length * exact.number(h)) for part in parts]
+
+        def grow(begin: Fraction, end: Fraction) -> Matrix:
+            return product(*gained, int((end - begin) / h), *axis)
+
+        return grow
+
+    return follow(choice, motion, transfer, step, duration, orthonormalize, record)

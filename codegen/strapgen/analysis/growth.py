@@ -1,0 +1,198 @@
+"""Growth: by what a step changes the length of a state or the determinant of a matrix, and where it keeps it small."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import sympy as sp
+
+from strapgen import checks
+from strapgen.analysis import motion_rates, one_step
+from strapgen.analysis.constant_rate import ANGLE, ConstantRate
+from strapgen.analysis.invariants import scalar, scalar_as_text, scalar_value
+from strapgen.analysis.one_step import Step
+from strapgen.analysis.powers import Powers
+from strapgen.analysis.series import MOST_TERMS, MOTIONS, STEP
+from strapgen.catalogue import Choice
+from strapgen.exceptions import InputError
+from strapgen.lowering.canonical.decomposition import Frame
+
+#: Powers beyond the order that are looked at where a growth does not begin.
+_PATIENCE = 4
+
+#: Decimal digits of an irrational coefficient.
+_DIGITS = 60
+
+
+@dataclass(frozen=True)
+class Growth:
+    """What one step adds to a length or a determinant that should stay 1.
+
+    Parameters
+    ----------
+    kernel, motion : str
+    length, determinant : dict of int to Expr
+        The first terms that are not zero, by power of the step length: of the length of the state, where that is four
+        parameters, and of the determinant of the direction cosine matrix.
+    invariant : dict of str to str
+        For a general rate the same sums in scalar products, "length" and "determinant".
+    """
+
+    kernel: str
+    motion: str
+    length: dict[int, sp.Expr] | None
+    determinant: dict[int, sp.Expr]
+    invariant: dict[str, str]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the sums as plain JSON data."""
+        data: dict[str, Any] = {}
+        for name in ("length", "determinant"):
+            terms = getattr(self, name)
+            if terms is not None:
+                data[name] = sp.sstr(sp.Add(*(x * STEP**p for p, x in terms.items())), order="lex")
+        if self.invariant:
+            data["invariant"] = self.invariant
+        return data
+
+
+def growth(choice: Choice, motion: str = "constant", terms: int = 2) -> Growth:
+    """Derive by what one step changes the length of the state and the determinant of the matrix.
+
+    Parameters
+    ----------
+    choice : Choice
+        An attitude step.
+    motion : str, optional
+        "general", or a motion of the catalogue.
+    terms : int, optional
+        How many terms that are not zero.
+
+    Returns
+    -------
+    Growth
+
+    Raises
+    ------
+    InputError
+        If a name or number is not allowed, or the step has no series.
+
+    Examples
+    --------
+    >>> from strapgen import catalogue
+    >>> found = growth(catalogue.choose("dcm", "rk4"), "constant", terms=1)
+    >>> sp.factor(found.determinant[6])
+    -(w_x**2 + w_y**2 + w_z**2)**3/72
+    """
+    checks.choice("motion", motion, MOTIONS)
+    checks.count("terms", terms, largest=MOST_TERMS)
+    taken = one_step.step(choice)
+    order = taken.kernel.order
+    top = 2 + (order.step if order else 1) + terms
+    most = top + _PATIENCE
+    try:
+        while True:
+            found = _growth(taken, motion, terms, top)
+            known = [x for x in (found.length, found.determinant) if x is not None]
+            if top >= most or all(len(x) >= terms for x in known):
+                return found
+            top += 1
+    except ArithmeticError as error:
+        raise InputError(f"kernel {taken.kernel.name} has no series in the step length: {error}") from None
+
+
+def _growth(taken: Step, motion: str, terms: int, top: int) -> Growth:
+    frame = None
+    if motion == "general":
+        frame = Frame(top)
+        ring = frame.ring.clone(domain=taken.domain)
+        rate = [[element.set_ring(ring) for element in vector] for vector in frame.vectors]
+    else:
+        made = motion_rates.at_time(motion, top, taken.domain)
+        ring, rate = made.ring, made.derivatives
+    matrix = one_step.computed_matrix(taken, ring, rate, top)
+    a, b, c = matrix[:3], matrix[3:6], matrix[6:]
+    determinant = sum(
+        (a[i] * (b[j] * c[k] - b[k] * c[j]) for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1))),
+        Powers(ring, {}, top),
+    )
+    sizes = {"determinant": determinant}
+    state = taken.kernel.inputs[0]
+    if state.shape == (4,):
+        elements = one_step.computed_state(taken, ring, rate, top)
+        sizes["length"] = sum((x * x for x in elements), Powers(ring, {}, top)).root()
+    found: dict[str, dict[int, sp.Expr]] = {}
+    texts: dict[str, str] = {}
+    for name, size in sizes.items():
+        parts = {
+            power: one_step.shown(taken, part)
+            for power, part in size.parts.items()
+            if power and power >= taken.lowest
+        }
+        if frame is None:
+            rows = {power: made.expression(part) for power, part in parts.items()}
+            found[name] = dict([(power, x) for power, x in rows.items() if x][:terms])
+        else:
+            kept = dict([(power, part) for power, part in parts.items() if part][:terms])
+            found[name], texts[name] = _invariant(frame, kept, top)
+    return Growth(taken.kernel.name, motion, found.get("length"), found["determinant"], texts)
+
+
+def _invariant(frame: Frame, parts: dict[int, Any], top: int) -> tuple[dict[int, sp.Expr], str]:
+    """Return scalars in components of the rate's derivatives, and as a sum of scalar products."""
+    vectors = [[sp.Symbol(f"w{j}_{axis}") for axis in "xyz"] for j in range(top)]
+    polynomials = {power: scalar(frame, part) for power, part in parts.items()}
+    components = {
+        power: sp.expand(scalar_value(polynomial, vectors)) for power, polynomial in polynomials.items()
+    }
+    text = " + ".join(f"h^{power} ({scalar_as_text(one)})" for power, one in polynomials.items())
+    return components, text or "0"
+
+
+def contraction(found: ConstantRate) -> list[tuple[float, float | None]] | None:
+    """Return where a step at a constant rate lets no state grow: intervals of its angle x = |w| h in rad.
+
+    Parameters
+    ----------
+    found : ConstantRate
+
+    Returns
+    -------
+    list of (float, float or None) or None
+        Intervals on which the stretch is at most 1, without the single point 0; an open end is None. The whole answer
+        is None where the length is kept exactly.
+
+    Examples
+    --------
+    >>> from strapgen import catalogue
+    >>> from strapgen.analysis.constant_rate import constant_rate
+    >>> contraction(constant_rate(catalogue.choose("dcm", "rk4")))
+    [(0.0, 2.8284271247461903)]
+    """
+    excess = found.stretch_squared - 1
+    if excess == 0:
+        return None
+    if not excess.is_polynomial(ANGLE):
+        raise InputError(f"kernel {found.kernel}: its growth at a constant rate is no polynomial of the angle")
+    # Irrational coefficients are rounded, for roots that are printed with 16 digits; what the rounding of published
+    # coefficients leaves below the order of a method is no growth.
+    polynomial = sp.Poly.from_dict(
+        {
+            (power,): number if number.is_Rational else sp.Rational(sp.N(number, _DIGITS))
+            for (power,), number in sp.Poly(excess, ANGLE).terms()
+            if power >= found.lowest
+        },
+        ANGLE,
+    )
+    crossings = [0.0]
+    crossings += sorted({float(root.evalf(20)) for root in sp.real_roots(polynomial) if root.evalf() > 0})
+    intervals: list[tuple[float, float | None]] = []
+    for k, begin in enumerate(crossings):
+        end = crossings[k + 1] if k + 1 < len(crossings) else None
+        middle = (begin + end) / 2 if end is not None else begin + 1
+        if polynomial.eval(sp.Rational(middle)) <= 0:
+            if intervals and intervals[-1][1] == begin:
+                begin = intervals.pop()[0]
+            intervals.append((begin, end))
+    return intervals

@@ -1,0 +1,259 @@
+"""The catalogue side by side: order, leading terms, operations of a step, and what an operation buys."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import sympy as sp
+
+from strapgen import catalogue, checks, pipeline
+from strapgen.analysis.accumulation import accumulate
+from strapgen.analysis.constant_rate import constant_rate
+from strapgen.analysis.growth import contraction
+from strapgen.analysis.invariants import as_text
+from strapgen.analysis.motion_rates import is_plain, parameters
+from strapgen.analysis.series import series
+from strapgen.catalogue import Choice
+from strapgen.catalogue.tableaux import TABLEAUX
+
+#: Taylor methods of higher orders lose less than any gyro shows.
+_HIGHEST_TAYLOR = 8
+#: Rates a, b and g of coning, in deg/s, and step in s that numbers are given for: those of the thesis's table 5.
+CONING_DEG_S, STEP_S = 10.0, 0.125
+#: Operations a second that equal work means: those of fourth order in Euler parameters at that step.
+WORK = 544.0
+#: Terms beyond which a vector is not written out in a table.
+_SHORT = 3
+
+
+@dataclass(frozen=True)
+class Row:
+    """What one algorithm loses and costs.
+
+    Parameters
+    ----------
+    kernel : str
+    increments : int
+    order : int or None
+        Order of the step on a general motion.
+    operations : int
+        Operations of a step, of all kinds.
+    constant_power, constant : int, Expr or None
+        At a constant rate the angle lost in a step is constant x^constant_power, x = |w| h; None where none is lost.
+    coning_power, coning : int, Expr or None
+        On coning the secular drift rate about the axis (0, b + g, a) is that vector times coning h^coning_power.
+    general : str
+        Leading term of the drift of a step on a general motion.
+    contractive : str
+        Angles of a step, in rad, at which no state grows.
+    """
+
+    kernel: str
+    increments: int
+    order: int | None
+    operations: int
+    constant_power: int | None
+    constant: sp.Expr | None
+    coning_power: int | None
+    coning: sp.Expr | None
+    general: str
+    contractive: str
+
+    def coning_rate(self, step: float = STEP_S) -> float | None:
+        """Return the leading secular drift rate in rad/s for the motion of the thesis's table 5 at a step in s."""
+        if self.coning is None or self.coning_power is None:
+            return None
+        rate = math.radians(CONING_DEG_S)
+        factor = float(self.coning.subs({name: rate for name in parameters("coning")}))
+        return abs(factor) * step**self.coning_power * math.sqrt(5) * rate
+
+    @property
+    def per_operation(self) -> float | None:
+        """Leading secular drift of a step over its operations, in rad."""
+        rate = self.coning_rate()
+        return None if rate is None else rate * STEP_S / self.operations
+
+    @property
+    def at_equal_work(self) -> float | None:
+        """Leading secular drift rate in rad/s where the step is so long that `WORK` operations a second do."""
+        return self.coning_rate(self.operations / WORK)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the row as plain JSON data."""
+        rate = self.coning_rate()
+        return {
+            "kernel": self.kernel,
+            "increments": self.increments,
+            "order": self.order,
+            "operations": self.operations,
+            "constant_power": self.constant_power,
+            "constant": None if self.constant is None else sp.sstr(self.constant),
+            "coning_power": self.coning_power,
+            "coning": None if self.coning is None else sp.sstr(self.coning),
+            "general": self.general,
+            "contractive": self.contractive,
+            "coning_drift_deg_h": None if rate is None else math.degrees(rate) * 3600,
+            "drift_per_operation_rad": self.per_operation,
+            "drift_at_equal_work_deg_h": (
+                None if self.at_equal_work is None else math.degrees(self.at_equal_work) * 3600
+            ),
+        }
+
+
+def methods() -> list[str]:
+    """Return the methods of the catalogue that are worth comparing."""
+    others = [
+        name
+        for name in catalogue.INTEGRATORS
+        if not name.startswith("taylor") or catalogue.INTEGRATORS[name].order <= _HIGHEST_TAYLOR
+    ]
+    return [*TABLEAUX, *others]
+
+
+def choices(
+    algorithms: Sequence[str] = tuple(catalogue.ALGORITHMS), names: Iterable[str] | None = None
+) -> list[Choice]:
+    """Return every algorithm by every method, on as many increments as its order needs."""
+    return [
+        catalogue.choose(algorithm, name, catalogue.enough(name))
+        for algorithm in algorithms
+        for name in (methods() if names is None else names)
+    ]
+
+
+def overview(chosen: Iterable[Choice]) -> Iterator[Row]:
+    """Derive the rows of a comparison.
+
+    Parameters
+    ----------
+    chosen : iterable of Choice
+        Attitude steps that are linear in their state.
+
+    Yields
+    ------
+    Row
+
+    Examples
+    --------
+    >>> (row,) = overview([catalogue.choose("dcm", "rk2", 1)])
+    >>> row.order, row.constant_power, row.constant, row.general
+    (2, 3, -1/6, '1/12 w0 x w1 - 1/6 |w0|^2 w0')
+    """
+    for choice in chosen:
+        yield _row(choice)
+
+
+def _row(choice: Choice) -> Row:
+    kernel = catalogue.derive(choice)
+    general = series(choice, "general", 1)
+    fixed = constant_rate(choice)
+    lost = fixed.series(1)
+    run = accumulate(choice, "coning", 1)
+    constant_power = next(iter(lost), None)
+    coning_power, coning = next(iter(run.secular.items()), (None, None))
+    a = parameters("coning")[0]
+    drift = min(general.drift, default=None)
+    counts = pipeline.lower(kernel).operations
+    return Row(
+        kernel.name,
+        catalogue.increments(choice),
+        general.order,
+        sum(counts.values()),
+        constant_power,
+        None if constant_power is None else lost[constant_power],
+        coning_power,
+        None if coning is None else _along(coning, a),
+        "0" if drift is None else as_text(general.invariant[drift].drift),
+        as_intervals(contraction(fixed)),
+    )
+
+
+def _along(vector: sp.Matrix, a: sp.Symbol) -> sp.Expr:
+    """Return by what the axis (0, b + g, a) is multiplied."""
+    factor = vector[2] / a
+    return sp.factor(sp.cancel(factor)) if is_plain(factor) else factor
+
+
+def as_intervals(found: Sequence[tuple[float, float | None]] | None) -> str:
+    """Return intervals as text.
+
+    Examples
+    --------
+    >>> as_intervals([(0.0, 2.8284271)]), as_intervals([]), as_intervals(None)
+    ('0 to 2.828', 'nowhere', 'kept')
+    """
+    if found is None:
+        return "kept"
+    parts = [f"{low:.4g} up" if high is None else f"{low:.4g} to {high:.4g}" for low, high in found]
+    return ", ".join(parts) or "nowhere"
+
+
+def as_table(rows: Sequence[Row]) -> str:
+    """Return rows as a table for a person."""
+    head = [
+        "algorithm",
+        "order",
+        "operations",
+        "constant",
+        "coning, deg/h",
+        "per operation",
+        "equal work",
+        "contractive",
+    ]
+    lines = [head]
+    for row in rows:
+        rate = row.coning_rate()
+        lines.append(
+            [
+                row.kernel,
+                "-" if row.order is None else str(row.order),
+                str(row.operations),
+                _power(row.constant, row.constant_power),
+                "-" if rate is None else f"{math.degrees(rate) * 3600:.3e}",
+                "-" if row.per_operation is None else f"{row.per_operation:.2e}",
+                "-" if row.at_equal_work is None else f"{math.degrees(row.at_equal_work) * 3600:.2e}",
+                row.contractive,
+            ]
+        )
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    text = [
+        "  ".join(
+            cell.ljust(width) if k in (0, 3, 7) else cell.rjust(width)
+            for k, (cell, width) in enumerate(zip(line, widths, strict=True))
+        ).rstrip()
+        for line in lines
+    ]
+    rates = f"a = b = g = {CONING_DEG_S:g} deg/s"
+    notes = [
+        "",
+        "constant       angle in rad that a step loses at a constant rate, x = |w| h; - none",
+        f"coning         leading secular drift rate for {rates}, step {STEP_S:g} s",
+        "per operation  that drift of a step in rad, over the operations of the step",
+        f"equal work     the drift rate in deg/h where the step is so long that {WORK:g} operations a second do",
+        "contractive    angles x of a step at which no state grows; kept: its length is kept exactly",
+        "",
+        "drift of a step, leading term for the rate w0 + w1 t + w2 t^2/2 + ...",
+    ]
+    longest = max(len(row.kernel) for row in rows)
+    for row in rows:
+        terms = len(row.general.replace(" - ", " + ").split(" + "))
+        shown = row.general if terms <= _SHORT else f"{terms} terms: strapgen series, or --format json"
+        notes.append(f"  {row.kernel:<{longest}}  {shown}")
+    return "\n".join([*text, *notes])
+
+
+def _power(number: sp.Expr | None, power: int | None) -> str:
+    if number is None or power is None:
+        return "-"
+    size = sp.Rational(number) if number.is_Rational else None
+    if size is None or size.q > 10**9:
+        return f"{float(number):.4g} x^{power}"
+    return f"{size} x^{power}"
+
+
+def require_methods(names: Sequence[str]) -> list[str]:
+    """Check names of methods."""
+    return [checks.choice("method", name, catalogue.METHODS) for name in names]

@@ -1,0 +1,243 @@
+"""Two algorithms side by side: the exact ratio of what they lose, with its next term."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import sympy as sp
+
+from strapgen import catalogue, checks
+from strapgen.analysis.accumulation import accumulate
+from strapgen.analysis.constant_rate import constant_rate
+from strapgen.analysis.motion_rates import TIME
+from strapgen.analysis.series import MOTIONS, STEP, series
+from strapgen.catalogue import Choice
+
+#: The angle of a step at a constant rate, |w| h.
+_ANGLE = sp.Symbol("x")
+#: Drift by power of the step or of the angle: vectors, or numbers in one row.
+Terms = Mapping[int, Sequence[sp.Expr]]
+
+
+@dataclass(frozen=True)
+class Ratio:
+    """What one algorithm loses over what another one does.
+
+    Parameters
+    ----------
+    first, second : str
+        The kernels.
+    motion : str
+    quantity : str
+        What is compared.
+    symbol : Symbol
+        What both are series in.
+    terms : tuple of dict
+        The terms of both, by power of the symbol.
+    ratio : dict of int to Expr or None
+        The first terms of the quotient by power of the symbol; None where there is none: one of the two loses nothing,
+        or their drifts are not parallel.
+    """
+
+    first: str
+    second: str
+    motion: str
+    quantity: str
+    symbol: sp.Symbol
+    terms: tuple[Terms, Terms]
+    ratio: dict[int, sp.Expr] | None
+
+    @property
+    def expression(self) -> sp.Expr | None:
+        """The quotient as a sum of its known terms."""
+        if self.ratio is None:
+            return None
+        return sp.Add(*(x * self.symbol**power for power, x in self.ratio.items()))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the comparison as plain JSON data."""
+        return {
+            "first": self.first,
+            "second": self.second,
+            "motion": self.motion,
+            "quantity": self.quantity,
+            "symbol": self.symbol.name,
+            "first_terms": [_sum(row, self.symbol) for row in _columns(self.terms[0])],
+            "second_terms": [_sum(row, self.symbol) for row in _columns(self.terms[1])],
+            "ratio": None if self.ratio is None else _sum(self.ratio, self.symbol),
+        }
+
+
+def _columns(terms: Terms) -> list[dict[int, sp.Expr]]:
+    length = max((len(row) for row in terms.values()), default=1)
+    return [{power: row[k] for power, row in terms.items()} for k in range(length)]
+
+
+def _sum(row: Mapping[int, sp.Expr], symbol: sp.Symbol) -> str:
+    return sp.sstr(sp.Add(*(x * symbol**power for power, x in row.items())), order="lex")
+
+
+def versus(first: Choice, second: Choice, motion: str = "general", terms: int = 2) -> Ratio:
+    """Compare what two algorithms lose on a motion.
+
+    Parameters
+    ----------
+    first, second : Choice
+        Attitude steps.
+    motion : str, optional
+        At a "constant" rate the angles lost in a step are compared, as functions of the angle x = |w| h; on "coning"
+        the secular drift rates; on a motion about a fixed axis the drifts after the time t; on "general" motion the
+        drifts of a step.
+    terms : int, optional
+        How many terms of each.
+
+    Returns
+    -------
+    Ratio
+
+    Raises
+    ------
+    InputError
+        If a name or number is not allowed, or a step has no series.
+
+    Examples
+    --------
+    >>> found = versus(catalogue.choose("euler", "rk1"), catalogue.choose("dcm", "rk1"), "constant")
+    >>> found.ratio
+    {0: 1/4, 2: 9/80}
+    """
+    checks.choice("motion", motion, MOTIONS)
+    kernels = [catalogue.derive(choice).name for choice in (first, second)]
+    if motion == "constant":
+        one, other = ({p: (x,) for p, x in constant_rate(c).series(terms).items()} for c in (first, second))
+        quantity, symbol = "angle lost in a step, rad", _ANGLE
+    elif motion == "general":
+        one, other = (series(c, motion, terms).drift for c in (first, second))
+        quantity, symbol = "drift of a step, rad", STEP
+    else:
+        runs = [accumulate(c, motion, terms) for c in (first, second)]
+        if motion == "coning":
+            one, other = ({p: tuple(row) for p, row in run.secular.items()} for run in runs)
+            quantity = "secular drift rate, rad/s"
+        else:
+            one, other = (_whole(run.secular, run.bounded) for run in runs)
+            quantity = "drift after the time t, rad"
+        symbol = STEP
+    ratio = quotient(one, other, terms)
+    return Ratio(kernels[0], kernels[1], motion, quantity, symbol, (one, other), ratio)
+
+
+def _whole(secular: Mapping[int, sp.Matrix], bounded: Mapping[int, sp.Matrix]) -> Terms:
+    zero = sp.zeros(3, 1)
+    return {
+        power: tuple(TIME * secular.get(power, zero) + bounded.get(power, zero))
+        for power in sorted({*secular, *bounded})
+    }
+
+
+def quotient(first: Terms, second: Terms, terms: int = 2) -> dict[int, sp.Expr] | None:
+    """Return the first terms of the quotient of two series of parallel vectors.
+
+    Parameters
+    ----------
+    first, second : mapping of int to sequence of Expr
+        Coefficients by power; powers that are missing up to the last one given are zero.
+    terms : int, optional
+        How many powers of the quotient are looked at; those that are zero are left out.
+
+    Returns
+    -------
+    dict of int to Expr or None
+        None where a series is empty or the vectors are not parallel.
+
+    Examples
+    --------
+    >>> quotient({3: (sp.Rational(1, 12),)}, {3: (sp.Rational(1, 3),)})
+    {0: 1/4}
+    """
+    if not first or not second:
+        return None
+    begin = min(second)
+    place = next(k for k, x in enumerate(second[begin]) if x)
+    direction = [sp.cancel(x / second[begin][place]) for x in second[begin]]
+    rows = []
+    for series_terms in (first, second):
+        row = {}
+        for power, vector in series_terms.items():
+            if any(
+                sp.cancel(sp.expand(x - vector[place] * d)) != 0
+                for x, d in zip(vector, direction, strict=True)
+            ):
+                return None
+            row[power] = vector[place]
+        rows.append(row)
+    upper, lower = rows
+    # Terms are known as far as both series go; a single term says nothing of what follows it.
+    reach = min(max(upper) - min(upper), max(lower) - begin)
+    found: dict[int, sp.Expr] = {}
+    for power in range(min(upper) - begin, min(upper) - begin + reach + 1):
+        rest = upper.get(power + begin, sp.S.Zero)
+        rest -= sum(
+            (x * lower.get(power + begin - other, sp.S.Zero) for other, x in found.items()), sp.S.Zero
+        )
+        value = _reduced(rest / lower[begin])
+        if value:
+            found[power] = value
+    return dict(list(found.items())[:terms])
+
+
+def _reduced(expression: sp.Expr) -> sp.Expr:
+    if not expression:
+        return sp.S.Zero
+    reduced = sp.factor(sp.cancel(sp.expand(expression)))
+    return sp.trigsimp(reduced) if reduced.has(sp.cos) else reduced
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A ratio that the thesis states, derived.
+
+    Parameters
+    ----------
+    statement : str
+    ratio : dict of int to Expr
+        Its first terms by power of the angle x = |w| h of a step.
+    """
+
+    statement: str
+    ratio: dict[int, sp.Expr]
+
+
+def claims() -> list[Claim]:
+    """Derive the ratios at a constant rate that section 5 of the thesis reads from its tables.
+
+    Returns
+    -------
+    list of Claim
+        Each with its leading term and the next one in x^2, x = |w| h.
+
+    Examples
+    --------
+    >>> claims()[0].ratio
+    {0: 1/4, 2: 9/80}
+    """
+
+    def lost(algorithm: str, order: int) -> Terms:
+        found = constant_rate(catalogue.choose(algorithm, f"rk{order}", 2)).series(3)
+        return {power: (x,) for power, x in found.items()}
+
+    made = []
+    for order in (1, 2, 3, 4):
+        ratio = quotient(lost("euler", order), lost("dcm", order))
+        made.append((f"Euler parameters over direction cosines, order {order}", ratio))
+    made.append(("second order over first", quotient(lost("dcm", 2), lost("dcm", 1))))
+    made.append(("fourth order over third", quotient(lost("dcm", 4), lost("dcm", 3))))
+    fourth = quotient(lost("dcm", 4), lost("dcm", 1))
+    assert fourth is not None
+    # |w| is 3^(1/2) times as large when all three axes turn at the rate of the one.
+    three = {power: (sp.sqrt(3) ** power * x,) for power, x in fourth.items()}
+    one = {power: (x,) for power, x in fourth.items()}
+    made.append(("fourth order over first, three equal axes over one axis", quotient(three, one)))
+    return [Claim(statement, ratio) for statement, ratio in made if ratio is not None]
