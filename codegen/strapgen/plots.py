@@ -18,6 +18,8 @@ from strapgen.simulation import Run
 from strapgen.study import Outcome
 
 if TYPE_CHECKING:
+    from strapgen.analysis.agreement import Agreement
+    from strapgen.analysis.growth import Stability
     from strapgen.convergence import Convergence
 
 _COLOURS = ("#1f5f8b", "#b5562b", "#3d7a4f")
@@ -267,6 +269,141 @@ def convergence_image(found: Sequence[Convergence], title: str, path: str | Path
         loc="lower right",
     )
     axes.set_title(title.encode(errors="replace").decode(), loc="left", fontsize=11)
+    return _image(figure, path)
+
+
+def agreement_image(found: Sequence[Agreement], title: str, path: str | Path) -> bytes:
+    """Return predicted against simulated drift: over time at the longest step, and their difference against the step.
+
+    Parameters
+    ----------
+    found : sequence of Agreement
+        Of one run, predicted by one term, two, and so on.
+    title : str
+    path : path
+        File for the image; its ending says which kind.
+
+    Returns
+    -------
+    bytes
+        The content of the file.
+
+    Raises
+    ------
+    MissingExtraError
+        If matplotlib is not installed.
+    InputError
+        If the kind of image is unknown.
+    """
+    pyplot = _pyplot()
+    figure, (left, right) = pyplot.subplots(1, 2, figsize=(11.5, 4.8), layout="constrained")
+    first = found[-1].rungs[0]
+    for axis, (name, colour) in enumerate(zip("xyz", _COLOURS, strict=True)):
+        left.plot(
+            first.times, [row[axis] for row in first.predicted], color=colour, label=f"{name}, predicted"
+        )
+        left.plot(
+            first.times,
+            [row[axis] for row in first.simulated],
+            linestyle="none",
+            marker="o",
+            markersize=4.5,
+            markerfacecolor="white",
+            color=colour,
+            label=f"{name}, simulated",
+        )
+    _style(left)
+    left.set_xlabel("time, s")
+    left.set_ylabel("drift, rad")
+    left.set_title(f"step {_fraction(first.step_s)} s", loc="left", fontsize=10)
+    left.legend(frameon=False, fontsize=9, ncols=3, loc="upper center", bbox_to_anchor=(0.5, -0.14))
+    steps = [rung.step_s for rung in found[0].rungs]
+    drifts = [rung.drift or math.nan for rung in found[0].rungs]
+    right.plot(steps, drifts, color="0.35", marker="o", markersize=4.5, label="simulated drift")
+    for one, colour in zip(found, _COLOURS, strict=False):
+        differences = [rung.difference or math.nan for rung in one.rungs]
+        terms = "the leading term" if one.terms == 1 else f"{one.terms} powers of h"
+        slope = f": slope {one.slopes[-1]:.2f}" if one.slopes else ""
+        right.plot(
+            steps, differences, color=colour, marker="s", markersize=4.5, label=f"less {terms}{slope}"
+        )
+    right.set_xscale("log", base=2)
+    if any(value > 0 for value in drifts):
+        right.set_yscale("log")
+    right.set_xticks(steps, [_fraction(step) for step in steps])
+    right.minorticks_off()
+    right.set_xlabel("step, s")
+    right.set_ylabel("largest over the run, rad")
+    right.spines[["top", "right"]].set_visible(False)
+    right.grid(alpha=0.25, linewidth=0.6)
+    right.set_title("what the prediction leaves", loc="left", fontsize=10)
+    right.legend(frameon=False, fontsize=9)
+    figure.suptitle(title.encode(errors="replace").decode(), fontsize=11, x=0.01, ha="left")
+    return _image(figure, path)
+
+
+def stability_image(found: Sequence[Stability], title: str, path: str | Path) -> bytes:
+    """Return the growth of a state at a constant rate against the angle of a step; below, where the step contracts.
+
+    Parameters
+    ----------
+    found : sequence of Stability
+    title : str
+    path : path
+        File for the image; its ending says which kind.
+
+    Returns
+    -------
+    bytes
+        The content of the file.
+
+    Raises
+    ------
+    MissingExtraError
+        If matplotlib is not installed.
+    InputError
+        If the kind of image is unknown.
+    """
+    pyplot = _pyplot()
+    ends = [end for one in found for pair in one.contractive or () for end in pair if end is not None]
+    reach = 1.15 * max([*ends, 2.0])
+    figure, (curves, bars) = pyplot.subplots(
+        2,
+        1,
+        figsize=(8.5, 4.6 + 0.28 * len(found)),
+        height_ratios=(4.0, 0.4 + 0.28 * len(found)),
+        sharex=True,
+        layout="constrained",
+    )
+    colours = pyplot.get_cmap("viridis")(np.linspace(0.0, 0.88, len(found)))
+    angles = np.linspace(0.0, reach, 600)
+    for number, (one, colour) in enumerate(zip(found, colours, strict=True)):
+        curves.plot(angles, one.stretch(angles), color=colour, linewidth=1.5, label=one.kernel)
+        place = len(found) - 1 - number
+        whole = one.contractive is None
+        for low, high in [(0.0, None)] if whole else one.contractive or ():
+            wide = (reach if high is None else high) - low
+            bars.barh(place, wide, left=low, height=0.55, color=colour, alpha=0.35 if whole else 0.9)
+        if not whole and not one.contractive:
+            bars.text(0.01 * reach, place, "nowhere", va="center", fontsize=8, color="0.35")
+        if whole:
+            bars.text(0.01 * reach, place, "length kept", va="center", fontsize=8, color="0.2")
+    curves.axhline(1.0, color="0.35", linewidth=0.9)
+    curves.axhspan(0.0, 1.0, color="0.5", alpha=0.08, linewidth=0)
+    curves.set_ylim(0.0, 2.0)
+    curves.set_ylabel("length of the state after a step")
+    curves.legend(
+        framealpha=0.85, edgecolor="none", fontsize=9, loc="upper left", ncols=1 + len(found) // 9
+    )
+    bars.set_yticks(range(len(found)), [one.kernel for one in reversed(found)], fontsize=9)
+    bars.set_ylim(-0.6, len(found) - 0.4)
+    bars.set_title("where no state grows", loc="left", fontsize=10)
+    bars.set_xlabel("angle of a step |w| h, rad")
+    bars.set_xlim(0.0, reach)
+    for axes in (curves, bars):
+        axes.spines[["top", "right"]].set_visible(False)
+        axes.grid(alpha=0.25, linewidth=0.6, axis="both" if axes is curves else "x")
+    figure.suptitle(title.encode(errors="replace").decode(), fontsize=11, x=0.01, ha="left")
     return _image(figure, path)
 
 

@@ -11,7 +11,7 @@ import sympy as sp
 
 from strapgen import exact, lower
 from strapgen.analysis import invariants
-from strapgen.analysis.one_step import errors
+from strapgen.analysis.one_step import errors, step
 from strapgen.catalogue import ALGORITHMS, Choice, choose, derive
 from strapgen.lowering.canonical.decomposition import Frame
 
@@ -30,7 +30,7 @@ CASES = [
 def constant(choice: Choice, top: int) -> tuple[list, list]:
     """Return symbols w_x, w_y, w_z and the error matrix at a constant rate."""
     ring, *w = sp.ring("w_x w_y w_z", sp.QQ)
-    return w, errors(derive(choice), ring, [w], top)["error"]
+    return w, errors(step(choice), ring, [w], top)["error"]
 
 
 @pytest.mark.parametrize(("algorithm", "share"), [("dcm", 1), ("euler", 16), ("cayley-klein", 16)])
@@ -100,7 +100,7 @@ def test_two_terms_leave_an_error_of_the_square_of_the_step(algorithm, method, i
     kernel = derive(choice)
     lowest = kernel.order.step + 1
     frame = Frame(lowest + 1)
-    error = errors(kernel, frame.ring, frame.vectors, lowest + 1)["error"]
+    error = errors(step(choice), frame.ring, frame.vectors, lowest + 1)["error"]
     assert all(power >= lowest for element in error for power in element.parts)
     vectors = rate(lowest + 1)
     terms = {}

@@ -22,12 +22,17 @@ def evaluated(expression: sp.Expr) -> sp.Expr:
     """Return an expression of a = h x and b = h^2 y as a series."""
     values = {"a": Powers(RING, {1: X}, TOP), "b": Powers(RING, {2: Y}, TOP)}
     made = algebra.evaluate(expression, values, number, function)
+    if isinstance(made, Root):
+        raise ArithmeticError("a root is no series")
     return sum(part.as_expr() * H**power for power, part in made.parts.items())
 
 
 def expected(expression: sp.Expr) -> sp.Expr:
-    replaced = expression.rewrite(sp.sin).subs({sp.Symbol("a", real=True): H * x, sp.Symbol("b", real=True): H**2 * y})
-    return sp.series(replaced, H, 0, TOP + 1).removeO()
+    replaced = expression.subs({sp.Symbol("a", real=True): H * x, sp.Symbol("b", real=True): H**2 * y})
+    if replaced.has(sp.sinc):  # SymPy has no series of it
+        (argument,) = {part.args[0] for part in replaced.atoms(sp.sinc)}
+        replaced = sp.sin(argument).series(H, 0, TOP + 2).removeO() / argument
+    return sp.series(sp.expand(replaced), H, 0, TOP + 1).removeO()
 
 
 a, b = sp.symbols("a b", real=True)
@@ -73,7 +78,7 @@ def test_even_functions_of_a_root_are_series():
     [
         (1 / a, "begins with 0"),
         (sp.sqrt(2 + a), "no series as its root"),
-        (sp.sqrt(a**2 + b) * a, "unsupported|no series|is no power series"),
+        (sp.sqrt(a**2 + b) * a, "no series|unsupported"),
         (sp.cos(1 + a), "no series with rational coefficients"),
         (sp.atan2(a, b), "atan2 is no power series"),
         (sp.Piecewise((1, a > 0), (2, True)), "at its very limit"),

@@ -222,7 +222,7 @@ def _about_an_axis(found: ErrorRate) -> Accumulation:
 def _integrated(rates: sp.Matrix, found: ErrorRate) -> tuple[sp.Matrix, sp.Matrix]:
     """Return the mean of rates and the integral of what is left, zero at time 0; of a polynomial there is no mean."""
     if found.motion == "polynomial":
-        return sp.zeros(*rates.shape), rates.applyfunc(lambda x: sp.integrate(x, TIME))
+        return sp.zeros(*rates.shape), rates.applyfunc(lambda x: sp.Poly(x, TIME).integrate().as_expr())
     b = sp.Symbol("b")
     means, swings = [], []
     for rate in rates:

@@ -22,7 +22,7 @@ from strapgen.analysis.powers import Powers, function
 from strapgen.analysis.prediction import Matrix, Prediction, Transfer, follow
 from strapgen.analysis.series import PARTS, STEP
 from strapgen.catalogue import Choice
-from strapgen.kernel import Kernel
+from strapgen.kernel import Kernel, evaluate_stages
 from strapgen.motions import Motion
 
 #: The angle of a step, |w| h.
@@ -199,16 +199,40 @@ def _state(taken: Step) -> list[sp.Expr]:
     kernel = taken.kernel
     assert kernel.companions is not None, "checked by `step`"
     state, samples = kernel.inputs
-    values: dict[str, Any] = {
+    share = sp.S.One
+    if taken.nodes is None:
+        share = sp.Rational(1, samples.shape[0] - kernel.companions.previous)
+    given = {
         name: sp.Rational(x.numerator, x.denominator)
         for name, x in zip(state.elements, kernel.companions.identity, strict=True)
     }
-    share = ANGLE
-    if taken.nodes is None:
-        share = ANGLE / (samples.shape[0] - kernel.companions.previous)
-    for k, name in enumerate(samples.elements):
-        values[name] = share if k % 3 == 2 else sp.S.Zero
-    return [_simple(x) for x in _expanded(kernel, values)]
+    turned = {name: share * ANGLE if k % 3 == 2 else sp.S.Zero for k, name in enumerate(samples.elements)}
+    try:
+        return _polynomials(taken, {**given, **turned})
+    except _NoPolynomialError:
+        return [_simple(x) for x in _expanded(kernel, {**given, **turned})]
+
+
+class _NoPolynomialError(Exception):
+    """A step divides by the angle or calls functions of it."""
+
+
+def _polynomials(taken: Step, values: dict[str, sp.Expr]) -> list[sp.Expr]:
+    """Return the state of a step that is a polynomial of the angle."""
+    ring, _ = sp.ring([ANGLE], taken.domain)
+
+    def number(value: sp.Expr) -> Any:
+        return ring(ring.domain.from_sympy(value))
+
+    def function(expression: sp.Expr, arguments: list[Any]) -> Any:
+        if expression.is_number:
+            return number(expression)
+        raise _NoPolynomialError
+
+    kernel = taken.kernel
+    taken_in = {name: ring.from_expr(value) for name, value in values.items()}
+    known = evaluate_stages((*kernel.stages, *kernel.outputs), taken_in, number, function)
+    return [known[name].as_expr() for name in kernel.outputs[-1].signal.elements]
 
 
 def _expanded(kernel: Kernel, values: dict[str, Any]) -> list[sp.Expr]:
@@ -216,8 +240,6 @@ def _expanded(kernel: Kernel, values: dict[str, Any]) -> list[sp.Expr]:
 
 
 def _simple(expression: sp.Expr) -> sp.Expr:
-    if expression.is_polynomial(ANGLE):
-        return sp.expand(expression)
     return sp.simplify(expression.rewrite(sp.sin))
 
 

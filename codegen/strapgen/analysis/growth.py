@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import sympy as sp
+from numpy.typing import NDArray
 
 from strapgen import checks
 from strapgen.analysis import motion_rates, one_step
-from strapgen.analysis.constant_rate import ANGLE, ConstantRate
+from strapgen.analysis.constant_rate import ANGLE, ConstantRate, constant_rate
 from strapgen.analysis.invariants import scalar, scalar_as_text, scalar_value
 from strapgen.analysis.one_step import Step
 from strapgen.analysis.powers import Powers
@@ -17,6 +20,7 @@ from strapgen.analysis.series import MOST_TERMS, MOTIONS, STEP
 from strapgen.catalogue import Choice
 from strapgen.exceptions import InputError
 from strapgen.lowering.canonical.decomposition import Frame
+from strapgen.lowering.polynomials import Polynomial
 
 #: Powers beyond the order that are looked at where a growth does not begin.
 _PATIENCE = 4
@@ -35,15 +39,15 @@ class Growth:
     length, determinant : dict of int to Expr
         The first terms that are not zero, by power of the step length: of the length of the state, where that is four
         parameters, and of the determinant of the direction cosine matrix.
-    invariant : dict of str to str
-        For a general rate the same sums in scalar products, "length" and "determinant".
+    invariant : dict of str to dict
+        For a general rate the same terms in scalar products, of "length" and "determinant".
     """
 
     kernel: str
     motion: str
     length: dict[int, sp.Expr] | None
     determinant: dict[int, sp.Expr]
-    invariant: dict[str, str]
+    invariant: dict[str, dict[int, Polynomial]]
 
     def as_dict(self) -> dict[str, Any]:
         """Return the sums as plain JSON data."""
@@ -53,7 +57,10 @@ class Growth:
             if terms is not None:
                 data[name] = sp.sstr(sp.Add(*(x * STEP**p for p, x in terms.items())), order="lex")
         if self.invariant:
-            data["invariant"] = self.invariant
+            data["invariant"] = {
+                name: {str(power): scalar_as_text(one) for power, one in rows.items()}
+                for name, rows in self.invariant.items()
+            }
         return data
 
 
@@ -123,7 +130,7 @@ def _growth(taken: Step, motion: str, terms: int, top: int) -> Growth:
         elements = one_step.computed_state(taken, ring, rate, top)
         sizes["length"] = sum((x * x for x in elements), Powers(ring, {}, top)).root()
     found: dict[str, dict[int, sp.Expr]] = {}
-    texts: dict[str, str] = {}
+    invariant: dict[str, dict[int, Polynomial]] = {}
     for name, size in sizes.items():
         parts = {
             power: one_step.shown(taken, part)
@@ -135,19 +142,12 @@ def _growth(taken: Step, motion: str, terms: int, top: int) -> Growth:
             found[name] = dict([(power, x) for power, x in rows.items() if x][:terms])
         else:
             kept = dict([(power, part) for power, part in parts.items() if part][:terms])
-            found[name], texts[name] = _invariant(frame, kept, top)
-    return Growth(taken.kernel.name, motion, found.get("length"), found["determinant"], texts)
-
-
-def _invariant(frame: Frame, parts: dict[int, Any], top: int) -> tuple[dict[int, sp.Expr], str]:
-    """Return scalars in components of the rate's derivatives, and as a sum of scalar products."""
-    vectors = [[sp.Symbol(f"w{j}_{axis}") for axis in "xyz"] for j in range(top)]
-    polynomials = {power: scalar(frame, part) for power, part in parts.items()}
-    components = {
-        power: sp.expand(scalar_value(polynomial, vectors)) for power, polynomial in polynomials.items()
-    }
-    text = " + ".join(f"h^{power} ({scalar_as_text(one)})" for power, one in polynomials.items())
-    return components, text or "0"
+            invariant[name] = {power: scalar(frame, part) for power, part in kept.items()}
+            vectors = [[sp.Symbol(f"w{j}_{axis}") for axis in "xyz"] for j in range(top)]
+            found[name] = {
+                power: sp.expand(scalar_value(one, vectors)) for power, one in invariant[name].items()
+            }
+    return Growth(taken.kernel.name, motion, found.get("length"), found["determinant"], invariant)
 
 
 def contraction(found: ConstantRate) -> list[tuple[float, float | None]] | None:
@@ -196,3 +196,77 @@ def contraction(found: ConstantRate) -> list[tuple[float, float | None]] | None:
                 begin = intervals.pop()[0]
             intervals.append((begin, end))
     return intervals
+
+
+@dataclass(frozen=True)
+class Stability:
+    """What a step does to the length of a state at a constant rate.
+
+    Parameters
+    ----------
+    kernel : str
+    stretch_squared : Expr
+        Square of the factor by which the state grows across the axis, a function of the angle x of the step.
+    contractive : list of (float, float or None) or None
+        What `contraction` returns.
+    """
+
+    kernel: str
+    stretch_squared: sp.Expr
+    contractive: list[tuple[float, float | None]] | None
+
+    def stretch(self, angles: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the factor at angles in rad."""
+        squares = sp.lambdify(ANGLE, self.stretch_squared, "numpy")(angles)
+        factors: NDArray[np.float64] = np.sqrt(np.broadcast_to(np.asarray(squares, np.float64), angles.shape))
+        return factors
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the answer as plain JSON data."""
+        return {
+            "kernel": self.kernel,
+            "stretch_squared": sp.sstr(self.stretch_squared),
+            "contractive": self.contractive,
+        }
+
+
+def stability(choice: Choice) -> Stability:
+    """Derive what a step does to the length of a state at a constant rate.
+
+    Parameters
+    ----------
+    choice : Choice
+        An attitude step.
+
+    Examples
+    --------
+    >>> from strapgen import catalogue
+    >>> stability(catalogue.choose("euler", "rk3")).as_dict()["contractive"]
+    [(0.0, 3.4641016151377544)]
+    """
+    found = constant_rate(choice)
+    return Stability(found.kernel, found.stretch_squared, contraction(found))
+
+
+def as_intervals(found: Sequence[tuple[float, float | None]] | None) -> str:
+    """Return intervals as text.
+
+    Examples
+    --------
+    >>> as_intervals([(0.0, 2.8284271)]), as_intervals([]), as_intervals(None)
+    ('0 to 2.828', 'nowhere', 'kept')
+    """
+    if found is None:
+        return "kept"
+    parts = [f"{low:.4g} up" if high is None else f"{low:.4g} to {high:.4g}" for low, high in found]
+    return ", ".join(parts) or "nowhere"
+
+
+def as_text(found: Sequence[Stability]) -> str:
+    """Return stabilities as a table."""
+    width = max(len(one.kernel) for one in found)
+    lines = [f"{'step':<{width}}  {'x at which no state grows':<26}  square of the stretch, x = |w| h"]
+    for one in found:
+        where = as_intervals(one.contractive)
+        lines.append(f"{one.kernel:<{width}}  {where:<26}  {sp.sstr(one.stretch_squared)}")
+    return "\n".join(lines)

@@ -130,7 +130,61 @@ def scalar_value(polynomial: Polynomial, vectors: Sequence[Sequence[Any]]) -> An
     return Decomposition(polynomial, {}, {}).evaluate([list(vector) for vector in vectors])[3]
 
 
-def scalar_as_text(polynomial: Polynomial, name: str = "w") -> str:
+@dataclass(frozen=True)
+class Notation:
+    """How invariants are written.
+
+    Parameters
+    ----------
+    vector, length, dot, cross, triple, symmetric, unit, power : str
+        Patterns: of a derivative of the rate by its number, of the length, the scalar, the cross and the triple product
+        of vectors, of the symmetrized product of two vectors, of the unit matrix, and of a power.
+    space : str
+        What stands between factors.
+    number : callable
+        Writes a number above 0.
+    """
+
+    vector: str
+    length: str
+    dot: str
+    cross: str
+    triple: str
+    symmetric: str
+    unit: str
+    power: str
+    number: Callable[[sp.Expr], str]
+    space: str = " "
+
+
+def _plain(size: sp.Expr) -> str:
+    if size.is_Rational:  # as a decimal where the method's own coefficients are decimals
+        return str(size) if size.q < _DECIMAL else f"{float(size):.11e}"
+    return f"({size})"
+
+
+def _typeset(size: sp.Expr) -> str:
+    return str(sp.latex(size if not size.is_Rational or size.q < _DECIMAL else sp.Float(size, 12)))
+
+
+TEXT = Notation(
+    "w{}", "|{}|", "({} . {})", "{} x {}", "({} . {} x {})", "S({}, {})", "1", "{}^{}", _plain
+)
+LATEX = Notation(
+    r"\boldsymbol\omega_{{{}}}",
+    r"|{}|",
+    r"({} \cdot {})",
+    r"{} \times {}",
+    r"({} \cdot {} \times {})",
+    r"\mathrm{{S}}({}, {})",
+    r"\mathbf{I}",
+    "{}^{{{}}}",
+    _typeset,
+    r"\,",
+)
+
+
+def scalar_as_text(polynomial: Polynomial, notation: Notation = TEXT) -> str:
     """Return a polynomial in scalar products as text.
 
     Examples
@@ -138,19 +192,18 @@ def scalar_as_text(polynomial: Polynomial, name: str = "w") -> str:
     >>> scalar_as_text({((0, 0), (0, 0)): Fraction(1, 4), ((0, 2),): Fraction(-1)})
     '-(w0 . w2) + 1/4 |w0|^4'
     """
-    return as_text({(): polynomial}, name, symmetric=True).replace(" 1 ", " ").removesuffix(" 1")
+    return _sum({(): polynomial}, notation, lambda _: "")
 
 
-def as_text(coefficients: Coefficients, name: str = "w", symmetric: bool = False) -> str:
-    """Return a vector or a symmetric matrix as text.
+def as_text(coefficients: Coefficients, symmetric: bool = False, notation: Notation = TEXT) -> str:
+    """Return a vector or a symmetric matrix as text, its terms in a fixed order.
 
     Parameters
     ----------
     coefficients : Coefficients
-    name : str, optional
-        Of the rate; its derivatives are numbered, |w0| is the length of the rate itself.
     symmetric : bool, optional
         Whether it is a matrix: then S(a, b) is a b' + b a', and 1 the unit matrix.
+    notation : Notation, optional
 
     Examples
     --------
@@ -159,13 +212,33 @@ def as_text(coefficients: Coefficients, name: str = "w", symmetric: bool = False
     >>> as_text({(): {((0, 0),): Fraction(-1)}, (0, 0): {(): Fraction(1, 2)}}, symmetric=True)
     '-|w0|^2 1 + 1/2 S(w0, w0)'
     """
+
+    def covariant(indices: tuple[int, ...]) -> str:
+        words = [notation.vector.format(i) for i in indices]
+        if not symmetric:
+            return notation.cross.format(*words) if len(words) > 1 else words[0]
+        if not words:
+            return notation.unit
+        second = notation.cross.format(*words[1:]) if len(words) > 2 else words[1]
+        return notation.symmetric.format(words[0], second)
+
+    return _sum(coefficients, notation, covariant)
+
+
+def _sum(
+    coefficients: Coefficients, notation: Notation, covariant: Callable[[tuple[int, ...]], str]
+) -> str:
     terms = []
-    for covariant in sorted(coefficients, key=lambda c: (len(c), c)):
-        polynomial = coefficients[covariant]
+    for indices in sorted(coefficients, key=lambda c: (len(c), c)):
+        polynomial = coefficients[indices]
         for monomial in sorted(polynomial, key=lambda m: (len(m), m)):
             number = exact(polynomial[monomial])
-            factors = [_number(number), *_products(monomial, name), _covariant(covariant, name, symmetric)]
-            terms.append(("-" if number < 0 else "+", " ".join(filter(None, factors))))
+            size = abs(number)
+            factors = [*_products(monomial, notation), covariant(indices)]
+            shown = [factor for factor in factors if factor]
+            if size != 1 or not shown:
+                shown.insert(0, notation.number(size))
+            terms.append(("-" if number < 0 else "+", notation.space.join(shown)))
     if not terms:
         return "0"
     (sign, first), *rest = terms
@@ -173,33 +246,15 @@ def as_text(coefficients: Coefficients, name: str = "w", symmetric: bool = False
     return text + "".join(f" {sign} {term}" for sign, term in rest)
 
 
-def _number(number: sp.Expr) -> str:
-    size = abs(number)
-    if size == 1:
-        return ""
-    if size.is_Rational:  # as a decimal where the method's own coefficients are decimals
-        return str(size) if size.q < _DECIMAL else f"{float(size):.11e}"
-    return f"({size})"
-
-
-def _products(monomial: Sequence[tuple[int, ...]], name: str) -> list[str]:
+def _products(monomial: Sequence[tuple[int, ...]], notation: Notation) -> list[str]:
     factors = []
     for product, power in Counter(monomial).items():
+        words = [notation.vector.format(i) for i in product]
         if len(product) == 3:
-            i, j, k = product
-            text = f"({name}{i} . {name}{j} x {name}{k})"
+            text = notation.triple.format(*words)
         elif product[0] == product[1]:
-            text, power = f"|{name}{product[0]}|", 2 * power
+            text, power = notation.length.format(words[0]), 2 * power
         else:
-            text = f"({name}{product[0]} . {name}{product[1]})"
-        factors.append(text if power == 1 else f"{text}^{power}")
+            text = notation.dot.format(*words)
+        factors.append(text if power == 1 else notation.power.format(text, power))
     return factors
-
-
-def _covariant(covariant: tuple[int, ...], name: str, symmetric: bool) -> str:
-    words = [f"{name}{i}" for i in covariant]
-    if not symmetric:
-        return " x ".join(words)
-    if not words:
-        return "1"
-    return f"S({words[0]}, {' x '.join(words[1:])})"

@@ -64,7 +64,7 @@ def at_time(motion: str, count: int, domain: Any = sp.QQ) -> MotionRate:
     cosine, sine = sp.symbols("cosine sine")
     frequency = next((p for p in symbols if p.name == "b"), None)
     waves = {} if frequency is None else {sp.cos(frequency * TIME): cosine, sp.sin(frequency * TIME): sine}
-    ring, *_ = sp.ring([*symbols, *waves.values()], domain)
+    ring, *_ = sp.ring([*reversed(waves.values()), *symbols], domain)
     vector = MOTIONS[motion].rate(TIME, *symbols)
     rate = []
     while len(rate) < count and any(vector):

@@ -188,7 +188,10 @@ def _evaluated(kernel: Kernel, values: dict[str, Any], ring: Any, top: int) -> l
     known = evaluate_stages(
         (*kernel.stages, *kernel.outputs), values, lambda value: _number(ring, value, top), function
     )
-    return [known[name] for name in kernel.outputs[-1].signal.elements]
+    made = [known[name] for name in kernel.outputs[-1].signal.elements]
+    if not all(isinstance(element, Powers) for element in made):
+        raise ArithmeticError("the root of a series that begins with 0 is no series")
+    return made
 
 
 def increments(ring: Any, rate: Rate, count: int, previous: int, top: int) -> list[Powers]:

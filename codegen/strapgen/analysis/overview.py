@@ -9,10 +9,10 @@ from typing import Any
 
 import sympy as sp
 
-from strapgen import catalogue, checks, pipeline
+from strapgen import catalogue, pipeline
 from strapgen.analysis.accumulation import accumulate
 from strapgen.analysis.constant_rate import constant_rate
-from strapgen.analysis.growth import contraction
+from strapgen.analysis.growth import as_intervals, contraction
 from strapgen.analysis.invariants import as_text
 from strapgen.analysis.motion_rates import is_plain, parameters
 from strapgen.analysis.series import series
@@ -177,20 +177,6 @@ def _along(vector: sp.Matrix, a: sp.Symbol) -> sp.Expr:
     return sp.factor(sp.cancel(factor)) if is_plain(factor) else factor
 
 
-def as_intervals(found: Sequence[tuple[float, float | None]] | None) -> str:
-    """Return intervals as text.
-
-    Examples
-    --------
-    >>> as_intervals([(0.0, 2.8284271)]), as_intervals([]), as_intervals(None)
-    ('0 to 2.828', 'nowhere', 'kept')
-    """
-    if found is None:
-        return "kept"
-    parts = [f"{low:.4g} up" if high is None else f"{low:.4g} to {high:.4g}" for low, high in found]
-    return ", ".join(parts) or "nowhere"
-
-
 def as_table(rows: Sequence[Row]) -> str:
     """Return rows as a table for a person."""
     head = [
@@ -253,7 +239,3 @@ def _power(number: sp.Expr | None, power: int | None) -> str:
         return f"{float(number):.4g} x^{power}"
     return f"{size} x^{power}"
 
-
-def require_methods(names: Sequence[str]) -> list[str]:
-    """Check names of methods."""
-    return [checks.choice("method", name, catalogue.METHODS) for name in names]

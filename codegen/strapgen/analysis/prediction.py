@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -148,7 +148,8 @@ def _follow(
         return _matrix(truth([exact.number(time)], *settings))
 
     restore = _orthonormalization(choice)
-    split = _parts()
+    split = parts_of()
+    identity = list(mpmath.eye(3))
     stops = sorted(
         {k * interval for k in range(int(total / interval) + 1)}
         | {k * every for k in range(int(total / every) + 1)}
@@ -162,7 +163,7 @@ def _follow(
         if time and time % every == 0:
             product = restore(product * true(time)) * true(time).T
         if time % interval == 0:
-            scale, skew, drift = split(product)
+            scale, skew, drift = split(list(product), identity)
             prediction.times.append(exact.number(time))
             prediction.errors.append(list(product - mpmath.eye(3)))
             prediction.scale.append(scale)
@@ -176,14 +177,16 @@ def _matrix(elements: list[Any]) -> Matrix:
     return mpmath.matrix([elements[k : k + 3] for k in (0, 3, 6)])
 
 
-def _parts() -> Callable[[Matrix], tuple[list[Any], list[Any], list[Any]]]:
-    """Return what splits the identity and an error matrix into scale, skew and drift, by the kernel error-matrix."""
-    program = interpreter("error-matrix").program
-    identity = list(mpmath.eye(3))
+def parts_of() -> Callable[[Sequence[Any], Sequence[Any]], tuple[list[Any], list[Any], list[Any]]]:
+    """Return what splits the error of a computed matrix against a true one into scale, skew and drift.
 
-    def split(product: Matrix) -> tuple[list[Any], list[Any], list[Any]]:
+    ``split(computed, true)``, both row by row: the outputs of the kernel error-matrix, in many digits.
+    """
+    program = interpreter("error-matrix").program
+
+    def split(computed: Sequence[Any], true: Sequence[Any]) -> tuple[list[Any], list[Any], list[Any]]:
         values: dict[str, Any] = {}
-        for signal, elements in zip(program.inputs, (list(product), identity), strict=True):
+        for signal, elements in zip(program.inputs, (computed, true), strict=True):
             values |= zip(signal.elements, elements, strict=True)
         made = program.run(values, exact.number, exact.FUNCTIONS)
         return made["scale"], made["skew"], made["drift"]

@@ -135,7 +135,7 @@ def series(choice: Choice, motion: str = "general", terms: int = 2) -> ErrorSeri
             enough = all(len(part) >= terms for part in parts if part)
             if top >= most or (enough and any(parts[:2])):
                 return found
-            top += 1
+            top = top + 1 if any(parts) else most
     except ArithmeticError as error:
         raise InputError(f"kernel {taken.kernel.name} has no series in the step length: {error}") from None
 

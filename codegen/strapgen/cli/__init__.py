@@ -17,6 +17,7 @@ from strapgen.cli import (
     listing,
     series,
     simulate,
+    stability,
     study,
     tableau,
     tables,
@@ -40,6 +41,7 @@ app.command("simulate")(simulate.simulate)
 app.command("compare")(compare.compare)
 app.command("converge")(converge.converge)
 app.command("series")(series.series)
+app.command("stability")(stability.stability)
 app.command("check")(check.check)
 app.command("tables")(tables.tables)
 app.add_typer(study.app, name="study")

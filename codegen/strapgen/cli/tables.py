@@ -10,6 +10,7 @@ import typer
 from strapgen.cli.fixed import Carry, Rounding, read_settings
 from strapgen.cli.options import Format, check_format, print_json
 from strapgen.cli.progress import track
+from strapgen.exceptions import InputError
 
 if TYPE_CHECKING:
     from strapgen.tables import Entry, Table
@@ -26,6 +27,12 @@ def tables(
     ] = None,
     rounding: Rounding = None,
     carry: Carry = None,
+    predict: Annotated[
+        bool,
+        typer.Option(
+            "--predict", help="Predict every figure from the truncation-error series, beside a simulation in numpy."
+        ),
+    ] = False,
     format: Format = "text",
 ) -> None:
     """Run the five tables of the thesis and print them beside its figures.
@@ -33,9 +40,14 @@ def tables(
     Example: strapgen tables --backend c-q31 --carry full
     """
     check_format(format)
+    if predict:
+        for option, value in (("--backend", backend), ("--rounding", rounding), ("--carry", carry)):
+            if value is not None:
+                raise InputError(f"--predict and {option} do not go together")
+        _predict(format)
+        return
     from strapgen import checks
     from strapgen.backends import BACKENDS
-    from strapgen.exceptions import InputError
     from strapgen.tables import ALGORITHMS, ORDERS, TABLES, build_all, run_tables
     from strapgen.targets import FIXED
 
@@ -52,6 +64,26 @@ def tables(
         return
     for table in TABLES:
         _print_table(table, [entry for entry in entries if entry.table == table.number])
+
+
+def _predict(format: str) -> None:
+    """Print the tables as the series predict them, and the ratios that the thesis reads from its tables."""
+    from strapgen.analysis import predicted_tables, ratios
+    from strapgen.tables import ALGORITHMS, ORDERS, TABLES
+
+    cases = len(TABLES) * len(ALGORITHMS) * len(ORDERS)
+    found = list(track(predicted_tables.predicted(), "predicting", cases))
+    claims = ratios.claims()
+    if format == "json":
+        print_json(
+            {
+                "entries": [entry.as_dict() for entry in found],
+                "ratios": [claim.as_dict() for claim in claims],
+            }
+        )
+        return
+    typer.echo(predicted_tables.as_text(found))
+    typer.echo(ratios.claims_as_text(claims))
 
 
 def _runnable() -> tuple[str, ...]:

@@ -1,0 +1,168 @@
+"""Predicted against simulated drift, as the step is halved: in many digits, so that rounding hides nothing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import pairwise
+from typing import Any
+
+import mpmath
+
+from strapgen import catalogue, checks, exact
+from strapgen.analysis.error_rate import error_rate
+from strapgen.analysis.prediction import Prediction, parts_of, predict
+from strapgen.catalogue import Choice
+from strapgen.convergence import exact_attitudes, step_of_increments
+from strapgen.exceptions import InputError
+from strapgen.motions import Motion
+
+
+@dataclass(frozen=True)
+class Rung:
+    """One step length.
+
+    Parameters
+    ----------
+    step_s : float
+    times : list of float
+        In s.
+    simulated, predicted : list of list of float
+        Drift on x, y, z at each time, in rad.
+    drift : float
+        Largest simulated drift, in rad.
+    difference : float
+        Largest difference of predicted and simulated drift, in rad.
+    """
+
+    step_s: float
+    times: list[float]
+    simulated: list[list[float]]
+    predicted: list[list[float]]
+    drift: float
+    difference: float
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """Predicted against simulated drift on a ladder of steps.
+
+    Parameters
+    ----------
+    kernel, motion : str
+    terms : int
+        Powers of the step that the prediction keeps.
+    order : int or None
+        The first power of the error rate; None where nothing is lost.
+    rungs : tuple of Rung
+        From the longest step to the shortest.
+    """
+
+    kernel: str
+    motion: str
+    terms: int
+    order: int | None
+    rungs: tuple[Rung, ...]
+
+    @property
+    def slopes(self) -> list[float]:
+        """Slope of the difference from each step to the next."""
+        return [
+            math.log(long.difference / short.difference) / math.log(long.step_s / short.step_s)
+            for long, short in pairwise(self.rungs)
+            if long.difference and short.difference
+        ]
+
+
+def agreement(
+    choice: Choice,
+    motion: Motion,
+    steps: Sequence[float | str | Fraction],
+    duration: float | str | Fraction,
+    terms: int = 2,
+) -> Agreement:
+    """Hold predicted against simulated drift.
+
+    Parameters
+    ----------
+    choice : Choice
+        An attitude step that takes increments and is linear in its state.
+    motion : Motion
+    steps : sequence of number
+        Steps in s, each a divisor of the longest one, and that of the duration.
+    duration : number
+        In s.
+    terms : int, optional
+        Powers of the step that the prediction keeps: the difference falls with the next one.
+
+    Returns
+    -------
+    Agreement
+
+    Raises
+    ------
+    InputError
+        If the step has no closed form of a run, or a number is not allowed.
+
+    Examples
+    --------
+    >>> from strapgen.motions import motion
+    >>> turn = motion("constant", y_rad_s=1)
+    >>> found = agreement(catalogue.choose("dcm", "rk2", 1), turn, ["1/8", "1/16"], 1, terms=1)
+    >>> found.order, round(found.slopes[0], 1)
+    (2, 4.0)
+    """
+    kernel = step_of_increments(choice)
+    total = checks.number("duration", duration, positive=True)
+    lengths = sorted({checks.number("step", step, positive=True) for step in steps}, reverse=True)
+    if not lengths:
+        raise InputError("at least one step is needed")
+    longest = lengths[0]
+    checks.multiple("duration", total, "step", longest)
+    run = exact_attitudes(choice, motion)
+    rungs = []
+    for length in lengths:
+        every = checks.multiple("the longest step", longest, "step", length)
+        expected = predict(choice, motion, length, total, record=longest, terms=terms)
+        with mpmath.workdps(exact.DIGITS):
+            split = parts_of()
+            states = list(run(length, int(total / length)))[::every]
+            drifts = [split(computed, true)[2] for computed, true in states]
+            rungs.append(_rung(length, expected, drifts))
+    order = error_rate(choice, motion.name, 1).order
+    return Agreement(kernel.name, motion.name, terms, order, tuple(rungs))
+
+
+def _rung(length: Fraction, expected: Prediction, drifts: list[list[Any]]) -> Rung:
+    rows = list(zip(expected.drift, drifts, strict=True))
+    return Rung(
+        float(length),
+        [float(time) for time in expected.times],
+        [[float(x) for x in row] for row in drifts],
+        [[float(x) for x in row] for row in expected.drift],
+        float(max(abs(x) for row in drifts for x in row)),
+        float(max(abs(a - b) for one, other in rows for a, b in zip(one, other, strict=True))),
+    )
+
+
+def as_text(found: Agreement) -> str:
+    """Return the agreement as a table."""
+    lines = [
+        f"{found.kernel}, {found.motion} motion: drift in rad, simulated and predicted by {found.terms} terms",
+        f"{'step, s':>12}  {'simulated':>12}  {'difference':>12}  {'relative':>9}  slope",
+    ]
+    slopes = ["", *(f"{slope:.2f}" for slope in found.slopes)]
+    slopes += [""] * (len(found.rungs) - len(slopes))
+    for rung, slope in zip(found.rungs, slopes, strict=True):
+        relative = f"{rung.difference / rung.drift:.1e}" if rung.drift else "-"
+        lines.append(
+            f"{rung.step_s:>12.6g}  {rung.drift:>12.4e}  {rung.difference:>12.4e}  {relative:>9}  {slope}".rstrip()
+        )
+    return "\n".join(lines)
+
+
+def default_steps(choice: Choice) -> tuple[str, ...]:
+    """Return a ladder of steps in s on which the next term shows."""
+    return ("1/4", "1/8", "1/16", "1/32") if catalogue.increments(choice) > 4 else ("1/8", "1/16", "1/32", "1/64")

@@ -1,0 +1,69 @@
+"""What orthonormalization does to a small error: appendix B of the thesis for every scheme of the catalogue."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import sympy as sp
+
+from strapgen import catalogue, checks
+from strapgen.analysis.powers import Powers, function
+from strapgen.exceptions import InputError
+from strapgen.kernel import evaluate_stages
+
+#: The error of the computed matrix: it is (I + s P) C with C the true one and s the size of the error.
+ERROR = sp.Matrix(3, 3, sp.symbols("p11 p12 p13 p21 p22 p23 p31 p32 p33"))
+
+
+def effect(scheme: str, order: int = 2) -> dict[int, sp.Matrix]:
+    """Return the error that a scheme of orthonormalization leaves, by power of the error that it is given.
+
+    The computed matrix is (I + s P) C, the orthonormalized one (I + s F_1(P) + s^2 F_2(P) + ...) C. To first order
+    every scheme leaves the skew part of P, so scale and skew vanish and the drift is unchanged (B.4); to second order
+    the nearest rotation changes the drift by -(K Y + Y K)/2, K and Y the skew and symmetric parts of P (B.14).
+
+    Parameters
+    ----------
+    scheme : str
+        A kernel that orthonormalizes direction cosine matrices.
+    order : int, optional
+        The last power.
+
+    Returns
+    -------
+    dict of int to Matrix, 3 x 3
+        F_1, F_2, ... in the elements of `ERROR`.
+
+    Raises
+    ------
+    InputError
+        If the kernel is none of these, or has no series: the one of the nearest rotation, whose series is that of
+        dcm-orthonormalize-first-order and dcm-orthonormalize-second-order to their orders.
+
+    Examples
+    --------
+    >>> (effect("dcm-orthonormalize")[1] - (ERROR - ERROR.T) / 2).expand().is_zero_matrix
+    True
+    """
+    checks.choice("scheme", scheme, catalogue.orthonormalizations("dcm"))
+    checks.count("order", order, largest=4)
+    kernel = catalogue.derive(catalogue.choose(scheme))
+    ring, *elements = sp.ring([str(symbol) for symbol in ERROR], sp.QQ)
+
+    def number(value: sp.Rational) -> Powers:
+        return Powers(ring, {0: ring(ring.domain.from_sympy(value))}, order)
+
+    (computed,) = kernel.inputs
+    values: dict[str, Any] = {
+        name: Powers(ring, {0: ring(int(k % 4 == 0)), 1: element}, order)
+        for k, (name, element) in enumerate(zip(computed.elements, elements, strict=True))
+    }
+    try:
+        known = evaluate_stages((*kernel.stages, *kernel.outputs), values, number, function)
+    except ArithmeticError as error:
+        raise InputError(f"kernel {scheme} has no series in the error: {error}") from None
+    result = [known[name] for name in kernel.outputs[-1].signal.elements]
+    return {
+        power: sp.Matrix(3, 3, [x.parts.get(power, ring.zero).as_expr() for x in result])
+        for power in range(1, order + 1)
+    }

@@ -1,0 +1,130 @@
+"""The thesis's tables as the series predict them, without a simulation."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from fractions import Fraction
+from typing import Any
+
+from strapgen import catalogue
+from strapgen.analysis.prediction import Prediction, predict
+from strapgen.backends import backend
+from strapgen.motions import motion
+from strapgen.simulation import simulate
+from strapgen.tables import ALGORITHMS, DURATION, INTERVAL, ORDERS, STEP, TABLES, Table, agrees, drift_deg
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One figure of a table.
+
+    Parameters
+    ----------
+    table : int
+    algorithm : str
+    order : int
+        Order of the integration.
+    drift_deg, normalised : float
+        Predicted drift in degrees, and over that of the direction cosine matrix as the table has it.
+    simulated_deg, simulated : float
+        The same of the run in numpy.
+    thesis : str
+        What the thesis prints.
+    agrees : bool
+        Whether `normalised` has the printed digits.
+    """
+
+    table: int
+    algorithm: str
+    order: int
+    drift_deg: float
+    normalised: float
+    simulated_deg: float
+    simulated: float
+    thesis: str
+    agrees: bool
+
+    @property
+    def deviation(self) -> float:
+        """By what the predicted figure is off the simulated one, relative."""
+        return self.normalised / self.simulated - 1
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the entry as plain JSON data, the thesis's figure as a number and as it is printed."""
+        return asdict(self) | {
+            "thesis": float(Fraction(self.thesis)),
+            "thesis_printed": self.thesis,
+            "deviation": self.deviation,
+        }
+
+
+def predicted(tables: Sequence[Table] = TABLES) -> Iterator[Entry]:
+    """Predict tables from two powers of the error rate, and hold them against the simulation.
+
+    Parameters
+    ----------
+    tables : sequence of Table, optional
+
+    Yields
+    ------
+    Entry
+    """
+    for table in tables:
+        profile = motion(table.motion, **table.settings)
+        drifts, runs = {}, {}
+        for algorithm in ALGORITHMS:
+            for order in ORDERS:
+                choice = catalogue.choose(algorithm, f"rk{order}", 2)
+                expected = predict(choice, profile, STEP, DURATION, INTERVAL, INTERVAL)
+                drifts[algorithm, order] = _drift_deg(table, expected)
+                made = backend(algorithm, f"rk{order}", 2, "numpy")
+                runs[algorithm, order] = drift_deg(
+                    table, simulate(made, profile, STEP, DURATION, INTERVAL, INTERVAL)
+                )
+                base = ("dcm", order if table.by_order else 1)
+                printed = table.printed[algorithm][ORDERS.index(order)]
+                normalised = drifts[algorithm, order] / drifts[base]
+                yield Entry(
+                    table.number,
+                    algorithm,
+                    order,
+                    drifts[algorithm, order],
+                    normalised,
+                    runs[algorithm, order],
+                    runs[algorithm, order] / runs[base],
+                    printed,
+                    agrees(normalised, printed),
+                )
+
+
+def _drift_deg(table: Table, expected: Prediction) -> float:
+    """Return the drift of a prediction as the table reports it."""
+    return math.degrees(expected.mean_drift if table.mean else max(expected.drift_by_axis))
+
+
+def as_text(found: Sequence[Entry]) -> str:
+    """Return predicted tables as text."""
+    lines = []
+    for table in TABLES:
+        rows = [entry for entry in found if entry.table == table.number]
+        if not rows:
+            continue
+        ratio = "of the same order" if table.by_order else "of first order"
+        lines += [
+            f"Table {table.number}: {table.title}",
+            f"  drift in deg, and its ratio to that of direction cosines {ratio}",
+            f"  {'':<20}{'predicted':>11}{'simulated':>11}{'ratio':>12}{'simulated':>11}{'off by':>9}{'thesis':>10}",
+        ]
+        for row in rows:
+            name = f"{row.algorithm}, order {row.order}"
+            mark = "" if row.agrees else " *"
+            lines.append(
+                f"  {name:<20}{row.drift_deg:>11.4g}{row.simulated_deg:>11.4g}{row.normalised:>12.4g}"
+                f"{row.simulated:>11.4g}{row.deviation:>+9.2%}{row.thesis:>10}{mark}"
+            )
+        lines.append("")
+    if not all(entry.agrees for entry in found):
+        lines.append("* not the thesis's figure in its printed digits\n")
+    return "\n".join(lines)

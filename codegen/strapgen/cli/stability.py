@@ -1,0 +1,56 @@
+"""strapgen stability."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from strapgen.cli.options import Format, StepAlgorithm, check_format, print_json
+from strapgen.exceptions import InputError
+
+
+def stability(
+    algorithm: StepAlgorithm,
+    methods: Annotated[
+        str, typer.Option("--method", metavar="NAME,...", help="Integration methods.")
+    ] = "rk1,rk2,rk3,rk4",
+    plot: Annotated[
+        Path | None, typer.Option("--plot", help="Image file for the plot.", show_default=False)
+    ] = None,
+    format: Format = "text",
+) -> None:
+    """Show at which constant rates a step lets the state grow, and at which it contracts.
+
+    The square of the factor by which a step of the angle x = |w| h stretches the state across the axis, exactly, and the
+    angles at which it is at most 1.
+
+    Example: strapgen stability dcm --method rk3,rk4,butcher5 --plot stability.png
+    """
+    check_format(format)
+    from strapgen import catalogue, checks, output
+
+    names = list(dict.fromkeys(name.strip() for name in methods.split(",") if name.strip()))
+    if not names:
+        raise InputError("--method names no method")
+    for name in names:
+        checks.choice("method", name, catalogue.METHODS)
+    choices = [
+        catalogue.choose_step(algorithm, name, catalogue.enough(name))
+        if algorithm in catalogue.ALGORITHMS
+        else catalogue.choose_step(algorithm, name)
+        for name in names
+    ]
+    from strapgen.analysis import growth
+
+    found = [growth.stability(choice) for choice in choices]
+    if plot is not None:
+        from strapgen import plots
+
+        title = "constant rate: growth of the state in a step, and where it contracts"
+        output.write_files(Path(), {str(plot): plots.stability_image(found, title, plot)})
+    if format == "json":
+        print_json([one.as_dict() for one in found])
+        return
+    typer.echo(growth.as_text(found))

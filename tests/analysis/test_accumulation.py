@@ -1,0 +1,134 @@
+"""From one step to a run: secular and bounded drift, and what orthonormalization does to it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from strapgen.analysis.accumulation import accumulate
+from strapgen.analysis.agreement import agreement, as_text
+from strapgen.analysis.error_rate import error_rate
+from strapgen.analysis.motion_rates import TIME
+from strapgen.analysis.series import STEP
+from strapgen.catalogue import ALGORITHMS, MOTIONS, choose, choose_step
+from strapgen.exceptions import InputError
+from strapgen.motions import motion
+
+a, b, g = sp.symbols("a b g")
+PROFILES = {
+    "constant": {"x_rad_s": 0.5, "y_rad_s": 0.7, "z_rad_s": -0.3},
+    "sinusoidal": {"a_rad_s": 1, "b_rad_s": 1.5},
+    "coning": {"a_rad_s": 1, "b_rad_s": 1.5, "g_rad_s": 0.6},
+    "polynomial": {"a0": 30, "a1": 40, "a2": -20, "a3": 10, "a4": 5},
+}
+
+
+@pytest.mark.parametrize(
+    "method", ["rk1", *(pytest.param(f"rk{order}", marks=pytest.mark.long) for order in (2, 3, 4))]
+)
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+@pytest.mark.parametrize("name", MOTIONS)
+def test_prediction_leaves_the_next_order(name, algorithm, method):
+    """In 40 digits, as the step is halved: two powers of the error rate leave the third, or better."""
+    found = agreement(choose(algorithm, method, 2), motion(name, **PROFILES[name]), ["1/16", "1/32"], 0.5)
+    assert found.slopes[-1] > found.order + found.terms - 0.15
+    assert found.rungs[-1].difference < 0.02 * found.rungs[-1].drift
+    assert "slope" in as_text(found)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("method", ["butcher5", "magnus4", "munthe-kaas4", "taylor6", "three-eighths"])
+@pytest.mark.parametrize("name", ["coning", "sinusoidal"])
+def test_prediction_leaves_the_next_order_for_other_methods(name, method):
+    found = agreement(choose("euler", method, 3), motion(name, **PROFILES[name]), ["1/16", "1/32"], 0.5)
+    if found.order is None:
+        assert found.rungs[-1].drift < 1e-30
+    else:
+        assert found.slopes[-1] > found.order + found.terms - 0.15
+
+
+@pytest.mark.parametrize("order", [1, 2, 3, 4])
+def test_constant_rate_adds_up_along_the_rate(order):
+    run = accumulate(choose("dcm", f"rk{order}", 2), "constant", 1)
+    w = sp.Matrix(sp.symbols("w_x w_y w_z"))
+    (power,) = run.secular
+    coefficient = {1: sp.Rational(1, 3), 2: -sp.Rational(1, 6), 3: -sp.Rational(1, 30), 4: sp.Rational(1, 120)}
+    wanted = coefficient[order] * w.dot(w) ** (power // 2) * w
+    assert (run.secular[power] - wanted).expand().is_zero_matrix
+    assert not run.bounded
+
+
+@pytest.mark.parametrize(("order", "power"), [(1, 1), (2, 2), (3, 4), (4, 4)])
+@pytest.mark.parametrize("algorithm", ["dcm", "euler"])
+def test_drift_on_a_sinusoid_is_bounded(algorithm, order, power):
+    """The thesis's third-order guess, b^3 where a = b, is wrong: third order grows with b^4, as the fourth does."""
+    run = accumulate(choose(algorithm, f"rk{order}", 2), "sinusoidal", 1)
+    assert not run.secular
+    assert list(run.bounded) == [power]
+    about_y = run.bounded[power][1]
+    assert sp.simplify(about_y.subs(TIME, TIME + 2 * sp.pi / b) - about_y) == 0
+    # With a = b it is b^power times a function of the angle b t alone.
+    scaled = sp.expand(about_y.subs(a, b).subs(TIME, TIME / b) / b**power)
+    assert b not in scaled.free_symbols
+
+
+@pytest.mark.parametrize(("method", "share"), [("rk1", 1), ("rk2", 4), ("rk4", 16)])
+def test_drift_ratio_on_a_sinusoid(method, share):
+    """Table 3: the ratio of Euler parameters to direction cosines is 1, 1/4, 1/16, at all times."""
+    ours, theirs = (accumulate(choose(name, method, 2), "sinusoidal", 1).bounded for name in ("euler", "dcm"))
+    (power,) = ours
+    assert sp.expand(share * ours[power][1] - theirs[power][1]) == 0
+
+
+@pytest.mark.parametrize("method", ["rk2", "rk3", "magnus4"])
+def test_coning_adds_up_along_its_axis(method):
+    """Without the constant rate's own part: what is secular is along (0, b + g, a), the bounded part has no mean."""
+    run = accumulate(choose("euler", method, 2), "coning", 1)
+    (row,) = run.secular.values()
+    assert row[0] == 0
+    assert sp.cancel(row[1] * a - row[2] * (b + g)) == 0
+    (swing,) = run.bounded.values()
+    length = sp.sqrt(a**2 + b**2 + 2 * b * g + g**2)
+    axis = sp.Matrix([0, b + g, a])
+    along = sp.simplify(swing.dot(axis))
+    assert along == 0
+    assert sp.simplify(swing.subs(TIME, 2 * sp.pi / length)).is_zero_matrix
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("method", ["rk2", "rk4"])
+@pytest.mark.parametrize("algorithm", ["dcm", "euler"])
+def test_drift_over_hours_is_the_secular_rate(algorithm, method, simulated):
+    """A long run on the thesis's motion: what grows is the closed form, its swing the bounded part."""
+    profile = motion("coning", a_deg_s=10, b_deg_s=10, g_deg_s=10)
+    run = accumulate(choose(algorithm, method, 2), "coning", 2)
+    values = {STEP: 0.125, **{sp.Symbol(k): v for k, v in profile.parameters.items()}}
+    drift = sp.lambdify(TIME, [x.subs(values) for x in run.drift()], "numpy")
+    made = simulated(algorithm, method, profile, 5)
+    wanted = np.array(np.broadcast_arrays(*drift(made.time))).T
+    # To first order in the error: the square of the scale error of 5 s and of the drift are left, below 1 %.
+    assert np.abs(made.drift - wanted).max() < 0.01 * np.abs(wanted).max()
+
+
+def test_first_order_on_coning_needs_products_of_errors():
+    """Its secular drift comes with h^2 while errors are of order h: the eigenvalue has them, to all orders."""
+    run = accumulate(choose("dcm", "rk1", 2), "coning", 1)
+    assert list(run.secular) == [2]
+    assert list(run.bounded) == [1]
+
+
+def test_growth_of_scale_is_that_of_the_closed_form():
+    run = accumulate(choose("dcm", "rk4", 2), "constant", 1)
+    square = sum(x**2 for x in sp.symbols("w_x w_y w_z"))
+    assert sp.expand(run.growth[5] + square**3 / 144) == 0
+
+
+def test_what_has_no_closed_form_says_so(own_algorithm):
+    with pytest.raises(InputError, match="not linear in its state"):
+        error_rate(choose_step(str(own_algorithm("mrp"))), "coning")
+    with pytest.raises(InputError, match="motion 'spin' is not known"):
+        accumulate(choose("dcm"), "spin")
+    with pytest.raises(InputError, match="takes no increments"):
+        agreement(choose("dcm", "rk4", rates=True), motion("constant", y_deg_s=1), ["1/8"], 1)
+

@@ -1,0 +1,98 @@
+"""Appendix B of the thesis as a theorem."""
+
+from __future__ import annotations
+
+import mpmath
+import pytest
+import sympy as sp
+
+from strapgen import exact
+from strapgen.analysis.orthonormalization import ERROR, effect
+from strapgen.catalogue import orthonormalizations
+from strapgen.convergence import interpreter
+from strapgen.exceptions import InputError
+
+P = ERROR
+K, Y = (P - P.T) / 2, (P + P.T) / 2
+SERIES = ["dcm-orthonormalize", "dcm-orthonormalize-first-order", "dcm-orthonormalize-second-order"]
+
+
+def is_zero(matrix: sp.Matrix) -> bool:
+    return bool(matrix.expand().is_zero_matrix)
+
+
+def nearest(order: int) -> list[sp.Matrix]:
+    """Return (I + sP) ((I + sP)'(I + sP))^(-1/2) by powers of s: equation (B.1) by the binomial series."""
+    s = sp.Symbol("s")
+    left = sp.eye(3) + s * P
+    excess = (left.T * left - sp.eye(3)).expand()
+    root = sum((sp.binomial(-sp.Rational(1, 2), k) * excess**k for k in range(order + 1)), sp.zeros(3))
+    product = (left * root).expand()
+    return [product.applyfunc(lambda x, k=k: sp.expand(x).coeff(s, k)) for k in range(order + 1)]
+
+
+@pytest.mark.parametrize("scheme", SERIES)
+def test_to_first_order_the_skew_part_is_left(scheme):
+    """(B.4): scale and skew vanish, and drift is unchanged."""
+    assert is_zero(effect(scheme, 1)[1] - K)
+
+
+def test_to_second_order():
+    """(B.14), and what it says of the drift: a change of -(K Y + Y K)/2."""
+    second = effect("dcm-orthonormalize-second-order")[2]
+    assert is_zero(second - (-P * P - P * P.T - P.T * P + 3 * P.T * P.T) / 8)
+    assert is_zero((second - second.T) / 2 + (K * Y + Y * K) / 2)
+    assert is_zero(second - nearest(2)[2])
+    # What is left of scale and skew is what a rotation has: K^2/2.
+    assert is_zero((second + second.T) / 2 - K * K / 2)
+
+
+def test_the_schemes_differ_from_second_order_on():
+    """The thesis's own scheme and the first-order one leave another symmetric part, of second order in the error."""
+    second = nearest(2)[2]
+    for scheme in ("dcm-orthonormalize", "dcm-orthonormalize-first-order"):
+        rest = effect(scheme)[2] - second
+        assert not is_zero(rest)
+    # The thesis's scheme changes the drift by the same, but for rows that it divides by their lengths one by one.
+    first = effect("dcm-orthonormalize-first-order")[2]
+    assert is_zero((first - first.T) / 2 - (second - second.T) / 2)
+
+
+def test_scale_alone_lets_the_drift_of_a_large_error_fall():
+    """Claim 6: with the scale y and the drift k about one axis, drift falls by y k."""
+    y, k = sp.symbols("y k")
+    error = sp.Matrix([[y, k, 0], [-k, y, 0], [0, 0, 0]])
+    values = dict(zip(P, error, strict=True))
+    second = effect("dcm-orthonormalize-second-order")[2].subs(values)
+    assert sp.expand((second - second.T)[0, 1] / 2 + y * k) == 0
+
+
+@pytest.mark.parametrize("scheme", orthonormalizations("dcm"))
+def test_any_true_matrix(scheme):
+    """The kernels, that of the nearest rotation too, on (I + sP) C: what they leave is as predicted, to order s^3."""
+    name = scheme if scheme in SERIES else "dcm-orthonormalize-second-order"
+    values = {symbol: sp.Rational((5 * n) % 7 - 3, 4) for n, symbol in enumerate(P)}
+    terms = {power: matrix.subs(values) for power, matrix in effect(name).items()}
+    with mpmath.workdps(exact.DIGITS):
+        true = mpmath.matrix(3, 3)
+        rows = interpreter("dcm-from-euler")([mpmath.mpf(x) / 5 for x in (1, 2, 2, 4)])
+        for k, x in enumerate(rows):
+            true[k // 3, k % 3] = x
+        left = []
+        for size in (mpmath.mpf(1) / 1000, mpmath.mpf(1) / 2000):
+            error = mpmath.matrix(P.subs(values).tolist()) * size
+            made = interpreter(scheme)(list((mpmath.eye(3) + error) * true))
+            expected = mpmath.eye(3) + sum(
+                (mpmath.matrix(m.tolist()) * size**power for power, m in terms.items()), mpmath.zeros(3)
+            )
+            wanted = list(expected * true)
+            left.append(max(abs(a - b) for a, b in zip(made, wanted, strict=True)))
+        assert left[0] < 1e-7
+        assert float(mpmath.log(left[0] / left[1], 2)) == pytest.approx(3, abs=0.05)
+
+
+def test_what_has_no_effect():
+    with pytest.raises(InputError, match="has no series in the error"):
+        effect("dcm-orthonormalize-optimal")
+    with pytest.raises(InputError, match="scheme 'dcm' is not known"):
+        effect("dcm")

@@ -1,0 +1,87 @@
+"""Ratios: the thesis's claims derived, and two algorithms side by side."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+import sympy as sp
+
+from strapgen.analysis.constant_rate import ANGLE, constant_rate
+from strapgen.analysis.ratios import as_latex, as_text, claims, claims_as_text, quotient, versus
+from strapgen.catalogue import choose
+
+R = sp.Rational
+
+
+def test_the_claims_of_section_8():
+    """With sign and with the next term in x^2."""
+    found = [claim.ratio for claim in claims()]
+    assert found == [
+        {0: R(1, 4), 2: R(9, 80)},
+        {0: R(1, 4), 2: R(9, 160)},
+        {0: R(1, 16), 2: R(5, 896)},
+        {0: R(1, 16), 2: R(15, 896)},
+        {0: -R(1, 2), 2: -R(3, 20)},
+        {0: -R(1, 4), 2: R(5, 84)},
+        {0: 3, 2: R(51, 35)},
+    ]
+    assert "1/4 + 9/80 x^2" in claims_as_text(claims())
+
+
+@pytest.mark.parametrize("order", [1, 2, 3, 4])
+def test_parameters_lose_twice_what_the_matrix_loses_at_half_the_angle(order):
+    """Claim 2 in closed form: the ratio is 2 delta(x/2)/delta(x), exactly."""
+    euler, dcm = (constant_rate(choose(name, f"rk{order}", 2)) for name in ("euler", "dcm"))
+    assert sp.simplify(euler.angle_lost - 2 * dcm.angle_lost.subs(ANGLE, ANGLE / 2)) == 0
+
+
+def test_three_axes_at_the_thesis_rate():
+    """3.00069 at 10 deg/s and 1/8 s."""
+    ratio = claims()[-1].ratio
+    x = math.radians(10) / 8
+    assert float(sum(value * x**power for power, value in ratio.items())) == pytest.approx(3.00069, abs=1e-5)
+
+
+@pytest.mark.parametrize("motion", ["constant", "sinusoidal", "polynomial"])
+def test_second_order_loses_a_quarter(motion):
+    ratio = versus(choose("euler", "rk2", 2), choose("dcm", "rk2", 2), motion).ratio
+    assert ratio[0] == R(1, 4)
+
+
+def test_steps_of_one_method_on_coning():
+    """Exponentials of the same rotation vector lose the same, whatever the state."""
+    found = versus(choose("euler", "magnus4", 2), choose("dcm", "magnus4", 2), "coning")
+    assert found.ratio == {0: 1}
+    assert found.expression == 1
+
+
+def test_vectors_that_are_not_parallel_have_no_ratio():
+    found = versus(choose("euler", "rk4", 2), choose("dcm", "rk4", 2), "general")
+    assert found.ratio is None
+    assert "not parallel" in as_text(found)
+    assert found.as_dict()["ratio"] is None
+
+
+def test_an_exact_step_has_no_ratio():
+    found = versus(choose("euler", "magnus4", 2), choose("dcm", "rk4", 2), "constant")
+    assert "euler-magnus4-2 loses nothing" in as_text(found)
+
+
+def test_quotient_is_the_series_of_the_quotient():
+    first = {2: (R(1, 3),), 3: (R(1, 5),), 4: (R(-1, 7),)}
+    second = {1: (R(2, 3),), 2: (R(-1, 2),), 3: (R(4),)}
+    h = sp.Symbol("h")
+
+    def total(terms):
+        return sum(row[0] * h**power for power, row in terms.items())
+
+    wanted = sp.series(total(first) / total(second), h, 0, 4).removeO()
+    found = quotient(first, second, 3)
+    assert sp.expand(wanted - sum(x * h**power for power, x in found.items())) == 0
+
+
+def test_latex():
+    text = as_latex(versus(choose("euler", "rk1"), choose("dcm", "rk1"), "constant"))
+    assert text.startswith("%")
+    assert r"\frac{9 x^{2}}{80}" in text
