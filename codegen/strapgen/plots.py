@@ -324,9 +324,7 @@ def agreement_image(found: Sequence[Agreement], title: str, path: str | Path) ->
         differences = [rung.difference or math.nan for rung in one.rungs]
         terms = "the leading term" if one.terms == 1 else f"{one.terms} powers of h"
         slope = f": slope {one.slopes[-1]:.2f}" if one.slopes else ""
-        right.plot(
-            steps, differences, color=colour, marker="s", markersize=4.5, label=f"less {terms}{slope}"
-        )
+        right.plot(steps, differences, color=colour, marker="s", markersize=4.5, label=f"less {terms}{slope}")
     right.set_xscale("log", base=2)
     if any(value > 0 for value in drifts):
         right.set_yscale("log")
@@ -392,9 +390,7 @@ def stability_image(found: Sequence[Stability], title: str, path: str | Path) ->
     curves.axhspan(0.0, 1.0, color="0.5", alpha=0.08, linewidth=0)
     curves.set_ylim(0.0, 2.0)
     curves.set_ylabel("length of the state after a step")
-    curves.legend(
-        framealpha=0.85, edgecolor="none", fontsize=9, loc="upper left", ncols=1 + len(found) // 9
-    )
+    curves.legend(framealpha=0.85, edgecolor="none", fontsize=9, loc="upper left", ncols=1 + len(found) // 9)
     bars.set_yticks(range(len(found)), [one.kernel for one in reversed(found)], fontsize=9)
     bars.set_ylim(-0.6, len(found) - 0.4)
     bars.set_title("where no state grows", loc="left", fontsize=10)

@@ -53,7 +53,12 @@ def test_constant_rate_adds_up_along_the_rate(order):
     run = accumulate(choose("dcm", f"rk{order}", 2), "constant", 1)
     w = sp.Matrix(sp.symbols("w_x w_y w_z"))
     (power,) = run.secular
-    coefficient = {1: sp.Rational(1, 3), 2: -sp.Rational(1, 6), 3: -sp.Rational(1, 30), 4: sp.Rational(1, 120)}
+    coefficient = {
+        1: sp.Rational(1, 3),
+        2: -sp.Rational(1, 6),
+        3: -sp.Rational(1, 30),
+        4: sp.Rational(1, 120),
+    }
     wanted = coefficient[order] * w.dot(w) ** (power // 2) * w
     assert (run.secular[power] - wanted).expand().is_zero_matrix
     assert not run.bounded
@@ -131,4 +136,3 @@ def test_what_has_no_closed_form_says_so(own_algorithm):
         accumulate(choose("dcm"), "spin")
     with pytest.raises(InputError, match="takes no increments"):
         agreement(choose("dcm", "rk4", rates=True), motion("constant", y_deg_s=1), ["1/8"], 1)
-

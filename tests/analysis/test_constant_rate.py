@@ -110,7 +110,9 @@ def test_a_run_of_1440_steps_in_many_digits(algorithm, order):
     expected = errors_after(choice, profile, STEP, 180)
     with mpmath.workdps(exact.DIGITS):
         *_, (computed, true) = exact_attitudes(choice, profile)(STEP, 1440)
-        for part, wanted in zip(parts_of()(computed, true), (expected.scale, expected.skew, expected.drift), strict=True):
+        for part, wanted in zip(
+            parts_of()(computed, true), (expected.scale, expected.skew, expected.drift), strict=True
+        ):
             largest = max(map(abs, wanted[-1]))
             assert all(abs(a - b) <= 1e-25 * largest + 1e-34 for a, b in zip(part, wanted[-1], strict=True))
 
@@ -120,7 +122,9 @@ def test_the_thesis_base_drifts():
     choice = choose("dcm", "rk1", 2)
 
     def drift(rate: str, every: int | None) -> float:
-        return math.degrees(max(errors_after(choice, motion("constant", **RATES[rate]), STEP, 180, every, 5).drift_by_axis))
+        return math.degrees(
+            max(errors_after(choice, motion("constant", **RATES[rate]), STEP, 180, every, 5).drift_by_axis)
+        )
 
     assert drift("one axis", 5) == pytest.approx(0.2855, abs=5e-5)
     assert drift("three axes", 5) == pytest.approx(0.856, abs=5e-4)

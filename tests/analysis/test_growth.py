@@ -74,7 +74,7 @@ def test_contraction(algorithm):
     assert high > low
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(st.floats(0.05, 6.0))
 def test_runs_grow_as_the_stretch_says(angle):
     """Ten steps at a constant rate on the numpy back end: the length of the state is the tenth power."""

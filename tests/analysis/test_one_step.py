@@ -19,11 +19,16 @@ CASES = [
     ("rk1", 2, 0),
     ("rk3", 2, 0),
     ("rk4", 2, 0),
-    ("rk4", 1, 2),
-    ("taylor4", 3, 0),
-    ("magnus4", 2, 0),
-    ("munthe-kaas4", 2, 0),
-    ("butcher6", 4, 0),
+    *(
+        pytest.param(*case, marks=pytest.mark.long)
+        for case in (
+            ("rk4", 1, 2),
+            ("taylor4", 3, 0),
+            ("magnus4", 2, 0),
+            ("munthe-kaas4", 2, 0),
+            ("butcher6", 4, 0),
+        )
+    ),
 ]
 
 

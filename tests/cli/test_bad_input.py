@@ -21,6 +21,29 @@ CONING = "--motion coning --step 0.125 --duration 1 --set"
 EVEN = f"--rates-csv {DATA}/rates_even.csv"
 
 BAD = {
+    # Series
+    "series": "an algorithm is needed, or --all",
+    "series eulr": "algorithm 'eulr' is not known",
+    "series euler --motion spin": "motion 'spin' is not known; allowed: general, constant",
+    "series euler --terms 0": "terms is 0; a whole number from 1 to 6",
+    "series euler --terms two": "terms is 'two'; a whole number is needed",
+    "series euler-normalize": "algorithm 'euler-normalize' is no attitude step",
+    "series euler --format yaml": "format 'yaml' is not known; allowed: text, json, latex",
+    "series euler --versus-method rk1": "--versus-method and --versus-increments need --versus",
+    "series euler --versus quaternion": "algorithm 'quaternion' is not known",
+    "series euler --plot drift.png": "--plot needs a --motion of the catalogue",
+    "series euler --motion coning --plot drift.xyz": "file type 'xyz' is not known",
+    "series euler --motion coning --set a_deg_s=1": "--set and --steps are for --plot",
+    "series euler --motion coning --plot a.png --set a_deg_s=1": "motion coning lacks b_deg_s or b_rad_s",
+    "series euler --motion coning --plot a.png --steps 1/8,1/12": "the longest step",
+    "series euler --motion coning --plot a.png --out a.png": "two files are needed",
+    "series --all --versus euler": "--all and --versus do not go together",
+    "series --all --method heun": "method 'heun' is not known",
+    "series --all --format latex": "--all is printed as text or json",
+    "stability euler --method heun": "method 'heun' is not known",
+    "stability euler --method ,": "--method names no method",
+    "stability euler --plot a.xyz": "file type 'xyz' is not known",
+    "tables --predict --backend c": "--predict and --backend do not go together",
     # Commands and options
     "integrate": "No such command 'integrate'",
     "list --formatt json": "No such option: --formatt",

@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import sympy
 from tolerances import certified
 
 import strapgen
@@ -34,7 +35,7 @@ pytestmark = pytest.mark.filterwarnings("error")
 
 COMMANDS = (
     *("list", "tableau", "derive", "generate", "simulate", "compare", "converge", "check", "tables"),
-    "study word-length",
+    *("study word-length", "series", "stability"),
 )
 DATA = Path(__file__).resolve().parents[1] / "data"
 CONING = "--motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 --step 0.125 --duration 5"
@@ -837,3 +838,48 @@ def test_check_fails_with_the_names_of_what_fails(capsys, tmp_path):
     data = json.loads(said.out)
     assert data["holds"] is False
     assert {finding["name"] for finding in data["findings"] if finding["holds"] is False} == {"order"}
+
+
+def test_series_prints_what_was_agreed(strapgen_says):
+    said = strapgen_says("series euler --method rk4 --increments 2 --motion constant --terms 2 --format json")
+    data = json.loads(said)
+    assert data["order"] == 4
+    h, x, y, z = sympy.symbols("h w_x w_y w_z")
+    square = x**2 + y**2 + z**2
+    wanted = h**5 * y * square**2 / 1920 - h**7 * y * square**3 / 21504
+    assert sympy.expand(sympy.sympify(data["drift"][1]) - wanted) == 0
+    assert data["skew"] == ["0", "0", "0"]
+    assert set(data) >= {"order", "drift", "scale", "skew", "run", "growth", "closed_form"}
+
+
+def test_series_versus_and_all(strapgen_says):
+    said = strapgen_says("series dcm --method rk1 --motion constant --versus euler --format json")
+    assert json.loads(said)["ratio"] == "-9*x**2/5 + 4"
+    said = strapgen_says("series dcm --method rk2 --motion constant --versus dcm --versus-method rk1")
+    assert "ratio = -3*x**2/20 - 1/2" in said
+    rows = json.loads(strapgen_says("series euler --all --method rk2,magnus2 --format json"))
+    assert [row["kernel"] for row in rows] == ["euler-rk2-1", "euler-magnus2-1"]
+
+
+def test_series_latex_and_files(strapgen_says, tmp_path):
+    said = strapgen_says("series dcm --method rk2 --format latex")
+    assert said.rstrip().endswith(r"\end{align*}")
+    strapgen_says(
+        "series dcm --method rk2 --motion sinusoidal --steps 1/4,1/8 --plot drift.svg --out drift.txt"
+    )
+    assert (tmp_path / "drift.svg").read_text().startswith("<?xml")
+    assert "order 2" in (tmp_path / "drift.txt").read_text()
+
+
+def test_stability(strapgen_says, tmp_path):
+    rows = json.loads(strapgen_says("stability dcm --format json --plot region.svg"))
+    assert [row["contractive"] for row in rows[:2]] == [[], []]
+    assert (tmp_path / "region.svg").is_file()
+
+
+@pytest.mark.long
+def test_tables_predicted(strapgen_says):
+    data = json.loads(strapgen_says("tables --predict --format json"))
+    assert len(data["entries"]) == 30
+    assert all(abs(entry["deviation"]) < 0.01 and entry["agrees"] for entry in data["entries"])
+    assert data["ratios"][0]["ratio"] == "9*x**2/80 + 1/4"

@@ -1,8 +1,8 @@
 """From one step to a run: the drift that grows with time, and the part that stays bounded.
 
 To first order in the error the error matrix of a run is the integral of the error rate, carried along with the motion.
-Where the frame turns evenly about an axis s, what lies along s adds up and the rest swings with |s| t. Orthonormalization
-leaves the drift as it is, to that order, and keeps scale and skew from adding up.
+Where the frame turns evenly about an axis s, what lies along s adds up and the rest swings with |s| t.
+Orthonormalization leaves the drift as it is, to that order, and keeps scale and skew from adding up.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from typing import Any
 
 import sympy as sp
 
-from strapgen import algebra, checks
-from strapgen.analysis import motion_rates, one_step
+from strapgen import algebra, catalogue, checks
+from strapgen.analysis import one_step
 from strapgen.analysis.error_rate import ErrorRate, error_rate
 from strapgen.analysis.motion_rates import TIME
 from strapgen.analysis.powers import Powers
@@ -76,8 +76,8 @@ def accumulate(choice: Choice, motion: str, terms: int = 2) -> Accumulation:
         An attitude step that is linear in its state.
     motion : str
     terms : int, optional
-        How many terms of the drift that grows and of the one that is bounded. They are looked for among the first powers
-        of the error rate, twice as many: every other one may be zero.
+        How many terms of the drift that grows and of the one that is bounded. They are looked for among the first
+        powers of the error rate, twice as many: every other one may be zero.
 
     Returns
     -------
@@ -93,9 +93,9 @@ def accumulate(choice: Choice, motion: str, terms: int = 2) -> Accumulation:
     >>> from strapgen import catalogue
     >>> run = accumulate(catalogue.choose("dcm", "rk2"), "coning", terms=1)
     >>> sp.factor(run.secular[2][1])
-    -(b + g)*(a**2*b + a**2*g + g**3)/(6*(a**2 + b**2 + 2*b*g + g**2))
+    -(b + g)*(a**4 + a**2*b**2 + a**2*b*g + 2*a**2*g**2 + b*g**3 + g**4)/(6*(a**2 + b**2 + 2*b*g + g**2))
     """
-    checks.choice("motion", motion, tuple(motion_rates.MOTIONS))
+    checks.choice("motion", motion, catalogue.MOTIONS)
     checks.count("terms", terms, largest=MOST_TERMS)
     found = error_rate(choice, motion, 2 * terms)
     made = _steady(found) if found.steady else _about_an_axis(found)

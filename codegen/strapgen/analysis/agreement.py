@@ -165,4 +165,8 @@ def as_text(found: Agreement) -> str:
 
 def default_steps(choice: Choice) -> tuple[str, ...]:
     """Return a ladder of steps in s on which the next term shows."""
-    return ("1/4", "1/8", "1/16", "1/32") if catalogue.increments(choice) > 4 else ("1/8", "1/16", "1/32", "1/64")
+    return (
+        ("1/4", "1/8", "1/16", "1/32")
+        if catalogue.increments(choice) > 4
+        else ("1/8", "1/16", "1/32", "1/64")
+    )

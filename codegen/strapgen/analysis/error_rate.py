@@ -15,7 +15,7 @@ from typing import Any
 
 import sympy as sp
 
-from strapgen import algebra, catalogue
+from strapgen import algebra
 from strapgen.analysis import motion_rates, one_step
 from strapgen.analysis.motion_rates import TIME
 from strapgen.analysis.one_step import Step
@@ -212,10 +212,7 @@ def _square(elements: Sequence[Powers]) -> _Matrix:
 
 def _product(left: _Matrix, right: _Matrix) -> _Matrix:
     return [
-        [
-            left[i][0] * right[0][j] + left[i][1] * right[1][j] + left[i][2] * right[2][j]
-            for j in range(3)
-        ]
+        [left[i][0] * right[0][j] + left[i][1] * right[1][j] + left[i][2] * right[2][j] for j in range(3)]
         for i in range(3)
     ]
 

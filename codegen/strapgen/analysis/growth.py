@@ -174,7 +174,9 @@ def contraction(found: ConstantRate) -> list[tuple[float, float | None]] | None:
     if excess == 0:
         return None
     if not excess.is_polynomial(ANGLE):
-        raise InputError(f"kernel {found.kernel}: its growth at a constant rate is no polynomial of the angle")
+        raise InputError(
+            f"kernel {found.kernel}: its growth at a constant rate is no polynomial of the angle"
+        )
     # Irrational coefficients are rounded, for roots that are printed with 16 digits; what the rounding of published
     # coefficients leaves below the order of a method is no growth.
     polynomial = sp.Poly.from_dict(

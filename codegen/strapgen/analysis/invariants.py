@@ -57,7 +57,9 @@ def invariants(
     domain = matrix[0].ring.domain
     if domain == sp.QQ:
         found = frame.matrix(list(matrix))
-        return Invariants(_scaled(_rounded(found.vector, shown), Fraction(-1)), _rounded(found.symmetric, shown))
+        return Invariants(
+            _scaled(_rounded(found.vector, shown), Fraction(-1)), _rounded(found.symmetric, shown)
+        )
     drift: Coefficients = {}
     symmetric: Coefficients = {}
     for power in range(domain.mod.degree()):
@@ -94,7 +96,10 @@ def _add(total: Coefficients, more: Coefficients) -> None:
 
 def _scaled(coefficients: Coefficients, factor: Any) -> Coefficients:
     return {
-        c: {m: x * factor if isinstance(factor, Fraction) else exact(x) * factor for m, x in polynomial.items()}
+        c: {
+            m: x * factor if isinstance(factor, Fraction) else exact(x) * factor
+            for m, x in polynomial.items()
+        }
         for c, polynomial in coefficients.items()
     }
 
@@ -167,9 +172,7 @@ def _typeset(size: sp.Expr) -> str:
     return str(sp.latex(size if not size.is_Rational or size.q < _DECIMAL else sp.Float(size, 12)))
 
 
-TEXT = Notation(
-    "w{}", "|{}|", "({} . {})", "{} x {}", "({} . {} x {})", "S({}, {})", "1", "{}^{}", _plain
-)
+TEXT = Notation("w{}", "|{}|", "({} . {})", "{} x {}", "({} . {} x {})", "S({}, {})", "1", "{}^{}", _plain)
 LATEX = Notation(
     r"\boldsymbol\omega_{{{}}}",
     r"|{}|",
@@ -225,9 +228,7 @@ def as_text(coefficients: Coefficients, symmetric: bool = False, notation: Notat
     return _sum(coefficients, notation, covariant)
 
 
-def _sum(
-    coefficients: Coefficients, notation: Notation, covariant: Callable[[tuple[int, ...]], str]
-) -> str:
+def _sum(coefficients: Coefficients, notation: Notation, covariant: Callable[[tuple[int, ...]], str]) -> str:
     terms = []
     for indices in sorted(coefficients, key=lambda c: (len(c), c)):
         polynomial = coefficients[indices]

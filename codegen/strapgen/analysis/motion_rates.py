@@ -66,7 +66,7 @@ def at_time(motion: str, count: int, domain: Any = sp.QQ) -> MotionRate:
     waves = {} if frequency is None else {sp.cos(frequency * TIME): cosine, sp.sin(frequency * TIME): sine}
     ring, *_ = sp.ring([*reversed(waves.values()), *symbols], domain)
     vector = MOTIONS[motion].rate(TIME, *symbols)
-    rate = []
+    rate: list[list[Any]] = []
     while len(rate) < count and any(vector):
         rate.append([ring.from_expr(sp.expand(element).subs(waves)) for element in vector])
         vector = vector.diff(TIME)

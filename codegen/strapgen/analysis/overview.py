@@ -140,7 +140,7 @@ def overview(chosen: Iterable[Choice]) -> Iterator[Row]:
     --------
     >>> (row,) = overview([catalogue.choose("dcm", "rk2", 1)])
     >>> row.order, row.constant_power, row.constant, row.general
-    (2, 3, -1/6, '1/12 w0 x w1 - 1/6 |w0|^2 w0')
+    (2, 3, -1/6, '-1/6 |w0|^2 w0 + 1/12 w0 x w1')
     """
     for choice in chosen:
         yield _row(choice)
@@ -238,4 +238,3 @@ def _power(number: sp.Expr | None, power: int | None) -> str:
     if size is None or size.q > 10**9:
         return f"{float(number):.4g} x^{power}"
     return f"{size} x^{power}"
-

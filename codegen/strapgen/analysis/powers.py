@@ -59,7 +59,8 @@ class Powers:
     __radd__, __rmul__ = __add__, __mul__
 
     def __neg__(self) -> Powers:
-        return self * self.ring(-1)
+        made: Powers = self * self.ring(-1)
+        return made
 
     def __sub__(self, other: Any) -> Powers:
         return self + -self._of(other)
@@ -98,7 +99,10 @@ class Powers:
         if not start:
             raise ArithmeticError("a series that begins with 0 has no inverse")
         rest = self * (self.ring.domain.one / start) - 1
-        return self.composed([(-1) ** k for k in range(self.top + 1)], rest) * (self.ring.domain.one / start)
+        made: Powers = self.composed([(-1) ** k for k in range(self.top + 1)], rest) * (
+            self.ring.domain.one / start
+        )
+        return made
 
     def root(self) -> Powers:
         """Return the square root of a series that begins with the square of a number of the field.
@@ -117,7 +121,8 @@ class Powers:
             raise ArithmeticError(f"a series that begins with {start} has no series as its root")
         rest = self * (self.ring.domain.one / (factor * factor)) - 1
         coefficients = [sp.binomial(sp.Rational(1, 2), k) for k in range(self.top + 1)]
-        return self.composed(coefficients, rest) * factor
+        made: Powers = self.composed(coefficients, rest) * factor
+        return made
 
     def composed(self, coefficients: Sequence[Any], inner: Powers) -> Powers:
         """Return sum_k coefficients[k] inner^k for a series that begins with 0."""

@@ -78,7 +78,7 @@ def _columns(terms: Terms) -> list[dict[int, sp.Expr]]:
 
 
 def _sum(row: Mapping[int, sp.Expr], symbol: sp.Symbol) -> str:
-    return sp.sstr(sp.Add(*(x * symbol**power for power, x in row.items())), order="lex")
+    return str(sp.sstr(sp.Add(*(x * symbol**power for power, x in row.items())), order="lex"))
 
 
 def versus(first: Choice, second: Choice, motion: str = "general", terms: int = 2) -> Ratio:
@@ -112,6 +112,8 @@ def versus(first: Choice, second: Choice, motion: str = "general", terms: int = 
     """
     checks.choice("motion", motion, MOTIONS)
     kernels = [catalogue.derive(choice).name for choice in (first, second)]
+    one: Terms
+    other: Terms
     if motion == "constant":
         one, other = ({p: (x,) for p, x in constant_rate(c).series(terms).items()} for c in (first, second))
         quantity, symbol = "angle lost in a step, rad", _ANGLE
@@ -220,7 +222,11 @@ def as_text(found: Ratio) -> str:
 
 def _no_ratio(found: Ratio) -> str:
     empty = [n for n, terms in zip((found.first, found.second), found.terms, strict=True) if not terms]
-    return f"no ratio: {' and '.join(empty)} loses nothing" if empty else "no ratio: the vectors are not parallel"
+    return (
+        f"no ratio: {' and '.join(empty)} loses nothing"
+        if empty
+        else "no ratio: the vectors are not parallel"
+    )
 
 
 def as_latex(found: Ratio) -> str:

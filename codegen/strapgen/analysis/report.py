@@ -122,7 +122,9 @@ def as_report(found: Report) -> str:
     if found.run is not None and found.run.motion != "polynomial":
         lines += ["", "in a run, orthonormalized or not, to first order in the error"]
         if min(found.run.secular, default=0) >= 2 * min(found.growth_powers, default=9):
-            lines[-1] = "in a run that is not orthonormalized; what adds up is known to all orders in the error"
+            lines[-1] = (
+                "in a run that is not orthonormalized; what adds up is known to all orders in the error"
+            )
         lines += _vector("drift gained in a second", _sums(found.run.secular), "drift that adds up: none")
         if found.run.bounded:
             lines += _vector("drift that is bounded", _sums(found.run.bounded))
@@ -228,4 +230,3 @@ def _wrapped(text: str, terms: int = 4) -> str:
     parts = text.replace(" + ", "\n+ ").replace(" - ", "\n- ").split("\n")
     lines = [" ".join(parts[k : k + terms]) for k in range(0, len(parts), terms)]
     return " \\\\\n    &\\quad ".join(lines)
-

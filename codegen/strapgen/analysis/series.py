@@ -151,7 +151,9 @@ def _general(taken: Step, terms: int, top: int) -> ErrorSeries:
     symmetric = sorted({*powers["scale"], *powers["skew"]})[:terms]
     wanted = sorted({*powers["drift"], *symmetric})
     invariant = {
-        power: invariants(frame, [element.parts.get(power, ring.zero) for element in made["error"]], taken.shown)
+        power: invariants(
+            frame, [element.parts.get(power, ring.zero) for element in made["error"]], taken.shown
+        )
         for power in wanted
     }
     vectors = [[sp.Symbol(f"w{j}_{axis}") for axis in "xyz"] for j in range(top)]
@@ -159,10 +161,12 @@ def _general(taken: Step, terms: int, top: int) -> ErrorSeries:
     for power in wanted:
         split = one_step.split([sp.expand(element) for element in matrix(invariant[power], vectors)])
         for part in PARTS:
-            row = tuple(sp.expand(element) for element in split[part])
+            row = (sp.expand(split[part][0]), sp.expand(split[part][1]), sp.expand(split[part][2]))
             if power in (powers["drift"] if part == "drift" else symmetric) and any(row):
                 parts[part][power] = row
-    return ErrorSeries(taken.kernel.name, "general", **parts, known=top, invariant=invariant)
+    return ErrorSeries(
+        taken.kernel.name, "general", parts["drift"], parts["scale"], parts["skew"], top, invariant
+    )
 
 
 def _named(taken: Step, motion: str, terms: int, top: int) -> ErrorSeries:
@@ -173,13 +177,12 @@ def _named(taken: Step, motion: str, terms: int, top: int) -> ErrorSeries:
     for part in PARTS:
         rows: Coefficients = {}
         for power in _powers(made[part]):
-            row = tuple(
-                rate.expression(one_step.shown(taken, element.parts.get(power, rate.ring.zero))) for element in made[part]
-            )
+            elements = [one_step.shown(taken, x.parts.get(power, rate.ring.zero)) for x in made[part]]
+            row = (rate.expression(elements[0]), rate.expression(elements[1]), rate.expression(elements[2]))
             if any(row) and len(rows) < terms:
                 rows[power] = row
         parts[part] = rows
-    return ErrorSeries(taken.kernel.name, motion, **parts, known=top)
+    return ErrorSeries(taken.kernel.name, motion, parts["drift"], parts["scale"], parts["skew"], top)
 
 
 def _powers(elements: Sequence[Powers]) -> list[int]:

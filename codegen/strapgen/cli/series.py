@@ -56,7 +56,10 @@ def series(
     versus: Annotated[
         _Text,
         typer.Option(
-            "--versus", metavar="ALGORITHM", help="Another algorithm: both, and their exact ratio.", show_default=False
+            "--versus",
+            metavar="ALGORITHM",
+            help="Another algorithm: both, and their exact ratio.",
+            show_default=False,
         ),
     ] = None,
     versus_method: Annotated[
@@ -83,10 +86,15 @@ def series(
     steps: Annotated[
         _Text,
         typer.Option(
-            "--steps", metavar="S,...", help="Steps of the plot in s.  [default: 1/8 to 1/64]", show_default=False
+            "--steps",
+            metavar="S,...",
+            help="Steps of the plot in s.  [default: 1/8 to 1/64]",
+            show_default=False,
         ),
     ] = None,
-    duration: Annotated[str, typer.Option("--duration", metavar="S", help="Duration of the plot in s.")] = "2",
+    duration: Annotated[
+        str, typer.Option("--duration", metavar="S", help="Duration of the plot in s.")
+    ] = "2",
     plot: Annotated[
         Path | None,
         typer.Option(
@@ -107,12 +115,10 @@ def series(
     motions of the catalogue in their own symbols, t the time at the beginning of the step, with what adds up in a run,
     and at a constant rate in closed form.
 
-    Example:
+    Example: strapgen series euler --method rk4 --increments 2 --motion constant
 
-    \b
-      strapgen series euler --method rk4 --increments 2 --motion constant
-      strapgen series dcm --method rk1 --motion constant --versus euler
-    """  # noqa: D301
+    Example: strapgen series dcm --method rk1 --motion constant --versus euler
+    """
     check_format(format, "latex")
     count = whole("terms", terms)
     if all_of_them:
@@ -194,9 +200,7 @@ def _overview(algorithm: _Text, method: _Text, format: str) -> tuple[str, Any]:
     return overview.as_table(rows), [row.as_dict() for row in rows]
 
 
-def _versus(
-    first: Choice, second: Choice, motion: str, count: int | None, format: str
-) -> tuple[str, Any]:
+def _versus(first: Choice, second: Choice, motion: str, count: int | None, format: str) -> tuple[str, Any]:
     from strapgen.analysis import ratios
 
     found = ratios.versus(first, second, motion, 2 if count is None else count)

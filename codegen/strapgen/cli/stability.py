@@ -23,8 +23,8 @@ def stability(
 ) -> None:
     """Show at which constant rates a step lets the state grow, and at which it contracts.
 
-    The square of the factor by which a step of the angle x = |w| h stretches the state across the axis, exactly, and the
-    angles at which it is at most 1.
+    The square of the factor by which a step of the angle x = |w| h stretches the state across the axis, exactly, and
+    the angles at which it is at most 1.
 
     Example: strapgen stability dcm --method rk3,rk4,butcher5 --plot stability.png
     """

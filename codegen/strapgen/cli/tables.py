@@ -30,7 +30,8 @@ def tables(
     predict: Annotated[
         bool,
         typer.Option(
-            "--predict", help="Predict every figure from the truncation-error series, beside a simulation in numpy."
+            "--predict",
+            help="Predict every figure from the truncation-error series, beside a simulation in numpy.",
         ),
     ] = False,
     format: Format = "text",
