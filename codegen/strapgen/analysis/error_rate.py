@@ -85,6 +85,7 @@ def error_rate(choice: Choice, motion: str, terms: int = 2) -> ErrorRate:
 
     Examples
     --------
+    >>> from strapgen import catalogue
     >>> found = error_rate(catalogue.choose("dcm", "rk1", 1), "sinusoidal")
     >>> found.order, found.matrices[1][0, 0]
     (1, a**2*cos(b*t)**2/2)
