@@ -145,8 +145,8 @@ def _product(stretch: sp.Expr, along: sp.Expr, lost: sp.Expr, steps: sp.Expr, *a
 
 
 def _square(cosine: sp.Expr, sine: sp.Expr) -> sp.Expr:
-    total = sp.expand(cosine**2 + sine**2)
-    return total if total.is_polynomial(ANGLE) else sp.simplify(total)
+    total = cosine**2 + sine**2
+    return sp.expand(total) if total.is_polynomial(ANGLE) else _simple(total)
 
 
 def _slope(series: Powers) -> Powers:
@@ -192,7 +192,7 @@ def constant_rate(choice: Choice) -> ConstantRate:
         attitude = catalogue.derive(catalogue.choose(kernel.companions.attitude))
         names = attitude.inputs[0].elements
         made = _expanded(attitude, dict(zip(names, state, strict=True)))
-        state = [sp.cancel(x) for x in made]
+        state = [_simple(x) for x in made]
     return ConstantRate(kernel.name, state[0], state[3], False, state[8], taken.lowest)
 
 
@@ -242,6 +242,9 @@ def _expanded(kernel: Kernel, values: dict[str, Any]) -> list[sp.Expr]:
 
 
 def _simple(expression: sp.Expr) -> sp.Expr:
+    """Return an expression in lowest terms, where it calls functions of the angle as SymPy simplifies it."""
+    if expression.is_rational_function(ANGLE):
+        return sp.cancel(expression)
     return sp.simplify(expression.rewrite(sp.sin))
 
 
