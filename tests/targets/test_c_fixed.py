@@ -212,7 +212,7 @@ def test_strict_compilers_are_silent(choice, word, tmp_path):
 
 
 def test_the_source_is_integers_alone():
-    for choice in LOWERED:
+    for choice in CHOICES:
         for text in generate(quantize(program(choice), Settings(16)), "c-fixed").files.values():
             code = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
             assert not re.search(r"\b(float|double|math\.h|sqrt|\d+\.\d)", code)
