@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -15,8 +15,7 @@ from strapgen.program import OPERATIONS, Program
 #: Decimal digits: a million steps lose six of them.
 DIGITS = 40
 
-#: What a program may call, on numbers of mpmath.
-FUNCTIONS: dict[str, Callable[..., Any]] = {
+_FUNCTIONS: dict[str, Callable[..., Any]] = {
     **OPERATIONS,
     "sqrt": mpmath.sqrt,
     "sin": mpmath.sin,
@@ -53,13 +52,14 @@ class Interpreter:
 
     def __call__(self, *inputs: Iterable[Any]) -> list[Any]:
         """Return the elements of the last output, from the elements of every input."""
+        return list(self.outputs(*inputs).values())[-1]
+
+    def outputs(self, *inputs: Iterable[Any]) -> dict[str, list[Any]]:
+        """Return the elements of every output by its name, from the elements of every input."""
         values: dict[str, Any] = {}
         for signal, elements in zip(self.program.inputs, inputs, strict=True):
             values |= zip(signal.elements, elements, strict=True)
-        return list(self._run(values).values())[-1]
-
-    def _run(self, values: Mapping[str, Any]) -> dict[str, list[Any]]:
-        return self.program.run(values, self._constant, FUNCTIONS)
+        return self.program.run(values, self._constant, _FUNCTIONS)
 
     def _constant(self, value: Fraction) -> Any:
         if value not in self._constants:

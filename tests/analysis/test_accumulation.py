@@ -7,7 +7,7 @@ import pytest
 import sympy as sp
 
 from strapgen.analysis.accumulation import accumulate
-from strapgen.analysis.agreement import agreement, as_text
+from strapgen.analysis.agreement import SETTINGS, agreement, as_text
 from strapgen.analysis.error_rate import error_rate
 from strapgen.analysis.motion_rates import TIME
 from strapgen.analysis.series import STEP
@@ -16,12 +16,6 @@ from strapgen.exceptions import InputError
 from strapgen.motions import motion
 
 a, b, g = sp.symbols("a b g")
-PROFILES = {
-    "constant": {"x_rad_s": 0.5, "y_rad_s": 0.7, "z_rad_s": -0.3},
-    "sinusoidal": {"a_rad_s": 1, "b_rad_s": 1.5},
-    "coning": {"a_rad_s": 1, "b_rad_s": 1.5, "g_rad_s": 0.6},
-    "polynomial": {"a0": 30, "a1": 40, "a2": -20, "a3": 10, "a4": 5},
-}
 
 
 @pytest.mark.parametrize(
@@ -31,7 +25,7 @@ PROFILES = {
 @pytest.mark.parametrize("name", MOTIONS)
 def test_prediction_leaves_the_next_order(name, algorithm, method):
     """In 40 digits, as the step is halved: two powers of the error rate leave the third, or better."""
-    found = agreement(choose(algorithm, method, 2), motion(name, **PROFILES[name]), ["1/16", "1/32"], 0.5)
+    found = agreement(choose(algorithm, method, 2), motion(name, **SETTINGS[name]), ["1/16", "1/32"], 0.5)
     assert found.slopes[-1] > found.order + found.terms - 0.15
     assert found.rungs[-1].difference < 0.02 * found.rungs[-1].drift
     assert "slope" in as_text(found)
@@ -41,7 +35,7 @@ def test_prediction_leaves_the_next_order(name, algorithm, method):
 @pytest.mark.parametrize("method", ["butcher5", "magnus4", "munthe-kaas4", "taylor6", "three-eighths"])
 @pytest.mark.parametrize("name", ["coning", "sinusoidal"])
 def test_prediction_leaves_the_next_order_for_other_methods(name, method):
-    found = agreement(choose("euler", method, 3), motion(name, **PROFILES[name]), ["1/16", "1/32"], 0.5)
+    found = agreement(choose("euler", method, 3), motion(name, **SETTINGS[name]), ["1/16", "1/32"], 0.5)
     if found.order is None:
         assert found.rungs[-1].drift < 1e-30
     else:

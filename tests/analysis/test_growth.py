@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from strapgen.analysis.constant_rate import constant_rate
 from strapgen.analysis.growth import as_text, contraction, growth, stability
+from strapgen.analysis.motion_rates import TIME, model, parameters
 from strapgen.backends import backend
 from strapgen.catalogue import ALGORITHMS, choose, choose_step
 from strapgen.exceptions import InputError
@@ -47,8 +48,6 @@ def test_growth_on_a_motion_is_that_of_the_general_rate(name):
     """The invariants, with the derivatives of the motion's rate put in."""
     general = growth(choose("dcm", "rk2", 2), "general", 1)
     special = growth(choose("dcm", "rk2", 2), name, 1)
-    from strapgen.analysis.motion_rates import TIME, model, parameters
-
     rate = model(name).rate(TIME, *parameters(name))
     values = {}
     for j in range(3):

@@ -15,7 +15,7 @@ import sympy as sp
 from strapgen import algebra, catalogue, checks
 from strapgen.analysis import one_step
 from strapgen.analysis.error_rate import ErrorRate, error_rate
-from strapgen.analysis.motion_rates import TIME
+from strapgen.analysis.motion_rates import TIME, is_plain
 from strapgen.analysis.powers import Powers
 from strapgen.analysis.series import MOST_TERMS, STEP
 from strapgen.catalogue import Choice
@@ -154,10 +154,8 @@ def _swing(drift: sp.Matrix, axis: sp.Matrix) -> sp.Matrix:
 
 
 def _short(expression: sp.Expr) -> sp.Expr:
-    """Return an expression in lowest terms and factors; over a field of roots, where that takes long, as it is."""
-    if any(root.is_number and not root.is_Rational for root in expression.atoms(sp.Pow)):
-        return expression
-    return sp.factor(sp.cancel(expression))
+    """Return an expression in lowest terms and factors, where its numbers are short fractions."""
+    return sp.factor(sp.cancel(expression)) if is_plain(expression) else expression
 
 
 def _eigenvalue(found: ErrorRate, top: int) -> dict[int, tuple[sp.Expr, sp.Expr]]:
@@ -182,14 +180,13 @@ def _eigenvalue(found: ErrorRate, top: int) -> dict[int, tuple[sp.Expr, sp.Expr]
 
     m = [[lifted(element) for element in row] for row in found.raw]
     trace = m[0][0] + m[1][1] + m[2][2]
-    zero = Powers(extended, {}, top)
-    minors = sum((m[i][i] * m[j][j] - m[i][j] * m[j][i] for i, j in ((0, 1), (0, 2), (1, 2))), zero)
-    determinant = sum(
-        (m[0][i] * (m[1][j] * m[2][k] - m[1][k] * m[2][j]) for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1))),
-        zero,
+    minors = sum(
+        (m[i][i] * m[j][j] - m[i][j] * m[j][i] for i, j in ((0, 1), (0, 2), (1, 2))),
+        Powers(extended, {}, top),
     )
+    determinant = algebra.dot(m[0], algebra.cross_elements(m[1], m[2]))
     axis = [extended.from_expr(sp.expand(x)) for x in found.axis]
-    square = sum((x * x for x in axis), extended.zero)
+    square = algebra.dot(axis, axis)
     value = Powers(extended, {0: y}, top)
     known = 1 / (2 * square.as_expr())
     shifts: dict[int, tuple[sp.Expr, sp.Expr]] = {}

@@ -15,7 +15,7 @@ from strapgen import catalogue, checks, exact
 from strapgen.analysis.error_rate import error_rate
 from strapgen.analysis.prediction import Prediction, parts_of, predict
 from strapgen.catalogue import Choice
-from strapgen.convergence import exact_attitudes, step_of_increments
+from strapgen.convergence import GENERAL, exact_attitudes, step_of_increments
 from strapgen.exceptions import InputError
 from strapgen.motions import Motion
 
@@ -163,6 +163,15 @@ def as_text(found: Agreement) -> str:
             f"{rung.step_s:>12.6g}  {rung.drift:>12.4e}  {rung.difference:>12.4e}  {relative:>9}  {slope}".rstrip()
         )
     return "\n".join(lines)
+
+
+#: Parameters of the motions where none are named, of about 1 rad/s.
+SETTINGS: dict[str, dict[str, str]] = {
+    "constant": {"x_rad_s": "0.5", "y_rad_s": "0.7", "z_rad_s": "-0.3"},
+    "sinusoidal": {"a_rad_s": "1", "b_rad_s": "1.5"},
+    "coning": GENERAL,
+    "polynomial": {"a0": "30", "a1": "40", "a2": "-20", "a3": "10", "a4": "5"},
+}
 
 
 def default_steps(choice: Choice) -> tuple[str, ...]:

@@ -17,12 +17,13 @@ import sympy as sp
 
 from strapgen import algebra
 from strapgen.analysis import motion_rates, one_step
+from strapgen.analysis.invariants import invariants
 from strapgen.analysis.motion_rates import TIME
 from strapgen.analysis.one_step import Step
 from strapgen.analysis.powers import Powers
 from strapgen.catalogue import Choice, user
 from strapgen.exceptions import InputError
-from strapgen.lowering.canonical.decomposition import Frame, NotCovariantError
+from strapgen.lowering.canonical.decomposition import NotCovariantError
 
 _Matrix = list[list[Powers]]
 
@@ -96,7 +97,7 @@ def error_rate(choice: Choice, motion: str, terms: int = 2) -> ErrorRate:
         if choice.name in user.KERNELS:
             _require_covariance(taken)
         top = 1 + (order.step if order else 1) + terms
-        most = top + _PATIENCE
+        most = top + one_step.PATIENCE
         while True:
             found = _rate(taken, motion, top)
             if found.order is not None and found.order + terms <= top:
@@ -115,10 +116,6 @@ def error_rate(choice: Choice, motion: str, terms: int = 2) -> ErrorRate:
     last = found.order + terms
     kept = {power: matrix for power, matrix in found.matrices.items() if power < last}
     return ErrorRate(found.kernel, motion, found.axis, found.steady, kept, found.ring, found.raw)
-
-
-#: Powers beyond the order that are looked at where an error rate does not begin.
-_PATIENCE = 4
 
 
 def _rate(taken: Step, motion: str, top: int) -> ErrorRate:
@@ -188,19 +185,17 @@ def _about_an_axis(taken: Step, motion: str, top: int) -> ErrorRate:
 
 
 def _bernoulli(number: int) -> sp.Expr:
+    """Return a Bernoulli number; the first one is -1/2, for a sum that begins with its first term."""
     return -sp.Rational(1, 2) if number == 1 else sp.bernoulli(number)
 
 
 def _require_covariance(taken: Step) -> None:
     """Refuse a user's step that does not turn with its inputs, as far as its first powers show."""
     count = 2 + (taken.kernel.order.step if taken.kernel.order else 1)
-    frame = Frame(count)
-    ring = frame.ring.clone(domain=taken.domain)
-    if taken.domain != sp.QQ:
-        return
-    made = one_step.computed_matrix(taken, ring, frame.vectors, count)
+    frame, ring, rate = one_step.general_rate(taken, count)
+    made = one_step.computed_matrix(taken, ring, rate, count)
     for power in range(1, count + 1):
-        frame.matrix([element.parts.get(power, ring.zero) for element in made])
+        invariants(frame, [element.parts.get(power, ring.zero) for element in made])
 
 
 def _square(elements: Sequence[Powers]) -> _Matrix:

@@ -11,19 +11,15 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from strapgen import checks
+from strapgen.algebra import cross_elements, dot
 from strapgen.analysis import motion_rates, one_step
 from strapgen.analysis.constant_rate import ANGLE, ConstantRate, constant_rate
 from strapgen.analysis.invariants import scalar, scalar_as_text, scalar_value
 from strapgen.analysis.one_step import Step
-from strapgen.analysis.powers import Powers
 from strapgen.analysis.series import MOST_TERMS, MOTIONS, STEP
 from strapgen.catalogue import Choice
 from strapgen.exceptions import InputError
-from strapgen.lowering.canonical.decomposition import Frame
 from strapgen.lowering.polynomials import Polynomial
-
-#: Powers beyond the order that are looked at where a growth does not begin.
-_PATIENCE = 4
 
 #: Decimal digits of an irrational coefficient.
 _DIGITS = 60
@@ -97,7 +93,7 @@ def growth(choice: Choice, motion: str = "constant", terms: int = 2) -> Growth:
     taken = one_step.step(choice)
     order = taken.kernel.order
     top = 2 + (order.step if order else 1) + terms
-    most = top + _PATIENCE
+    most = top + one_step.PATIENCE
     try:
         while True:
             found = _growth(taken, motion, terms, top)
@@ -112,23 +108,16 @@ def growth(choice: Choice, motion: str = "constant", terms: int = 2) -> Growth:
 def _growth(taken: Step, motion: str, terms: int, top: int) -> Growth:
     frame = None
     if motion == "general":
-        frame = Frame(top)
-        ring = frame.ring.clone(domain=taken.domain)
-        rate = [[element.set_ring(ring) for element in vector] for vector in frame.vectors]
+        frame, ring, rate = one_step.general_rate(taken, top)
     else:
         made = motion_rates.at_time(motion, top, taken.domain)
         ring, rate = made.ring, made.derivatives
     matrix = one_step.computed_matrix(taken, ring, rate, top)
-    a, b, c = matrix[:3], matrix[3:6], matrix[6:]
-    determinant = sum(
-        (a[i] * (b[j] * c[k] - b[k] * c[j]) for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1))),
-        Powers(ring, {}, top),
-    )
-    sizes = {"determinant": determinant}
+    sizes = {"determinant": dot(matrix[:3], cross_elements(matrix[3:6], matrix[6:]))}
     state = taken.kernel.inputs[0]
     if state.shape == (4,):
         elements = one_step.computed_state(taken, ring, rate, top)
-        sizes["length"] = sum((x * x for x in elements), Powers(ring, {}, top)).root()
+        sizes["length"] = dot(elements, elements).root()
     found: dict[str, dict[int, sp.Expr]] = {}
     invariant: dict[str, dict[int, Polynomial]] = {}
     for name, size in sizes.items():

@@ -18,10 +18,14 @@ from strapgen.catalogue import Choice
 from strapgen.catalogue.coefficients import Number
 from strapgen.exceptions import InputError, InputTypeError
 from strapgen.kernel import Kernel, evaluate_stages
+from strapgen.lowering.canonical.decomposition import Frame
 
 #: Of a method whose coefficients are published with 17 digits or so: digits of its error, and what may be zero.
 _DIGITS = 12
 _LEAST = Fraction(1, 10**14)
+
+#: Powers beyond the order that are looked at where a series does not begin.
+PATIENCE = 4
 
 #: A vector of polynomials for every derivative of the rate.
 Rate = Sequence[Sequence[Any]]
@@ -98,6 +102,20 @@ def linear_step(choice: Choice) -> Step:
             f"kernel {taken.kernel.name} is not linear in its state: what it loses in a run depends on the attitude"
         )
     return taken
+
+
+def general_rate(taken: Step, count: int) -> tuple[Frame, Any, list[list[Any]]]:
+    """Return what a general rate is given in: a rotated frame, a ring over the step's field, the rate's derivatives.
+
+    Parameters
+    ----------
+    taken : Step
+    count : int
+        How many derivatives, with the rate itself.
+    """
+    frame = Frame(count)
+    ring = frame.ring.clone(domain=taken.domain)
+    return frame, ring, [[element.set_ring(ring) for element in vector] for vector in frame.vectors]
 
 
 def errors(taken: Step, ring: Any, rate: Rate, top: int) -> dict[str, list[Powers]]:

@@ -182,13 +182,10 @@ def parts_of() -> Callable[[Sequence[Any], Sequence[Any]], tuple[list[Any], list
 
     ``split(computed, true)``, both row by row: the outputs of the kernel error-matrix, in many digits.
     """
-    program = interpreter("error-matrix").program
+    kernel = interpreter("error-matrix")
 
     def split(computed: Sequence[Any], true: Sequence[Any]) -> tuple[list[Any], list[Any], list[Any]]:
-        values: dict[str, Any] = {}
-        for signal, elements in zip(program.inputs, (computed, true), strict=True):
-            values |= zip(signal.elements, elements, strict=True)
-        made = program.run(values, exact.number, exact.FUNCTIONS)
+        made = kernel.outputs(computed, true)
         return made["scale"], made["skew"], made["drift"]
 
     return split
@@ -239,7 +236,9 @@ def _orthonormalization(choice: Choice) -> Callable[[Matrix], Matrix]:
     """Return what restores a computed matrix: the scheme of the algorithm, or the normalization of its parameters."""
     companions = catalogue.derive(choice).companions
     assert companions is not None, "checked by error_rate"
-    if companions.attitude is not None or companions.orthonormalize is None:
+    if companions.orthonormalize is None:
+        return lambda computed: computed
+    if companions.attitude is not None:
         # The matrix of parameters whose length is off is a rotation times a factor.
         return lambda computed: computed / mpmath.cbrt(mpmath.det(computed))
     scheme = interpreter(companions.orthonormalize)

@@ -215,7 +215,10 @@ def as_latex(found: Report) -> str:
         else:
             rows.append((symbol, sp.latex(sp.Add(*(x * STEP**p for p, x in terms.items())))))
     body = " \\\\\n".join(f"  {left} &= {right}" for left, right in rows)
-    head = f"% {step.kernel}, {step.motion} motion: what one step of length h loses"
+    head = (
+        f"% {step.kernel}, {step.motion} motion: what one step of length h loses\n"
+        "% d: drift; Y: scale and skew, S(a, b) = a b' + b a'; delta: angle lost, rho: stretch, x = |w| h"
+    )
     return f"{head}\n\\begin{{align*}}\n{body}\n\\end{{align*}}"
 
 

@@ -19,7 +19,6 @@ from strapgen.analysis.one_step import Step, errors
 from strapgen.analysis.powers import Powers
 from strapgen.catalogue import Choice
 from strapgen.exceptions import InputError
-from strapgen.lowering.canonical.decomposition import Frame
 
 #: Motions that a series is made for.
 MOTIONS = ("general", *catalogue.MOTIONS)
@@ -29,9 +28,6 @@ MOST_TERMS = 6
 STEP = sp.Symbol("h")
 #: Parts of an error matrix.
 PARTS = ("drift", "scale", "skew")
-#: Powers beyond the order that are looked at where a series does not begin.
-_PATIENCE = 4
-
 #: Coefficients of a vector or of three numbers, by power of the step.
 Coefficients = dict[int, tuple[sp.Expr, sp.Expr, sp.Expr]]
 
@@ -127,7 +123,7 @@ def series(choice: Choice, motion: str = "general", terms: int = 2) -> ErrorSeri
     order = taken.kernel.order
     # At a constant rate every other power is missing.
     top = 1 + (order.step if order else 0) + terms * (2 if motion == "constant" else 1)
-    most = top + _PATIENCE
+    most = top + one_step.PATIENCE
     try:
         while True:
             found = _general(taken, terms, top) if motion == "general" else _named(taken, motion, terms, top)
@@ -142,9 +138,7 @@ def series(choice: Choice, motion: str = "general", terms: int = 2) -> ErrorSeri
 
 def _general(taken: Step, terms: int, top: int) -> ErrorSeries:
     """Derive the series for a general rate, in the rotated frame of its vectors."""
-    frame = Frame(top)
-    ring = frame.ring.clone(domain=taken.domain)
-    rate = [[element.set_ring(ring) for element in vector] for vector in frame.vectors]
+    frame, ring, rate = one_step.general_rate(taken, top)
     made = errors(taken, ring, rate, top)
     powers = {part: _powers(made[part])[:terms] for part in PARTS}
     # Scale and skew are parts of one matrix: each axis looks different in the frame, so all their powers are kept.

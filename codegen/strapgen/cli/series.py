@@ -207,15 +207,6 @@ def _versus(first: Choice, second: Choice, motion: str, count: int | None, forma
     return ratios.as_latex(found) if format == "latex" else ratios.as_text(found), found.as_dict()
 
 
-#: Parameters of the motions where a plot is asked for without any.
-_DEFAULTS = {
-    "constant": {"x_rad_s": "0.5", "y_rad_s": "0.7", "z_rad_s": "-0.3"},
-    "sinusoidal": {"a_rad_s": "1", "b_rad_s": "1.5"},
-    "coning": {"a_rad_s": "1", "b_rad_s": "1.5", "g_rad_s": "0.6"},
-    "polynomial": {"a0": "30", "a1": "40", "a2": "-20", "a3": "10", "a4": "5"},
-}
-
-
 def _plotted(
     choice: Choice,
     motion: str,
@@ -229,7 +220,8 @@ def _plotted(
     from strapgen.analysis import agreement
     from strapgen.motions import motion as make_motion
 
-    given = pairs(settings) if settings else _DEFAULTS[checks.choice("motion", motion, MOTIONS)]
+    checks.choice("motion", motion, MOTIONS)
+    given = pairs(settings) if settings else agreement.SETTINGS[motion]
     ladder = agreement.default_steps(choice)
     if steps is not None:
         ladder = tuple(step.strip() for step in steps.split(",") if step.strip())
