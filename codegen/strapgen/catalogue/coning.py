@@ -117,7 +117,7 @@ class Residual:
         """The drift in rad/s as SymPy reads it, in alpha (rad), omega (rad/s) and T (s)."""
         terms = [f"{_signed(c)}*sin({m}*omega*T)" for m, c in self.sines.items()]
         inner = " ".join([f"-{Fraction(self.samples, 2)}*omega*T", *terms])
-        return f"alpha**2/({self.samples}*T)*({inner})".replace("(1*", "(")
+        return f"alpha**2/({self.samples}*T)*({inner})".replace("(1*", "(").replace("(T)", "T")
 
     @property
     def leading_expression(self) -> str:

@@ -197,6 +197,28 @@ def _with_terms(build: KernelBuilder, samples: Samples, pairs: Scalars) -> sp.Ma
     return build.stage(PHI, phi)
 
 
+def sample_terms(
+    increments: int, previous: int = 0
+) -> tuple[dict[int, Scalars], dict[tuple[int, int], Scalars]]:
+    """Return the terms of third and fourth order of the polynomial through samples, in these.
+
+    Parameters
+    ----------
+    increments, previous : int
+
+    Returns
+    -------
+    third, fourth : dict
+        See `rotation_series.third` and `rotation_series.fourth`; vectors are numbered from the oldest sample, 0.
+    """
+    fit = rates.from_increments(increments, previous)
+    count = increments + previous
+    table = [{k: fraction(w) for k, w in enumerate(fit.taylor(power))} for power in range(count)]
+    terms = rotation_series.terms(count, 4)
+    third, fourth = (rotation_series.substituted(words, table) for words in terms[2:])
+    return rotation_series.third(third), rotation_series.fourth(fourth)
+
+
 def in_legendre(pairs: Scalars, increments: int, previous: int) -> Scalars:
     """Return coefficients of cross products of samples as those of cross products of the rate's Legendre coefficients.
 
