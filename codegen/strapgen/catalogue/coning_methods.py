@@ -243,8 +243,7 @@ def in_legendre(pairs: Scalars, increments: int, previous: int) -> Scalars:
         for sample in range(count)
     ]  # every sample in the coefficients
     words: Words = {pair: c for pair, c in pairs.items()}
-    found = rotation_series.pairs(rotation_series.substituted(words, table))
-    return {key: c for key, c in found.items() if c}
+    return rotation_series.pairs(rotation_series.substituted(words, table))
 
 
 def _combined(weights: dict[int, Fraction], vectors: list[sp.Matrix]) -> sp.Matrix:

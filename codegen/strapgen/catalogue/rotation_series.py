@@ -121,7 +121,7 @@ def pairs(words: Words) -> Scalars:
     for (i, j), c in words.items():
         if i != j:
             _add(found, {(min(i, j), max(i, j)): c if i < j else -c})
-    return {(i, j): c for (i, j), c in sorted(found.items())}
+    return {(i, j): c for (i, j), c in sorted(found.items()) if c}
 
 
 def third(words: Words) -> dict[int, Scalars]:
@@ -168,7 +168,7 @@ def fraction(number: sp.Expr) -> Fraction:
 def _product(word: Word, other: Word) -> Words:
     """Return the cross product of two words: (a x p) x q = a x (p x q) - p x (a x q), a one vector."""
     if len(word) == 1:
-        return {word + other: Fraction(1)}
+        return {} if word == other else {word + other: Fraction(1)}
     head, rest = word[:1], word[1:]
     found: Words = {head + inner: c for inner, c in _product(rest, other).items()}
     _add(found, _product(rest, head + other), Fraction(-1))
