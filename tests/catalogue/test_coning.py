@@ -289,6 +289,16 @@ def test_sculling_is_the_dual_of_coning(form, count, previous):
     assert [ring(x) for x in found] == [ring(x.coeff(e)) for x in total]
 
 
+@pytest.mark.parametrize(("count", "previous"), [(1, 0), (3, 0), (2, 2)])
+@FORM
+def test_at_a_constant_rate_the_rotation_vector_is_the_sum_of_the_increments(form, count, previous):
+    kernel = derive("rotation-vector", f"coning-{form}", count, previous=previous)
+    ring, *w = sp.ring("x y z", sp.QQ)
+    values = dict(zip(kernel.inputs[0].elements, w * (count + previous), strict=True))
+    (phi,) = kernel.expand(values).values()
+    assert [ring(x) for x in phi] == [count * x for x in w]
+
+
 def test_a_method_without_rotation_vector_is_refused():
     from strapgen.catalogue.runge_kutta import method
     from strapgen.catalogue.steps import rotation_vector

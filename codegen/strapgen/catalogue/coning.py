@@ -115,9 +115,12 @@ class Residual:
     @property
     def expression(self) -> str:
         """The drift in rad/s as SymPy reads it, in alpha (rad), omega (rad/s) and T (s)."""
-        terms = [f"{_signed(c)}*sin({m}*omega*T)" for m, c in self.sines.items()]
-        inner = " ".join([f"-{Fraction(self.samples, 2)}*omega*T", *terms])
-        return f"alpha**2/({self.samples}*T)*({inner})".replace("(1*", "(").replace("(T)", "T")
+        interval = _times(self.samples, "T")
+        terms = [f"-{_times(Fraction(self.samples, 2), 'omega*T')}"]
+        for m, c in self.sines.items():
+            sine = f"sin({_times(m, 'omega*T')})"
+            terms.append(f"{'+' if c > 0 else '-'} {_times(abs(c), sine)}")
+        return f"alpha**2/{interval if self.samples == 1 else f'({interval})'}*({' '.join(terms)})"
 
     @property
     def leading_expression(self) -> str:
@@ -126,8 +129,8 @@ class Residual:
         return f"{c / self.samples}*alpha**2*omega*(omega*T)**{power - 1}"
 
 
-def _signed(c: Fraction) -> str:
-    return f"{'+' if c > 0 else '-'} {abs(c)}"
+def _times(c: Fraction | int, factor: str) -> str:
+    return factor if c == 1 else f"{c}*{factor}"
 
 
 @cache
