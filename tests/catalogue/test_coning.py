@@ -181,6 +181,9 @@ def test_orders_of_the_forms():
     combined = coning_methods.method("combined")
     assert [combined.step_order(n, 0).step for n in range(1, 9)] == [2, 4, 4, *[6] * 5]
     assert [combined.step_order(1, p).step for p in range(4)] == [2, 3, 4, 5]
+    polynomial = coning_methods.method("polynomial")
+    for samples, previous in ALL:
+        assert polynomial.step_order(samples, previous) == combined.step_order(samples, previous)
 
 
 @pytest.mark.long
@@ -190,6 +193,7 @@ def test_orders_of_the_forms():
         *(("compressed", n, p) for n, p in FEW),
         *(("uncompressed", n, p) for n, p in FEW),
         *(("combined", n, p) for n, p in [*FEW, (1, 3), (6, 0), (7, 0)]),
+        *(("polynomial", n, p) for n, p in [(3, 0), (4, 0), (7, 0)]),
     ],
 )
 def test_the_local_error_is_one_order_above_the_stated_one(form, count, previous):
@@ -231,9 +235,13 @@ def test_a_kernel_is_its_design(form, count, previous):
     assert max(x.degree() for x in phi) == (4 if form == "combined" else 2)
 
 
-@pytest.mark.parametrize(("count", "previous"), [(2, 0), (4, 0), (2, 2)])
-def test_the_combined_kernel_keeps_the_terms_of_the_polynomial_through_the_samples(count, previous):
-    d, phi = scaled("combined", count, previous)
+@pytest.mark.parametrize(
+    ("method", "count", "previous"),
+    [("combined", 2, 0), ("combined", 4, 0), ("combined", 2, 2), ("polynomial", 3, 0), ("polynomial", 1, 2)]
+    + [pytest.param("polynomial", n, 0, marks=pytest.mark.long) for n in (5, 6)],
+)
+def test_terms_are_those_of_the_polynomial_through_the_samples(method, count, previous):
+    d, phi = scaled(method, count, previous)
     fit = strapgen.catalogue.rates.from_increments(count, previous)
     rate = [
         [
@@ -243,7 +251,7 @@ def test_the_combined_kernel_keeps_the_terms_of_the_polynomial_through_the_sampl
         for power in range(count + previous)
     ]
     for order, words in enumerate(series.terms(count + previous, 4), 1):
-        if order > 2:
+        if order > 2 or method == "polynomial":
             total = [Fraction(0)] * 3
             for word, c in words.items():
                 nested = rate[word[-1]]
@@ -312,6 +320,7 @@ KERNELS = [
     ("rotation-vector", "coning-compressed", 4, 0),
     ("rotation-vector", "coning-uncompressed", 2, 1),
     ("sculling", "coning-compressed", 3, 0),
+    pytest.param("rotation-vector", "coning-polynomial", 6, 0, marks=pytest.mark.long),
     ("rotation-vector", "coning-combined", 3, 0),
     pytest.param("rotation-vector", "coning-combined", 5, 0, marks=pytest.mark.long),
     pytest.param("sculling", "coning-combined", 3, 1, marks=pytest.mark.long),

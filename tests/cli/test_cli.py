@@ -247,6 +247,18 @@ def test_coning_terms(strapgen_says):
     assert data["fourth_order"] == {"d1 x d2": {"d1.d1": "-1/126", "d1.d2": "19/315", "d2.d2": "-1/126"}}
 
 
+def test_fixed_point_of_a_vector_of_a_step(strapgen_says, tmp_path):
+    limits = "--target c-fixed --max-rate-deg-s 400 --step 0.01"
+    said = strapgen_says(f"generate rotation-vector --method coning-compressed --increments 4 {limits}")
+    assert re.search(r"^  rotation_vector: Q\S+, error at most ", said, flags=re.MULTILINE)
+    header = (tmp_path / "rotation_vector_coning_compressed_4_q31.h").read_text()
+    assert "strapgen generate rotation-vector --method coning-compressed --increments 4" in header
+    said = strapgen_says(
+        f"generate sculling --method coning-compressed --increments 4 {limits} --range velocity_increments=0.5"
+    )
+    assert re.search(r"^  sculling: Q\S+, error at most ", said, flags=re.MULTILINE)
+
+
 def test_coefficients_of_eight_samples_are_quick(strapgen_says):
     coning.design.cache_clear()
     begin = time.process_time()

@@ -68,6 +68,13 @@ INTEGRATORS = {
         False,
         ("combined",),
     ),
+    "coning-polynomial": Integrator(
+        "uncompressed coning coefficients, with the terms of third and fourth order",
+        "coning_methods",
+        6,
+        False,
+        ("polynomial",),
+    ),
 }
 
 #: Integration methods.

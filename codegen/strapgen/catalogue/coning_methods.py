@@ -29,30 +29,38 @@ MOST_COEFFICIENTS = 6
 _SECOND, _FOURTH = 4, 6
 
 
-def method(form: str) -> Method:
-    """Return the step by coning coefficients of a form.
+#: Methods by the end of their name: the form of the coefficients, and whether the terms of third and fourth order,
+#: those of the polynomial through the samples, are kept.
+_METHODS = {
+    "compressed": ("compressed", False),
+    "uncompressed": ("uncompressed", False),
+    "combined": ("combined", True),
+    "polynomial": ("uncompressed", True),
+}
 
-    The combined form keeps the terms of third and fourth order too, those of the polynomial through the samples.
+
+def method(name: str) -> Method:
+    """Return a step by coning coefficients.
 
     Parameters
     ----------
-    form : str
-        A form of `coning.design`.
+    name : str
+        "compressed", "uncompressed", "combined", which keeps the terms of third and fourth order too, or "polynomial":
+        uncompressed with these terms.
     """
-    combined = form == "combined"
-    terms = ", terms to fourth order" if combined else ""
-    order = _FOURTH if combined else _SECOND
+    form, terms = _METHODS[name]
+    order = _FOURTH if terms else _SECOND
 
     def limit(increments: int, previous: int) -> int:
-        # What is integrated to a total degree leaves an error of the local order three above it.
+        # The first product that is not integrated exactly is of the local order three above the total degree.
         return min(order, coning.design(increments, previous, form).degree + 2)
 
     return exponential(
-        f"coning-{form}",
-        f"{form} coning coefficients{terms}",
-        f"{coning.SOURCES[form]}; {rotation_series.SOURCE}" if combined else coning.SOURCES[form],
+        f"coning-{name}",
+        f"{form} coning coefficients{', terms to fourth order' if terms else ''}",
+        f"{coning.SOURCES[form]}; {rotation_series.SOURCE}" if terms else coning.SOURCES[form],
         order,
-        lambda build, samples: _rotation_vector(build, samples, form),
+        lambda build, samples: (_with_terms if terms else _of_pairs)(build, samples, form),
         limit=limit,
     )
 
@@ -75,7 +83,7 @@ def sculling(method: Method, increments: int, previous: int = 0) -> Kernel:
         Inputs ``increments`` in rad and ``velocity_increments`` in m/s, both (previous + increments, 3); output
         ``sculling`` (3,) in m/s.
     """
-    form = method.name.removeprefix("coning-")
+    form = _METHODS[method.name.removeprefix("coning-")][0]
     build = KernelBuilder()
     angles = increments_signal(increments, previous)
     names = sample_names(increments, previous, "v")
@@ -120,12 +128,11 @@ def sculling(method: Method, increments: int, previous: int = 0) -> Kernel:
     )
 
 
-def _rotation_vector(build: KernelBuilder, samples: Samples, form: str) -> sp.Matrix:
+def _of_pairs(build: KernelBuilder, samples: Samples, form: str) -> sp.Matrix:
+    """Write the rotation vector in the increments themselves: their sum and their cross products."""
     increments = samples.increments
     assert increments is not None, "rates are refused before"
     pairs = coning.design(increments, samples.previous, form).pairs
-    if form == "combined":
-        return _with_terms(build, samples, pairs)
     names = sample_names(increments, samples.previous)
     total = samples.combination("increment_sum", samples.fit.moment(0), "integral of the rate over the step")
     if not any(pairs.values()):
@@ -144,8 +151,10 @@ def _rotation_vector(build: KernelBuilder, samples: Samples, form: str) -> sp.Ma
     return build.stage(PHI, total + second)
 
 
-def _with_terms(build: KernelBuilder, samples: Samples, pairs: Scalars) -> sp.Matrix:
-    """Write the rotation vector in the Legendre coefficients of the rate, where most coefficients of terms vanish."""
+def _with_terms(build: KernelBuilder, samples: Samples, form: str) -> sp.Matrix:
+    """Write the rotation vector in the Legendre coefficients of the rate, where half of the coefficients vanish."""
+    assert samples.increments is not None, "rates are refused before"
+    pairs = coning.design(samples.increments, samples.previous, form).pairs
     count = len(samples.fit.basis)
     vectors = [
         samples.combination(
@@ -155,7 +164,6 @@ def _with_terms(build: KernelBuilder, samples: Samples, pairs: Scalars) -> sp.Ma
         )
         for m in range(count)
     ]
-    assert samples.increments is not None
     second = in_legendre(pairs, samples.increments, samples.previous)
     series = rotation_series.legendre_terms(min(count, MOST_COEFFICIENTS), 4)
     third, fourth = rotation_series.third(series[2]), rotation_series.fourth(series[3])

@@ -126,6 +126,8 @@ def _text(design: Design, data: dict[str, Any]) -> str:
     ]
     if design.form == "combined":
         lines.append("terms of third and fourth order: kept by the kernels of this form; --terms lists them")
+    if design.form == "uncompressed":
+        lines.append("terms of third and fourth order: kept by method coning-polynomial; --terms lists them")
     for kind in ("third", "fourth"):
         rows = data.get(f"{kind}_order", {})
         if rows:
