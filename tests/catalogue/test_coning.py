@@ -443,6 +443,15 @@ def test_a_cone_of_one_degree():
     assert largest("combined", 5) < 0.01
 
 
+@pytest.mark.parametrize("samples", [4, pytest.param(5, marks=pytest.mark.long)])
+def test_with_the_terms_a_cone_of_one_degree_leaves_the_residual(samples):
+    # Without them, what is of fourth order in the cone outweighs it, or is as large.
+    residual = stated("combined", samples, 0, sp.pi / 180, 20 * sp.pi, sp.Rational(1, 100))
+    wanted = abs(float(residual)) * math.degrees(1) * 3600
+    assert largest("combined", samples) == pytest.approx(wanted, rel=0.01)
+    assert largest("compressed", samples) > 1.5 * wanted
+
+
 @pytest.mark.long
 def test_six_samples_leave_less():
     assert largest("combined", 6) < 0.001

@@ -86,11 +86,11 @@ def sculling(method: Method, increments: int, previous: int = 0) -> Kernel:
     form = _METHODS[method.name.removeprefix("coning-")][0]
     build = KernelBuilder()
     angles = increments_signal(increments, previous)
-    names = sample_names(increments, previous, "v")
+    names = [sample_names(increments, previous, letter) for letter in "dv"]
     velocities = Signal(
         "velocity_increments",
         angles.shape,
-        tuple(f"{name}_{axis}" for name in names for axis in "xyz"),
+        tuple(f"{name}_{axis}" for name in names[1] for axis in "xyz"),
         unit="m/s",
         meaning="velocity increments of the step, body axes, oldest first: exact integrals of the specific force"
         + kept(previous),
@@ -104,11 +104,12 @@ def sculling(method: Method, increments: int, previous: int = 0) -> Kernel:
             weights = {older: c for (older, other), c in pairs.items() if other == newer and c}
             if not weights:
                 continue
+            name = f"{what}_lever_{names[crossed][newer]}"
             signal = Signal.vector(
-                f"{what}_lever_{newer}",
-                f"{what}_lever_{newer}",
+                name,
+                name,
                 unit=(angles, velocities)[levered].unit,
-                meaning=f"sum of older {what} increments that is crossed with sample {newer}",
+                meaning=f"sum of older {what} increments that is crossed with {names[crossed][newer]}",
             )
             lever = build.stage(signal, _combined(weights, rows[levered]))
             total += cross(lever, rows[crossed][newer])
@@ -187,7 +188,7 @@ def _with_terms(build: KernelBuilder, samples: Samples, form: str) -> sp.Matrix:
         if value.is_Rational:
             phi += value * vectors[k]
         else:
-            phi += build.value(f"weight_{k}", value, f"of Legendre coefficient {k}") * vectors[k]
+            phi += build.value(f"weight_{k}", value, f"weight of Legendre coefficient {k}") * vectors[k]
     for k, m in sorted({*second, *fourth}):
         product = build.stage(
             Signal.vector(
@@ -201,7 +202,7 @@ def _with_terms(build: KernelBuilder, samples: Samples, form: str) -> sp.Matrix:
         if value.is_Rational:
             phi += value * product
         else:
-            phi += build.value(f"weight_{k}_{m}", value, f"of their cross product {k}, {m}") * product
+            phi += build.value(f"weight_{k}_{m}", value, "weight of that cross product") * product
     return build.stage(PHI, phi)
 
 
