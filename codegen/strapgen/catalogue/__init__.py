@@ -52,10 +52,10 @@ INTEGRATORS = {
     },
     "munthe-kaas4": Integrator("Runge-Kutta-Munthe-Kaas method of order 4", "munthe_kaas", 4),
     "coning-compressed": Integrator(
-        "compressed coning coefficients, exact for coning", "coning_methods", 4, False, ("compressed",)
+        "compressed coning coefficients, made for coning", "coning_methods", 4, False, ("compressed",)
     ),
     "coning-uncompressed": Integrator(
-        "uncompressed coning coefficients, exact for polynomial rates",
+        "uncompressed coning coefficients, made for polynomial rates",
         "coning_methods",
         4,
         False,

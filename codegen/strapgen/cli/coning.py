@@ -27,7 +27,7 @@ def coning(
         str,
         typer.Option(
             "--form",
-            help="compressed: exact for coning; uncompressed: for polynomial rates; combined: for both.",
+            help="compressed: made for coning; uncompressed: for polynomial rates; combined: for both.",
         ),
     ] = "compressed",
     terms: Annotated[
