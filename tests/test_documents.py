@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text()
 
 
-@pytest.mark.parametrize("page", ["python-api", "canonical-form", "fixed-point", "series"])
+@pytest.mark.parametrize("page", ["python-api", "canonical-form", "fixed-point", "series", "coning"])
 def test_page(page):
     result = doctest.testfile(str(ROOT / "docs" / f"{page}.md"), module_relative=False)
     assert result.attempted >= 10
@@ -43,6 +43,7 @@ def test_readme_shows_every_command():
         "compare",
         "converge",
         "check",
+        "coning",
         "study",
         "series",
         "stability",

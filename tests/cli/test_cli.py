@@ -17,13 +17,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import sympy
+import sympy as sp
 from tolerances import certified
 
 import strapgen
 from strapgen import catalogue, formulas, pipeline
 from strapgen.backends import BACKENDS, fitted
-from strapgen.catalogue import coefficients
+from strapgen.catalogue import coefficients, coning
 from strapgen.catalogue.tableaux import TABLEAUX
 from strapgen.cli import main
 from strapgen.motions import motion as make_motion
@@ -34,7 +34,7 @@ from strapgen.targets import FIXED, TARGETS
 pytestmark = pytest.mark.filterwarnings("error")
 
 COMMANDS = (
-    *("list", "tableau", "derive", "generate", "simulate", "compare", "converge", "check", "tables"),
+    *("list", "tableau", "coning", "derive", "generate", "simulate", "compare", "converge", "check", "tables"),
     *("study word-length", "series", "stability"),
 )
 DATA = Path(__file__).resolve().parents[1] / "data"
@@ -110,9 +110,10 @@ def test_version_names_all_that_shapes_the_output(strapgen_says):
 
 def test_list(strapgen_says):
     data = json.loads(strapgen_says("list --format json"))
-    assert list(data) == ["algorithms", "methods", "kernels", "motions", "targets", "backends"]
+    assert list(data) == ["algorithms", "methods", "vectors", "kernels", "motions", "targets", "backends"]
     assert list(data["algorithms"]) == ["dcm", "euler", "cayley-klein"]
     assert list(data["methods"].items()) == list(catalogue.METHODS.items())
+    assert data["vectors"].keys() == catalogue.VECTORS.keys()
     assert data["kernels"].keys() == catalogue.KERNELS.keys()
     assert list(data["motions"]) == ["constant", "sinusoidal", "coning", "polynomial"]
     assert list(data["targets"]) == list(TARGETS) == ["numpy", "c", "c-float", "c-fixed", "fixed-model"]
@@ -190,6 +191,70 @@ def test_tableau_of_a_file(strapgen_says, tmp_path):
         assert strapgen_says(f"tableau {name}").startswith(
             "ralston-s-third-order-method: Ralston's third-order method\n"
         )
+
+
+# coning
+
+
+@pytest.mark.parametrize(
+    ("options", "wanted"),
+    [
+        ("--samples 2", "2/3"),
+        ("--samples 3", "9/20 27/20"),
+        ("--samples 4 --form compressed", "18/35 92/105 214/105"),
+        ("--samples 1 --previous 1", "1/12"),
+        ("--samples 3 --form uncompressed", "57/80 33/80 57/80"),
+        ("--samples 3 --form combined", "27/40 9/20 27/40"),
+        ("--samples 1", ""),
+    ],
+)
+def test_coning_json(options, wanted, strapgen_says):
+    data = json.loads(strapgen_says(f"coning {options} --format json"))
+    assert data["coefficients"] == wanted.split()
+    residual, leading = (sp.sympify(data[key]) for key in ("residual", "leading"))
+    assert {symbol.name for symbol in residual.free_symbols} == {"alpha", "omega", "T"}
+    small = {"alpha": sp.Rational(1, 10), "omega": 1, "T": sp.Rational(1, 10**6)}
+    assert abs((residual / leading).subs(small).evalf(80, maxn=400) - 1) < 1e-9
+    assert len(data["pairs"]) == len(data["coefficients"])
+    assert not data["pairs"] or data["pairs"][-1][1] == f"d{options.split()[1]}"  # the newest sample
+
+
+def test_coning_text(strapgen_says):
+    said = strapgen_says("coning --samples 2 --previous 1 --form combined --terms")
+    for line in (
+        "combined coning coefficients, 2 samples and 1 before them",
+        "terms of fourth order: each vector",
+    ):
+        assert line in said
+    assert re.search(r"^  past1 x d1 +-?\d+/\d+ ", said, flags=re.MULTILINE)
+    assert "strapgen derive rotation-vector --method coning-combined --increments 2 --previous 1;" in said
+
+
+def test_coning_terms(strapgen_says):
+    data = json.loads(strapgen_says("coning --samples 2 --terms --format json"))
+    assert data["third_order"]["d1"] == {"d1.d2": "2/15", "d2.d2": "-2/15"}
+    assert data["fourth_order"] == {"d1 x d2": {"d1.d1": "-1/126", "d1.d2": "19/315", "d2.d2": "-1/126"}}
+
+
+def test_fixed_point_of_a_vector_of_a_step(strapgen_says, tmp_path):
+    limits = "--target c-fixed --max-rate-deg-s 400 --step 0.01"
+    said = strapgen_says(f"generate rotation-vector --method coning-compressed --increments 4 {limits}")
+    assert re.search(r"^  rotation_vector: Q\S+, error at most ", said, flags=re.MULTILINE)
+    header = (tmp_path / "rotation_vector_coning_compressed_4_q31.h").read_text()
+    assert "strapgen generate rotation-vector --method coning-compressed --increments 4" in header
+    said = strapgen_says(
+        f"generate sculling --method coning-compressed --increments 4 {limits} --range velocity_increments=0.5"
+    )
+    assert re.search(r"^  sculling: Q\S+, error at most ", said, flags=re.MULTILINE)
+
+
+def test_coefficients_of_eight_samples_are_quick(strapgen_says):
+    coning.design.cache_clear()
+    begin = time.process_time()
+    for form in coning.FORMS:
+        data = json.loads(strapgen_says(f"coning --samples 8 --form {form} --format json"))
+        assert len(data["coefficients"]) == (7 if form == "compressed" else 28)
+    assert time.process_time() - begin < 3
 
 
 # derive
@@ -844,10 +909,10 @@ def test_series_prints_what_was_agreed(strapgen_says):
     said = strapgen_says("series euler --method rk4 --increments 2 --motion constant --terms 2 --format json")
     data = json.loads(said)
     assert data["order"] == 4
-    h, x, y, z = sympy.symbols("h w_x w_y w_z")
+    h, x, y, z = sp.symbols("h w_x w_y w_z")
     square = x**2 + y**2 + z**2
     wanted = h**5 * y * square**2 / 1920 - h**7 * y * square**3 / 21504
-    assert sympy.expand(sympy.sympify(data["drift"][1]) - wanted) == 0
+    assert sp.expand(sp.sympify(data["drift"][1]) - wanted) == 0
     assert data["skew"] == ["0", "0", "0"]
     assert set(data) >= {"order", "drift", "scale", "skew", "run", "growth", "closed_form"}
 

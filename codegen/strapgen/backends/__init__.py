@@ -87,13 +87,13 @@ def _loaded(target: str) -> tuple[type[Evaluator], type[Backend]]:
     return getattr(module, entry.evaluator), getattr(module, entry.backend)
 
 
-def evaluator(kernel: str, backend: str = "numpy", settings: Settings | None = None) -> Evaluator:
-    """Return a kernel of the catalogue that takes no method as a callable.
+def evaluator(kernel: str | Choice, backend: str = "numpy", settings: Settings | None = None) -> Evaluator:
+    """Return a kernel of the catalogue as a callable.
 
     Parameters
     ----------
-    kernel : str
-        Name of the kernel, for instance "dcm-from-euler".
+    kernel : str or Choice
+        Name of a kernel that takes no method, for instance "dcm-from-euler"; or what `catalogue.choose` returned.
     backend : str, optional
         A key of `BACKENDS`.
     settings : Settings, optional
@@ -118,10 +118,12 @@ def evaluator(kernel: str, backend: str = "numpy", settings: Settings | None = N
            [ 0.,  0.,  1.]])
     """
     checks.choice("backend", backend, BACKENDS)
-    if kernel not in catalogue.user.KERNELS:
-        checks.choice("kernel", kernel, catalogue.KERNELS)
+    if not isinstance(kernel, Choice):
+        if kernel not in catalogue.user.KERNELS:
+            checks.choice("kernel", kernel, catalogue.KERNELS)
+        kernel = catalogue.choose(kernel)
     chosen = fitted(backend, settings)
-    return _evaluator(library.sources(catalogue.choose(kernel), BACKENDS[backend].target, chosen))
+    return _evaluator(library.sources(kernel, BACKENDS[backend].target, chosen))
 
 
 def backend(

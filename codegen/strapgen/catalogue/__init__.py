@@ -29,12 +29,13 @@ ALGORITHMS = {
 
 
 class Integrator(NamedTuple):
-    """A method without tableau: a module of this package whose ``method(order)`` makes it."""
+    """A method without tableau: a module of this package whose ``method`` makes it of its arguments, or its order."""
 
     title: str
     module: str
     order: int
     takes_rates: bool = True
+    arguments: tuple[str, ...] = ()
 
 
 #: Integration methods that have no tableau.
@@ -50,6 +51,30 @@ INTEGRATORS = {
         for order in (2, 4, 6)
     },
     "munthe-kaas4": Integrator("Runge-Kutta-Munthe-Kaas method of order 4", "munthe_kaas", 4),
+    "coning-compressed": Integrator(
+        "compressed coning coefficients, made for coning", "coning_methods", 4, False, ("compressed",)
+    ),
+    "coning-uncompressed": Integrator(
+        "uncompressed coning coefficients, made for polynomial rates",
+        "coning_methods",
+        4,
+        False,
+        ("uncompressed",),
+    ),
+    "coning-combined": Integrator(
+        "coning coefficients for both, with the terms of third and fourth order",
+        "coning_methods",
+        6,
+        False,
+        ("combined",),
+    ),
+    "coning-polynomial": Integrator(
+        "uncompressed coning coefficients, with the terms of third and fourth order",
+        "coning_methods",
+        6,
+        False,
+        ("polynomial",),
+    ),
 }
 
 #: Integration methods.
@@ -124,8 +149,46 @@ KERNELS = {
 }
 
 
+class StepVector(NamedTuple):
+    """A vector of one step, by a method: a module of this package, a function, modules of methods that go with it."""
+
+    title: str
+    module: str
+    function: str
+    families: tuple[str, ...]
+    default: str
+
+    @property
+    def methods(self) -> list[str]:
+        """Names of the methods that go with it."""
+        return [name for name, integrator in INTEGRATORS.items() if integrator.module in self.families]
+
+
+#: Vectors of a step that are derived by a method.
+VECTORS = {
+    "rotation-vector": StepVector(
+        "rotation vector of a step",
+        "steps",
+        "rotation_vector",
+        ("magnus", "munthe_kaas", "coning_methods"),
+        "coning-combined",
+    ),
+    "sculling": StepVector(
+        "sculling term of a step, by duality with coning",
+        "coning_methods",
+        "sculling",
+        ("coning_methods",),
+        "coning-combined",
+    ),
+}
+
+
+#: Names that no algorithm of a user may have.
+RESERVED = (*ALGORITHMS, *VECTORS, *KERNELS)
+
+
 class Choice(NamedTuple):
-    """A kernel of the catalogue: its name, and method and samples where it is an attitude step.
+    """A kernel of the catalogue: its name, and method and samples where it is an attitude step or a vector of one.
 
     A step without increments is given the body rate at every node of its method; `previous` counts increments before
     the step that it takes too.
@@ -201,10 +264,10 @@ def choose(
             if value:
                 raise InputError(f"kernel {name} is loaded with its options; it takes no {option}")
         return Choice(name)
-    if name.endswith(".py") or (name not in ALGORITHMS and name not in KERNELS and name in user.installed()):
+    if name.endswith(".py") or (name not in RESERVED and name in user.installed()):
         return _choose_own(name, method, increments, rates, previous)
-    if name not in ALGORITHMS and name not in KERNELS:
-        raise InputError(f"algorithm {name!r} is not known; allowed: {_allowed(*KERNELS)}")
+    if name not in RESERVED:
+        raise InputError(f"algorithm {name!r} is not known; allowed: {_allowed(*VECTORS, *KERNELS)}")
     if name in KERNELS:
         given = {
             "method": method.name if isinstance(method, Tableau) else method,
@@ -214,9 +277,16 @@ def choose(
         }
         for option, value in given.items():
             if value is not None:
-                takers = ", ".join(ALGORITHMS)
+                takers = ", ".join([*ALGORITHMS, *VECTORS])
                 raise InputError(f"kernel {name} takes no {option} (got {value}); these do: {takers}")
         return Choice(name)
+    if name in VECTORS:
+        if isinstance(method, Tableau):
+            raise InputError(
+                f"{name} goes with no tableau; allowed methods: {', '.join(VECTORS[name].methods)}"
+            )
+        method = VECTORS[name].default if method is None else method
+        checks.choice(f"method of {name}", method, VECTORS[name].methods)
     if not isinstance(method, Tableau):
         method = checks.choice("method", "rk4" if method is None else method, METHODS)
     previous = checks.count("previous", previous, smallest=0, largest=MOST_PREVIOUS)
@@ -244,11 +314,7 @@ def _choose_own(
         options["increments"] = checks.count("increments", increments, largest=MOST_INCREMENTS)
     if previous:
         options["previous"] = checks.count("previous", previous, smallest=0, largest=MOST_PREVIOUS)
-    return Choice(
-        user.load(
-            name, frozenset([*ALGORITHMS, *KERNELS]), lambda known: derive(Choice(known)), **options
-        ).name
-    )
+    return Choice(user.load(name, frozenset(RESERVED), lambda known: derive(Choice(known)), **options).name)
 
 
 def _allowed(*more: str) -> str:
@@ -269,7 +335,7 @@ def choose_step(
     previous: int = 0,
 ) -> Choice:
     """Check a choice of attitude step; parameters and errors are those of `choose`."""
-    if name in KERNELS:
+    if name in KERNELS or name in VECTORS:
         raise InputError(f"algorithm {name!r} is no attitude step; allowed: {_allowed()}")
     return choose(name, method, increments, rates, previous)
 
@@ -311,10 +377,10 @@ def enough(method: str | Tableau) -> int:
     >>> enough("rk4"), enough("butcher6")
     (2, 4)
     """
-    from strapgen.catalogue.rates import step_order
-
-    order = _method(method).order
-    return next(count for count in range(1, MOST_INCREMENTS + 1) if step_order(count) >= min(order, 10))
+    loaded = _method(method)
+    return next(
+        count for count in range(1, MOST_INCREMENTS + 1) if loaded.limit(count, 0) >= min(loaded.order, 10)
+    )
 
 
 def orthonormalizations(algorithm: str) -> list[str]:
@@ -344,6 +410,12 @@ def derive(choice: Choice) -> Kernel:
         function = getattr(import_module(f"{__name__}.{recipe.module}"), recipe.function)
         kernel: Kernel = function(*recipe.arguments)
         return kernel
+    if choice.name in VECTORS:
+        vector = VECTORS[choice.name]
+        derived: Kernel = getattr(import_module(f"{__name__}.{vector.module}"), vector.function)(
+            _method(choice.method), choice.increments, choice.previous
+        )
+        return derived
     from strapgen.catalogue.kinematics import KINEMATICS
     from strapgen.catalogue.steps import step
 
@@ -359,5 +431,5 @@ def _method(method: str | Tableau) -> Method:
     if method in TABLEAUX:
         return runge_kutta.method(TABLEAUX[method])
     family = INTEGRATORS[method]
-    made: Method = import_module(f"{__name__}.{family.module}").method(family.order)
+    made: Method = import_module(f"{__name__}.{family.module}").method(*(family.arguments or (family.order,)))
     return made

@@ -11,6 +11,7 @@ import typer
 from strapgen.cli import (
     check,
     compare,
+    coning,
     converge,
     derive,
     generate,
@@ -35,6 +36,7 @@ app = typer.Typer(
 app.callback()(version.options)
 app.command("list")(listing.list_names)
 app.command("tableau")(tableau.tableau)
+app.command("coning")(coning.coning)
 app.command("derive")(derive.derive)
 app.command("generate")(generate.generate)
 app.command("simulate")(simulate.simulate)

@@ -26,6 +26,10 @@ def list_names(format: Format = "text") -> None:
     parts: dict[str, dict[str, str]] = {
         "algorithms": {**catalogue.ALGORITHMS, **installed},
         "methods": catalogue.METHODS,
+        "vectors": {
+            name: f"{vector.title}; methods {', '.join(vector.methods)}"
+            for name, vector in catalogue.VECTORS.items()
+        },
         "kernels": {name: recipe.title for name, recipe in catalogue.KERNELS.items()},
         "motions": {
             name: ", ".join(" or ".join(choices) for choices in keys(name).values())
