@@ -22,6 +22,8 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
     "cos": mpmath.cos,
     "sinc": mpmath.sinc,
     "atan2": mpmath.atan2,
+    "direction": mpmath.atan2,
+    "wrap": lambda x: x - 2 * mpmath.pi * (int(x > mpmath.pi) - int(x < -mpmath.pi)),
 }
 
 

@@ -142,8 +142,11 @@ class _Quantization:
             is_output = result in self.program.outputs
             wish = self.settings.formats.get(result.signal.name)
             wish = asked(self.settings, result.signal) if is_output else wish
+            carried = self._carried_input(result.signal) if is_output else None
             if wish is not None:
                 fraction = Format.parse(wish, self.word).fraction
+            elif carried is not None:
+                fraction = carried.format.fraction
             elif is_output and (result.signal.constraint or self.program.companions is not None):
                 fraction = self._state_like(result.signal)
             else:
@@ -152,6 +155,12 @@ class _Quantization:
             forced |= {name: forced.get(name, fraction) for name in held}
         self.words = set(forced) | self.factors
         return forced
+
+    def _carried_input(self, signal: Signal) -> code.Argument | None:
+        """Return the input that an output is in the next call."""
+        recursion = self.program.recursion
+        name = recursion.inputs.get(signal.name) if recursion else None
+        return next((argument for argument in self.inputs if argument.signal.name == name), None)
 
     def _state_like(self, signal: Signal) -> int:
         """Return the fraction of an output that is an attitude: that of an input like it, or of every state."""
@@ -274,6 +283,9 @@ class _Quantization:
             if quantity.name in self.exact.results[result.signal.name]:
                 if result.signal.constraint:
                     return math.floor((Fraction(1) + self.settings.allowance) * Fraction(2) ** fraction)
+                carried = self._carried_input(result.signal)
+                if carried is not None:
+                    return carried.high
                 if self.program.companions is not None:  # the state of the next step
                     return self.inputs[0].high
         return None
