@@ -84,8 +84,26 @@ class Recipe(NamedTuple):
 #: Orders of the updates that are cut off.
 UPDATE_ORDERS = range(1, 21)
 
+#: Kernels of algorithms in two speeds that are in the standard catalogue; their variants are not.
+_STANDARD_TWO_SPEED = (
+    *("dcm-update", "euler-update", "navigation-rotation", "coning-fast", "coning-slow", "sculling-fast-1"),
+    *(
+        "sculling-fast-2",
+        "dcm-velocity-2",
+        "euler-velocity-2",
+        "navigation-velocity",
+        "euler-normalize-first-order",
+    ),
+    *(
+        "euler-from-dcm-sheppard",
+        "euler-from-dcm-continuous",
+        "dcm-from-euler-angles",
+        "euler-angles-from-dcm",
+    ),
+)
+
 #: Kernels of algorithms in two speeds: they take no method.
-TWO_SPEED = {
+_TWO_SPEED = {
     **{
         f"{algorithm}-update": Recipe(
             f"{title}: update by a rotation vector", "updates", "update", (algorithm,)
@@ -98,7 +116,6 @@ TWO_SPEED = {
             "updates",
             "update",
             (algorithm, order),
-            standard=False,
         )
         for algorithm, title in ALGORITHMS.items()
         for order in UPDATE_ORDERS
@@ -109,7 +126,6 @@ TWO_SPEED = {
             "updates",
             "navigation_update",
             (algorithm, order),
-            standard=False,
         )
         for algorithm, title in ALGORITHMS.items()
         for order, suffix, words in ((1, "-1", ", order 1"), (2, "-2", ", order 2"), (None, "", ""))
@@ -166,6 +182,10 @@ TWO_SPEED = {
     "euler-angles-from-dcm": Recipe(
         "conversion: Euler angles from direction cosine matrix", "euler_angles", "euler_angles_from_dcm"
     ),
+}
+
+TWO_SPEED = {
+    name: recipe._replace(standard=name in _STANDARD_TWO_SPEED) for name, recipe in _TWO_SPEED.items()
 }
 
 #: Kernels that take no method.
