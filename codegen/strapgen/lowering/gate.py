@@ -135,8 +135,11 @@ class _Writer:
     def _inverse(self, expression: sp.Expr) -> Node:
         """Write an arcsine or arccosine by atan2: accurate up to the ends, and no error just beyond them."""
         value, one = self._named(self.node(expression.args[0])), Constant(Fraction(1))
-        inside = Operation("multiply", (Operation("subtract", (one, value)), Operation("add", (one, value))))
-        other = Operation("sqrt", (Operation("maximum", (Constant(Fraction(0)), inside)),))
+        # Two roots: multiplied out, 1 - x^2 would lose its digits where x is near 1.
+        sides = (Operation(kind, (one, value)) for kind in ("subtract", "add"))
+        zero = Constant(Fraction(0))
+        roots = tuple(Operation("sqrt", (Operation("maximum", (zero, side)),)) for side in sides)
+        other = Operation("multiply", roots)
         return Operation("atan2", (value, other) if expression.func is sp.asin else (other, value))
 
     def _repeated(self, base: Node, exponent: int) -> Node:
