@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -24,6 +26,15 @@ class Recursion:
 
     states: tuple[tuple[str, str], ...]
     kept: tuple[str, ...] = ()
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the recursion as plain JSON data."""
+        return {"states": [list(pair) for pair in self.states], "kept": list(self.kept)}
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Recursion:
+        """Rebuild a recursion from `as_dict`."""
+        return cls(tuple((name, output) for name, output in data["states"]), tuple(data["kept"]))
 
     @property
     def begun_anew(self) -> tuple[str, ...]:

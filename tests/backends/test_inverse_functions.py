@@ -12,7 +12,7 @@ from derived import generated
 
 import strapgen
 from strapgen.algebra import Wrapped
-from strapgen.backends import BACKENDS, _evaluator
+from strapgen.backends import BACKENDS, of_sources
 from strapgen.kernel import KernelBuilder, resolution
 from strapgen.signal import Signal
 from strapgen.targets import FIXED
@@ -23,7 +23,7 @@ def made(backend_name, function, bound=1):
     x = build.scalar(Signal.scalar("x", meaning="argument", bound=Fraction(bound)))
     build.output(Signal("y", (1,), ("y_1",), meaning="value"), [function(x)])
     kernel = build.kernel("tested", "A function", "none")
-    return _evaluator(generated(strapgen.lower(kernel), backend_name))
+    return of_sources(generated(strapgen.lower(kernel), backend_name))
 
 
 def last_place(evaluator, backend_name):

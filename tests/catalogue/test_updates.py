@@ -142,8 +142,8 @@ def test_the_rotation_of_the_navigation_frame_is_exact_for_a_rate_that_is_linear
     turns = {"previous_turn": a * T, "turn": (a + b * T) * T}
     values = {name: turns[s.name] if s.name in turns else ring(0) for s in made.inputs for name in s.elements}
     result = made.expand(values)
-    assert result["next_rotation"] == [a * T + b * T**2 / 2] * 3
-    assert result["next_turn"] == [turns["turn"]] * 3
+    assert result["next_navigation_rotation"] == [a * T + b * T**2 / 2] * 3
+    assert result["next_previous_turn"] == [turns["turn"]] * 3
 
 
 def test_orders_are_told():

@@ -153,6 +153,21 @@ _TWO_SPEED = {
     "navigation-velocity": Recipe(
         "velocity correction for the rotation of the navigation frame", "acceleration", "navigation_velocity"
     ),
+    **{
+        f"two-speed-fast-{form}": Recipe(f"two speeds: fast loop with S{form}", "loops", "fast", (form,))
+        for form in (1, 2)
+    },
+    **{
+        f"{name}-two-speed-slow-{form}": Recipe(
+            f"two speeds: slow loop with S{form}", "loops", "slow", (name, form)
+        )
+        for name in ("dcm", "euler")
+        for form in (1, 2)
+    },
+    **{
+        f"{name}-two-speed-navigation": Recipe("two speeds: navigation loop", "loops", "navigation", (name,))
+        for name in ("dcm", "euler")
+    },
     "dcm-rows-orthogonalize": Recipe(
         "rows made orthogonal, to first order", "orthonormal", "rows_orthogonalized"
     ),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from fractions import Fraction
 
 import sympy as sp
@@ -12,7 +11,7 @@ from strapgen.catalogue.kinematics import SAVAGE
 from strapgen.catalogue.updates import ROTATION_VECTOR
 from strapgen.kernel import Kernel, KernelBuilder
 from strapgen.recursion import Recursion
-from strapgen.signal import Signal
+from strapgen.signal import Signal, after
 
 INCREMENT = Signal.vector(
     "increment",
@@ -65,16 +64,6 @@ SCULLING = Signal.vector(
 )
 
 
-def after(signal: Signal) -> Signal:
-    """Return the signal of what a state is after the call: its name with ``next_`` before it."""
-    return replace(
-        signal,
-        name=f"next_{signal.name}",
-        elements=tuple(f"next_{element}" for element in signal.elements),
-        meaning=f"{signal.meaning.partition(';')[0]}, after the call",
-    )
-
-
 class FastLoop:
     """The inputs of a fast cycle, and the outputs that take their place in the next one.
 
@@ -91,13 +80,8 @@ class FastLoop:
 
     def hand_on(self, signal: Signal, value: sp.Matrix) -> None:
         """Make a value the state of the next cycle."""
-        self.states.append((signal.name, self.next(signal).name))
-        self.build.output(self.next(signal), value)
-
-    @staticmethod
-    def next(signal: Signal) -> Signal:
-        """Return the output that takes the place of an input."""
-        return after(signal)
+        self.states.append((signal.name, after(signal).name))
+        self.build.output(after(signal), value)
 
     def kernel(self, name: str, title: str, source: str) -> Kernel:
         """Finish the kernel: the increment before is kept when a slow cycle ends, all else begins anew."""

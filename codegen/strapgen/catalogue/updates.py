@@ -10,7 +10,7 @@ from strapgen import algebra
 from strapgen.catalogue.kinematics import KINEMATICS, SAVAGE, Kinematics
 from strapgen.kernel import Kernel, KernelBuilder
 from strapgen.recursion import Recursion
-from strapgen.signal import Signal
+from strapgen.signal import Signal, after
 
 ROTATION_VECTOR = Signal.vector(
     "rotation_vector", "phi", unit="rad", meaning="rotation vector of the cycle, body axes", bound=Fraction(1)
@@ -21,6 +21,16 @@ NAVIGATION_ROTATION = Signal.vector(
     unit="rad",
     meaning="rotation of the navigation frame over its cycle, navigation axes",
     bound=Fraction(1, 8),
+)
+TURN, PREVIOUS_TURN = (
+    Signal.vector(
+        name,
+        prefix,
+        unit="rad",
+        meaning=f"rate of the navigation frame {when} times the slow cycle, navigation axes",
+        bound=Fraction(1, 64),
+    )
+    for name, prefix, when in (("turn", "turn", "at its end"), ("previous_turn", "before", "at its start"))
 )
 #: Where an attitude update stands in the source, by the size of the state: cut off, navigation frame.
 _EQUATIONS = {9: ("(2) to (4)", "(5) and (6)"), 4: ("(9) to (14)", "(15)")}
@@ -141,34 +151,18 @@ def navigation_rotation() -> Kernel:
     -------
     Kernel
         Inputs ``navigation_rotation``, the sum so far, ``previous_turn`` and ``turn``: the rate before and after the
-        cycle, each times its length in rad; outputs ``next_rotation`` and ``next_turn``.
+        cycle, each times its length in rad; outputs ``next_navigation_rotation`` and ``next_previous_turn``.
     """
     build = KernelBuilder()
-    theta = build.input(NAVIGATION_ROTATION)
-    before, after = (
-        build.input(
-            Signal.vector(
-                name, prefix, unit="rad", meaning=f"{meaning} times the cycle", bound=Fraction(1, 64)
-            )
-        )
-        for name, prefix, meaning in (
-            ("previous_turn", "before", "rate of the navigation frame one cycle ago"),
-            ("turn", "after", "rate of the navigation frame now"),
-        )
-    )
-    build.output(
-        Signal.vector("next_rotation", "next_theta", unit="rad", meaning="rotation of the navigation frame"),
-        theta + (before + after) / 2,
-    )
-    build.output(
-        Signal.vector("next_turn", "next_turn", unit="rad", meaning="the rate for the next call"), after
-    )
+    theta, before, turn = map(build.input, (NAVIGATION_ROTATION, PREVIOUS_TURN, TURN))
+    build.output(after(NAVIGATION_ROTATION), theta + (before + turn) / 2)
+    build.output(after(PREVIOUS_TURN), turn)
     return build.kernel(
         "navigation-rotation",
         "Rotation of the navigation frame, trapezoidal",
         f"{SAVAGE}, equation (27)",
         recursion=Recursion(
-            (("navigation_rotation", "next_rotation"), ("previous_turn", "next_turn")),
-            kept=("previous_turn",),
+            tuple((signal.name, after(signal).name) for signal in (NAVIGATION_ROTATION, PREVIOUS_TURN)),
+            kept=(PREVIOUS_TURN.name,),
         ),
     )

@@ -19,6 +19,7 @@ from strapgen.cli import (
     study,
     tableau,
     tables,
+    two_speed,
     version,
 )
 from strapgen.exceptions import StrapgenError
@@ -40,6 +41,7 @@ app.command("compare")(compare.compare)
 app.command("converge")(converge.converge)
 app.command("check")(check.check)
 app.command("tables")(tables.tables)
+app.command("two-speed")(two_speed.two_speed)
 app.add_typer(study.app, name="study")
 
 

@@ -54,9 +54,10 @@ def lowered(program: Program, settings: Settings) -> code.FixedProgram:
 
     tried = map(started, range(_MOST_GUARD_BITS + 1))
     first = next(tried)
+    # What is handed on from call to call keeps its own finest format: it is no increment.
     finest = (
         first
-        if first.sums_of_inputs_are_exact()
+        if program.recursion is not None or first.sums_of_inputs_are_exact()
         else next((work for work in tried if work.sums_of_inputs_are_exact()), first)
     )
     made, guard_bits = finest.exact, finest.guard_bits

@@ -139,6 +139,7 @@ def emit(program: Program, target: str = "c") -> Sources:
         program.operations,
         program.temporaries,
         program.companions,
+        recursion=program.recursion,
     )
 
 

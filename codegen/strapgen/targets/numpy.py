@@ -74,6 +74,7 @@ def emit(program: Program, target: str = "numpy") -> Sources:
         program.operations,
         program.temporaries,
         program.companions,
+        recursion=program.recursion,
     )
 
 
