@@ -7,7 +7,8 @@ the navigation frame. The C back ends run all loops in one generated function; t
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from strapgen import backends, checks, compilation, library
 from strapgen.backends import BACKENDS, Evaluator
-from strapgen.backends.fixed import FixedEvaluator
+from strapgen.backends.fixed import FixedEvaluator, integers, numbers
 from strapgen.catalogue import Choice
 from strapgen.exceptions import InputError
 from strapgen.fixedpoint import Settings
@@ -44,7 +45,8 @@ class Run(NamedTuple):
     attitudes : array, (slow cycles, state shape)
         Attitude after every slow cycle, and after the navigation cycle that ends with it.
     velocity_changes : array, (navigation cycles, 3)
-        Change of the velocity over every navigation cycle in m/s, navigation axes at its end; gravity is not in it.
+        Integral of the specific force over every navigation cycle in m/s, navigation axes as they turn. What gravity
+        and Coriolis forces add is for the navigation to say.
     """
 
     attitudes: Array
@@ -181,37 +183,30 @@ def sources(
     return whole(f"{algorithm}-two-speed-{sculling}", title, " ".join(words), made)
 
 
-@dataclass(frozen=True)
 class _Door:
-    """Turns numbers into what a loop computes with, and back."""
+    """Turns numbers into what loops compute with, and back."""
 
-    evaluators: tuple[Evaluator, ...]
-
-    def _argument(self, name: str) -> Argument | None:
-        for evaluator in self.evaluators:
-            if isinstance(evaluator, FixedEvaluator):
-                for argument in (*evaluator.interface.inputs, *evaluator.interface.outputs):
-                    if argument.signal.name == name:
-                        return argument
-        return None
+    def __init__(self, loops: Sequence[Sources]) -> None:
+        self.arguments: dict[str, tuple[Argument, str]] = {}
+        for loop in loops:
+            if loop.fixed is not None:
+                for argument in (*loop.fixed.inputs, *loop.fixed.outputs):
+                    self.arguments.setdefault(argument.signal.name, (argument, loop.kernel))
+        self.dtype = np.dtype(np.float32 if loops[0].target == "c-float" else np.float64)
 
     def taken(self, name: str, values: Array, *, summed: bool = False) -> Array:
         """Return samples, (count, elements), as the loop takes them; sums of them lose no more than one rounding."""
-        argument, first = self._argument(name), self.evaluators[0]
-        if argument is None or not isinstance(first, FixedEvaluator):
-            return np.ascontiguousarray(values, first.dtype)
-        if not summed:
-            return first.integers(argument, values)
-        angle = np.rint(np.ldexp(np.cumsum(values, axis=0), argument.format.fraction))
-        steps = np.ldexp(np.diff(angle, axis=0, prepend=0.0), -argument.format.fraction)
-        return first.integers(argument, steps)
+        if name not in self.arguments:
+            return np.ascontiguousarray(values, self.dtype)
+        argument, kernel = self.arguments[name]
+        if summed:
+            angle = np.rint(np.ldexp(np.cumsum(values, axis=0), argument.format.fraction))
+            values = np.ldexp(np.diff(angle, axis=0, prepend=0.0), -argument.format.fraction)
+        return integers(argument, values, kernel)
 
     def given(self, name: str, values: Array) -> Array:
         """Return outputs of a loop as numbers."""
-        argument, first = self._argument(name), self.evaluators[0]
-        if argument is None or not isinstance(first, FixedEvaluator):
-            return values
-        return first.numbers(argument, values)
+        return numbers(self.arguments[name][0], values) if name in self.arguments else values
 
 
 class TwoSpeed:
@@ -230,8 +225,12 @@ class TwoSpeed:
 
     Attributes
     ----------
-    fast, slow, navigation : Evaluator
-        The generated function of each loop.
+    loops : tuple of Sources
+        The fast, the slow and the navigation loop.
+    state : Signal
+        The attitude.
+    identity : array
+        The attitude of zero rotation.
 
     Raises
     ------
@@ -266,14 +265,16 @@ class TwoSpeed:
             if entry.target.startswith("c")
             else None
         )
-        self.fast, self.slow, self.navigation = self.evaluators = tuple(
-            backends.of_sources(loop) for loop in self.loops
-        )
         self._wires = wiring(self.loops)
-        self._door = _Door(self.evaluators)
+        self._door = _Door(self.loops)
         self._function = f"{algorithm}-two-speed-{sculling}".replace("-", "_") + _suffix(self.loops[0])
-        self.state = self.slow.function.inputs[0]
+        self.state = self.loops[1].function.inputs[0]
         self.identity: Array = np.eye(3) if algorithm == "dcm" else np.array([0.0, 0, 0, 1])
+
+    @cached_property
+    def evaluators(self) -> tuple[Evaluator, ...]:
+        """The generated function of each loop by itself."""
+        return tuple(backends.of_sources(loop) for loop in self.loops)
 
     def run(
         self,
@@ -419,10 +420,8 @@ class TwoSpeed:
         slow_cycles: int,
     ) -> tuple[Array, Array]:
         ffi, lib = module.ffi, module.lib
-        first = self.evaluators[0]
-        kind = first.dtype
-        if isinstance(first, FixedEvaluator):
-            kind = np.dtype(f"int{first.interface.settings.word}")
+        fixed = self.loops[0].fixed
+        kind = self._door.dtype if fixed is None else np.dtype(f"int{fixed.settings.word}")
         type_ = {"float64": "double", "float32": "float"}.get(kind.name, f"{kind.name}_t")
 
         def pointer(array: Array) -> Any:

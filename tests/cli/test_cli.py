@@ -34,7 +34,7 @@ pytestmark = pytest.mark.filterwarnings("error")
 
 COMMANDS = (
     *("list", "tableau", "derive", "generate", "simulate", "compare", "converge", "check", "tables"),
-    "study word-length",
+    *("two-speed", "study word-length"),
 )
 DATA = Path(__file__).resolve().parents[1] / "data"
 CONING = "--motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 --step 0.125 --duration 5"

@@ -110,7 +110,7 @@ def slow(name: str, form: int) -> Kernel:
 
 
 def navigation(name: str) -> Kernel:
-    """Return the loop of the navigation frame: attitude and velocity referred to the frame after its rotation.
+    """Return the loop of the navigation frame: the attitude after its rotation, the velocity corrected for that.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def navigation(name: str) -> Kernel:
     -------
     Kernel
         Inputs ``state``, which is handed on, ``navigation_rotation`` and ``navigation_velocity``; outputs ``next`` and
-        ``velocity_change`` (3,) in m/s, what the velocity has gained over the cycle.
+        ``velocity_change`` (3,) in m/s, the integral of the specific force in navigation axes as they turn.
     """
     kinematics = KINEMATICS[name]
     build = KernelBuilder()
@@ -131,7 +131,7 @@ def navigation(name: str) -> Kernel:
         NAVIGATION_VELOCITY,
         name="velocity_change",
         elements=tuple(f"change_{axis}" for axis in "xyz"),
-        meaning="change of the velocity over the navigation cycle, navigation axes at its end",
+        meaning="integral of the specific force over the navigation cycle, navigation axes as they turn",
     )
     build.output(gained, v + frame_correction(theta, v))
     return build.kernel(
