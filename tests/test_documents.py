@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text()
 
 
-@pytest.mark.parametrize("page", ["python-api", "canonical-form", "fixed-point"])
+@pytest.mark.parametrize("page", ["python-api", "canonical-form", "fixed-point", "two-speed"])
 def test_page(page):
     result = doctest.testfile(str(ROOT / "docs" / f"{page}.md"), module_relative=False)
     assert result.attempted >= 10
@@ -43,6 +43,7 @@ def test_readme_shows_every_command():
         "compare",
         "converge",
         "check",
+        "two-speed",
         "study",
     }
     assert "`strapgen tables`" in README

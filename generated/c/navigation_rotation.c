@@ -6,7 +6,7 @@
 
 /* The algorithm. Static, so that the loop below can take it in. */
 static inline void one_(const double navigation_rotation[3], const double previous_turn[3],
-    const double turn[3], double next_rotation[3], double next_turn[3])
+    const double turn[3], double next_navigation_rotation[3], double next_previous_turn[3])
 {
     const double theta_x = navigation_rotation[0];
     const double theta_y = navigation_rotation[1];
@@ -14,31 +14,32 @@ static inline void one_(const double navigation_rotation[3], const double previo
     const double before_x = previous_turn[0];
     const double before_y = previous_turn[1];
     const double before_z = previous_turn[2];
-    const double after_x = turn[0];
-    const double after_y = turn[1];
-    const double after_z = turn[2];
-    /* rotation of the navigation frame */
-    const double next_theta_x = 0.5 * (after_x + before_x) + theta_x;
-    const double next_theta_y = 0.5 * (after_y + before_y) + theta_y;
-    const double next_theta_z = 0.5 * (after_z + before_z) + theta_z;
-    next_rotation[0] = next_theta_x;
-    next_rotation[1] = next_theta_y;
-    next_rotation[2] = next_theta_z;
-    next_turn[0] = after_x;
-    next_turn[1] = after_y;
-    next_turn[2] = after_z;
+    const double turn_x = turn[0];
+    const double turn_y = turn[1];
+    const double turn_z = turn[2];
+    /* rotation of the navigation frame over its cycle, navigation axes, after the call */
+    const double next_theta_x = 0.5 * (before_x + turn_x) + theta_x;
+    const double next_theta_y = 0.5 * (before_y + turn_y) + theta_y;
+    const double next_theta_z = 0.5 * (before_z + turn_z) + theta_z;
+    next_navigation_rotation[0] = next_theta_x;
+    next_navigation_rotation[1] = next_theta_y;
+    next_navigation_rotation[2] = next_theta_z;
+    next_previous_turn[0] = turn_x;
+    next_previous_turn[1] = turn_y;
+    next_previous_turn[2] = turn_z;
 }
 
 void navigation_rotation(const double navigation_rotation[3], const double previous_turn[3],
-    const double turn[3], double next_rotation[3], double next_turn[3])
+    const double turn[3], double next_navigation_rotation[3], double next_previous_turn[3])
 {
-    one_(navigation_rotation, previous_turn, turn, next_rotation, next_turn);
+    one_(navigation_rotation, previous_turn, turn, next_navigation_rotation, next_previous_turn);
 }
 
 void navigation_rotation_array(size_t count, const double *navigation_rotation,
-    const double *previous_turn, const double *turn, double *next_rotation, double *next_turn)
+    const double *previous_turn, const double *turn, double *next_navigation_rotation,
+    double *next_previous_turn)
 {
     for (size_t k = 0; k < count; ++k)
         one_(navigation_rotation + 3 * k, previous_turn + 3 * k, turn + 3 * k,
-            next_rotation + 3 * k, next_turn + 3 * k);
+            next_navigation_rotation + 3 * k, next_previous_turn + 3 * k);
 }

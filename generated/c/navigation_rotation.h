@@ -23,22 +23,25 @@ extern "C" {
  * in   navigation_rotation[3]: rotation of the navigation frame over its cycle, navigation axes;
  *      unit rad; theta_x, theta_y, theta_z; any finite number; at most 1/8 in magnitude in proper
  *      use.
- * in   previous_turn[3]: rate of the navigation frame one cycle ago times the cycle; unit rad;
- *      before_x, before_y, before_z; any finite number; at most 1/64 in magnitude in proper use.
- * in   turn[3]: rate of the navigation frame now times the cycle; unit rad; after_x, after_y,
- *      after_z; any finite number; at most 1/64 in magnitude in proper use.
- * out  next_rotation[3]: rotation of the navigation frame; unit rad; next_theta_x, next_theta_y,
- *      next_theta_z.
- * out  next_turn[3]: the rate for the next call; unit rad; next_turn_x, next_turn_y, next_turn_z.
+ * in   previous_turn[3]: rate of the navigation frame at its start times the slow cycle, navigation
+ *      axes; unit rad; before_x, before_y, before_z; any finite number; at most 1/64 in magnitude
+ *      in proper use.
+ * in   turn[3]: rate of the navigation frame at its end times the slow cycle, navigation axes; unit
+ *      rad; turn_x, turn_y, turn_z; any finite number; at most 1/64 in magnitude in proper use.
+ * out  next_navigation_rotation[3]: rotation of the navigation frame over its cycle, navigation
+ *      axes, after the call; unit rad; next_theta_x, next_theta_y, next_theta_z.
+ * out  next_previous_turn[3]: rate of the navigation frame at its start times the slow cycle,
+ *      navigation axes, after the call; unit rad; next_before_x, next_before_y, next_before_z.
  */
 void navigation_rotation(const double navigation_rotation[3], const double previous_turn[3],
-    const double turn[3], double next_rotation[3], double next_turn[3]);
+    const double turn[3], double next_navigation_rotation[3], double next_previous_turn[3]);
 
 /* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
  * whose samples have the same size; otherwise they must not overlap.
  */
 void navigation_rotation_array(size_t count, const double *navigation_rotation,
-    const double *previous_turn, const double *turn, double *next_rotation, double *next_turn);
+    const double *previous_turn, const double *turn, double *next_navigation_rotation,
+    double *next_previous_turn);
 
 #ifdef __cplusplus
 }

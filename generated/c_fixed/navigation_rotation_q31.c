@@ -20,7 +20,7 @@ static inline int64_t shifted_(int64_t x, int n)
 
 /* The algorithm. Static, so that the loops below can take it in. */
 static inline int one_(const int32_t navigation_rotation[3], const int32_t previous_turn[3],
-    const int32_t turn[3], int32_t next_rotation[3], int32_t next_turn[3])
+    const int32_t turn[3], int32_t next_navigation_rotation[3], int32_t next_previous_turn[3])
 {
     const int_fast32_t theta_x = navigation_rotation[0];
     const int_fast32_t theta_y = navigation_rotation[1];
@@ -28,51 +28,52 @@ static inline int one_(const int32_t navigation_rotation[3], const int32_t previ
     const int_fast32_t before_x = previous_turn[0];
     const int_fast32_t before_y = previous_turn[1];
     const int_fast32_t before_z = previous_turn[2];
-    const int_fast32_t after_x = turn[0];
-    const int_fast32_t after_y = turn[1];
-    const int_fast32_t after_z = turn[2];
+    const int_fast32_t turn_x = turn[0];
+    const int_fast32_t turn_y = turn[1];
+    const int_fast32_t turn_z = turn[2];
     if (outside_(theta_x, INT32_C(1073741824))
         || outside_(theta_y, INT32_C(1073741824))
         || outside_(theta_z, INT32_C(1073741824))
         || outside_(before_x, INT32_C(1073741824))
         || outside_(before_y, INT32_C(1073741824))
         || outside_(before_z, INT32_C(1073741824))
-        || outside_(after_x, INT32_C(1073741824))
-        || outside_(after_y, INT32_C(1073741824))
-        || outside_(after_z, INT32_C(1073741824)))
+        || outside_(turn_x, INT32_C(1073741824))
+        || outside_(turn_y, INT32_C(1073741824))
+        || outside_(turn_z, INT32_C(1073741824)))
         return 1;
-    /* rotation of the navigation frame */
-    const int_fast32_t next_theta_x = (int_fast32_t)((int64_t)theta_x + shifted_((int64_t)after_x
-        + (int64_t)before_x + 8, 4));
-    const int_fast32_t next_theta_y = (int_fast32_t)((int64_t)theta_y + shifted_((int64_t)after_y
-        + (int64_t)before_y + 8, 4));
-    const int_fast32_t next_theta_z = (int_fast32_t)((int64_t)theta_z + shifted_((int64_t)after_z
-        + (int64_t)before_z + 8, 4));
-    const int_fast32_t next_turn_x = (int_fast32_t)((int64_t)after_x);
-    const int_fast32_t next_turn_y = (int_fast32_t)((int64_t)after_y);
-    const int_fast32_t next_turn_z = (int_fast32_t)((int64_t)after_z);
-    next_rotation[0] = (int32_t)next_theta_x;
-    next_rotation[1] = (int32_t)next_theta_y;
-    next_rotation[2] = (int32_t)next_theta_z;
-    next_turn[0] = (int32_t)next_turn_x;
-    next_turn[1] = (int32_t)next_turn_y;
-    next_turn[2] = (int32_t)next_turn_z;
+    /* rotation of the navigation frame over its cycle, navigation axes, after the call */
+    const int_fast32_t next_theta_x = (int_fast32_t)((int64_t)theta_x + shifted_((int64_t)before_x
+        + (int64_t)turn_x + 8, 4));
+    const int_fast32_t next_theta_y = (int_fast32_t)((int64_t)theta_y + shifted_((int64_t)before_y
+        + (int64_t)turn_y + 8, 4));
+    const int_fast32_t next_theta_z = (int_fast32_t)((int64_t)theta_z + shifted_((int64_t)before_z
+        + (int64_t)turn_z + 8, 4));
+    const int_fast32_t next_before_x = (int_fast32_t)((int64_t)turn_x);
+    const int_fast32_t next_before_y = (int_fast32_t)((int64_t)turn_y);
+    const int_fast32_t next_before_z = (int_fast32_t)((int64_t)turn_z);
+    next_navigation_rotation[0] = (int32_t)next_theta_x;
+    next_navigation_rotation[1] = (int32_t)next_theta_y;
+    next_navigation_rotation[2] = (int32_t)next_theta_z;
+    next_previous_turn[0] = (int32_t)next_before_x;
+    next_previous_turn[1] = (int32_t)next_before_y;
+    next_previous_turn[2] = (int32_t)next_before_z;
     return 0;
 }
 
 int navigation_rotation_q31(const int32_t navigation_rotation[3], const int32_t previous_turn[3],
-    const int32_t turn[3], int32_t next_rotation[3], int32_t next_turn[3])
+    const int32_t turn[3], int32_t next_navigation_rotation[3], int32_t next_previous_turn[3])
 {
-    return one_(navigation_rotation, previous_turn, turn, next_rotation, next_turn);
+    return one_(navigation_rotation, previous_turn, turn, next_navigation_rotation, next_previous_turn);
 }
 
 size_t navigation_rotation_q31_array(size_t count, int *status, const int32_t *navigation_rotation,
-    const int32_t *previous_turn, const int32_t *turn, int32_t *next_rotation, int32_t *next_turn)
+    const int32_t *previous_turn, const int32_t *turn, int32_t *next_navigation_rotation,
+    int32_t *next_previous_turn)
 {
     *status = 0;
     for (size_t k = 0; k < count; ++k) {
         *status = one_(navigation_rotation + 3 * k, previous_turn + 3 * k, turn + 3 * k,
-            next_rotation + 3 * k, next_turn + 3 * k);
+            next_navigation_rotation + 3 * k, next_previous_turn + 3 * k);
         if (*status)
             return k;
     }

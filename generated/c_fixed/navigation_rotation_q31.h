@@ -27,20 +27,23 @@ extern "C" {
  * in      navigation_rotation[3]: rotation of the navigation frame over its cycle, navigation axes;
  *         theta_x, theta_y, theta_z; format Q-2.33, unit 2^-33 rad; range -1073741824 to
  *         1073741824 (-0.125 to 0.125).
- * in      previous_turn[3]: rate of the navigation frame one cycle ago times the cycle; before_x,
- *         before_y, before_z; format Q-5.36, unit 2^-36 rad; range -1073741824 to 1073741824
+ * in      previous_turn[3]: rate of the navigation frame at its start times the slow cycle,
+ *         navigation axes; before_x, before_y, before_z; format Q-5.36, unit 2^-36 rad; range
+ *         -1073741824 to 1073741824 (-0.015625 to 0.015625).
+ * in      turn[3]: rate of the navigation frame at its end times the slow cycle, navigation axes;
+ *         turn_x, turn_y, turn_z; format Q-5.36, unit 2^-36 rad; range -1073741824 to 1073741824
  *         (-0.015625 to 0.015625).
- * in      turn[3]: rate of the navigation frame now times the cycle; after_x, after_y, after_z;
- *         format Q-5.36, unit 2^-36 rad; range -1073741824 to 1073741824 (-0.015625 to 0.015625).
- * out     next_rotation[3]: rotation of the navigation frame; next_theta_x, next_theta_y,
- *         next_theta_z; format Q-2.33, unit 2^-33 rad; range -1207959553 to 1207959553 (-0.140625
- *         to 0.140625); error at most 5.82077e-11, 0.5000 of the last place.
- * out     next_turn[3]: the rate for the next call; next_turn_x, next_turn_y, next_turn_z; format
+ * out     next_navigation_rotation[3]: rotation of the navigation frame over its cycle, navigation
+ *         axes, after the call; next_theta_x, next_theta_y, next_theta_z; format Q-2.33, unit
+ *         2^-33 rad; range -1207959553 to 1207959553 (-0.140625 to 0.140625); error at most
+ *         5.82077e-11, 0.5000 of the last place.
+ * out     next_previous_turn[3]: rate of the navigation frame at its start times the slow cycle,
+ *         navigation axes, after the call; next_before_x, next_before_y, next_before_z; format
  *         Q-5.36, unit 2^-36 rad; range -1073741824 to 1073741824 (-0.015625 to 0.015625).
  * Returns 0; or, with the outputs left alone, 1 if an input lies outside its range.
  */
 int navigation_rotation_q31(const int32_t navigation_rotation[3], const int32_t previous_turn[3],
-    const int32_t turn[3], int32_t next_rotation[3], int32_t next_turn[3]);
+    const int32_t turn[3], int32_t next_navigation_rotation[3], int32_t next_previous_turn[3]);
 
 /* `count` calls on arrays of samples, one after the other, up to the first that is refused: every array holds `count`
  * times what one call takes.
@@ -48,7 +51,8 @@ int navigation_rotation_q31(const int32_t navigation_rotation[3], const int32_t 
  * Returns how many calls were done, and in `status` what the last one returned.
  */
 size_t navigation_rotation_q31_array(size_t count, int *status, const int32_t *navigation_rotation,
-    const int32_t *previous_turn, const int32_t *turn, int32_t *next_rotation, int32_t *next_turn);
+    const int32_t *previous_turn, const int32_t *turn, int32_t *next_navigation_rotation,
+    int32_t *next_previous_turn);
 
 #ifdef __cplusplus
 }

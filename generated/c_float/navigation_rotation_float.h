@@ -23,22 +23,25 @@ extern "C" {
  * in   navigation_rotation[3]: rotation of the navigation frame over its cycle, navigation axes;
  *      unit rad; theta_x, theta_y, theta_z; any finite number; at most 1/8 in magnitude in proper
  *      use.
- * in   previous_turn[3]: rate of the navigation frame one cycle ago times the cycle; unit rad;
- *      before_x, before_y, before_z; any finite number; at most 1/64 in magnitude in proper use.
- * in   turn[3]: rate of the navigation frame now times the cycle; unit rad; after_x, after_y,
- *      after_z; any finite number; at most 1/64 in magnitude in proper use.
- * out  next_rotation[3]: rotation of the navigation frame; unit rad; next_theta_x, next_theta_y,
- *      next_theta_z.
- * out  next_turn[3]: the rate for the next call; unit rad; next_turn_x, next_turn_y, next_turn_z.
+ * in   previous_turn[3]: rate of the navigation frame at its start times the slow cycle, navigation
+ *      axes; unit rad; before_x, before_y, before_z; any finite number; at most 1/64 in magnitude
+ *      in proper use.
+ * in   turn[3]: rate of the navigation frame at its end times the slow cycle, navigation axes; unit
+ *      rad; turn_x, turn_y, turn_z; any finite number; at most 1/64 in magnitude in proper use.
+ * out  next_navigation_rotation[3]: rotation of the navigation frame over its cycle, navigation
+ *      axes, after the call; unit rad; next_theta_x, next_theta_y, next_theta_z.
+ * out  next_previous_turn[3]: rate of the navigation frame at its start times the slow cycle,
+ *      navigation axes, after the call; unit rad; next_before_x, next_before_y, next_before_z.
  */
 void navigation_rotation_float(const float navigation_rotation[3], const float previous_turn[3],
-    const float turn[3], float next_rotation[3], float next_turn[3]);
+    const float turn[3], float next_navigation_rotation[3], float next_previous_turn[3]);
 
 /* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
  * whose samples have the same size; otherwise they must not overlap.
  */
 void navigation_rotation_float_array(size_t count, const float *navigation_rotation,
-    const float *previous_turn, const float *turn, float *next_rotation, float *next_turn);
+    const float *previous_turn, const float *turn, float *next_navigation_rotation,
+    float *next_previous_turn);
 
 #ifdef __cplusplus
 }

@@ -22,22 +22,23 @@ def navigation_rotation(navigation_rotation, previous_turn, turn):
         number; at most 1/8 in magnitude in proper use.
         Elements: theta_x, theta_y, theta_z.
     previous_turn : array, (..., 3)
-        rate of the navigation frame one cycle ago times the cycle, unit rad; any finite number; at
-        most 1/64 in magnitude in proper use.
+        rate of the navigation frame at its start times the slow cycle, navigation axes, unit rad;
+        any finite number; at most 1/64 in magnitude in proper use.
         Elements: before_x, before_y, before_z.
     turn : array, (..., 3)
-        rate of the navigation frame now times the cycle, unit rad; any finite number; at most 1/64
-        in magnitude in proper use.
-        Elements: after_x, after_y, after_z.
+        rate of the navigation frame at its end times the slow cycle, navigation axes, unit rad; any
+        finite number; at most 1/64 in magnitude in proper use.
+        Elements: turn_x, turn_y, turn_z.
 
     Returns
     -------
-    next_rotation : array, (..., 3)
-        rotation of the navigation frame, unit rad.
+    next_navigation_rotation : array, (..., 3)
+        rotation of the navigation frame over its cycle, navigation axes, after the call, unit rad.
         Elements: next_theta_x, next_theta_y, next_theta_z.
-    next_turn : array, (..., 3)
-        the rate for the next call, unit rad.
-        Elements: next_turn_x, next_turn_y, next_turn_z.
+    next_previous_turn : array, (..., 3)
+        rate of the navigation frame at its start times the slow cycle, navigation axes, after the
+        call, unit rad.
+        Elements: next_before_x, next_before_y, next_before_z.
     """
     navigation_rotation = np.asarray(navigation_rotation)
     previous_turn = np.asarray(previous_turn)
@@ -48,24 +49,24 @@ def navigation_rotation(navigation_rotation, previous_turn, turn):
     before_x = previous_turn[..., 0]
     before_y = previous_turn[..., 1]
     before_z = previous_turn[..., 2]
-    after_x = turn[..., 0]
-    after_y = turn[..., 1]
-    after_z = turn[..., 2]
-    after_x = after_x.copy()
-    after_y = after_y.copy()
-    after_z = after_z.copy()
-    # rotation of the navigation frame
-    next_theta_x = 0.5 * (after_x + before_x) + theta_x
-    next_theta_y = 0.5 * (after_y + before_y) + theta_y
-    next_theta_z = 0.5 * (after_z + before_z) + theta_z
+    turn_x = turn[..., 0]
+    turn_y = turn[..., 1]
+    turn_z = turn[..., 2]
+    turn_x = turn_x.copy()
+    turn_y = turn_y.copy()
+    turn_z = turn_z.copy()
+    # rotation of the navigation frame over its cycle, navigation axes, after the call
+    next_theta_x = 0.5 * (before_x + turn_x) + theta_x
+    next_theta_y = 0.5 * (before_y + turn_y) + theta_y
+    next_theta_z = 0.5 * (before_z + turn_z) + theta_z
     batch = np.broadcast_shapes(navigation_rotation.shape[:-1], previous_turn.shape[:-1], turn.shape[:-1])
     dtype = np.result_type(navigation_rotation.dtype, previous_turn.dtype, turn.dtype, np.float32)
-    next_rotation = np.empty((*batch, 3), dtype)
-    next_turn = np.empty((*batch, 3), dtype)
-    next_rotation[..., 0] = next_theta_x
-    next_rotation[..., 1] = next_theta_y
-    next_rotation[..., 2] = next_theta_z
-    next_turn[..., 0] = after_x
-    next_turn[..., 1] = after_y
-    next_turn[..., 2] = after_z
-    return next_rotation, next_turn
+    next_navigation_rotation = np.empty((*batch, 3), dtype)
+    next_previous_turn = np.empty((*batch, 3), dtype)
+    next_navigation_rotation[..., 0] = next_theta_x
+    next_navigation_rotation[..., 1] = next_theta_y
+    next_navigation_rotation[..., 2] = next_theta_z
+    next_previous_turn[..., 0] = turn_x
+    next_previous_turn[..., 1] = turn_y
+    next_previous_turn[..., 2] = turn_z
+    return next_navigation_rotation, next_previous_turn

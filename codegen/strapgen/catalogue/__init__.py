@@ -328,7 +328,10 @@ def choose(
     if name.endswith(".py") or (name not in ALGORITHMS and name not in KERNELS and name in user.installed()):
         return _choose_own(name, method, increments, rates, previous)
     if name not in ALGORITHMS and name not in KERNELS:
-        raise InputError(f"algorithm {name!r} is not known; allowed: {_allowed(*KERNELS)}")
+        shown = [kernel for kernel, recipe in KERNELS.items() if recipe.standard]
+        raise InputError(
+            f"algorithm {name!r} is not known; allowed: {_allowed(*shown, 'other kernels of strapgen list')}"
+        )
     if name in KERNELS:
         given = {
             "method": method.name if isinstance(method, Tableau) else method,
