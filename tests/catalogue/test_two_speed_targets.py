@@ -12,10 +12,10 @@ from strapgen.catalogue import TWO_SPEED
 from strapgen.fixedpoint import Settings
 
 NAMES = [
-    *("dcm-update-5", "euler-update-4", "cayley-klein-update-3", "dcm-navigation-update-2"),
-    *("euler-navigation-update", "dcm-acceleration", "euler-velocity-1", "dcm-rows-orthogonalize"),
-    *("dcm-rows-normalize", "dcm-third-row", "cayley-klein-normalize-first-order", "dcm-two-speed-slow-1"),
-    *("euler-two-speed-navigation",),
+    *("dcm-update-5", "euler-update", "euler-update-4", "dcm-navigation-update-2", "euler-navigation-update"),
+    *("navigation-rotation", "coning-slow", "sculling-fast-1", "dcm-acceleration", "euler-velocity-1"),
+    *("euler-velocity-2", "navigation-velocity", "dcm-rows-orthogonalize", "dcm-third-row"),
+    *("euler-normalize-first-order", "euler-from-dcm-continuous"),
 ]
 
 
