@@ -26,7 +26,8 @@ def kernels(backend: str = "numpy") -> tuple[Evaluator, Evaluator]:
 
 def apart(angles, others):
     """Return the difference of angles without whole turns."""
-    return np.abs((np.asarray(angles) - others + np.pi) % TURN - np.pi)
+    difference = np.abs(np.asarray(angles) - others)
+    return np.min([difference, np.abs(difference - TURN), np.abs(difference - 2 * TURN)], axis=0)
 
 
 def random_angles(count: int, rng: np.random.Generator) -> np.ndarray:
