@@ -15,15 +15,16 @@ from strapgen.program import OPERATIONS, Program
 #: Decimal digits: a million steps lose six of them.
 DIGITS = 40
 
-#: What a program may call, on numbers of mpmath.
+#: The functions of programs on numbers of mpmath, roots apart.
 FUNCTIONS: dict[str, Callable[..., Any]] = {
-    **OPERATIONS,
-    "sqrt": mpmath.sqrt,
     "sin": mpmath.sin,
     "cos": mpmath.cos,
     "sinc": mpmath.sinc,
     "atan2": mpmath.atan2,
+    "direction": mpmath.atan2,
+    "wrap": lambda x: x - 2 * mpmath.pi * (int(x > mpmath.pi) - int(x < -mpmath.pi)),
 }
+_OPERATIONS: dict[str, Callable[..., Any]] = {**OPERATIONS, "sqrt": mpmath.sqrt, **FUNCTIONS}
 
 
 def number(value: Fraction) -> Any:
@@ -53,13 +54,17 @@ class Interpreter:
 
     def __call__(self, *inputs: Iterable[Any]) -> list[Any]:
         """Return the elements of the last output, from the elements of every input."""
+        return list(self.outputs(*inputs).values())[-1]
+
+    def outputs(self, *inputs: Iterable[Any]) -> dict[str, list[Any]]:
+        """Return the elements of every output by its name, from the elements of every input."""
         values: dict[str, Any] = {}
         for signal, elements in zip(self.program.inputs, inputs, strict=True):
             values |= zip(signal.elements, elements, strict=True)
-        return list(self._run(values).values())[-1]
+        return self._run(values)
 
     def _run(self, values: Mapping[str, Any]) -> dict[str, list[Any]]:
-        return self.program.run(values, self._constant, FUNCTIONS)
+        return self.program.run(values, self._constant, _OPERATIONS)
 
     def _constant(self, value: Fraction) -> Any:
         if value not in self._constants:

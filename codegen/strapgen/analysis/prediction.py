@@ -182,13 +182,10 @@ def parts_of() -> Callable[[Sequence[Any], Sequence[Any]], tuple[list[Any], list
 
     ``split(computed, true)``, both row by row: the outputs of the kernel error-matrix, in many digits.
     """
-    program = interpreter("error-matrix").program
+    kernel = interpreter("error-matrix")
 
     def split(computed: Sequence[Any], true: Sequence[Any]) -> tuple[list[Any], list[Any], list[Any]]:
-        values: dict[str, Any] = {}
-        for signal, elements in zip(program.inputs, (computed, true), strict=True):
-            values |= zip(signal.elements, elements, strict=True)
-        made = program.run(values, exact.number, exact.FUNCTIONS)
+        made = kernel.outputs(computed, true)
         return made["scale"], made["skew"], made["drift"]
 
     return split

@@ -22,6 +22,7 @@ from strapgen.cli import (
     study,
     tableau,
     tables,
+    two_speed,
     version,
 )
 from strapgen.exceptions import StrapgenError
@@ -46,6 +47,7 @@ app.command("series")(series.series)
 app.command("stability")(stability.stability)
 app.command("check")(check.check)
 app.command("tables")(tables.tables)
+app.command("two-speed")(two_speed.two_speed)
 app.add_typer(study.app, name="study")
 
 
