@@ -34,7 +34,18 @@ from strapgen.targets import FIXED, TARGETS
 pytestmark = pytest.mark.filterwarnings("error")
 
 COMMANDS = (
-    *("list", "tableau", "coning", "derive", "generate", "simulate", "compare", "converge", "check", "tables"),
+    *(
+        "list",
+        "tableau",
+        "coning",
+        "derive",
+        "generate",
+        "simulate",
+        "compare",
+        "converge",
+        "check",
+        "tables",
+    ),
     *("two-speed", "study word-length", "series", "stability"),
 )
 DATA = Path(__file__).resolve().parents[1] / "data"
