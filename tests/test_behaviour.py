@@ -28,6 +28,7 @@ def findings(choice: catalogue.Choice) -> dict[str, behaviour.Finding]:
         pytest.param("dormand-prince5", 3, 1, marks=pytest.mark.long),
     ],
 )
+@pytest.mark.parametrize("algorithm", ["dcm", "euler"])
 def test_our_own_algorithms_hold(algorithm, method, increments, previous):
     found = findings(choose(algorithm, method, increments, previous=previous))
     assert [finding for finding in found.values() if finding.holds is False] == []

@@ -36,13 +36,29 @@ def _pyplot() -> Any:
     return pyplot
 
 
-def _image(figure: Any, path: str | Path) -> bytes:
-    path = Path(path)
-    _pyplot().close(figure)  # pyplot lets go of it, it can still be drawn
-    kind = path.suffix.lstrip(".").lower()
-    allowed = sorted(figure.canvas.get_supported_filetypes())
+def require_kind(path: str | Path) -> str:
+    """Return the kind of image that a file's ending says.
+
+    Raises
+    ------
+    MissingExtraError
+        If matplotlib is not installed.
+    InputError
+        If the kind is unknown.
+    """
+    _pyplot()
+    from matplotlib.backend_bases import FigureCanvasBase
+
+    kind = Path(path).suffix.lstrip(".").lower()
+    allowed = sorted(FigureCanvasBase.get_supported_filetypes())
     if kind not in allowed:
         raise InputError(f"plot {path}: file type {kind!r} is not known; allowed: {', '.join(allowed)}")
+    return kind
+
+
+def _image(figure: Any, path: str | Path) -> bytes:
+    _pyplot().close(figure)  # pyplot lets go of it, it can still be drawn
+    kind = require_kind(path)
     image = io.BytesIO()
     figure.savefig(image, format=kind, dpi=150)
     return image.getvalue()

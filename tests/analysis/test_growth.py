@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from strapgen.analysis.constant_rate import constant_rate
 from strapgen.analysis.growth import as_text, contraction, growth, stability
 from strapgen.backends import backend
-from strapgen.catalogue import ALGORITHMS, choose
+from strapgen.catalogue import ALGORITHMS, choose, choose_step
+from strapgen.exceptions import InputError
 from strapgen.motions import motion
 
 SQUARE = sum(w**2 for w in sp.symbols("w_x w_y w_z"))
@@ -91,3 +92,8 @@ def test_report():
     assert "nowhere" in text
     assert "0 to 2.828" in text
     assert "kept" in text
+
+
+def test_a_step_that_is_not_linear_has_no_stretch(own_algorithm):
+    with pytest.raises(InputError, match="not linear in its state"):
+        stability(choose_step(str(own_algorithm("mrp"))))

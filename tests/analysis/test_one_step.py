@@ -97,7 +97,7 @@ def one_step(choice: Choice, vectors: list[list[sp.Rational]], h: Fraction) -> l
     return list(computed * true.T - mpmath.eye(3))
 
 
-@pytest.mark.parametrize("algorithm", ALGORITHMS)
+@pytest.mark.parametrize("algorithm", ["dcm", "euler"])
 @pytest.mark.parametrize(("method", "increments", "previous"), CASES)
 def test_two_terms_leave_an_error_of_the_square_of_the_step(algorithm, method, increments, previous):
     """For a general rate, in vector-invariant form: held against one step in 60 digits, as the step is halved."""

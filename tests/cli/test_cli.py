@@ -736,7 +736,10 @@ def test_an_interrupt_stops_a_study_at_once(tmp_path):
 TABLE_KEYS = ["table", "backend", "algorithm", "order", "drift_deg", "normalised", "thesis", "agrees"]
 
 
-@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize(
+    "backend",
+    [pytest.param(b, marks=() if b in ("numpy", "c", "c-q31") else pytest.mark.long) for b in BACKENDS],
+)
 def test_tables_json(backend, strapgen_says):
     entries = json.loads(
         strapgen_says(f"tables --backend {backend} --format json"), parse_constant=pytest.fail

@@ -121,6 +121,8 @@ def agreement(
         raise InputError("at least one step is needed")
     longest = lengths[0]
     checks.multiple("duration", total, "step", longest)
+    for length in lengths:
+        checks.multiple("the longest step", longest, "step", length)
     run = exact_attitudes(choice, motion)
     rungs = []
     for length in lengths:

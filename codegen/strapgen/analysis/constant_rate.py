@@ -17,7 +17,6 @@ import sympy as sp
 from strapgen import algebra, catalogue, exact
 from strapgen.analysis import one_step
 from strapgen.analysis.motion_rates import CONSTANT
-from strapgen.analysis.one_step import Step
 from strapgen.analysis.powers import Powers, function
 from strapgen.analysis.prediction import Matrix, Prediction, Transfer, follow
 from strapgen.analysis.series import PARTS, STEP
@@ -40,6 +39,8 @@ class ConstantRate:
     kernel : str
     cosine, sine : Expr
         What the method makes of cos x and sin x; for Euler and Cayley-Klein parameters of cos(x/2) and sin(x/2).
+    stretch_squared : Expr
+        Square of the factor by which the state grows across the axis.
     parameters : bool
         Whether the state are such parameters, whose matrix is of second degree in them.
     along : Expr
@@ -51,6 +52,7 @@ class ConstantRate:
     kernel: str
     cosine: sp.Expr
     sine: sp.Expr
+    stretch_squared: sp.Expr
     parameters: bool
     along: sp.Expr
     lowest: int = 0
@@ -63,11 +65,6 @@ class ConstantRate:
             return sp.S.Zero
         turned = sp.atan2(self.sine, self.cosine)
         return ANGLE - (2 * turned if self.parameters else turned)
-
-    @property
-    def stretch_squared(self) -> sp.Expr:
-        """Square of the factor by which the state grows across the axis."""
-        return _square(self.cosine, self.sine)
 
     @property
     def stretch(self) -> sp.Expr:
@@ -144,11 +141,6 @@ def _product(stretch: sp.Expr, along: sp.Expr, lost: sp.Expr, steps: sp.Expr, *a
     return along**steps * projection + stretch**steps * turned
 
 
-def _square(cosine: sp.Expr, sine: sp.Expr) -> sp.Expr:
-    total = sp.expand(cosine**2 + sine**2)
-    return total if total.is_polynomial(ANGLE) else sp.simplify(total)
-
-
 def _slope(series: Powers) -> Powers:
     """Return the derivative of a series."""
     return Powers(
@@ -164,11 +156,16 @@ def constant_rate(choice: Choice) -> ConstantRate:
     Parameters
     ----------
     choice : Choice
-        An attitude step.
+        An attitude step that is linear in its state.
 
     Returns
     -------
     ConstantRate
+
+    Raises
+    ------
+    InputError
+        If the step is not.
 
     Examples
     --------
@@ -177,72 +174,98 @@ def constant_rate(choice: Choice) -> ConstantRate:
     >>> constant_rate(catalogue.choose("euler", "rk2")).stretch_squared
     x**4/64 + 1
     """
-    taken = one_step.step(choice)
-    kernel = taken.kernel
-    assert kernel.companions is not None, "checked by `step`"
-    state = _state(taken)
-    used = [k for k, x in enumerate(state) if x]
-    if kernel.companions.attitude is not None and len(state) == 4 and len(used) == 2:
-        identity = kernel.companions.identity
-        scalar = next(k for k, x in enumerate(identity) if x)
-        vector = next(k for k in used if k != scalar)
-        cosine, sine = state[scalar], state[vector]
-        return ConstantRate(kernel.name, cosine, sine, True, _square(cosine, sine), taken.lowest)
-    if kernel.companions.attitude is not None:
-        attitude = catalogue.derive(catalogue.choose(kernel.companions.attitude))
-        names = attitude.inputs[0].elements
-        made = _expanded(attitude, dict(zip(names, state, strict=True)))
-        state = [sp.cancel(x) for x in made]
-    return ConstantRate(kernel.name, state[0], state[3], False, state[8], taken.lowest)
-
-
-def _state(taken: Step) -> list[sp.Expr]:
-    """Return the state after one step by the angle x about z."""
-    kernel = taken.kernel
-    assert kernel.companions is not None, "checked by `step`"
+    taken = one_step.linear_step(choice)
+    kernel, companions = taken.kernel, taken.kernel.companions
+    assert companions is not None, "checked by `linear_step`"
     state, samples = kernel.inputs
-    share = sp.S.One
-    if taken.nodes is None:
-        share = sp.Rational(1, samples.shape[0] - kernel.companions.previous)
+    share = 1 if taken.nodes is not None else samples.shape[0] - companions.previous
     given = {
         name: sp.Rational(x.numerator, x.denominator)
-        for name, x in zip(state.elements, kernel.companions.identity, strict=True)
+        for name, x in zip(state.elements, companions.identity, strict=True)
     }
-    turned = {name: share * ANGLE if k % 3 == 2 else sp.S.Zero for k, name in enumerate(samples.elements)}
+    turned = {name: ANGLE / share if k % 3 == 2 else sp.S.Zero for k, name in enumerate(samples.elements)}
+    attitude = None
+    if companions.attitude is not None:
+        attitude = catalogue.derive(catalogue.choose(companions.attitude))
     try:
-        return _polynomials(taken, {**given, **turned})
-    except _NoPolynomialError:
-        return [_simple(x) for x in _expanded(kernel, {**given, **turned})]
+        made = _rational(taken.domain, kernel, {**given, **turned}, attitude)
+    except _NotRationalError:
+        made = _simplified(kernel, {**given, **turned}, attitude)
+    scalar = next((k for k, x in enumerate(companions.identity) if x), 0)
+    return ConstantRate(kernel.name, *made.part(scalar), taken.lowest)
 
 
-class _NoPolynomialError(Exception):
-    """A step divides by the angle or calls functions of it."""
+@dataclass(frozen=True)
+class _Made:
+    """A state and its direction cosine matrix after a step by the angle x about z, in lowest terms.
+
+    Parameters
+    ----------
+    state, matrix : list of Expr
+    squares : tuple of Expr
+        The sum of the squares of the state's elements, and that of the first column of the matrix.
+    """
+
+    state: list[sp.Expr]
+    matrix: list[sp.Expr]
+    squares: tuple[sp.Expr, sp.Expr]
+
+    def part(self, scalar: int) -> tuple[sp.Expr, sp.Expr, sp.Expr, bool, sp.Expr]:
+        """Return cosine, sine, square of the stretch, whether they are of half the angle, and the factor along z."""
+        used = [k for k, x in enumerate(self.state) if x]
+        if len(self.state) == 4 and len(used) == 2:
+            vector = next(k for k in used if k != scalar)
+            return self.state[scalar], self.state[vector], self.squares[0], True, self.squares[0]
+        return self.matrix[0], self.matrix[3], self.squares[1], False, self.matrix[8]
 
 
-def _polynomials(taken: Step, values: dict[str, sp.Expr]) -> list[sp.Expr]:
-    """Return the state of a step that is a polynomial of the angle."""
-    ring, _ = sp.ring([ANGLE], taken.domain)
+class _NotRationalError(Exception):
+    """A step calls functions of the angle."""
+
+
+def _rational(domain: Any, kernel: Kernel, values: dict[str, sp.Expr], attitude: Kernel | None) -> _Made:
+    """Return what a step makes that is a rational function of the angle."""
+    field, _ = sp.field([ANGLE], domain)
 
     def number(value: sp.Expr) -> Any:
-        return ring(ring.domain.from_sympy(value))
+        return field(domain.from_sympy(value))
 
     def function(expression: sp.Expr, arguments: list[Any]) -> Any:
         if expression.is_number:
             return number(expression)
-        raise _NoPolynomialError
+        if expression.is_Pow and expression.exp.is_Integer:
+            return arguments[0] ** int(expression.exp)
+        raise _NotRationalError
 
-    kernel = taken.kernel
-    taken_in = {name: ring.from_expr(value) for name, value in values.items()}
-    known = evaluate_stages((*kernel.stages, *kernel.outputs), taken_in, number, function)
-    return [known[name].as_expr() for name in kernel.outputs[-1].signal.elements]
+    def evaluated(made: Kernel, taken: dict[str, Any]) -> list[Any]:
+        known = evaluate_stages((*made.stages, *made.outputs), taken, number, function)
+        return [known[name] for name in made.outputs[-1].signal.elements]
+
+    state = evaluated(kernel, {name: field.from_expr(value) for name, value in values.items()})
+    matrix = state
+    if attitude is not None:
+        matrix = evaluated(attitude, dict(zip(attitude.inputs[0].elements, state, strict=True)))
+    squares = (sum((x * x for x in state), field.zero), matrix[0] ** 2 + matrix[3] ** 2)
+    return _Made(
+        [x.as_expr() for x in state],
+        [x.as_expr() for x in matrix],
+        (sp.expand(squares[0].as_expr()), sp.expand(squares[1].as_expr())),
+    )
 
 
-def _expanded(kernel: Kernel, values: dict[str, Any]) -> list[sp.Expr]:
-    return [sp.sympify(x) for x in kernel.expand(values)[kernel.outputs[-1].signal.name]]
+def _simplified(kernel: Kernel, values: dict[str, Any], attitude: Kernel | None) -> _Made:
+    """Return what a step makes that calls functions of the angle, as SymPy simplifies it."""
 
+    def evaluated(made: Kernel, taken: dict[str, Any]) -> list[sp.Expr]:
+        rows = made.expand(taken)[made.outputs[-1].signal.name]
+        return [sp.simplify(sp.sympify(x).rewrite(sp.sin)) for x in rows]
 
-def _simple(expression: sp.Expr) -> sp.Expr:
-    return sp.simplify(expression.rewrite(sp.sin))
+    state = evaluated(kernel, values)
+    matrix = state
+    if attitude is not None:
+        matrix = evaluated(attitude, dict(zip(attitude.inputs[0].elements, state, strict=True)))
+    squares = sum(x**2 for x in state), matrix[0] ** 2 + matrix[3] ** 2
+    return _Made(state, matrix, (sp.simplify(squares[0]), sp.simplify(squares[1])))
 
 
 def _plain(expression: sp.Expr) -> sp.Expr:

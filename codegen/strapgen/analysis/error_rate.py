@@ -90,11 +90,7 @@ def error_rate(choice: Choice, motion: str, terms: int = 2) -> ErrorRate:
     >>> found.order, found.matrices[1][0, 0]
     (1, a**2*cos(b*t)**2/2)
     """
-    taken = one_step.step(choice)
-    if taken.kernel.transition is None:
-        raise InputError(
-            f"kernel {taken.kernel.name} is not linear in its state: what it loses in a run depends on the attitude"
-        )
+    taken = one_step.linear_step(choice)
     order = taken.kernel.order
     try:
         if choice.name in user.KERNELS:

@@ -84,6 +84,22 @@ def step(choice: Choice) -> Step:
     return Step(kernel, nodes, kernel.order.step + 1 if kernel.order and rounded else 0)
 
 
+def linear_step(choice: Choice) -> Step:
+    """Return a chosen attitude step that is linear in its state, so that it loses the same at any attitude.
+
+    Raises
+    ------
+    InputError, InputTypeError
+        If it is not, or no attitude step.
+    """
+    taken = step(choice)
+    if taken.kernel.transition is None:
+        raise InputError(
+            f"kernel {taken.kernel.name} is not linear in its state: what it loses in a run depends on the attitude"
+        )
+    return taken
+
+
 def errors(taken: Step, ring: Any, rate: Rate, top: int) -> dict[str, list[Powers]]:
     """Return the error matrix of one step from zero rotation, and its parts, up to a power of the step.
 

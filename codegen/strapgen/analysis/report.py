@@ -96,7 +96,7 @@ def report(choice: Choice, motion: str = "general", terms: int = 2) -> Report:
             run = accumulate(choice, motion, terms)
         except InputError as error:
             why = str(error)
-    constant = constant_rate(choice) if motion == "constant" else None
+    constant = constant_rate(choice) if motion == "constant" and run is not None else None
     return Report(step, growth(choice, motion, terms), run, constant, why)
 
 

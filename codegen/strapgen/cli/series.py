@@ -159,9 +159,9 @@ def series(
         return
     from strapgen.analysis import report as reports
 
+    files = {} if plot is None else _plotted(choice, motion, settings, steps, duration, count, plot)
     found = reports.report(choice, motion, 2 if count is None else count)
     text = reports.as_latex(found) if format == "latex" else reports.as_report(found)
-    files = {} if plot is None else _plotted(choice, motion, settings, steps, duration, count, plot)
     _emit(text, found.as_dict(), format, out, files)
 
 
@@ -234,6 +234,7 @@ def _plotted(
     if steps is not None:
         ladder = tuple(step.strip() for step in steps.split(",") if step.strip())
     profile = make_motion(motion, **given)
+    plots.require_kind(plot)
     found = [
         agreement.agreement(choice, profile, ladder, duration, powers)
         for powers in ((1,) if count == 1 else (1, 3))  # every other power may be without drift

@@ -14,8 +14,14 @@ from strapgen.exceptions import InputError
 def stability(
     algorithm: StepAlgorithm,
     methods: Annotated[
-        str, typer.Option("--method", metavar="NAME,...", help="Integration methods.")
-    ] = "rk1,rk2,rk3,rk4",
+        str | None,
+        typer.Option(
+            "--method",
+            metavar="NAME,...",
+            help="Integration methods.  [default: rk1,rk2,rk3,rk4; that of an algorithm of your own]",
+            show_default=False,
+        ),
+    ] = None,
     plot: Annotated[
         Path | None, typer.Option("--plot", help="Image file for the plot.", show_default=False)
     ] = None,
@@ -31,15 +37,15 @@ def stability(
     check_format(format)
     from strapgen import catalogue, checks, output
 
-    names = list(dict.fromkeys(name.strip() for name in methods.split(",") if name.strip()))
-    if not names:
-        raise InputError("--method names no method")
-    for name in names:
-        checks.choice("method", name, catalogue.METHODS)
+    ours = algorithm in catalogue.ALGORITHMS
+    names: list[str | None] = [*catalogue.STANDARD_METHODS] if ours else [None]
+    if methods is not None:
+        given = list(dict.fromkeys(name.strip() for name in methods.split(",") if name.strip()))
+        if not given:
+            raise InputError("--method names no method")
+        names = [checks.choice("method", name, catalogue.METHODS) for name in given]
     choices = [
-        catalogue.choose_step(algorithm, name, catalogue.enough(name))
-        if algorithm in catalogue.ALGORITHMS
-        else catalogue.choose_step(algorithm, name)
+        catalogue.choose_step(algorithm, name, catalogue.enough(name) if ours and name else None)
         for name in names
     ]
     from strapgen.analysis import growth
