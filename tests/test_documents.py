@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text()
 
 
-@pytest.mark.parametrize("page", ["python-api", "canonical-form", "fixed-point", "coning"])
+@pytest.mark.parametrize("page", ["python-api", "canonical-form", "fixed-point", "coning", "two-speed"])
 def test_page(page):
     result = doctest.testfile(str(ROOT / "docs" / f"{page}.md"), module_relative=False)
     assert result.attempted >= 10
@@ -44,6 +44,7 @@ def test_readme_shows_every_command():
         "converge",
         "check",
         "coning",
+        "two-speed",
         "study",
     }
     assert "`strapgen tables`" in README

@@ -15,14 +15,16 @@ from strapgen.program import OPERATIONS, Program
 #: Decimal digits: a million steps lose six of them.
 DIGITS = 40
 
-_FUNCTIONS: dict[str, Callable[..., Any]] = {
-    **OPERATIONS,
-    "sqrt": mpmath.sqrt,
+#: The functions of programs on numbers of mpmath, roots apart.
+FUNCTIONS: dict[str, Callable[..., Any]] = {
     "sin": mpmath.sin,
     "cos": mpmath.cos,
     "sinc": mpmath.sinc,
     "atan2": mpmath.atan2,
+    "direction": mpmath.atan2,
+    "wrap": lambda x: x - 2 * mpmath.pi * (int(x > mpmath.pi) - int(x < -mpmath.pi)),
 }
+_OPERATIONS: dict[str, Callable[..., Any]] = {**OPERATIONS, "sqrt": mpmath.sqrt, **FUNCTIONS}
 
 
 def number(value: Fraction) -> Any:
@@ -58,7 +60,7 @@ class Interpreter:
         return list(self._run(values).values())[-1]
 
     def _run(self, values: Mapping[str, Any]) -> dict[str, list[Any]]:
-        return self.program.run(values, self._constant, _FUNCTIONS)
+        return self.program.run(values, self._constant, _OPERATIONS)
 
     def _constant(self, value: Fraction) -> Any:
         if value not in self._constants:

@@ -15,7 +15,18 @@ from strapgen.exceptions import InputError
 from strapgen.fixedpoint import Settings
 from strapgen.targets import FIXED, Sources
 
-__all__ = ["BACKENDS", "Backend", "Entry", "Evaluator", "backend", "build", "evaluator", "fitted", "of"]
+__all__ = [
+    "BACKENDS",
+    "Backend",
+    "Entry",
+    "Evaluator",
+    "backend",
+    "build",
+    "evaluator",
+    "fitted",
+    "of",
+    "of_sources",
+]
 
 
 class Entry(NamedTuple):
@@ -123,7 +134,7 @@ def evaluator(kernel: str | Choice, backend: str = "numpy", settings: Settings |
             checks.choice("kernel", kernel, catalogue.KERNELS)
         kernel = catalogue.choose(kernel)
     chosen = fitted(backend, settings)
-    return _evaluator(library.sources(kernel, BACKENDS[backend].target, chosen))
+    return of_sources(library.sources(kernel, BACKENDS[backend].target, chosen))
 
 
 def backend(
@@ -214,14 +225,15 @@ def build(sources: Sources, orthonormalization: str | None = None) -> Backend:
 
     def evaluate(kernel: str) -> Evaluator:
         if kernel == sources.kernel:
-            return _evaluator(sources)
+            return of_sources(sources)
         settings = sources.fixed.companion_settings if sources.fixed else None
-        return _evaluator(library.sources(catalogue.choose(kernel), sources.target, settings))
+        return of_sources(library.sources(catalogue.choose(kernel), sources.target, settings))
 
     make = _loaded(sources.target)[1]
     return make(sources, evaluate, orthonormalization)
 
 
-def _evaluator(sources: Sources) -> Evaluator:
+def of_sources(sources: Sources) -> Evaluator:
+    """Return the generated function of any kernel as a callable."""
     make: Callable[[Sources], Evaluator] = _loaded(sources.target)[0]
     return make(sources)

@@ -102,8 +102,131 @@ class Recipe(NamedTuple):
     title: str
     module: str
     function: str
-    arguments: tuple[str, ...] = ()
+    arguments: tuple[Any, ...] = ()
+    standard: bool = True
 
+
+#: Orders of the updates that are cut off.
+UPDATE_ORDERS = range(1, 21)
+
+#: Kernels of algorithms in two speeds that are in the standard catalogue; their variants are not.
+_STANDARD_TWO_SPEED = (
+    *("dcm-update", "euler-update", "navigation-rotation", "coning-fast", "coning-slow", "sculling-fast-1"),
+    *(
+        "sculling-fast-2",
+        "dcm-velocity-2",
+        "euler-velocity-2",
+        "navigation-velocity",
+        "euler-normalize-first-order",
+    ),
+    *(
+        "euler-from-dcm-sheppard",
+        "euler-from-dcm-continuous",
+        "dcm-from-euler-angles",
+        "euler-angles-from-dcm",
+    ),
+)
+
+#: Kernels of algorithms in two speeds: they take no method.
+_TWO_SPEED = {
+    **{
+        f"{algorithm}-update": Recipe(
+            f"{title}: update by a rotation vector", "updates", "update", (algorithm,)
+        )
+        for algorithm, title in ALGORITHMS.items()
+    },
+    **{
+        f"{algorithm}-update-{order}": Recipe(
+            f"{title}: update by a rotation vector, order {order}",
+            "updates",
+            "update",
+            (algorithm, order),
+        )
+        for algorithm, title in ALGORITHMS.items()
+        for order in UPDATE_ORDERS
+    },
+    **{
+        f"{algorithm}-navigation-update{suffix}": Recipe(
+            f"{title}: update by the rotation of the navigation frame{words}",
+            "updates",
+            "navigation_update",
+            (algorithm, order),
+        )
+        for algorithm, title in ALGORITHMS.items()
+        for order, suffix, words in ((1, "-1", ", order 1"), (2, "-2", ", order 2"), (None, "", ""))
+    },
+    "navigation-rotation": Recipe(
+        "rotation of the navigation frame, trapezoidal", "updates", "navigation_rotation"
+    ),
+    "coning-fast": Recipe("rotation vector by recursion: fast loop", "two_speed", "coning"),
+    "coning-slow": Recipe("rotation vector by recursion: slow loop", "two_speed", "rotation_vector"),
+    **{
+        f"sculling-fast-{form}": Recipe(
+            f"sculling integral S{form} by recursion: fast loop", "two_speed", "sculling", (form,)
+        )
+        for form in (1, 2)
+    },
+    **{
+        f"{name}-{what}": Recipe(title, "acceleration", function, (name, *more))
+        for name in ("dcm", "euler")
+        for what, title, function, *more in (
+            ("acceleration", "acceleration transformation", "transformation"),
+            ("velocity-1", "velocity increment in navigation axes with S1", "velocity", 1),
+            ("velocity-2", "velocity increment in navigation axes with S2", "velocity", 2),
+        )
+    },
+    "navigation-velocity": Recipe(
+        "velocity correction for the rotation of the navigation frame", "acceleration", "navigation_velocity"
+    ),
+    **{
+        f"two-speed-fast-{form}": Recipe(f"two speeds: fast loop with S{form}", "loops", "fast", (form,))
+        for form in (1, 2)
+    },
+    **{
+        f"{name}-two-speed-slow-{form}": Recipe(
+            f"two speeds: slow loop with S{form}", "loops", "slow", (name, form)
+        )
+        for name in ("dcm", "euler")
+        for form in (1, 2)
+    },
+    **{
+        f"{name}-two-speed-navigation": Recipe("two speeds: navigation loop", "loops", "navigation", (name,))
+        for name in ("dcm", "euler")
+    },
+    "dcm-rows-orthogonalize": Recipe(
+        "rows made orthogonal, to first order", "orthonormal", "rows_orthogonalized"
+    ),
+    "dcm-rows-normalize": Recipe("rows made of length 1, to first order", "orthonormal", "rows_normalized"),
+    "dcm-third-row": Recipe("third row from the first two", "orthonormal", "third_row"),
+    **{
+        f"{name}-normalize-first-order": Recipe(
+            "normalization to first order", "orthonormal", "normalized_first_order", (name,)
+        )
+        for name in ("euler", "cayley-klein")
+    },
+    "euler-from-dcm-sheppard": Recipe(
+        "conversion: the largest parameter keeps its sign",
+        "conversions",
+        "euler_from_dcm_followed",
+        ("element",),
+    ),
+    "euler-from-dcm-continuous": Recipe(
+        "conversion: the nearer sign to the call before",
+        "conversions",
+        "euler_from_dcm_followed",
+        ("product",),
+    ),
+    "dcm-from-euler-angles": Recipe(
+        "conversion: direction cosine matrix from Euler angles", "euler_angles", "dcm_from_euler_angles"
+    ),
+    "euler-angles-from-dcm": Recipe(
+        "conversion: Euler angles from direction cosine matrix", "euler_angles", "euler_angles_from_dcm"
+    ),
+}
+
+TWO_SPEED = {
+    name: recipe._replace(standard=name in _STANDARD_TWO_SPEED) for name, recipe in _TWO_SPEED.items()
+}
 
 #: Kernels that take no method.
 KERNELS = {
@@ -146,6 +269,7 @@ KERNELS = {
         )
         for motion in MOTIONS
     },
+    **TWO_SPEED,
 }
 
 
@@ -267,7 +391,11 @@ def choose(
     if name.endswith(".py") or (name not in RESERVED and name in user.installed()):
         return _choose_own(name, method, increments, rates, previous)
     if name not in RESERVED:
-        raise InputError(f"algorithm {name!r} is not known; allowed: {_allowed(*VECTORS, *KERNELS)}")
+        shown = [kernel for kernel, recipe in KERNELS.items() if recipe.standard]
+        raise InputError(
+            f"algorithm {name!r} is not known; "
+            f"allowed: {_allowed(*VECTORS, *shown, 'other kernels of strapgen list')}"
+        )
     if name in KERNELS:
         given = {
             "method": method.name if isinstance(method, Tableau) else method,
@@ -387,7 +515,7 @@ def orthonormalizations(algorithm: str) -> list[str]:
 def standard() -> list[Choice]:
     """Return the standard catalogue: every algorithm by the thesis's methods on two increments, and all else."""
     steps = [Choice(algorithm, method, 2) for algorithm in ALGORITHMS for method in STANDARD_METHODS]
-    return steps + [Choice(name) for name in KERNELS]
+    return steps + [Choice(name) for name, recipe in KERNELS.items() if recipe.standard]
 
 
 def derive(choice: Choice) -> Kernel:

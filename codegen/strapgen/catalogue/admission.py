@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 import sympy as sp
 
 from strapgen import checks
+from strapgen.algebra import Direction, Wrapped
 from strapgen.exceptions import InputError
 from strapgen.kernel import Kernel
 from strapgen.signal import Signal
@@ -23,10 +24,10 @@ sin cos tan sqrt exp log pow floor ceil round fabs abs asin acos atan atan2 sinh
 """
 _OF_C = frozenset(_WORDS.split())
 #: Functions that can be generated.
-_FUNCTIONS = (sp.sin, sp.cos, sp.sinc, sp.atan2, sp.Max, sp.Piecewise)
+_FUNCTIONS = (sp.sin, sp.cos, sp.sinc, sp.atan2, sp.asin, sp.acos, Direction, Wrapped, sp.Max, sp.Piecewise)
 _COMPARISONS = (sp.Gt, sp.Ge, sp.Lt, sp.Le)
 ALLOWED = (
-    "exact numbers, + - * /, whole powers, square roots, sin, cos, sinc, atan2, Max, "
+    "exact numbers, + - * /, whole powers, square roots, sin, cos, sinc, atan2, asin, acos, Max, "
     "and Piecewise on < <= > >= with a last case that is always true"
 )
 

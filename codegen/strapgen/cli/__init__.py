@@ -20,6 +20,7 @@ from strapgen.cli import (
     study,
     tableau,
     tables,
+    two_speed,
     version,
 )
 from strapgen.exceptions import StrapgenError
@@ -42,6 +43,7 @@ app.command("compare")(compare.compare)
 app.command("converge")(converge.converge)
 app.command("check")(check.check)
 app.command("tables")(tables.tables)
+app.command("two-speed")(two_speed.two_speed)
 app.add_typer(study.app, name="study")
 
 

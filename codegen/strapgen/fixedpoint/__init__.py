@@ -40,7 +40,7 @@ def quantize(program: Program, settings: Settings) -> FixedProgram:
 OPERATIONS = frozenset(
     (
         *("add", "subtract", "multiply", "divide", "negate", "sqrt", "maximum", "select", "at_least"),
-        *("sin", "cos", "sinc", "atan2"),
+        *("sin", "cos", "sinc", "atan2", "direction", "wrap"),
     )
 )
 
