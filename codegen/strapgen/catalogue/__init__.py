@@ -17,6 +17,7 @@ from strapgen.catalogue.tableaux import TABLEAUX, TITLES, Tableau
 from strapgen.exceptions import InputError, InputTypeError
 
 if TYPE_CHECKING:
+    from strapgen.catalogue.coefficients import Number
     from strapgen.catalogue.steps import Method
     from strapgen.kernel import Kernel
 
@@ -482,6 +483,13 @@ def previous(choice: Choice) -> int:
         companions = user.KERNELS[choice.name].companions
         return companions.previous if companions else 0
     return choice.previous
+
+
+def nodes(choice: Choice) -> tuple[Number, ...]:
+    """Return the nodes at which a step takes the rate; empty for one that takes increments."""
+    if choice.method is None or choice.increments is not None:
+        return ()
+    return _method(choice.method).nodes
 
 
 def rounding(choice: Choice) -> Fraction:

@@ -22,6 +22,7 @@ from strapgen.cli import (
     tables,
     two_speed,
     version,
+    vibration,
 )
 from strapgen.exceptions import StrapgenError
 
@@ -42,6 +43,7 @@ app.command("simulate")(simulate.simulate)
 app.command("compare")(compare.compare)
 app.command("converge")(converge.converge)
 app.command("check")(check.check)
+app.command("vibration")(vibration.vibration)
 app.command("tables")(tables.tables)
 app.command("two-speed")(two_speed.two_speed)
 app.add_typer(study.app, name="study")
