@@ -304,7 +304,7 @@ def vibration_image(
     figure, grid = pyplot.subplots(
         len(panels),
         1,
-        figsize=(9.5, 1.6 + 4.2 * len(panels)),
+        figsize=(8.5, 1.0 + 3.4 * len(panels) + 0.11 * len(curves)),
         sharex=True,
         layout="constrained",
         squeeze=False,
@@ -323,7 +323,7 @@ def vibration_image(
                 linestyle=_LINES[place // len(_MANY_COLOURS) % len(_LINES)],
                 linewidth=3.0
                 - 1.8 * place / max(1, len(labels) - 1),  # equal errors: one line inside the other
-                label=label,
+                label=f"error of {label}",
             )
         if mark_hz and hertz[0] <= mark_hz <= hertz[-1]:
             axes.axvline(mark_hz, color="0.6", linewidth=0.9, zorder=0)
@@ -343,7 +343,7 @@ def vibration_image(
             lowest = min(
                 float(np.min(np.abs(curve.error[curve.error != 0]), initial=1.0)) for _, curve in group
             )
-            axes.set_ylim(max(lowest * factor / 3, highest * _LOWEST), highest * 30)
+            axes.set_ylim(max(lowest * factor / 3, highest * _LOWEST), highest * 8)
         axes.set_ylabel(words)
         axes.set_xlim(hertz[0], hertz[-1])
         axes.spines[["top", "right"]].set_visible(False)
@@ -353,18 +353,20 @@ def vibration_image(
     for axes in grid[:, 0]:
         handles, texts = axes.get_legend_handles_labels()
         found |= dict(zip(texts, handles, strict=True))
-    figure.legend(found.values(), found.keys(), loc="outside right center", frameon=False, fontsize=9)
+    figure.legend(
+        found.values(), found.keys(), loc="outside lower center", ncols=2, frameon=False, fontsize=9
+    )
     figure.suptitle(title.encode(errors="replace").decode(), fontsize=11, x=0.01, ha="left")
     return _image(figure, path)
 
 
 #: What is drawn of rates under vibration, and the factor to it.
 _VIBRATION = {
-    "rad/s": ("error of the drift rate, deg/h", math.degrees(3600)),
-    "m/s^2": ("error of the acceleration, micro-g", 1e6 / 9.80665),
+    "rad/s": ("mean drift, deg/h", math.degrees(3600)),
+    "m/s^2": ("mean acceleration, micro-g", 1e6 / 9.80665),
 }
 #: The lowest error that is drawn, as a part of the highest true rate.
-_LOWEST = 1e-12
+_LOWEST = 1e-9
 _MANY_COLOURS = (*_COLOURS, "#8a4f9e", "#c79a1b", "#2a9d9d", "#a83250", "#6b6b6b")
 _LINES = ("-", (0, (5, 2)), (0, (1, 1.5)))
 

@@ -18,8 +18,39 @@ if TYPE_CHECKING:
 _Text = str | None
 
 
-def _number(name: str, what: str, metavar: str) -> Any:
-    return Annotated[_Text, typer.Option(name, metavar=metavar, help=what, show_default=False)]
+FrequencyHz = Annotated[
+    _Text, typer.Option("--frequency-hz", metavar="F", help="Frequency f in Hz.", show_default=False)
+]
+Step = Annotated[
+    _Text,
+    typer.Option(
+        "--step", metavar="S", help="Step T in s; of a fast loop the slow cycle.", show_default=False
+    ),
+]
+ThetaX = Annotated[
+    _Text,
+    typer.Option(
+        "--theta-x-rad", metavar="X", help="Amplitude of the angle about x in rad.", show_default=False
+    ),
+]
+ThetaY = Annotated[
+    _Text,
+    typer.Option(
+        "--theta-y-rad", metavar="Y", help="Amplitude of the angle about y in rad.", show_default=False
+    ),
+]
+Phase = Annotated[
+    _Text, typer.Option("--phase-rad", metavar="P", help="Phase of y before x in rad.", show_default=False)
+]
+AccelerationY = Annotated[
+    _Text,
+    typer.Option(
+        "--acceleration-y",
+        metavar="M_S2",
+        help="Amplitude of the acceleration along y in m/s^2: the sculling rates too.",
+        show_default=False,
+    ),
+]
 
 
 def vibration(
@@ -46,14 +77,12 @@ def vibration(
     ] = None,
     previous: Previous = None,
     rates: Rates = False,
-    frequency: _number("--frequency-hz", "Frequency f in Hz.", "F") = None,  # type: ignore[valid-type]
-    step: _number("--step", "Step T in s; of a fast loop the slow cycle.", "S") = None,  # type: ignore[valid-type]
-    theta_x: _number("--theta-x-rad", "Amplitude of the angle about x in rad.", "X") = None,  # type: ignore[valid-type]
-    theta_y: _number("--theta-y-rad", "Amplitude of the angle about y in rad.", "Y") = None,  # type: ignore[valid-type]
-    phase: _number("--phase-rad", "Phase of y before x in rad.", "P") = None,  # type: ignore[valid-type]
-    acceleration: _number(  # type: ignore[valid-type]
-        "--acceleration-y", "Amplitude of the acceleration along y in m/s^2: the sculling rates too.", "M_S2"
-    ) = None,
+    frequency: FrequencyHz = None,
+    step: Step = None,
+    theta_x: ThetaX = None,
+    theta_y: ThetaY = None,
+    phase: Phase = None,
+    acceleration: AccelerationY = None,
     spectrum: Annotated[
         Path | None,
         typer.Option(
@@ -108,12 +137,10 @@ def vibration(
     from strapgen import output
     from strapgen import vibration as assessing
 
-    names: list[_Text] = list(_listed(methods)) or [None]
-    counts: list[_Text] = list(_listed(increments)) or [None]
     cases = [
         case
-        for name in names
-        for count in counts
+        for name in _listed("--method", methods)
+        for count in _listed("--increments", increments)
         for case in _assessed(
             algorithm,
             (name, tableau, count, previous, rates),
@@ -123,6 +150,7 @@ def vibration(
         )
     ]
     found: list[_Outcome] = []
+    given: dict[str, Any] = {}
     if spectrum is None:
         given = {
             "theta_x": theta_x,
@@ -135,7 +163,7 @@ def vibration(
         words += "" if acceleration is None else f", {acceleration} m/s^2 along y"
         words += f", phase {phase} rad"
         found = [
-            _Outcome(case, case.assessment.rates(frequency, step, cycles=case.cycles, **given))
+            _Outcome(case, case.assessment.rates(frequency or "", step or "", cycles=case.cycles, **given))
             for case in cases
         ]
     else:
@@ -143,7 +171,7 @@ def vibration(
         words = f"spectrum {spectrum.name}, {shaken.edges[0]:g} to {shaken.edges[-1]:g} Hz"
         for case in cases:
             if case.moved(set(shaken.transfers)):
-                random = assessing.random_rates(case.assessment, shaken, step, cycles=case.cycles)
+                random = assessing.random_rates(case.assessment, shaken, step or "", cycles=case.cycles)
                 found.append(_Outcome(case, random.rates, random.quadrature))
         if not found:
             raise InputError(
@@ -202,8 +230,14 @@ def _check_vibration(
         raise InputError("--plot-hz goes with --plot")
 
 
-def _listed(text: _Text) -> list[str]:
-    return list(dict.fromkeys(part.strip() for part in (text or "").split(",") if part.strip()))
+def _listed(option: str, text: _Text) -> list[_Text]:
+    """Return the parts of a list, each once; nothing is given where there is none."""
+    if text is None:
+        return [None]
+    parts: list[_Text] = list(dict.fromkeys(part.strip() for part in text.split(",") if part.strip()))
+    if not parts:
+        raise InputError(f"{option} is {text!r}; a list with commas between is needed")
+    return parts
 
 
 def _assessed(
@@ -247,29 +281,29 @@ _READ = {"rad/s": ("deg/h", math.degrees(3600)), "m/s^2": ("micro-g", 1e6 / 9.80
 
 def _merged(found: list[_Outcome]) -> list[dict[str, Any]]:
     """Return plain JSON data, an object an algorithm."""
-    merged: dict[tuple[str, int | None], dict[str, Any]] = {}
-    for case, rates, quadrature in found:
-        unit = _UNITS[case.assessment.unit]
-        data = merged.setdefault((case.assessment.kernel, case.cycles), {})
-        data |= {f"{part}_{unit}": value for part, value in rates._asdict().items()}
-        if quadrature is not None:
-            data |= {f"{part}_quadrature_{unit}": value for part, value in quadrature._asdict().items()}
-    for (kernel, cycles), data in merged.items():
-        data |= {
-            "kernel": kernel,
-            "increments": next(o.case.samples for o in found if _is(o, kernel, cycles)),
-        }
-        for outcome in found:
-            if _is(outcome, kernel, cycles):
-                name = "drift" if outcome.case.assessment.unit == "rad/s" else "sculling"
-                data[f"{name}_closed_form"] = {
-                    part: outcome.case.assessment.text(part) for part in ("computed", "continuous")
+    groups: dict[str, list[_Outcome]] = {}
+    for outcome in found:
+        groups.setdefault(_label(outcome.case), []).append(outcome)
+    merged = []
+    for group in groups.values():
+        data: dict[str, Any] = {}
+        for case, rates, quadrature in group:
+            unit = _UNITS[case.assessment.unit]
+            data |= {f"{part}_{unit}": value for part, value in rates._asdict().items()}
+            if quadrature is not None:
+                data |= {f"{part}_quadrature_{unit}": value for part, value in quadrature._asdict().items()}
+        data |= {"kernel": group[0].case.assessment.kernel, "increments": group[0].case.samples}
+        for case, _, quadrature in group:
+            if quadrature is None:
+                data[f"{_quantity(case)}_closed_form"] = {
+                    part: case.assessment.text(part) for part in ("computed", "continuous")
                 }
-    return list(merged.values())
+        merged.append(data)
+    return merged
 
 
-def _is(outcome: _Outcome, kernel: str, cycles: int | None) -> bool:
-    return (outcome.case.assessment.kernel, outcome.case.cycles) == (kernel, cycles)
+def _quantity(case: _Case) -> str:
+    return "drift" if case.assessment.unit == "rad/s" else "sculling"
 
 
 def _label(case: _Case) -> str:
@@ -286,20 +320,20 @@ def _text(found: list[_Outcome], title: str) -> str:
         heads = [f"{part}, {unit}" for part in ("continuous", "computed", "error")] + [f"error, {read}"]
         lines += [
             "",
-            f"{'drift' if unit == 'rad/s' else 'sculling':<{width}} " + "".join(f"{h:>20}" for h in heads),
+            f"{_quantity(group[0].case):<{width}} " + "".join(f"{h:>20}" for h in heads),
         ]
         for outcome in group:
             cells = "".join(f"{value:>20.9e}" for value in outcome.rates)
             lines.append(f"{_label(outcome.case):<{width}} {cells}{outcome.rates.error * factor:>20.6g}")
             if outcome.quadrature is not None:
                 spread = "".join(f"{value:>20.1e}" for value in outcome.quadrature)
-                lines.append(f"{'  integrals, at most off by':<{width}} {spread}"[: width + 1 + 60])
-    if len({_label(outcome.case) for outcome in found}) == 1:
+                lines.append(f"{'  quadrature':<{width}} {spread}")
+    if all(outcome.quadrature is None for outcome in found) and len({_label(o.case) for o in found}) == 1:
         for outcome in found:
             made = outcome.case.assessment
             lines += [
                 "",
-                f"closed form of the {'drift' if made.unit == 'rad/s' else 'sculling'} rate in {made.unit}",
+                f"closed form of the {_quantity(outcome.case)} rate in {made.unit}",
             ]
             lines += [f"  {part:<10} = {made.text(part)}" for part in ("continuous", "computed")]
     return "\n".join(lines)
@@ -333,7 +367,7 @@ def _image(
 
     length = float(checks.number("step", step or "", positive=True))
     high: Any = max(case.samples for case in cases) / length / 2
-    low: Any = high / 300
+    low: Any = high / 100
     if span is not None:
         ends = span.split(",")
         if len(ends) != 2:
@@ -346,7 +380,7 @@ def _image(
     ]
     return plots.vibration_image(
         drawn,
-        f"Error under vibration, step {step} s\n{words.partition(', ')[2]}",
+        f"Errors under vibration, step {step} s\n{words.partition(', ')[2]}",
         path,
-        float(frequency or 0),
+        float(checks.number("frequency-hz", frequency or "")),
     )

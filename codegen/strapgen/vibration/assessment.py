@@ -200,6 +200,10 @@ class Assessment:
         }
         values = [_accurate(self._exactly[part], list(given.values())) for part in PARTS]
         if not all(map(np.isfinite, values)):
+            if not self.resonant:
+                raise InputError(
+                    f"{self.kernel}: the rates at {frequency_hz} Hz are beyond the range of double"
+                )
             raise InputError(
                 f"{self.kernel} has no mean rate at {frequency_hz} Hz and a step of {step} s: "
                 "every step has the same samples, and it turns about their axis"
@@ -371,7 +375,7 @@ def sculling(kernel: Kernel, *, nodes: Sequence[Fraction | sp.Expr] = (), previo
     >>> sculling(derive("sculling-fast-2")).expression("continuous").has(systems.T_M)
     True
     """
-    if not any(signal.name in systems.SAMPLES and signal.unit == "m/s" for signal in kernel.inputs):
+    if not _takes_velocities(kernel):
         if kernel.recursion is not None and kernel.companions is None:
             raise InputError(f"kernel {kernel.name} takes no velocity increments; sculling-fast-1 or -2 does")
         return _dual(drift(kernel, nodes=nodes, previous=previous))
@@ -383,6 +387,10 @@ def sculling(kernel: Kernel, *, nodes: Sequence[Fraction | sp.Expr] = (), previo
     compensated = any(form.real != 0 for form in computed.values())
     true = response.true_forms("S1" if compensated and not endless else "S2", endless)
     return Assessment(kernel.name, "m/s^2", not endless, computed, true)
+
+
+def _takes_velocities(kernel: Kernel) -> bool:
+    return any(signal.name in systems.SAMPLES and signal.unit == "m/s" for signal in kernel.inputs)
 
 
 def _dual(assessment: Assessment) -> Assessment:
@@ -426,7 +434,6 @@ def quantities(choice: Choice) -> tuple[str, ...]:
     return tuple(found)
 
 
-@lru_cache(maxsize=64)
 def of(choice: Choice, quantity: str = "drift") -> Assessment:
     """Assess a kernel of the catalogue.
 
@@ -453,8 +460,18 @@ def of(choice: Choice, quantity: str = "drift") -> Assessment:
     >>> [float(f"{rate:.6g}") for rate in rates]
     [-0.00264356, -0.00263046, 1.31029e-05]
     """
-    assess = {"drift": drift, "sculling": sculling}[
-        checks.choice("quantity", quantity, ("drift", "sculling"))
-    ]
+    checks.choice("quantity", quantity, ("drift", "sculling"))
+    if choice.name in catalogue.user.KERNELS:  # which another one of the same name may replace
+        return _of(choice, quantity)
+    return _of_catalogue(choice, quantity)
+
+
+def _of(choice: Choice, quantity: str) -> Assessment:
     kernel = catalogue.derive(choice)
+    if quantity == "sculling" and kernel.companions is not None:
+        return _dual(of(choice))
+    assess = {"drift": drift, "sculling": sculling}[quantity]
     return assess(kernel, nodes=catalogue.nodes(choice), previous=catalogue.previous(choice))
+
+
+_of_catalogue = lru_cache(maxsize=64)(_of)

@@ -217,9 +217,11 @@ class Expander:
                 total = total * base
             return total
         if not base.constant:
-            if exponent == sp.S.Half:
+            if exponent == sp.S.Half and not base.linear:
                 return Root(base)
-            raise InputError("a division by what vanishes")
+            raise InputError(
+                "a division by what vanishes" if exponent < 0 else f"the power {exponent} of what vanishes"
+            )
         if exponent.is_Integer:
             at = base.constant ** int(exponent)
         elif (2 * exponent).is_Integer:
