@@ -268,3 +268,27 @@ def test_the_whole_compiles_without_a_warning(target, tmp_path):
         assert text.isascii() and all(line == line.rstrip() for line in text.splitlines())
     code = [name for name in files if name.endswith(".c")]
     subprocess.run(["gcc", *STRICT, "-c", *code], cwd=tmp_path, check=True)
+
+
+def test_a_run_in_c_goes_on_from_its_memory(rng):
+    # Twice two navigation cycles are four; null pointers and no cycles are refused.
+    angles, velocities, turns = noisy(48, rng)
+    runner = made("dcm", 2, "c")
+    wanted = runner.run(angles, velocities, fast_cycles=4, slow_cycles=3, turns=turns)
+    ffi, lib = runner._whole.ffi, runner._whole.lib
+    memory = ffi.new("dcm_two_speed_2_memory *")
+    pointer = lambda array: ffi.from_buffer("double[]", np.ascontiguousarray(array))  # noqa: E731
+    lib.dcm_two_speed_2_begin(memory, pointer(np.eye(3)))
+    memory.previous_turn[0:3] = turns[0].tolist()
+    attitudes, changes = np.empty((12, 3, 3)), np.empty((4, 3))
+    for half in (0, 1):
+        fast, slow = slice(24 * half, 24 * half + 24), slice(6 * half, 6 * half + 6)
+        given = (angles[fast], velocities[fast], turns[1:][slow])
+        held = [*map(pointer, given), pointer(attitudes[slow]), pointer(changes[2 * half : 2 * half + 2])]
+        assert lib.dcm_two_speed_2_run(2, 3, 4, memory, *held) == 0
+    np.testing.assert_array_equal(attitudes, wanted.attitudes)
+    np.testing.assert_array_equal(changes, wanted.velocity_changes)
+    assert lib.dcm_two_speed_2_run(2, 0, 4, memory, *held) == 4
+    assert lib.dcm_two_speed_2_run(2, 3, 4, ffi.NULL, *held) == 4
+    assert lib.dcm_two_speed_2_run(2, 3, 4, memory, ffi.NULL, *held[1:]) == 4
+    np.testing.assert_array_equal(attitudes, wanted.attitudes)

@@ -240,7 +240,7 @@ class Wrapped(sp.Function):  # type: ignore[misc]
         """Return the value of a number."""
         if not angle.is_number:
             return None
-        turns = sp.Integer(angle > sp.pi) - sp.Integer(angle < -sp.pi)
+        turns = int(bool(angle > sp.pi)) - int(bool(angle < -sp.pi))
         return angle - 2 * sp.pi * turns
 
 

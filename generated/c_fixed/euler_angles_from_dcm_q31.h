@@ -33,7 +33,7 @@ extern "C" {
  *         2^-29 rad; range -1686629857 to 1686629857 (-3.14159 to 3.14159).
  * out     next[3]: Euler angles: roll, pitch, heading; found_roll, found_pitch, found_heading;
  *         format Q2.29, unit 2^-29 rad; range -1686629858 to 1686629858 (-3.14159 to 3.14159);
- *         error at most 5.79497e-09, 3.1112 of the last place.
+ *         error at most 6.12424e-09, 3.2879 of the last place.
  * Returns 0; or, with the outputs left alone, 1 if an input lies outside its range,
  * 2 if it is too far from a proper one, so that something leaves its limits: next_pitch_distance
  *   from 0.5 to 2; apart_distance from 0.5 to 8.

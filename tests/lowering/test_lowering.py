@@ -57,9 +57,7 @@ def test_roots_and_functions_are_where_they_belong():
         "coning-increments",
         "polynomial-truth",
         "dcm-update",
-        "euler-update",
         "euler-from-dcm-sheppard",
-        "euler-from-dcm-continuous",
         "dcm-from-euler-angles",
         "euler-angles-from-dcm",
     }

@@ -112,20 +112,8 @@ UPDATE_ORDERS = range(1, 21)
 
 #: Kernels of algorithms in two speeds that are in the standard catalogue; their variants are not.
 _STANDARD_TWO_SPEED = (
-    *("dcm-update", "euler-update", "navigation-rotation", "coning-fast", "coning-slow", "sculling-fast-1"),
-    *(
-        "sculling-fast-2",
-        "dcm-velocity-2",
-        "euler-velocity-2",
-        "navigation-velocity",
-        "euler-normalize-first-order",
-    ),
-    *(
-        "euler-from-dcm-sheppard",
-        "euler-from-dcm-continuous",
-        "dcm-from-euler-angles",
-        "euler-angles-from-dcm",
-    ),
+    *("dcm-update", "coning-fast", "sculling-fast-2", "dcm-velocity-2"),
+    *("euler-from-dcm-sheppard", "dcm-from-euler-angles", "euler-angles-from-dcm"),
 )
 
 #: Kernels of algorithms in two speeds: they take no method.

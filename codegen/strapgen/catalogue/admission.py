@@ -12,6 +12,7 @@ from strapgen import checks
 from strapgen.algebra import Direction, Wrapped
 from strapgen.exceptions import InputError
 from strapgen.kernel import Kernel
+from strapgen.program import RESOLUTION
 from strapgen.signal import Signal
 
 _NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
@@ -89,6 +90,8 @@ def _require_names(kernel: Kernel, catalogue: frozenset[str]) -> None:
             if not (part.isascii() and part.isidentifier()):
                 _refuse(kernel, f"{part!r} is no name for generated code")
         for element in signal.elements:
+            if element == RESOLUTION:
+                _refuse(kernel, f"{element} stands for the resolution of a target; another name is needed")
             if element in seen:
                 _refuse(
                     kernel,
@@ -107,7 +110,7 @@ def _require_texts(kernel: Kernel) -> None:
 
 
 def _require_formulas(kernel: Kernel) -> None:
-    known = {element for signal in kernel.inputs for element in signal.elements}
+    known = {RESOLUTION, *(element for signal in kernel.inputs for element in signal.elements)}
     for stage in (*kernel.stages, *kernel.outputs):
         name = stage.signal.name
         if len(stage.expressions) != stage.signal.size:

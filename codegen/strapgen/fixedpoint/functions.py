@@ -78,7 +78,7 @@ def derived(
     word : int
         Bits of a word.
     distance : Fraction, optional
-        How far the arguments of atan2 are from the origin at least, where more is known than their ranges tell.
+        The inverse of a bound of how fast atan2 changes with its arguments, where more is known than their ranges tell.
 
     Returns
     -------

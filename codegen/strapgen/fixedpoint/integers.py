@@ -444,7 +444,8 @@ class _Quantization:
         What comes after is bounded as a function of the computed value, so that it stays inside its formats; an output
         that depends on it is certified by the range of its signal alone.
         """
-        if not self._is_limited() or not self._depends_on_operations(quantity.name):
+        only_checked = all(quantity.name not in exact.used_by(item) for item in self.exact.items.values())
+        if only_checked or not self._is_limited() or not self._depends_on_operations(quantity.name):
             raise InputError(
                 f"{self.program.kernel}: words of {self.word} bits are too short for {quantity.name}, its error may be "
                 "as large as itself"
