@@ -21,6 +21,7 @@ from strapgen.kernel import KernelBuilder
 from strapgen.recursion import Recursion
 from strapgen.signal import Signal, after
 from strapgen.simulation import attitude
+from strapgen.two_speed import TwoSpeed
 from strapgen.vibration import assessment
 from strapgen.vibration.assessment import D_Y, PARTS, PHI, THETA_X, THETA_Y
 from strapgen.vibration.systems import T_L, T_M, F, T
@@ -282,6 +283,53 @@ def test_the_recursions_sum_as_the_closed_form_says():
     assert np.all(np.abs(np.array(ends) - wanted) < 1e-12 * np.abs(wanted).max() + 1e-17)
 
 
+def test_all_loops_together_have_the_errors_of_the_recursions():
+    """Attitude and velocity of an algorithm in two speeds: true rates without T_m, and the errors of (76) and (81)."""
+    frequency, fast, cycles, total, phase = 12.0, 0.01, 5, 15, 0.8
+    amplitudes = 1e-3, 2e-3, 4.0
+    grid = 2 * np.pi * frequency * fast * np.arange(-1, cycles * total + 1)
+    zero = np.zeros(len(grid) - 1)
+    x, y = np.diff(amplitudes[0] * np.sin(grid)), np.diff(amplitudes[1] * np.sin(grid + phase))
+    v = np.diff(-amplitudes[2] / (2 * np.pi * frequency) * np.cos(grid + phase))
+    increments, velocities = np.stack([x, y, zero], axis=-1), np.stack([zero, v, zero], axis=-1)
+    run = TwoSpeed("dcm", sculling=2).run(
+        increments[1:], velocities[1:], fast_cycles=cycles, slow_cycles=1, previous=increments[0]
+    )
+    duration = total * cycles * fast  # whole periods
+    drift = (run.attitudes[-1][1, 0] - run.attitudes[-1][0, 1]) / 2 / duration
+    growth = run.velocity_changes[:, 2].sum() / duration
+    given = {"theta_x": amplitudes[0], "phase": phase, "cycles": cycles}
+    coned = vibration.of(choose("coning-fast")).rates(12, "0.05", theta_y=amplitudes[1], **given)
+    sculled = vibration.of(choose("sculling-fast-2"), "sculling").rates(
+        12, "0.05", acceleration_y=amplitudes[2], **given
+    )
+    true = -math.pi * frequency * amplitudes[0] * amplitudes[1] * math.sin(phase)
+    assert drift == pytest.approx(true + coned.error, rel=1e-5)
+    assert abs(coned.error) > 1e-3 * abs(true)
+    true = amplitudes[0] * amplitudes[2] * math.cos(phase) / 2
+    assert growth == pytest.approx(true + sculled.error, rel=1e-5)
+
+
+def test_steps_gain_velocity_as_the_closed_form_says():
+    """The sculling term of a step with its rotation compensation, turned by the attitude at its beginning."""
+    options = ("coning-uncompressed", 3)
+    frequency, step, steps, count, phase = 100 / 9, 0.03, 9, 3, 0.6
+    grid = 2 * np.pi * frequency * step / count * np.arange(steps * count + 1)
+    zero = np.zeros(steps * count)
+    d = np.stack([np.diff(1e-3 * np.sin(grid)), zero, zero], axis=-1).reshape(steps, count, 3)
+    v = np.diff(-4.0 / (2 * np.pi * frequency) * np.cos(grid + phase))
+    v = np.stack([zero, v, zero], axis=-1).reshape(steps, count, 3)
+    attitudes = strapgen.backend("dcm", *options).propagate(d)[:-1]
+    terms = strapgen.evaluator(choose("sculling", *options))(d, v)
+    gained = strapgen.evaluator("dcm-velocity-2")(attitudes, v.sum(axis=1), terms, d.sum(axis=1))
+    measured = gained[:, 2].sum() / (step * steps)
+    rates = vibration.of(choose("sculling", *options), "sculling").rates(
+        Fraction(100, 9), "0.03", theta_x="0.001", acceleration_y=4, phase="0.6"
+    )
+    assert measured == pytest.approx(rates.computed, rel=1e-6)
+    assert abs(rates.error) > 1e-4 * abs(rates.continuous)
+
+
 # Kernels of a user
 
 
@@ -334,6 +382,8 @@ def test_quantities_that_a_kernel_does_not_have():
         vibration.of(choose("euler"), "bias")
     with pytest.raises(InputError, match="nodes; they must be given"):
         vibration.drift(derive("euler", rates=True))
+    with pytest.raises(InputError, match="previous is 2; a whole number from 0 to 1"):
+        vibration.drift(derive("rotation-vector", "magnus4", 2), previous=2)
 
 
 # Numbers

@@ -127,17 +127,17 @@ def _of_step(kernel: Kernel, taken: Sequence[Signal], nodes: Sequence[Fraction |
         shown = attitude.inputs[0].elements
         (matrix,) = expander(attitude, dict(zip(shown, begun.values(), strict=True))).values()
     return System(
-        kernel,
-        expander.domain,
-        _handed_on(kernel, begun, dict(zip(state.elements, made, strict=True))),
-        frozenset(),
-        samples,
-        cycle,
-        None,
-        times,
-        _turned(expander, matrix),
-        "rad",
-        taken[0].name == "turns",
+        kernel=kernel,
+        domain=expander.domain,
+        following=_handed_on(kernel, begun, dict(zip(state.elements, made, strict=True))),
+        begun_anew=frozenset(),
+        samples=samples,
+        cycle=cycle,
+        slow_cycle=None,
+        times=times,
+        watched=_turned(expander, matrix),
+        unit="rad",
+        rates=taken[0].name == "turns",
     )
 
 
@@ -156,7 +156,8 @@ def _of_vector(
     output = kernel.outputs[-1].signal
     if output.shape != (3,) or output.unit not in ("rad", "m/s"):
         raise InputError(f"kernel {kernel.name} gives {output.name}; a vector in rad or m/s can be assessed")
-    count = taken[0].size // 3 - previous
+    most = taken[0].size // 3
+    count = most - checks.count("previous", previous, smallest=0, largest=most - 1)
     samples, times, cycle = _waves(expander, kernel, taken, previous, nodes)
     variables = _variables(expander, samples)
     vector = expander(kernel, variables)[output.name]
@@ -172,7 +173,8 @@ def _of_vector(
     given = dict(begun)
     sums = {"angle_sum": vector} if output.unit == "rad" else {"sculling": vector}
     if output.unit == "m/s":
-        for signal, name in zip(taken, ("angle_sum", "velocity_sum"), strict=True):
+        for signal in taken:
+            name = "angle_sum" if signal.unit == "rad" else "velocity_sum"
             rows = [signal.elements[3 * k : 3 * k + 3] for k in range(previous, previous + count)]
             zero = expander.constant(0)
             sums[name] = [
@@ -191,17 +193,17 @@ def _of_vector(
     else:
         watched = {inputs["navigation_velocity"].elements[2]: expander.domain.one}
     return System(
-        kernel,
-        expander.domain,
-        _handed_on(kernel, begun, following),
-        frozenset(),
-        samples,
-        cycle,
-        None,
-        times,
-        watched,
-        output.unit,
-        taken[0].name == "turns",
+        kernel=kernel,
+        domain=expander.domain,
+        following=_handed_on(kernel, begun, following),
+        begun_anew=frozenset(),
+        samples=samples,
+        cycle=cycle,
+        slow_cycle=None,
+        times=times,
+        watched=watched,
+        unit=output.unit,
+        rates=taken[0].name == "turns",
     )
 
 
@@ -234,19 +236,19 @@ def _of_recursion(kernel: Kernel, taken: Sequence[Signal], unit: str) -> System:
         )
     anew = frozenset(element for name in kernel.recursion.begun_anew for element in inputs[name].elements)
     return System(
-        kernel,
-        expander.domain,
-        _handed_on(kernel, begun, following),
-        anew,
-        {
+        kernel=kernel,
+        domain=expander.domain,
+        following=_handed_on(kernel, begun, following),
+        begun_anew=anew,
+        samples={
             name: {channel: _with_end(wave) for channel, wave in waves.items()}
             for name, waves in samples.items()
         },
-        (*cycle, 0),
-        (*(0 for _ in cycle), 1),
-        (*times, T_M),
-        {summed[0].elements[2]: expander.domain.one},
-        unit,
+        cycle=(*cycle, 0),
+        slow_cycle=(*(0 for _ in cycle), 1),
+        times=(*times, T_M),
+        watched={summed[0].elements[2]: expander.domain.one},
+        unit=unit,
     )
 
 
