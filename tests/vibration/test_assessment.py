@@ -172,8 +172,19 @@ def named(options):
     return choose(*options)
 
 
-@pytest.mark.parametrize("options", ALGORITHMS, ids=str)
-@pytest.mark.parametrize(("periods", "phase"), [(2, 1.1), pytest.param(9, -2.4, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    ("options", "periods", "phase"),
+    [
+        *(
+            pytest.param(options, 2, 1.1, id=str(options), marks=[pytest.mark.long] if k % 2 else [])
+            for k, options in enumerate(ALGORITHMS)
+        ),
+        *(
+            pytest.param(options, 9, -2.4, id=f"fast {options}", marks=pytest.mark.long)
+            for options in ALGORITHMS
+        ),
+    ],
+)
 def test_steps_drift_as_the_closed_form_says(options, periods, phase):
     """23 steps, 2 or 9 periods: what is left beside the second order falls by the square as the amplitude is halved."""
     choice = named(options)
