@@ -19,6 +19,7 @@ TIMES = "--step 0.125 --duration 1"
 CONSTANT = f"--motion constant --set x_deg_s=1 {TIMES}"
 CONING = "--motion coning --step 0.125 --duration 1 --set"
 EVEN = f"--rates-csv {DATA}/rates_even.csv"
+WAVE = "--step 0.01 --frequency-hz 10 --theta-x-rad 1 --phase-rad 1"
 
 BAD = {
     # Series
@@ -72,6 +73,28 @@ BAD = {
     "check error-matrix": "algorithm 'error-matrix' is no attitude step",
     "check none.py": "none.py is no file",
     "check euler --format csv": "format 'csv' is not known; allowed: text, json",
+    # vibration
+    "vibration": "Missing argument",
+    "vibration euler": "--step in s is needed",
+    "vibration euler --step 0.01": "--frequency-hz is needed, or a --spectrum",
+    f"vibration euler {WAVE}": "--theta-y-rad is needed for the drift, or --acceleration-y for sculling",
+    f"vibration error-matrix {WAVE} --theta-y-rad 1": "kernel error-matrix takes no angle increments",
+    f"vibration rk4 {WAVE} --theta-y-rad 1": "algorithm 'rk4' is not known",
+    f"vibration euler {WAVE} --theta-y-rad 1 --method rk9": "method 'rk9' is not known",
+    f"vibration euler {WAVE} --theta-y-rad 1 --method ,": "--method is ','; a list with commas between is needed",
+    f"vibration euler {WAVE} --theta-y-rad far": "theta-y-rad is 'far'; a finite number is needed",
+    f"vibration euler {WAVE} --theta-y-rad 1 --increments 9": "increments is 9; a whole number from 1 to 8",
+    f"vibration euler {WAVE} --theta-y-rad 1 --format csv": "format 'csv' is not known; allowed: text, json, latex",
+    f"vibration euler {WAVE} --theta-y-rad 1 --plot-hz 1,2": "--plot-hz goes with --plot",
+    f"vibration euler {WAVE} --theta-y-rad 1 --plot a.png --plot-hz 1": "two frequencies, LOW,HIGH, are needed",
+    f"vibration euler {WAVE} --theta-y-rad 1 --plot a.docx": "file type 'docx' is not known",
+    f"vibration euler {WAVE} --theta-y-rad 1 --frequency-hz 0": "frequency-hz is 0; a number above 0 is needed",
+    f"vibration euler {WAVE} --theta-y-rad 1 --method rk1 --frequency-hz 100": "euler-rk1-2 has no mean rate",
+    f"vibration coning-fast {WAVE} --theta-y-rad 1": "--increments must say how many of its cycles make a step",
+    f"vibration coning-fast {WAVE} --acceleration-y 1 --increments 9": "drift rates alone; --theta-y-rad is needed",
+    f"vibration sculling {WAVE} --theta-y-rad 1": "sculling rates alone; --acceleration-y is needed",
+    f"vibration euler {WAVE} --spectrum a.csv": "--frequency-hz goes with one frequency, not with --spectrum",
+    "vibration euler --step 0.01 --spectrum none.csv": "none.csv cannot be read (No such file or directory)",
     # tableau
     "tableau": "Missing argument",
     "tableau rk9": "method 'rk9' is not known; allowed: rk1, rk2, midpoint, ",

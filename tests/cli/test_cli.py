@@ -45,8 +45,10 @@ COMMANDS = (
         "converge",
         "check",
         "tables",
+        "two-speed",
+        "vibration",
     ),
-    *("two-speed", "study word-length", "series", "stability"),
+    *("study word-length", "series", "stability"),
 )
 DATA = Path(__file__).resolve().parents[1] / "data"
 CONING = "--motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 --step 0.125 --duration 5"
@@ -204,6 +206,89 @@ def test_tableau_of_a_file(strapgen_says, tmp_path):
         assert strapgen_says(f"tableau {name}").startswith(
             "ralston-s-third-order-method: Ralston's third-order method\n"
         )
+
+
+# vibration
+
+ONE = "--frequency-hz 10 --step 0.02 --theta-x-rad 0.01 --theta-y-rad 0.02 --phase-rad 1.1"
+HEADS = [*((part, "rad/s") for part in ("continuous", "computed", "error")), ("error", "deg/h")]
+TRUE = -math.pi * 10 * 0.01 * 0.02 * math.sin(1.1)
+
+
+@pytest.mark.parametrize(
+    "algorithm",
+    [
+        "dcm",
+        "euler --method rk1 --increments 1",
+        "cayley-klein --method rk4 --rates",
+        "euler --method coning-combined --increments 3 --previous 1",
+        "rotation-vector --method magnus4",
+        "examples/modified_rodrigues.py --method rk2",
+    ],
+)
+def test_vibration_json(algorithm, strapgen_says, tmp_path):
+    (tmp_path / "examples").symlink_to(DATA.parents[1] / "examples")
+    data = json.loads(strapgen_says(f"vibration {algorithm} {ONE} --format json"))
+    assert list(data)[:3] == ["continuous_rad_s", "computed_rad_s", "error_rad_s"]
+    assert data["continuous_rad_s"] == pytest.approx(TRUE, rel=1e-14)
+    assert data["computed_rad_s"] - data["continuous_rad_s"] == pytest.approx(data["error_rad_s"], rel=1e-9)
+    assert 0 < abs(data["error_rad_s"]) < abs(TRUE)
+    values = {"f": 10, "T": 0.02, "theta_x": 0.01, "theta_y": 0.02, "phi": 1.1}
+    closed = sp.sympify(data["drift_closed_form"]["computed"]).subs(values)
+    assert float(closed) == pytest.approx(data["computed_rad_s"], rel=1e-12)
+
+
+def test_vibration_with_an_acceleration(strapgen_says):
+    data = json.loads(strapgen_says(f"vibration euler {ONE} --acceleration-y 3 --format json"))
+    assert data["continuous_m_s2"] == pytest.approx(0.01 * 3 * math.cos(1.1) / 2, rel=1e-14)
+    # By duality the rates of drift and sculling are off by the same part.
+    ratio = data["error_rad_s"] / data["continuous_rad_s"]
+    assert data["error_m_s2"] / data["continuous_m_s2"] == pytest.approx(ratio, rel=1e-12)
+    alone = "--frequency-hz 10 --step 0.02 --theta-x-rad 0.01 --phase-rad 1.1 --acceleration-y 3"
+    for algorithm in ("euler", "sculling --method coning-compressed"):
+        again = json.loads(strapgen_says(f"vibration {algorithm} {alone} --format json"))
+        assert "computed_rad_s" not in again
+        assert again["computed_m_s2"] == pytest.approx(data["computed_m_s2"], rel=1e-14)
+
+
+def test_vibration_of_the_recursions(strapgen_says):
+    given = "--increments 10 --frequency-hz 7 --step 0.1 --theta-x-rad 0.01 --phase-rad 0.9 --format json"
+    coned = json.loads(strapgen_says(f"vibration coning-fast {given} --theta-y-rad 0.013"))
+    assert coned["computed_rad_s"] == pytest.approx(-2.720926166e-3, abs=1e-12)
+    sculled = json.loads(strapgen_says(f"vibration sculling-fast-2 {given} --acceleration-y 3"))
+    assert sculled["computed_m_s2"] == pytest.approx(1.1042645359e-2, abs=1e-12)
+
+
+def test_vibration_of_several(strapgen_says, tmp_path):
+    several = f"vibration euler --method rk2,rk4 --increments 1,2 {ONE}"
+    data = json.loads(strapgen_says(f"{several} --format json"))
+    assert [(one["kernel"], one["increments"]) for one in data] == [
+        (f"euler-{method}-{count}", count) for method in ("rk2", "rk4") for count in (1, 2)
+    ]
+    pytest.importorskip("matplotlib")
+    said = strapgen_says(f"{several} --plot errors.svg --plot-hz 1,20")
+    assert said.splitlines()[2].split()[1:] == " ".join(f"{part}, {unit}" for part, unit in HEADS).split()
+    hour = math.degrees(data[0]["error_rad_s"]) * 3600
+    assert float(said.splitlines()[3].split()[-1]) == pytest.approx(hour, rel=1e-5)
+    assert "error of euler-rk4-2" in (tmp_path / "errors.svg").read_text()
+
+
+def test_vibration_in_words_and_in_latex(strapgen_says):
+    said = strapgen_says(f"vibration dcm {ONE}")
+    assert "  continuous = -pi*f*theta_x*theta_y*sin(phi)\n" in said
+    latex = strapgen_says(f"vibration dcm {ONE} --format latex")
+    assert latex.startswith("\\begin{align*}\n") and latex.count("&=") == 3
+
+
+def test_vibration_under_a_spectrum(strapgen_says, tmp_path):
+    (tmp_path / "flat.csv").write_text(
+        "frequency_hz,density,angle_x_rad,angle_y_rad,angle_y_phase_rad\n9.999,0.25,0.01,0.02,1.1\n10.001,0.25,0.01,0.02,1.1\n"
+    )
+    data = json.loads(strapgen_says("vibration dcm --step 0.02 --spectrum flat.csv --format json"))
+    # A band 2 mHz wide: an oscillation of which half the square is 0.25 * 0.002.
+    assert data["continuous_rad_s"] == pytest.approx(TRUE * 2 * 0.25 * 0.002, rel=1e-6)
+    assert 0 <= data["error_quadrature_rad_s"] < 1e-9 * abs(data["error_rad_s"])
+    assert "quadrature" in strapgen_says("vibration dcm --step 0.02 --spectrum flat.csv")
 
 
 # coning

@@ -17,6 +17,7 @@ from strapgen.catalogue.tableaux import TABLEAUX, TITLES, Tableau
 from strapgen.exceptions import InputError, InputTypeError
 
 if TYPE_CHECKING:
+    from strapgen.catalogue.coefficients import Number
     from strapgen.catalogue.steps import Method
     from strapgen.kernel import Kernel
 
@@ -381,7 +382,8 @@ def choose(
     if name not in RESERVED:
         shown = [kernel for kernel, recipe in KERNELS.items() if recipe.standard]
         raise InputError(
-            f"algorithm {name!r} is not known; allowed: {_allowed(*VECTORS, *shown, 'other kernels of strapgen list')}"
+            f"algorithm {name!r} is not known; "
+            f"allowed: {_allowed(*VECTORS, *shown, 'other kernels of strapgen list')}"
         )
     if name in KERNELS:
         given = {
@@ -471,9 +473,11 @@ def previous(choice: Choice) -> int:
     return choice.previous
 
 
-def nodes(choice: Choice) -> tuple[Any, ...]:
-    """Return the nodes of a chosen method, at which a step that takes rates is given them."""
-    return () if choice.method is None else tuple(_method(choice.method).nodes)
+def nodes(choice: Choice) -> tuple[Number, ...]:
+    """Return the nodes at which a step takes the rate; empty for one that takes increments."""
+    if choice.method is None or choice.increments is not None:
+        return ()
+    return _method(choice.method).nodes
 
 
 def rounding(choice: Choice) -> Fraction:

@@ -24,6 +24,7 @@ from strapgen.cli import (
     tables,
     two_speed,
     version,
+    vibration,
 )
 from strapgen.exceptions import StrapgenError
 
@@ -46,6 +47,7 @@ app.command("converge")(converge.converge)
 app.command("series")(series.series)
 app.command("stability")(stability.stability)
 app.command("check")(check.check)
+app.command("vibration")(vibration.vibration)
 app.command("tables")(tables.tables)
 app.command("two-speed")(two_speed.two_speed)
 app.add_typer(study.app, name="study")
