@@ -51,6 +51,7 @@ def test_readme_shows_every_command():
         "study",
         "series",
         "stability",
+        "stress",
     }
     assert "`strapgen tables`" in README
 

@@ -48,7 +48,7 @@ COMMANDS = (
         "two-speed",
         "vibration",
     ),
-    *("study word-length", "series", "stability"),
+    *("study word-length", "series", "stability", "stress"),
 )
 DATA = Path(__file__).resolve().parents[1] / "data"
 CONING = "--motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 --step 0.125 --duration 5"
