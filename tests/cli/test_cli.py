@@ -839,6 +839,7 @@ def test_tables_json(backend, strapgen_says):
     assert {entry["backend"] for entry in entries} == {backend}
 
 
+@pytest.mark.long
 def test_tables_run_on_every_back_end_by_default(strapgen_says):
     entries = json.loads(strapgen_says("tables --format json"))
     assert len(entries) == 5 * 30

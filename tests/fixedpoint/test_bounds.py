@@ -146,6 +146,7 @@ def test_the_bound_of_a_run_holds_along_it(algorithm, word, rounding, carry, rng
     assert np.all(apart[1:] <= [made.rounding_bound(n, True) + 1e-13 for n in range(1, 201)])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rounding", ["nearest", "truncation"])
 @pytest.mark.parametrize("angle", [Fraction(1, 10**6), Fraction(1, 10**4), Fraction(1, 600)])
 def test_small_increments_keep_the_bound_in_c(angle, rounding, rng):

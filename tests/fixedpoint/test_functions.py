@@ -381,6 +381,7 @@ def assert_certified(lowered: FixedProgram, inputs: list[np.ndarray], made: list
                 assert error <= _precise(argument.errors[k]), (argument.signal.name, k)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("word", C_WORDS)
 @pytest.mark.parametrize("kernel", MOTIONS)
 def test_motions_on_stated_ranges(kernel, word):

@@ -62,6 +62,7 @@ def test_c_and_model_agree_bit_for_bit(choice, word, carry, rng):
         assert results(in_c, rows, residuals[k : k + 1]) == results(model, rows, residuals[k : k + 1])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "settings", [Settings(16), Settings(32), Settings(32, rounding="truncation", carry="full")]
 )

@@ -31,6 +31,7 @@ def emitted(kernel, target):
     return emit(program, target, Settings(ranges=ranges))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("target", TARGETS)
 @pytest.mark.parametrize("kernel", KERNELS)
 def test_named_command_makes_the_same_text(kernel, target, tmp_path, capsys):
