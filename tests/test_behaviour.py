@@ -24,7 +24,6 @@ def findings(choice: catalogue.Choice) -> dict[str, behaviour.Finding]:
         ("rk4", 2, 0),
         pytest.param("magnus4", 2, 0, marks=pytest.mark.long),
         pytest.param("munthe-kaas4", 1, 2, marks=pytest.mark.long),
-        pytest.param("taylor6", 4, 0, marks=pytest.mark.long),
         pytest.param("dormand-prince5", 3, 1, marks=pytest.mark.long),
     ],
 )

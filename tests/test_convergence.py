@@ -44,9 +44,12 @@ def order_of(name: str) -> int:
     return TABLEAUX[name].order if name in TABLEAUX else INTEGRATORS[name].order
 
 
-@pytest.mark.parametrize("algorithm", ["euler", "dcm"])
 @pytest.mark.parametrize(
-    "method", [pytest.param(m, marks=() if m in QUICK else pytest.mark.long) for m in METHODS]
+    ("algorithm", "method"),
+    [
+        *((algorithm, method) for algorithm in ("euler", "dcm") for method in QUICK),
+        *(pytest.param("euler", m, marks=pytest.mark.long) for m in METHODS if m not in QUICK),
+    ],
 )
 def test_every_method_has_its_order_with_enough_increments(algorithm, method, coning):
     increments = catalogue.enough(method)

@@ -385,7 +385,7 @@ def stability_image(found: Sequence[Stability], title: str, path: str | Path) ->
     figure, (curves, bars) = pyplot.subplots(
         2,
         1,
-        figsize=(8.5, 4.6 + 0.28 * len(found)),
+        figsize=(9.5, 4.6 + 0.28 * len(found)),
         height_ratios=(4.0, 0.4 + 0.28 * len(found)),
         sharex=True,
         layout="constrained",
@@ -407,7 +407,7 @@ def stability_image(found: Sequence[Stability], title: str, path: str | Path) ->
     curves.axhspan(0.0, 1.0, color="0.5", alpha=0.08, linewidth=0)
     curves.set_ylim(0.0, 2.0)
     curves.set_ylabel("length of the state after a step")
-    curves.legend(framealpha=0.85, edgecolor="none", fontsize=9, loc="upper left", ncols=1 + len(found) // 9)
+    curves.legend(frameon=False, fontsize=9, loc="upper left", bbox_to_anchor=(1.0, 1.02))
     bars.set_yticks(range(len(found)), [one.kernel for one in reversed(found)], fontsize=9)
     bars.set_ylim(-0.6, len(found) - 0.4)
     bars.set_title("where no state grows", loc="left", fontsize=10)
