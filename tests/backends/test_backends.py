@@ -21,7 +21,9 @@ def random_increments(rng, *shape: int, size: float = 0.01) -> np.ndarray:
     return rng.normal(scale=size, size=(*shape, 3))
 
 
-@pytest.mark.parametrize("method", ["rk1", "rk2", "rk3", "rk4"])
+@pytest.mark.parametrize(
+    "method", [*(pytest.param(f"rk{order}", marks=pytest.mark.long) for order in (1, 2, 3)), "rk4"]
+)
 def test_back_ends_agree_over_a_run(make, backend_name, algorithm, method, rng):
     increments = random_increments(rng, STEPS, 2)
     reference = strapgen.backend(algorithm, method, 2, "numpy")
@@ -294,7 +296,11 @@ METHODS = ("taylor4", "magnus4", "munthe-kaas4")
 
 
 @pytest.mark.parametrize(
-    ("algorithm", "count", "previous"), [("dcm", 1, 2), ("euler", 2, 1), ("cayley-klein", 1, 3)]
+    ("algorithm", "count", "previous"),
+    [
+        ("dcm", 1, 2),
+        *(pytest.param(*case, marks=pytest.mark.long) for case in (("euler", 2, 1), ("cayley-klein", 1, 3))),
+    ],
 )
 def test_a_step_keeps_increments_on_every_back_end(make, algorithm, count, previous, rng):
     backend = make(algorithm, "rk4", count, previous=previous)
@@ -364,7 +370,7 @@ def test_exponentials_stay_rotations_however_long_the_run(method, rng):
 
 
 @pytest.mark.parametrize("size", [0.0, 1e-300, 1e-160, 1e-9])
-@pytest.mark.parametrize("method", ["magnus4", "munthe-kaas4"])
+@pytest.mark.parametrize("method", ["magnus4", pytest.param("munthe-kaas4", marks=pytest.mark.long)])
 def test_exponentials_have_no_hole_at_zero(method, algorithm, size):
     # The root of a square that underflows is 0, and sin(x)/x is 1 there.
     for name in ("numpy", "c", "c-float"):

@@ -152,6 +152,7 @@ def test_to_first_order_drift_stays_and_scale_and_skew_vanish(name):
     assert left == K
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", [SCHEME, *EXPANSIONS.values()])
 def test_the_second_order_of_what_is_left(name):
     K, Y, left = left_of_the_error(name, 2)
