@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from fractions import Fraction
 
+import mpmath
 import numpy as np
 
 from strapgen.backends.fixed import FixedEvaluator
+from strapgen.exact import FUNCTIONS
 from strapgen.fixedpoint import FixedProgram
-from strapgen.program import OPERATIONS, Constant, Program, Reference
+from strapgen.program import OPERATIONS, RESOLUTION, Constant, Program, Reference
 
 
 def corners_and_random(evaluator: FixedEvaluator, count: int, rng: np.random.Generator) -> list[np.ndarray]:
@@ -38,12 +40,21 @@ def corners_and_random(evaluator: FixedEvaluator, count: int, rng: np.random.Gen
     return inputs
 
 
+def number(value: Fraction) -> mpmath.mpf:
+    return mpmath.mpf(value.numerator) / value.denominator
+
+
+def fraction(value: mpmath.mpf) -> Fraction:
+    sign, digits, exponent, _ = mpmath.mpf(value)._mpf_
+    return (-1) ** sign * int(digits) * Fraction(2) ** exponent
+
+
 def exactly(fixed: FixedProgram, inputs: list[list[int]]) -> dict[str, Fraction]:
     """Return every value of the program that was lowered, in exact arithmetic on the integers of one sample.
 
-    Roots are rounded at 200 binary places.
+    Roots are rounded at 200 binary places, functions to 300 binary digits.
     """
-    known: dict[str, Fraction] = {}
+    known = {RESOLUTION: Fraction(1, 1 << (fixed.word - 2))}
     for argument, integers in zip(fixed.interface.inputs, inputs, strict=True):
         for name, integer in zip(argument.signal.elements, integers, strict=True):
             known[name] = int(integer) * argument.format.unit
@@ -56,6 +67,9 @@ def exactly(fixed: FixedProgram, inputs: list[list[int]]) -> dict[str, Fraction]
         arguments = [value(argument) for argument in node.arguments]
         if node.kind == "sqrt":
             return Fraction(math.isqrt(int(arguments[0] * 4**200)), 2**200)
+        if node.kind in FUNCTIONS:
+            with mpmath.workprec(300):
+                return fraction(FUNCTIONS[node.kind](*map(number, arguments)))
         return OPERATIONS[node.kind](*arguments)
 
     for assignment in fixed.program.body:

@@ -16,7 +16,9 @@ ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text()
 
 
-@pytest.mark.parametrize("page", ["python-api", "canonical-form", "fixed-point", "series"])
+@pytest.mark.parametrize(
+    "page", ["python-api", "canonical-form", "fixed-point", "series", "coning", "two-speed", "vibration"]
+)
 def test_page(page):
     result = doctest.testfile(str(ROOT / "docs" / f"{page}.md"), module_relative=False)
     assert result.attempted >= 10
@@ -43,9 +45,13 @@ def test_readme_shows_every_command():
         "compare",
         "converge",
         "check",
+        "coning",
+        "two-speed",
+        "vibration",
         "study",
         "series",
         "stability",
+        "stress",
     }
     assert "`strapgen tables`" in README
 
@@ -80,6 +86,18 @@ def test_readme_tables_are_the_command_s(capsys):
         # Round-off differs from one mathematical library to the next: it rules the figures of single precision
         # at fourth order, and touches double precision below 1e-10 degrees.
         assert float(ours) == pytest.approx(value, rel=1e-3 if value > 1e-3 else 0.5)
+
+
+def test_the_commands_of_the_page_on_vibration(tmp_path, monkeypatch, capsys):
+    page = (ROOT / "docs" / "vibration.md").read_text()
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    shown = re.findall(r"^    (strapgen .*)$", page, flags=re.MULTILINE)
+    assert len(shown) == 3
+    for command in shown:
+        with pytest.raises(SystemExit) as stop:
+            main(shlex.split(command)[1:])
+        assert stop.value.code == 0, capsys.readouterr().err
 
 
 def test_the_page_on_own_algorithms(tmp_path, monkeypatch, capsys):

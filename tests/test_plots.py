@@ -14,6 +14,7 @@ from strapgen.exceptions import InputError, MissingExtraError
 from strapgen.order import Order
 from strapgen.recording import History
 from strapgen.simulation import Run, simulate
+from strapgen.vibration.curves import Curve
 
 pyplot = pytest.importorskip("matplotlib.pyplot")
 
@@ -92,6 +93,30 @@ def test_convergence_has_a_line_and_a_theory_for_each_algorithm(figures):
     words = [text.get_text() for text in axes.get_legend().get_texts()]
     assert words == ["euler-rk4-2: 4.00, theory 4", "mine: order hidden"]
     assert next(label.get_text() for label in axes.get_xticklabels()) == "1/32"
+
+
+def test_vibration_has_a_panel_for_drift_and_one_for_acceleration(figures):
+    hertz = np.geomspace(1, 100, 30)
+    curves = [
+        (label, Curve(label, unit, hertz, true * hertz, part * hertz**3))
+        for label, part in (("one", 1e-9), ("two", -1e-8))
+        for unit, true in (("rad/s", 1e-6), ("m/s^2", 1e-3))
+    ]
+    plots.vibration_image(curves, "A title", "vibration.png", 10.0)
+    (figure,) = figures
+    drift, acceleration = figure.axes
+    assert (drift.get_ylabel(), acceleration.get_ylabel()) == (
+        "mean drift, deg/h",
+        "mean acceleration, micro-g",
+    )
+    for axes, factor, true in ((drift, np.degrees(3600), 1e-6), (acceleration, 1e6 / 9.80665, 1e-3)):
+        lines = axes.get_lines()
+        assert [line.get_label() for line in lines[:3]] == ["true rate", "error of one", "error of two"]
+        np.testing.assert_allclose(lines[0].get_ydata(), true * hertz * factor)
+        np.testing.assert_allclose(lines[2].get_ydata(), 1e-8 * hertz**3 * factor)
+    assert len(figure.legends[0].get_texts()) == 3
+    still = [("still", Curve("still", "rad/s", hertz, 0 * hertz, 0 * hertz))]
+    plots.vibration_image(still, "Nothing moves", "vibration.png")
 
 
 @pytest.mark.parametrize(

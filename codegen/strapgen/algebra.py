@@ -133,7 +133,30 @@ def cayley_klein_parameters(U: sp.Matrix) -> sp.Matrix:
     return sp.Matrix([sp.expand(part) for part in parts])
 
 
-def rotation(v: sp.Matrix) -> sp.Matrix:
+def wave_series(square: Any, first: int, order: int) -> Any:
+    """Return sin(x)/x, (1 - cos x)/x^2 or cos x in the square of x, cut off.
+
+    Parameters
+    ----------
+    square : Expr or ring element
+        x^2.
+    first : int
+        1, 2 or 0: the power of x by which the function is multiplied where it stands.
+    order : int
+        Highest power of x that is kept, these included.
+
+    Examples
+    --------
+    >>> wave_series(sp.Symbol("A"), 1, 5)
+    A**2/120 - A/6 + 1
+    """
+    total = 0 * square
+    for j in range((order - first) // 2 + 1):
+        total += square**j * sp.Rational((-1) ** j, sp.factorial(2 * j + first))
+    return total
+
+
+def rotation(v: sp.Matrix, order: int | None = None, square: sp.Expr | None = None) -> sp.Matrix:
     """Return exp(skew(v)), the rotation by the rotation vector v, without a singularity at v = 0.
 
     I + (sin x)/x skew(v) + (1 - cos x)/x^2 skew(v)^2 with x = |v|, where (1 - cos x)/x^2 is written as
@@ -143,31 +166,82 @@ def rotation(v: sp.Matrix) -> sp.Matrix:
     ----------
     v : Matrix, 3 x 1
         Rotation vector in rad.
+    order : int, optional
+        Highest degree in v of the products that are kept; all by default.
+    square : Expr, optional
+        v . v, where it has a name.
 
     Returns
     -------
     Matrix, 3 x 3
     """
-    angle = sp.sqrt(dot(v, v))
+    square = dot(v, v) if square is None else square
     K = skew(v)
+    if order is not None:
+        return sp.eye(3) + wave_series(square, 1, order) * K + wave_series(square, 2, order) * (K * K)
+    angle = sp.sqrt(square)
     return sp.eye(3) + sp.sinc(angle) * K + sp.sinc(angle / 2) ** 2 / 2 * K * K
 
 
-def quaternion(v: sp.Matrix) -> sp.Matrix:
+def quaternion(v: sp.Matrix, order: int | None = None, square: sp.Expr | None = None) -> sp.Matrix:
     """Return the unit quaternion of the rotation by the rotation vector v, without a singularity at v = 0.
 
     Parameters
     ----------
     v : Matrix, 3 x 1
         Rotation vector in rad.
+    order : int, optional
+        Highest degree in v of the products that are kept; all by default.
+    square : Expr, optional
+        v . v, where it has a name.
 
     Returns
     -------
     Matrix, 4 x 1
         Scalar last.
     """
-    half = sp.sqrt(dot(v, v)) / 2
+    square = dot(v, v) if square is None else square
+    if order is not None:
+        return sp.Matrix([*(wave_series(square / 4, 1, order) / 2 * v), wave_series(square / 4, 0, order)])
+    half = sp.sqrt(square) / 2
     return sp.Matrix([*(sp.sinc(half) / 2 * v), sp.cos(half)])
+
+
+class Direction(sp.Function):  # type: ignore[misc]
+    """The angle atan2(y, x) where whole turns do not count: -pi is as good as pi.
+
+    Examples
+    --------
+    >>> Direction(0, -1)
+    pi
+    """
+
+    nargs = 2
+
+    @classmethod
+    def eval(cls, y: sp.Expr, x: sp.Expr) -> sp.Expr | None:
+        """Return the value of numbers."""
+        return sp.atan2(y, x) if y.is_number and x.is_number else None
+
+
+class Wrapped(sp.Function):  # type: ignore[misc]
+    """An angle of up to a turn and a half, brought to -pi to pi by a whole turn.
+
+    Examples
+    --------
+    >>> Wrapped(3 * sp.pi / 2)
+    -pi/2
+    """
+
+    nargs = 1
+
+    @classmethod
+    def eval(cls, angle: sp.Expr) -> sp.Expr | None:
+        """Return the value of a number."""
+        if not angle.is_number:
+            return None
+        turns = int(bool(angle > sp.pi)) - int(bool(angle < -sp.pi))
+        return angle - 2 * sp.pi * turns
 
 
 def adjugate(A: sp.Matrix) -> sp.Matrix:

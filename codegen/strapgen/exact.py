@@ -15,14 +15,16 @@ from strapgen.program import OPERATIONS, Program
 #: Decimal digits: a million steps lose six of them.
 DIGITS = 40
 
-_FUNCTIONS: dict[str, Callable[..., Any]] = {
-    **OPERATIONS,
-    "sqrt": mpmath.sqrt,
+#: The functions of programs on numbers of mpmath, roots apart.
+FUNCTIONS: dict[str, Callable[..., Any]] = {
     "sin": mpmath.sin,
     "cos": mpmath.cos,
     "sinc": mpmath.sinc,
     "atan2": mpmath.atan2,
+    "direction": mpmath.atan2,
+    "wrap": lambda x: x - 2 * mpmath.pi * (int(x > mpmath.pi) - int(x < -mpmath.pi)),
 }
+_OPERATIONS: dict[str, Callable[..., Any]] = {**OPERATIONS, "sqrt": mpmath.sqrt, **FUNCTIONS}
 
 
 def number(value: Fraction) -> Any:
@@ -59,7 +61,7 @@ class Interpreter:
         values: dict[str, Any] = {}
         for signal, elements in zip(self.program.inputs, inputs, strict=True):
             values |= zip(signal.elements, elements, strict=True)
-        return self.program.run(values, self._constant, _FUNCTIONS)
+        return self.program.run(values, self._constant, _OPERATIONS)
 
     def _constant(self, value: Fraction) -> Any:
         if value not in self._constants:

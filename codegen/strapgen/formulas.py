@@ -50,6 +50,9 @@ class _ExactPrinter(Printer):
     def constant(self, value: Fraction) -> str:
         return str(value) if value.denominator == 1 else f"({value})"
 
+    def reference(self, name: str) -> str:
+        return name
+
     def function(self, kind: str, arguments: list[str]) -> str:
         return f"{kind}({', '.join(arguments)})"
 

@@ -11,7 +11,12 @@ import sympy as sp
 from strapgen.algebra import evaluate
 from strapgen.companions import Companions
 from strapgen.order import Order
+from strapgen.program import RESOLUTION
+from strapgen.recursion import Recursion
 from strapgen.signal import Signal
+
+#: The step from 1 to the next number of the target that a kernel is lowered for; 0 in exact arithmetic.
+resolution = sp.Symbol(RESOLUTION, real=True)
 
 
 def symbols(signal: Signal) -> sp.Matrix:
@@ -54,7 +59,7 @@ def evaluate_stages(
     -------
     dict of str to number or ring element
     """
-    known = dict(values)
+    known = {RESOLUTION: sp.S.Zero, **values}
     for stage in stages:
         for name, expression in zip(stage.signal.elements, stage.expressions, strict=True):
             known[name] = evaluate(expression, known, number, function)
@@ -85,6 +90,8 @@ class Kernel:
         What belongs to an attitude step.
     order : Order or None
         Order of an attitude step.
+    recursion : Recursion or None
+        Which outputs are inputs of the next call.
     own : tuple of Kernel
         Kernels that its companions name and the catalogue does not have.
     arguments : str
@@ -102,6 +109,7 @@ class Kernel:
     transition: str | None = None
     companions: Companions | None = None
     order: Order | None = None
+    recursion: Recursion | None = None
     own: tuple[Kernel, ...] = ()
     arguments: str = ""
     notes: tuple[str, ...] = field(default=())

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from strapgen.analysis.agreement import Agreement
     from strapgen.analysis.growth import Stability
     from strapgen.convergence import Convergence
+    from strapgen.vibration.curves import Curve
 
 _COLOURS = ("#1f5f8b", "#b5562b", "#3d7a4f")
 
@@ -417,6 +418,106 @@ def stability_image(found: Sequence[Stability], title: str, path: str | Path) ->
         axes.grid(alpha=0.25, linewidth=0.6, axis="both" if axes is curves else "x")
     figure.suptitle(title.encode(errors="replace").decode(), fontsize=11, x=0.01, ha="left")
     return _image(figure, path)
+
+
+def vibration_image(
+    curves: Sequence[tuple[str, Curve]], title: str, path: str | Path, mark_hz: float | None = None
+) -> bytes:
+    """Return the errors of algorithms under vibration against frequency: drift in deg/h, acceleration in micro-g.
+
+    Parameters
+    ----------
+    curves : sequence of (str, Curve)
+        Labels and curves; those in rad/s and those in m/s^2 have a panel each.
+    title : str
+    path : path
+        File for the image; its ending says which kind.
+    mark_hz : float, optional
+        A frequency to mark.
+
+    Returns
+    -------
+    bytes
+        The content of the file.
+
+    Raises
+    ------
+    MissingExtraError
+        If matplotlib is not installed.
+    InputError
+        If the kind of image is unknown.
+    """
+    pyplot = _pyplot()
+    panels = {unit: [(label, curve) for label, curve in curves if curve.unit == unit] for unit in _VIBRATION}
+    panels = {unit: group for unit, group in panels.items() if group}
+    figure, grid = pyplot.subplots(
+        len(panels),
+        1,
+        figsize=(8.5, 1.0 + 3.4 * len(panels) + 0.11 * len(curves)),
+        sharex=True,
+        layout="constrained",
+        squeeze=False,
+    )
+    labels = list(dict.fromkeys(label for label, _ in curves))
+    for axes, (unit, group) in zip(grid[:, 0], panels.items(), strict=True):
+        words, factor = _VIBRATION[unit]
+        hertz, true = group[0][1].frequencies_hz, np.abs(group[0][1].continuous) * factor
+        axes.plot(hertz, true, color="0.45", linewidth=1.3, linestyle="--", label="true rate")
+        for label, curve in group:
+            place = labels.index(label)
+            axes.plot(
+                curve.frequencies_hz,
+                np.abs(curve.error) * factor,
+                color=_MANY_COLOURS[place % len(_MANY_COLOURS)],
+                linestyle=_LINES[place // len(_MANY_COLOURS) % len(_LINES)],
+                linewidth=3.0
+                - 1.8 * place / max(1, len(labels) - 1),  # equal errors: one line inside the other
+                label=f"error of {label}",
+            )
+        if mark_hz and hertz[0] <= mark_hz <= hertz[-1]:
+            axes.axvline(mark_hz, color="0.6", linewidth=0.9, zorder=0)
+            axes.annotate(
+                f"{mark_hz:g} Hz",
+                (mark_hz, 0.0),
+                xycoords=("data", "axes fraction"),
+                xytext=(4, 5),
+                textcoords="offset points",
+                fontsize=8.5,
+                color="0.4",
+            )
+        axes.set_xscale("log")
+        if np.any(true):
+            axes.set_yscale("log")
+            highest = float(true.max())
+            lowest = min(
+                float(np.min(np.abs(curve.error[curve.error != 0]), initial=1.0)) for _, curve in group
+            )
+            axes.set_ylim(max(lowest * factor / 3, highest * _LOWEST), highest * 8)
+        axes.set_ylabel(words)
+        axes.set_xlim(hertz[0], hertz[-1])
+        axes.spines[["top", "right"]].set_visible(False)
+        axes.grid(alpha=0.25, linewidth=0.6)
+    grid[-1, 0].set_xlabel("frequency, Hz")
+    found: dict[str, Any] = {}
+    for axes in grid[:, 0]:
+        handles, texts = axes.get_legend_handles_labels()
+        found |= dict(zip(texts, handles, strict=True))
+    figure.legend(
+        found.values(), found.keys(), loc="outside lower center", ncols=2, frameon=False, fontsize=9
+    )
+    figure.suptitle(title.encode(errors="replace").decode(), fontsize=11, x=0.01, ha="left")
+    return _image(figure, path)
+
+
+#: What is drawn of rates under vibration, and the factor to it.
+_VIBRATION = {
+    "rad/s": ("mean drift, deg/h", math.degrees(3600)),
+    "m/s^2": ("mean acceleration, micro-g", 1e6 / 9.80665),
+}
+#: The lowest error that is drawn, as a part of the highest true rate.
+_LOWEST = 1e-9
+_MANY_COLOURS = (*_COLOURS, "#8a4f9e", "#c79a1b", "#2a9d9d", "#a83250", "#6b6b6b")
+_LINES = ("-", (0, (5, 2)), (0, (1, 1.5)))
 
 
 def _fraction(number: float) -> str:

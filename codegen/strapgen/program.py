@@ -15,6 +15,7 @@ from functools import cached_property
 from typing import Any
 
 from strapgen.companions import Companions
+from strapgen.recursion import Recursion
 from strapgen.signal import Signal
 
 
@@ -47,6 +48,15 @@ def _sinc(x: Any) -> Any:
     return math.sin(x) / x if x else 1
 
 
+def _wrap(x: Any) -> Any:
+    return x - math.tau if x > math.pi else x + math.tau if x < -math.pi else x
+
+
+#: The name that stands for the step from 1 to the next number of a target, wherever a program uses it.
+RESOLUTION = "resolution"
+#: The resolution of a double.
+DOUBLE_RESOLUTION = Fraction(1, 1 << 52)
+
 #: What each operation means, on any ordered numbers; the integer, exact and float interpreters share it.
 OPERATIONS: dict[str, Callable[..., Any]] = {
     "add": operator.add,
@@ -59,6 +69,8 @@ OPERATIONS: dict[str, Callable[..., Any]] = {
     "cos": math.cos,
     "sinc": _sinc,  # sin(x)/x, 1 at 0
     "atan2": math.atan2,
+    "direction": math.atan2,  # atan2 where whole turns do not count
+    "wrap": _wrap,  # an angle of up to a turn and a half, brought to -pi to pi by a whole turn
     "maximum": max,
     "at_least": operator.ge,  # a condition: first >= second
     "select": lambda condition, yes, no: yes if condition else no,
@@ -79,6 +91,8 @@ COUNTED_AS = {
     "cos": "function",
     "sinc": "function",
     "atan2": "function",
+    "direction": "function",
+    "wrap": "function",
 }
 
 
@@ -125,6 +139,8 @@ class Program:
         For a step that is linear in the state, the part that depends on the increments alone.
     companions : Companions or None
         What belongs to an attitude step; None for every other kernel.
+    recursion : Recursion or None
+        Which outputs are inputs of the next call.
 
     Raises
     ------
@@ -143,9 +159,10 @@ class Program:
     outputs: tuple[Result, ...]
     transition: Result | None = None
     companions: Companions | None = None
+    recursion: Recursion | None = None
 
     def __post_init__(self) -> None:
-        known = {element for signal in self.inputs for element in signal.elements}
+        known = {element for signal in self.inputs for element in signal.elements} | {RESOLUTION}
         for assignment in self.body:
             if assignment.name in known:
                 raise ValueError(f"{self.name}: {assignment.name!r} is assigned twice")
@@ -167,7 +184,7 @@ class Program:
     def operations(self) -> dict[str, int]:
         """Count of operations by kind; subtractions count as additions.
 
-        "select" counts choices between two values, "function" counts sin, cos, sin(x)/x and atan2.
+        "select" counts choices between two values, "function" counts sin, cos, sin(x)/x, atan2 and "wrap".
         """
         counts = dict.fromkeys(("add", "multiply", "divide", "sqrt", "negate", "select", "function"), 0)
         for assignment in self.body:
@@ -197,7 +214,7 @@ class Program:
         Parameters
         ----------
         values : mapping of str to number
-            A value for every input element.
+            A value for every input element; another resolution than that of doubles too.
         number : callable, optional
             What stands for a constant; by default the exact rational itself.
         operations : mapping of str to callable, optional
@@ -208,11 +225,12 @@ class Program:
         dict of str to list
             For each output its elements, row-major.
         """
-        known = dict(values)
+        constant = number or (lambda exact: exact)
+        known = {RESOLUTION: constant(DOUBLE_RESOLUTION), **values}
 
         def value(node: Node) -> Any:
             if isinstance(node, Constant):
-                return node.value if number is None else number(node.value)
+                return constant(node.value)
             if isinstance(node, Reference):
                 return known[node.name]
             return operations[node.kind](*map(value, node.arguments))
@@ -253,6 +271,7 @@ class Program:
             outputs=(self.transition,),
             transition=None,
             companions=None,
+            recursion=None,
         )
 
     def split(self) -> tuple[Program, Program]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from typing import Any
 
@@ -92,3 +92,19 @@ class Signal:
                 "bound": None if bound is None else Fraction(bound),
             }
         )
+
+
+def after(signal: Signal) -> Signal:
+    """Return the signal of what a state is after a call: its names with ``next_`` before them.
+
+    Examples
+    --------
+    >>> after(Signal.vector("sum", "s")).elements
+    ('next_s_x', 'next_s_y', 'next_s_z')
+    """
+    return replace(
+        signal,
+        name=f"next_{signal.name}",
+        elements=tuple(f"next_{element}" for element in signal.elements),
+        meaning=f"{signal.meaning.partition(';')[0]}, after the call",
+    )

@@ -9,6 +9,7 @@ import sympy as sp
 from strapgen import catalogue
 from strapgen.catalogue import ALGORITHMS, KERNELS, METHODS, MOST_INCREMENTS, STANDARD_METHODS, Choice, choose
 from strapgen.exceptions import InputError
+from strapgen.program import RESOLUTION
 
 STANDARD = catalogue.standard()
 EVERY = pytest.mark.parametrize("choice", STANDARD, ids=lambda choice: choice.kernel)
@@ -49,13 +50,18 @@ def test_orthonormalizations_of_each_algorithm():
         "dcm-orthonormalize-first-order",
         "dcm-orthonormalize-second-order",
     ]
-    assert catalogue.orthonormalizations("euler") == ["euler-normalize"]
-    assert catalogue.orthonormalizations("cayley-klein") == ["cayley-klein-normalize"]
+    for algorithm in ("euler", "cayley-klein"):
+        normalize = f"{algorithm}-normalize"
+        assert catalogue.orthonormalizations(algorithm) == [normalize, f"{normalize}-first-order"]
 
 
 def test_the_standard_catalogue_holds_everything_once():
     names = [choice.kernel for choice in STANDARD]
-    assert len(set(names)) == len(names) == len(ALGORITHMS) * len(STANDARD_METHODS) + len(KERNELS)
+    assert (
+        len(set(names))
+        == len(names)
+        == len(ALGORITHMS) * len(STANDARD_METHODS) + sum(recipe.standard for recipe in KERNELS.values())
+    )
     identifiers = {name.replace("-", "_") for name in names}
     assert len(identifiers) == len(names)
 
@@ -81,7 +87,7 @@ def test_a_kernel_is_exact_and_closed(choice):
         assert len(stage.expressions) == stage.signal.size
         for expression in stage.expressions:
             assert not expression.has(sp.Float)
-            assert {symbol.name for symbol in expression.free_symbols} <= set(known)
+            assert {symbol.name for symbol in expression.free_symbols} <= {*known, RESOLUTION}
             assert all(symbol.is_real for symbol in expression.free_symbols)
         known += stage.signal.elements
     assert len(set(known)) == len(known)  # names serve as variables in generated code

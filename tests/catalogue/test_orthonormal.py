@@ -11,7 +11,8 @@ import scipy.linalg
 import sympy as sp
 from scipy.spatial.transform import Rotation
 
-from strapgen import derive, lower
+import strapgen
+from strapgen import algebra, derive, lower
 
 EPS = np.finfo(float).eps
 SCHEME = "dcm-orthonormalize"
@@ -275,3 +276,61 @@ def test_the_nearest_rotation_is_the_nearest(rng):
         steps = Rotation.from_rotvec(rng.standard_normal((50, 3)) * 10.0 ** rng.uniform(-3, 0, (50, 1)))
         for other in [*others, *(nearest @ steps.as_matrix())]:
             assert criterion(other, C) > least
+
+
+# Rows, as the paper of 1984 corrects them
+
+
+GENERAL = sp.Matrix(3, 3, sp.symbols("c:9"))
+
+
+def change(name: str) -> sp.Matrix:
+    """Return what a scheme adds to a matrix, expanded."""
+    return (sp.Matrix(3, 3, apply(name, GENERAL)) - GENERAL).expand()
+
+
+def test_correcting_rows_is_correcting_columns():
+    # (33) and (34) are one polynomial, and with (32) the thesis's first order.
+    rows = (sp.eye(3) - GENERAL * GENERAL.T) * GENERAL / 2
+    columns = GENERAL * (sp.eye(3) - GENERAL.T * GENERAL) / 2
+    assert rows.expand() == columns.expand() == change("dcm-orthonormalize-first-order")
+
+
+def test_orthogonality_and_length_of_rows_make_the_whole_correction():
+    # (28) to (31) from one matrix, their corrections added, are (32).
+    parts = change("dcm-rows-orthogonalize") + change("dcm-rows-normalize")
+    assert parts.expand() == change("dcm-orthonormalize-first-order")
+
+
+def test_errors_of_rows_turn_with_the_navigation_frame_and_those_of_columns_with_the_body():
+    # (40), from dC/dt = C (w x) - (W x) C (38): rows are preferred, since the navigation frame turns slowly.
+    C = GENERAL
+    w, W = (algebra.skew(sp.Matrix(sp.symbols(f"{name}:3"))) for name in "wW")
+    rate = C * w - W * C
+    rows, columns = sp.eye(3) - C * C.T, sp.eye(3) - C.T * C
+    rows_rate, columns_rate = -(rate * C.T + C * rate.T), -(rate.T * C + C.T * rate)
+    assert (rows_rate - (rows * W - W * rows)).expand() == sp.zeros(3, 3)
+    assert (columns_rate - (columns * w - w * columns)).expand() == sp.zeros(3, 3)
+
+
+def test_the_sign_of_the_length_correction_is_plus():
+    # A row that is too long becomes shorter: what is left is of second order.
+    e = sp.Symbol("e")
+    made = apply("dcm-rows-normalize", sp.diag(1 + e, 1, 1))
+    assert sp.expand(made[0] - 1 + sp.Rational(3, 2) * e**2 + e**3 / 2) == 0
+
+
+def test_the_third_row_is_the_cross_product_of_the_others(rng):
+    rotation = Rotation.random(rng=rng).as_matrix()
+    made = strapgen.evaluator("dcm-third-row")(np.vstack([rotation[:2], rng.normal(size=(1, 3))]))
+    np.testing.assert_allclose(made, rotation, atol=3e-16)
+
+
+@pytest.mark.parametrize("name", ["euler", "cayley-klein"])
+def test_first_order_normalization_leaves_the_square_of_the_error(name, rng):
+    state = rng.normal(size=4)
+    state /= np.linalg.norm(state)
+    normalize = strapgen.evaluator(f"{name}-normalize-first-order")
+    for error in (1e-2, 1e-4, -1e-4):
+        left = np.linalg.norm(normalize(state * (1 + error))) - 1
+        assert left == pytest.approx(-1.5 * error**2, rel=abs(error) * 2, abs=4e-16)

@@ -164,6 +164,11 @@ WRONG = {
         "def other():",
         "defines no function algorithm; one that returns a Kernel",
     ),
+    "a name that is taken": (
+        '("d_x", "d_y", "d_z")',
+        '("resolution", "d_y", "d_z")',
+        "resolution stands for the resolution of a target; another name is needed",
+    ),
     "no function": ("def algorithm():", "algorithm = 3\n\ndef other():", "algorithm is no function"),
     "raises": (
         "    build = K",

@@ -19,6 +19,7 @@ TIMES = "--step 0.125 --duration 1"
 CONSTANT = f"--motion constant --set x_deg_s=1 {TIMES}"
 CONING = "--motion coning --step 0.125 --duration 1 --set"
 EVEN = f"--rates-csv {DATA}/rates_even.csv"
+WAVE = "--step 0.01 --frequency-hz 10 --theta-x-rad 1 --phase-rad 1"
 
 BAD = {
     # Series
@@ -72,6 +73,28 @@ BAD = {
     "check error-matrix": "algorithm 'error-matrix' is no attitude step",
     "check none.py": "none.py is no file",
     "check euler --format csv": "format 'csv' is not known; allowed: text, json",
+    # vibration
+    "vibration": "Missing argument",
+    "vibration euler": "--step in s is needed",
+    "vibration euler --step 0.01": "--frequency-hz is needed, or a --spectrum",
+    f"vibration euler {WAVE}": "--theta-y-rad is needed for the drift, or --acceleration-y for sculling",
+    f"vibration error-matrix {WAVE} --theta-y-rad 1": "kernel error-matrix takes no angle increments",
+    f"vibration rk4 {WAVE} --theta-y-rad 1": "algorithm 'rk4' is not known",
+    f"vibration euler {WAVE} --theta-y-rad 1 --method rk9": "method 'rk9' is not known",
+    f"vibration euler {WAVE} --theta-y-rad 1 --method ,": "--method is ','; a list with commas between is needed",
+    f"vibration euler {WAVE} --theta-y-rad far": "theta-y-rad is 'far'; a finite number is needed",
+    f"vibration euler {WAVE} --theta-y-rad 1 --increments 9": "increments is 9; a whole number from 1 to 8",
+    f"vibration euler {WAVE} --theta-y-rad 1 --format csv": "format 'csv' is not known; allowed: text, json, latex",
+    f"vibration euler {WAVE} --theta-y-rad 1 --plot-hz 1,2": "--plot-hz goes with --plot",
+    f"vibration euler {WAVE} --theta-y-rad 1 --plot a.png --plot-hz 1": "two frequencies, LOW,HIGH, are needed",
+    f"vibration euler {WAVE} --theta-y-rad 1 --plot a.docx": "file type 'docx' is not known",
+    f"vibration euler {WAVE} --theta-y-rad 1 --frequency-hz 0": "frequency-hz is 0; a number above 0 is needed",
+    f"vibration euler {WAVE} --theta-y-rad 1 --method rk1 --frequency-hz 100": "euler-rk1-2 has no mean rate",
+    f"vibration coning-fast {WAVE} --theta-y-rad 1": "--increments must say how many of its cycles make a step",
+    f"vibration coning-fast {WAVE} --acceleration-y 1 --increments 9": "drift rates alone; --theta-y-rad is needed",
+    f"vibration sculling {WAVE} --theta-y-rad 1": "sculling rates alone; --acceleration-y is needed",
+    f"vibration euler {WAVE} --spectrum a.csv": "--frequency-hz goes with one frequency, not with --spectrum",
+    "vibration euler --step 0.01 --spectrum none.csv": "none.csv cannot be read (No such file or directory)",
     # tableau
     "tableau": "Missing argument",
     "tableau rk9": "method 'rk9' is not known; allowed: rk1, rk2, midpoint, ",
@@ -81,6 +104,24 @@ BAD = {
     "tableau .toml": ".toml cannot be read (No such file or directory)",
     "tableau heun.toml": "heun.toml: order 3: sum b_i c_i^2 = 1/2, 1/3 is needed (off by 1/6)",
     "tableau implicit.toml": "implicit.toml: matrix row 1 has 1 entries: not explicit, 0 are needed",
+    # coning, and vectors of a step
+    "coning": "Missing option '--samples'",
+    "coning --samples 0": "samples is 0; a whole number from 1 to 8 is needed",
+    "coning --samples 9": "samples is 9; a whole number from 1 to 8 is needed",
+    "coning --samples few": "samples is 'few'; a whole number is needed",
+    "coning --samples 2 --previous 4": "previous is 4; a whole number from 0 to 3 is needed",
+    "coning --samples 2 --form optimal": "form 'optimal' is not known; allowed: compressed, uncompressed, combined",
+    "coning --samples 6 --previous 1 --terms": "are listed for up to 6 samples; 7 are given",
+    "coning --samples 2 --format csv": "format 'csv' is not known; allowed: text, json",
+    "derive rotation-vector --method rk4": "method of rotation-vector 'rk4' is not known; allowed: magnus2, magnus4",
+    "derive rotation-vector --tableau kutta.toml": "rotation-vector goes with no tableau; allowed methods: magnus2",
+    "derive sculling --method magnus4": "method of sculling 'magnus4' is not known; allowed: coning-compressed",
+    "derive sculling --rates": "method coning-combined takes increments; rates at nodes do not go with it",
+    "derive euler --method coning-compressed --rates": "rates at nodes do not go with it",
+    "derive sculling --increments 9": "increments is 9; a whole number from 1 to 8 is needed",
+    "generate sculling --target c-fixed": "the range of input velocity_increments is not known",
+    "converge rotation-vector": "algorithm 'rotation-vector' is no attitude step; allowed: dcm, euler",
+    f"simulate sculling {CONSTANT}": "algorithm 'sculling' is no attitude step",
     # derive
     "derive eulr": "algorithm 'eulr' is not known; allowed: dcm, euler, cayley-klein, ",
     "derive euler --method rk5": "method 'rk5' is not known; allowed: rk1, rk2, midpoint, ralston2, rk3, ",

@@ -17,13 +17,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import sympy
+import sympy as sp
 from tolerances import certified
 
 import strapgen
 from strapgen import catalogue, formulas, pipeline
 from strapgen.backends import BACKENDS, fitted
-from strapgen.catalogue import coefficients
+from strapgen.catalogue import coefficients, coning
 from strapgen.catalogue.tableaux import TABLEAUX
 from strapgen.cli import main
 from strapgen.motions import motion as make_motion
@@ -34,8 +34,21 @@ from strapgen.targets import FIXED, TARGETS
 pytestmark = pytest.mark.filterwarnings("error")
 
 COMMANDS = (
-    *("list", "tableau", "derive", "generate", "simulate", "compare", "converge", "check", "tables"),
-    *("study word-length", "series", "stability"),
+    *(
+        "list",
+        "tableau",
+        "coning",
+        "derive",
+        "generate",
+        "simulate",
+        "compare",
+        "converge",
+        "check",
+        "tables",
+        "two-speed",
+        "vibration",
+    ),
+    *("study word-length", "series", "stability", "stress"),
 )
 DATA = Path(__file__).resolve().parents[1] / "data"
 CONING = "--motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 --step 0.125 --duration 5"
@@ -110,9 +123,10 @@ def test_version_names_all_that_shapes_the_output(strapgen_says):
 
 def test_list(strapgen_says):
     data = json.loads(strapgen_says("list --format json"))
-    assert list(data) == ["algorithms", "methods", "kernels", "motions", "targets", "backends"]
+    assert list(data) == ["algorithms", "methods", "vectors", "kernels", "motions", "targets", "backends"]
     assert list(data["algorithms"]) == ["dcm", "euler", "cayley-klein"]
     assert list(data["methods"].items()) == list(catalogue.METHODS.items())
+    assert data["vectors"].keys() == catalogue.VECTORS.keys()
     assert data["kernels"].keys() == catalogue.KERNELS.keys()
     assert list(data["motions"]) == ["constant", "sinusoidal", "coning", "polynomial"]
     assert list(data["targets"]) == list(TARGETS) == ["numpy", "c", "c-float", "c-fixed", "fixed-model"]
@@ -122,7 +136,9 @@ def test_list(strapgen_says):
     for title, part in data.items():
         assert title in lines
         for name, meaning in part.items():
-            if name.startswith("taylor"):  # twenty of a kind take one line
+            if (
+                re.match(r"taylor|[a-z-]+-update-\d", name) and "navigation" not in name
+            ):  # twenty take one line
                 continue
             assert any(line.split() == [name, *meaning.split()] for line in lines)
     assert sum(line.startswith("  taylor1 to taylor20 ") for line in lines) == 1
@@ -192,6 +208,153 @@ def test_tableau_of_a_file(strapgen_says, tmp_path):
         )
 
 
+# vibration
+
+ONE = "--frequency-hz 10 --step 0.02 --theta-x-rad 0.01 --theta-y-rad 0.02 --phase-rad 1.1"
+HEADS = [*((part, "rad/s") for part in ("continuous", "computed", "error")), ("error", "deg/h")]
+TRUE = -math.pi * 10 * 0.01 * 0.02 * math.sin(1.1)
+
+
+@pytest.mark.parametrize(
+    "algorithm",
+    [
+        "dcm",
+        "euler --method rk1 --increments 1",
+        "cayley-klein --method rk4 --rates",
+        "euler --method coning-combined --increments 3 --previous 1",
+        "rotation-vector --method magnus4",
+        "examples/modified_rodrigues.py --method rk2",
+    ],
+)
+def test_vibration_json(algorithm, strapgen_says, tmp_path):
+    (tmp_path / "examples").symlink_to(DATA.parents[1] / "examples")
+    data = json.loads(strapgen_says(f"vibration {algorithm} {ONE} --format json"))
+    assert list(data)[:3] == ["continuous_rad_s", "computed_rad_s", "error_rad_s"]
+    assert data["continuous_rad_s"] == pytest.approx(TRUE, rel=1e-14)
+    assert data["computed_rad_s"] - data["continuous_rad_s"] == pytest.approx(data["error_rad_s"], rel=1e-9)
+    assert 0 < abs(data["error_rad_s"]) < abs(TRUE)
+    values = {"f": 10, "T": 0.02, "theta_x": 0.01, "theta_y": 0.02, "phi": 1.1}
+    closed = sp.sympify(data["drift_closed_form"]["computed"]).subs(values)
+    assert float(closed) == pytest.approx(data["computed_rad_s"], rel=1e-12)
+
+
+def test_vibration_with_an_acceleration(strapgen_says):
+    data = json.loads(strapgen_says(f"vibration euler {ONE} --acceleration-y 3 --format json"))
+    assert data["continuous_m_s2"] == pytest.approx(0.01 * 3 * math.cos(1.1) / 2, rel=1e-14)
+    # By duality the rates of drift and sculling are off by the same part.
+    ratio = data["error_rad_s"] / data["continuous_rad_s"]
+    assert data["error_m_s2"] / data["continuous_m_s2"] == pytest.approx(ratio, rel=1e-12)
+    alone = "--frequency-hz 10 --step 0.02 --theta-x-rad 0.01 --phase-rad 1.1 --acceleration-y 3"
+    for algorithm in ("euler", "sculling --method coning-compressed"):
+        again = json.loads(strapgen_says(f"vibration {algorithm} {alone} --format json"))
+        assert "computed_rad_s" not in again
+        assert again["computed_m_s2"] == pytest.approx(data["computed_m_s2"], rel=1e-14)
+
+
+def test_vibration_of_the_recursions(strapgen_says):
+    given = "--increments 10 --frequency-hz 7 --step 0.1 --theta-x-rad 0.01 --phase-rad 0.9 --format json"
+    coned = json.loads(strapgen_says(f"vibration coning-fast {given} --theta-y-rad 0.013"))
+    assert coned["computed_rad_s"] == pytest.approx(-2.720926166e-3, abs=1e-12)
+    sculled = json.loads(strapgen_says(f"vibration sculling-fast-2 {given} --acceleration-y 3"))
+    assert sculled["computed_m_s2"] == pytest.approx(1.1042645359e-2, abs=1e-12)
+
+
+def test_vibration_of_several(strapgen_says, tmp_path):
+    several = f"vibration euler --method rk2,rk4 --increments 1,2 {ONE}"
+    data = json.loads(strapgen_says(f"{several} --format json"))
+    assert [(one["kernel"], one["increments"]) for one in data] == [
+        (f"euler-{method}-{count}", count) for method in ("rk2", "rk4") for count in (1, 2)
+    ]
+    pytest.importorskip("matplotlib")
+    said = strapgen_says(f"{several} --plot errors.svg --plot-hz 1,20")
+    assert said.splitlines()[2].split()[1:] == " ".join(f"{part}, {unit}" for part, unit in HEADS).split()
+    hour = math.degrees(data[0]["error_rad_s"]) * 3600
+    assert float(said.splitlines()[3].split()[-1]) == pytest.approx(hour, rel=1e-5)
+    assert "error of euler-rk4-2" in (tmp_path / "errors.svg").read_text()
+
+
+def test_vibration_in_words_and_in_latex(strapgen_says):
+    said = strapgen_says(f"vibration dcm {ONE}")
+    assert "  continuous = -pi*f*theta_x*theta_y*sin(phi)\n" in said
+    latex = strapgen_says(f"vibration dcm {ONE} --format latex")
+    assert latex.startswith("\\begin{align*}\n") and latex.count("&=") == 3
+
+
+def test_vibration_under_a_spectrum(strapgen_says, tmp_path):
+    (tmp_path / "flat.csv").write_text(
+        "frequency_hz,density,angle_x_rad,angle_y_rad,angle_y_phase_rad\n9.999,0.25,0.01,0.02,1.1\n10.001,0.25,0.01,0.02,1.1\n"
+    )
+    data = json.loads(strapgen_says("vibration dcm --step 0.02 --spectrum flat.csv --format json"))
+    # A band 2 mHz wide: an oscillation of which half the square is 0.25 * 0.002.
+    assert data["continuous_rad_s"] == pytest.approx(TRUE * 2 * 0.25 * 0.002, rel=1e-6)
+    assert 0 <= data["error_quadrature_rad_s"] < 1e-9 * abs(data["error_rad_s"])
+    assert "quadrature" in strapgen_says("vibration dcm --step 0.02 --spectrum flat.csv")
+
+
+# coning
+
+
+@pytest.mark.parametrize(
+    ("options", "wanted"),
+    [
+        ("--samples 2", "2/3"),
+        ("--samples 3", "9/20 27/20"),
+        ("--samples 4 --form compressed", "18/35 92/105 214/105"),
+        ("--samples 1 --previous 1", "1/12"),
+        ("--samples 3 --form uncompressed", "57/80 33/80 57/80"),
+        ("--samples 3 --form combined", "27/40 9/20 27/40"),
+        ("--samples 1", ""),
+    ],
+)
+def test_coning_json(options, wanted, strapgen_says):
+    data = json.loads(strapgen_says(f"coning {options} --format json"))
+    assert data["coefficients"] == wanted.split()
+    residual, leading = (sp.sympify(data[key]) for key in ("residual", "leading"))
+    assert {symbol.name for symbol in residual.free_symbols} == {"alpha", "omega", "T"}
+    small = {"alpha": sp.Rational(1, 10), "omega": 1, "T": sp.Rational(1, 10**6)}
+    assert abs((residual / leading).subs(small).evalf(80, maxn=400) - 1) < 1e-9
+    assert len(data["pairs"]) == len(data["coefficients"])
+    assert not data["pairs"] or data["pairs"][-1][1] == f"d{options.split()[1]}"  # the newest sample
+
+
+def test_coning_text(strapgen_says):
+    said = strapgen_says("coning --samples 2 --previous 1 --form combined --terms")
+    for line in (
+        "combined coning coefficients, 2 samples and 1 before them",
+        "terms of fourth order: each vector",
+    ):
+        assert line in said
+    assert re.search(r"^  past1 x d1 +-?\d+/\d+ ", said, flags=re.MULTILINE)
+    assert "strapgen derive rotation-vector --method coning-combined --increments 2 --previous 1;" in said
+
+
+def test_coning_terms(strapgen_says):
+    data = json.loads(strapgen_says("coning --samples 2 --terms --format json"))
+    assert data["third_order"]["d1"] == {"d1.d2": "2/15", "d2.d2": "-2/15"}
+    assert data["fourth_order"] == {"d1 x d2": {"d1.d1": "-1/126", "d1.d2": "19/315", "d2.d2": "-1/126"}}
+
+
+def test_fixed_point_of_a_vector_of_a_step(strapgen_says, tmp_path):
+    limits = "--target c-fixed --max-rate-deg-s 400 --step 0.01"
+    said = strapgen_says(f"generate rotation-vector --method coning-compressed --increments 4 {limits}")
+    assert re.search(r"^  rotation_vector: Q\S+, error at most ", said, flags=re.MULTILINE)
+    header = (tmp_path / "rotation_vector_coning_compressed_4_q31.h").read_text()
+    assert "strapgen generate rotation-vector --method coning-compressed --increments 4" in header
+    said = strapgen_says(
+        f"generate sculling --method coning-compressed --increments 4 {limits} --range velocity_increments=0.5"
+    )
+    assert re.search(r"^  sculling: Q\S+, error at most ", said, flags=re.MULTILINE)
+
+
+def test_coefficients_of_eight_samples_are_quick(strapgen_says):
+    coning.design.cache_clear()
+    begin = time.process_time()
+    for form in coning.FORMS:
+        data = json.loads(strapgen_says(f"coning --samples 8 --form {form} --format json"))
+        assert len(data["coefficients"]) == (7 if form == "compressed" else 28)
+    assert time.process_time() - begin < 3
+
+
 # derive
 
 
@@ -233,7 +396,7 @@ def test_derive_json(show, strapgen_says):
     assert [signal["name"] for signal in data["inputs"]] == ["state", "increments"]
 
 
-@pytest.mark.parametrize("kernel", sorted(catalogue.KERNELS))
+@pytest.mark.parametrize("kernel", [n for n, recipe in catalogue.KERNELS.items() if recipe.standard])
 def test_every_kernel_can_be_shown(kernel, strapgen_says):
     assert strapgen_says(f"derive {kernel}")
 
@@ -853,10 +1016,10 @@ def test_series_prints_what_was_agreed(strapgen_says):
     said = strapgen_says("series euler --method rk4 --increments 2 --motion constant --terms 2 --format json")
     data = json.loads(said)
     assert data["order"] == 4
-    h, x, y, z = sympy.symbols("h w_x w_y w_z")
+    h, x, y, z = sp.symbols("h w_x w_y w_z")
     square = x**2 + y**2 + z**2
     wanted = h**5 * y * square**2 / 1920 - h**7 * y * square**3 / 21504
-    assert sympy.expand(sympy.sympify(data["drift"][1]) - wanted) == 0
+    assert sp.expand(sp.sympify(data["drift"][1]) - wanted) == 0
     assert data["skew"] == ["0", "0", "0"]
     assert set(data) >= {"order", "drift", "scale", "skew", "run", "growth", "closed_form"}
 

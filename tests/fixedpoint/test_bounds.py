@@ -19,7 +19,7 @@ from strapgen.backends import evaluator as make_evaluator
 from strapgen.backends.fixed import ModelEvaluator
 from strapgen.catalogue import Choice, standard
 from strapgen.exceptions import InputError
-from strapgen.fixedpoint import Settings, can_lower
+from strapgen.fixedpoint import Settings, can_lower, functions
 from strapgen.fixedpoint.code import Sum
 
 STEPS = [choice for choice in standard() if choice.method]
@@ -68,7 +68,7 @@ def spied(fixed):
 @pytest.mark.parametrize("choice", STEPS + OTHERS, ids=lambda choice: choice.kernel)
 def test_every_value_keeps_its_range_and_its_error_bound(choice, word, rounding, rng):
     loose = choice.name == "dcm-orthonormalize-optimal"
-    if loose and word == 8:
+    if word == 8 and (loose or (choice.name, rounding) == ("euler-angles-from-dcm", "truncation")):
         with pytest.raises(InputError, match="words of 8 bits are too short"):
             lowered(choice, Settings(word, Fraction(1, 60), rounding))
         return
@@ -92,9 +92,14 @@ def test_every_value_keeps_its_range_and_its_error_bound(choice, word, rounding,
             if value.name not in known or value.name not in seen:
                 continue
             computed = value.offset + seen[value.name] * Fraction(2) ** -value.fraction
-            assert abs(computed - known[value.name]) <= value.error, value.name
+            apart = abs(computed - known[value.name])
+            if choice.name == "euler-angles-from-dcm":  # its angles are told without whole turns
+                apart = min(apart, abs(apart - 2 * functions.pi()))
+            assert apart <= value.error, value.name
             compared += 1
-    assert compared > (5 * len(fixed.body) if not loose else 0)
+    # What functions are made of has no name in the program.
+    named = sum(value.name in known for value in fixed.body)
+    assert compared > (5 * named if not loose else 0)
 
 
 @pytest.mark.parametrize("word", [16, 32])

@@ -39,13 +39,18 @@ CASES = {
     "sinc": ("sinc", (Fraction(20),), 2),
     "atan2": ("atan2", (Fraction(1), Fraction(1)), 1),
     "atan2-unlike": ("atan2", (Fraction(100), Fraction(1, 3)), 11),
+    "wrap": ("wrap", (Fraction(9),), 1),
 }
 EXACT = {
     "sin": PRECISE.sin,
     "cos": PRECISE.cos,
     "sinc": lambda x: PRECISE.sin(x) / x if x else PRECISE.mpf(1),
     "atan2": PRECISE.atan2,
+    "direction": PRECISE.atan2,
+    "wrap": lambda x: x - 2 * PRECISE.pi * ((x > PRECISE.pi) - (x < -PRECISE.pi)),
 }
+#: Functions whose errors are told without whole turns.
+TURNING = ("direction", "wrap")
 STRICT = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Werror", "-O3"]
 #: Largest magnitudes of the inputs of motions, for some seconds of flight.
 RANGES = {
@@ -113,6 +118,11 @@ def outputs(evaluator: FixedEvaluator, inputs: list[np.ndarray]) -> list[np.ndar
     return [array.astype(object) for array in made]
 
 
+def distance(kind: str, computed: Any, exact: Any) -> Any:
+    apart = abs(computed - exact)
+    return min(apart, abs(apart - 2 * PRECISE.pi)) if kind in TURNING else apart
+
+
 def worst_error(lowered: FixedProgram, inputs: list[np.ndarray], integers: np.ndarray, kind: str) -> Fraction:
     """Return the worst distance from the function of the same integers."""
     units = [argument.format.unit for argument in lowered.interface.inputs]
@@ -124,7 +134,7 @@ def worst_error(lowered: FixedProgram, inputs: list[np.ndarray], integers: np.nd
             for a, u in zip(inputs, units, strict=True)
         ]
         scaled = PRECISE.mpf(int(computed)) * unit.numerator / unit.denominator
-        worst = max(worst, abs(scaled - EXACT[kind](*arguments)))
+        worst = max(worst, distance(kind, scaled, EXACT[kind](*arguments)))
     return Fraction(int(PRECISE.floor(worst * 2**300)), 2**300)
 
 
@@ -217,6 +227,7 @@ def test_any_argument_stays_below_the_bound(case, data):
         ("cos", (Fraction(3),)),
         ("sinc", (Fraction(5),)),
         ("atan2", (Fraction(1),) * 2),
+        ("wrap", (Fraction(25),)),
     ],
 )
 def test_error_of_the_argument_is_in_the_bound(kind, bounds):
@@ -234,7 +245,8 @@ def test_error_of_the_argument_is_in_the_bound(kind, bounds):
             for a, g in zip(inputs, lowered.interface.inputs, strict=True)
         ]
         exact = EXACT[kind](*arguments)
-        assert abs(_precise(int(computed) * argument.format.unit) - exact) <= _precise(argument.errors[0])
+        made = _precise(int(computed) * argument.format.unit)
+        assert distance(kind, made, exact) <= _precise(argument.errors[0])
     if kind == "atan2":  # the cut and the origin lie in its range
         assert argument.errors[0] > 6
 
@@ -252,6 +264,49 @@ def test_atan2_away_from_the_origin_and_the_cut_keeps_a_small_bound():
         lowered = quantize(changed, Settings(word=24))
         (argument,) = lowered.interface.outputs
         assert argument.errors[0] <= places * argument.format.unit
+
+
+def test_a_direction_has_no_error_at_the_cut():
+    # Both arguments are rounded, and the angle is near half a turn: only whole turns are uncertain.
+    third, x = Constant(Fraction(1, 3)), Reference("x0")
+    small = Operation("multiply", (third, x))
+    far = Operation("subtract", (small, Constant(Fraction(1))))
+    errors = {}
+    for kind in ("atan2", "direction"):
+        value = Assignment("value", Operation(kind, (small, far)))
+        made = program_of("sin", (Fraction(1),))
+        lowered = quantize(Program(**{**made.__dict__, "body": (value,)}), Settings(word=32))
+        errors[kind] = lowered.interface.outputs[0].errors[0]
+        evaluator = ModelEvaluator(emit(lowered, "fixed-model"))
+        inputs = corners_and_others(evaluator, 100)
+        (integers,) = outputs(evaluator, inputs)
+        unit, place = (a.format.unit for a in (lowered.interface.inputs[0], lowered.interface.outputs[0]))
+        for given_, computed in zip(inputs[0][:, 0], integers[:, 0], strict=True):
+            y = _precise(int(given_) * unit) / 3
+            apart = distance(kind, _precise(int(computed) * place), PRECISE.atan2(y, y - 1))
+            assert apart <= _precise(errors[kind])
+    assert errors["atan2"] > 6
+    assert errors["direction"] < Fraction(1, 10**8)
+
+
+def test_a_wrapped_angle_is_at_most_a_turn_and_a_half():
+    with pytest.raises(InputError, match="more than a turn and a half"):
+        quantize(program_of("wrap", (Fraction(10),)), Settings())
+
+
+def test_arguments_on_a_circle_are_checked_to_be_off_the_origin():
+    # y and the root of the rest of 1: a check while the code runs proves the bound; a proof where there is one.
+    y, z = Reference("x0"), Reference("x1")
+    made = program_of("atan2", (Fraction(1), Fraction(1)))
+    root = Operation("sqrt", (Operation("multiply", (z, z)),))
+    free = Program(**{**made.__dict__, "body": (Assignment("value", Operation("atan2", (y, root))),)})
+    assert quantize(free, Settings()).interface.outputs[0].errors[0] > 1
+    rest = Operation("subtract", (Constant(Fraction(1)), Operation("multiply", (y, y))))
+    root = Operation("sqrt", (Operation("maximum", (Constant(Fraction(0)), rest)),))
+    value = Operation("atan2", (y, root))
+    bound = Program(**{**made.__dict__, "body": (Assignment("value", value),)})
+    lowered = quantize(bound, Settings())
+    assert lowered.interface.outputs[0].errors[0] < Fraction(1, 10**8)
 
 
 def test_both_arguments_zero_give_zero():

@@ -412,6 +412,7 @@ CALLS = {
     "cos": "function",
     "atan2": "function",
     "sinc_": "function",
+    "wrap_": "function",
 }
 
 

@@ -15,7 +15,18 @@ from strapgen.exceptions import InputError
 from strapgen.fixedpoint import Settings
 from strapgen.targets import FIXED, Sources
 
-__all__ = ["BACKENDS", "Backend", "Entry", "Evaluator", "backend", "build", "evaluator", "fitted", "of"]
+__all__ = [
+    "BACKENDS",
+    "Backend",
+    "Entry",
+    "Evaluator",
+    "backend",
+    "build",
+    "evaluator",
+    "fitted",
+    "of",
+    "of_sources",
+]
 
 
 class Entry(NamedTuple):
@@ -87,13 +98,13 @@ def _loaded(target: str) -> tuple[type[Evaluator], type[Backend]]:
     return getattr(module, entry.evaluator), getattr(module, entry.backend)
 
 
-def evaluator(kernel: str, backend: str = "numpy", settings: Settings | None = None) -> Evaluator:
-    """Return a kernel of the catalogue that takes no method as a callable.
+def evaluator(kernel: str | Choice, backend: str = "numpy", settings: Settings | None = None) -> Evaluator:
+    """Return a kernel of the catalogue as a callable.
 
     Parameters
     ----------
-    kernel : str
-        Name of the kernel, for instance "dcm-from-euler".
+    kernel : str or Choice
+        Name of a kernel that takes no method, for instance "dcm-from-euler"; or what `catalogue.choose` returned.
     backend : str, optional
         A key of `BACKENDS`.
     settings : Settings, optional
@@ -118,10 +129,12 @@ def evaluator(kernel: str, backend: str = "numpy", settings: Settings | None = N
            [ 0.,  0.,  1.]])
     """
     checks.choice("backend", backend, BACKENDS)
-    if kernel not in catalogue.user.KERNELS:
-        checks.choice("kernel", kernel, catalogue.KERNELS)
+    if not isinstance(kernel, Choice):
+        if kernel not in catalogue.user.KERNELS:
+            checks.choice("kernel", kernel, catalogue.KERNELS)
+        kernel = catalogue.choose(kernel)
     chosen = fitted(backend, settings)
-    return _evaluator(library.sources(catalogue.choose(kernel), BACKENDS[backend].target, chosen))
+    return of_sources(library.sources(kernel, BACKENDS[backend].target, chosen))
 
 
 def backend(
@@ -212,14 +225,15 @@ def build(sources: Sources, orthonormalization: str | None = None) -> Backend:
 
     def evaluate(kernel: str) -> Evaluator:
         if kernel == sources.kernel:
-            return _evaluator(sources)
+            return of_sources(sources)
         settings = sources.fixed.companion_settings if sources.fixed else None
-        return _evaluator(library.sources(catalogue.choose(kernel), sources.target, settings))
+        return of_sources(library.sources(catalogue.choose(kernel), sources.target, settings))
 
     make = _loaded(sources.target)[1]
     return make(sources, evaluate, orthonormalization)
 
 
-def _evaluator(sources: Sources) -> Evaluator:
+def of_sources(sources: Sources) -> Evaluator:
+    """Return the generated function of any kernel as a callable."""
     make: Callable[[Sources], Evaluator] = _loaded(sources.target)[0]
     return make(sources)

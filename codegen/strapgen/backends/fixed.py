@@ -18,6 +18,32 @@ from strapgen.fixedpoint.code import Argument, Interface
 from strapgen.targets import Sources
 
 
+def integers(argument: Argument, values: Any, kernel: str) -> Array:
+    """Return numbers as the integers of an input, rounded to the nearest.
+
+    Raises
+    ------
+    InputError
+        If one lies outside the input's range.
+    """
+    scaled = np.rint(np.ldexp(np.asarray(values, np.float64), argument.format.fraction))
+    outside = (scaled < argument.low) | (scaled > argument.high)
+    if outside.any():
+        worst = float(np.asarray(values)[outside].flat[0])
+        limit = float(argument.high * argument.format.unit)
+        raise InputError(
+            f"{argument.signal.name} holds {worst:.9g}; the formats of {kernel} were chosen for at most "
+            f"{limit:.9g} in magnitude"
+        )
+    whole = scaled.astype(np.int64)
+    return whole.astype(object) if argument.format.word > 32 else whole
+
+
+def numbers(argument: Argument, integers: Any) -> Array:
+    """Return integers of an input or output as numbers."""
+    return np.ldexp(np.asarray(integers).astype(np.float64), -argument.format.fraction)
+
+
 class FixedEvaluator(Evaluator):
     """A generated fixed-point function.
 
@@ -42,21 +68,11 @@ class FixedEvaluator(Evaluator):
         InputError
             If one lies outside the input's range.
         """
-        scaled = np.rint(np.ldexp(np.asarray(values, np.float64), argument.format.fraction))
-        outside = (scaled < argument.low) | (scaled > argument.high)
-        if outside.any():
-            worst = float(np.asarray(values)[outside].flat[0])
-            limit = float(argument.high * argument.format.unit)
-            raise InputError(
-                f"{argument.signal.name} holds {worst:.9g}; the formats of {self.kernel} were chosen for at most "
-                f"{limit:.9g} in magnitude"
-            )
-        whole = scaled.astype(np.int64)
-        return whole.astype(object) if self.integer_type is object else whole
+        return integers(argument, values, self.kernel)
 
     def numbers(self, argument: Argument, integers: Any) -> Array:
         """Return integers of an output as numbers."""
-        return np.ldexp(np.asarray(integers).astype(np.float64), -argument.format.fraction)
+        return numbers(argument, integers)
 
     def _call(self, arrays: list[Array], batch: tuple[int, ...]) -> tuple[Array, ...]:
         count = int(np.prod(batch, dtype=int))

@@ -17,6 +17,7 @@ from strapgen.catalogue.tableaux import TABLEAUX, TITLES, Tableau
 from strapgen.exceptions import InputError, InputTypeError
 
 if TYPE_CHECKING:
+    from strapgen.catalogue.coefficients import Number
     from strapgen.catalogue.steps import Method
     from strapgen.kernel import Kernel
 
@@ -29,12 +30,13 @@ ALGORITHMS = {
 
 
 class Integrator(NamedTuple):
-    """A method without tableau: a module of this package whose ``method(order)`` makes it."""
+    """A method without tableau: a module of this package whose ``method`` makes it of its arguments, or its order."""
 
     title: str
     module: str
     order: int
     takes_rates: bool = True
+    arguments: tuple[str, ...] = ()
 
 
 #: Integration methods that have no tableau.
@@ -50,6 +52,30 @@ INTEGRATORS = {
         for order in (2, 4, 6)
     },
     "munthe-kaas4": Integrator("Runge-Kutta-Munthe-Kaas method of order 4", "munthe_kaas", 4),
+    "coning-compressed": Integrator(
+        "compressed coning coefficients, made for coning", "coning_methods", 4, False, ("compressed",)
+    ),
+    "coning-uncompressed": Integrator(
+        "uncompressed coning coefficients, made for polynomial rates",
+        "coning_methods",
+        4,
+        False,
+        ("uncompressed",),
+    ),
+    "coning-combined": Integrator(
+        "coning coefficients for both, with the terms of third and fourth order",
+        "coning_methods",
+        6,
+        False,
+        ("combined",),
+    ),
+    "coning-polynomial": Integrator(
+        "uncompressed coning coefficients, with the terms of third and fourth order",
+        "coning_methods",
+        6,
+        False,
+        ("polynomial",),
+    ),
 }
 
 #: Integration methods.
@@ -77,8 +103,119 @@ class Recipe(NamedTuple):
     title: str
     module: str
     function: str
-    arguments: tuple[str, ...] = ()
+    arguments: tuple[Any, ...] = ()
+    standard: bool = True
 
+
+#: Orders of the updates that are cut off.
+UPDATE_ORDERS = range(1, 21)
+
+#: Kernels of algorithms in two speeds that are in the standard catalogue; their variants are not.
+_STANDARD_TWO_SPEED = (
+    *("dcm-update", "coning-fast", "sculling-fast-2", "dcm-velocity-2"),
+    *("euler-from-dcm-sheppard", "dcm-from-euler-angles", "euler-angles-from-dcm"),
+)
+
+#: Kernels of algorithms in two speeds: they take no method.
+_TWO_SPEED = {
+    **{
+        f"{algorithm}-update": Recipe(
+            f"{title}: update by a rotation vector", "updates", "update", (algorithm,)
+        )
+        for algorithm, title in ALGORITHMS.items()
+    },
+    **{
+        f"{algorithm}-update-{order}": Recipe(
+            f"{title}: update by a rotation vector, order {order}",
+            "updates",
+            "update",
+            (algorithm, order),
+        )
+        for algorithm, title in ALGORITHMS.items()
+        for order in UPDATE_ORDERS
+    },
+    **{
+        f"{algorithm}-navigation-update{suffix}": Recipe(
+            f"{title}: update by the rotation of the navigation frame{words}",
+            "updates",
+            "navigation_update",
+            (algorithm, order),
+        )
+        for algorithm, title in ALGORITHMS.items()
+        for order, suffix, words in ((1, "-1", ", order 1"), (2, "-2", ", order 2"), (None, "", ""))
+    },
+    "navigation-rotation": Recipe(
+        "rotation of the navigation frame, trapezoidal", "updates", "navigation_rotation"
+    ),
+    "coning-fast": Recipe("rotation vector by recursion: fast loop", "two_speed", "coning"),
+    "coning-slow": Recipe("rotation vector by recursion: slow loop", "two_speed", "rotation_vector"),
+    **{
+        f"sculling-fast-{form}": Recipe(
+            f"sculling integral S{form} by recursion: fast loop", "two_speed", "sculling", (form,)
+        )
+        for form in (1, 2)
+    },
+    **{
+        f"{name}-{what}": Recipe(title, "acceleration", function, (name, *more))
+        for name in ("dcm", "euler")
+        for what, title, function, *more in (
+            ("acceleration", "acceleration transformation", "transformation"),
+            ("velocity-1", "velocity increment in navigation axes with S1", "velocity", 1),
+            ("velocity-2", "velocity increment in navigation axes with S2", "velocity", 2),
+        )
+    },
+    "navigation-velocity": Recipe(
+        "velocity correction for the rotation of the navigation frame", "acceleration", "navigation_velocity"
+    ),
+    **{
+        f"two-speed-fast-{form}": Recipe(f"two speeds: fast loop with S{form}", "loops", "fast", (form,))
+        for form in (1, 2)
+    },
+    **{
+        f"{name}-two-speed-slow-{form}": Recipe(
+            f"two speeds: slow loop with S{form}", "loops", "slow", (name, form)
+        )
+        for name in ("dcm", "euler")
+        for form in (1, 2)
+    },
+    **{
+        f"{name}-two-speed-navigation": Recipe("two speeds: navigation loop", "loops", "navigation", (name,))
+        for name in ("dcm", "euler")
+    },
+    "dcm-rows-orthogonalize": Recipe(
+        "rows made orthogonal, to first order", "orthonormal", "rows_orthogonalized"
+    ),
+    "dcm-rows-normalize": Recipe("rows made of length 1, to first order", "orthonormal", "rows_normalized"),
+    "dcm-third-row": Recipe("third row from the first two", "orthonormal", "third_row"),
+    **{
+        f"{name}-normalize-first-order": Recipe(
+            "normalization to first order", "orthonormal", "normalized_first_order", (name,)
+        )
+        for name in ("euler", "cayley-klein")
+    },
+    "euler-from-dcm-sheppard": Recipe(
+        "conversion: the largest parameter keeps its sign",
+        "conversions",
+        "euler_from_dcm_followed",
+        ("element",),
+    ),
+    "euler-from-dcm-continuous": Recipe(
+        "conversion: the nearer sign to the call before",
+        "conversions",
+        "euler_from_dcm_followed",
+        ("product",),
+    ),
+    "dcm-from-euler-angles": Recipe(
+        "conversion: direction cosine matrix from Euler angles", "euler_angles", "dcm_from_euler_angles"
+    ),
+    "euler-angles-from-dcm": Recipe(
+        "conversion: Euler angles from direction cosine matrix", "euler_angles", "euler_angles_from_dcm"
+    ),
+}
+
+TWO_SPEED = {
+    name: recipe._replace(standard=name in _STANDARD_TWO_SPEED) for name, recipe in _TWO_SPEED.items()
+}
 
 #: Kernels that take no method.
 KERNELS = {
@@ -121,11 +258,50 @@ KERNELS = {
         )
         for motion in MOTIONS
     },
+    **TWO_SPEED,
 }
 
 
+class StepVector(NamedTuple):
+    """A vector of one step, by a method: a module of this package, a function, modules of methods that go with it."""
+
+    title: str
+    module: str
+    function: str
+    families: tuple[str, ...]
+    default: str
+
+    @property
+    def methods(self) -> list[str]:
+        """Names of the methods that go with it."""
+        return [name for name, integrator in INTEGRATORS.items() if integrator.module in self.families]
+
+
+#: Vectors of a step that are derived by a method.
+VECTORS = {
+    "rotation-vector": StepVector(
+        "rotation vector of a step",
+        "steps",
+        "rotation_vector",
+        ("magnus", "munthe_kaas", "coning_methods"),
+        "coning-combined",
+    ),
+    "sculling": StepVector(
+        "sculling term of a step, by duality with coning",
+        "coning_methods",
+        "sculling",
+        ("coning_methods",),
+        "coning-combined",
+    ),
+}
+
+
+#: Names that no algorithm of a user may have.
+RESERVED = (*ALGORITHMS, *VECTORS, *KERNELS)
+
+
 class Choice(NamedTuple):
-    """A kernel of the catalogue: its name, and method and samples where it is an attitude step.
+    """A kernel of the catalogue: its name, and method and samples where it is an attitude step or a vector of one.
 
     A step without increments is given the body rate at every node of its method; `previous` counts increments before
     the step that it takes too.
@@ -201,10 +377,14 @@ def choose(
             if value:
                 raise InputError(f"kernel {name} is loaded with its options; it takes no {option}")
         return Choice(name)
-    if name.endswith(".py") or (name not in ALGORITHMS and name not in KERNELS and name in user.installed()):
+    if name.endswith(".py") or (name not in RESERVED and name in user.installed()):
         return _choose_own(name, method, increments, rates, previous)
-    if name not in ALGORITHMS and name not in KERNELS:
-        raise InputError(f"algorithm {name!r} is not known; allowed: {_allowed(*KERNELS)}")
+    if name not in RESERVED:
+        shown = [kernel for kernel, recipe in KERNELS.items() if recipe.standard]
+        raise InputError(
+            f"algorithm {name!r} is not known; "
+            f"allowed: {_allowed(*VECTORS, *shown, 'other kernels of strapgen list')}"
+        )
     if name in KERNELS:
         given = {
             "method": method.name if isinstance(method, Tableau) else method,
@@ -214,9 +394,16 @@ def choose(
         }
         for option, value in given.items():
             if value is not None:
-                takers = ", ".join(ALGORITHMS)
+                takers = ", ".join([*ALGORITHMS, *VECTORS])
                 raise InputError(f"kernel {name} takes no {option} (got {value}); these do: {takers}")
         return Choice(name)
+    if name in VECTORS:
+        if isinstance(method, Tableau):
+            raise InputError(
+                f"{name} goes with no tableau; allowed methods: {', '.join(VECTORS[name].methods)}"
+            )
+        method = VECTORS[name].default if method is None else method
+        checks.choice(f"method of {name}", method, VECTORS[name].methods)
     if not isinstance(method, Tableau):
         method = checks.choice("method", "rk4" if method is None else method, METHODS)
     previous = checks.count("previous", previous, smallest=0, largest=MOST_PREVIOUS)
@@ -244,11 +431,7 @@ def _choose_own(
         options["increments"] = checks.count("increments", increments, largest=MOST_INCREMENTS)
     if previous:
         options["previous"] = checks.count("previous", previous, smallest=0, largest=MOST_PREVIOUS)
-    return Choice(
-        user.load(
-            name, frozenset([*ALGORITHMS, *KERNELS]), lambda known: derive(Choice(known)), **options
-        ).name
-    )
+    return Choice(user.load(name, frozenset(RESERVED), lambda known: derive(Choice(known)), **options).name)
 
 
 def _allowed(*more: str) -> str:
@@ -269,7 +452,7 @@ def choose_step(
     previous: int = 0,
 ) -> Choice:
     """Check a choice of attitude step; parameters and errors are those of `choose`."""
-    if name in KERNELS:
+    if name in KERNELS or name in VECTORS:
         raise InputError(f"algorithm {name!r} is no attitude step; allowed: {_allowed()}")
     return choose(name, method, increments, rates, previous)
 
@@ -290,9 +473,11 @@ def previous(choice: Choice) -> int:
     return choice.previous
 
 
-def nodes(choice: Choice) -> tuple[Any, ...]:
-    """Return the nodes of a chosen method, at which a step that takes rates is given them."""
-    return () if choice.method is None else tuple(_method(choice.method).nodes)
+def nodes(choice: Choice) -> tuple[Number, ...]:
+    """Return the nodes at which a step takes the rate; empty for one that takes increments."""
+    if choice.method is None or choice.increments is not None:
+        return ()
+    return _method(choice.method).nodes
 
 
 def rounding(choice: Choice) -> Fraction:
@@ -311,10 +496,10 @@ def enough(method: str | Tableau) -> int:
     >>> enough("rk4"), enough("butcher6")
     (2, 4)
     """
-    from strapgen.catalogue.rates import step_order
-
-    order = _method(method).order
-    return next(count for count in range(1, MOST_INCREMENTS + 1) if step_order(count) >= min(order, 10))
+    loaded = _method(method)
+    return next(
+        count for count in range(1, MOST_INCREMENTS + 1) if loaded.limit(count, 0) >= min(loaded.order, 10)
+    )
 
 
 def orthonormalizations(algorithm: str) -> list[str]:
@@ -326,7 +511,7 @@ def orthonormalizations(algorithm: str) -> list[str]:
 def standard() -> list[Choice]:
     """Return the standard catalogue: every algorithm by the thesis's methods on two increments, and all else."""
     steps = [Choice(algorithm, method, 2) for algorithm in ALGORITHMS for method in STANDARD_METHODS]
-    return steps + [Choice(name) for name in KERNELS]
+    return steps + [Choice(name) for name, recipe in KERNELS.items() if recipe.standard]
 
 
 def derive(choice: Choice) -> Kernel:
@@ -344,6 +529,12 @@ def derive(choice: Choice) -> Kernel:
         function = getattr(import_module(f"{__name__}.{recipe.module}"), recipe.function)
         kernel: Kernel = function(*recipe.arguments)
         return kernel
+    if choice.name in VECTORS:
+        vector = VECTORS[choice.name]
+        derived: Kernel = getattr(import_module(f"{__name__}.{vector.module}"), vector.function)(
+            _method(choice.method), choice.increments, choice.previous
+        )
+        return derived
     from strapgen.catalogue.kinematics import KINEMATICS
     from strapgen.catalogue.steps import step
 
@@ -359,5 +550,5 @@ def _method(method: str | Tableau) -> Method:
     if method in TABLEAUX:
         return runge_kutta.method(TABLEAUX[method])
     family = INTEGRATORS[method]
-    made: Method = import_module(f"{__name__}.{family.module}").method(family.order)
+    made: Method = import_module(f"{__name__}.{family.module}").method(*(family.arguments or (family.order,)))
     return made

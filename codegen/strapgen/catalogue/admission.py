@@ -9,8 +9,10 @@ from collections.abc import Callable, Iterator
 import sympy as sp
 
 from strapgen import checks
+from strapgen.algebra import Direction, Wrapped
 from strapgen.exceptions import InputError
 from strapgen.kernel import Kernel
+from strapgen.program import RESOLUTION
 from strapgen.signal import Signal
 
 _NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
@@ -23,10 +25,10 @@ sin cos tan sqrt exp log pow floor ceil round fabs abs asin acos atan atan2 sinh
 """
 _OF_C = frozenset(_WORDS.split())
 #: Functions that can be generated.
-_FUNCTIONS = (sp.sin, sp.cos, sp.sinc, sp.atan2, sp.Max, sp.Piecewise)
+_FUNCTIONS = (sp.sin, sp.cos, sp.sinc, sp.atan2, sp.asin, sp.acos, Direction, Wrapped, sp.Max, sp.Piecewise)
 _COMPARISONS = (sp.Gt, sp.Ge, sp.Lt, sp.Le)
 ALLOWED = (
-    "exact numbers, + - * /, whole powers, square roots, sin, cos, sinc, atan2, Max, "
+    "exact numbers, + - * /, whole powers, square roots, sin, cos, sinc, atan2, asin, acos, Max, "
     "and Piecewise on < <= > >= with a last case that is always true"
 )
 
@@ -88,6 +90,8 @@ def _require_names(kernel: Kernel, catalogue: frozenset[str]) -> None:
             if not (part.isascii() and part.isidentifier()):
                 _refuse(kernel, f"{part!r} is no name for generated code")
         for element in signal.elements:
+            if element == RESOLUTION:
+                _refuse(kernel, f"{element} stands for the resolution of a target; another name is needed")
             if element in seen:
                 _refuse(
                     kernel,
@@ -106,7 +110,7 @@ def _require_texts(kernel: Kernel) -> None:
 
 
 def _require_formulas(kernel: Kernel) -> None:
-    known = {element for signal in kernel.inputs for element in signal.elements}
+    known = {RESOLUTION, *(element for signal in kernel.inputs for element in signal.elements)}
     for stage in (*kernel.stages, *kernel.outputs):
         name = stage.signal.name
         if len(stage.expressions) != stage.signal.size:

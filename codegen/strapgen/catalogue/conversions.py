@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
 import sympy as sp
 
 from strapgen import algebra
-from strapgen.catalogue.kinematics import CAYLEY_KLEIN, DCM, EULER, THESIS, Kinematics
+from strapgen.catalogue.kinematics import CAYLEY_KLEIN, DCM, EULER, SAVAGE, THESIS, Kinematics
 from strapgen.kernel import Kernel, KernelBuilder
+from strapgen.recursion import Recursion
 from strapgen.signal import Signal
 
 _CONVERTED = Signal.matrix(
@@ -61,9 +66,17 @@ def dcm_from_cayley_klein() -> Kernel:
     )
 
 
-def _from_dcm(kinematics: Kinematics, name: str) -> Kernel:
-    """Derive a unit quaternion from the largest column of 4 e e', which is linear in the matrix."""
-    build = KernelBuilder()
+def _largest_column(build: KernelBuilder) -> tuple[sp.Matrix, sp.Symbol, sp.Matrix]:
+    """Name the column of 4 e e' through its largest diagonal element; 4 e e' is linear in the matrix.
+
+    Returns
+    -------
+    column : Matrix, 4 x 1
+        Scalar last.
+    largest : Symbol
+        The diagonal element.
+    diagonal : Matrix, 4 x 1
+    """
     C = build.input(DCM.state)
     trace = build.value("trace", C.trace(), "trace of C")
     diagonal = [build.value(f"four_{k}{k}", 1 + 2 * C[i, i] - trace) for i, k in enumerate("xyz")]
@@ -77,16 +90,30 @@ def _from_dcm(kinematics: Kinematics, name: str) -> Kernel:
         four[i, i] = diagonal[i]
     four[3, 3] = diagonal[3]
     largest = build.value("largest", sp.Max(*diagonal), "4 times the square of the largest parameter")
-    order = (3, 0, 1)
     column = build.stage(
         Signal.labelled("column", "column", "xyzs", meaning="the column of 4 e e' through the largest"),
-        [
-            sp.Piecewise(*((four[i, k], diagonal[k] >= largest) for k in order), (four[i, 2], True))
-            for i in range(4)
-        ],
+        [_of_largest([four[i, k] for k in range(4)], diagonal, largest) for i in range(4)],
     )
-    sign = sp.Piecewise((sp.Integer(1), column[3] >= 0), (sp.Integer(-1), True))
-    factor = build.value("factor", sign / (2 * sp.sqrt(largest)), "makes the scalar part positive")
+    return column, largest, sp.Matrix(diagonal)
+
+
+def _of_largest(values: Sequence[Any], diagonal: Sequence[sp.Symbol], largest: sp.Symbol) -> sp.Piecewise:
+    """Return that of four values, scalar last, which stands where the diagonal is largest; the scalar comes first."""
+    return sp.Piecewise(*((values[k], diagonal[k] >= largest) for k in (3, 0, 1)), (values[2], True))
+
+
+def _sign(expression: sp.Expr) -> sp.Piecewise:
+    """Return 1, or -1 below zero."""
+    return sp.Piecewise((sp.Integer(1), expression >= 0), (sp.Integer(-1), True))
+
+
+def _from_dcm(kinematics: Kinematics, name: str) -> Kernel:
+    """Derive a unit quaternion whose scalar part is not negative."""
+    build = KernelBuilder()
+    column, largest, _ = _largest_column(build)
+    factor = build.value(
+        "factor", _sign(column[3]) / (2 * sp.sqrt(largest)), "makes the scalar part positive"
+    )
     converted = _result(kinematics)
     by_label = dict(zip("xyzs", column, strict=True))
     build.output(converted, [factor * by_label[element[-1]] for element in converted.elements])
@@ -96,6 +123,53 @@ def _from_dcm(kinematics: Kinematics, name: str) -> Kernel:
         f"{THESIS}, chapter 2, inverted; largest element first as in S. W. Shepperd, J. Guidance and Control"
         " 1 (1978) 223-224",
         notes=("The scalar part of the result is not negative.",),
+    )
+
+
+_PREVIOUS = replace(
+    EULER.state,
+    name="previous",
+    elements=tuple(f"last_{label}" for label in "xyzs"),
+    meaning=f"{EULER.state.meaning}, of the call before",
+)
+
+
+def euler_from_dcm_followed(rule: str) -> Kernel:
+    """Return Euler parameters of a direction cosine matrix, with the sign of those before.
+
+    Parameters
+    ----------
+    rule : str
+        "element": the largest element keeps its sign, equation (18), good for turns of less than 60 degrees since
+        the call before; "product": the scalar product with the parameters before is not negative, good to 180 degrees.
+
+    Returns
+    -------
+    Kernel
+        Inputs ``state`` (3, 3) and ``previous`` (4,); output ``converted`` (4,), scalar last.
+    """
+    build = KernelBuilder()
+    column, largest, diagonal = _largest_column(build)
+    previous = build.input(_PREVIOUS)
+    if rule == "element":
+        before = build.value(
+            "before", _of_largest(previous, diagonal, largest), "the largest parameter, before"
+        )
+        name, words, note = "sheppard", "the largest keeps its sign", "60"
+    else:
+        before = build.value(
+            "along", algebra.dot(previous, column), "4 times the largest, times their product"
+        )
+        name, words, note = "continuous", "continued", "180"
+    factor = build.value("factor", _sign(before) / (2 * sp.sqrt(largest)), "carries the sign")
+    converted = _result(EULER)
+    build.output(converted, factor * column)
+    return build.kernel(
+        f"euler-from-dcm-{name}",
+        f"Euler parameters from a direction cosine matrix, {words}",
+        f"{SAVAGE}, equation (18){'' if rule == 'element' else ', its sign by the scalar product'}",
+        recursion=Recursion((("previous", converted.name),), kept=("previous",)),
+        notes=(f"The sign is continuous for turns of less than {note} degrees from call to call.",),
     )
 
 

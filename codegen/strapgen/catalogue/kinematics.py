@@ -17,6 +17,7 @@ from strapgen import algebra
 from strapgen.signal import Signal
 
 THESIS = "MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969)"
+SAVAGE = "P. G. Savage, Strapdown System Algorithms, AGARD Lecture Series 133 (1984), paper 3"
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,8 @@ class Kinematics:
     product : callable
         ``product(x, p)``: the state x after the transition p, bilinear.
     exponential : callable
-        ``exponential(v)``: the transition of the rotation by the rotation vector v.
+        ``exponential(v, order, square)``: the transition of the rotation by the rotation vector v; with an order,
+        without the products of its elements above that degree; square may name v . v.
     orthonormalize, attitude : str, str or None
         Names of the kernels that restore the state's constraint and that turn it into a direction
         cosine matrix.
@@ -58,7 +60,7 @@ class Kinematics:
     scale: sp.Rational
     derivative: Callable[[sp.Matrix, sp.Matrix], sp.Matrix]
     product: Callable[[sp.Matrix, sp.Matrix], sp.Matrix]
-    exponential: Callable[[sp.Matrix], sp.Matrix]
+    exponential: Callable[..., sp.Matrix]
     orthonormalize: str
     attitude: str | None
 
@@ -143,7 +145,7 @@ CAYLEY_KLEIN = Kinematics(
     scale=sp.Rational(1, 2),
     derivative=cayley_klein_derivative,
     product=cayley_klein_product,
-    exponential=lambda v: sp.Matrix(_scalar_first(algebra.quaternion(v))),
+    exponential=lambda v, *rest: sp.Matrix(_scalar_first(algebra.quaternion(v, *rest))),
     orthonormalize="cayley-klein-normalize",
     attitude="dcm-from-cayley-klein",
 )

@@ -5,8 +5,7 @@ from __future__ import annotations
 import sympy as sp
 
 from strapgen import algebra
-from strapgen.catalogue.kinematics import Kinematics
-from strapgen.catalogue.steps import Method, Samples
+from strapgen.catalogue.steps import PHI, Method, Samples, exponential
 from strapgen.kernel import KernelBuilder
 from strapgen.signal import Signal
 
@@ -30,20 +29,18 @@ def method(order: int) -> Method:
     order : int
     """
 
-    def transition(build: KernelBuilder, kinematics: Kinematics, samples: Samples) -> sp.Matrix:
+    def rotation_vector(build: KernelBuilder, samples: Samples) -> sp.Matrix:
         if order == 2:
-            return kinematics.exponential(_moment(samples, 0))
-        phi = Signal.vector("phi", "phi", unit="rad", meaning="rotation vector of the step")
-        return kinematics.exponential(build.stage(phi, (_fourth if order == 4 else _sixth)(build, samples)))
+            return _moment(samples, 0)
+        return build.stage(PHI, (_fourth if order == 4 else _sixth)(build, samples))
 
-    return Method(
+    return exponential(
         f"magnus{order}",
         f"Magnus series of order {order}",
         SOURCE,
         order,
-        transition,
+        rotation_vector,
         nodes=_GAUSS[order // 2],
-        isometry=True,
     )
 
 

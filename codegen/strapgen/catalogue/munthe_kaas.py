@@ -5,9 +5,8 @@ from __future__ import annotations
 import sympy as sp
 
 from strapgen.algebra import cross
-from strapgen.catalogue.kinematics import Kinematics
 from strapgen.catalogue.runge_kutta import advance
-from strapgen.catalogue.steps import Method, Samples
+from strapgen.catalogue.steps import PHI, Method, Samples, exponential
 from strapgen.catalogue.tableaux import TABLEAUX
 from strapgen.kernel import KernelBuilder
 from strapgen.signal import Signal
@@ -23,7 +22,7 @@ def method(order: int) -> Method:
     tableau = TABLEAUX[f"rk{order}"]
     nodes = tuple(dict.fromkeys(tableau.nodes))
 
-    def transition(build: KernelBuilder, kinematics: Kinematics, samples: Samples) -> sp.Matrix:
+    def rotation_vector(build: KernelBuilder, samples: Samples) -> sp.Matrix:
         end = advance(
             build,
             tableau,
@@ -33,17 +32,15 @@ def method(order: int) -> Method:
             like=Signal.vector("phi", "phi"),
             origin="zero",
         )
-        phi = build.stage(Signal.vector("phi", "phi", unit="rad", meaning="rotation vector of the step"), end)
-        return kinematics.exponential(phi)
+        return build.stage(PHI, end)
 
-    return Method(
+    return exponential(
         f"munthe-kaas{order}",
         f"Runge-Kutta-Munthe-Kaas method of order {order}",
         "H. Munthe-Kaas, Appl. Numer. Math. 29 (1999) 115-127",
         order,
-        transition,
+        rotation_vector,
         nodes=nodes,
-        isometry=True,
     )
 
 
@@ -69,6 +66,13 @@ def bortz(phi: sp.Matrix, turn: sp.Matrix, products: int) -> sp.Matrix:
     total, nested = turn, turn
     for k in range(1, products + 1):
         nested = cross(phi, nested)
-        # SymPy's B_1 is +1/2 or -1/2 by its release; with its sign taken out it does not matter.
-        total += abs(sp.bernoulli(1)) * nested if k == 1 else sp.bernoulli(k) / sp.factorial(k) * nested
+        total += bortz_coefficient(k) * nested
     return total
+
+
+def bortz_coefficient(products: int) -> sp.Rational:
+    """Return the coefficient of so many nested cross products in Bortz's equation, see `bortz`."""
+    # SymPy's B_1 is +1/2 or -1/2 by its release; with its sign taken out it does not matter.
+    if products == 1:
+        return abs(sp.bernoulli(1))
+    return sp.bernoulli(products) / sp.factorial(products)

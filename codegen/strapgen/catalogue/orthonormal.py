@@ -5,7 +5,7 @@ from __future__ import annotations
 import sympy as sp
 
 from strapgen import algebra
-from strapgen.catalogue.kinematics import CAYLEY_KLEIN, DCM_MEANING, EULER, THESIS, UNIT, Kinematics
+from strapgen.catalogue.kinematics import CAYLEY_KLEIN, DCM_MEANING, EULER, SAVAGE, THESIS, UNIT, Kinematics
 from strapgen.kernel import Kernel, KernelBuilder
 from strapgen.signal import Signal
 
@@ -151,3 +151,82 @@ def dcm_first_order() -> Kernel:
 def dcm_second_order() -> Kernel:
     """Return the optimal orthonormalization to second order: C (I - S/2 + 3/8 S^2), S = C'C - I."""
     return _expansion(2)
+
+
+def rows_orthogonalized() -> Kernel:
+    """Return the rows of a matrix, each less half its projections on the others, equations (28) and (29)."""
+    build = KernelBuilder()
+    C = build.input(_COMPUTED)
+    rows = [C[k, :] for k in range(3)]
+    error = {
+        frozenset((i, j)): build.value(
+            f"error_{i + 1}{j + 1}", algebra.dot(rows[i], rows[j]), f"rows {i + 1} and {j + 1}, multiplied"
+        )
+        for i, j in ((0, 1), (0, 2), (1, 2))
+    }
+    corrected = [
+        rows[i] - sum((error[frozenset((i, j))] * rows[j] for j in range(3) if j != i), sp.zeros(1, 3)) / 2
+        for i in range(3)
+    ]
+    build.output(_RESULT, sp.Matrix.vstack(*corrected))
+    return build.kernel(
+        "dcm-rows-orthogonalize",
+        "Direction cosine matrix: rows made orthogonal, to first order",
+        f"{SAVAGE}, equations (28) and (29), all rows corrected from the same matrix",
+        notes=(_NEAR,),
+    )
+
+
+def rows_normalized() -> Kernel:
+    """Return the rows of a matrix with their lengths brought to 1 to first order, equations (30) and (31)."""
+    build = KernelBuilder()
+    C = build.input(_COMPUTED)
+    corrected = []
+    for k in range(3):
+        row = C[k, :]
+        factor = build.value(
+            f"factor_{k + 1}", 1 + (1 - algebra.dot(row, row)) / 2, f"1/|row {k + 1}| to first order"
+        )
+        corrected.append(factor * row)
+    build.output(_RESULT, sp.Matrix.vstack(*corrected))
+    return build.kernel(
+        "dcm-rows-normalize",
+        "Direction cosine matrix: rows made of length 1, to first order",
+        f"{SAVAGE}, equations (30) and (31), whose minus sign is a plus",
+        notes=(_NEAR,),
+    )
+
+
+def third_row() -> Kernel:
+    """Return a matrix whose third row is the cross product of the first two, equation (43)."""
+    build = KernelBuilder()
+    C = build.input(_COMPUTED)
+    rows = [C[k, :].T for k in range(2)]
+    build.output(_RESULT, sp.Matrix.vstack(C[:2, :], algebra.cross(*rows).T))
+    return build.kernel(
+        "dcm-third-row",
+        "Direction cosine matrix: third row from the first two",
+        f"{SAVAGE}, equation (43)",
+    )
+
+
+def normalized_first_order(name: str) -> Kernel:
+    """Return the normalization of a unit quaternion to first order, equations (41) and (42).
+
+    Parameters
+    ----------
+    name : str
+        "euler" or "cayley-klein".
+    """
+    kinematics = {"euler": EULER, "cayley-klein": CAYLEY_KLEIN}[name]
+    build = KernelBuilder()
+    x = build.input(kinematics.state)
+    error = build.value("error", algebra.dot(x, x) - 1, "|state|^2 - 1")
+    factor = build.value("factor", 1 - error / 2, "1/|state| to first order")
+    build.output(kinematics.next, factor * x)
+    return build.kernel(
+        f"{kinematics.orthonormalize}-first-order",
+        f"{kinematics.title}: normalization to length 1, to first order",
+        f"{SAVAGE}, equations (41) and (42)",
+        notes=("Made for a state whose length is near 1.",),
+    )

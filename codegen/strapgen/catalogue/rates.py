@@ -41,6 +41,21 @@ class Fit:
         """Return the weights of the samples in the coefficient of a power of time."""
         return [row[power] if power < len(row) else sp.Integer(0) for row in self.basis]
 
+    def legendre(self, degree: int) -> list[sp.Expr]:
+        """Return the weights of the samples in the coefficient of a Legendre polynomial, see `legendre`.
+
+        Examples
+        --------
+        >>> from_increments(2).legendre(1)
+        [-2, 2]
+        """
+        terms = [
+            [(2 * degree + 1) * c * w for w in self.moment(power)]
+            for power, c in enumerate(legendre(degree, sp.Rational(1, 2)))
+            if c
+        ]
+        return [_reduced(sp.Add(*column)) for column in zip(*terms, strict=True)]
+
     def moment(self, power: int) -> list[sp.Expr]:
         """Return the weights of the samples in the integral over the step of the rate times (t - 1/2)^power."""
         half = sp.Rational(1, 2)
@@ -52,6 +67,27 @@ class Fit:
                     total += c * sp.binomial(power, j) * (-half) ** (power - j) / (k + j + 1)
             weights.append(_reduced(total))
         return weights
+
+
+def legendre(degree: int, middle: sp.Rational = sp.S.Zero) -> Coefficients:
+    """Return the Legendre polynomial of the step in powers of the time from a moment of it, the constant one first.
+
+    Over the step, from time 0 to 1, these polynomials are orthogonal to each other; each is 1 at its end.
+
+    Parameters
+    ----------
+    degree : int
+    middle : Rational, optional
+        The moment from which the time of the powers counts.
+
+    Examples
+    --------
+    >>> legendre(2), legendre(2, sp.Rational(1, 2))
+    ((1, -6, 6), (-1/2, 0, 6))
+    """
+    t = sp.Symbol("t")
+    polynomial = sp.Poly(sp.legendre(degree, 2 * (t + middle) - 1), t)
+    return tuple(reversed(polynomial.all_coeffs()))
 
 
 def from_increments(increments: int, previous: int = 0) -> Fit:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 import sympy as sp
 
@@ -17,6 +18,28 @@ from strapgen.kernel import Kernel, KernelBuilder
 from strapgen.order import Order
 from strapgen.signal import Signal
 
+#: Signal of the rotation vector of a step.
+PHI = Signal.vector("phi", "phi", unit="rad", meaning="rotation vector of the step")
+
+
+def sample_names(count: int, previous: int = 0, letter: str = "d") -> list[str]:
+    """Return the names of the samples that a step takes, oldest first.
+
+    Parameters
+    ----------
+    count, previous : int
+        Samples of the step itself, and those before it.
+    letter : str, optional
+        What a sample of the step is called.
+
+    Examples
+    --------
+    >>> sample_names(2, previous=1)
+    ['past1', 'd1', 'd2']
+    """
+    past = "past" if letter == "d" else f"past_{letter}"
+    return [f"{past}{k}" for k in range(previous, 0, -1)] + [f"{letter}{k}" for k in range(1, count + 1)]
+
 
 def increments_signal(count: int, previous: int = 0) -> Signal:
     """Return the signal of the angle increments that a step takes, oldest first.
@@ -28,16 +51,20 @@ def increments_signal(count: int, previous: int = 0) -> Signal:
     previous : int, optional
         Increments before the step.
     """
-    names = [f"past{k}" for k in range(previous, 0, -1)] + [f"d{k}" for k in range(1, count + 1)]
-    kept = f"; the first {previous} are those before the step" if previous else ""
     return Signal(
         "increments",
         (previous + count, 3),
-        tuple(f"{name}_{axis}" for name in names for axis in "xyz"),
+        tuple(f"{name}_{axis}" for name in sample_names(count, previous) for axis in "xyz"),
         unit="rad",
-        meaning=f"angle increments of the step, body axes, oldest first: exact integrals of the body rate{kept}",
+        meaning="angle increments of the step, body axes, oldest first: exact integrals of the body rate"
+        + kept(previous),
         bound=Fraction(1),
     )
+
+
+def kept(previous: int) -> str:
+    """Return what a description of samples says of those before the step."""
+    return f"; the first {previous} are those before the step" if previous else ""
 
 
 def turns_signal(nodes: Sequence[Number]) -> Signal:
@@ -102,15 +129,14 @@ class Samples:
             signal = increments_signal(increments, previous)
             self.fit = rates.from_increments(increments, previous)
         self._symbols = build.input(signal)
-        self._counts = increments, previous
+        self.increments, self.previous = increments, previous
 
     def order(self, method: int) -> Order:
         """Return the order of a step by a method of this order on any kinematics."""
-        increments, previous = self._counts
-        if increments is None:
+        if self.increments is None:
             return Order(method, method, None, method)
-        limit = rates.step_order(increments, previous)
-        return Order(method, method, increments + previous, min(method, limit))
+        limit = rates.step_order(self.increments, self.previous)
+        return Order(method, method, self.increments + self.previous, min(method, limit))
 
     def turn(self, node: Number, scale: sp.Expr = sp.S.One) -> sp.Matrix:
         """Name the rate times the step at a node, times `scale`, which is 1 or 1/2."""
@@ -168,6 +194,12 @@ class Method:
         Whether its transition is a rotation whatever the increments are.
     option : str
         How the command line names it.
+    rotation_vector : callable, optional
+        ``rotation_vector(build, samples)`` writes the stages of the rotation vector of the step and returns it, where
+        the transition is its exponential.
+    limit : callable, optional
+        ``limit(increments, previous)``: order to which these samples can be used; by default that of the polynomial
+        through them.
     """
 
     name: str
@@ -179,6 +211,8 @@ class Method:
     attitude_order: Callable[[int | None], int] | None = None
     isometry: bool = False
     option: str = ""
+    rotation_vector: Callable[[KernelBuilder, Samples], sp.Matrix] | None = None
+    limit: Callable[[int, int], int] = rates.step_order
 
     def step_order(self, increments: int | None, previous: int = 0) -> Order:
         """Return the order of the step from so many increments, None for rates at the nodes."""
@@ -187,8 +221,43 @@ class Method:
         if increments is None:
             return Order(self.order, attitude, None, attitude)
         count = increments + previous
-        step = min(of(count - 1), rates.step_order(increments, previous))
+        step = min(of(count - 1), self.limit(increments, previous))
         return Order(self.order, attitude, count, step)
+
+
+def exponential(
+    name: str,
+    title: str,
+    source: str,
+    order: int,
+    rotation_vector: Callable[[KernelBuilder, Samples], sp.Matrix],
+    **rest: Any,
+) -> Method:
+    """Return the method whose transition is the exponential of a rotation vector.
+
+    Parameters
+    ----------
+    name, title, source, order
+        As in `Method`.
+    rotation_vector : callable
+        ``rotation_vector(build, samples)`` writes its stages and returns the rotation vector of the step.
+    **rest
+        As in `Method`.
+    """
+
+    def transition(build: KernelBuilder, kinematics: Kinematics, samples: Samples) -> sp.Matrix:
+        return kinematics.exponential(rotation_vector(build, samples))
+
+    return Method(
+        name,
+        title,
+        source,
+        order,
+        transition,
+        isometry=True,
+        rotation_vector=rotation_vector,
+        **rest,
+    )
 
 
 def step(kinematics: Kinematics, method: Method, increments: int | None, previous: int = 0) -> Kernel:
@@ -219,20 +288,11 @@ def step(kinematics: Kinematics, method: Method, increments: int | None, previou
     samples = Samples(build, increments, previous, method.nodes)
     transition = build.stage(kinematics.transition, method.transition(build, kinematics, samples))
     build.output(kinematics.next, kinematics.product(state, transition))
-    name = f"{kinematics.name}-{method.name}-{increments or 'rates'}"
-    option = method.option or f"--method {method.name}"
-    if increments is None:
-        given = f"the rate at {len(method.nodes)} {'node' if len(method.nodes) == 1 else 'nodes'}"
-        option, extracted = f"{option} --rates", ""
-    else:
-        given = f"{increments} angle {'increment' if increments == 1 else 'increments'}"
-        option, extracted = f"{option} --increments {increments}", "rate extraction chapter 3 A; "
-    if previous:
-        name, option = f"{name}-previous{previous}", f"{option} --previous {previous}"
-        given += f" and {previous} before {'it' if increments == 1 else 'them'}"
+    suffix, option, given = chosen(method, increments, previous)
+    extracted = "" if increments is None else "rate extraction chapter 3 A; "
     order = method.step_order(increments, previous)
     return build.kernel(
-        name,
+        f"{kinematics.name}-{suffix}",
         f"{kinematics.title}: step by {method.title} from {given}",
         f"{kinematics.source}; {extracted}{method.title}: {method.source}",
         transition=kinematics.transition.name,
@@ -248,6 +308,67 @@ def step(kinematics: Kinematics, method: Method, increments: int | None, previou
         arguments=f"{kinematics.name} {option}",
         notes=(str(order).capitalize() + ".",) if order.limited else (),
     )
+
+
+def rotation_vector(method: Method, increments: int | None, previous: int = 0) -> Kernel:
+    """Derive the rotation vector of one step from angle increments, or from rates.
+
+    Parameters
+    ----------
+    method : Method
+        A method whose transition is the exponential of a rotation vector.
+    increments, previous : int
+        As in `step`.
+
+    Returns
+    -------
+    Kernel
+        Input ``increments`` (previous + increments, 3) in rad, or ``turns``; output ``rotation_vector`` (3,) in rad.
+
+    Raises
+    ------
+    ValueError
+        If the method has no rotation vector.
+    """
+    if method.rotation_vector is None:
+        raise ValueError(f"{method.name} has no rotation vector")
+    build = KernelBuilder()
+    vector = method.rotation_vector(build, Samples(build, increments, previous, method.nodes))
+    build.output(
+        Signal.vector(
+            "rotation_vector",
+            "rotation_vector",
+            unit="rad",
+            meaning="rotation vector of the step, body axes",
+        ),
+        vector,
+    )
+    suffix, option, given = chosen(method, increments, previous)
+    order = method.step_order(increments, previous)
+    return build.kernel(
+        f"rotation-vector-{suffix}",
+        f"Rotation vector of a step by {method.title} from {given}",
+        method.source,
+        order=order,
+        arguments=f"rotation-vector {option}",
+        notes=(str(order).capitalize() + ".",) if order.limited else (),
+    )
+
+
+def chosen(method: Method, increments: int | None, previous: int) -> tuple[str, str, str]:
+    """Return the ending of a kernel's name, its options on the command line, and what it is given, in words."""
+    suffix = f"{method.name}-{increments or 'rates'}"
+    option = method.option or f"--method {method.name}"
+    if increments is None:
+        given = f"the rate at {len(method.nodes)} {'node' if len(method.nodes) == 1 else 'nodes'}"
+        option = f"{option} --rates"
+    else:
+        given = f"{increments} angle {'increment' if increments == 1 else 'increments'}"
+        option = f"{option} --increments {increments}"
+    if previous:
+        suffix, option = f"{suffix}-previous{previous}", f"{option} --previous {previous}"
+        given += f" and {previous} before {'it' if increments == 1 else 'them'}"
+    return suffix, option, given
 
 
 def product(name: str) -> Kernel:

@@ -11,6 +11,7 @@ import typer
 from strapgen.cli import (
     check,
     compare,
+    coning,
     converge,
     derive,
     generate,
@@ -18,10 +19,13 @@ from strapgen.cli import (
     series,
     simulate,
     stability,
+    stress,
     study,
     tableau,
     tables,
+    two_speed,
     version,
+    vibration,
 )
 from strapgen.exceptions import StrapgenError
 
@@ -35,6 +39,7 @@ app = typer.Typer(
 app.callback()(version.options)
 app.command("list")(listing.list_names)
 app.command("tableau")(tableau.tableau)
+app.command("coning")(coning.coning)
 app.command("derive")(derive.derive)
 app.command("generate")(generate.generate)
 app.command("simulate")(simulate.simulate)
@@ -43,7 +48,10 @@ app.command("converge")(converge.converge)
 app.command("series")(series.series)
 app.command("stability")(stability.stability)
 app.command("check")(check.check)
+app.command("vibration")(vibration.vibration)
 app.command("tables")(tables.tables)
+app.command("two-speed")(two_speed.two_speed)
+app.command("stress")(stress.stress)
 app.add_typer(study.app, name="study")
 
 

@@ -130,7 +130,8 @@ def generate(
             f"the options of fixed point go with --target {' or '.join(FIXED)}, not with {target}"
         )
     program = pipeline.lower(catalogue.derive(choice))
-    if program.companions is None and (max_rate_deg_s or step or max_angle_rad):
+    takes = {signal.name for signal in program.inputs}
+    if not takes & {"increments", "turns"} and (max_rate_deg_s or step or max_angle_rad):
         raise InputError(
             f"kernel {program.kernel} takes no increments; a largest rate or angle does not go with it"
         )

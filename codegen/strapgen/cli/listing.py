@@ -26,6 +26,10 @@ def list_names(format: Format = "text") -> None:
     parts: dict[str, dict[str, str]] = {
         "algorithms": {**catalogue.ALGORITHMS, **installed},
         "methods": catalogue.METHODS,
+        "vectors": {
+            name: f"{vector.title}; methods {', '.join(vector.methods)}"
+            for name, vector in catalogue.VECTORS.items()
+        },
         "kernels": {name: recipe.title for name, recipe in catalogue.KERNELS.items()},
         "motions": {
             name: ", ".join(" or ".join(choices) for choices in keys(name).values())
@@ -41,6 +45,18 @@ def list_names(format: Format = "text") -> None:
     methods = {name: title for name, title in catalogue.METHODS.items() if name not in series}
     methods[f"{series[0]} to {series[-1]}"] = "Taylor series of the transition, of any order to 20"
     parts["methods"] = methods
+    first, *_, last = catalogue.UPDATE_ORDERS
+    for algorithm, title in catalogue.ALGORITHMS.items():
+        orders = [f"{algorithm}-update-{order}" for order in catalogue.UPDATE_ORDERS]
+        parts["kernels"] = {
+            f"{name} to {last}" if name == orders[0] else name: (
+                f"{title}: update by a rotation vector, order {first} to {last}"
+                if name == orders[0]
+                else said
+            )
+            for name, said in parts["kernels"].items()
+            if name not in orders[1:]
+        }
     width = max(len(name) for part in parts.values() for name in part)
     for title, part in parts.items():
         typer.echo(title)

@@ -40,14 +40,14 @@ def quantize(program: Program, settings: Settings) -> FixedProgram:
 OPERATIONS = frozenset(
     (
         *("add", "subtract", "multiply", "divide", "negate", "sqrt", "maximum", "select", "at_least"),
-        *("sin", "cos", "sinc", "atan2"),
+        *("sin", "cos", "sinc", "atan2", "direction", "wrap"),
     )
 )
 
 
 def can_lower(program: Program) -> bool:
     """Tell whether a program needs no word of a user: its operations are known here, and the ranges of all inputs."""
-    known = ("increments", "turns") if program.companions else ()
+    known = ("increments", "turns")
     nodes = (node for assignment in program.body for node in walk(assignment.value))
     return all(signal.bound is not None or signal.name in known for signal in program.inputs) and all(
         node.kind in OPERATIONS for node in nodes if isinstance(node, Operation)

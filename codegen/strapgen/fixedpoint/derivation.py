@@ -36,7 +36,7 @@ from strapgen.fixedpoint.quantities import (
 )
 from strapgen.fixedpoint.ranges import Ranges
 from strapgen.fixedpoint.samples import samples
-from strapgen.program import Constant, Node, Operation, Program, Reference
+from strapgen.program import RESOLUTION, Constant, Node, Operation, Program, Reference
 
 
 def quantities(
@@ -143,6 +143,8 @@ class _Derivation:
         if isinstance(node, Constant):
             return {(): node.value} if node.value else {}
         if isinstance(node, Reference):
+            if node.name == RESOLUTION:  # that of a word which holds an attitude
+                return {(): Fraction(1, 1 << (self.word - 2))}
             return self._value_of(node.name)
         if node.kind in ("add", "subtract"):
             left, right = (self._terms(argument, name) for argument in node.arguments)
@@ -353,8 +355,11 @@ class _Derivation:
         for argument in node.arguments:
             operand = self._operand(argument, f"{name}_argument")
             arguments.append(operand if isinstance(operand, str) else self._constant(operand, name))
+        distance = self._distance(name, *arguments) if node.kind in ("atan2", "direction") else Fraction(0)
         try:
-            made = functions.derived(node.kind, name, arguments, self.items, self.same, self._free, self.word)
+            made = functions.derived(
+                node.kind, name, arguments, self.items, self.same, self._free, self.word, distance
+            )
         except ValueError as error:
             raise InputError(f"{self.program.kernel}: {error}") from None
         made[-1] = replace(made[-1], meaning=meaning)
@@ -363,6 +368,32 @@ class _Derivation:
         self._note(
             name, *(_FUNCTIONS[node.kind](*(s[a] for a in arguments)) for s in (self.proper, self.any))
         )
+
+    def _distance(self, name: str, ordinate: str, abscissa: str) -> Fraction:
+        """Return the inverse of the largest slope of atan2 of inexact arguments: their least distance from the origin.
+
+        That is proved, or checked when the code runs if they keep one in proper use; 0 where nothing is known.
+        """
+        definitions = [self.items[argument].definition for argument in (ordinate, abscissa)]
+        if all(isinstance(definition, Given) for definition in definitions):
+            return Fraction(0)
+        terms: Terms = {}
+        for argument, definition in zip((ordinate, abscissa), definitions, strict=True):
+            square: Terms = {(argument, argument): Fraction(1)}
+            if isinstance(definition, Root):
+                square = self._value_of(definition.argument)
+            terms = combined(terms, square, Fraction(1))
+        free = self._free(f"{name}_distance")
+        self._store(free, terms, "", whole=True)
+        self._guard(free)
+        least = self.items[free].range
+        if least.low > 0:
+            # Two vectors of length L or more, d apart, are up to 2 asin(d/2L) apart in angle. A value that is checked
+            # has an error below half its smaller end, so that d < 3L/4, the angle below 9/8 d/L; else below pi/2 d/L.
+            part = Fraction(8, 9) if self.items[free].guarded else Fraction(7, 11)
+            return least.sqrt().lowest * part
+        del self.items[free]
+        return Fraction(0)
 
     def _other(self, name: str, definition: Definition, enclosure: Interval, meaning: str) -> None:
         self.items[name] = Quantity(name, definition, Fraction(0), enclosure, meaning)
@@ -443,6 +474,8 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
     "cos": np.cos,
     "sinc": lambda x: np.sinc(x / np.pi),
     "atan2": np.arctan2,
+    "direction": np.arctan2,
+    "wrap": lambda x: np.where(x > np.pi, x - 2 * np.pi, np.where(x < -np.pi, x + 2 * np.pi, x)),
 }
 _WORDS = {
     "divide": "quotient",
@@ -453,6 +486,8 @@ _WORDS = {
     "cos": "cosine",
     "sinc": "sinc",
     "atan2": "angle",
+    "direction": "angle",
+    "wrap": "principal",
 }
 
 

@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from functools import cache
+from functools import cache, partial
 
 from strapgen.fixedpoint.formats import finest
 from strapgen.fixedpoint.intervals import Interval, maximum
@@ -57,13 +57,14 @@ def derived(
     same: dict[Definition, str],
     free: Callable[[str], str],
     word: int,
+    distance: Fraction = Fraction(0),
 ) -> list[Quantity]:
     """Return the quantities that make a function of others, in order; the last is the function.
 
     Parameters
     ----------
     kind : str
-        "sin", "cos", "sinc" or "atan2".
+        "sin", "cos", "sinc", "atan2", "direction" or "wrap".
     name : str
         Name of the function's value.
     arguments : sequence of str
@@ -76,6 +77,8 @@ def derived(
         Makes a name that no other quantity has out of one that may be taken.
     word : int
         Bits of a word.
+    distance : Fraction, optional
+        The inverse of a bound of how fast atan2 changes with its arguments, where more is known than their ranges tell.
 
     Returns
     -------
@@ -91,7 +94,9 @@ def derived(
         "sin": _sine,
         "cos": _cosine,
         "sinc": _sinc,
-        "atan2": _arctangent,
+        "atan2": partial(_arctangent, distance=distance),
+        "direction": partial(_arctangent, distance=distance, turns=False),
+        "wrap": _wrap,
     }
     makers[kind](chain, *arguments)
     return chain.made
@@ -473,7 +478,7 @@ def _under_root(chain: _Chain, argument: str) -> str | None:
 # atan2
 
 
-def _arctangent(chain: _Chain, ordinate: str, abscissa: str) -> None:
+def _arctangent(chain: _Chain, ordinate: str, abscissa: str, distance: Fraction, turns: bool = True) -> None:
     y, x = chain.taken(ordinate), chain.taken(abscissa)
     height, width = chain.magnitude("height", y), chain.magnitude("width", x)
     heights, widths = chain.range(height), chain.range(width)
@@ -518,7 +523,7 @@ def _arctangent(chain: _Chain, ordinate: str, abscissa: str) -> None:
         angle = chain.choice("half", (x, zero, angle), otherwise=_from(chain, _ONE, angle, -1))
     if chain.range(y).low < 0:
         angle = chain.choice("side", (y, zero, angle), otherwise=_from(chain, zero, angle, -1))
-    _finish(chain, angle, *_slopes(chain, ordinate, abscissa))
+    _finish(chain, angle, *_slopes(chain, ordinate, abscissa, distance, turns))
 
 
 def _from(chain: _Chain, part: Fraction, angle: str, sign: int) -> str:
@@ -528,11 +533,38 @@ def _from(chain: _Chain, part: Fraction, angle: str, sign: int) -> str:
     )
 
 
-def _slopes(chain: _Chain, ordinate: str, abscissa: str) -> list[tuple[str, Fraction | None]]:
+def _wrap(chain: _Chain, argument: str) -> None:
+    """Take a whole turn off an angle, or add one: the error is that of the angle, where turns do not count."""
+    angle = chain.taken(argument)
+    inside = chain.range(angle)
+    if inside.magnitude > 3 * pi():
+        raise ValueError(
+            f"an angle of up to {float(inside.magnitude):.6g} rad is more than a turn and a half"
+        )
+    grid = 1 << (chain.word - 4)
+    limit = Fraction(math.floor(pi() * grid), grid)
+    within = Interval.symmetric(limit + Fraction(2, grid))
+    value = angle
+    cases: list[tuple[Operand, Operand, Operand]] = []
+    for beyond, left, right, sign in (
+        (inside.highest > limit, angle, limit, -1),
+        (inside.lowest < -limit, -limit, angle, 1),
+    ):
+        if beyond:
+            other = chain.sum("turned", ((angle,), _ONE), ((), sign * 2 * pi()), inexact=2 * PI_ERROR)
+            cases.append((left, right, other))
+    if cases:
+        value = chain.add("principal", Choice(tuple(cases), angle), within)
+    _finish(chain, value, (argument, _ONE))
+
+
+def _slopes(
+    chain: _Chain, ordinate: str, abscissa: str, known: Fraction, turns: bool
+) -> list[tuple[str, Fraction | None]]:
     """Return how fast the angle can change: by the inverse distance from the origin, and by a turn at the cut."""
     above, beside = chain.range(ordinate), chain.range(abscissa)
     distances = [max(Fraction(0), inside.lowest, -inside.highest) for inside in (above, beside)]
-    distance = Interval.of(sum((d * d for d in distances), Fraction(0))).sqrt().lowest
+    distance = max(known, Interval.of(sum((d * d for d in distances), Fraction(0))).sqrt().lowest)
     slope = 1 / distance if distance else None
-    is_cut = above.low < 0 and beside.low < 0
+    is_cut = turns and above.low < 0 and beside.low < 0
     return [(ordinate, None if is_cut else slope), (abscissa, slope)]

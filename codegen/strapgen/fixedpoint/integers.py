@@ -54,9 +54,10 @@ def lowered(program: Program, settings: Settings) -> code.FixedProgram:
 
     tried = map(started, range(_MOST_GUARD_BITS + 1))
     first = next(tried)
+    # What is handed on from call to call keeps its own finest format: it is no increment.
     finest = (
         first
-        if first.sums_of_inputs_are_exact()
+        if program.recursion is not None or first.sums_of_inputs_are_exact()
         else next((work for work in tried if work.sums_of_inputs_are_exact()), first)
     )
     made, guard_bits = finest.exact, finest.guard_bits
@@ -142,8 +143,11 @@ class _Quantization:
             is_output = result in self.program.outputs
             wish = self.settings.formats.get(result.signal.name)
             wish = asked(self.settings, result.signal) if is_output else wish
+            carried = self._carried_input(result.signal) if is_output else None
             if wish is not None:
                 fraction = Format.parse(wish, self.word).fraction
+            elif carried is not None:
+                fraction = carried.format.fraction
             elif is_output and (result.signal.constraint or self.program.companions is not None):
                 fraction = self._state_like(result.signal)
             else:
@@ -152,6 +156,12 @@ class _Quantization:
             forced |= {name: forced.get(name, fraction) for name in held}
         self.words = set(forced) | self.factors
         return forced
+
+    def _carried_input(self, signal: Signal) -> code.Argument | None:
+        """Return the input that an output is in the next call."""
+        recursion = self.program.recursion
+        name = recursion.inputs.get(signal.name) if recursion else None
+        return next((argument for argument in self.inputs if argument.signal.name == name), None)
 
     def _state_like(self, signal: Signal) -> int:
         """Return the fraction of an output that is an attitude: that of an input like it, or of every state."""
@@ -274,6 +284,9 @@ class _Quantization:
             if quantity.name in self.exact.results[result.signal.name]:
                 if result.signal.constraint:
                     return math.floor((Fraction(1) + self.settings.allowance) * Fraction(2) ** fraction)
+                carried = self._carried_input(result.signal)
+                if carried is not None:
+                    return carried.high
                 if self.program.companions is not None:  # the state of the next step
                     return self.inputs[0].high
         return None
@@ -431,7 +444,8 @@ class _Quantization:
         What comes after is bounded as a function of the computed value, so that it stays inside its formats; an output
         that depends on it is certified by the range of its signal alone.
         """
-        if not self._is_limited() or not self._depends_on_operations(quantity.name):
+        only_checked = all(quantity.name not in exact.used_by(item) for item in self.exact.items.values())
+        if only_checked or not self._is_limited() or not self._depends_on_operations(quantity.name):
             raise InputError(
                 f"{self.program.kernel}: words of {self.word} bits are too short for {quantity.name}, its error may be "
                 "as large as itself"

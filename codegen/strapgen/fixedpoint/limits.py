@@ -84,7 +84,7 @@ def _largest(program: Program, signal: Signal, settings: Settings) -> Fraction:
                 f"the range of {signal.name} follows from the drift allowance and the largest angle; it takes no other"
             )
         return settings.ranges[signal.name]
-    if signal.name in ("increments", "turns") and program.companions:
+    if signal.name in ("increments", "turns"):
         return settings.largest_angle
     if signal.constraint:
         return (signal.bound or Fraction(1)) + settings.allowance

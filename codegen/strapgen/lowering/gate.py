@@ -11,6 +11,7 @@ from fractions import Fraction
 import sympy as sp
 from sympy.core.relational import GreaterThan, LessThan, StrictGreaterThan, StrictLessThan
 
+from strapgen.algebra import Direction, Wrapped
 from strapgen.kernel import Kernel
 from strapgen.lowering.arithmetic import chain, gathered, plain, with_constant
 from strapgen.lowering.names import FACTOR
@@ -18,7 +19,14 @@ from strapgen.lowering.share import Shared
 from strapgen.program import Assignment, Constant, Node, Operation, Program, Reference, Result
 from strapgen.signal import Signal
 
-_FUNCTIONS = {sp.sin: "sin", sp.cos: "cos", sp.sinc: "sinc", sp.atan2: "atan2"}
+_FUNCTIONS = {
+    sp.sin: "sin",
+    sp.cos: "cos",
+    sp.sinc: "sinc",
+    sp.atan2: "atan2",
+    Wrapped: "wrap",
+    Direction: "direction",
+}
 
 
 def gate(kernel: Kernel, shared: Shared) -> Program:
@@ -51,6 +59,7 @@ def gate(kernel: Kernel, shared: Shared) -> Program:
         outputs=tuple(result(stage.signal) for stage in kernel.outputs),
         transition=None if kernel.transition is None else result(stages[kernel.transition]),
         companions=kernel.companions,
+        recursion=kernel.recursion,
     )
 
 
@@ -79,6 +88,8 @@ class _Writer:
             return first
         if isinstance(expression, sp.Piecewise):
             return self._choice(list(expression.args))
+        if expression.func in (sp.asin, sp.acos):
+            return self._inverse(expression)
         if expression.func in _FUNCTIONS:
             return Operation(_FUNCTIONS[expression.func], tuple(self.node(a) for a in expression.args))
         raise NotImplementedError(f"no operation for {expression.func.__name__} in {expression}")
@@ -120,6 +131,16 @@ class _Writer:
         if not exponent.is_Integer:
             raise NotImplementedError(f"no operation for the power {exponent} of {base}")
         return self._repeated(self._named(self.node(base)), int(exponent))
+
+    def _inverse(self, expression: sp.Expr) -> Node:
+        """Write an arcsine or arccosine by atan2: accurate up to the ends, and no error just beyond them."""
+        value, one = self._named(self.node(expression.args[0])), Constant(Fraction(1))
+        # Two roots: multiplied out, 1 - x^2 would lose its digits where x is near 1.
+        sides = (Operation(kind, (one, value)) for kind in ("subtract", "add"))
+        zero = Constant(Fraction(0))
+        roots = tuple(Operation("sqrt", (Operation("maximum", (zero, side)),)) for side in sides)
+        other = Operation("multiply", roots)
+        return Operation("atan2", (value, other) if expression.func is sp.asin else (other, value))
 
     def _repeated(self, base: Node, exponent: int) -> Node:
         """Multiply by squaring."""

@@ -49,10 +49,16 @@ _FUNCTIONS = {
     "cos": "cos{s}({})",
     "sinc": "sinc_({})",
     "atan2": "atan2{s}({}, {})",
+    "direction": "atan2{s}({}, {})",
+    "wrap": "wrap_({})",
     "maximum": "fmax{s}({}, {})",
     "at_least": "{} >= {}",
     "select": "({} ? {} : {})",
 }
+
+
+#: Half a turn and a turn, to more digits than a double has.
+_HALF_TURNS = tuple(Fraction(k * 314159265358979323846264338327950288, 10**35) for k in (1, 2))
 
 
 class CPrinter(Printer):
@@ -60,6 +66,8 @@ class CPrinter(Printer):
 
     def __init__(self, real: Real) -> None:
         self.real = real
+        if real is FLOAT:
+            self.resolution = Fraction(1, 1 << 23)
 
     def constant(self, value: Fraction) -> str:
         """Return the shortest literal that reads as the nearest number of the type."""
@@ -113,9 +121,10 @@ def emit(program: Program, target: str = "c") -> Sources:
         "code": _code(program, printer),
         "propagation": _loop(program, printer) if program.companions else None,
         "uses_math": any(
-            node.kind in _FUNCTIONS and node.kind not in ("at_least", "select") for node in nodes
+            node.kind in _FUNCTIONS and node.kind not in ("at_least", "select", "wrap") for node in nodes
         ),
         "uses_sinc": any(node.kind == "sinc" for node in nodes),
+        "turn": tuple(map(printer.constant, _HALF_TURNS)) if any(n.kind == "wrap" for n in nodes) else None,
     }
     files = {
         f"{name}.h": render("c/header.h.j2", **values),
@@ -130,6 +139,7 @@ def emit(program: Program, target: str = "c") -> Sources:
         program.operations,
         program.temporaries,
         program.companions,
+        recursion=program.recursion,
     )
 
 

@@ -50,6 +50,7 @@ def emit(program: Program | FixedProgram, target: str, settings: Settings | None
         fixed.temporaries,
         fixed.program.companions,
         interface,
+        fixed.program.recursion,
     )
 
 

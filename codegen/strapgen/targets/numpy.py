@@ -15,6 +15,8 @@ _FUNCTIONS = {
     "cos": "np.cos({})",
     "sinc": "_sinc({})",
     "atan2": "np.arctan2({}, {})",
+    "direction": "np.arctan2({}, {})",
+    "wrap": "_wrap({})",
     "maximum": "np.maximum({}, {})",
     "at_least": "{} >= {}",
     "select": "np.where({}, {}, {})",
@@ -49,17 +51,19 @@ def emit(program: Program, target: str = "numpy") -> Sources:
         ``<name>_transition``, from the increments to the transition.
     """
     functions = [program] if program.transition is None else [program, program.transition_program()]
-    uses_sinc = any(
-        isinstance(node, Operation) and node.kind == "sinc"
+    kinds = {
+        node.kind
         for assignment in program.body
         for node in walk(assignment.value)
-    )
+        if isinstance(node, Operation)
+    }
     text = render(
         "numpy/module.py.j2",
         program=program,
         command=f"strapgen generate {program.arguments} --target {target}",
         functions=[_function(part, part is not program) for part in functions],
-        uses_sinc=uses_sinc,
+        uses_sinc="sinc" in kinds,
+        uses_wrap="wrap" in kinds,
     )
     function = Function(program.name, program.inputs, tuple(result.signal for result in program.outputs))
     return Sources(
@@ -70,6 +74,7 @@ def emit(program: Program, target: str = "numpy") -> Sources:
         program.operations,
         program.temporaries,
         program.companions,
+        recursion=program.recursion,
     )
 
 

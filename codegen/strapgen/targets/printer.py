@@ -6,7 +6,7 @@ import re
 import textwrap
 from fractions import Fraction
 
-from strapgen.program import Constant, Node, Program, Reference
+from strapgen.program import DOUBLE_RESOLUTION, RESOLUTION, Constant, Node, Program, Reference
 from strapgen.signal import Signal
 
 _SUM, _PRODUCT, _UNARY, _ATOM = range(4)
@@ -19,6 +19,9 @@ class Printer:
     every language here.
     """
 
+    #: The step from 1 to the next number of the target.
+    resolution = DOUBLE_RESOLUTION
+
     def text(self, node: Node) -> str:
         """Return a node as source text."""
         return self._print(node)[0]
@@ -27,13 +30,17 @@ class Printer:
         """Return a number as source text, correctly rounded."""
         raise NotImplementedError
 
+    def reference(self, name: str) -> str:
+        """Return a name as source text; the resolution is a number of the target."""
+        return self.constant(self.resolution) if name == RESOLUTION else name
+
     def function(self, kind: str, arguments: list[str]) -> str:
         """Return a call, for every operation that is not written with an operator."""
         raise NotImplementedError
 
     def _print(self, node: Node) -> tuple[str, int]:
         if isinstance(node, Reference):
-            return node.name, _ATOM
+            return self.reference(node.name), _ATOM
         if isinstance(node, Constant):
             text = self.constant(abs(node.value))
             return (f"-{text}", _UNARY) if node.value < 0 else (text, _ATOM)

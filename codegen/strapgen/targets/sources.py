@@ -8,6 +8,7 @@ from typing import Any
 
 from strapgen.companions import Companions
 from strapgen.fixedpoint import Interface
+from strapgen.recursion import Recursion
 from strapgen.signal import Signal
 
 
@@ -40,6 +41,8 @@ class Sources:
         What belongs to an attitude step; None for every other kernel.
     fixed : Interface or None
         Formats, ranges and error bounds of fixed-point code; None for every other target.
+    recursion : Recursion or None
+        Which outputs are inputs of the next call.
     """
 
     kernel: str
@@ -50,6 +53,7 @@ class Sources:
     temporaries: int
     companions: Companions | None
     fixed: Interface | None = None
+    recursion: Recursion | None = None
 
     def interface(self) -> dict[str, Any]:
         """Return everything but the text as plain JSON data."""
@@ -75,6 +79,7 @@ class Sources:
                 "isometry": companions.isometry,
             },
             "fixed": self.fixed and self.fixed.as_dict(),
+            "recursion": self.recursion and self.recursion.as_dict(),
         }
 
     @classmethod
@@ -97,4 +102,5 @@ class Sources:
             interface["temporaries"],
             companions,
             interface["fixed"] and Interface.from_dict(interface["fixed"]),
+            interface["recursion"] and Recursion.from_dict(interface["recursion"]),
         )

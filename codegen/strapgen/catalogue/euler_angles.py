@@ -1,0 +1,117 @@
+"""Euler angles: roll, pitch and heading, rotations in the order heading, pitch, roll, from and to the matrix."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from fractions import Fraction
+
+import sympy as sp
+
+from strapgen.algebra import Direction, Wrapped
+from strapgen.catalogue.kinematics import DCM, SAVAGE
+from strapgen.kernel import Kernel, KernelBuilder, resolution
+from strapgen.recursion import Recursion
+from strapgen.signal import Signal
+
+ANGLES = Signal(
+    "angles",
+    (3,),
+    ("roll", "pitch", "heading"),
+    unit="rad",
+    meaning="Euler angles: roll, pitch, heading",
+    bound=Fraction(355, 113),
+)
+#: From this pitch on, heading is found beside roll, by their sum or difference: where the cosine squared is below.
+_STEEP = sp.Rational(1, 4)
+#: The cosine of pitch up to which nothing tells roll from heading, in steps of the resolution.
+_VERTICAL = 2
+
+
+def dcm_from_euler_angles() -> Kernel:
+    """Return the direction cosine matrix of Euler angles, equation (60).
+
+    Returns
+    -------
+    Kernel
+        Input ``angles`` (3,) in rad: roll, pitch, heading; output ``attitude`` (3, 3).
+    """
+    build = KernelBuilder()
+    roll, pitch, heading = build.input(ANGLES)
+
+    def turned(angle: sp.Expr, name: str, axis: int) -> sp.Matrix:
+        c, s = build.value(f"cos_{name}", sp.cos(angle)), build.value(f"sin_{name}", sp.sin(angle))
+        matrix, (j, k) = sp.eye(3), ((1, 2), (2, 0), (0, 1))[axis]
+        matrix[j, j] = matrix[k, k] = c
+        matrix[k, j], matrix[j, k] = s, -s
+        return matrix
+
+    product = turned(heading, "heading", 2) * turned(pitch, "pitch", 1) * turned(roll, "roll", 0)
+    build.output(replace(DCM.state, name="attitude"), product)
+    return build.kernel(
+        "dcm-from-euler-angles", "Direction cosine matrix from Euler angles", f"{SAVAGE}, equation (60)"
+    )
+
+
+def euler_angles_from_dcm() -> Kernel:
+    """Return the Euler angles of a direction cosine matrix, equations (61) to (63).
+
+    (63) holds at every pitch: C23 - C12 and C13 + C22 are 1 + sin(pitch) times the sine and cosine of heading - roll.
+    It is used at steep pitch, so that heading - roll, or their sum, is as good as the matrix where neither is by
+    itself. Where the pitch is vertical to the last place, roll stays what it was.
+
+    Returns
+    -------
+    Kernel
+        Inputs ``state`` (3, 3) and ``previous`` (3,), the angles of the call before in rad; output ``next`` (3,): roll
+        and heading from -pi to pi, pitch from -pi/2 to pi/2.
+    """
+    build = KernelBuilder()
+    C = build.input(DCM.state)
+    before = build.input(
+        Signal(
+            "previous",
+            (3,),
+            ("last_roll", "last_pitch", "last_heading"),
+            "rad",
+            "the angles before",
+            ANGLES.bound,
+        )
+    )
+    square = build.value("cosine_squared", C[0, 0] ** 2 + C[1, 0] ** 2, "square of the cosine of pitch")
+    pitch = build.value("next_pitch", sp.atan2(-C[2, 0], sp.sqrt(square)), "pitch")
+    vertical = (_VERTICAL * resolution) ** 2
+    roll = build.value(
+        "next_roll",
+        sp.Piecewise((before[0], square <= vertical), (sp.atan2(C[2, 1], C[2, 2]), True)),
+        "roll; held where pitch is vertical",
+    )
+    up = C[2, 0] <= 0
+    sine = build.value(
+        "steep_sine",
+        sp.Piecewise((C[1, 2] - C[0, 1], up), (-C[1, 2] - C[0, 1], True)),
+        "heading - roll, or +",
+    )
+    cosine = build.value("steep_cosine", sp.Piecewise((C[1, 1] + C[0, 2], up), (C[1, 1] - C[0, 2], True)))
+    apart = build.value("apart", Direction(sine, cosine), "the angle between or together")
+    heading = build.value(
+        "next_heading",
+        sp.Piecewise(
+            (sp.atan2(C[1, 0], C[0, 0]), square >= _STEEP),
+            (Wrapped(apart + sp.Piecewise((roll, up), (-roll, True))), True),
+        ),
+        "heading",
+    )
+    build.output(
+        replace(ANGLES, name="next", elements=tuple(f"found_{e}" for e in ANGLES.elements)),
+        [roll, pitch, heading],
+    )
+    return build.kernel(
+        "euler-angles-from-dcm",
+        "Euler angles from a direction cosine matrix",
+        f"{SAVAGE}, equations (61) to (63), the root of (61) of C11^2 + C21^2",
+        recursion=Recursion((("previous", "next"),), kept=("previous",)),
+        notes=(
+            "Heading - roll at pitch up, heading + roll at pitch down, are as good as the matrix at every pitch.",
+            "Errors of angles are told without whole turns.",
+        ),
+    )

@@ -1,0 +1,142 @@
+"""The three loops of a strapdown algorithm in two speeds: fast, slow, and that of the navigation frame."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from strapgen.catalogue.acceleration import NAVIGATION_VELOCITY, compensated, frame_correction, rotated
+from strapgen.catalogue.kinematics import KINEMATICS, SAVAGE
+from strapgen.catalogue.two_speed import (
+    ANGLE_SUM,
+    CONING,
+    INCREMENT,
+    PREVIOUS,
+    SCULLING,
+    VELOCITY_INCREMENT,
+    VELOCITY_SUM,
+    FastLoop,
+    coned,
+    sculled,
+)
+from strapgen.catalogue.updates import (
+    NAVIGATION_ROTATION,
+    PREVIOUS_TURN,
+    ROTATION_VECTOR,
+    TURN,
+    transition,
+    turned_frame,
+)
+from strapgen.kernel import Kernel, KernelBuilder
+from strapgen.recursion import Recursion
+from strapgen.signal import Signal, after
+
+
+def fast(form: int) -> Kernel:
+    """Return the fast loop: coning and sculling from angle and velocity increments, equations (26) and (55) or (56).
+
+    Parameters
+    ----------
+    form : int
+        Which sculling integral: 1 or 2.
+
+    Returns
+    -------
+    Kernel
+        Inputs ``angle_sum``, ``coning``, ``previous_increment``, ``velocity_sum``, ``sculling``, which are handed on,
+        and ``increment``, ``velocity_increment``; angles in rad, velocities in m/s, all (3,).
+    """
+    loop = FastLoop()
+    beta, coning, past, u, eta, d, dv = map(
+        loop.build.input,
+        (ANGLE_SUM, CONING, PREVIOUS, VELOCITY_SUM, SCULLING, INCREMENT, VELOCITY_INCREMENT),
+    )
+    loop.hand_on(ANGLE_SUM, beta + d)
+    loop.hand_on(CONING, coned(loop.build, coning, beta, past, d))
+    loop.hand_on(PREVIOUS, d)
+    loop.hand_on(VELOCITY_SUM, u + dv)
+    loop.hand_on(SCULLING, sculled(loop.build, form, eta, beta, u, d, dv))
+    equation = "(55)" if form == 1 else "(56)"
+    return loop.kernel(
+        f"two-speed-fast-{form}", f"Two speeds: fast loop with S{form}", f"equations (26) and {equation}"
+    )
+
+
+def slow(name: str, form: int) -> Kernel:
+    """Return the slow loop: velocity in navigation axes, attitude by the rotation vector, rotation of the frame.
+
+    Parameters
+    ----------
+    name : str
+        "dcm" or "euler".
+    form : int
+        Which sculling integral the fast loop makes: 1 or 2.
+
+    Returns
+    -------
+    Kernel
+        Inputs ``state``, ``navigation_velocity``, ``navigation_rotation``, ``previous_turn``, which are handed on; the
+        sums of the fast loop, ``angle_sum``, ``coning``, ``velocity_sum``, ``sculling``; and ``turn``, the rate of the
+        navigation frame times the slow cycle in rad.
+    """
+    kinematics = KINEMATICS[name]
+    build = KernelBuilder()
+    state, v, theta, before = map(
+        build.input, (kinematics.state, NAVIGATION_VELOCITY, NAVIGATION_ROTATION, PREVIOUS_TURN)
+    )
+    beta, coning, u, eta, turn = map(build.input, (ANGLE_SUM, CONING, VELOCITY_SUM, SCULLING, TURN))
+    phi = build.stage(ROTATION_VECTOR, beta + coning)
+    made = transition(build, kinematics, phi)
+    states = (
+        (kinematics.state, kinematics.next, kinematics.product(state, made)),
+        (
+            NAVIGATION_VELOCITY,
+            after(NAVIGATION_VELOCITY),
+            v + rotated(build, name, state, compensated(build, form, u, eta, beta)),
+        ),
+        (NAVIGATION_ROTATION, after(NAVIGATION_ROTATION), theta + (before + turn) / 2),
+        (PREVIOUS_TURN, after(PREVIOUS_TURN), turn),
+    )
+    for _, signal, value in states:
+        build.output(signal, value)
+    return build.kernel(
+        f"{name}-two-speed-slow-{form}",
+        f"Two speeds: slow loop of the {kinematics.title.lower() if name == 'dcm' else kinematics.title}",
+        f"{SAVAGE}, equations (2) to (14), (22), (27) and {'(51)' if form == 1 else '(52)'}",
+        recursion=Recursion(
+            tuple((held.name, signal.name) for held, signal, _ in states),
+            kept=(kinematics.state.name, PREVIOUS_TURN.name),
+        ),
+    )
+
+
+def navigation(name: str) -> Kernel:
+    """Return the loop of the navigation frame: the attitude after its rotation, the velocity corrected for that.
+
+    Parameters
+    ----------
+    name : str
+        "dcm" or "euler".
+
+    Returns
+    -------
+    Kernel
+        Inputs ``state``, which is handed on, ``navigation_rotation`` and ``navigation_velocity``; outputs ``next`` and
+        ``velocity_change`` (3,) in m/s, the integral of the specific force in navigation axes as they turn.
+    """
+    kinematics = KINEMATICS[name]
+    build = KernelBuilder()
+    state, theta, v = map(build.input, (kinematics.state, NAVIGATION_ROTATION, NAVIGATION_VELOCITY))
+    build.output(kinematics.next, turned_frame(build, kinematics, state, theta))
+    gained: Signal = replace(
+        NAVIGATION_VELOCITY,
+        name="velocity_change",
+        elements=tuple(f"change_{axis}" for axis in "xyz"),
+        meaning="integral of the specific force over the navigation cycle, navigation axes as they turn",
+    )
+    build.output(gained, v + frame_correction(theta, v))
+    return build.kernel(
+        f"{name}-two-speed-navigation",
+        f"Two speeds: navigation loop of the {kinematics.title.lower() if name == 'dcm' else kinematics.title}",
+        f"{SAVAGE}, equations (5), (15) and (59)",
+        recursion=Recursion(((kinematics.state.name, kinematics.next.name),), kept=(kinematics.state.name,)),
+    )

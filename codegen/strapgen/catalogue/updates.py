@@ -1,0 +1,168 @@
+"""Attitude updates from a rotation vector: of the body frame, of the navigation frame, exact or cut off."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import sympy as sp
+
+from strapgen import algebra
+from strapgen.catalogue.kinematics import KINEMATICS, SAVAGE, Kinematics
+from strapgen.kernel import Kernel, KernelBuilder
+from strapgen.recursion import Recursion
+from strapgen.signal import Signal, after
+
+ROTATION_VECTOR = Signal.vector(
+    "rotation_vector", "phi", unit="rad", meaning="rotation vector of the cycle, body axes", bound=Fraction(1)
+)
+NAVIGATION_ROTATION = Signal.vector(
+    "navigation_rotation",
+    "theta",
+    unit="rad",
+    meaning="rotation of the navigation frame over its cycle, navigation axes",
+    bound=Fraction(1, 8),
+)
+TURN, PREVIOUS_TURN = (
+    Signal.vector(
+        name,
+        prefix,
+        unit="rad",
+        meaning=f"rate of the navigation frame {when} times the slow cycle, navigation axes",
+        bound=Fraction(1, 64),
+    )
+    for name, prefix, when in (("turn", "turn", "at its end"), ("previous_turn", "before", "at its start"))
+)
+#: Where an attitude update stands in the source, by the size of the state: cut off, navigation frame.
+_EQUATIONS = {9: ("(2) to (4)", "(5) and (6)"), 4: ("(9) to (14)", "(15)")}
+
+
+def transition(
+    build: KernelBuilder, kinematics: Kinematics, phi: sp.Matrix, order: int | None = None
+) -> sp.Matrix:
+    """Name the transition of the rotation by a rotation vector, and return its symbols.
+
+    Parameters
+    ----------
+    build : KernelBuilder
+    kinematics : Kinematics
+    phi : Matrix, 3 x 1
+        Rotation vector in rad.
+    order : int, optional
+        Highest degree of the products of its elements that are kept; exact by default.
+    """
+    square = build.value("angle_squared", algebra.dot(phi, phi), "square of the angle")
+    return build.stage(kinematics.transition, kinematics.exponential(phi, order, square))
+
+
+def _described(kinematics: Kinematics, order: int | None, which: int) -> tuple[str, str, tuple[str, ...]]:
+    """Return title, source and notes that tell the order."""
+    equations = _EQUATIONS[kinematics.state.size][which]
+    if order is None:
+        return ", exact", f"{SAVAGE}, equations {equations} with all terms", ()
+    note = f"Products of the elements of the rotation vector are kept up to degree {order}."
+    return f", order {order}", f"{SAVAGE}, equations {equations}", (note,)
+
+
+def update(name: str, order: int | None = None) -> Kernel:
+    """Return the kernel that turns an attitude by the rotation vector of a cycle.
+
+    sin(x)/x takes its place at every angle, also where it is small: rounded, it is as good there as elsewhere.
+
+    Parameters
+    ----------
+    name : str
+        Name of the attitude algorithm.
+    order : int, optional
+        Highest degree in the rotation vector of the products that are kept; exact by default.
+
+    Returns
+    -------
+    Kernel
+        Inputs ``state`` and ``rotation_vector`` (3,) in rad; output ``next``.
+    """
+    kinematics = KINEMATICS[name]
+    build = KernelBuilder()
+    state, phi = build.input(kinematics.state), build.input(ROTATION_VECTOR)
+    made = transition(build, kinematics, phi, order)
+    build.output(kinematics.next, kinematics.product(state, made))
+    words, source, notes = _described(kinematics, order, 0)
+    return build.kernel(
+        f"{name}-update" + (f"-{order}" if order else ""),
+        f"{kinematics.title}: update by a rotation vector{words}",
+        source,
+        transition=kinematics.transition.name,
+        recursion=Recursion(((kinematics.state.name, kinematics.next.name),), kept=(kinematics.state.name,)),
+        notes=notes,
+    )
+
+
+def turned_frame(
+    build: KernelBuilder, kinematics: Kinematics, state: sp.Matrix, theta: sp.Matrix, order: int | None = None
+) -> sp.Matrix:
+    """Return a state against the navigation frame after that has turned by theta.
+
+    Parameters
+    ----------
+    build : KernelBuilder
+    kinematics : Kinematics
+    state : Matrix
+    theta : Matrix, 3 x 1
+        Rotation vector of the navigation frame in rad, navigation axes.
+    order : int, optional
+        As for `transition`.
+    """
+    turn = transition(build, kinematics, -theta, order)
+    return kinematics.product(turn, state)
+
+
+def navigation_update(name: str, order: int | None = None) -> Kernel:
+    """Return the kernel that refers an attitude to the navigation frame after its rotation.
+
+    Parameters
+    ----------
+    name : str
+        Name of the attitude algorithm.
+    order : int, optional
+        Highest degree in the rotation of the products that are kept; exact by default.
+
+    Returns
+    -------
+    Kernel
+        Inputs ``state`` and ``navigation_rotation`` (3,) in rad; output ``next``.
+    """
+    kinematics = KINEMATICS[name]
+    build = KernelBuilder()
+    state, theta = build.input(kinematics.state), build.input(NAVIGATION_ROTATION)
+    build.output(kinematics.next, turned_frame(build, kinematics, state, theta, order))
+    words, source, notes = _described(kinematics, order, 1)
+    return build.kernel(
+        f"{name}-navigation-update" + (f"-{order}" if order else ""),
+        f"{kinematics.title}: update by the rotation of the navigation frame{words}",
+        source,
+        recursion=Recursion(((kinematics.state.name, kinematics.next.name),), kept=(kinematics.state.name,)),
+        notes=notes,
+    )
+
+
+def navigation_rotation() -> Kernel:
+    """Return the trapezoidal sum of the navigation frame's rate, by cycles of the body frame's update.
+
+    Returns
+    -------
+    Kernel
+        Inputs ``navigation_rotation``, the sum so far, ``previous_turn`` and ``turn``: the rate before and after the
+        cycle, each times its length in rad; outputs ``next_navigation_rotation`` and ``next_previous_turn``.
+    """
+    build = KernelBuilder()
+    theta, before, turn = map(build.input, (NAVIGATION_ROTATION, PREVIOUS_TURN, TURN))
+    build.output(after(NAVIGATION_ROTATION), theta + (before + turn) / 2)
+    build.output(after(PREVIOUS_TURN), turn)
+    return build.kernel(
+        "navigation-rotation",
+        "Rotation of the navigation frame, trapezoidal",
+        f"{SAVAGE}, equation (27)",
+        recursion=Recursion(
+            tuple((signal.name, after(signal).name) for signal in (NAVIGATION_ROTATION, PREVIOUS_TURN)),
+            kept=(PREVIOUS_TURN.name,),
+        ),
+    )

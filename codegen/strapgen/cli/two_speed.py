@@ -1,0 +1,62 @@
+"""strapgen two-speed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from strapgen.cli.fixed import Fixes, Ranges, Rounding, Word, read_settings
+from strapgen.cli.options import Format, check_format, print_json
+from strapgen.exceptions import InputError
+
+
+def two_speed(
+    algorithm: Annotated[str, typer.Argument(help="dcm or euler.")],
+    sculling: Annotated[
+        int,
+        typer.Option(
+            "--sculling", help="Sculling integral: 1 with the rotation compensation in it, 2 without."
+        ),
+    ] = 2,
+    target: Annotated[str, typer.Option("--target", help="c, c-float or c-fixed.")] = "c",
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Folder to write to.  [default: here]", show_default=False)
+    ] = None,
+    word: Word = None,
+    rounding: Rounding = None,
+    ranges: Ranges = None,
+    fix: Fixes = None,
+    format: Format = "text",
+) -> None:
+    """Generate the C of an algorithm in two speeds: a function for every loop, and one for the whole.
+
+    Example: strapgen two-speed dcm --target c --out firmware
+    """
+    check_format(format)
+    from strapgen import output
+    from strapgen import two_speed as made
+    from strapgen.fixedpoint import Settings
+
+    settings = read_settings(1, word=word, rounding=rounding, ranges=ranges, formats=fix)
+    if target == "c-fixed":
+        settings = settings or Settings()
+    elif settings is not None:
+        raise InputError(f"the options of fixed point go with --target c-fixed, not with {target}")
+    sources = made.sources(algorithm, sculling, target, settings)
+    written = output.write_files(out or Path(), sources.files)
+    if format == "json":
+        print_json(
+            {
+                "kernel": sources.kernel,
+                "target": target,
+                "loops": list(made.kernels(algorithm, sculling)),
+                "files": [str(path) for path in written],
+                "operations": sources.operations,
+            }
+        )
+        return
+    typer.echo(f"{sources.kernel} for {target}")
+    for path in written:
+        typer.echo(f"  {path}")

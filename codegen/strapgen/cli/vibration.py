@@ -1,0 +1,386 @@
+"""strapgen vibration."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+
+import typer
+
+from strapgen.cli.options import Previous, Rates, TableauFile, check_format, chosen, print_json, whole
+from strapgen.exceptions import InputError
+
+if TYPE_CHECKING:
+    from strapgen.vibration import Assessment
+    from strapgen.vibration.assessment import Rates as MeanRates
+
+_Text = str | None
+
+
+FrequencyHz = Annotated[
+    _Text, typer.Option("--frequency-hz", metavar="F", help="Frequency f in Hz.", show_default=False)
+]
+Step = Annotated[
+    _Text,
+    typer.Option(
+        "--step", metavar="S", help="Step T in s; of a fast loop the slow cycle.", show_default=False
+    ),
+]
+ThetaX = Annotated[
+    _Text,
+    typer.Option(
+        "--theta-x-rad", metavar="X", help="Amplitude of the angle about x in rad.", show_default=False
+    ),
+]
+ThetaY = Annotated[
+    _Text,
+    typer.Option(
+        "--theta-y-rad", metavar="Y", help="Amplitude of the angle about y in rad.", show_default=False
+    ),
+]
+Phase = Annotated[
+    _Text, typer.Option("--phase-rad", metavar="P", help="Phase of y before x in rad.", show_default=False)
+]
+AccelerationY = Annotated[
+    _Text,
+    typer.Option(
+        "--acceleration-y",
+        metavar="M_S2",
+        help="Amplitude of the acceleration along y in m/s^2: the sculling rates too.",
+        show_default=False,
+    ),
+]
+
+
+def vibration(
+    algorithm: Annotated[
+        str,
+        typer.Argument(
+            help="dcm, euler, cayley-klein, rotation-vector, sculling, a fast loop (coning-fast, sculling-fast-1, "
+            "sculling-fast-2, two-speed-fast-1, two-speed-fast-2), or your own Python file."
+        ),
+    ],
+    methods: Annotated[
+        _Text,
+        typer.Option("--method", metavar="NAME,...", help="Methods.  [default: rk4]", show_default=False),
+    ] = None,
+    tableau: TableauFile = None,
+    increments: Annotated[
+        _Text,
+        typer.Option(
+            "--increments",
+            metavar="N,...",
+            help="Angle increments a step; for a fast loop its cycles in a step.  [default: 2]",
+            show_default=False,
+        ),
+    ] = None,
+    previous: Previous = None,
+    rates: Rates = False,
+    frequency: FrequencyHz = None,
+    step: Step = None,
+    theta_x: ThetaX = None,
+    theta_y: ThetaY = None,
+    phase: Phase = None,
+    acceleration: AccelerationY = None,
+    spectrum: Annotated[
+        Path | None,
+        typer.Option(
+            "--spectrum",
+            metavar="FILE",
+            help="Random vibration in place of one frequency: a CSV of frequency_hz, density, angle_x_rad, "
+            "angle_x_phase_rad, ...",
+            show_default=False,
+        ),
+    ] = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option("--plot", help="Image file for the errors against frequency.", show_default=False),
+    ] = None,
+    span: Annotated[
+        _Text,
+        typer.Option(
+            "--plot-hz",
+            metavar="LOW,HIGH",
+            help="Frequencies of the plot.  [default: up to half the sampling frequency]",
+            show_default=False,
+        ),
+    ] = None,
+    format: Annotated[str, typer.Option("--format", help="text, json or latex.")] = "text",
+) -> None:
+    """Assess an algorithm under vibration: the mean drift about z that it computes, the true one, and its error.
+
+    The angles are X sin(2 pi f t) about x and Y sin(2 pi f t + P) about y; an acceleration along y has the phase P too.
+    Closed forms to second order in the amplitudes are derived from the algorithm itself. Several methods, or numbers of
+    increments, stand side by side.
+
+    Example:
+
+    \b
+      strapgen vibration euler --method coning-compressed --increments 4 --frequency-hz 10 \\
+        --step 0.04 --theta-x-rad 0.01 --theta-y-rad 0.01 --phase-rad 1.5 --acceleration-y 5
+    """  # noqa: D301
+    check_format(format, "latex")
+    _check_vibration(
+        {
+            "--frequency-hz": frequency,
+            "--theta-x-rad": theta_x,
+            "--theta-y-rad": theta_y,
+            "--phase-rad": phase,
+            "--acceleration-y": acceleration,
+        },
+        step,
+        spectrum,
+        plot,
+        span,
+    )
+    from strapgen import output
+    from strapgen import vibration as assessing
+
+    cases = [
+        case
+        for name in _listed("--method", methods)
+        for count in _listed("--increments", increments)
+        for case in _assessed(
+            algorithm,
+            (name, tableau, count, previous, rates),
+            drift=theta_y is not None,
+            sculling=acceleration is not None,
+            random=spectrum is not None,
+        )
+    ]
+    found: list[_Outcome] = []
+    given: dict[str, Any] = {}
+    if spectrum is None:
+        given = {
+            "theta_x": theta_x,
+            "theta_y": theta_y or "0",
+            "phase": phase,
+            "acceleration_y": acceleration or "0",
+        }
+        words = f"{frequency} Hz, amplitudes {theta_x} rad about x"
+        words += "" if theta_y is None else f", {theta_y} rad about y"
+        words += "" if acceleration is None else f", {acceleration} m/s^2 along y"
+        words += f", phase {phase} rad"
+        found = [
+            _Outcome(case, case.assessment.rates(frequency or "", step or "", cycles=case.cycles, **given))
+            for case in cases
+        ]
+    else:
+        shaken = assessing.read_spectrum(spectrum)
+        words = f"spectrum {spectrum.name}, {shaken.edges[0]:g} to {shaken.edges[-1]:g} Hz"
+        for case in cases:
+            if case.moved(set(shaken.transfers)):
+                random = assessing.random_rates(case.assessment, shaken, step or "", cycles=case.cycles)
+                found.append(_Outcome(case, random.rates, random.quadrature))
+        if not found:
+            raise InputError(
+                f"{spectrum} moves {', '.join(shaken.transfers)}; angles about x and y, or an angle and "
+                f"an acceleration across it, are needed for {cases[0].assessment.kernel}"
+            )
+    if plot is not None:
+        output.write_files(Path(), {str(plot): _image(cases, given, step, frequency, span, words, plot)})
+    title = f"{words}; step {step} s"
+    if format == "json":
+        data = _merged(found)
+        print_json(data[0] if len(data) == 1 else data)
+    elif format == "latex":
+        typer.echo(_latex(cases))
+    else:
+        typer.echo(_text(found, title))
+
+
+class _Case(NamedTuple):
+    """What is assessed, with the fast cycles in a step, and the samples."""
+
+    assessment: Assessment
+    cycles: int | None
+    samples: int
+
+    def moved(self, transfers: set[str]) -> bool:
+        """Tell whether a spectrum moves what this needs."""
+        if self.assessment.unit == "rad/s":
+            return {"angle_x", "angle_y"} <= transfers
+        return {"angle_x", "acceleration_y"} <= transfers or {"angle_y", "acceleration_x"} <= transfers
+
+
+class _Outcome(NamedTuple):
+    case: _Case
+    rates: MeanRates
+    quadrature: MeanRates | None = None
+
+
+def _check_vibration(
+    numbers: dict[str, _Text], step: _Text, spectrum: Path | None, plot: Path | None, span: _Text
+) -> None:
+    """Check that one frequency or a spectrum is given, with all that goes with it."""
+    if step is None:
+        raise InputError("--step in s is needed")
+    if spectrum is not None:
+        for name, value in {**numbers, "--plot": plot, "--plot-hz": span}.items():
+            if value is not None:
+                raise InputError(f"{name} goes with one frequency, not with --spectrum")
+        return
+    for name in ("--frequency-hz", "--theta-x-rad", "--phase-rad"):
+        if numbers[name] is None:
+            raise InputError(f"{name} is needed, or a --spectrum")
+    if numbers["--theta-y-rad"] is None and numbers["--acceleration-y"] is None:
+        raise InputError("--theta-y-rad is needed for the drift, or --acceleration-y for sculling")
+    if span is not None and plot is None:
+        raise InputError("--plot-hz goes with --plot")
+
+
+def _listed(option: str, text: _Text) -> list[_Text]:
+    """Return the parts of a list, each once; nothing is given where there is none."""
+    if text is None:
+        return [None]
+    parts: list[_Text] = list(dict.fromkeys(part.strip() for part in text.split(",") if part.strip()))
+    if not parts:
+        raise InputError(f"{option} is {text!r}; a list with commas between is needed")
+    return parts
+
+
+def _assessed(
+    algorithm: str,
+    options: tuple[_Text, Path | None, _Text, _Text, bool],
+    *,
+    drift: bool,
+    sculling: bool,
+    random: bool,
+) -> list[_Case]:
+    """Return what can be assessed of an algorithm, of what is asked for."""
+    from strapgen import catalogue, checks
+    from strapgen.vibration import assessment
+
+    method, tableau, count, previous, rates = options
+    cycles = None
+    if algorithm in assessment.RECURSIONS:
+        if count is None:
+            raise InputError(
+                f"{algorithm} is a recursion: --increments must say how many of its cycles make a step"
+            )
+        cycles = checks.count("increments", whole("increments", count), largest=checks.MOST)
+        count = None
+    choice = chosen(algorithm, method, tableau, count, previous, rates, step=False)
+    can = assessment.quantities(choice)
+    if random:
+        wanted = list(can)
+    else:
+        wanted = [name for name, asked in (("drift", drift), ("sculling", sculling)) if asked and name in can]
+        if not wanted:
+            needed = {"drift": "--theta-y-rad", "sculling": "--acceleration-y"}[can[0]]
+            raise InputError(f"{algorithm} has {' and '.join(can)} rates alone; {needed} is needed")
+    samples = cycles or catalogue.increments(choice)
+    return [_Case(assessment.of(choice, quantity), cycles, samples) for quantity in wanted]
+
+
+_UNITS = {"rad/s": "rad_s", "m/s^2": "m_s2"}
+#: What a person reads, and its factor.
+_READ = {"rad/s": ("deg/h", math.degrees(3600)), "m/s^2": ("micro-g", 1e6 / 9.80665)}
+
+
+def _merged(found: list[_Outcome]) -> list[dict[str, Any]]:
+    """Return plain JSON data, an object an algorithm."""
+    groups: dict[str, list[_Outcome]] = {}
+    for outcome in found:
+        groups.setdefault(_label(outcome.case), []).append(outcome)
+    merged = []
+    for group in groups.values():
+        data: dict[str, Any] = {}
+        for case, rates, quadrature in group:
+            unit = _UNITS[case.assessment.unit]
+            data |= {f"{part}_{unit}": value for part, value in rates._asdict().items()}
+            if quadrature is not None:
+                data |= {f"{part}_quadrature_{unit}": value for part, value in quadrature._asdict().items()}
+        data |= {"kernel": group[0].case.assessment.kernel, "increments": group[0].case.samples}
+        for case, _, quadrature in group:
+            if quadrature is None:
+                data[f"{_quantity(case)}_closed_form"] = {
+                    part: case.assessment.text(part) for part in ("computed", "continuous")
+                }
+        merged.append(data)
+    return merged
+
+
+def _quantity(case: _Case) -> str:
+    return "drift" if case.assessment.unit == "rad/s" else "sculling"
+
+
+def _label(case: _Case) -> str:
+    return case.assessment.kernel + ("" if case.cycles is None else f", {case.cycles} cycles")
+
+
+def _text(found: list[_Outcome], title: str) -> str:
+    lines = [f"mean rates about z, to second order in the amplitudes; {title}"]
+    for unit, (read, factor) in _READ.items():
+        group = [outcome for outcome in found if outcome.case.assessment.unit == unit]
+        if not group:
+            continue
+        width = max(len(_label(outcome.case)) for outcome in group)
+        heads = [f"{part}, {unit}" for part in ("continuous", "computed", "error")] + [f"error, {read}"]
+        lines += [
+            "",
+            f"{_quantity(group[0].case):<{width}} " + "".join(f"{h:>20}" for h in heads),
+        ]
+        for outcome in group:
+            cells = "".join(f"{value:>20.9e}" for value in outcome.rates)
+            lines.append(f"{_label(outcome.case):<{width}} {cells}{outcome.rates.error * factor:>20.6g}")
+            if outcome.quadrature is not None:
+                spread = "".join(f"{value:>20.1e}" for value in outcome.quadrature)
+                lines.append(f"{'  quadrature':<{width}} {spread}")
+    if all(outcome.quadrature is None for outcome in found) and len({_label(o.case) for o in found}) == 1:
+        for outcome in found:
+            made = outcome.case.assessment
+            lines += [
+                "",
+                f"closed form of the {_quantity(outcome.case)} rate in {made.unit}",
+            ]
+            lines += [f"  {part:<10} = {made.text(part)}" for part in ("continuous", "computed")]
+    return "\n".join(lines)
+
+
+def _latex(cases: list[_Case]) -> str:
+    """Return the closed forms as one LaTeX align environment."""
+    import sympy as sp
+
+    rows = []
+    for case in cases:
+        made = case.assessment
+        letter = r"\dot\phi_z" if made.unit == "rad/s" else r"\dot v_z"
+        for part in ("continuous", "computed", "error"):
+            index = rf"\mathrm{{{part}}}" if len(cases) == 1 else rf"\mathrm{{{part},\ {_label(case)}}}"
+            rows.append(f"{letter}^{{{index}}} &= {sp.latex(made.expression(part))}")
+    return "\\begin{align*}\n" + " \\\\\n".join(rows) + "\n\\end{align*}"
+
+
+def _image(
+    cases: list[_Case],
+    given: dict[str, Any],
+    step: _Text,
+    frequency: _Text,
+    span: _Text,
+    words: str,
+    path: Path,
+) -> bytes:
+    from strapgen import checks, plots
+    from strapgen.vibration import curves
+
+    length = float(checks.number("step", step or "", positive=True))
+    high: Any = max(case.samples for case in cases) / length / 2
+    low: Any = high / 100
+    if span is not None:
+        ends = span.split(",")
+        if len(ends) != 2:
+            raise InputError(f"plot-hz is {span!r}; two frequencies, LOW,HIGH, are needed")
+        low, high = ends
+    hertz = curves.frequencies(low, high)
+    drawn = [
+        (_label(case), curves.curve(case.assessment, hertz, step or "", cycles=case.cycles, **given))
+        for case in cases
+    ]
+    return plots.vibration_image(
+        drawn,
+        f"Errors under vibration, step {step} s\n{words.partition(', ')[2]}",
+        path,
+        float(checks.number("frequency-hz", frequency or "")),
+    )

@@ -1,0 +1,47 @@
+"""Recursions: which outputs of a kernel are inputs of its next call."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Recursion:
+    """What a kernel hands on from call to call.
+
+    Parameters
+    ----------
+    states : tuple of (str, str)
+        Names of an input, and of the output that takes its place in the next call, pair by pair.
+    kept : tuple of str
+        Inputs of these pairs that go on over the end of a cycle of the slower loop; the others begin again from zero.
+
+    Examples
+    --------
+    >>> Recursion((("sum", "next_sum"), ("previous", "next_previous")), kept=("previous",)).begun_anew
+    ('sum',)
+    """
+
+    states: tuple[tuple[str, str], ...]
+    kept: tuple[str, ...] = ()
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the recursion as plain JSON data."""
+        return {"states": [list(pair) for pair in self.states], "kept": list(self.kept)}
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Recursion:
+        """Rebuild a recursion from `as_dict`."""
+        return cls(tuple((name, output) for name, output in data["states"]), tuple(data["kept"]))
+
+    @property
+    def begun_anew(self) -> tuple[str, ...]:
+        """The inputs that are zero at the start of a cycle of the slower loop."""
+        return tuple(name for name, _ in self.states if name not in self.kept)
+
+    @property
+    def inputs(self) -> dict[str, str]:
+        """The input that an output is in the next call, by the output's name."""
+        return {output: name for name, output in self.states}

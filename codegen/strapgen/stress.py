@@ -1,0 +1,226 @@
+"""The rate-table test of 1984: 70 deg/s about all three axes at once, steady and swinging, through 90 deg of pitch."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapgen import catalogue, checks
+from strapgen.backends import BACKENDS, evaluator, of
+from strapgen.exceptions import InputError
+from strapgen.fixedpoint import Settings
+from strapgen.gyro import windows
+from strapgen.simulation import attitude, drift_between
+from strapgen.targets import FIXED
+from strapgen.two_speed import TwoSpeed
+
+Array = NDArray[np.float64]
+
+#: Rate on each axis in deg/s (AGARD Lecture Series 133, the largest specified rate of that time).
+RATE_DEG_S = 70.0
+#: Rate in rad/s of the swing's phase: the angle on each axis swings by 140 deg, enough to pass 90 deg of pitch.
+SWING_RAD_S = 0.5
+MOTIONS = ("linear", "oscillating")
+#: Attitude methods that are run where none are named, and increments of each.
+METHODS = (("rk1", 2), ("rk2", 2), ("rk3", 2), ("rk4", 2), ("magnus4", 2), ("coning-combined", 4))
+#: Back ends that are run where none are named: the model gives the bits of the C.
+DEFAULT_BACKENDS = tuple(name for name in BACKENDS if name != "fixed-model")
+#: The algorithm in two speeds, beside the attitude steps.
+TWO_SPEED = "two-speed"
+ALGORITHMS = (*catalogue.ALGORITHMS, TWO_SPEED)
+#: Fast cycles in a slow one.
+_FAST_CYCLES = 4
+
+
+@dataclass(frozen=True)
+class Row:
+    """The drift of one algorithm on one back end.
+
+    Parameters
+    ----------
+    motion, algorithm, backend : str
+    drift_deg : float or None
+        Largest angle between computed and true attitude over the run, in degrees; None where the run left the range of
+        its numbers.
+    pitch_deg : float or None
+        Largest pitch of the computed attitude, in degrees.
+    """
+
+    motion: str
+    algorithm: str
+    backend: str
+    drift_deg: float | None
+    pitch_deg: float | None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the row as plain JSON data."""
+        return asdict(self)
+
+
+def angles(motion: str, times: Array) -> Array:
+    """Return the angle about each axis that the table has turned at times in s; its axis (1, 1, 1) stays where it is.
+
+    Parameters
+    ----------
+    motion : str
+        "linear" or "oscillating".
+    times : array, (N,)
+
+    Returns
+    -------
+    array, (N, 3)
+        In rad: a rotation vector, for the axis is fixed.
+
+    Examples
+    --------
+    >>> angles("linear", np.array([1.0])).round(4)
+    array([[1.2217, 1.2217, 1.2217]])
+    """
+    rate = math.radians(RATE_DEG_S)
+    turned: Array = rate * times if motion == "linear" else rate / SWING_RAD_S * np.sin(SWING_RAD_S * times)
+    return np.repeat(turned[:, None], 3, axis=1)
+
+
+def stress(
+    duration: float | str | Fraction = 3600,
+    sample: float | str | Fraction = "0.01",
+    record: float | str | Fraction = 1,
+    backends: Sequence[str] = DEFAULT_BACKENDS,
+    algorithms: Sequence[str] = ALGORITHMS,
+) -> Iterator[Row]:
+    """Run the test on every algorithm and back end.
+
+    Parameters
+    ----------
+    duration, sample, record : number
+        Duration, time between gyro samples, and time from record to record, in s; each a multiple of the next. A step
+        takes as many samples as its method needs, and so does a slow cycle. Attitudes are orthonormalized at every
+        record, but for the algorithm in two speeds, which needs no more than its exact update.
+    backends : sequence of str, optional
+    algorithms : sequence of str, optional
+        Attitude algorithms, and "two-speed", which runs on back ends in C.
+
+    Yields
+    ------
+    Row
+
+    Raises
+    ------
+    InputError
+        If a name or number is not allowed.
+
+    Examples
+    --------
+    >>> rows = list(stress(10, "0.01", 1, ["numpy"], ["euler"]))
+    >>> [row.algorithm for row in rows if row.motion == "linear"][3:5]
+    ['euler-rk4-2', 'euler-magnus4-2']
+    >>> rows[3].drift_deg < 1e-6 < rows[0].drift_deg
+    True
+    """
+    for name in backends:
+        checks.choice("backend", name, BACKENDS)
+    for name in algorithms:
+        checks.choice("algorithm", name, ALGORITHMS)
+    total = checks.number("duration", duration, positive=True)
+    width = checks.number("sample", sample, positive=True)
+    interval = checks.number("record", record, positive=True)
+    count = checks.multiple("duration", total, "sample", width)
+    every = checks.multiple("record", interval, "sample", width)
+    checks.multiple("duration", total, "record", interval)
+    if every % _FAST_CYCLES:
+        raise InputError(
+            f"record is {every} samples; a multiple of {_FAST_CYCLES}, which a step may take, is needed"
+        )
+    for motion in MOTIONS:
+        turned = angles(motion, np.arange(count + 1, dtype=np.float64) * float(width))
+        samples = np.diff(turned, axis=0)
+        truth = evaluator("dcm-update")
+        true = truth(np.broadcast_to(np.eye(3), (count // every + 1, 3, 3)), turned[::every])
+        for one, algorithm, method, taken, backend in cases(algorithms, backends):
+            if one == motion:
+                yield _row(motion, algorithm, method, taken, backend, samples, every, true)
+
+
+def cases(algorithms: Sequence[str], backends: Sequence[str]) -> Iterator[tuple[str, str, str, int, str]]:
+    """Yield motion, algorithm, method, samples of a step and back end of every run."""
+    for motion in MOTIONS:
+        for algorithm in algorithms:
+            for method, taken in [(TWO_SPEED, _FAST_CYCLES)] if algorithm == TWO_SPEED else METHODS:
+                for backend in backends:
+                    if algorithm != TWO_SPEED or BACKENDS[backend].target.startswith("c"):
+                        yield motion, algorithm, method, taken, backend
+
+
+def _row(
+    motion: str,
+    algorithm: str,
+    method: str,
+    taken: int,
+    backend: str,
+    samples: Array,
+    every: int,
+    true: Array,
+) -> Row:
+    settings = None
+    if BACKENDS[backend].target in FIXED:
+        settings = Settings().fitted(float(np.abs(samples).max()))
+    try:
+        if algorithm == TWO_SPEED:
+            name, computed = "dcm two-speed", _two_speed(backend, settings, samples, every)
+        else:
+            made = of(catalogue.choose(algorithm, method, taken), backend, settings=settings)
+            states = made.propagate(windows(samples, taken), every // taken, every // taken)
+            name, computed = made.kernel, attitude(made, states)
+    except InputError:  # the state leaves the range of its numbers
+        return Row(motion, f"{algorithm}-{method}-{taken}", backend, None, None)
+    if not np.isfinite(computed).all():
+        return Row(motion, name, backend, None, None)
+    # The whole angle between the frames: low orders lose more than a right angle in an hour.
+    cosine = ((computed * true).sum(axis=(1, 2)) - 1) / 2
+    drift = np.arctan2(np.linalg.norm(drift_between(computed, true), axis=1), cosine)
+    pitch = np.arcsin(np.clip(-computed[:, 2, 0], -1, 1))
+    return Row(
+        motion, name, backend, math.degrees(float(drift.max())), math.degrees(float(np.abs(pitch).max()))
+    )
+
+
+def _two_speed(backend: str, settings: Settings | None, samples: Array, every: int) -> Array:
+    """Return the matrices of an algorithm in two speeds, one a record, without acceleration."""
+    run = TwoSpeed("dcm", backend=backend, settings=settings).run(
+        samples, np.zeros_like(samples), fast_cycles=_FAST_CYCLES
+    )
+    stride = every // _FAST_CYCLES
+    recorded = np.asarray(run.attitudes, np.float64)[stride - 1 :: stride]
+    return np.concatenate([np.eye(3)[None], recorded])
+
+
+def as_text(rows: Sequence[Row], duration: str, sample: str) -> str:
+    """Return rows as a table: a line an algorithm, a column a back end."""
+    backends = list(dict.fromkeys(row.backend for row in rows))
+    lines = [
+        f"{RATE_DEG_S:g} deg/s on all three axes, {duration} s, a gyro sample every {sample} s",
+        "largest drift in deg",
+    ]
+    for motion in dict.fromkeys(row.motion for row in rows):
+        here = [row for row in rows if row.motion == motion]
+        steepest = max((row.pitch_deg for row in here if row.pitch_deg is not None), default=math.nan)
+        lines += ["", f"{motion}; pitch up to {steepest:.2f} deg"]
+        names = list(dict.fromkeys(row.algorithm for row in here))
+        width = max(map(len, names))
+        lines.append(" " * width + "".join(f"{name:>14}" for name in backends))
+        for name in names:
+            cells = {row.backend: row.drift_deg for row in here if row.algorithm == name}
+            lines.append(
+                name.ljust(width)
+                + "".join(
+                    f"{'' if b not in cells else 'out of range' if cells[b] is None else format(cells[b], '.3e'):>14}"
+                    for b in backends
+                )
+            )
+    return "\n".join(line.rstrip() for line in lines)

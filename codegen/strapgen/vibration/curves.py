@@ -1,0 +1,102 @@
+"""Rates against frequency, at amplitudes that stay."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapgen import checks
+from strapgen.exceptions import InputError
+from strapgen.vibration.assessment import Assessment
+
+Array = NDArray[np.float64]
+
+#: Frequencies of a curve.
+POINTS = 400
+
+
+@dataclass(frozen=True)
+class Curve:
+    """The mean rates of an algorithm against frequency.
+
+    Parameters
+    ----------
+    label : str
+    unit : str
+        "rad/s" or "m/s^2".
+    frequencies_hz : array, (N,)
+    continuous, error : array, (N,)
+    """
+
+    label: str
+    unit: str
+    frequencies_hz: Array
+    continuous: Array
+    error: Array
+
+
+def frequencies(low: float | str | Fraction, high: float | str | Fraction, points: int = POINTS) -> Array:
+    """Return frequencies in Hz with even ratios, both ends included.
+
+    Examples
+    --------
+    >>> frequencies(1, 100, 3)
+    array([  1.,  10., 100.])
+    """
+    first, last = (float(checks.number("frequency", end, positive=True)) for end in (low, high))
+    if not first < last:
+        raise InputError(f"frequencies {low} to {high} Hz do not rise")
+    found: Array = np.geomspace(first, last, points)
+    return found
+
+
+def curve(
+    assessment: Assessment,
+    hertz: Array,
+    step: float | str | Fraction,
+    *,
+    theta_x: float | str | Fraction,
+    theta_y: float | str | Fraction = 0,
+    phase: float | str | Fraction = 0,
+    acceleration_y: float | str | Fraction = 0,
+    cycles: int | None = None,
+) -> Curve:
+    """Return the rates of an algorithm for the vibration of (65) or (70), at frequencies.
+
+    Parameters
+    ----------
+    assessment : Assessment
+    hertz : array, (N,)
+        Frequencies, above 0.
+    step, theta_x, theta_y, phase, acceleration_y, cycles
+        As for `Assessment.rates`.
+
+    Returns
+    -------
+    Curve
+    """
+    amplitude_x, amplitude_y, turn, amplitude = (
+        float(checks.number(what, value))
+        for what, value in (
+            ("theta-x-rad", theta_x),
+            ("theta-y-rad", theta_y),
+            ("phase-rad", phase),
+            ("acceleration-y", acceleration_y),
+        )
+    )
+    turned = np.exp(1j * turn)
+    held = {
+        "angle_x": amplitude_x + 0 * hertz,
+        "angle_y": amplitude_y * turned + 0 * hertz,
+        "velocity_y": amplitude * turned / (2j * np.pi * hertz),
+    }
+    rates = {}
+    for part in ("continuous", "error"):
+        rates[part] = np.zeros(len(hertz))
+        for (first, second), factor in assessment.factors(part, hertz, step, cycles).items():
+            if first in held and second in held:
+                rates[part] += (factor * held[first] * np.conj(held[second])).real
+    return Curve(assessment.kernel, assessment.unit, hertz, rates["continuous"], rates["error"])

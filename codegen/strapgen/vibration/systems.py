@@ -1,0 +1,326 @@
+"""What is assessed, as one recursion: states that are handed on, samples of the vibration, and what is watched."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from math import lcm
+from typing import Any
+
+import sympy as sp
+
+from strapgen import catalogue, checks
+from strapgen.algebra import exact
+from strapgen.catalogue import Choice
+from strapgen.exceptions import InputError
+from strapgen.kernel import Kernel
+from strapgen.signal import Signal
+from strapgen.vibration.expansion import Expander, Expansion, Number
+from strapgen.vibration.waves import Shift, Wave
+
+#: Frequency in Hz, step of an attitude algorithm, fast and slow cycle of a recursion in s.
+F, T, T_L, T_M = sp.symbols("f T T_l T_m", positive=True)
+
+#: What oscillates: angles in rad and velocities in m/s on the axes x and y.
+ANGLES, VELOCITIES = ("angle_x", "angle_y"), ("velocity_x", "velocity_y")
+CHANNELS = (*ANGLES, *VELOCITIES)
+#: Inputs that are samples of it.
+SAMPLES = ("increments", "increment", "turns", "velocity_increments", "velocity_increment")
+#: The kernel that follows a rotation vector and a sculling term: attitude and velocity after a step.
+_SLOW_LOOP = "dcm-two-speed-slow-2"
+
+
+@dataclass(frozen=True)
+class System:
+    """A kernel to second order, with its samples.
+
+    Parameters
+    ----------
+    kernel : Kernel
+    domain : domain of SymPy
+        The field of all numbers.
+    following : dict of str to Expansion
+        Every element of the states after a call, as it depends on the elements before and on the samples.
+    begun_anew : frozenset of str
+        Elements that begin at zero in every slow cycle; empty if there is none.
+    samples : dict of str to dict of str to Wave
+        For every element of the samples what it holds of every channel.
+    cycle : tuple of int
+        The time from call to call as a shift.
+    slow_cycle : tuple of int or None
+        The slow cycle as a shift; None where the recursion never ends.
+    times : tuple of Expr
+        Basic times of the shifts in s.
+    watched : dict of str to number
+        The sum of elements whose growth is assessed.
+    unit : str
+        Its unit: rad or m/s.
+    rates : bool
+        Whether the samples are rates times the cycle: the waves are to be multiplied by j omega T.
+    """
+
+    kernel: Kernel
+    domain: Any
+    following: dict[str, Expansion]
+    begun_anew: frozenset[str]
+    samples: dict[str, dict[str, Wave]]
+    cycle: Shift
+    slow_cycle: Shift | None
+    times: tuple[sp.Expr, ...]
+    watched: dict[str, Number]
+    unit: str
+    rates: bool = False
+
+
+def of(
+    kernel: Kernel, unit: str = "rad", nodes: Sequence[Fraction | sp.Expr] = (), previous: int = 0
+) -> System:
+    """Return the system of a kernel.
+
+    Parameters
+    ----------
+    kernel : Kernel
+        An attitude step; the rotation vector or the sculling term of one; or a recursion that sums such terms over a
+        slow cycle.
+    unit : str, optional
+        Of a recursion that makes both what is assessed: rad or m/s.
+    nodes : sequence of Fraction or Expr, optional
+        Nodes of a step that takes rates.
+    previous : int, optional
+        How many samples of the vector of a step are those before it; an attitude step says so itself.
+
+    Raises
+    ------
+    InputError
+        If the kernel is none of these, or has no expansion to second order.
+    """
+    taken = [signal for signal in kernel.inputs if signal.name in SAMPLES]
+    if not any(signal.unit == "rad" for signal in taken):
+        raise InputError(
+            f"kernel {kernel.name} takes no angle increments; an attitude step, rotation-vector, sculling or a fast "
+            "loop (coning-fast, sculling-fast-1, sculling-fast-2) can be assessed"
+        )
+    if kernel.companions is not None:
+        return _of_step(kernel, taken, nodes)
+    if kernel.recursion is not None:
+        return _of_recursion(kernel, taken, unit)
+    return _of_vector(kernel, taken, nodes, previous)
+
+
+def _of_step(kernel: Kernel, taken: Sequence[Signal], nodes: Sequence[Fraction | sp.Expr]) -> System:
+    assert kernel.companions is not None
+    own = {made.name: made for made in kernel.own}
+    name = kernel.companions.attitude
+    attitude = None if name is None else own.get(name) or catalogue.derive(Choice(name))
+    expander = Expander([kernel] if attitude is None else [kernel, attitude])
+    state, output = kernel.inputs[0], kernel.outputs[-1].signal
+    begun = {
+        element: expander.variable(element, exact(value))
+        for element, value in zip(state.elements, kernel.companions.identity, strict=True)
+    }
+    samples, times, cycle = _waves(expander, kernel, taken, kernel.companions.previous, nodes)
+    made = expander(kernel, begun | _variables(expander, samples))[output.name]
+    if attitude is None:
+        matrix = list(begun.values())
+    else:
+        shown = attitude.inputs[0].elements
+        (matrix,) = expander(attitude, dict(zip(shown, begun.values(), strict=True))).values()
+    return System(
+        kernel=kernel,
+        domain=expander.domain,
+        following=_handed_on(kernel, begun, dict(zip(state.elements, made, strict=True))),
+        begun_anew=frozenset(),
+        samples=samples,
+        cycle=cycle,
+        slow_cycle=None,
+        times=times,
+        watched=_turned(expander, matrix),
+        unit="rad",
+        rates=taken[0].name == "turns",
+    )
+
+
+def _turned(expander: Expander, matrix: Sequence[Expansion]) -> dict[str, Number]:
+    """Return the rotation about z in the elements of the state: (C21 - C12)/2."""
+    half = expander.number(sp.S.Half)
+    return (matrix[3].scaled(half) + matrix[1].scaled(-half)).linear
+
+
+def _of_vector(
+    kernel: Kernel, taken: Sequence[Signal], nodes: Sequence[Fraction | sp.Expr], previous: int
+) -> System:
+    slow = catalogue.derive(Choice(_SLOW_LOOP))
+    assert slow.recursion is not None
+    expander = Expander([kernel, slow])
+    output = kernel.outputs[-1].signal
+    if output.shape != (3,) or output.unit not in ("rad", "m/s"):
+        raise InputError(f"kernel {kernel.name} gives {output.name}; a vector in rad or m/s can be assessed")
+    most = taken[0].size // 3
+    count = most - checks.count("previous", previous, smallest=0, largest=most - 1)
+    samples, times, cycle = _waves(expander, kernel, taken, previous, nodes)
+    variables = _variables(expander, samples)
+    vector = expander(kernel, variables)[output.name]
+    inputs = {signal.name: signal for signal in slow.inputs}
+    begun = {
+        element: expander.variable(element)
+        for name, _ in slow.recursion.states
+        for element in inputs[name].elements
+    }
+    for k in (0, 4, 8):
+        element = inputs["state"].elements[k]
+        begun[element] = expander.variable(element, 1)
+    given = dict(begun)
+    sums = {"angle_sum": vector} if output.unit == "rad" else {"sculling": vector}
+    if output.unit == "m/s":
+        for signal in taken:
+            name = "angle_sum" if signal.unit == "rad" else "velocity_sum"
+            rows = [signal.elements[3 * k : 3 * k + 3] for k in range(previous, previous + count)]
+            zero = expander.constant(0)
+            sums[name] = [
+                sum((variables.get(e, zero) for e in axis), zero) for axis in zip(*rows, strict=True)
+            ]
+    for name, elements in sums.items():
+        given |= dict(zip(inputs[name].elements, elements, strict=True))
+    made = expander(slow, given)
+    following = {
+        element: value
+        for name, after in slow.recursion.states
+        for element, value in zip(inputs[name].elements, made[after], strict=True)
+    }
+    if output.unit == "rad":
+        watched = _turned(expander, [begun[e] for e in inputs["state"].elements])
+    else:
+        watched = {inputs["navigation_velocity"].elements[2]: expander.domain.one}
+    return System(
+        kernel=kernel,
+        domain=expander.domain,
+        following=_handed_on(kernel, begun, following),
+        begun_anew=frozenset(),
+        samples=samples,
+        cycle=cycle,
+        slow_cycle=None,
+        times=times,
+        watched=watched,
+        unit=output.unit,
+        rates=taken[0].name == "turns",
+    )
+
+
+def _of_recursion(kernel: Kernel, taken: Sequence[Signal], unit: str) -> System:
+    assert kernel.recursion is not None
+    checks.choice("unit", unit, ("rad", "m/s"))
+    expander = Expander([kernel])
+    inputs = {signal.name: signal for signal in kernel.inputs}
+    other = inputs.keys() - {name for name, _ in kernel.recursion.states} - {signal.name for signal in taken}
+    if other:
+        raise InputError(f"kernel {kernel.name} takes {', '.join(sorted(other))}, which is no sample")
+    begun = {
+        element: expander.variable(element)
+        for name, _ in kernel.recursion.states
+        for element in inputs[name].elements
+    }
+    samples, times, cycle = _waves(expander, kernel, taken, 0, (), T_L)
+    made = expander(kernel, begun | _variables(expander, samples))
+    following: dict[str, Expansion] = {}
+    summed = []
+    for name, after in kernel.recursion.states:
+        signal = inputs[name]
+        following |= dict(zip(signal.elements, made[after], strict=True))
+        if signal.unit == unit and signal.shape == (3,) and any(element.square for element in made[after]):
+            summed.append(signal)
+    if len(summed) != 1:
+        raise InputError(
+            f"kernel {kernel.name} has {len(summed) or 'no'} states in {unit} that sum products of samples; "
+            "one is needed"
+        )
+    anew = frozenset(element for name in kernel.recursion.begun_anew for element in inputs[name].elements)
+    return System(
+        kernel=kernel,
+        domain=expander.domain,
+        following=_handed_on(kernel, begun, following),
+        begun_anew=anew,
+        samples={
+            name: {channel: _with_end(wave) for channel, wave in waves.items()}
+            for name, waves in samples.items()
+        },
+        cycle=(*cycle, 0),
+        slow_cycle=(*(0 for _ in cycle), 1),
+        times=(*times, T_M),
+        watched={summed[0].elements[2]: expander.domain.one},
+        unit=unit,
+    )
+
+
+def _with_end(wave: Wave) -> Wave:
+    """Return a wave with one more basic time, the slow cycle."""
+    return Wave((*wave.cycle, 0), {(*shift, 0): c for shift, c in wave.terms.items()}, wave.poles)
+
+
+def _variables(expander: Expander, samples: Iterable[str]) -> dict[str, Expansion]:
+    return {name: expander.variable(name) for name in samples}
+
+
+def _handed_on(
+    kernel: Kernel, begun: Mapping[str, Expansion], following: Mapping[str, Expansion]
+) -> dict[str, Expansion]:
+    """Return the elements after a call less where they begin; without samples they must stay there."""
+    for name, value in following.items():
+        if value.constant != begun[name].constant:
+            raise InputError(f"kernel {kernel.name} does not rest: {name} changes without any motion")
+    return {name: value.without_constant() for name, value in following.items()}
+
+
+def _waves(
+    expander: Expander,
+    kernel: Kernel,
+    taken: Sequence[Signal],
+    previous: int,
+    nodes: Sequence[Fraction | sp.Expr],
+    cycle: sp.Symbol = T,
+) -> tuple[dict[str, dict[str, Wave]], tuple[sp.Expr, ...], Shift]:
+    """Return what elements of the samples hold of the channels, the basic times and the cycle."""
+    if taken[0].name == "turns":
+        return _waves_of_rates(expander, kernel, taken[0], nodes, cycle)
+    counts = {signal.size // 3 - previous for signal in taken}
+    if len(counts) != 1:
+        raise InputError(f"kernel {kernel.name} takes different numbers of angle and velocity increments")
+    (count,) = counts
+    one = expander.domain.one
+    found: dict[str, dict[str, Wave]] = {}
+    for signal in taken:
+        channels = ANGLES if signal.unit == "rad" else VELOCITIES
+        for k in range(signal.size // 3):
+            wave = Wave((count,), {(k - previous + 1,): one, (k - previous,): -one})
+            for axis, channel in enumerate(channels):
+                found[signal.elements[3 * k + axis]] = {channel: wave}
+    return found, (cycle / count,), (count,)
+
+
+def _waves_of_rates(
+    expander: Expander,
+    kernel: Kernel,
+    signal: Signal,
+    nodes: Sequence[Fraction | sp.Expr],
+    cycle: sp.Symbol,
+) -> tuple[dict[str, dict[str, Wave]], tuple[sp.Expr, ...], Shift]:
+    if len(nodes) != signal.shape[0]:
+        raise InputError(
+            f"kernel {kernel.name} takes the rate at {signal.shape[0]} nodes; they must be given"
+        )
+    values = [sp.sympify(exact(node)) for node in nodes]
+    whole = lcm(*(int(value.q) for value in values if value.is_Rational), 1)
+    others = list(dict.fromkeys(value for value in values if not value.is_Rational))
+    size = 1 + len(others)
+    period = (whole, *(0 for _ in others))
+    found = {}
+    for k, value in enumerate(values):
+        shift = [0] * size
+        if value.is_Rational:
+            shift[0] = int(value * whole)
+        else:
+            shift[1 + others.index(value)] = 1
+        for axis, channel in enumerate(ANGLES):
+            wave = Wave(period, {tuple(shift): expander.domain.one})
+            found[signal.elements[3 * k + axis]] = {channel: wave}
+    return found, (cycle / whole, *(cycle * value for value in others)), period

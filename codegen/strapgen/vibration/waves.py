@@ -1,0 +1,197 @@
+"""Sums of shifts in time of one oscillation, and their response through a linear recursion, exact."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+#: A time as whole multiples of basic times.
+Shift = tuple[int, ...]
+Matrix = list[list[Any]]
+
+
+@dataclass(frozen=True)
+class Wave:
+    """A sum of terms c exp(j omega t), t a shift in time, over a power of exp(j omega T) - 1, T the cycle.
+
+    Parameters
+    ----------
+    cycle : tuple of int
+        The cycle as a shift.
+    terms : dict of tuple of int to number
+        Real coefficients by shifts.
+    poles : int
+        The power below the line; no smaller one would do.
+
+    Examples
+    --------
+    >>> step = Wave((2,), {(2,): 1, (0,): -1})
+    >>> step.summed().terms, step.conjugate().terms
+    ({(0,): 1}, {(-2,): 1, (0,): -1})
+    """
+
+    cycle: Shift
+    terms: dict[Shift, Any]
+    poles: int = 0
+
+    def __add__(self, other: Wave) -> Wave:
+        poles = max(self.poles, other.poles)
+        left, right = self._over(poles), other._over(poles)
+        total = dict(left)
+        for shift, c in right.items():
+            total[shift] = total[shift] + c if shift in total else c
+        return _reduced(self.cycle, total, poles)
+
+    def __mul__(self, other: Wave) -> Wave:
+        return _reduced(self.cycle, _product(self.terms, other.terms), self.poles + other.poles)
+
+    def scaled(self, factor: Any) -> Wave:
+        """Return this times a number."""
+        terms = {shift: factor * c for shift, c in self.terms.items()} if factor else {}
+        return Wave(self.cycle, terms, self.poles if factor else 0)
+
+    def shifted(self, shift: Shift) -> Wave:
+        """Return this, later by a shift."""
+        return Wave(self.cycle, {_plus(own, shift): c for own, c in self.terms.items()}, self.poles)
+
+    def conjugate(self) -> Wave:
+        """Return the complex conjugate: 1/(z - 1) becomes -z/(z - 1), z being of length 1."""
+        turned = {_minus(shift): c * (-1) ** self.poles for shift, c in self.terms.items()}
+        return Wave(self.cycle, turned, self.poles).shifted(_times(self.cycle, self.poles))
+
+    def summed(self) -> Wave:
+        """Return this over z - 1: the sum over cycles of what it is at each."""
+        return _reduced(self.cycle, self.terms, self.poles + 1)
+
+    def _over(self, poles: int) -> dict[Shift, Any]:
+        terms, one = self.terms, (0,) * len(self.cycle)
+        for _ in range(poles - self.poles):
+            terms = _product(terms, {self.cycle: 1, one: -1})
+        return terms
+
+
+def _plus(left: Shift, right: Shift) -> Shift:
+    return tuple(a + b for a, b in zip(left, right, strict=True))
+
+
+def _times(shift: Shift, count: int) -> Shift:
+    return tuple(a * count for a in shift)
+
+
+def _minus(shift: Shift) -> Shift:
+    return _times(shift, -1)
+
+
+def _product(left: dict[Shift, Any], right: dict[Shift, Any]) -> dict[Shift, Any]:
+    total: dict[Shift, Any] = {}
+    for a, c in left.items():
+        for b, d in right.items():
+            shift = _plus(a, b)
+            total[shift] = total[shift] + c * d if shift in total else c * d
+    return {shift: c for shift, c in total.items() if c}
+
+
+def _reduced(cycle: Shift, terms: dict[Shift, Any], poles: int) -> Wave:
+    """Divide by z - 1 as often as that goes."""
+    terms = {shift: c for shift, c in terms.items() if c}
+    while poles:
+        quotient = _quotient(cycle, terms)
+        if quotient is None:
+            break
+        terms, poles = quotient, poles - 1
+    return Wave(cycle, terms, poles if terms else 0)
+
+
+def _quotient(cycle: Shift, terms: dict[Shift, Any]) -> dict[Shift, Any] | None:
+    """Return terms over z - 1; None if something is left over.
+
+    Shifts that whole cycles lie between make a chain, along which the quotient is minus the sum of what came before.
+    """
+    place = next(k for k, length in enumerate(cycle) if length)
+    chains: dict[Shift, dict[int, Any]] = {}
+    for shift, c in terms.items():
+        cycles = shift[place] // cycle[place]
+        chains.setdefault(_plus(shift, _times(cycle, -cycles)), {})[cycles] = c
+    quotient: dict[Shift, Any] = {}
+    for start, chain in chains.items():
+        total = 0
+        for k in range(min(chain), max(chain) + 1):
+            total = total + chain.get(k, 0)
+            if total:
+                quotient[_plus(start, _times(cycle, k))] = -total
+        if total:
+            return None
+    return quotient
+
+
+def resolvent(matrix: Matrix, one: Any) -> tuple[list[Matrix], int, int] | None:
+    """Return adj(z I - P) in powers of z, and the powers of z and of z - 1 in det(z I - P).
+
+    By Faddeev and Le Verrier; None if the matrix has other eigenvalues than 0 and 1.
+
+    Parameters
+    ----------
+    matrix : list of list of number, n x n
+    one : number
+        1 of their field.
+
+    Examples
+    --------
+    >>> from fractions import Fraction
+    >>> memory = [[Fraction(1), Fraction(2)], [Fraction(0), Fraction(0)]]
+    >>> powers, zeros, ones = resolvent(memory, Fraction(1))
+    >>> [[[int(c) for c in row] for row in power] for power in powers], zeros, ones
+    ([[[0, 2], [0, -1]], [[1, 0], [0, 1]]], 1, 1)
+    """
+    size = len(matrix)
+    zero = one - one
+    identity = [[one if i == k else zero for k in range(size)] for i in range(size)]
+    adjugate, coefficients = [identity], [one]
+    current = identity
+    for k in range(1, size + 1):
+        moved = _matrix_product(matrix, current, zero)
+        trace = sum((moved[i][i] for i in range(size)), zero)
+        coefficients.append(-trace / k)
+        current = [
+            [x + (coefficients[-1] if i == m else zero) for m, x in enumerate(row)]
+            for i, row in enumerate(moved)
+        ]
+        adjugate.append(current)
+    adjugate.pop()  # zero, by Cayley and Hamilton
+    polynomial = list(reversed(coefficients))  # constant first
+    zeros = next(k for k, c in enumerate(polynomial) if c)
+    ones, rest = 0, polynomial[zeros:]
+    while len(rest) > 1 and not sum(rest, zero):
+        ones += 1
+        quotient = []
+        total = zero
+        for c in rest[:0:-1]:  # by z - 1, from the highest power
+            total = total + c
+            quotient.append(total)
+        rest = list(reversed(quotient))
+    if len(rest) > 1:
+        return None
+    return list(reversed(adjugate)), zeros, ones
+
+
+def _matrix_product(left: Matrix, right: Matrix, zero: Any) -> Matrix:
+    columns = list(zip(*right, strict=True))
+    return [
+        [sum((a * b for a, b in zip(row, column, strict=True) if a and b), zero) for column in columns]
+        for row in left
+    ]
+
+
+def combined(cycle: Shift, parts: Sequence[tuple[Any, Wave]]) -> Wave:
+    """Return a sum of waves, each times a number."""
+    total = Wave(cycle, {})
+    for factor, wave in parts:
+        if factor:
+            total = total + wave.scaled(factor)
+    return total
+
+
+def mapped(wave: Wave, change: Callable[[Any], Any]) -> list[tuple[Shift, Any]]:
+    """Return the terms with their coefficients changed, in the order of the shifts."""
+    return [(shift, change(c)) for shift, c in sorted(wave.terms.items())]

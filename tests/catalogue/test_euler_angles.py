@@ -1,0 +1,186 @@
+"""Euler angles: round trips at every attitude, and no jump where pitch is vertical."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import pytest
+import sympy as sp
+from scipy.spatial.transform import Rotation
+
+import strapgen
+from strapgen import derive
+from strapgen.backends import BACKENDS, Evaluator
+from strapgen.targets import FIXED
+
+EPS = 2.0**-52
+TURN = 2 * np.pi
+
+
+def kernels(backend: str = "numpy") -> tuple[Evaluator, Evaluator]:
+    return strapgen.evaluator("dcm-from-euler-angles", backend), strapgen.evaluator(
+        "euler-angles-from-dcm", backend
+    )
+
+
+def apart(angles, others):
+    """Return the difference of angles without whole turns."""
+    difference = np.abs(np.asarray(angles) - others)
+    return np.min([difference, np.abs(difference - TURN), np.abs(difference - 2 * TURN)], axis=0)
+
+
+def random_angles(count: int, rng: np.random.Generator) -> np.ndarray:
+    """Return angles of attitudes that are evenly spread, a tenth of them at steep pitch."""
+    pitch = np.arcsin(rng.uniform(-1, 1, count))
+    steep = count // 10
+    nearness = 10.0 ** rng.uniform(-17, 0, steep)
+    pitch[:steep] = rng.choice([-1, 1], steep) * (np.pi / 2 - nearness)
+    return np.stack([rng.uniform(-np.pi, np.pi, count), pitch, rng.uniform(-np.pi, np.pi, count)], axis=-1)
+
+
+def corners() -> np.ndarray:
+    """Return the matrices of all quarter turns, and of half turns about axes between."""
+    turns = [
+        Rotation.from_euler("ZYX", q, degrees=True).as_matrix().round()
+        for q in product((-90, 0, 90, 180), repeat=3)
+    ]
+    axes = [np.array(axis) for axis in product((-1, 0, 1), repeat=3) if any(axis)] + [np.array([1, 2, -2])]
+    halves = [2 * np.outer(n, n) / (n @ n) - np.eye(3) for n in axes]
+    return np.array([*turns, *halves])
+
+
+def check_matrices(matrices: np.ndarray) -> None:
+    """Matrix to angles and back: the angles, rounded, hold it to half a last place each; the rest is 4 of them."""
+    to, of = kernels()
+    back = of(matrices, np.zeros(3))
+    rounding = (np.spacing(np.abs(back)) / 2).sum(axis=-1)
+    error = np.abs(to(back) - matrices).max(axis=(-2, -1))
+    assert np.all(error <= rounding + 4 * EPS)
+    assert np.all(np.abs(back[..., 1]) <= np.pi / 2)
+    assert np.all(np.abs(back) <= np.pi)
+
+
+def check_angles(angles: np.ndarray) -> None:
+    """Angles to matrix and back: roll and heading are as good as the matrix over the cosine of pitch."""
+    to, of = kernels()
+    matrices = to(angles)
+    back = of(matrices, np.zeros(3))
+    cosine = np.hypot(matrices[:, 0, 0], matrices[:, 1, 0])
+    told = cosine > 2 * EPS  # elsewhere roll is held
+    assert np.all(apart(back[:, 1], angles[:, 1]) <= 4 * EPS)
+    for k in (0, 2):
+        assert np.all(apart(back[told, k], angles[told, k]) * cosine[told] <= 4 * EPS)
+    # What the matrix does tell at every pitch: heading less roll above the horizon, their sum below.
+    sign = np.where(angles[:, 1] > 0, -1, 1)
+    known = apart(back[:, 2] + sign * back[:, 0], angles[:, 2] + sign * angles[:, 0])
+    assert np.all(known <= 8 * EPS + 2 * cosine * ~told)
+
+
+@pytest.mark.parametrize("count", [20_000, pytest.param(1_000_000, marks=pytest.mark.long)])
+def test_round_trips_of_random_attitudes(count, rng):
+    angles = random_angles(count, rng)
+    check_angles(angles)
+    matrices = Rotation.random(count, rng=rng).as_matrix()
+    matrices[: count // 10] = kernels()[0](angles[: count // 10])
+    check_matrices(matrices)
+
+
+def test_round_trips_of_corners_and_half_turns():
+    check_matrices(corners())
+    quarters = np.array(list(product((-np.pi, -np.pi / 2, 0, np.pi / 2, np.pi), repeat=3)))
+    check_angles(quarters[np.abs(quarters[:, 1]) < 2])
+
+
+def test_the_matrix_is_scipys(rng):
+    angles = random_angles(200, rng)
+    wanted = Rotation.from_euler("ZYX", angles[:, ::-1]).as_matrix()
+    np.testing.assert_allclose(kernels()[0](angles), wanted, rtol=0, atol=4 * EPS)
+
+
+def test_the_singular_cases_hold_at_every_pitch():
+    # (63) from (60): 1 + sin(pitch) times sine and cosine of heading - roll; 1 - sin(pitch) of heading + roll.
+    roll, pitch, heading = sp.symbols("roll pitch heading", real=True)
+    C = sp.Matrix(3, 3, derive("dcm-from-euler-angles").expand()["attitude"])
+    up, down = 1 + sp.sin(pitch), 1 - sp.sin(pitch)
+    for made, wanted in (
+        (C[1, 2] - C[0, 1], up * sp.sin(heading - roll)),
+        (C[1, 1] + C[0, 2], up * sp.cos(heading - roll)),
+        (-C[1, 2] - C[0, 1], down * sp.sin(heading + roll)),
+        (C[1, 1] - C[0, 2], down * sp.cos(heading + roll)),
+    ):
+        assert sp.expand(sp.expand_trig(made - wanted)) == 0
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize(("roll", "heading"), [(0.3, 1.0), (-2.0, 3.0), (3.0, -3.1), (0.0, 0.0)])
+def test_nothing_jumps_on_the_way_to_vertical_pitch(roll, heading, sign, backend_name):
+    # Nose up, or down, in smaller and smaller steps until nothing tells roll from heading, and on the spot.
+    to = kernels()[0]
+    of = strapgen.evaluator("euler-angles-from-dcm", backend_name)
+    steps = np.concatenate([10.0 ** -np.arange(0, 18, 0.5), [0, 0]])
+    pitches = sign * (np.pi / 2 - steps)
+    matrices = to(np.stack([np.full_like(pitches, roll), pitches, np.full_like(pitches, heading)], axis=-1))
+    # Vertical to the last place, as a table of cosines has it, not as the cosine of a rounded angle.
+    matrices[-1, :, 0] = [0, 0, -sign]
+    matrices[-1, 2] = [-sign, 0, 0]
+    unit = (
+        float(of.interface.inputs[0].format.unit)
+        if BACKENDS[backend_name].target in FIXED
+        else np.finfo(of.dtype).eps
+    )
+    before = np.array([roll, pitches[0], heading])
+    for matrix, pitch in zip(matrices, pitches, strict=True):
+        angles = np.asarray(of(matrix, before.astype(of.dtype)), float)
+        near = max(abs(np.cos(pitch)), 2 * unit)
+        # The matrix, rounded, tells roll and heading to its last place over the cosine of pitch.
+        loose = 4 * unit / near
+        assert np.all(apart(angles, [roll, pitch, heading]) <= [min(loose, 2.5), 8 * unit, min(loose, 2.5)])
+        known = apart(angles[2] - sign * angles[0], heading - sign * roll)
+        assert known <= 16 * unit
+        if abs(np.cos(pitch)) < unit / 8:
+            np.testing.assert_array_equal(angles[0], before[0])
+        before = angles
+
+
+def test_the_attitude_is_continuous_through_vertical_pitch():
+    # A loop: pitch rises through 90 degrees, roll and heading turn over by half a turn there, the attitude does not.
+    to, of = kernels()
+    before, last = np.array([0.4, 0.0, -1.2]), None
+    for pitch in np.radians(np.arange(80, 100.001, 0.125)):
+        matrix = to([0.4, pitch, -1.2])
+        angles = of(matrix, before)
+        assert np.abs(to(angles) - matrix).max() <= 8 * EPS
+        over = pitch > np.pi / 2 + 1e-9
+        turned = np.array([np.pi, 0, np.pi]) * over
+        level = np.pi - pitch if over else pitch
+        if abs(pitch - np.pi / 2) > 1e-9:
+            assert np.all(apart(angles, np.array([0.4, level, -1.2]) + turned) <= 1e-12)
+        else:
+            assert angles[0] == before[0]
+        if last is not None:
+            assert apart(angles[2] - angles[0], last) <= 8 * EPS
+        before, last = angles, angles[2] - angles[0]
+
+
+def test_elements_beyond_one_do_no_harm():
+    # Round-off may make |C31| greater than 1: the root is of other elements.
+    matrix = np.array([[0.0, -1, 0], [0, 0, 1], [-1 - 4 * EPS, 0, 0]])
+    angles = kernels()[1](matrix, [0.5, 0, 0])
+    assert np.isfinite(angles).all() and angles[0] == 0.5
+    assert angles[1] == np.pi / 2
+
+
+@pytest.mark.parametrize(
+    ("roll", "pitch", "heading"), [(2, 1, -2), (-1, -1, 3), (3, 0, 2), (0, 2, 3), (4, -2, -5), (6, 1, 6)]
+)
+def test_exactly(roll, pitch, heading):
+    # In sixths of half a turn and quarters of pitch: every case, on exact numbers.
+    angles = [roll * sp.pi / 6, pitch * sp.pi / 4, heading * sp.pi / 6]
+    to, of = derive("dcm-from-euler-angles"), derive("euler-angles-from-dcm")
+    (matrix,) = to.expand(dict(zip(to.inputs[0].elements, angles, strict=True))).values()
+    values = dict(zip(of.inputs[0].elements, map(sp.nsimplify, matrix), strict=True))
+    values |= dict(zip(of.inputs[1].elements, angles, strict=True))
+    (found,) = of.expand(values).values()
+    for made, wanted in zip(found, angles, strict=True):
+        assert sp.nsimplify(sp.simplify((made - wanted) / (2 * sp.pi))).is_integer

@@ -1,0 +1,130 @@
+"""Kernels to second order: beside SymPy's own series, and what has none."""
+
+from __future__ import annotations
+
+import pytest
+import sympy as sp
+
+from strapgen import derive
+from strapgen.exceptions import InputError
+from strapgen.kernel import KernelBuilder
+from strapgen.signal import Signal
+from strapgen.vibration.expansion import Expander
+
+X, Y = sp.symbols("x y", real=True)
+
+
+def kernel(*expressions, stages=()):
+    build = KernelBuilder()
+    for name in "xy":
+        build.scalar(Signal.scalar(name))
+    for name, expression in stages:
+        build.value(name, expression)
+    build.output(
+        Signal("out", (len(expressions),), tuple(f"out{k}" for k in range(len(expressions)))), expressions
+    )
+    return build.kernel("made", "Made", "none")
+
+
+def polynomial(expander, expansion):
+    """Return an expansion as SymPy's expression."""
+    total = expander.domain.to_sympy(expansion.constant)
+    for name, c in expansion.linear.items():
+        total += expander.domain.to_sympy(c) * sp.Symbol(name, real=True)
+    for pair, c in expansion.square.items():
+        total += expander.domain.to_sympy(c) * sp.Mul(*(sp.Symbol(name, real=True) for name in pair))
+    return sp.expand(total)
+
+
+def expanded(expression, stages=()):
+    made = kernel(expression, stages=stages)
+    expander = Expander([made])
+    (result,) = expander(made, {name: expander.variable(name) for name in "xy"})["out"]
+    return polynomial(expander, result)
+
+
+def truncated(expression):
+    e = sp.Symbol("e", positive=True)
+    plain = expression.replace(sp.sinc, lambda angle: sp.sin(angle) / angle)
+    series = sp.series(plain.subs({X: e * X, Y: e * Y}, simultaneous=True), e, 0, 3).removeO()
+    return sp.expand(series.subs(e, 1))
+
+
+R = sp.sqrt(X**2 + 2 * Y**2)
+
+
+@pytest.mark.parametrize(
+    "expression",
+    [
+        (1 + X - 3 * Y) * (2 - X * Y + Y),
+        (2 + X) ** 3 / (1 - Y),
+        sp.sqrt(4 + X + Y**2) / 3,
+        1 / sp.sqrt(1 + X - Y),
+        sp.sin(X + Y) * sp.cos(X) + sp.asin(Y),
+        sp.sinc(X - Y) * (1 + Y),
+        sp.atan2(X + Y, 1 + X),
+        sp.sqrt(3) * X / (1 + sp.sqrt(3) * Y),
+    ],
+    ids=str,
+)
+def test_expansions_are_those_of_sympy(expression):
+    assert sp.simplify(expanded(expression) - truncated(expression)) == 0
+
+
+@pytest.mark.parametrize(
+    ("expression", "wanted"),
+    [
+        (sp.sinc(R / 2), 1 - (X**2 + 2 * Y**2) / 24),
+        (sp.cos(2 * R), 1 - 2 * (X**2 + 2 * Y**2)),
+        (R**2 * (1 + X), X**2 + 2 * Y**2),
+        (sp.Max(1, X**2) * Y, Y),
+        (sp.Piecewise((X, Y**2 > 1), (Y, True)), Y),
+        (sp.pi * X, None),
+    ],
+    ids=str,
+)
+def test_roots_and_branches(expression, wanted):
+    if wanted is None:  # what is not algebraic is rounded to many digits
+        assert abs(sp.N(expanded(expression).coeff(X) - sp.pi, 90)) < sp.Rational(1, 10) ** 75
+    else:
+        assert expanded(expression) == sp.expand(wanted)
+
+
+@pytest.mark.parametrize(
+    ("expression", "said"),
+    [
+        (1 / X, "a division by what vanishes"),
+        (R * X, "a square root of what vanishes stands in a product"),
+        (R + X, "the square root of what vanishes"),
+        (R**3, "the power 3/2 of what vanishes"),
+        (sp.sqrt(X), "the power 1/2 of what vanishes"),
+        (X ** sp.Rational(1, 3), "the power 1/3 of what vanishes"),
+        ((1 + X) ** sp.Rational(1, 3), "the power 1/3"),
+        (sp.cos(1 + X), "an angle that does not vanish"),
+        (sp.sin(1 + X), "sin of an angle that does not vanish"),
+        (sp.acos(X), "nothing is known of acos"),
+        (sp.sqrt(2 + X), "the square root of 2 is not rational"),
+        (sp.atan2(1 + X, Y), "the direction of a vector that does not lie on the first axis"),
+        (sp.Max(X, Y), "changes from one argument to another where nothing moves"),
+        (sp.Piecewise((X, X > Y), (Y, True)), "changes where nothing moves"),
+    ],
+    ids=str,
+)
+def test_what_has_no_expansion_is_refused(expression, said):
+    with pytest.raises(InputError, match="kernel made has no expansion to second order") as caught:
+        expanded(expression)
+    assert said in str(caught.value)
+
+
+def test_kernels_of_the_catalogue_are_their_polynomials_cut_off():
+    made = derive("dcm", "rk4", 2)
+    expander = Expander([made])
+    names = [name for signal in made.inputs for name in signal.elements]
+    result = expander(made, {name: expander.variable(name) for name in names})["next"]
+    for ours, whole in zip(result, made.polynomials()["next"], strict=True):
+        wanted = sp.S.Zero
+        for powers, c in whole.terms():
+            if sum(powers) <= 2:
+                factors = (sp.Symbol(n, real=True) ** p for n, p in zip(names, powers, strict=True))
+                wanted += c * sp.Mul(*factors)
+        assert polynomial(expander, ours) == sp.expand(wanted)
