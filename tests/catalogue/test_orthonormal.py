@@ -128,15 +128,6 @@ def test_the_residual_of_the_expansions(order):
         assert result.T * result - sp.eye(3) == residuals[order](C.T * C - sp.eye(3))
 
 
-def left_of_the_error(name: str, order: int) -> tuple[sp.Matrix, sp.Matrix, sp.Matrix]:
-    """Return K and Y, the skew and symmetric parts of P, and the power `order` of the result for I + P."""
-    eps = sp.Symbol("eps")
-    P = sp.Matrix(3, 3, sp.symbols("p1:10", real=True))
-    result = sp.Matrix(3, 3, apply(name, sp.eye(3) + eps * P))
-    left = result.diff(eps, order).subs(eps, 0) / sp.factorial(order)
-    return (P - P.T) / 2, (P + P.T) / 2, left.applyfunc(sp.expand)
-
-
 @pytest.mark.parametrize("name", [SCHEME, *EXPANSIONS.values()])
 def test_a_turned_matrix_gives_the_turned_result(name):
     # So the error matrix of (I + P) T with T true is that of I + P with I true.
@@ -144,29 +135,6 @@ def test_a_turned_matrix_gives_the_turned_result(name):
     M = sp.Matrix(3, 3, lambda i, j: rational(random))
     difference = sp.Matrix(3, 3, apply(name, M * TURNED)) - sp.Matrix(3, 3, apply(name, M)) * TURNED
     assert difference.applyfunc(sp.radsimp) == sp.zeros(3, 3)
-
-
-@pytest.mark.parametrize("name", [SCHEME, *EXPANSIONS.values()])
-def test_to_first_order_drift_stays_and_scale_and_skew_vanish(name):
-    K, _, left = left_of_the_error(name, 1)
-    assert left == K
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("name", [SCHEME, *EXPANSIONS.values()])
-def test_the_second_order_of_what_is_left(name):
-    K, Y, left = left_of_the_error(name, 2)
-    # Drift changes by half of KY + YK, whatever the scheme.
-    assert ((left - left.T) / 2 + (K * Y + Y * K) / 2).expand() == sp.zeros(3, 3)
-    # Scale and skew are K^2/2 in a rotation by K. Of the symmetric error the second expansion leaves nothing, the
-    # first one the root of 1 - 3/4 (2Y)^2, and the scheme of the thesis, whose rows have length 1, a skew.
-    cofactors = Y.adjugate()
-    remainder = {
-        SCHEME: (cofactors - sp.diag(*cofactors.diagonal())) / 2,
-        EXPANSIONS[1]: -sp.Rational(3, 2) * Y * Y,
-        EXPANSIONS[2]: sp.zeros(3, 3),
-    }
-    assert ((left + left.T) / 2 - K * K / 2 - remainder[name]).expand() == sp.zeros(3, 3)
 
 
 def in_high_precision(name: str, matrix: sp.Matrix) -> mpmath.matrix:
