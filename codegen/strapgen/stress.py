@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from typing import Any
 
@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 
 from strapgen import catalogue, checks, two_speed
 from strapgen.backends import BACKENDS, evaluator, of
+from strapgen.backends.fixed import FixedBackend
+from strapgen.catalogue import Choice
 from strapgen.exceptions import InputError
 from strapgen.fixedpoint import Settings
-from strapgen.gyro import windows
+from strapgen.gyro import pulses, windows
 from strapgen.simulation import attitude, drift_between
 from strapgen.targets import FIXED
 
@@ -35,6 +37,8 @@ TWO_SPEED = "two-speed"
 ALGORITHMS = (*catalogue.ALGORITHMS, TWO_SPEED)
 #: Fast cycles in a slow one.
 _FAST_CYCLES = 4
+#: Room for the rounding of sums.
+_SPARE = Fraction(33, 32)
 _TWO_SPEEDS = tuple((name, _FAST_CYCLES) for name in two_speed.ALGORITHMS)
 
 
@@ -93,6 +97,7 @@ def stress(
     record: float | str | Fraction = 1,
     backends: Sequence[str] = DEFAULT_BACKENDS,
     algorithms: Sequence[str] = ALGORITHMS,
+    settings: Settings | None = None,
 ) -> Iterator[Row]:
     """Run the test on every algorithm and back end.
 
@@ -101,10 +106,13 @@ def stress(
     duration, sample, record : number
         Duration, time between gyro samples, and time from record to record, in s; each a multiple of the next. A step
         takes as many samples as its method needs, and so does a slow cycle. Attitudes are orthonormalized at every
-        record, but for the algorithms in two speeds, which need no more than their exact update.
+        record, but for the algorithms in two speeds, which need no more than their exact update. In fixed point the
+        gyro counts pulses of one unit of the increments.
     backends : sequence of str, optional
     algorithms : sequence of str, optional
         Attitude algorithms, and "two-speed", matrix and quaternion, which run on back ends in C.
+    settings : Settings, optional
+        What fixed point is made for: rounding, and what is carried from step to step.
 
     Yields
     ------
@@ -144,11 +152,15 @@ def stress(
         true = truth(np.broadcast_to(np.eye(3), (count // every + 1, 3, 3)), turned[::every])
         for one, algorithm, method, taken, backend in cases(algorithms, backends):
             if one == motion:
-                yield _row(motion, algorithm, method, taken, backend, samples, every, true)
+                yield _row((motion, algorithm, method, taken, backend), samples, every, true, settings)
 
 
-def cases(algorithms: Sequence[str], backends: Sequence[str]) -> Iterator[tuple[str, str, str, int, str]]:
-    """Yield motion, algorithm, method, samples of a step and back end of every run."""
+#: Motion, algorithm, method, samples of a step and back end.
+Case = tuple[str, str, str, int, str]
+
+
+def cases(algorithms: Sequence[str], backends: Sequence[str]) -> Iterator[Case]:
+    """Yield what every run is of."""
     for motion in MOTIONS:
         for algorithm in algorithms:
             for method, taken in _TWO_SPEEDS if algorithm == TWO_SPEED else METHODS:
@@ -157,28 +169,21 @@ def cases(algorithms: Sequence[str], backends: Sequence[str]) -> Iterator[tuple[
                         yield motion, algorithm, method, taken, backend
 
 
-def _row(
-    motion: str,
-    algorithm: str,
-    method: str,
-    taken: int,
-    backend: str,
-    samples: Array,
-    every: int,
-    true: Array,
-) -> Row:
-    settings = None
+def _row(case: Case, samples: Array, every: int, true: Array, settings: Settings | None) -> Row:
+    motion, algorithm, method, taken, backend = case
     if BACKENDS[backend].target in FIXED:
-        settings = Settings().fitted(float(np.abs(samples).max()))
+        settings = (settings or Settings()).fitted(float(np.abs(samples).max()))
+    else:
+        settings = None
+    if algorithm == TWO_SPEED:
+        name, run = f"{method} {TWO_SPEED}", _in_two_speeds(method, backend, settings, samples, every)
+    else:
+        choice = catalogue.choose(algorithm, method, taken)
+        name, run = choice.kernel, _in_steps(choice, taken, backend, settings, samples, every)
     try:
-        if algorithm == TWO_SPEED:
-            name, computed = f"{method} {algorithm}", _two_speed(method, backend, settings, samples, every)
-        else:
-            made = of(catalogue.choose(algorithm, method, taken), backend, settings=settings)
-            states = made.propagate(windows(samples, taken), every // taken, every // taken)
-            name, computed = made.kernel, attitude(made, states)
+        computed = run()
     except InputError:  # the state leaves the range of its numbers
-        return Row(motion, f"{algorithm}-{method}-{taken}", backend, None, None)
+        return Row(motion, name, backend, None, None)
     if not np.isfinite(computed).all():
         return Row(motion, name, backend, None, None)
     # The whole angle between the frames: low orders lose more than a right angle in an hour.
@@ -190,15 +195,36 @@ def _row(
     )
 
 
-def _two_speed(algorithm: str, backend: str, settings: Settings | None, samples: Array, every: int) -> Array:
-    """Return the matrices of an algorithm in two speeds, one a record, without acceleration."""
-    run = two_speed.TwoSpeed(algorithm, backend=backend, settings=settings).run(
-        samples, np.zeros_like(samples), fast_cycles=_FAST_CYCLES
-    )
+def _in_steps(
+    choice: Choice, taken: int, backend: str, settings: Settings | None, samples: Array, every: int
+) -> Callable[[], Array]:
+    """Return the run of an attitude step: its matrices, one a record."""
+    made = of(choice, backend, settings=settings)
+    given = windows(samples, taken)
+    if isinstance(made, FixedBackend):
+        given = pulses(given, made.interface.inputs[1].format.unit)
+    return lambda: attitude(made, made.propagate(given, every // taken, every // taken))
+
+
+def _in_two_speeds(
+    algorithm: str, backend: str, settings: Settings | None, samples: Array, every: int
+) -> Callable[[], Array]:
+    """Return the run of an algorithm in two speeds, without acceleration: its matrices, one a record."""
+    if settings is not None:
+        increment = Fraction(float(np.abs(samples).max())) * _SPARE
+        angle = increment * _FAST_CYCLES
+        ranges = {"increment": increment, "previous_increment": increment}
+        settings = replace(settings, ranges=ranges | {"angle_sum": angle, "coning": angle**2 / 2})
+    loops = two_speed.TwoSpeed(algorithm, backend=backend, settings=settings)
     stride = every // _FAST_CYCLES
-    recorded = np.asarray(run.attitudes, np.float64)[stride - 1 :: stride]
-    matrices = recorded if algorithm == "dcm" else evaluator(f"dcm-from-{algorithm}")(recorded)
-    return np.concatenate([np.eye(3)[None], matrices])
+
+    def run() -> Array:
+        made = loops.run(samples, np.zeros_like(samples), fast_cycles=_FAST_CYCLES)
+        recorded = np.asarray(made.attitudes, np.float64)[stride - 1 :: stride]
+        matrices = recorded if algorithm == "dcm" else evaluator(f"dcm-from-{algorithm}")(recorded)
+        return np.concatenate([np.eye(3)[None], matrices])
+
+    return run
 
 
 def as_text(rows: Sequence[Row], duration: str, sample: str) -> str:

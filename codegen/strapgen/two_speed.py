@@ -21,6 +21,7 @@ from strapgen.catalogue import Choice
 from strapgen.exceptions import InputError
 from strapgen.fixedpoint import Settings
 from strapgen.fixedpoint.code import Argument
+from strapgen.gyro import pulses
 from strapgen.targets import FIXED, Sources
 from strapgen.targets.whole import LOOPS, recursion, whole, wiring
 
@@ -200,8 +201,7 @@ class _Door:
             return np.ascontiguousarray(values, self.dtype)
         argument, kernel = self.arguments[name]
         if summed:
-            angle = np.rint(np.ldexp(np.cumsum(values, axis=0), argument.format.fraction))
-            values = np.ldexp(np.diff(angle, axis=0, prepend=0.0), -argument.format.fraction)
+            values = pulses(values[:, None], argument.format.unit)[:, 0]
         return integers(argument, values, kernel)
 
     def given(self, name: str, values: Array) -> Array:

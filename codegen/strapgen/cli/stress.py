@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from strapgen.cli.fixed import Carry, Rounding, read_settings
 from strapgen.cli.options import Format, check_format, print_json
 from strapgen.cli.progress import track
 from strapgen.exceptions import InputError
@@ -34,6 +35,8 @@ def stress(
     sample: Annotated[
         str, typer.Option("--sample", metavar="S", help="Time from gyro sample to sample in s.")
     ] = "0.01",
+    rounding: Rounding = None,
+    carry: Carry = None,
     format: Format = "text",
 ) -> None:
     """Turn every algorithm on every back end at 70 deg/s about all three axes, steadily and to and fro.
@@ -57,7 +60,9 @@ def stress(
     chosen = names("algorithms", algorithms, test.ALGORITHMS)
     places = names("backends", backends, test.DEFAULT_BACKENDS)
     count = len(list(test.cases(chosen, places)))
-    rows = list(track(test.stress(duration, sample, 1, places, chosen), "running", count))
+    settings = read_settings(1, rounding=rounding, carry=carry)
+    runs = test.stress(duration, sample, 1, places, chosen, settings)
+    rows = list(track(runs, "running", count))
     if format == "json":
         print_json([row.as_dict() for row in rows])
     else:
