@@ -269,7 +269,7 @@ def evaluate(
         What stands for a rational number where the values do not combine with those of SymPy.
     function : callable, optional
         ``function(expression, arguments)``: what stands for what is neither sum, product nor whole power, by default
-        SymPy's own.
+        SymPy's own. Of a condition it says whether it holds, and then one branch alone is evaluated.
 
     Returns
     -------
@@ -290,6 +290,11 @@ def evaluate(
         return values[expression.name]
     if expression.is_Rational:
         return number(expression) if number else expression
+    if function is not None and isinstance(expression, sp.Piecewise):
+        # One branch after the other: what another one says may have no value here.
+        for value, condition in expression.args:
+            if condition == sp.true or evaluate(condition, values, number, function):
+                return evaluate(value, values, number, function)
     arguments = [evaluate(argument, values, number, function) for argument in expression.args]
     if expression.is_Add or expression.is_Mul:
         result = arguments[0]

@@ -40,7 +40,7 @@ def expanded(expression, stages=()):
     made = kernel(expression, stages=stages)
     expander = Expander([made])
     (result,) = expander(made, {name: expander.variable(name) for name in "xy"})["out"]
-    return polynomial(expander, result)
+    return polynomial(expander, expander.expansion(result))
 
 
 def truncated(expression):
@@ -93,20 +93,9 @@ def test_roots_and_branches(expression, wanted):
 @pytest.mark.parametrize(
     ("expression", "said"),
     [
-        (1 / X, "a division by what vanishes"),
-        (R * X, "a square root of what vanishes stands in a product"),
-        (R + X, "the square root of what vanishes"),
-        (R**3, "the power 3/2 of what vanishes"),
-        (sp.sqrt(X), "the power 1/2 of what vanishes"),
-        (X ** sp.Rational(1, 3), "the power 1/3 of what vanishes"),
-        ((1 + X) ** sp.Rational(1, 3), "the power 1/3"),
-        (sp.cos(1 + X), "an angle that does not vanish"),
-        (sp.sin(1 + X), "sin of an angle that does not vanish"),
-        (sp.acos(X), "nothing is known of acos"),
-        (sp.sqrt(2 + X), "the square root of 2 is not rational"),
-        (sp.atan2(1 + X, Y), "the direction of a vector that does not lie on the first axis"),
-        (sp.Max(X, Y), "changes from one argument to another where nothing moves"),
-        (sp.Piecewise((X, X > Y), (Y, True)), "changes where nothing moves"),
+        (1 / X, "a series that begins with 0 has no inverse"),
+        (R + X, "the square root of a series that begins with 0 is no series"),
+        (sp.cos(1 + X), "is no series with rational coefficients"),
     ],
     ids=str,
 )
@@ -127,4 +116,4 @@ def test_kernels_of_the_catalogue_are_their_polynomials_cut_off():
             if sum(powers) <= 2:
                 factors = (sp.Symbol(n, real=True) ** p for n, p in zip(names, powers, strict=True))
                 wanted += c * sp.Mul(*factors)
-        assert polynomial(expander, ours) == sp.expand(wanted)
+        assert polynomial(expander, expander.expansion(ours)) == sp.expand(wanted)

@@ -16,9 +16,9 @@ from strapgen import algebra, catalogue, checks
 from strapgen.analysis import one_step
 from strapgen.analysis.error_rate import ErrorRate, error_rate
 from strapgen.analysis.motion_rates import TIME, is_plain
-from strapgen.analysis.powers import Powers
 from strapgen.analysis.series import MOST_TERMS, STEP
 from strapgen.catalogue import Choice
+from strapgen.powers import Powers
 
 
 @dataclass(frozen=True)

@@ -17,12 +17,12 @@ import sympy as sp
 from strapgen import algebra, catalogue, exact
 from strapgen.analysis import one_step
 from strapgen.analysis.motion_rates import CONSTANT
-from strapgen.analysis.powers import Powers, function
 from strapgen.analysis.prediction import Matrix, Prediction, Transfer, follow
 from strapgen.analysis.series import PARTS, STEP
 from strapgen.catalogue import Choice
 from strapgen.kernel import Kernel, evaluate_stages
 from strapgen.motions import Motion
+from strapgen.powers import Powers, constant, field, function
 
 #: The angle of a step, |w| h.
 ANGLE = sp.Symbol("x", positive=True)
@@ -79,15 +79,14 @@ class ConstantRate:
         >>> constant_rate(catalogue.choose("dcm", "rk1")).series(3)
         {3: 1/3, 5: -1/5, 7: 1/7}
         """
-        roots = [x for x in (self.cosine + self.sine).atoms(sp.Pow) if x.is_number and not x.is_Rational]
-        ring, _ = sp.ring("x", sp.QQ.algebraic_field(*roots) if roots else sp.QQ)
+        ring, _ = sp.ring("x", field((self.cosine, self.sine)))
         top = 4
         while True:
             top += 4
             angle = {"x": Powers(ring, {1: ring.one}, top)}
 
             def number(value: sp.Rational, top: int = top) -> Powers:
-                return Powers(ring, {0: ring(ring.domain.from_sympy(value))}, top)
+                return constant(ring, value, top)
 
             cosine, sine = (
                 algebra.evaluate(part, angle, number, function)
@@ -225,10 +224,10 @@ class _NotRationalError(Exception):
 
 def _rational(domain: Any, kernel: Kernel, values: dict[str, sp.Expr], attitude: Kernel | None) -> _Made:
     """Return what a step makes that is a rational function of the angle."""
-    field, _ = sp.field([ANGLE], domain)
+    rational, _ = sp.field([ANGLE], domain)
 
     def number(value: sp.Expr) -> Any:
-        return field(domain.from_sympy(value))
+        return rational(domain.from_sympy(value))
 
     def function(expression: sp.Expr, arguments: list[Any]) -> Any:
         if expression.is_number:
@@ -241,11 +240,11 @@ def _rational(domain: Any, kernel: Kernel, values: dict[str, sp.Expr], attitude:
         known = evaluate_stages((*made.stages, *made.outputs), taken, number, function)
         return [known[name] for name in made.outputs[-1].signal.elements]
 
-    state = evaluated(kernel, {name: field.from_expr(value) for name, value in values.items()})
+    state = evaluated(kernel, {name: rational.from_expr(value) for name, value in values.items()})
     matrix = state
     if attitude is not None:
         matrix = evaluated(attitude, dict(zip(attitude.inputs[0].elements, state, strict=True)))
-    squares = (sum((x * x for x in state), field.zero), matrix[0] ** 2 + matrix[3] ** 2)
+    squares = (sum((x * x for x in state), rational.zero), matrix[0] ** 2 + matrix[3] ** 2)
     return _Made(
         [x.as_expr() for x in state],
         [x.as_expr() for x in matrix],

@@ -20,10 +20,10 @@ from strapgen.analysis import motion_rates, one_step
 from strapgen.analysis.invariants import invariants
 from strapgen.analysis.motion_rates import TIME
 from strapgen.analysis.one_step import Step
-from strapgen.analysis.powers import Powers
 from strapgen.catalogue import Choice, user
 from strapgen.exceptions import InputError
 from strapgen.lowering.canonical.decomposition import NotCovariantError
+from strapgen.powers import Powers
 
 _Matrix = list[list[Powers]]
 

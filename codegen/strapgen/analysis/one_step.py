@@ -13,12 +13,12 @@ from typing import Any
 import sympy as sp
 
 from strapgen import algebra, catalogue
-from strapgen.analysis.powers import Powers, function
 from strapgen.catalogue import Choice
 from strapgen.catalogue.coefficients import Number
 from strapgen.exceptions import InputError, InputTypeError
-from strapgen.kernel import Kernel, evaluate_stages
+from strapgen.kernel import Kernel
 from strapgen.lowering.canonical.decomposition import Frame
+from strapgen.powers import Powers, constant, field, outputs
 
 #: Of a method whose coefficients are published with 17 digits or so: digits of its error, and what may be zero.
 _DIGITS = 12
@@ -61,13 +61,7 @@ class Step:
         expressions = [algebra.exact(node) for node in self.nodes or ()]
         for stage in (*self.kernel.stages, *self.kernel.outputs):
             expressions += stage.expressions
-        found = {
-            root
-            for expression in expressions
-            for root in expression.atoms(sp.Pow)
-            if root.is_number and not root.is_Rational
-        }
-        return sp.QQ.algebraic_field(*sorted(found, key=str)) if found else sp.QQ
+        return field(expressions)
 
 
 def step(choice: Choice) -> Step:
@@ -142,7 +136,7 @@ def errors(taken: Step, ring: Any, rate: Rate, top: int) -> dict[str, list[Power
     values: dict[str, Any] = {}
     for signal, elements in zip(split.inputs, both, strict=True):
         values |= zip(signal.elements, elements, strict=True)
-    made: dict[str, list[Powers]] = split.expand(values, lambda value: _number(ring, value, top))
+    made: dict[str, list[Powers]] = split.expand(values, lambda value: constant(ring, value, top))
     if taken.lowest:
         made = {
             name: [
@@ -184,17 +178,13 @@ def _error_matrix() -> Kernel:
     return catalogue.derive(catalogue.choose("error-matrix"))
 
 
-def _number(ring: Any, value: Any, top: int) -> Powers:
-    return Powers(ring, {0: ring(ring.domain.from_sympy(sp.sympify(value)))}, top)
-
-
 def computed_state(taken: Step, ring: Any, rate: Rate, top: int) -> list[Powers]:
     """Return the state after one step from zero rotation, row by row."""
     kernel, companions = taken.kernel, taken.kernel.companions
     assert companions is not None, "checked by `step`"
     state, samples = kernel.inputs
     values: dict[str, Any] = {
-        name: _number(ring, sp.Rational(x.numerator, x.denominator), top)
+        name: constant(ring, sp.Rational(x.numerator, x.denominator), top)
         for name, x in zip(state.elements, companions.identity, strict=True)
     }
     if taken.nodes is None:
@@ -219,13 +209,7 @@ def computed_matrix(taken: Step, ring: Any, rate: Rate, top: int) -> list[Powers
 
 def _evaluated(kernel: Kernel, values: dict[str, Any], ring: Any, top: int) -> list[Powers]:
     """Return the elements of a kernel's last output."""
-    known = evaluate_stages(
-        (*kernel.stages, *kernel.outputs), values, lambda value: _number(ring, value, top), function
-    )
-    made = [known[name] for name in kernel.outputs[-1].signal.elements]
-    if not all(isinstance(element, Powers) for element in made):
-        raise ArithmeticError("the root of a series that begins with 0 is no series")
-    return made
+    return outputs(kernel, values, ring, top)[kernel.outputs[-1].signal.name]
 
 
 def increments(ring: Any, rate: Rate, count: int, previous: int, top: int) -> list[Powers]:

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import sympy as sp
 
 from strapgen import catalogue, checks
-from strapgen.analysis.powers import Powers, function
 from strapgen.exceptions import InputError
-from strapgen.kernel import evaluate_stages
+from strapgen.powers import Powers, outputs
 
 #: The error of the computed matrix: it is (I + s P) C with C the true one and s the size of the error.
 ERROR = sp.Matrix(3, 3, sp.symbols("p11 p12 p13 p21 p22 p23 p31 p32 p33"))
@@ -50,19 +47,16 @@ def effect(scheme: str, order: int = 2) -> dict[int, sp.Matrix]:
     kernel = catalogue.derive(catalogue.choose(scheme))
     ring, *elements = sp.ring([str(symbol) for symbol in ERROR], sp.QQ)
 
-    def number(value: sp.Rational) -> Powers:
-        return Powers(ring, {0: ring(ring.domain.from_sympy(value))}, order)
-
     (computed,) = kernel.inputs
-    values: dict[str, Any] = {
+    values = {
         name: Powers(ring, {0: ring(int(k % 4 == 0)), 1: element}, order)
         for k, (name, element) in enumerate(zip(computed.elements, elements, strict=True))
     }
     try:
-        known = evaluate_stages((*kernel.stages, *kernel.outputs), values, number, function)
+        made = outputs(kernel, values, ring, order)
     except ArithmeticError as error:
         raise InputError(f"kernel {scheme} has no series in the error: {error}") from None
-    result = [known[name] for name in kernel.outputs[-1].signal.elements]
+    result = made[kernel.outputs[-1].signal.name]
     return {
         power: sp.Matrix(3, 3, [x.parts.get(power, ring.zero).as_expr() for x in result])
         for power in range(1, order + 1)

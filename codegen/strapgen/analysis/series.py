@@ -16,9 +16,9 @@ from strapgen import catalogue, checks
 from strapgen.analysis import motion_rates, one_step
 from strapgen.analysis.invariants import Invariants, as_text, invariants, matrix
 from strapgen.analysis.one_step import Step, errors
-from strapgen.analysis.powers import Powers
 from strapgen.catalogue import Choice
 from strapgen.exceptions import InputError
+from strapgen.powers import Powers
 
 #: Motions that a series is made for.
 MOTIONS = ("general", *catalogue.MOTIONS)

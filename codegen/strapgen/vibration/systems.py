@@ -15,6 +15,7 @@ from strapgen.algebra import exact
 from strapgen.catalogue import Choice
 from strapgen.exceptions import InputError
 from strapgen.kernel import Kernel
+from strapgen.powers import Powers
 from strapgen.signal import Signal
 from strapgen.vibration.expansion import Expander, Expansion, Number
 from strapgen.vibration.waves import Shift, Wave
@@ -129,7 +130,7 @@ def _of_step(kernel: Kernel, taken: Sequence[Signal], nodes: Sequence[Fraction |
     return System(
         kernel=kernel,
         domain=expander.domain,
-        following=_handed_on(kernel, begun, dict(zip(state.elements, made, strict=True))),
+        following=_handed_on(kernel, expander, begun, dict(zip(state.elements, made, strict=True))),
         begun_anew=frozenset(),
         samples=samples,
         cycle=cycle,
@@ -141,10 +142,9 @@ def _of_step(kernel: Kernel, taken: Sequence[Signal], nodes: Sequence[Fraction |
     )
 
 
-def _turned(expander: Expander, matrix: Sequence[Expansion]) -> dict[str, Number]:
+def _turned(expander: Expander, matrix: Sequence[Powers]) -> dict[str, Number]:
     """Return the rotation about z in the elements of the state: (C21 - C12)/2."""
-    half = expander.number(sp.S.Half)
-    return (matrix[3].scaled(half) + matrix[1].scaled(-half)).linear
+    return expander.expansion((matrix[3] - matrix[1]) * expander.number(sp.S.Half)).linear
 
 
 def _of_vector(
@@ -195,7 +195,7 @@ def _of_vector(
     return System(
         kernel=kernel,
         domain=expander.domain,
-        following=_handed_on(kernel, begun, following),
+        following=_handed_on(kernel, expander, begun, following),
         begun_anew=frozenset(),
         samples=samples,
         cycle=cycle,
@@ -222,12 +222,16 @@ def _of_recursion(kernel: Kernel, taken: Sequence[Signal], unit: str) -> System:
     }
     samples, times, cycle = _waves(expander, kernel, taken, 0, (), T_L)
     made = expander(kernel, begun | _variables(expander, samples))
-    following: dict[str, Expansion] = {}
+    following: dict[str, Powers] = {}
     summed = []
     for name, after in kernel.recursion.states:
         signal = inputs[name]
         following |= dict(zip(signal.elements, made[after], strict=True))
-        if signal.unit == unit and signal.shape == (3,) and any(element.square for element in made[after]):
+        if (
+            signal.unit == unit
+            and signal.shape == (3,)
+            and any(expander.expansion(element).square for element in made[after])
+        ):
             summed.append(signal)
     if len(summed) != 1:
         raise InputError(
@@ -238,7 +242,7 @@ def _of_recursion(kernel: Kernel, taken: Sequence[Signal], unit: str) -> System:
     return System(
         kernel=kernel,
         domain=expander.domain,
-        following=_handed_on(kernel, begun, following),
+        following=_handed_on(kernel, expander, begun, following),
         begun_anew=anew,
         samples={
             name: {channel: _with_end(wave) for channel, wave in waves.items()}
@@ -257,18 +261,18 @@ def _with_end(wave: Wave) -> Wave:
     return Wave((*wave.cycle, 0), {(*shift, 0): c for shift, c in wave.terms.items()}, wave.poles)
 
 
-def _variables(expander: Expander, samples: Iterable[str]) -> dict[str, Expansion]:
+def _variables(expander: Expander, samples: Iterable[str]) -> dict[str, Powers]:
     return {name: expander.variable(name) for name in samples}
 
 
 def _handed_on(
-    kernel: Kernel, begun: Mapping[str, Expansion], following: Mapping[str, Expansion]
+    kernel: Kernel, expander: Expander, begun: Mapping[str, Powers], following: Mapping[str, Powers]
 ) -> dict[str, Expansion]:
-    """Return the elements after a call less where they begin; without samples they must stay there."""
+    """Return the elements after a call as expansions; without samples they must stay where they begin."""
     for name, value in following.items():
-        if value.constant != begun[name].constant:
+        if value.start != begun[name].start:
             raise InputError(f"kernel {kernel.name} does not rest: {name} changes without any motion")
-    return {name: value.without_constant() for name, value in following.items()}
+    return {name: expander.expansion(value) for name, value in following.items()}
 
 
 def _waves(
