@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import shutil
 from pathlib import Path
@@ -207,3 +208,55 @@ def test_a_compiler_that_makes_nothing(sources, root, monkeypatch):
     with pytest.raises(CompilerError, match="failed on"):
         compilation.load(sources)
     assert not list((root / "builds").iterdir())
+
+
+def other(sources: Sources, number: int) -> Sources:
+    """Return sources that differ in a comment."""
+    files = {
+        name: text + (f"/* {number} */\n" if name.endswith(".c") else "")
+        for name, text in sources.files.items()
+    }
+    return Sources.restore(sources.interface(), files)
+
+
+def test_one_process_compiles_one_source_after_the_other(sources):
+    compilation.load(sources)
+    service = compilation._service()
+    compilation.load(other(sources, 1))
+    assert compilation._service() is service
+
+
+def test_a_compiling_process_that_has_ended_is_replaced(sources, root):
+    compilation.load(sources)
+    service = compilation._service()
+    service.stop()
+    assert compilation.load(other(sources, 1)).lib.euler_normalize
+    assert compilation._service() is not service
+
+
+def test_a_compiling_process_that_ends_at_work_says_so(sources, root, tmp_path, monkeypatch):
+    """The compiler kills what called it; the next compilation has a process of its own again."""
+    script = tmp_path / "killing-cc"
+    script.write_text("#!/bin/sh\nkill -9 $PPID\n")
+    script.chmod(0o755)
+    with monkeypatch.context() as patched, pytest.raises(CompilerError, match="has ended before"):
+        patched.setenv("CC", str(script))
+        compilation.load(sources)
+    assert list((root / "builds").iterdir()) == []
+    assert compilation.load(sources).lib.euler_normalize
+
+
+def _compile_in_a_fork(text_number: int, sources: Sources, made) -> None:
+    made.put((compilation.load(other(sources, text_number)) is not None, compilation._service()._owner))
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
+def test_a_fork_compiles_in_a_process_of_its_own(sources):
+    compilation.load(sources)
+    context = multiprocessing.get_context("fork")
+    made = context.SimpleQueue()
+    child = context.Process(target=_compile_in_a_fork, args=(2, sources, made))
+    child.start()
+    child.join(60)
+    assert made.get() == (True, child.pid)
+    assert compilation.load(other(sources, 3)).lib.euler_normalize

@@ -6,6 +6,7 @@ a second call compiles nothing.
 
 from __future__ import annotations
 
+import atexit
 import importlib.machinery
 import importlib.util
 import json
@@ -18,6 +19,7 @@ import subprocess
 import sys
 import sysconfig
 import tempfile
+import threading
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -26,8 +28,9 @@ from strapgen import cache
 from strapgen.exceptions import CompilerError
 from strapgen.targets import Sources
 
-#: Flags beside the compiler's own: no contraction to fused multiply-add, so that every machine gives the same bits.
-C_FLAGS = ("-std=c99", "-O3", "-ffp-contract=off")
+#: Flags beside the compiler's own: no contraction to fused multiply-add, so that every machine gives the same bits; no
+#: notes for debuggers, which Python's own flags ask for and which take a tenth of the time.
+C_FLAGS = ("-std=c99", "-O3", "-ffp-contract=off", "-g0")
 
 _loaded: dict[str, Any] = {}
 
@@ -162,17 +165,11 @@ def _compile(sources: Sources, name: str, path: str, draft: Path) -> None:
     environment = {
         k: v for k, v in os.environ.items() if k not in ("CFLAGS", "CPPFLAGS", "LDFLAGS", "LDSHARED")
     }
-    done = subprocess.run(
-        [sys.executable, "-P", str(Path(__file__).with_name("extension.py"))],
-        input=json.dumps(wanted),
-        env=environment | {"CC": _chosen_compiler() or path},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    built = Path(done.stdout.strip().splitlines()[-1]) if done.stdout.strip() else draft
-    if done.returncode or not built.is_file():
-        said = (done.stderr + done.stdout).splitlines()
+    with _one_at_a_time:
+        answer = _service().ask(wanted | {"environment": environment | {"CC": _chosen_compiler() or path}})
+    built = Path(answer["path"] or draft)
+    if not built.is_file():
+        said = answer["said"].splitlines()
         reasons = (
             [line.strip() for line in said if "error" in line.lower()] or said[-1:] or ["no output file"]
         )
@@ -184,6 +181,57 @@ def _compile(sources: Sources, name: str, path: str, draft: Path) -> None:
             shutil.rmtree(leftover)
         elif leftover != library:
             leftover.unlink()
+
+
+class _Service:
+    """The process that compiles, for as long as this one lives."""
+
+    def __init__(self) -> None:
+        self._owner = os.getpid()
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", str(Path(__file__).with_name("extension.py"))],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        atexit.register(self.stop)
+
+    @property
+    def serves(self) -> bool:
+        """Whether it runs, for this very process: a fork must not share its pipes."""
+        return self._owner == os.getpid() and self._process.poll() is None
+
+    def ask(self, wanted: dict[str, Any]) -> dict[str, Any]:
+        """Compile and return the answer; if interrupted, or if the process dies, nothing of it is left."""
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        try:
+            print(json.dumps(wanted), file=self._process.stdin, flush=True)
+            answer: dict[str, Any] = json.loads(self._process.stdout.readline())
+        except BaseException as error:
+            self.stop()
+            if isinstance(error, (OSError, ValueError)):
+                raise CompilerError("the process that compiles has ended before it was done") from None
+            raise
+        return answer
+
+    def stop(self) -> None:
+        """End the process."""
+        atexit.unregister(self.stop)
+        if self._owner == os.getpid():
+            self._process.kill()
+            self._process.communicate()
+
+
+_running: list[_Service] = []
+_one_at_a_time = threading.Lock()
+
+
+def _service() -> _Service:
+    """Return the process that compiles; a new one if there is none."""
+    if not _running or not _running[0].serves:
+        _running[:] = [_Service()]
+    return _running[0]
 
 
 def _library(name: str) -> str:
