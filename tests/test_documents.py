@@ -56,7 +56,21 @@ def test_readme_shows_every_command():
     assert "`strapgen tables`" in README
 
 
-@pytest.mark.parametrize("command", commands())
+#: Commands that take seconds: many kernels, or many terms.
+LONG = (
+    "strapgen stress ",
+    "strapgen series euler --method rk4 --motion coning",
+    "strapgen series euler --all",
+)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        pytest.param(command, marks=pytest.mark.long if command.startswith(LONG) else ())
+        for command in commands()
+    ],
+)
 def test_readme_command(command, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "examples").symlink_to(ROOT / "examples")

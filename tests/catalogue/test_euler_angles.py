@@ -50,9 +50,9 @@ def corners() -> np.ndarray:
     return np.array([*turns, *halves])
 
 
-def check_matrices(matrices: np.ndarray) -> None:
+def check_matrices(matrices: np.ndarray, backend: str = "numpy") -> None:
     """Matrix to angles and back: the angles, rounded, hold it to half a last place each; the rest is 4 of them."""
-    to, of = kernels()
+    to, of = kernels(backend)
     back = of(matrices, np.zeros(3))
     rounding = (np.spacing(np.abs(back)) / 2).sum(axis=-1)
     error = np.abs(to(back) - matrices).max(axis=(-2, -1))
@@ -61,9 +61,9 @@ def check_matrices(matrices: np.ndarray) -> None:
     assert np.all(np.abs(back) <= np.pi)
 
 
-def check_angles(angles: np.ndarray) -> None:
+def check_angles(angles: np.ndarray, backend: str = "numpy") -> None:
     """Angles to matrix and back: roll and heading are as good as the matrix over the cosine of pitch."""
-    to, of = kernels()
+    to, of = kernels(backend)
     matrices = to(angles)
     back = of(matrices, np.zeros(3))
     cosine = np.hypot(matrices[:, 0, 0], matrices[:, 1, 0])
@@ -77,19 +77,24 @@ def check_angles(angles: np.ndarray) -> None:
     assert np.all(known <= 8 * EPS + 2 * cosine * ~told)
 
 
+DOUBLE = pytest.mark.parametrize("backend", ["numpy", "c"])
+
+
+@DOUBLE
 @pytest.mark.parametrize("count", [20_000, pytest.param(1_000_000, marks=pytest.mark.long)])
-def test_round_trips_of_random_attitudes(count, rng):
+def test_round_trips_of_random_attitudes(count, backend, rng):
     angles = random_angles(count, rng)
-    check_angles(angles)
+    check_angles(angles, backend)
     matrices = Rotation.random(count, rng=rng).as_matrix()
-    matrices[: count // 10] = kernels()[0](angles[: count // 10])
-    check_matrices(matrices)
+    matrices[: count // 10] = kernels(backend)[0](angles[: count // 10])
+    check_matrices(matrices, backend)
 
 
-def test_round_trips_of_corners_and_half_turns():
-    check_matrices(corners())
+@DOUBLE
+def test_round_trips_of_corners_and_half_turns(backend):
+    check_matrices(corners(), backend)
     quarters = np.array(list(product((-np.pi, -np.pi / 2, 0, np.pi / 2, np.pi), repeat=3)))
-    check_angles(quarters[np.abs(quarters[:, 1]) < 2])
+    check_angles(quarters[np.abs(quarters[:, 1]) < 2], backend)
 
 
 def test_the_matrix_is_scipys(rng):
