@@ -24,6 +24,9 @@ Array = NDArray[np.float64]
 RATE_UNITS = {"rad/s": 1.0, "deg/s": math.radians(1)}
 
 _INCREMENT_COLUMNS = ("t", "dx", "dy", "dz")
+_INERTIAL_COLUMNS = (*_INCREMENT_COLUMNS, "dvx", "dvy", "dvz")
+#: Columns of recorded rates, by place: the time and three rates.
+_RATE_COLUMNS = 4
 #: Largest departure of an interval from the median, as a part of it, that counts as even.
 _EVEN = 1e-3
 #: An interval this many times the median is a gap: nothing is known of the motion inside.
@@ -55,6 +58,19 @@ class Recording:
 
 
 @dataclass(frozen=True)
+class InertialRecording(Recording):
+    """Angle and velocity increments at even intervals.
+
+    Parameters
+    ----------
+    velocity_increments : array, (N, 3)
+        Integrals of the specific force in m/s, body axes.
+    """
+
+    velocity_increments: Array
+
+
+@dataclass(frozen=True)
 class History:
     """The attitude along a recording.
 
@@ -77,17 +93,17 @@ class History:
 
 
 def _rows(path: Path, names: tuple[str, ...] | None) -> tuple[Array, list[int]]:
-    """Read four columns of numbers and the line number of each row."""
+    """Read columns of numbers, by name if there is a header with names, and the line number of each row."""
     values: list[list[float]] = []
     lines: list[int] = []
-    places = [0, 1, 2, 3]
+    places = list(range(_RATE_COLUMNS if names is None else len(names)))
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             for count, (line, row) in enumerate(_numbered(csv.reader(file))):
                 if count == 0 and not any(map(_is_number, row)):
                     header = [cell.strip().lower() for cell in row]
                     if names is not None:
-                        places = [_place(path, line, header, name) for name in names]
+                        places = [_place(path, line, header, name, names) for name in names]
                     continue
                 values.append([_number(path, line, row, place) for place in places])
                 lines.append(line)
@@ -115,10 +131,10 @@ def _is_number(cell: str) -> bool:
     return True
 
 
-def _place(path: Path, line: int, header: list[str], name: str) -> int:
+def _place(path: Path, line: int, header: list[str], name: str, names: tuple[str, ...]) -> int:
     if name not in header:
         raise InputError(
-            f"{path}, line {line}: no column {name!r}; the columns {', '.join(_INCREMENT_COLUMNS)} are needed"
+            f"{path}, line {line}: no column {name!r}; the columns {', '.join(names)} are needed"
         )
     return header.index(name)
 
@@ -190,12 +206,49 @@ def read_increments(path: str | Path) -> Recording:
     >>> read_increments(log).increments[:, 2]
     array([0.001, 0.002])
     """
-    path = Path(path)
-    values, lines = _rows(path, _INCREMENT_COLUMNS)
+    start, interval, values = _even_increments(Path(path), _INCREMENT_COLUMNS)
+    return Recording(start, interval, values)
+
+
+def read_inertial(path: str | Path) -> InertialRecording:
+    r"""Read a file of angle and velocity increments.
+
+    Parameters
+    ----------
+    path : path
+        Comma-separated values: time in s at the end of each increment, the angle increments about x, y, z in rad, the
+        velocity increments along x, y, z in m/s. A header, if there is one, names the columns t, dx, dy, dz, dvx, dvy,
+        dvz, in any order.
+
+    Returns
+    -------
+    InertialRecording
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, a value is no finite number, or the times are not even; the message names
+        the line.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> log = Path(tempfile.mkdtemp()) / "inertial.csv"
+    >>> _ = log.write_text("0.1,0,0,1e-3,0,0,0.98\n0.2,0,0,2e-3,0,0,0.98\n")
+    >>> read_inertial(log).velocity_increments[:, 2]
+    array([0.98, 0.98])
+    """
+    start, interval, values = _even_increments(Path(path), _INERTIAL_COLUMNS)
+    return InertialRecording(start, interval, *map(np.ascontiguousarray, np.hsplit(values, 2)))
+
+
+def _even_increments(path: Path, names: tuple[str, ...]) -> tuple[float, float, Array]:
+    """Return when the first increment begins, the interval, and the increments."""
+    values, lines = _rows(path, names)
     intervals, median = _intervals(path, values[:, 0], lines)
     _require_even(path, intervals, median, lines, "increments are needed at even times")
     interval = float((values[-1, 0] - values[0, 0]) / len(intervals))
-    return Recording(float(values[0, 0]) - interval, interval, np.ascontiguousarray(values[:, 1:]))
+    return float(values[0, 0]) - interval, interval, np.ascontiguousarray(values[:, 1:])
 
 
 def read_rates(path: str | Path, unit: str, resample_hz: float | str | None = None) -> Recording:

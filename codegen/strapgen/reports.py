@@ -11,8 +11,10 @@ import numpy as np
 
 from strapgen.recording import History
 from strapgen.simulation import Run
+from strapgen.strapdown import Course
 
 AXES = ("x", "y", "z")
+ANGLES = ("roll", "pitch", "heading")
 #: The planes of skew about the axes x, y, z, as the thesis names them.
 SKEW_PLANES = ("y-z", "z-x", "x-y")
 _PLACES = [f"{row}{column}" for row in "123" for column in "123"]
@@ -119,6 +121,57 @@ def history_text(history: History, elements: Sequence[str], settings: dict[str, 
         lines.append(f"({len(shown)} of {len(history.time)} records; --format csv prints all)")
     if history.unused:
         lines.append(f"{history.unused} increments at the end make no whole step and were not used")
+    return "\n".join(lines)
+
+
+def course_csv(course: Course) -> str:
+    """Return attitude and velocity along a recording as comma-separated values."""
+    count = len(course.time)
+    columns = (
+        course.time,
+        course.states.reshape(count, -1),
+        np.degrees(course.angles),
+        course.velocity_changes,
+    )
+    header = [
+        "time_s",
+        *course.elements,
+        *(f"{name}_deg" for name in ANGLES),
+        *(f"dv{axis}_m_s" for axis in AXES),
+    ]
+    return _csv(header, np.column_stack(columns).tolist())
+
+
+def course_data(course: Course, settings: dict[str, Any]) -> dict[str, Any]:
+    """Return attitude and velocity along a recording as plain JSON data after the settings."""
+    return settings | {
+        "unused_increments": course.unused,
+        "elements": list(course.elements),
+        "time_s": course.time.tolist(),
+        "attitude": course.states.reshape(len(course.time), -1).tolist(),
+        **{
+            f"{name}_deg": np.degrees(column).tolist()
+            for name, column in zip(ANGLES, course.angles.T, strict=True)
+        },
+        "velocity_changes_m_s": course.velocity_changes.tolist(),
+    }
+
+
+def course_text(course: Course, settings: dict[str, Any]) -> str:
+    """Return attitude and velocity along a recording as a report."""
+    lines = [", ".join(f"{key} {value}" for key, value in settings.items())]
+    titles = [*(f"{name}, deg" for name in ANGLES), *(f"dv{axis}, m/s" for axis in AXES)]
+    lines += ["", f"{'time, s':>10} " + " ".join(f"{title:>13}" for title in titles)]
+    shown = _thinned(len(course.time))
+    rows = np.column_stack([np.degrees(course.angles), course.velocity_changes])
+    for k in shown:
+        lines.append(f"{course.time[k]:10.4f} " + " ".join(f"{value:13.8f}" for value in rows[k]))
+    if len(shown) < len(course.time):
+        lines.append(f"({len(shown)} of {len(course.time)} cycles; --format csv prints all)")
+    if course.unused:
+        lines.append(
+            f"{course.unused} increments at the end make no whole navigation cycle and were not used"
+        )
     return "\n".join(lines)
 
 

@@ -37,8 +37,6 @@ TWO_SPEED = "two-speed"
 ALGORITHMS = (*catalogue.ALGORITHMS, TWO_SPEED)
 #: Fast cycles in a slow one.
 _FAST_CYCLES = 4
-#: Room for the rounding of sums.
-_SPARE = Fraction(33, 32)
 _TWO_SPEEDS = tuple((name, _FAST_CYCLES) for name in two_speed.ALGORITHMS)
 
 
@@ -110,7 +108,7 @@ def stress(
         gyro counts pulses of one unit of the increments.
     backends : sequence of str, optional
     algorithms : sequence of str, optional
-        Attitude algorithms, and "two-speed", matrix and quaternion, which run on back ends in C.
+        Attitude algorithms, and "two-speed", matrix and quaternion.
     settings : Settings, optional
         What fixed point is made for: rounding, and what is carried from step to step.
 
@@ -131,10 +129,7 @@ def stress(
     >>> rows[3].drift_deg < 1e-5 < rows[0].drift_deg
     True
     """
-    for name in backends:
-        checks.choice("backend", name, BACKENDS)
-    for name in algorithms:
-        checks.choice("algorithm", name, ALGORITHMS)
+    chosen = list(cases(algorithms, backends))
     total = checks.number("duration", duration, positive=True)
     width = checks.number("sample", sample, positive=True)
     interval = checks.number("record", record, positive=True)
@@ -150,9 +145,9 @@ def stress(
         samples = np.diff(turned, axis=0)
         truth = evaluator("dcm-update")
         true = truth(np.broadcast_to(np.eye(3), (count // every + 1, 3, 3)), turned[::every])
-        for one, algorithm, method, taken, backend in cases(algorithms, backends):
-            if one == motion:
-                yield _row((motion, algorithm, method, taken, backend), samples, every, true, settings)
+        for case in chosen:
+            if case[0] == motion:
+                yield _row(case, samples, every, true, settings)
 
 
 #: Motion, algorithm, method, samples of a step and back end.
@@ -160,13 +155,22 @@ Case = tuple[str, str, str, int, str]
 
 
 def cases(algorithms: Sequence[str], backends: Sequence[str]) -> Iterator[Case]:
-    """Yield what every run is of."""
+    """Yield what every run is of.
+
+    Raises
+    ------
+    InputError
+        If a name is not known.
+    """
+    for name in backends:
+        checks.choice("backend", name, BACKENDS)
+    for name in algorithms:
+        checks.choice("algorithm", name, ALGORITHMS)
     for motion in MOTIONS:
         for algorithm in algorithms:
             for method, taken in _TWO_SPEEDS if algorithm == TWO_SPEED else METHODS:
                 for backend in backends:
-                    if algorithm != TWO_SPEED or BACKENDS[backend].target.startswith("c"):
-                        yield motion, algorithm, method, taken, backend
+                    yield motion, algorithm, method, taken, backend
 
 
 def _row(case: Case, samples: Array, every: int, true: Array, settings: Settings | None) -> Row:
@@ -211,10 +215,8 @@ def _in_two_speeds(
 ) -> Callable[[], Array]:
     """Return the run of an algorithm in two speeds, without acceleration: its matrices, one a record."""
     if settings is not None:
-        increment = Fraction(float(np.abs(samples).max())) * _SPARE
-        angle = increment * _FAST_CYCLES
-        ranges = {"increment": increment, "previous_increment": increment}
-        settings = replace(settings, ranges=ranges | {"angle_sum": angle, "coning": angle**2 / 2})
+        ranges = two_speed.ranges(float(np.abs(samples).max()), fast_cycles=_FAST_CYCLES)
+        settings = replace(settings, ranges=ranges)
     loops = two_speed.TwoSpeed(algorithm, backend=backend, settings=settings)
     stride = every // _FAST_CYCLES
 
@@ -246,8 +248,7 @@ def as_text(rows: Sequence[Row], duration: str, sample: str) -> str:
             lines.append(
                 name.ljust(width)
                 + "".join(
-                    f"{'' if b not in cells else 'out of range' if cells[b] is None else format(cells[b], '.3e'):>14}"
-                    for b in backends
+                    f"{'out of range' if cells[b] is None else format(cells[b], '.3e'):>14}" for b in backends
                 )
             )
     return "\n".join(line.rstrip() for line in lines)

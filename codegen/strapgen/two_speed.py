@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from fractions import Fraction
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -31,6 +32,9 @@ Array = NDArray[Any]
 ALGORITHMS = {"dcm": "direction cosine matrix", "euler": "Euler parameters, scalar last"}
 #: Which sculling integral the fast loop makes.
 SCULLING = {1: "with the rotation compensation in it", 2: "with the rotation compensation in the slow loop"}
+#: Room for the rounding of sums, and the smallest increments that formats are made for.
+_SPARE = Fraction(33, 32)
+_LEAST = Fraction(1, 2**16)
 #: What is summed in a cycle, and the increments of which it is the sum: exact where both have one format.
 _SUMMED = {
     "angle_sum": ("increment", "previous_increment"),
@@ -81,6 +85,44 @@ def kernels(algorithm: str, sculling: int = 2) -> tuple[str, str, str]:
         f"{algorithm}-two-speed-slow-{sculling}",
         f"{algorithm}-two-speed-navigation",
     )
+
+
+def ranges(
+    angle: float, velocity: float = 0.0, fast_cycles: int = 1, slow_cycles: int = 1
+) -> dict[str, Fraction]:
+    """Return ranges for the loops' inputs in fixed point that hold what increments of a stated size sum up to.
+
+    Parameters
+    ----------
+    angle, velocity : float
+        Largest magnitude of an element of the angle increments in rad, and of the velocity increments in m/s.
+    fast_cycles, slow_cycles : int, optional
+        As for `TwoSpeed.run`.
+
+    Returns
+    -------
+    dict of str to Fraction
+        For `Settings`: by the names of inputs.
+
+    Examples
+    --------
+    >>> {name: round(float(value), 4) for name, value in ranges(0.01, 0.1, 4).items() if "velocity" not in name}
+    {'increment': 0.0103, 'previous_increment': 0.0103, 'angle_sum': 0.0413, 'coning': 0.0009, 'sculling': 0.017}
+    """
+    turned, moved = (max(Fraction(value), _LEAST) * _SPARE for value in (angle, velocity))
+    sums = turned * fast_cycles, moved * fast_cycles
+    return {
+        "increment": turned,
+        "previous_increment": turned,
+        "angle_sum": sums[0],
+        # The sum of |beta x d|/2 <= |beta| |d| over the cycles, an element; so for sculling.
+        "coning": sums[0] ** 2 / 2,
+        "velocity_increment": moved,
+        "velocity_sum": sums[1],
+        "sculling": sums[0] * sums[1],
+        # In any direction, turned by at most the angle: each element up to the length.
+        "navigation_velocity": 2 * (sums[1] + 2 * sums[0] * sums[1]) * slow_cycles,
+    }
 
 
 def loops(
@@ -383,24 +425,30 @@ class TwoSpeed:
             for evaluator in self.evaluators
         ]
 
+        handed_on = [recursion(loop).inputs for loop in self.loops]
+
         def call(number: int, place: int) -> dict[str, Array]:
-            evaluator, loop = self.evaluators[number], recursion(self.loops[number])
+            evaluator, inputs = self.evaluators[number], handed_on[number]
             given = [
                 memory[s.name] if s.name in memory else samples[s.name][place : place + 1]
                 for s in evaluator.function.inputs
             ]
             outputs, kept[number] = _called(evaluator, given, kept[number])
             named = dict(zip((s.name for s in evaluator.function.outputs), outputs, strict=True))
-            memory.update({loop.inputs[name]: value for name, value in named.items() if name in loop.inputs})
-            return {name: value for name, value in named.items() if name not in loop.inputs}
+            memory.update({inputs[name]: value for name, value in named.items() if name in inputs})
+            return {name: value for name, value in named.items() if name not in inputs}
 
         fast, slow, navigation = range(len(LOOPS))
         slow_total = len(samples["turn"])
         attitudes, changes = [], []
+        at_once = None if self.loops[fast].fixed else self._fast_loops(samples, begun, fast_cycles)
         for cycle in range(slow_total):
-            memory.update({name: zero[name] for name in recursion(self.loops[fast]).begun_anew})
-            for k in range(fast_cycles):
-                call(fast, cycle * fast_cycles + k)
+            if at_once is not None:
+                memory.update({name: values[cycle : cycle + 1] for name, values in at_once.items()})
+            else:
+                memory.update({name: zero[name] for name in recursion(self.loops[fast]).begun_anew})
+                for k in range(fast_cycles):
+                    call(fast, cycle * fast_cycles + k)
             call(slow, cycle)
             if (cycle + 1) % slow_cycles == 0:
                 changes.append(call(navigation, 0)["velocity_change"])
@@ -410,6 +458,28 @@ class TwoSpeed:
         if not attitudes:
             return empty
         return np.concatenate(attitudes), np.concatenate(changes) if changes else empty[1]
+
+    def _fast_loops(
+        self, samples: Mapping[str, Array], begun: Mapping[str, Array], fast_cycles: int
+    ) -> dict[str, Array]:
+        """Return what the fast loop hands to each slow cycle: the cycles side by side, since all of it begins anew."""
+        evaluator, loop = self.evaluators[0], recursion(self.loops[0])
+        last = samples["increment"][fast_cycles - 1 :: fast_cycles]
+        memory = {
+            signal.name: np.zeros((len(last), signal.size), self._door.dtype)
+            for signal in evaluator.function.inputs
+            if signal.name in loop.begun_anew
+        }
+        memory["previous_increment"] = np.concatenate([begun["previous_increment"], last[:-1]])
+        for k in range(fast_cycles):
+            given = [
+                memory[s.name] if s.name in memory else samples[s.name][k::fast_cycles]
+                for s in evaluator.function.inputs
+            ]
+            results = evaluator.evaluate(given, (len(last),))
+            named = zip((s.name for s in evaluator.function.outputs), results, strict=True)
+            memory = {loop.inputs[name]: np.asarray(value) for name, value in named}
+        return memory
 
     def _run_in_c(
         self,
@@ -468,6 +538,5 @@ def _called(evaluator: Evaluator, given: Sequence[Array], kept: Array) -> tuple[
         array.reshape(1, *signal.shape)
         for array, signal in zip(given, evaluator.function.inputs, strict=True)
     ]
-    results = evaluator(*shaped)
-    results = results if isinstance(results, tuple) else (results,)
+    results = evaluator.evaluate(shaped, (1,))  # all samples have been checked
     return [np.asarray(result).reshape(1, -1) for result in results], kept

@@ -21,7 +21,41 @@ CONING = "--motion coning --step 0.125 --duration 1 --set"
 EVEN = f"--rates-csv {DATA}/rates_even.csv"
 WAVE = "--step 0.01 --frequency-hz 10 --theta-x-rad 1 --phase-rad 1"
 
+LOG = f"--increments-csv {DATA.parents[1]}/examples/inertial_log.csv"
+
 BAD = {
+    # Two speeds, generated
+    "two-speed": "Missing argument",
+    "two-speed cayley-klein": "algorithm 'cayley-klein' is not known; allowed: dcm, euler",
+    "two-speed dcm --sculling 3": "sculling is 3; a whole number from 1 to 2",
+    "two-speed dcm --target numpy": "target 'numpy' is not known; allowed: c, c-float, c-fixed",
+    "two-speed dcm --word 16": "go with --target c-fixed, not with c",
+    "two-speed dcm --target c-fixed --word 24": "word",
+    "two-speed dcm --target c-fixed --range arm=1": "no loop has an input 'arm'",
+    "two-speed dcm --format csv": "format 'csv' is not known",
+    # The rate table
+    "stress --duration 0": "duration is 0",
+    "stress --duration long": "duration is 'long'",
+    "stress --duration 20 --sample 0.3": "multiple",
+    "stress --algorithms bortz": "algorithm 'bortz' is not known; allowed: dcm, euler, cayley-klein, two-speed",
+    "stress --algorithms ,": "at least one name is needed",
+    "stress --backends c-q7": "backend 'c-q7' is not known",
+    "stress --carry some": "carry 'some' is not known",
+    "stress --format csv": "format 'csv' is not known",
+    # Along a recording in two speeds
+    "strapdown dcm": "Missing option '--increments-csv'",
+    "strapdown dcm --increments-csv nowhere.csv --fast-cycles 4": "nowhere.csv cannot be read",
+    f"strapdown dcm --increments-csv {DATA}/rates_even.csv --fast-cycles 4": "no column",
+    f"strapdown dcm {LOG} --fast-cycles four": "fast-cycles is 'four'; a whole number is needed",
+    f"strapdown dcm {LOG} --fast-cycles 0": "fast_cycles is 0; a whole number from 1 to",
+    f"strapdown dcm {LOG} --fast-cycles 4 --slow-cycles 999": "a navigation cycle needs 3996",
+    f"strapdown cayley-klein {LOG} --fast-cycles 4": "algorithm 'cayley-klein' is not known; allowed: dcm, euler",
+    f"strapdown dcm {LOG} --fast-cycles 4 --initial-deg 1,2": "three numbers with commas between are needed",
+    f"strapdown dcm {LOG} --fast-cycles 4 --initial-deg 1,2,up": "initial-deg is 'up'; a finite number is needed",
+    f"strapdown dcm {LOG} --fast-cycles 4 --word 16": "--word is for fixed-point back ends, not for numpy",
+    f"strapdown dcm {LOG} --fast-cycles 4 --backend c-q15 --word 32": "--word 32 does not go with c-q15",
+    f"strapdown dcm {LOG} --fast-cycles 4 --frame-rate-deg-h 1e300,0,0": "finite numbers are needed",
+    f"strapdown dcm {LOG} --fast-cycles 4 --format xml": "format 'xml' is not known; allowed: text, json, csv",
     # Series
     "series": "an algorithm is needed, or --all",
     "series eulr": "algorithm 'eulr' is not known",

@@ -27,7 +27,9 @@ from strapgen.catalogue import coefficients, coning
 from strapgen.catalogue.tableaux import TABLEAUX
 from strapgen.cli import main
 from strapgen.motions import motion as make_motion
+from strapgen.recording import read_inertial
 from strapgen.simulation import largest_increment
+from strapgen.strapdown import course
 from strapgen.tables import TABLES
 from strapgen.targets import FIXED, TARGETS
 
@@ -46,6 +48,7 @@ COMMANDS = (
         "check",
         "tables",
         "two-speed",
+        "strapdown",
         "vibration",
     ),
     *("study word-length", "series", "stability", "stress"),
@@ -1055,3 +1058,28 @@ def test_tables_predicted(strapgen_says):
     assert len(data["entries"]) == 30
     assert all(abs(entry["deviation"]) < 0.01 and entry["agrees"] for entry in data["entries"])
     assert data["ratios"][0]["ratio"] == "9*x**2/80 + 1/4"
+
+
+def test_strapdown_is_the_course_of_python(strapgen_says, tmp_path):
+    log = DATA.parents[1] / "examples" / "inertial_log.csv"
+    command = (
+        f"strapdown euler --increments-csv {log} --fast-cycles 4 --slow-cycles 50 --initial-deg 10,20,30"
+    )
+    said = json.loads(strapgen_says(f"{command} --frame-rate-deg-h 0,0,15 --format json"))
+    made = course(
+        "euler",
+        read_inertial(log),
+        fast_cycles=4,
+        slow_cycles=50,
+        initial_angles=np.radians([10, 20, 30]),
+        frame_rate=np.radians([0, 0, 15]) / 3600,
+    )
+    assert said["attitude"] == made.states.tolist()
+    assert said["velocity_changes_m_s"] == made.velocity_changes.tolist()
+    assert strapgen_says(f"{command} --out course.csv") == ""
+    assert (
+        (tmp_path / "course.csv")
+        .read_text()
+        .startswith("time_s,e_x,e_y,e_z,e_s,roll_deg,pitch_deg,heading_deg,dvx_m_s")
+    )
+    assert "roll, deg" in strapgen_says(command)

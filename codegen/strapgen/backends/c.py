@@ -23,7 +23,8 @@ class CEvaluator(Evaluator):
         self.module = compilation.load(sources)
         self._array = getattr(self.module.lib, f"{sources.function.name}_array")
 
-    def _call(self, arrays: list[Array], batch: tuple[int, ...]) -> tuple[Array, ...]:
+    def evaluate(self, arrays: list[Array], batch: tuple[int, ...]) -> tuple[Array, ...]:
+        """Evaluate on checked arrays."""
         inputs = [
             np.ascontiguousarray(np.broadcast_to(array, batch + signal.shape))
             for signal, array in zip(self.function.inputs, arrays, strict=True)

@@ -74,7 +74,8 @@ class FixedEvaluator(Evaluator):
         """Return integers of an output as numbers."""
         return numbers(argument, integers)
 
-    def _call(self, arrays: list[Array], batch: tuple[int, ...]) -> tuple[Array, ...]:
+    def evaluate(self, arrays: list[Array], batch: tuple[int, ...]) -> tuple[Array, ...]:
+        """Evaluate on checked arrays of numbers."""
         count = int(np.prod(batch, dtype=int))
         inputs = []
         for argument, array in zip(self.interface.inputs, arrays, strict=True):

@@ -31,7 +31,8 @@ class NumpyEvaluator(Evaluator):
         super().__init__(sources.function, np.float64)
         self._generated = getattr(compilation.load(sources), sources.function.name)
 
-    def _call(self, arrays: list[Array], batch: tuple[int, ...]) -> tuple[Array, ...]:
+    def evaluate(self, arrays: list[Array], batch: tuple[int, ...]) -> tuple[Array, ...]:
+        """Evaluate on checked arrays."""
         result = self._generated(*arrays)
         return result if isinstance(result, tuple) else (result,)
 

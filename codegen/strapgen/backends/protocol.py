@@ -65,11 +65,11 @@ class Evaluator(ABC):
         except ValueError:
             shapes = ", ".join(f"{s.name} {a.shape}" for s, a in zip(signals, arrays, strict=True))
             raise InputError(f"the leading axes of {shapes} do not broadcast together") from None
-        results = self._call(arrays, batch)
+        results = self.evaluate(arrays, batch)
         return results[0] if len(results) == 1 else results
 
     @abstractmethod
-    def _call(self, arrays: list[Array], batch: tuple[int, ...]) -> tuple[Array, ...]:
+    def evaluate(self, arrays: list[Array], batch: tuple[int, ...]) -> tuple[Array, ...]:
         """Evaluate on checked arrays whose leading axes broadcast to `batch`."""
 
 

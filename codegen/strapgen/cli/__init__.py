@@ -19,6 +19,7 @@ from strapgen.cli import (
     series,
     simulate,
     stability,
+    strapdown,
     stress,
     study,
     tableau,
@@ -51,6 +52,7 @@ app.command("check")(check.check)
 app.command("vibration")(vibration.vibration)
 app.command("tables")(tables.tables)
 app.command("two-speed")(two_speed.two_speed)
+app.command("strapdown")(strapdown.strapdown)
 app.command("stress")(stress.stress)
 app.add_typer(study.app, name="study")
 

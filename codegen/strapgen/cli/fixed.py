@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Annotated
+from collections.abc import Callable, Iterable, Mapping
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -122,10 +122,22 @@ def read_settings(
     )
 
 
+def check_fixed(backend: str, stated: Mapping[str, Any]) -> None:
+    """Refuse options of fixed point for a back end in floating point."""
+    from strapgen import checks
+    from strapgen.backends import BACKENDS
+    from strapgen.targets import FIXED
+
+    checks.choice("backend", backend, BACKENDS)
+    for name, value in stated.items():
+        if value and BACKENDS[backend].target not in FIXED:
+            raise InputError(f"--{name.replace('_', '-')} is for fixed-point back ends, not for {backend}")
+
+
 def settings_for_run(
     backend: str,
     increments: int | None,
-    stated: dict[str, str | None],
+    stated: Mapping[str, Any],
     step: float,
     largest: Callable[[], float],
 ) -> Settings | None:
@@ -136,7 +148,7 @@ def settings_for_run(
     backend : str
     increments : int or None
         Increments a step, None for the default.
-    stated : dict of str to str
+    stated : mapping of str to str, or to list of str
         Options by the names that `read_settings` takes, without the step.
     step : float
         Step of the run in s.

@@ -16,6 +16,7 @@ from strapgen.cli.fixed import (
     MaxRate,
     Rounding,
     Word,
+    check_fixed,
     settings_for_run,
 )
 from strapgen.cli.inputs import (
@@ -156,7 +157,7 @@ def simulate(
         "carry": carry,
         "drift_allowance": drift_allowance,
     }
-    _check_fixed(backend, stated)
+    check_fixed(backend, stated)
     pulse = arcseconds(pulse_arcsec)
 
     def ready(seconds: float, largest: Callable[[], float]) -> Backend:
@@ -189,15 +190,6 @@ def simulate(
     output.write_files(Path(), files)
     if out is None:
         typer.echo(text)
-
-
-def _check_fixed(backend: str, stated: dict[str, _Text]) -> None:
-    from strapgen.backends import BACKENDS
-    from strapgen.targets import FIXED
-
-    for name, value in stated.items():
-        if value is not None and BACKENDS[backend].target not in FIXED:
-            raise InputError(f"--{name.replace('_', '-')} is for fixed-point back ends, not for {backend}")
 
 
 def _check_names(backend: str, motion: str | None, format: str | None) -> None:

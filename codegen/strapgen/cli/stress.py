@@ -27,7 +27,7 @@ def stress(
         typer.Option(
             "--backends",
             metavar="NAME,...",
-            help="Back ends.  [default: all but the model]",
+            help="Back ends.  [default: all but fixed-model, whose bits are those of the C]",
             show_default=False,
         ),
     ] = None,
