@@ -78,7 +78,7 @@ def test_increments_that_make_no_whole_cycle_are_told(wobble):
 
 def test_ranges_that_are_stated_hold(wobble):
     narrow = Settings(ranges={"coning": Fraction(1, 10**7)})
-    with pytest.raises(InputError, match="leaves the range that the formats were chosen for"):
+    with pytest.raises(InputError, match="two-speed-fast-2 refuses its input"):
         course("dcm", wobble, fast_cycles=4, backend="c-q31", settings=narrow)
 
 

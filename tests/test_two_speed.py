@@ -12,6 +12,7 @@ import pytest
 from scipy.integrate import quad_vec
 from scipy.spatial.transform import Rotation
 
+from strapgen import compilation
 from strapgen.backends import BACKENDS
 from strapgen.exceptions import InputError, InputTypeError
 from strapgen.fixedpoint import Settings
@@ -292,3 +293,91 @@ def test_a_run_in_c_goes_on_from_its_memory(rng):
     assert lib.dcm_two_speed_2_run(2, 3, 4, ffi.NULL, *held) == 4
     assert lib.dcm_two_speed_2_run(2, 3, 4, memory, ffi.NULL, *held[1:]) == 4
     np.testing.assert_array_equal(attitudes, wanted.attitudes)
+
+
+def test_one_cycle_at_a_time_is_a_run():
+    """The functions of single cycles on the memory, called as samples come, in C."""
+    runner = made("dcm", 2, "c")
+    angles, velocities = vibration(2)
+    turns = np.full((3, 3), 1e-4)
+    whole = runner.run(
+        angles[1:],
+        velocities[1:],
+        fast_cycles=5,
+        slow_cycles=2,
+        turns=np.full((5, 3), 1e-4),
+        previous=angles[0],
+    )
+    module = compilation.load(sources("dcm", 2, "c"))
+    lib, ffi = module.lib, module.ffi
+
+    def pointer(row):
+        return ffi.from_buffer("double[]", np.ascontiguousarray(row))
+
+    memory = ffi.new("dcm_two_speed_2_memory *")
+    lib.dcm_two_speed_2_begin(memory, pointer(np.eye(3)))
+    memory.previous_increment[0:3] = angles[0].tolist()
+    memory.previous_turn[0:3] = turns[0].tolist()
+    attitudes, changes = [], []
+    for k, (angle, velocity) in enumerate(zip(angles[1:], velocities[1:], strict=True), 1):
+        assert lib.dcm_two_speed_2_fast(memory, pointer(angle), pointer(velocity)) == 0
+        if k % 5 == 0:
+            assert lib.dcm_two_speed_2_slow(memory, pointer(turns[0])) == 0
+        if k % 10 == 0:
+            change = np.empty(3)
+            assert lib.dcm_two_speed_2_navigation(memory, pointer(change)) == 0
+            changes.append(change)
+        if k % 5 == 0:
+            attitudes.append(list(memory.state))
+    np.testing.assert_array_equal(np.reshape(attitudes, (-1, 3, 3)), whole.attitudes)
+    np.testing.assert_array_equal(changes, whole.velocity_changes)
+
+
+def test_null_pointers_are_refused():
+    lib, ffi = compilation.load(sources("dcm", 2, "c")).lib, compilation.load(sources("dcm", 2, "c")).ffi
+    memory = ffi.new("dcm_two_speed_2_memory *")
+    assert lib.dcm_two_speed_2_fast(memory, ffi.NULL, ffi.NULL) == 4
+    assert lib.dcm_two_speed_2_slow(ffi.NULL, ffi.NULL) == 4
+    assert lib.dcm_two_speed_2_navigation(memory, ffi.NULL) == 4
+
+
+@pytest.mark.parametrize(
+    ("name", "partner"), [("increment", "previous_increment"), ("turn", "previous_turn")]
+)
+def test_what_is_handed_on_has_the_range_of_what_it_was(name, partner):
+    fixed = {
+        argument.signal.name: argument
+        for loop in loops("dcm", 2, "c-fixed", Settings(ranges={name: Fraction(1, 2)}))
+        for argument in loop.fixed.inputs
+    }
+    assert fixed[partner].high == fixed[name].high
+    assert fixed[partner].format == fixed[name].format
+
+
+def test_a_refusal_names_the_loop(backend_name):
+    if BACKENDS[backend_name].target not in FIXED:
+        with pytest.raises(InputError, match="does not stay finite"):
+            made("dcm", 2, backend_name).run(
+                np.full((4, 3), 1e200), np.full((4, 3), 1e200), fast_cycles=2, slow_cycles=2
+            )
+        return
+    with pytest.raises(InputError, match="two-speed-slow-2 refuses its input"):
+        made("dcm", 2, backend_name).run(
+            np.zeros((100, 3)), np.full((100, 3), 0.9), fast_cycles=5, slow_cycles=20
+        )
+
+
+def test_words_that_are_not_the_back_end_s():
+    with pytest.raises(InputError, match="word is 16; backend c-q31 has words of 32 bits"):
+        TwoSpeed("dcm", 2, "c-q31", Settings(word=16))
+    with pytest.raises(InputTypeError, match=r"settings is 3; strapgen\.Settings is needed"):
+        TwoSpeed("dcm", 2, "c-q31", 3)
+    with pytest.raises(InputError, match="has steps larger than its range"):
+        loops("dcm", 2, "c-fixed", Settings(formats={"angle_sum": "Q40.-9"}))
+
+
+def test_a_long_word_needs_no_pulses():
+    run = TwoSpeed("euler", 2, "fixed-model", Settings(word=64)).run(
+        np.full((4, 3), 0.01), np.zeros((4, 3)), fast_cycles=2
+    )
+    np.testing.assert_allclose(Rotation.from_quat(run.attitudes[-1]).as_rotvec(), 0.04, rtol=1e-12)

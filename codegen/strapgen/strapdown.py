@@ -14,7 +14,6 @@ from strapgen.backends import BACKENDS
 from strapgen.exceptions import InputError
 from strapgen.fixedpoint import Settings
 from strapgen.recording import InertialRecording
-from strapgen.simulation import require_finite
 from strapgen.targets import FIXED
 
 Array = NDArray[np.float64]
@@ -137,7 +136,6 @@ def course(
     )
     states = run.attitudes[slow_cycles - 1 :: slow_cycles]
     time = recording.start + recording.interval * of_cycle * np.arange(1.0, cycles + 1)
-    require_finite(states, time)
     matrices = np.asarray(states, np.float64)
     if algorithm != "dcm":
         matrices = backends.evaluator(f"dcm-from-{algorithm}")(matrices)

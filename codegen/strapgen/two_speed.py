@@ -35,6 +35,10 @@ SCULLING = {1: "with the rotation compensation in it", 2: "with the rotation com
 #: Room for the rounding of sums, and the smallest increments that formats are made for.
 _SPARE = Fraction(33, 32)
 _LEAST = Fraction(1, 2**16)
+#: Words from which on a double is as exact as its fixed-point number: nothing is left to carry on.
+_EXACT_BITS = 53
+#: What has the range and the format of another input, unless its own is stated.
+_AS = {"previous_increment": "increment", "previous_turn": "turn"}
 #: What is summed in a cycle, and the increments of which it is the sum: exact where both have one format.
 _SUMMED = {
     "angle_sum": ("increment", "previous_increment"),
@@ -164,11 +168,16 @@ def loops(
             known = ", ".join(sorted(set().union(*inputs)))
             raise InputError(f"no loop has an input {sorted(unknown)[0]!r} for a {what}; inputs are: {known}")
 
+    stated = {
+        **{name: asked.ranges[other] for name, other in _AS.items() if other in asked.ranges},
+        **asked.ranges,
+    }
+
     def made(number: int, formats: Mapping[str, str]) -> Sources:
         own = inputs[number]
         chosen = replace(
             asked,
-            ranges={name: value for name, value in asked.ranges.items() if name in own},
+            ranges={name: value for name, value in stated.items() if name in own},
             formats={name: text for name, text in formats.items() if name in own},
         )
         return library.sources(Choice(names[number]), target, chosen)
@@ -242,7 +251,7 @@ class _Door:
         if name not in self.arguments:
             return np.ascontiguousarray(values, self.dtype)
         argument, kernel = self.arguments[name]
-        if summed:
+        if summed and argument.format.word < _EXACT_BITS:
             values = pulses(values[:, None], argument.format.unit)[:, 0]
         return integers(argument, values, kernel)
 
@@ -390,14 +399,19 @@ class TwoSpeed:
             "previous_turn": door.taken("previous_turn", frame[:1]),
             "previous_increment": door.taken("previous_increment", before.reshape(1, -1)),
         }
-        if self._whole is None:
-            attitudes, changes = self.run_loops(samples, begun, fast_cycles, slow_cycles)
-        else:
-            attitudes, changes = self._run_in_c(self._whole, samples, begun, fast_cycles, slow_cycles)
-        return Run(
+        with np.errstate(all="ignore"):  # numbers that overflow are refused, in one line
+            if self._whole is None:
+                attitudes, changes = self.run_loops(samples, begun, fast_cycles, slow_cycles)
+            else:
+                attitudes, changes = self._run_in_c(self._whole, samples, begun, fast_cycles, slow_cycles)
+        run = Run(
             door.given("state", attitudes).reshape(-1, *self.state.shape),
             door.given("velocity_change", changes),
         )
+        for what, values in zip(("attitude", "velocity"), run, strict=True):
+            if not np.isfinite(values).all():
+                raise InputError(f"the {what} does not stay finite: increments or turns are too large")
+        return run
 
     def run_loops(
         self, samples: Mapping[str, Array], begun: Mapping[str, Array], fast_cycles: int, slow_cycles: int
@@ -517,10 +531,8 @@ class TwoSpeed:
                 pointer(changes),
             )
             if status:
-                raise InputError(
-                    f"{self._function.replace('_', '-')} refuses its input: something leaves the range that the "
-                    "formats were chosen for; state larger ranges"
-                )
+                self.run_loops(samples, begun, fast_cycles, slow_cycles)  # says which loop refuses what
+                raise AssertionError("the loops by themselves refuse what the whole refuses")
         return attitudes, changes
 
 

@@ -11,7 +11,7 @@ from strapgen import catalogue, checks, library
 from strapgen.backends.protocol import Backend, Evaluator
 from strapgen.catalogue import Choice
 from strapgen.catalogue.tableaux import Tableau
-from strapgen.exceptions import InputError
+from strapgen.exceptions import InputError, InputTypeError
 from strapgen.fixedpoint import Settings
 from strapgen.targets import FIXED, Sources
 
@@ -79,8 +79,8 @@ def fitted(backend: str, settings: Settings | None) -> Settings | None:
 
     Raises
     ------
-    InputError
-        If the back end takes no settings.
+    InputError, InputTypeError
+        If the back end takes no settings, or none of this word.
     """
     entry = BACKENDS[checks.choice("backend", backend, BACKENDS)]
     if entry.target not in FIXED:
@@ -88,8 +88,14 @@ def fitted(backend: str, settings: Settings | None) -> Settings | None:
             takers = ", ".join(name for name, other in BACKENDS.items() if other.target in FIXED)
             raise InputError(f"backend {backend} takes no fixed-point settings; these do: {takers}")
         return None
+    if settings is not None and not isinstance(settings, Settings):
+        raise InputTypeError(f"settings is {settings!r}; strapgen.Settings is needed")
     settings = settings or Settings()
-    return settings if entry.word is None else replace(settings, word=entry.word)
+    if entry.word is None:
+        return settings
+    if settings.word not in (entry.word, Settings().word):
+        raise InputError(f"word is {settings.word}; backend {backend} has words of {entry.word} bits")
+    return replace(settings, word=entry.word)
 
 
 def _loaded(target: str) -> tuple[type[Evaluator], type[Backend]]:

@@ -36,6 +36,8 @@ SOURCES = {
     "combined": "M. Song, W. Wu, X. Pan, J. Guid. Control Dyn. 36 (2013) 1872-1880, for polynomials and coning",
 }
 FORMS = tuple(SOURCES)
+#: Samples of a slow cycle, and kept ones, beyond which a design would take long.
+MOST_SAMPLES, MOST_KEPT = 12, 3
 
 
 @dataclass(frozen=True)
@@ -133,7 +135,6 @@ def _times(c: Fraction | int, factor: str) -> str:
     return factor if c == 1 else f"{c}*{factor}"
 
 
-@cache
 def design(samples: int, previous: int = 0, form: str = "compressed") -> Design:
     """Derive coning coefficients exactly.
 
@@ -153,7 +154,7 @@ def design(samples: int, previous: int = 0, form: str = "compressed") -> Design:
     Raises
     ------
     InputError
-        If the form is unknown, or a number is below 1 or 0.
+        If the form is unknown, or a number is out of range: up to 12 samples, up to 3 kept ones.
 
     Examples
     --------
@@ -162,10 +163,15 @@ def design(samples: int, previous: int = 0, form: str = "compressed") -> Design:
     >>> [str(c) for c in design(3, form="uncompressed").pairs.values()]
     ['57/80', '33/80', '57/80']
     """
-    checks.count("samples", samples)
-    checks.count("previous", previous, smallest=0)
+    count = checks.count("samples", samples, largest=MOST_SAMPLES)
+    kept = checks.count("previous", previous, smallest=0, largest=MOST_KEPT)
+    return _designed(count, kept, checks.choice("form", form, FORMS))
+
+
+@cache
+def _designed(samples: int, previous: int, form: str) -> Design:
     solve = {"compressed": _compressed, "uncompressed": _uncompressed, "combined": _combined}
-    return Design(form, samples, previous, solve[checks.choice("form", form, FORMS)](samples, previous))
+    return Design(form, samples, previous, solve[form](samples, previous))
 
 
 def powers(samples: int, previous: int, power: int) -> list[Fraction]:

@@ -8,18 +8,18 @@ from typing import Annotated
 import typer
 
 from strapgen.cli.fixed import Fixes, Ranges, Rounding, Word, read_settings
-from strapgen.cli.options import Format, check_format, print_json
+from strapgen.cli.options import Format, check_format, print_json, whole
 from strapgen.exceptions import InputError
 
 
 def two_speed(
     algorithm: Annotated[str, typer.Argument(help="dcm or euler.")],
     sculling: Annotated[
-        int,
+        str,
         typer.Option(
             "--sculling", help="Sculling integral: 1 with the rotation compensation in it, 2 without."
         ),
-    ] = 2,
+    ] = "2",
     target: Annotated[str, typer.Option("--target", help="c, c-float or c-fixed.")] = "c",
     out: Annotated[
         Path | None, typer.Option("--out", help="Folder to write to.  [default: here]", show_default=False)
@@ -39,19 +39,20 @@ def two_speed(
     from strapgen import two_speed as made
     from strapgen.fixedpoint import Settings
 
+    form = whole("sculling", sculling) or 0
     settings = read_settings(1, word=word, rounding=rounding, ranges=ranges, formats=fix)
     if target == "c-fixed":
         settings = settings or Settings()
     elif settings is not None:
         raise InputError(f"the options of fixed point go with --target c-fixed, not with {target}")
-    sources = made.sources(algorithm, sculling, target, settings)
+    sources = made.sources(algorithm, form, target, settings)
     written = output.write_files(out or Path(), sources.files)
     if format == "json":
         print_json(
             {
                 "kernel": sources.kernel,
                 "target": target,
-                "loops": list(made.kernels(algorithm, sculling)),
+                "loops": list(made.kernels(algorithm, form)),
                 "files": [str(path) for path in written],
                 "operations": sources.operations,
             }

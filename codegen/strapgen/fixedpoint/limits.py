@@ -55,6 +55,10 @@ def limits(program: Program, settings: Settings) -> list[Limit]:
         text = asked(settings, signal)
         if text is not None:
             fraction = Format.parse(text, word).fraction
+            if largest * Fraction(2) ** fraction < 1:
+                raise InputError(
+                    f"format {text} of {signal.name} has steps larger than its range of +-{float(largest):.6g}"
+                )
             if largest * Fraction(2) ** fraction > Format(word, fraction).largest:
                 raise InputError(
                     f"format {text} of {signal.name} does not hold its range of +-{float(largest):.6g}"

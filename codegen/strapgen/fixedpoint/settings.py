@@ -88,7 +88,9 @@ class Settings:
             raise InputError(
                 f"drift allowance is {float(self.allowance):g}; more than 0 and at most 0.5 is needed"
             )
-        for name, largest in self.ranges.items():
+        ranges = {name: checks.number(f"range of {name}", value) for name, value in self.ranges.items()}
+        object.__setattr__(self, "ranges", ranges)
+        for name, largest in ranges.items():
             if largest <= 0:
                 raise InputError(f"range of {name} is {float(largest):g}; a number above 0 is needed")
         for text in self.formats.values():

@@ -15,6 +15,8 @@ from strapgen.targets.sources import Function, Sources
 
 #: What the loops are called, from the fastest.
 LOOPS = ("fast", "slow", "navigation")
+#: What takes rounding out of an attitude, by the size of its state.
+_NORMALIZATION = {9: "dcm-orthonormalize-first-order", 4: "euler-normalize-first-order"}
 
 
 @dataclass(frozen=True)
@@ -99,13 +101,22 @@ def whole(name: str, title: str, command: str, loops: Sequence[Sources]) -> Sour
         for which, loop in zip(LOOPS, loops, strict=True)
         if loop.fixed is not None
     }
+    own_names = {
+        which: [s.name for s in (*taken, *given)]
+        for which, taken, given in zip(LOOPS, wires.samples, wires.results, strict=True)
+    }
+    own_parameters = {
+        which: [*(f"const {type_} *{s.name}" for s in taken), *(f"{type_} *{s.name}" for s in given)]
+        for which, taken, given in zip(LOOPS, wires.samples, wires.results, strict=True)
+    }
     values = {
         "name": identifier,
         "title": title,
         "command": command,
         "guard": f"{identifier}_h".upper(),
         "headers": [next(file for file in loop.files if file.endswith(".h")) for loop in loops],
-        "source": "; ".join(dict.fromkeys(loop.kernel for loop in loops)),
+        "loops": LOOPS,
+        "normalization": _NORMALIZATION[state.size],
         "type": type_,
         "residual_type": residual_type,
         "word": fixed.settings.word if fixed else 0,
@@ -113,13 +124,19 @@ def whole(name: str, title: str, command: str, loops: Sequence[Sources]) -> Sour
         "state": state,
         "samples": wires.samples,
         "results": wires.results[2],
-        "formats": {name_: str(argument.format) for name_, argument in arguments.items()},
+        "arguments": arguments,
         "residuals": {which: kept for which, kept in residuals.items() if kept},
         "calls": {
             which: f"{loop.function.name}({_call(loop, which, wires)})"
             for which, loop in zip(LOOPS, loops, strict=True)
         },
-        "anew": {which: recursion(loop).begun_anew for which, loop in zip(LOOPS, loops, strict=True)},
+        # What a loop has summed begins anew when the next slower one has taken it.
+        "clears": dict(zip(LOOPS, [(), *(recursion(loop).begun_anew for loop in loops[:-1])], strict=True)),
+        "parameters": {
+            which: ", ".join([f"{identifier}_memory *memory", *own]) for which, own in own_parameters.items()
+        },
+        "checked": {which: ["memory", *names] for which, names in own_names.items()},
+        "given": {which: ", ".join(["memory", *names]) for which, names in own_names.items()},
         "arrays": "".join(
             [f", const {type_} *{s.name}" for group in wires.samples for s in group]
             + [f", {type_} *{s.name}" for s in (state, *wires.results[2])]
