@@ -262,6 +262,18 @@ def test_vibration_of_the_recursions(strapgen_says):
     assert sculled["computed_m_s2"] == pytest.approx(1.1042645359e-2, abs=1e-12)
 
 
+def test_vibration_of_a_fast_loop_says_what_its_rates_are(strapgen_says):
+    given = (
+        "--increments 10 --frequency-hz 7 --step 0.1 --theta-x-rad 0.01 --phase-rad 0.9 --theta-y-rad 0.013"
+    )
+    explained = (
+        "the part of the fast loop within a slow cycle T_m; the slow loop adds the term in T_m to both"
+    )
+    assert explained in strapgen_says(f"vibration coning-fast {given}")
+    assert "fast loop" not in strapgen_says(f"vibration dcm {given.partition(' ')[2].partition(' ')[2]}")
+    assert "the slow loop adds that to both" in " ".join(strapgen_says("vibration --help").split())
+
+
 def test_vibration_of_several(strapgen_says, tmp_path):
     several = f"vibration euler --method rk2,rk4 --increments 1,2 {ONE}"
     data = json.loads(strapgen_says(f"{several} --format json"))

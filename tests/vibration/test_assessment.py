@@ -16,13 +16,13 @@ from hypothesis import strategies as st
 import strapgen
 from strapgen import backends, catalogue, derive, exact, gyro, lower, vibration
 from strapgen.catalogue import coning
-from strapgen.exceptions import InputError
+from strapgen.exceptions import InputError, InputTypeError
 from strapgen.kernel import KernelBuilder
 from strapgen.recursion import Recursion
 from strapgen.signal import Signal, after
 from strapgen.simulation import attitude
 from strapgen.two_speed import TwoSpeed
-from strapgen.vibration import assessment
+from strapgen.vibration import systems
 from strapgen.vibration.assessment import D_Y, PARTS, PHI, THETA_X, THETA_Y
 from strapgen.vibration.systems import T_L, T_M, F, T
 
@@ -373,13 +373,27 @@ def test_a_loop_of_a_user_is_the_recursion_26_again():
     [
         (own_loop(kept=False), "forgets what begins anew"),
         (own_loop(extra=1), "does not hand on what it sums|grows to first order|neither stay"),
-        (derive("error-matrix"), "takes no angle increments"),
-        (derive("coning-slow"), "takes no angle increments"),
+        (derive("error-matrix"), "takes no samples of a vibration; allowed: dcm, euler"),
+        (derive("coning-slow"), "takes no samples of a vibration; allowed: dcm, euler"),
+        (derive("dcm-update"), "takes no samples of a vibration; allowed: dcm, euler"),
     ],
 )
 def test_what_cannot_be_assessed_is_refused(kernel, said):
     with pytest.raises(InputError, match=said):
         vibration.drift(kernel)
+
+
+@pytest.mark.parametrize("thing", [None, 3, "euler", ("euler", "rk4", 2, 0)])
+def test_what_is_no_choice_and_no_kernel(thing):
+    for assess, what in (
+        (vibration.of, "choice"),
+        (vibration.drift, "kernel"),
+        (vibration.sculling, "kernel"),
+    ):
+        with pytest.raises(
+            InputTypeError, match=f"{what} is .*; (what catalogue.choose returns|a Kernel) is"
+        ):
+            assess(thing)
 
 
 def test_quantities_that_a_kernel_does_not_have():
@@ -448,5 +462,5 @@ def test_a_recursion_needs_its_cycles():
             if name
             in ("coning-fast", "sculling-fast-1", "sculling-fast-2", "two-speed-fast-1", "two-speed-fast-2")
         )
-        == assessment.RECURSIONS
+        == systems.RECURSIONS
     )

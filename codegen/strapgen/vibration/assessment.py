@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from strapgen import catalogue, checks
 from strapgen.catalogue import Choice
-from strapgen.exceptions import InputError
+from strapgen.exceptions import InputError, InputTypeError
 from strapgen.kernel import Kernel
 from strapgen.vibration import response, systems
 from strapgen.vibration.response import Form, Pair
@@ -23,9 +23,6 @@ from strapgen.vibration.systems import ANGLES, T_L, T_M, VELOCITIES, F, T
 
 #: Amplitudes of the angles in rad, of the acceleration in m/s^2, and the phase in rad, equations (65) and (70).
 THETA_X, THETA_Y, PHI, D_Y = sp.symbols("theta_x theta_y phi D_y", real=True)
-
-#: Kernels of the catalogue that sum over a slow cycle.
-RECURSIONS = ("coning-fast", "sculling-fast-1", "sculling-fast-2", "two-speed-fast-1", "two-speed-fast-2")
 
 #: What of an assessment is asked for.
 PARTS = ("continuous", "computed", "error")
@@ -375,7 +372,7 @@ def sculling(kernel: Kernel, *, nodes: Sequence[Fraction | sp.Expr] = (), previo
     >>> sculling(derive("sculling-fast-2")).expression("continuous").has(systems.T_M)
     True
     """
-    if not _takes_velocities(kernel):
+    if not _takes_velocities(systems.checked(kernel)):
         if kernel.recursion is not None and kernel.companions is None:
             raise InputError(f"kernel {kernel.name} takes no velocity increments; sculling-fast-1 or -2 does")
         return _dual(drift(kernel, nodes=nodes, previous=previous))
@@ -450,6 +447,8 @@ def of(choice: Choice, quantity: str = "drift") -> Assessment:
 
     Raises
     ------
+    InputTypeError
+        If the choice is none.
     InputError
         As `drift` and `sculling` do.
 
@@ -460,6 +459,8 @@ def of(choice: Choice, quantity: str = "drift") -> Assessment:
     >>> [float(f"{rate:.6g}") for rate in rates]
     [-0.00264356, -0.00263046, 1.31029e-05]
     """
+    if not isinstance(choice, Choice):
+        raise InputTypeError(f"choice is {choice!r}; what catalogue.choose returns is needed")
     checks.choice("quantity", quantity, ("drift", "sculling"))
     if choice.name in catalogue.user.KERNELS:  # which another one of the same name may replace
         return _of(choice, quantity)
