@@ -22,7 +22,7 @@ EVEN = f"--rates-csv {DATA}/rates_even.csv"
 WAVE = "--step 0.01 --frequency-hz 10 --theta-x-rad 1 --phase-rad 1"
 ASSESSED = (
     "allowed: dcm, euler, cayley-klein, rotation-vector, sculling, coning-fast, sculling-fast-1, sculling-fast-2, "
-    "two-speed-fast-1, two-speed-fast-2, or your own Python file"
+    "two-speed-fast-1, two-speed-fast-2, two-speed, or your own Python file"
 )
 
 LOG = f"--increments-csv {DATA.parents[1]}/examples/inertial_log.csv"
@@ -138,6 +138,10 @@ BAD = {
     f"vibration euler {WAVE} --theta-y-rad 1 --frequency-hz 0": "frequency-hz is 0; a number above 0 is needed",
     f"vibration euler {WAVE} --theta-y-rad 1 --method rk1 --frequency-hz 100": "euler-rk1-2 has no mean rate",
     f"vibration coning-fast {WAVE} --theta-y-rad 1": "--increments must say how many of its cycles make a step",
+    f"vibration two-speed {WAVE} --theta-y-rad 1": "two-speed is in two speeds: --increments must say how many",
+    f"vibration two-speed {WAVE} --theta-y-rad 1 --increments 0": "increments is 0; a whole number from 1 to",
+    f"vibration two-speed {WAVE} --theta-y-rad 1 --increments 9 --method rk4": "two-speed takes no --method",
+    f"vibration two-speed {WAVE} --theta-y-rad 1 --increments 9 --rates": "two-speed takes no --rates",
     f"vibration coning-fast {WAVE} --acceleration-y 1 --increments 9": "drift rates alone; --theta-y-rad is needed",
     f"vibration sculling {WAVE} --theta-y-rad 1": "sculling rates alone; --acceleration-y is needed",
     f"vibration euler {WAVE} --spectrum a.csv": "--frequency-hz goes with one frequency, not with --spectrum",

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
@@ -24,7 +26,10 @@ FrequencyHz = Annotated[
 Step = Annotated[
     _Text,
     typer.Option(
-        "--step", metavar="S", help="Step T in s; of a fast loop the slow cycle.", show_default=False
+        "--step",
+        metavar="S",
+        help="Step T in s; of algorithms in two speeds the slow cycle.",
+        show_default=False,
     ),
 ]
 ThetaX = Annotated[
@@ -58,7 +63,7 @@ def vibration(
         str,
         typer.Argument(
             help="dcm, euler, cayley-klein, rotation-vector, sculling, a fast loop (coning-fast, sculling-fast-1, "
-            "sculling-fast-2, two-speed-fast-1, two-speed-fast-2), or your own Python file."
+            "sculling-fast-2, two-speed-fast-1, two-speed-fast-2), two-speed (both loops), or your own Python file."
         ),
     ],
     methods: Annotated[
@@ -71,7 +76,7 @@ def vibration(
         typer.Option(
             "--increments",
             metavar="N,...",
-            help="Angle increments a step; for a fast loop its cycles in a step.  [default: 2]",
+            help="Angle increments a step; in two speeds the fast cycles in a step.  [default: 2]",
             show_default=False,
         ),
     ] = None,
@@ -276,18 +281,33 @@ def _assessed(
     from strapgen.catalogue import user
     from strapgen.vibration import assessment, systems
 
-    _check_known(algorithm, systems.NAMES, (*user.KERNELS, *user.installed()))
+    _check_known(algorithm, (*systems.NAMES, _TWO_SPEED), (*user.KERNELS, *user.installed()))
     method, tableau, count, previous, rates = options
     cycles = None
-    if algorithm in systems.RECURSIONS:
+    whole_algorithm = algorithm == _TWO_SPEED
+    if whole_algorithm or algorithm in systems.RECURSIONS:
         if count is None:
-            raise InputError(
-                f"{algorithm} is a recursion: --increments must say how many of its cycles make a step"
-            )
+            loop = "is in two speeds" if whole_algorithm else "is a recursion"
+            raise InputError(f"{algorithm} {loop}: --increments must say how many of its cycles make a step")
         cycles = checks.count("increments", whole("increments", count), largest=checks.MOST)
         count = None
-    choice = chosen(algorithm, method, tableau, count, previous, rates, step=False)
-    can = assessment.quantities(choice)
+    of: Callable[[str], Assessment]
+    if whole_algorithm:
+        assert cycles is not None
+        for option, value in (
+            ("--method", method),
+            ("--tableau", tableau),
+            ("--previous", previous),
+            ("--rates", rates or None),
+        ):
+            if value is not None:
+                raise InputError(f"{algorithm} takes no {option}")
+        can: tuple[str, ...] = ("drift", "sculling")
+        of, samples = assessment.two_speed, cycles
+    else:
+        choice = chosen(algorithm, method, tableau, count, previous, rates, step=False)
+        can = assessment.quantities(choice)
+        of, samples = partial(assessment.of, choice), cycles or catalogue.increments(choice)
     if random:
         wanted = list(can)
     else:
@@ -295,12 +315,13 @@ def _assessed(
         if not wanted:
             needed = {"drift": "--theta-y-rad", "sculling": "--acceleration-y"}[can[0]]
             raise InputError(f"{algorithm} has {' and '.join(can)} rates alone; {needed} is needed")
-    samples = cycles or catalogue.increments(choice)
-    return [_Case(assessment.of(choice, quantity), cycles, samples) for quantity in wanted]
+    return [_Case(of(quantity), cycles, samples) for quantity in wanted]
 
 
 #: Lowest and highest frequency of a plot, by the sampling frequency.
 _PLOTTED = 1e-6, 100.0
+#: The fast loop and the slow loop together.
+_TWO_SPEED = "two-speed"
 #: What the rates of a fast loop are.
 _FAST_LOOP = (
     "continuous and computed are the part of the fast loop within a slow cycle T_m; the slow loop adds the term in T_m "
@@ -365,7 +386,7 @@ def _text(found: list[_Outcome], title: str) -> str:
             if outcome.quadrature is not None:
                 spread = "".join(f"{value:>20.1e}" for value in outcome.quadrature)
                 lines.append(f"{'  quadrature':<{width}} {spread}")
-    if any(outcome.case.cycles is not None for outcome in found):
+    if any(o.case.cycles is not None and o.case.assessment.kernel != _TWO_SPEED for o in found):
         lines += ["", _FAST_LOOP]
     if all(outcome.quadrature is None for outcome in found) and len({_label(o.case) for o in found}) == 1:
         for outcome in found:

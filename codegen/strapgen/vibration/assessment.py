@@ -404,6 +404,51 @@ def _dual(assessment: Assessment) -> Assessment:
     return Assessment(assessment.kernel, "m/s^2", False, computed, response.true_forms("S2", endless=True))
 
 
+#: Fast loop, and the vector of a slow cycle of one sample, of an algorithm in two speeds.
+_LOOPS = {
+    "drift": ("coning-fast", ("rotation-vector", "coning-compressed", 1)),
+    "sculling": ("sculling-fast-2", ("sculling", "coning-compressed", 1)),
+}
+
+
+@lru_cache
+def two_speed(quantity: str = "drift") -> Assessment:
+    """Assess a whole algorithm in two speeds: the fast loop, and the slow loop that follows it.
+
+    What the fast loop sums of second order the slow loop adds to what it makes of the sums of the increments alone,
+    which are the one sample of a slow cycle. The navigation frame rests.
+
+    Parameters
+    ----------
+    quantity : str, optional
+        "drift" or "sculling".
+
+    Returns
+    -------
+    Assessment
+        Continuous is the true rate, without a term in T_m.
+
+    Raises
+    ------
+    InputError
+        If the quantity is unknown.
+
+    Examples
+    --------
+    >>> two_speed().text("computed")
+    '-pi*f*theta_x*theta_y*sin(phi)*(2*sin(2*pi*T_l*f)/(3*pi*T_l*f) - sin(4*pi*T_l*f)/(12*pi*T_l*f))'
+    """
+    fast, slow = _LOOPS[checks.choice("quantity", quantity, tuple(_LOOPS))]
+    parts = [of(catalogue.choose(fast), quantity), of(catalogue.choose(*slow), quantity)]
+    none = Form(sp.S.Zero, sp.S.Zero)
+    computed = {}
+    for pair in {**parts[0].computed, **parts[1].computed}:
+        forms = [part.computed.get(pair, none) for part in parts]
+        real, imaginary = (sp.Add(*(form[k].subs(T, T_M) for form in forms)) for k in range(2))
+        computed[pair] = Form(real, imaginary)
+    return Assessment("two-speed", parts[0].unit, True, computed, parts[1].continuous)
+
+
 def quantities(choice: Choice) -> tuple[str, ...]:
     """Return which of "drift" and "sculling" can be assessed of a kernel of the catalogue; at least one.
 
