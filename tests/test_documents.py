@@ -108,7 +108,7 @@ def test_the_commands_of_the_page_on_vibration(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     shown = re.findall(r"^    (strapgen .*)$", page, flags=re.MULTILINE)
-    assert len(shown) == 3
+    assert len(shown) == 4
     for command in shown:
         with pytest.raises(SystemExit) as stop:
             main(shlex.split(command)[1:])

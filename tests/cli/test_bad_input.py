@@ -20,6 +20,10 @@ CONSTANT = f"--motion constant --set x_deg_s=1 {TIMES}"
 CONING = "--motion coning --step 0.125 --duration 1 --set"
 EVEN = f"--rates-csv {DATA}/rates_even.csv"
 WAVE = "--step 0.01 --frequency-hz 10 --theta-x-rad 1 --phase-rad 1"
+ASSESSED = (
+    "allowed: dcm, euler, cayley-klein, rotation-vector, sculling, coning-fast, sculling-fast-1, sculling-fast-2, "
+    "two-speed-fast-1, two-speed-fast-2, two-speed, or your own Python file"
+)
 
 LOG = f"--increments-csv {DATA.parents[1]}/examples/inertial_log.csv"
 
@@ -112,8 +116,17 @@ BAD = {
     "vibration euler": "--step in s is needed",
     "vibration euler --step 0.01": "--frequency-hz is needed, or a --spectrum",
     f"vibration euler {WAVE}": "--theta-y-rad is needed for the drift, or --acceleration-y for sculling",
-    f"vibration error-matrix {WAVE} --theta-y-rad 1": "kernel error-matrix takes no angle increments",
-    f"vibration rk4 {WAVE} --theta-y-rad 1": "algorithm 'rk4' is not known",
+    f"vibration rk4 {WAVE} --theta-y-rad 1": f"algorithm 'rk4' is not known; {ASSESSED}",
+    **{
+        f"vibration {name} {WAVE} --theta-y-rad 1 {more}": f"algorithm '{name}' has no rate under vibration; {ASSESSED}"
+        for name, more in (
+            ("error-matrix", ""),
+            ("euler-update", "--increments 2"),
+            ("dcm-update", "--method rk4"),
+            ("coning-slow", "--increments 10"),
+            ("dcm-two-speed-slow-2", ""),
+        )
+    },
     f"vibration euler {WAVE} --theta-y-rad 1 --method rk9": "method 'rk9' is not known",
     f"vibration euler {WAVE} --theta-y-rad 1 --method ,": "--method is ','; a list with commas between is needed",
     f"vibration euler {WAVE} --theta-y-rad far": "theta-y-rad is 'far'; a finite number is needed",
@@ -125,9 +138,36 @@ BAD = {
     f"vibration euler {WAVE} --theta-y-rad 1 --frequency-hz 0": "frequency-hz is 0; a number above 0 is needed",
     f"vibration euler {WAVE} --theta-y-rad 1 --method rk1 --frequency-hz 100": "euler-rk1-2 has no mean rate",
     f"vibration coning-fast {WAVE} --theta-y-rad 1": "--increments must say how many of its cycles make a step",
+    f"vibration two-speed {WAVE} --theta-y-rad 1": "two-speed is in two speeds: --increments must say how many",
+    f"vibration two-speed {WAVE} --theta-y-rad 1 --increments 0": "increments is 0; a whole number from 1 to",
+    f"vibration two-speed {WAVE} --theta-y-rad 1 --increments 9 --method rk4": "two-speed takes no --method",
+    f"vibration two-speed {WAVE} --theta-y-rad 1 --increments 9 --rates": "two-speed takes no --rates",
     f"vibration coning-fast {WAVE} --acceleration-y 1 --increments 9": "drift rates alone; --theta-y-rad is needed",
     f"vibration sculling {WAVE} --theta-y-rad 1": "sculling rates alone; --acceleration-y is needed",
     f"vibration euler {WAVE} --spectrum a.csv": "--frequency-hz goes with one frequency, not with --spectrum",
+    **{
+        f"vibration euler {WAVE} --theta-y-rad 1 --plot a.png --plot-hz {span}": said
+        for span, said in (
+            (
+                "1,1e300",
+                "plot-hz is 1e+300; a plot takes 0.0002 to 20000 Hz, 1e-06 to 100 times the sampling",
+            ),
+            ("1e-300,1", "plot-hz is 1e-300; a plot takes 0.0002 to 20000 Hz"),
+            ("1,far", "plot-hz is 'far'; a finite number is needed"),
+        )
+    },
+    f"vibration euler {WAVE} --theta-y-rad 1 --frequency-hz 1e9 --plot a.png": "frequency-hz is 1e+09; a plot takes",
+    f"vibration euler {WAVE} --theta-y-rad 1 --step 1e-310 --plot a.png": "a plot takes",
+    f"vibration euler {WAVE} --acceleration-y ''": "acceleration-y is ''; a finite number is needed",
+    f"vibration euler {WAVE} --theta-y-rad ''": "theta-y-rad is ''; a finite number is needed",
+    f"vibration euler {WAVE} --theta-y-rad 1e154 --theta-x-rad 1e150 --frequency-hz 1000": (
+        "euler-rk4-2: the error in deg/h is beyond the range of double; take smaller amplitudes"
+    ),
+    "vibration euler --step 0.005 --spectrum winding.csv": "over 100000 panels to integrate",
+    "vibration euler --step 0.005 --spectrum huge.csv": "the spectrum is not finite at",
+    "vibration euler --step 0.005 --spectrum strong.csv": "the integral of the spectrum is beyond the range of double",
+    "vibration euler --step 0.005 --spectrum loud.csv": "the error in deg/h is beyond the range of double",
+    "vibration euler --step 0.01 --spectrum loud.csv --format latex": "text or json is allowed",
     "vibration euler --step 0.01 --spectrum none.csv": "none.csv cannot be read (No such file or directory)",
     # tableau
     "tableau": "Missing argument",
@@ -405,6 +445,18 @@ FILES = {
     "short.csv": "t,dx,dy,dz\n0.01,0,0,0\n0.02,0,0,0\n0.03,0,0,0\n",
     "nan.csv": "t,dx,dy,dz\n0.01,0,0,0\n0.02,0,nan,0\n0.03,0,0,0\n",
     "gap.csv": "t,dx,dy,dz\n0.01,0,0,0\n0.02,0,0,0\n0.03,0,0,0\n1,0,0,0\n1.01,0,0,0\n1.02,0,0,0\n",
+    "winding.csv": (
+        "frequency_hz,density,angle_x_rad,angle_x_phase_rad,angle_y_rad\n10,1,1,0,1\n20,1,1,1e9,1\n"
+    ),
+    **{
+        f"{name}.csv": "frequency_hz,density,angle_x_rad,angle_y_rad,angle_y_phase_rad\n"
+        + "".join(f"{hertz},{density},{angle},{angle},1\n" for hertz in (10, 20))
+        for name, density, angle in (
+            ("huge", "1", "1e200"),
+            ("strong", "1.7e308", "0.1"),
+            ("loud", "1e300", "100"),
+        )
+    },
     "large.csv": "t,dx,dy,dz\n" + "".join(f"0.{k},1e300,1e300,1e300\n" for k in range(1, 10)),
 }
 

@@ -262,6 +262,33 @@ def test_vibration_of_the_recursions(strapgen_says):
     assert sculled["computed_m_s2"] == pytest.approx(1.1042645359e-2, abs=1e-12)
 
 
+def test_vibration_of_both_loops(strapgen_says):
+    """The same error as that of the fast loops, beside the true rates."""
+    given = (
+        "--increments 10 --frequency-hz 7 --step 0.1 --theta-x-rad 0.01 --phase-rad 0.9 --theta-y-rad 0.013"
+    )
+    whole = json.loads(strapgen_says(f"vibration two-speed {given} --acceleration-y 3 --format json"))
+    assert (whole["kernel"], whole["increments"]) == ("two-speed", 10)
+    assert whole["continuous_rad_s"] == pytest.approx(-math.pi * 7 * 0.01 * 0.013 * math.sin(0.9), rel=1e-14)
+    assert whole["continuous_m_s2"] == pytest.approx(0.01 * 3 * math.cos(0.9) / 2, rel=1e-14)
+    fast = json.loads(strapgen_says(f"vibration two-speed-fast-2 {given} --acceleration-y 3 --format json"))
+    for error in ("error_rad_s", "error_m_s2"):
+        assert whole[error] == pytest.approx(fast[error], rel=1e-12)
+    assert "fast loop" not in strapgen_says(f"vibration two-speed {given}")
+
+
+def test_vibration_of_a_fast_loop_says_what_its_rates_are(strapgen_says):
+    given = (
+        "--increments 10 --frequency-hz 7 --step 0.1 --theta-x-rad 0.01 --phase-rad 0.9 --theta-y-rad 0.013"
+    )
+    explained = (
+        "the part of the fast loop within a slow cycle T_m; the slow loop adds the term in T_m to both"
+    )
+    assert explained in strapgen_says(f"vibration coning-fast {given}")
+    assert "fast loop" not in strapgen_says(f"vibration dcm {given.partition(' ')[2].partition(' ')[2]}")
+    assert "the slow loop adds that to both" in " ".join(strapgen_says("vibration --help").split())
+
+
 def test_vibration_of_several(strapgen_says, tmp_path):
     several = f"vibration euler --method rk2,rk4 --increments 1,2 {ONE}"
     data = json.loads(strapgen_says(f"{several} --format json"))

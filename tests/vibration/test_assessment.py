@@ -16,13 +16,13 @@ from hypothesis import strategies as st
 import strapgen
 from strapgen import backends, catalogue, derive, exact, gyro, lower, vibration
 from strapgen.catalogue import coning
-from strapgen.exceptions import InputError
+from strapgen.exceptions import InputError, InputTypeError
 from strapgen.kernel import KernelBuilder
 from strapgen.recursion import Recursion
 from strapgen.signal import Signal, after
 from strapgen.simulation import attitude
 from strapgen.two_speed import TwoSpeed
-from strapgen.vibration import assessment
+from strapgen.vibration import systems
 from strapgen.vibration.assessment import D_Y, PARTS, PHI, THETA_X, THETA_Y
 from strapgen.vibration.systems import T_L, T_M, F, T
 
@@ -76,6 +76,19 @@ def test_the_numbers_of_the_recursions():
     assert drift.computed == pytest.approx(-2.720926166e-3, abs=1e-12)
     sculling = vibration.of(choose("sculling-fast-2"), "sculling").rates(7, "0.1", acceleration_y=3, **given)
     assert sculling.computed == pytest.approx(1.1042645359e-2, abs=1e-12)
+
+
+def test_both_loops_have_equations_75_and_79_and_the_term_in_the_slow_cycle():
+    fast, slow = sp.sin(A_L) / A_L, sp.sin(A_M) / A_M
+    coned, sculled = (vibration.two_speed(quantity) for quantity in ("drift", "sculling"))
+    assert same(coned.expression("continuous"), CONING)
+    assert same(sculled.expression("continuous"), SCULLING)
+    of_75 = CONING * ((1 + (1 - sp.cos(A_L)) / 3) * fast - slow)
+    assert same(coned.expression("computed"), of_75 + CONING * slow)
+    assert same(sculled.expression("computed"), SCULLING * (fast - slow) + SCULLING * slow)
+    assert sculled.forms("computed").keys() == {("angle_x", "velocity_y"), ("angle_y", "velocity_x")}
+    with pytest.raises(InputError, match="quantity 'bias' is not known; allowed: drift, sculling"):
+        vibration.two_speed("bias")
 
 
 # Other derivations of the same
@@ -295,7 +308,7 @@ def test_the_recursions_sum_as_the_closed_form_says():
 
 
 def test_all_loops_together_have_the_errors_of_the_recursions():
-    """Attitude and velocity of an algorithm in two speeds: true rates without T_m, and the errors of (76) and (81)."""
+    """Attitude and velocity of an algorithm in two speeds: rates without T_m, and the errors of the fast loops."""
     frequency, fast, cycles, total, phase = 12.0, 0.01, 5, 15, 0.8
     amplitudes = 1e-3, 2e-3, 4.0
     grid = 2 * np.pi * frequency * fast * np.arange(-1, cycles * total + 1)
@@ -310,15 +323,16 @@ def test_all_loops_together_have_the_errors_of_the_recursions():
     drift = (run.attitudes[-1][1, 0] - run.attitudes[-1][0, 1]) / 2 / duration
     growth = run.velocity_changes[:, 2].sum() / duration
     given = {"theta_x": amplitudes[0], "phase": phase, "cycles": cycles}
-    coned = vibration.of(choose("coning-fast")).rates(12, "0.05", theta_y=amplitudes[1], **given)
-    sculled = vibration.of(choose("sculling-fast-2"), "sculling").rates(
-        12, "0.05", acceleration_y=amplitudes[2], **given
-    )
-    true = -math.pi * frequency * amplitudes[0] * amplitudes[1] * math.sin(phase)
-    assert drift == pytest.approx(true + coned.error, rel=1e-5)
-    assert abs(coned.error) > 1e-3 * abs(true)
-    true = amplitudes[0] * amplitudes[2] * math.cos(phase) / 2
-    assert growth == pytest.approx(true + sculled.error, rel=1e-5)
+    coned = vibration.two_speed().rates(12, "0.05", theta_y=amplitudes[1], **given)
+    sculled = vibration.two_speed("sculling").rates(12, "0.05", acceleration_y=amplitudes[2], **given)
+    for measured, rates, alone in (
+        (drift, coned, vibration.of(choose("coning-fast"))),
+        (growth, sculled, vibration.of(choose("sculling-fast-2"), "sculling")),
+    ):
+        assert measured == pytest.approx(rates.computed, rel=1e-5)
+        assert abs(rates.error) > 1e-3 * abs(rates.continuous)  # which is told from the true rate
+        in_part = alone.rates(12, "0.05", theta_y=amplitudes[1], acceleration_y=amplitudes[2], **given)
+        assert rates.error == pytest.approx(in_part.error, rel=1e-12)
 
 
 def test_steps_gain_velocity_as_the_closed_form_says():
@@ -373,13 +387,27 @@ def test_a_loop_of_a_user_is_the_recursion_26_again():
     [
         (own_loop(kept=False), "forgets what begins anew"),
         (own_loop(extra=1), "does not hand on what it sums|grows to first order|neither stay"),
-        (derive("error-matrix"), "takes no angle increments"),
-        (derive("coning-slow"), "takes no angle increments"),
+        (derive("error-matrix"), "takes no samples of a vibration; allowed: dcm, euler"),
+        (derive("coning-slow"), "takes no samples of a vibration; allowed: dcm, euler"),
+        (derive("dcm-update"), "takes no samples of a vibration; allowed: dcm, euler"),
     ],
 )
 def test_what_cannot_be_assessed_is_refused(kernel, said):
     with pytest.raises(InputError, match=said):
         vibration.drift(kernel)
+
+
+@pytest.mark.parametrize("thing", [None, 3, "euler", ("euler", "rk4", 2, 0)])
+def test_what_is_no_choice_and_no_kernel(thing):
+    for assess, what in (
+        (vibration.of, "choice"),
+        (vibration.drift, "kernel"),
+        (vibration.sculling, "kernel"),
+    ):
+        with pytest.raises(
+            InputTypeError, match=f"{what} is .*; (what catalogue.choose returns|a Kernel) is"
+        ):
+            assess(thing)
 
 
 def test_quantities_that_a_kernel_does_not_have():
@@ -448,5 +476,5 @@ def test_a_recursion_needs_its_cycles():
             if name
             in ("coning-fast", "sculling-fast-1", "sculling-fast-2", "two-speed-fast-1", "two-speed-fast-2")
         )
-        == assessment.RECURSIONS
+        == systems.RECURSIONS
     )

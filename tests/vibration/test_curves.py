@@ -29,3 +29,10 @@ def test_frequencies_rise():
         curves.frequencies(2, 1)
     with pytest.raises(InputError, match="a number above 0 is needed"):
         curves.frequencies(0, 1)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_curve_beyond_the_range_is_refused():
+    hertz = curves.frequencies(1, 50, 3)
+    with pytest.raises(InputError, match="the rates of the curve are beyond the range of double"):
+        curves.curve(vibration.of(catalogue.choose("euler")), hertz, 1, theta_x=1e200, theta_y=1e200, phase=1)

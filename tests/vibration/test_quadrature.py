@@ -38,3 +38,7 @@ def test_what_cannot_be_integrated_is_refused():
         integrate(lambda x: 1 / (x - 0.3)[None], [0, 1], 1.0)
     with pytest.raises(InputError, match="panels to integrate"):
         integrate(lambda x: x[None], [0, 1], 1e-7)
+    with pytest.raises(InputError, match="panels to integrate"):
+        integrate(lambda x: x[None], [0, 1e308], 1e-7)
+    with pytest.raises(InputError, match="the integral of the spectrum is beyond the range of double"):
+        integrate(lambda x: 1e308 + 0 * x[None], [0, 100], 1.0)

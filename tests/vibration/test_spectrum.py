@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 import strapgen
 from strapgen import catalogue, gyro, vibration
-from strapgen.exceptions import InputError
+from strapgen.exceptions import InputError, InputTypeError
 from strapgen.simulation import attitude
 from strapgen.vibration import Spectrum, random_rates, read_spectrum
 
@@ -179,12 +180,100 @@ def test_a_file_is_a_spectrum(tmp_path):
 
 
 def test_a_density_of_zero_is_reached_in_a_straight_line(tmp_path):
-    rows = "frequency_hz,density,angle_x_rad,angle_y_rad\n0,1,1,1\n10,1,1,1\n20,0,1,1\n"
+    rows = "frequency_hz,density,angle_x_rad,angle_y_rad,angle_y_phase_rad\n0,1,1,1,0.7\n10,1,1,1,0.7\n20,0,1,1,0.7\n"
     found = read_spectrum(written(tmp_path, rows))
     assert found.density(np.array([0.0, 5.0, 15.0, 20.0])) == pytest.approx([1, 1, 0.5, 0])
-    assert random_rates(vibration.of(choose("euler")), found, "0.02").rates == pytest.approx(
-        (0, 0, 0), abs=1e-12
+    true = computed = 0.0
+    for low, high, density in ((0, 10, lambda f: 1 + 0 * f), (10, 20, lambda f: (20 - f) / 10)):
+
+        def integrand(f, ratio, density=density):
+            # An oscillation as strong as a band of width df has the amplitudes sqrt(2 P df).
+            return -np.pi * f * np.sin(0.7) * 2 * density(f) * ratio(f)
+
+        true += simpson(low, high, lambda f, drift=integrand: drift(f, lambda f: 1))
+        computed += simpson(low, high, lambda f, drift=integrand: drift(f, rk4_2))
+    rates = random_rates(vibration.of(choose("euler")), found, "0.02").rates
+    assert rates == pytest.approx((true, computed, computed - true), rel=1e-9)
+
+
+def simpson(low, high, function, points=20001):
+    """Return an integral between two rows, without the ends, where a quotient may have no value."""
+    f = np.linspace(low, high, points)
+    f[0] += 1e-12
+    weights = np.full(points, 2.0)
+    weights[1::2] = 4.0
+    weights[[0, -1]] = 1.0
+    return float(weights @ function(f)) * (high - low) / (points - 1) / 3
+
+
+def rk4_2(f):
+    """Return what rk4 on two increments makes of the drift in a step of 0.02 s, of 1."""
+    x = np.pi * f * 0.02
+    return 4 * np.sin(x) / (3 * x) - np.sin(2 * x) / (6 * x)
+
+
+#: Rows with a falling and a rising density, and phases that wind; the paper's fast and slow sines over them.
+SEVERAL = """frequency_hz,density,angle_x_rad,angle_x_phase_rad,angle_y_rad,angle_y_phase_rad,\
+acceleration_x_m_s2,acceleration_x_phase_rad,acceleration_y_m_s2,acceleration_y_phase_rad
+3,1e-5,0.02,0.1,0.03,-1.0,2,0.4,1,1.2
+11,4e-4,0.05,-0.6,0.01,-1.5,5,0.9,4,-0.3
+26,3e-4,0.01,-2.0,0.02,1.4,1,2.5,3,0.2
+45,1e-6,0.002,-3.0,0.004,3.0,0.5,2.0,0.7,-1.1
+""".replace("\\\n", "")
+
+
+def drift_of_one(f, moved, phases):
+    """Return Savage's coning rate for amplitudes of 1 in a unit of band: (65) with the phase of y before x."""
+    turn = np.sin(phases["angle_y"] - phases["angle_x"])
+    return -np.pi * f * moved["angle_x"] * moved["angle_y"] * turn
+
+
+def sculling_of_one(f, moved, phases):
+    """Return the mean of half the cross products both ways: angle about x with y, less angle about y with x."""
+    ways = [
+        moved[f"angle_{a}"]
+        * moved[f"acceleration_{b}"]
+        * np.cos(phases[f"angle_{a}"] - phases[f"acceleration_{b}"])
+        / 2
+        for a, b in ("xy", "yx")
+    ]
+    return ways[0] - ways[1]
+
+
+@pytest.mark.parametrize(
+    ("name", "quantity", "one", "step", "cycles", "made", "less"),
+    [
+        ("coning-fast", "drift", drift_of_one, SLOW, CYCLES, lambda f: recursion_26(2 * np.pi * f), True),
+        ("sculling-fast-2", "sculling", sculling_of_one, SLOW, CYCLES, lambda f: fast(2 * np.pi * f), True),
+        ("euler", "drift", drift_of_one, "0.02", None, rk4_2, False),
+        ("euler", "sculling", sculling_of_one, "0.02", None, rk4_2, False),
+    ],
+)
+def test_a_file_of_several_rows_is_integrated(name, quantity, one, step, cycles, made, less, tmp_path):
+    """Between rows the density is a power of frequency, magnitudes and phases are straight lines: Simpson's rule."""
+    rows = [list(map(float, row.split(","))) for row in SEVERAL.splitlines()[1:]]
+    channels = ("angle_x", "angle_y", "acceleration_x", "acceleration_y")
+
+    def between(low, high, factor):
+        def integrand(f):
+            share = (f - low[0]) / (high[0] - low[0])
+            power = math.log(high[1] / low[1]) / math.log(high[0] / low[0])
+            line = [a + (b - a) * share for a, b in zip(low, high, strict=True)]
+            moved = dict(zip(channels, line[2::2], strict=True))
+            phases = dict(zip(channels, line[3::2], strict=True))
+            return 2 * low[1] * (f / low[0]) ** power * one(f, moved, phases) * factor(f)
+
+        return simpson(low[0], high[0], integrand)
+
+    ending = (lambda f: slow(2 * np.pi * f)) if less else (lambda f: 0.0)
+    true, computed = (
+        sum(between(low, high, lambda f, ratio=ratio: ratio(f) - ending(f)) for low, high in pairwise(rows))
+        for ratio in (lambda f: 1.0, made)
     )
+    found = random_rates(
+        vibration.of(choose(name), quantity), read_spectrum(written(tmp_path, SEVERAL)), step, cycles=cycles
+    )
+    assert found.rates == pytest.approx((true, computed, computed - true), rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -222,12 +311,104 @@ def test_files_that_cannot_be_read(path, tmp_path):
     ("transfers", "edges", "said"),
     [
         ({"angle_z": abs}, (1.0, 2.0), "transfer function 'angle_z' is not known"),
-        ({}, (1.0,), "two rising frequencies"),
-        ({}, (2.0, 1.0), "two rising frequencies"),
-        ({}, (-1.0, 1.0), "two rising frequencies"),
-        ({}, (1.0, math.inf), "two rising frequencies"),
+        ({}, (1.0, 2.0), "nothing moves; a transfer function is needed: angle_x, angle_y"),
+        ({"angle_x": abs}, (1.0,), "two rising frequencies"),
+        ({"angle_x": abs}, (), "two rising frequencies"),
+        ({"angle_x": abs}, (2.0, 1.0), "two rising frequencies"),
+        ({"angle_x": abs}, (-1.0, 1.0), "two rising frequencies"),
+        ({"angle_x": abs}, (1.0, math.inf), "two rising frequencies"),
     ],
 )
 def test_spectra_that_are_refused(transfers, edges, said):
     with pytest.raises(InputError, match=said):
         Spectrum(np.ones_like, transfers, edges)
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"density": 1}, "density is 1; a function of frequency is needed"),
+        ({"transfers": {"angle_x": 2.0}}, "angle_x is 2.0; a function of frequency is needed"),
+        ({"transfers": None}, "the transfer functions are None; a dict of functions by name is needed"),
+        ({"edges": "ab"}, "the edges are 'ab'; frequencies in Hz are needed"),
+        ({"edges": None}, "the edges are None; frequencies in Hz are needed"),
+        ({"edges": (1.0, "b")}, "the edges hold 'b'; frequencies in Hz are needed"),
+        ({"edges": (1.0, 2j)}, "the edges hold 2j; frequencies in Hz are needed"),
+    ],
+)
+def test_what_is_no_spectrum(changed, said):
+    given = {"density": np.ones_like, "transfers": {"angle_x": np.ones_like}, "edges": (1.0, 2.0)}
+    with pytest.raises(InputTypeError, match=said):
+        Spectrum(**{**given, **changed})
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    ("density", "transfer", "kind", "said"),
+    [
+        (lambda f: 1j + f, np.ones_like, InputTypeError, "density returns complex128; real numbers"),
+        (lambda f: "loud", np.ones_like, InputTypeError, "density returns <U4; real numbers"),
+        (lambda f: None, np.ones_like, InputTypeError, "density returns object; real numbers"),
+        (
+            lambda f: f[1:],
+            np.ones_like,
+            InputError,
+            r"density returns shape \(\d+,\); \(\d+,\) like the frequencies",
+        ),
+        (
+            lambda f: [[1.0], [1.0, 2.0]],
+            np.ones_like,
+            InputError,
+            "density returns rows of different lengths",
+        ),
+        (lambda f: 1.5 - f, np.ones_like, InputError, r"density is -0\.\d+ at 1\.\d+ Hz; no number below 0"),
+        (lambda f: np.nan * f, np.ones_like, InputError, r"the spectrum is not finite at 1\.\d+ Hz"),
+        (np.ones_like, lambda f: "far", InputTypeError, "angle_y returns <U3; numbers are needed"),
+        (np.ones_like, lambda f: f[:, None], InputError, "angle_y returns shape"),
+        (np.ones_like, lambda f: 1e308j * f * 2, InputError, "the spectrum is not finite at"),
+    ],
+)
+def test_functions_that_are_refused(density, transfer, kind, said):
+    shaken = Spectrum(density, {"angle_x": np.ones_like, "angle_y": transfer}, (1.0, 2.0))
+    with pytest.raises(kind, match=said):
+        random_rates(vibration.of(choose("euler")), shaken, "0.02")
+
+
+def test_functions_may_return_one_number():
+    assessed = vibration.of(choose("euler"))
+    single = Spectrum(lambda f: 2, {"angle_x": lambda f: 1, "angle_y": lambda f: 1j}, (1.0, 2.0))
+    whole = Spectrum(
+        lambda f: 2 + 0 * f, {"angle_x": np.ones_like, "angle_y": lambda f: 1j + 0 * f}, (1.0, 2.0)
+    )
+    rates = random_rates(assessed, single, "0.02").rates
+    assert rates == random_rates(assessed, whole, "0.02").rates
+    assert rates.continuous == pytest.approx(-math.pi * 3 / 2 * 2 * 2, rel=1e-12)  # pi f times 2 P
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ((3, SHAKEN, 1), "assessment is 3; what vibration.of returns is needed"),
+        ((vibration.of(choose("euler")), 3, 1), "spectrum is 3; a Spectrum is needed"),
+    ],
+)
+def test_random_rates_of_something_else(given, said):
+    with pytest.raises(InputTypeError, match=said):
+        random_rates(*given)
+
+
+def test_a_tolerance_and_a_path_must_be_one():
+    with pytest.raises(InputError, match="tolerance is 0; a number above 0 is needed"):
+        random_rates(vibration.of(choose("euler")), SHAKEN, "0.001", tolerance=0)
+    with pytest.raises(InputTypeError, match="spectrum is None; the path of a file is needed"):
+        read_spectrum(None)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_density_that_rises_steeply(tmp_path):
+    """By 600 orders of magnitude in an octave: no slope in between is beyond the range."""
+    rows = "frequency_hz,density,angle_x_rad,angle_y_rad\n10,1e-300,1,1\n20,1e300,1,1\n"
+    found = read_spectrum(written(tmp_path, rows))
+    f = np.array([10.0, 200**0.5, 20.0])
+    assert found.density(f) == pytest.approx([1e-300, 1, 1e300], rel=1e-10)
+    assert random_rates(vibration.of(choose("euler")), found, "0.02").rates == (0, 0, 0)  # in phase

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
@@ -24,7 +26,10 @@ FrequencyHz = Annotated[
 Step = Annotated[
     _Text,
     typer.Option(
-        "--step", metavar="S", help="Step T in s; of a fast loop the slow cycle.", show_default=False
+        "--step",
+        metavar="S",
+        help="Step T in s; of algorithms in two speeds the slow cycle.",
+        show_default=False,
     ),
 ]
 ThetaX = Annotated[
@@ -58,7 +63,7 @@ def vibration(
         str,
         typer.Argument(
             help="dcm, euler, cayley-klein, rotation-vector, sculling, a fast loop (coning-fast, sculling-fast-1, "
-            "sculling-fast-2, two-speed-fast-1, two-speed-fast-2), or your own Python file."
+            "sculling-fast-2, two-speed-fast-1, two-speed-fast-2), two-speed (both loops), or your own Python file."
         ),
     ],
     methods: Annotated[
@@ -71,7 +76,7 @@ def vibration(
         typer.Option(
             "--increments",
             metavar="N,...",
-            help="Angle increments a step; for a fast loop its cycles in a step.  [default: 2]",
+            help="Angle increments a step; in two speeds the fast cycles in a step.  [default: 2]",
             show_default=False,
         ),
     ] = None,
@@ -114,6 +119,9 @@ def vibration(
     Closed forms to second order in the amplitudes are derived from the algorithm itself. Several methods, or numbers of
     increments, stand side by side.
 
+    Of a fast loop, continuous and computed are its part within a slow cycle T_m, without the term in T_m: the slow loop
+    adds that to both, so that the error is that of both loops.
+
     Example:
 
     \b
@@ -133,6 +141,7 @@ def vibration(
         spectrum,
         plot,
         span,
+        format,
     )
     from strapgen import output
     from strapgen import vibration as assessing
@@ -154,9 +163,9 @@ def vibration(
     if spectrum is None:
         given = {
             "theta_x": theta_x,
-            "theta_y": theta_y or "0",
+            "theta_y": "0" if theta_y is None else theta_y,
             "phase": phase,
-            "acceleration_y": acceleration or "0",
+            "acceleration_y": "0" if acceleration is None else acceleration,
         }
         words = f"{frequency} Hz, amplitudes {theta_x} rad about x"
         words += "" if theta_y is None else f", {theta_y} rad about y"
@@ -211,7 +220,12 @@ class _Outcome(NamedTuple):
 
 
 def _check_vibration(
-    numbers: dict[str, _Text], step: _Text, spectrum: Path | None, plot: Path | None, span: _Text
+    numbers: dict[str, _Text],
+    step: _Text,
+    spectrum: Path | None,
+    plot: Path | None,
+    span: _Text,
+    format: str,
 ) -> None:
     """Check that one frequency or a spectrum is given, with all that goes with it."""
     if step is None:
@@ -220,6 +234,10 @@ def _check_vibration(
         for name, value in {**numbers, "--plot": plot, "--plot-hz": span}.items():
             if value is not None:
                 raise InputError(f"{name} goes with one frequency, not with --spectrum")
+        if format == "latex":
+            raise InputError(
+                "--format latex writes closed forms of one frequency; with --spectrum text or json is allowed"
+            )
         return
     for name in ("--frequency-hz", "--theta-x-rad", "--phase-rad"):
         if numbers[name] is None:
@@ -240,6 +258,16 @@ def _listed(option: str, text: _Text) -> list[_Text]:
     return parts
 
 
+def _check_known(algorithm: str, names: tuple[str, ...], own: tuple[str, ...]) -> None:
+    """Check that an algorithm is one that can be assessed: a name, or a user's."""
+    from strapgen import catalogue
+
+    if algorithm in (*names, *own) or algorithm.endswith(".py"):
+        return
+    why = "has no rate under vibration" if algorithm in catalogue.RESERVED else "is not known"
+    raise InputError(f"algorithm {algorithm!r} {why}; allowed: {', '.join(names)}, or your own Python file")
+
+
 def _assessed(
     algorithm: str,
     options: tuple[_Text, Path | None, _Text, _Text, bool],
@@ -250,19 +278,36 @@ def _assessed(
 ) -> list[_Case]:
     """Return what can be assessed of an algorithm, of what is asked for."""
     from strapgen import catalogue, checks
-    from strapgen.vibration import assessment
+    from strapgen.catalogue import user
+    from strapgen.vibration import assessment, systems
 
+    _check_known(algorithm, (*systems.NAMES, _TWO_SPEED), (*user.KERNELS, *user.installed()))
     method, tableau, count, previous, rates = options
     cycles = None
-    if algorithm in assessment.RECURSIONS:
+    whole_algorithm = algorithm == _TWO_SPEED
+    if whole_algorithm or algorithm in systems.RECURSIONS:
         if count is None:
-            raise InputError(
-                f"{algorithm} is a recursion: --increments must say how many of its cycles make a step"
-            )
+            loop = "is in two speeds" if whole_algorithm else "is a recursion"
+            raise InputError(f"{algorithm} {loop}: --increments must say how many of its cycles make a step")
         cycles = checks.count("increments", whole("increments", count), largest=checks.MOST)
         count = None
-    choice = chosen(algorithm, method, tableau, count, previous, rates, step=False)
-    can = assessment.quantities(choice)
+    of: Callable[[str], Assessment]
+    if whole_algorithm:
+        assert cycles is not None
+        for option, value in (
+            ("--method", method),
+            ("--tableau", tableau),
+            ("--previous", previous),
+            ("--rates", rates or None),
+        ):
+            if value is not None:
+                raise InputError(f"{algorithm} takes no {option}")
+        can: tuple[str, ...] = ("drift", "sculling")
+        of, samples = assessment.two_speed, cycles
+    else:
+        choice = chosen(algorithm, method, tableau, count, previous, rates, step=False)
+        can = assessment.quantities(choice)
+        of, samples = partial(assessment.of, choice), cycles or catalogue.increments(choice)
     if random:
         wanted = list(can)
     else:
@@ -270,10 +315,18 @@ def _assessed(
         if not wanted:
             needed = {"drift": "--theta-y-rad", "sculling": "--acceleration-y"}[can[0]]
             raise InputError(f"{algorithm} has {' and '.join(can)} rates alone; {needed} is needed")
-    samples = cycles or catalogue.increments(choice)
-    return [_Case(assessment.of(choice, quantity), cycles, samples) for quantity in wanted]
+    return [_Case(of(quantity), cycles, samples) for quantity in wanted]
 
 
+#: Lowest and highest frequency of a plot, by the sampling frequency.
+_PLOTTED = 1e-6, 100.0
+#: The fast loop and the slow loop together.
+_TWO_SPEED = "two-speed"
+#: What the rates of a fast loop are.
+_FAST_LOOP = (
+    "continuous and computed are the part of the fast loop within a slow cycle T_m; the slow loop adds the term in T_m "
+    "to both, so that the error is that of both loops"
+)
 _UNITS = {"rad/s": "rad_s", "m/s^2": "m_s2"}
 #: What a person reads, and its factor.
 _READ = {"rad/s": ("deg/h", math.degrees(3600)), "m/s^2": ("micro-g", 1e6 / 9.80665)}
@@ -323,11 +376,18 @@ def _text(found: list[_Outcome], title: str) -> str:
             f"{_quantity(group[0].case):<{width}} " + "".join(f"{h:>20}" for h in heads),
         ]
         for outcome in group:
+            if not math.isfinite(outcome.rates.error * factor):
+                raise InputError(
+                    f"{_label(outcome.case)}: the error in {read} is beyond the range of double; "
+                    "take smaller amplitudes"
+                )
             cells = "".join(f"{value:>20.9e}" for value in outcome.rates)
             lines.append(f"{_label(outcome.case):<{width}} {cells}{outcome.rates.error * factor:>20.6g}")
             if outcome.quadrature is not None:
                 spread = "".join(f"{value:>20.1e}" for value in outcome.quadrature)
                 lines.append(f"{'  quadrature':<{width}} {spread}")
+    if any(o.case.cycles is not None and o.case.assessment.kernel != _TWO_SPEED for o in found):
+        lines += ["", _FAST_LOOP]
     if all(outcome.quadrature is None for outcome in found) and len({_label(o.case) for o in found}) == 1:
         for outcome in found:
             made = outcome.case.assessment
@@ -366,13 +426,21 @@ def _image(
     from strapgen.vibration import curves
 
     length = float(checks.number("step", step or "", positive=True))
-    high: Any = max(case.samples for case in cases) / length / 2
-    low: Any = high / 100
+    sampling = max(case.samples for case in cases) / length
+    low, high = sampling / 200, sampling / 2
     if span is not None:
         ends = span.split(",")
         if len(ends) != 2:
             raise InputError(f"plot-hz is {span!r}; two frequencies, LOW,HIGH, are needed")
-        low, high = ends
+        low, high = (float(checks.number("plot-hz", end, positive=True)) for end in ends)
+    marked = float(checks.number("frequency-hz", frequency or ""))
+    lowest, highest = (times * sampling for times in _PLOTTED)
+    for option, end in (("plot-hz", low), ("plot-hz", high), ("frequency-hz", marked)):
+        if not lowest <= end <= highest < math.inf:
+            raise InputError(
+                f"{option} is {end:g}; a plot takes {lowest:g} to {highest:g} Hz, "
+                f"{_PLOTTED[0]:g} to {_PLOTTED[1]:g} times the sampling frequency"
+            )
     hertz = curves.frequencies(low, high)
     drawn = [
         (_label(case), curves.curve(case.assessment, hertz, step or "", cycles=case.cycles, **given))
@@ -382,5 +450,5 @@ def _image(
         drawn,
         f"Errors under vibration, step {step} s\n{words.partition(', ')[2]}",
         path,
-        float(checks.number("frequency-hz", frequency or "")),
+        marked,
     )

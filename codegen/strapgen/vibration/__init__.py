@@ -8,6 +8,7 @@ from strapgen.vibration.assessment import Rates as Rates
 from strapgen.vibration.assessment import drift as drift
 from strapgen.vibration.assessment import of as of
 from strapgen.vibration.assessment import sculling as sculling
+from strapgen.vibration.assessment import two_speed as two_speed
 from strapgen.vibration.spectrum import RandomRates as RandomRates
 from strapgen.vibration.spectrum import Spectrum as Spectrum
 from strapgen.vibration.spectrum import random_rates as random_rates

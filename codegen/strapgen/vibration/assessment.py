@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from strapgen import catalogue, checks
 from strapgen.catalogue import Choice
-from strapgen.exceptions import InputError
+from strapgen.exceptions import InputError, InputTypeError
 from strapgen.kernel import Kernel
 from strapgen.vibration import response, systems
 from strapgen.vibration.response import Form, Pair
@@ -23,9 +23,6 @@ from strapgen.vibration.systems import ANGLES, T_L, T_M, VELOCITIES, F, T
 
 #: Amplitudes of the angles in rad, of the acceleration in m/s^2, and the phase in rad, equations (65) and (70).
 THETA_X, THETA_Y, PHI, D_Y = sp.symbols("theta_x theta_y phi D_y", real=True)
-
-#: Kernels of the catalogue that sum over a slow cycle.
-RECURSIONS = ("coning-fast", "sculling-fast-1", "sculling-fast-2", "two-speed-fast-1", "two-speed-fast-2")
 
 #: What of an assessment is asked for.
 PARTS = ("continuous", "computed", "error")
@@ -375,7 +372,7 @@ def sculling(kernel: Kernel, *, nodes: Sequence[Fraction | sp.Expr] = (), previo
     >>> sculling(derive("sculling-fast-2")).expression("continuous").has(systems.T_M)
     True
     """
-    if not _takes_velocities(kernel):
+    if not _takes_velocities(systems.checked(kernel)):
         if kernel.recursion is not None and kernel.companions is None:
             raise InputError(f"kernel {kernel.name} takes no velocity increments; sculling-fast-1 or -2 does")
         return _dual(drift(kernel, nodes=nodes, previous=previous))
@@ -405,6 +402,51 @@ def _dual(assessment: Assessment) -> Assessment:
     turned = Form(sp.S.Zero, -form.imaginary)
     computed = {("angle_x", "velocity_y"): form, ("angle_y", "velocity_x"): turned}
     return Assessment(assessment.kernel, "m/s^2", False, computed, response.true_forms("S2", endless=True))
+
+
+#: Fast loop, and the vector of a slow cycle of one sample, of an algorithm in two speeds.
+_LOOPS = {
+    "drift": ("coning-fast", ("rotation-vector", "coning-compressed", 1)),
+    "sculling": ("sculling-fast-2", ("sculling", "coning-compressed", 1)),
+}
+
+
+@lru_cache
+def two_speed(quantity: str = "drift") -> Assessment:
+    """Assess a whole algorithm in two speeds: the fast loop, and the slow loop that follows it.
+
+    What the fast loop sums of second order the slow loop adds to what it makes of the sums of the increments alone,
+    which are the one sample of a slow cycle. The navigation frame rests.
+
+    Parameters
+    ----------
+    quantity : str, optional
+        "drift" or "sculling".
+
+    Returns
+    -------
+    Assessment
+        Continuous is the true rate, without a term in T_m.
+
+    Raises
+    ------
+    InputError
+        If the quantity is unknown.
+
+    Examples
+    --------
+    >>> two_speed().text("computed")
+    '-pi*f*theta_x*theta_y*sin(phi)*(2*sin(2*pi*T_l*f)/(3*pi*T_l*f) - sin(4*pi*T_l*f)/(12*pi*T_l*f))'
+    """
+    fast, slow = _LOOPS[checks.choice("quantity", quantity, tuple(_LOOPS))]
+    parts = [of(catalogue.choose(fast), quantity), of(catalogue.choose(*slow), quantity)]
+    none = Form(sp.S.Zero, sp.S.Zero)
+    computed = {}
+    for pair in {**parts[0].computed, **parts[1].computed}:
+        forms = [part.computed.get(pair, none) for part in parts]
+        real, imaginary = (sp.Add(*(form[k].subs(T, T_M) for form in forms)) for k in range(2))
+        computed[pair] = Form(real, imaginary)
+    return Assessment("two-speed", parts[0].unit, True, computed, parts[1].continuous)
 
 
 def quantities(choice: Choice) -> tuple[str, ...]:
@@ -450,6 +492,8 @@ def of(choice: Choice, quantity: str = "drift") -> Assessment:
 
     Raises
     ------
+    InputTypeError
+        If the choice is none.
     InputError
         As `drift` and `sculling` do.
 
@@ -460,6 +504,8 @@ def of(choice: Choice, quantity: str = "drift") -> Assessment:
     >>> [float(f"{rate:.6g}") for rate in rates]
     [-0.00264356, -0.00263046, 1.31029e-05]
     """
+    if not isinstance(choice, Choice):
+        raise InputTypeError(f"choice is {choice!r}; what catalogue.choose returns is needed")
     checks.choice("quantity", quantity, ("drift", "sculling"))
     if choice.name in catalogue.user.KERNELS:  # which another one of the same name may replace
         return _of(choice, quantity)

@@ -77,6 +77,11 @@ def curve(
     Returns
     -------
     Curve
+
+    Raises
+    ------
+    InputError
+        If a number is not allowed, or the rates are beyond the range of double.
     """
     amplitude_x, amplitude_y, turn, amplitude = (
         float(checks.number(what, value))
@@ -98,5 +103,10 @@ def curve(
         rates[part] = np.zeros(len(hertz))
         for (first, second), factor in assessment.factors(part, hertz, step, cycles).items():
             if first in held and second in held:
-                rates[part] += (factor * held[first] * np.conj(held[second])).real
+                with np.errstate(all="ignore"):
+                    rates[part] += (factor * held[first] * np.conj(held[second])).real
+                if not np.isfinite(rates[part][np.isfinite(factor)]).all():
+                    raise InputError(
+                        f"{assessment.kernel}: the rates of the curve are beyond the range of double"
+                    )
     return Curve(assessment.kernel, assessment.unit, hertz, rates["continuous"], rates["error"])

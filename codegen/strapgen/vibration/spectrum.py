@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Callable, Mapping
+import os
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import partial
 from itertools import pairwise
+from numbers import Real
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen.exceptions import InputError
+from strapgen import checks
+from strapgen.exceptions import InputError, InputTypeError
 from strapgen.vibration.assessment import Assessment, Rates
 from strapgen.vibration.quadrature import integrate
 
@@ -30,22 +34,25 @@ class Spectrum:
 
     The input n has the one-sided power spectral density P, E[n^2] being the integral of P over frequencies in Hz.
     An angle or acceleration follows it by its transfer function H: for n = Re(c exp(j omega t)) it is
-    Re(H c exp(j omega t)). All functions take an array of frequencies in Hz, (N,), and return one of that shape.
+    Re(H c exp(j omega t)). All functions take an array of frequencies in Hz, (N,), and return one of that shape, or one
+    number.
 
     Parameters
     ----------
     density : callable
-        P in the unit of n squared, per Hz.
+        P in the unit of n squared, per Hz; not below 0.
     transfers : dict of str to callable
         Complex transfer functions: "angle_x" and "angle_y" in rad, "acceleration_x" and "acceleration_y" in m/s^2, each
-        per unit of n. What is left out does not move.
+        per unit of n. What is left out does not move; one is needed.
     edges : tuple of float
         Rising frequencies in Hz: the lowest and the highest, and between them all where a function or its slope jumps.
 
     Raises
     ------
+    InputTypeError
+        If something is no function, or the edges are no numbers.
     InputError
-        If a transfer function has another name, or the edges do not rise from 0 or above.
+        If a transfer function has another name or there is none, or the edges do not rise from 0 or above.
 
     Examples
     --------
@@ -60,24 +67,79 @@ class Spectrum:
     edges: tuple[float, ...]
 
     def __post_init__(self) -> None:
+        if not isinstance(self.transfers, Mapping):
+            raise InputTypeError(
+                f"the transfer functions are {self.transfers!r}; a dict of functions by name is needed"
+            )
         for name in self.transfers:
             if name not in TRANSFERS:
                 raise InputError(f"transfer function {name!r} is not known; allowed: {', '.join(TRANSFERS)}")
-        rising = all(low < high for low, high in pairwise(self.edges))
-        if len(self.edges) < 2 or self.edges[0] < 0 or not rising or not math.isfinite(self.edges[-1]):
+        if not self.transfers:
+            raise InputError(f"nothing moves; a transfer function is needed: {', '.join(TRANSFERS)}")
+        for what, function in {"density": self.density, **self.transfers}.items():
+            if not callable(function):
+                raise InputTypeError(f"{what} is {function!r}; a function of frequency is needed")
+        edges = self.edges
+        if isinstance(edges, str) or not isinstance(edges, Sequence | np.ndarray):
+            raise InputTypeError(f"the edges are {edges!r}; frequencies in Hz are needed")
+        for edge in edges:
+            if not isinstance(edge, Real) or isinstance(edge, bool):
+                raise InputTypeError(f"the edges hold {edge!r}; frequencies in Hz are needed")
+        rising = all(low < high for low, high in pairwise(edges))
+        if len(edges) < 2 or edges[0] < 0 or not rising or not math.isfinite(edges[-1]):
             raise InputError(
                 "the edges of a spectrum must be two rising frequencies in Hz or more, from 0 or above"
             )
 
+    def densities(self, hertz: Array) -> Array:
+        """Return the density at frequencies.
+
+        Raises
+        ------
+        InputTypeError
+            If the function returns no real numbers.
+        InputError
+            If it returns another shape, or a number below 0.
+        """
+        found = _returned("density", self.density(hertz), hertz, "fiu").astype(float)
+        if (found < 0).any():
+            place = int(np.argmax(found < 0))
+            raise InputError(
+                f"density is {found[place]:g} at {hertz[place]:.9g} Hz; no number below 0 is allowed"
+            )
+        return found
+
     def amplitudes(self, hertz: Array) -> dict[str, Array]:
-        """Return the transfer functions of the channels: angles, and velocities in place of accelerations."""
+        """Return the transfer functions of the channels: angles, and velocities in place of accelerations.
+
+        Raises
+        ------
+        InputTypeError
+            If a function returns no numbers.
+        InputError
+            If one returns another shape.
+        """
         found = {}
         for name, function in self.transfers.items():
-            values = np.asarray(function(hertz), complex)
+            values = _returned(name, function(hertz), hertz, "fiuc").astype(complex)
             if name.startswith("acceleration"):
                 values = values / (2j * np.pi * hertz)
             found[name.replace("acceleration", "velocity")] = values
         return found
+
+
+def _returned(what: str, values: Any, hertz: Array, kinds: str) -> Array:
+    """Return what a function made of frequencies, with a shape like theirs."""
+    try:
+        array = np.asarray(values)
+    except ValueError:
+        raise InputError(f"{what} returns rows of different lengths; shape {hertz.shape} is needed") from None
+    if array.dtype.kind not in kinds:
+        numbers = "numbers" if "c" in kinds else "real numbers"
+        raise InputTypeError(f"{what} returns {array.dtype}; {numbers} are needed")
+    if array.shape not in ((), hertz.shape):
+        raise InputError(f"{what} returns shape {array.shape}; {hertz.shape} like the frequencies is needed")
+    return np.broadcast_to(array, hertz.shape)
 
 
 class RandomRates(NamedTuple):
@@ -122,10 +184,16 @@ def random_rates(
 
     Raises
     ------
+    InputTypeError
+        If something is not of its type, or a function of the spectrum returns no numbers.
     InputError
-        If a function is not finite, or the integral does not settle.
+        If a function or an integral is not finite, a density is below 0, or an integral does not settle.
     """
-    parts = ("continuous", "error")
+    if not isinstance(assessment, Assessment):
+        raise InputTypeError(f"assessment is {assessment!r}; what vibration.of returns is needed")
+    if not isinstance(spectrum, Spectrum):
+        raise InputTypeError(f"spectrum is {spectrum!r}; a Spectrum is needed")
+    allowed = float(checks.number("tolerance", tolerance, positive=True))
     longest = float(max(assessment.lengths(step, cycles).values()))
     if assessment.resonant and spectrum.edges[-1] * longest >= 1:
         raise InputError(
@@ -133,22 +201,26 @@ def random_rates(
             f"there; the spectrum reaches to {spectrum.edges[-1]:g} Hz"
         )
 
-    def integrand(hertz: Array) -> Array:
+    def rate(part: str, hertz: Array) -> Array:
         moved = spectrum.amplitudes(hertz)
-        density = np.asarray(spectrum.density(hertz), float)
-        rows = []
-        for part in parts:
-            total = np.zeros(len(hertz))
-            for (first, second), factor in assessment.factors(part, hertz, step, cycles).items():
-                if first in moved and second in moved:
-                    total = total + 2 * (factor * moved[first] * moved[second].conj()).real
-            rows.append(total * density)
-        return np.array(rows)
+        total = np.zeros(len(hertz))
+        for (first, second), factor in assessment.factors(part, hertz, step, cycles).items():
+            if first in moved and second in moved:
+                total = total + 2 * (factor * moved[first] * moved[second].conj()).real
+        return (total * spectrum.densities(hertz))[None]
 
-    found = integrate(integrand, spectrum.edges, 1 / longest, tolerance)
-    continuous, error = map(float, found.values)
-    spread = list(map(float, found.errors))
-    return RandomRates(Rates(continuous, continuous + error, error), Rates(spread[0], sum(spread), spread[1]))
+    # The true rate first: its factors take no more than double nearly everywhere, so that what does not settle is soon
+    # found; those of the error take many digits.
+    found = {
+        part: integrate(partial(rate, part), spectrum.edges, 1 / longest, allowed)
+        for part in ("continuous", "error")
+    }
+    continuous, error = (float(one.values[0]) for one in found.values())
+    spread = [float(one.errors[0]) for one in found.values()]
+    rates = Rates(continuous, continuous + error, error)
+    if not np.isfinite(rates).all():
+        raise InputError(f"{assessment.kernel}: the rates are beyond the range of double")
+    return RandomRates(rates, Rates(spread[0], sum(spread), spread[1]))
 
 
 def read_spectrum(path: str | Path) -> Spectrum:
@@ -171,9 +243,13 @@ def read_spectrum(path: str | Path) -> Spectrum:
 
     Raises
     ------
+    InputTypeError
+        If the path is none.
     InputError
         If the file cannot be read, or a column, a number or the order of the rows is not as it must be.
     """
+    if not isinstance(path, str | os.PathLike):
+        raise InputTypeError(f"spectrum is {path!r}; the path of a file is needed")
     columns = _columns(Path(path))
     hertz, density = columns["frequency_hz"], columns["density"]
     transfers = {}
@@ -201,8 +277,8 @@ def _density(hertz: Array, density: Array) -> Callable[[Array], Array]:
         ends = density[place], density[place + 1]
         curved = (low > 0) & (ends[0] > 0) & (ends[1] > 0) & (at > 0)
         with np.errstate(divide="ignore", invalid="ignore"):
-            slope = np.log(ends[1] / ends[0]) / np.log(high / low)
-            power = ends[0] * (at / low) ** slope
+            below, above = np.log(ends)
+            power = np.exp(below + (above - below) * (np.log(at / low) / np.log(high / low)))
         return np.where(curved, power, values)
 
     return straight

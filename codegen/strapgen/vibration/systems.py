@@ -13,7 +13,7 @@ import sympy as sp
 from strapgen import catalogue, checks
 from strapgen.algebra import exact
 from strapgen.catalogue import Choice
-from strapgen.exceptions import InputError
+from strapgen.exceptions import InputError, InputTypeError
 from strapgen.kernel import Kernel
 from strapgen.powers import Powers
 from strapgen.signal import Signal
@@ -28,6 +28,10 @@ ANGLES, VELOCITIES = ("angle_x", "angle_y"), ("velocity_x", "velocity_y")
 CHANNELS = (*ANGLES, *VELOCITIES)
 #: Inputs that are samples of it.
 SAMPLES = ("increments", "increment", "turns", "velocity_increments", "velocity_increment")
+#: Kernels of the catalogue that sum over a slow cycle.
+RECURSIONS = ("coning-fast", "sculling-fast-1", "sculling-fast-2", "two-speed-fast-1", "two-speed-fast-2")
+#: What can be assessed of the catalogue.
+NAMES = (*catalogue.ALGORITHMS, *catalogue.VECTORS, *RECURSIONS)
 #: The kernel that follows a rotation vector and a sculling term: attitude and velocity after a step.
 _SLOW_LOOP = "dcm-two-speed-slow-2"
 
@@ -93,20 +97,35 @@ def of(
 
     Raises
     ------
+    InputTypeError
+        If it is no kernel.
     InputError
         If the kernel is none of these, or has no expansion to second order.
     """
-    taken = [signal for signal in kernel.inputs if signal.name in SAMPLES]
+    taken = [signal for signal in checked(kernel).inputs if signal.name in SAMPLES]
     if not any(signal.unit == "rad" for signal in taken):
         raise InputError(
-            f"kernel {kernel.name} takes no angle increments; an attitude step, rotation-vector, sculling or a fast "
-            "loop (coning-fast, sculling-fast-1, sculling-fast-2) can be assessed"
+            f"kernel {kernel.name} takes no samples of a vibration; allowed: {', '.join(NAMES)}, or a kernel of your "
+            "own that takes angle increments"
         )
     if kernel.companions is not None:
         return _of_step(kernel, taken, nodes)
     if kernel.recursion is not None:
         return _of_recursion(kernel, taken, unit)
     return _of_vector(kernel, taken, nodes, previous)
+
+
+def checked(kernel: Any) -> Kernel:
+    """Return a kernel if it is one.
+
+    Raises
+    ------
+    InputTypeError
+        If it is none.
+    """
+    if not isinstance(kernel, Kernel):
+        raise InputTypeError(f"kernel is {kernel!r}; a Kernel is needed")
+    return kernel
 
 
 def _of_step(kernel: Kernel, taken: Sequence[Signal], nodes: Sequence[Fraction | sp.Expr]) -> System:
