@@ -5,13 +5,15 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from strapgen.recording import History
 from strapgen.simulation import Run
-from strapgen.strapdown import Course
+
+if TYPE_CHECKING:
+    from strapgen.strapdown import Course
 
 AXES = ("x", "y", "z")
 ANGLES = ("roll", "pitch", "heading")
