@@ -298,13 +298,16 @@ def test_sculling_is_the_dual_of_coning(form, count, previous):
 
 
 @pytest.mark.parametrize(("count", "previous"), [(1, 0), (3, 0), (2, 2)])
-@FORM
-def test_at_a_constant_rate_the_rotation_vector_is_the_sum_of_the_increments(form, count, previous):
-    kernel = derive("rotation-vector", f"coning-{form}", count, previous=previous)
-    ring, *w = sp.ring("x y z", sp.QQ)
-    values = dict(zip(kernel.inputs[0].elements, w * (count + previous), strict=True))
-    (phi,) = kernel.expand(values).values()
-    assert [ring(x) for x in phi] == [count * x for x in w]
+@pytest.mark.parametrize("method", [*FORMS, "polynomial"])
+def test_about_one_axis_the_rotation_vector_is_the_sum_of_the_increments(method, count, previous):
+    # Whatever the sizes are, those before the step too: no product of second, third or fourth order is left.
+    kernel = derive("rotation-vector", f"coning-{method}", count, previous=previous)
+    ring, *axis = sp.ring("x y z", sp.QQ)
+    random = Random(19)
+    sizes = [sp.QQ(random.randint(-9, 9), random.randint(1, 5)) for _ in range(count + previous)]
+    turns = [size * x for size in sizes for x in axis]
+    (phi,) = kernel.expand(dict(zip(kernel.inputs[0].elements, turns, strict=True))).values()
+    assert [ring(x) for x in phi] == [sum(sizes[previous:]) * x for x in axis]
 
 
 def test_a_method_without_rotation_vector_is_refused():
@@ -398,7 +401,6 @@ def test_measured_drift_in_double_is_the_residual(form, samples, previous):
     [
         pytest.param(form, n, p, marks=pytest.mark.long if form == "combined" and n + p > 4 else ())
         for form, (n, p) in product(FORMS, ALL)
-        if p in (0, 2) or n < 3
     ],
 )
 def test_measured_drift_in_many_digits_is_the_residual(form, samples, previous):
@@ -428,6 +430,32 @@ def test_measured_drift_in_many_digits_is_the_residual(form, samples, previous):
             60
         )
         assert abs(found / mpmath.mpf(str(wanted)) - 1) < 0.01
+
+
+@pytest.mark.parametrize(("samples", "previous"), FEW)
+@FORM
+def test_measured_sculling_drift_is_the_residual(form, samples, previous):
+    # Angle a sin(W t), force D sin(W t + f) across it: what is left of S2 is what is left on a cone whose half-angle
+    # has the square a D cos(f) / W; in every cycle, wherever it begins.
+    kernel = derive("sculling", f"coning-{form}", samples, previous=previous)
+    with mpmath.workdps(60):
+        a, D, f, W, T = (mpmath.mpf(x) / 10 for x in (3, 50, 7, 20, 2))
+        interval = samples * T
+        true = a * D * mpmath.cos(f) / 2 * (1 - mpmath.sin(W * interval) / (W * interval))
+        wanted = stated(form, samples, previous, sp.Symbol("alpha"), sp.Integer(2), sp.Rational(1, 5))
+        wanted = mpmath.mpf(str((wanted / sp.Symbol("alpha") ** 2).evalf(60))) * a * D * mpmath.cos(f) / W
+        for begin in (mpmath.mpf(0), mpmath.mpf(1) / 3):
+            times = [begin + k * T for k in range(-previous, samples + 1)]
+            angles = [a * (mpmath.sin(W * t) - mpmath.sin(W * s)) for s, t in pairwise(times)]
+            velocities = [
+                -D / W * (mpmath.cos(W * t + f) - mpmath.cos(W * s + f)) for s, t in pairwise(times)
+            ]
+            row = [x for d in angles for x in (d, 0, 0)] + [x for v in velocities for x in (0, v, 0)]
+            names = [name for signal in kernel.inputs for name in signal.elements]
+            values = dict(zip(names, map(mpmath.mpf, row), strict=True))
+            (found,) = kernel.expand(values, lambda q: mpmath.mpf(int(q.p)) / int(q.q)).values()
+            assert abs((found[2] / interval - true) / wanted - 1) < mpmath.mpf(10) ** -40
+            assert found[:2] == [0, 0]
 
 
 def largest(form: str, samples: int, previous: int = 0) -> float:

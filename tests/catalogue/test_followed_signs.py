@@ -7,6 +7,7 @@ from itertools import product
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from tolerances import one_call
 
 import strapgen
 
@@ -39,15 +40,63 @@ def test_round_trips_and_signs(name, backend, count, rng):
     assert np.all(np.abs(back - end.as_matrix()).max(axis=(-2, -1)) <= rounding + 4 * EPS)
 
 
-def test_the_rule_of_the_largest_element_fails_beyond_its_limit(rng):
+def corners() -> np.ndarray:
+    """Return the parameters of all quarter turns about three axes in turn, and of half turns about axes between."""
+    quarters = Rotation.from_euler("ZYX", list(product((-90, 0, 90, 180), repeat=3)), degrees=True).as_quat()
+    axes = np.array([axis for axis in product((-1, 0, 1), repeat=3) if any(axis)] + [(1, 2, -2)], float)
+    axes /= np.linalg.norm(axes, axis=-1, keepdims=True)
+    return np.concatenate([quarters, np.column_stack([axes, np.zeros(len(axes))])])
+
+
+def parameters_known_to(backend_name: str) -> float:
+    """Return the bound of the rounding of parameters whose sign is told.
+
+    A parameter is no worse than the matrix: half a unit of each element is one of a parameter. In fixed point the
+    arithmetic is certified; both rules have the same but for the sign, and the one that compares a number with zero as
+    it was given cannot turn the sign over.
+    """
+    return one_call(strapgen.evaluator("euler-from-dcm-sheppard", backend_name), 4)
+
+
+@pytest.mark.parametrize("name", RULES)
+def test_quarter_and_half_turns(name, backend_name):
+    # Where parameters are equal in size, or the scalar is zero, the sign is still that of the call before.
+    ends = corners()
+    assert len(ends) == 64 + 27
+    matrices = Rotation.from_quat(ends).as_matrix()
+    convert = strapgen.evaluator(name, backend_name)
+    allowed = parameters_known_to(backend_name)
+    for sign in (1, -1):
+        made = np.asarray(convert(matrices.astype(convert.dtype), (sign * ends).astype(convert.dtype)), float)
+        assert np.abs(made - sign * ends).max() <= allowed
+        # The matrix is quadratic in the parameters: an error of each stands there twice, times the others.
+        rounding = 2 * np.abs(made).sum(axis=-1) * allowed
+        if allowed <= 4 * EPS:
+            rounding = np.abs(made).sum(axis=-1) * np.spacing(np.abs(made)).max(axis=-1)
+        back = strapgen.evaluator("dcm-from-euler")(made)
+        assert np.all(np.abs(back - matrices).max(axis=(-2, -1)) <= rounding + 4 * EPS)
+
+
+@pytest.mark.parametrize(("first", "turn", "holds"), [(-1e-3, 60.56, False), (0.01, 59.83, True)])
+def test_the_rule_of_the_largest_element_holds_to_60_degrees(first, turn, holds, backend_name):
+    # The parameters are next to equal now, the first one the largest; 60 degrees before it was zero.
+    before, after = np.array([first, 1, 1, 1]), np.array([1.01, 1, 1, 1])
+    before, after = before / np.linalg.norm(before), after / np.linalg.norm(after)
+    assert 2 * np.degrees(np.arccos(before @ after)) == pytest.approx(turn, abs=0.005)
+    matrix = Rotation.from_quat(after).as_matrix()
+    for name, sign in (("euler-from-dcm-sheppard", 1 if holds else -1), ("euler-from-dcm-continuous", 1)):
+        convert = strapgen.evaluator(name, backend_name)
+        made = np.asarray(convert(matrix.astype(convert.dtype), before.astype(convert.dtype)), float)
+        assert np.abs(made - sign * after).max() <= parameters_known_to(backend_name)
+
+
+def test_the_rule_of_the_largest_element_fails_for_some_turns_of_100_degrees(rng):
     start = Rotation.random(20_000, rng=rng)
-    end = start * Rotation.from_rotvec(np.radians(61) * np.array([1, 0, 0]))
-    end_of_others = start * turns(20_000, 100, rng)
-    for after, least in ((end, 0), (end_of_others, 1)):
-        made = strapgen.evaluator("euler-from-dcm-sheppard")(after.as_matrix(), start.as_quat())
-        assert ((made * start.as_quat()).sum(axis=-1) < 0).sum() >= least
-        made = strapgen.evaluator("euler-from-dcm-continuous")(after.as_matrix(), start.as_quat())
-        assert ((made * start.as_quat()).sum(axis=-1) >= 0).all()
+    end = start * turns(20_000, 100, rng)
+    made = strapgen.evaluator("euler-from-dcm-sheppard")(end.as_matrix(), start.as_quat())
+    assert ((made * start.as_quat()).sum(axis=-1) < 0).any()
+    made = strapgen.evaluator("euler-from-dcm-continuous")(end.as_matrix(), start.as_quat())
+    assert ((made * start.as_quat()).sum(axis=-1) >= 0).all()
 
 
 def test_zero_counts_as_plus():

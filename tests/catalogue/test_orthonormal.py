@@ -302,3 +302,22 @@ def test_first_order_normalization_leaves_the_square_of_the_error(name, rng):
     for error in (1e-2, 1e-4, -1e-4):
         left = np.linalg.norm(normalize(state * (1 + error))) - 1
         assert left == pytest.approx(-1.5 * error**2, rel=abs(error) * 2, abs=4e-16)
+
+
+@pytest.mark.parametrize("name", ["euler", "cayley-klein"])
+def test_first_order_normalization_is_the_sources(name):
+    # (41), (42): the error is q q* - 1, and half of its product with q is taken away.
+    e = sp.Symbol("e")
+    q = sp.Matrix(sp.symbols("x y z s"))
+    error = algebra.quaternion_product(q, algebra.quaternion_conjugate(q)) - sp.Matrix([0, 0, 0, 1])
+    wanted = q - algebra.quaternion_product(error, q) / 2
+    first = name == "cayley-klein"  # the scalar
+    state = [q[3], *q[:3]] if first else list(q)
+    made = sp.Matrix(apply(f"{name}-normalize-first-order", state))
+    made = sp.Matrix([*made[1:], made[0]]) if first else made
+    assert (made - wanted).expand() == sp.zeros(4, 1)
+    # Of a length 1 + e is left 1 - 3/2 e^2 - e^3/2, exactly.
+    unit = [sp.Rational(x, 9) for x in (2, -4, 5, 6)]
+    made = apply(f"{name}-normalize-first-order", [(1 + e) * x for x in unit])
+    left = 1 - sp.Rational(3, 2) * e**2 - e**3 / 2
+    assert [sp.expand(x - left * y) for x, y in zip(made, unit, strict=True)] == [0] * 4

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import pytest
 import sympy as sp
 
-from strapgen import algebra
+from strapgen import algebra, derive
 from strapgen.algebra import cross_elements
+from strapgen.catalogue.kinematics import EULER
 from strapgen.catalogue.munthe_kaas import bortz
 
 A = sp.Symbol("alpha", positive=True)
@@ -41,6 +43,24 @@ def test_bortz_equation_follows_from_the_quaternions():
     assert solution[Y] == sp.Rational(1, 2)
     assert sp.simplify(solution[X] - (1 - BRACKET * A**2)) == 0
     assert sp.simplify(solution[Z] - BRACKET * P) == 0
+
+
+def test_bortz_equation_is_that_of_the_codes_quaternions():
+    # Component by component: the derivative of the quaternion of alpha, where alpha obeys (20), is the product h w / 2
+    # of the kinematics, its order and signs included.
+    alpha, w = (sp.Matrix(sp.symbols(f"{name}x {name}y {name}z")) for name in "aw")
+    first = algebra.cross(alpha, w)
+    rate = w + first / 2 + BRACKET * algebra.cross(alpha, first)
+    f3, f4 = sp.sin(A / 2) / A, sp.cos(A / 2)
+    angle_rate = algebra.dot(alpha, rate) / A
+    derivative = sp.Matrix([*(sp.diff(f3, A) * angle_rate * alpha + f3 * rate), sp.diff(f4, A) * angle_rate])
+    wanted = EULER.derivative(sp.Matrix([*(f3 * alpha), f4]), EULER.scale * w)
+    for x, y in zip(derivative, wanted, strict=True):
+        polynomial = sp.Poly(sp.expand(x - y), *alpha, *w)
+        # The square of the last component is what the others leave of the square of the angle.
+        square = sp.Poly(algebra.dot(alpha, alpha) - A**2, *alpha, *w)
+        rest = sp.rem(polynomial, square, alpha[2])
+        assert all(sp.simplify(c) == 0 for c in sp.Poly(rest, *alpha, *w).coeffs())
 
 
 def test_the_slip_of_the_appendix_vanishes_in_the_limit():
@@ -164,3 +184,50 @@ def test_without_its_third_term_the_equation_is_worse_than_two_integrals():
     assert difference(made, 4) == combination(
         (-sp.Rational(1, 96), cross_elements(w0, cross_elements(w0, w1)))
     )
+
+
+TIMED, TIME = sp.ring("T", RING.to_domain())
+
+
+def recursion(cycles: int) -> Series:
+    """Return phi of (26) after so many fast cycles, the increment before the first one known."""
+    turned = integral(RATE)
+
+    def angle(k: int) -> list:
+        end = sp.Rational(k, cycles)
+        return [
+            sum((TIME**n * (x[axis] * end**n) for n, x in enumerate(turned)), TIMED(0)) for axis in range(3)
+        ]
+
+    def given(kernel, state) -> dict:
+        values = {name: x for s in kernel.inputs for name, x in zip(s.elements, state[s.name], strict=True)}
+        return {name: list(map(TIMED, x)) for name, x in kernel.expand(values).items()}
+
+    fast, zero = derive("coning-fast"), [TIMED(0)] * 3
+    increments = [[b - a for a, b in zip(angle(k - 1), angle(k), strict=True)] for k in range(cycles + 1)]
+    state = {"angle_sum": zero, "coning": zero, "previous_increment": increments[0]}
+    for increment in increments[1:]:
+        made = given(fast, state | {"increment": increment})
+        state = {name: made[output] for output, name in fast.recursion.inputs.items()}
+    phi = given(derive("coning-slow"), state)["rotation_vector"]
+    return [[x.coeff(TIME**n) for x in phi] for n in range(ORDER + 1)]
+
+
+@pytest.mark.parametrize("cycles", [1, 2, 3])
+def test_the_recursion_compares_with_third_order(cycles):
+    # (26) against (20), on any rate: nothing up to the third power, as of a method of third order. The fourth has what
+    # a ramp leaves of a curved rate, -w0 x w2 / 24, by the cube of the number of cycles. (21) begins with the sixth
+    # power, (22) with the fifth: more cycles bring the recursion to (22).
+    made = recursion(cycles)
+    assert all(difference(made, power) == ZERO for power in range(4))
+    w0, _, w2 = W[:3]
+    wanted = combination((-sp.Rational(1, 24 * cycles**3), cross_elements(w0, w2)))
+    assert difference(made, 4) == wanted != ZERO
+
+
+def test_the_recursion_leaves_the_fifth_power_of_two_integrals():
+    # What stands in the fifth power for any number N of cycles is that of (22), and terms in 1/N^2 and less of two
+    # vectors only: (26) has the products of three and four that (22) has.
+    for cycles in (1, 2):
+        found, wanted = difference(recursion(cycles), 5), difference(second(), 5)
+        assert [sum((RING({m: c}) for m, c in x.terms() if sum(m) > 2), RING(0)) for x in found] == wanted

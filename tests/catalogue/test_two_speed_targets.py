@@ -8,6 +8,7 @@ from evidence import corners_and_random
 
 import strapgen
 import strapgen.exceptions
+from strapgen import derive, generate, lower
 from strapgen.catalogue import TWO_SPEED
 from strapgen.fixedpoint import Settings
 
@@ -54,3 +55,27 @@ def test_every_target_computes_the_kernel(name, rng):
             np.testing.assert_allclose(one, other, rtol=0, atol=8e-16 * max(1.0, float(np.abs(one).max())))
             apart = np.abs(model.numbers(argument, made).ravel() - one.ravel())
             assert np.all(apart <= [float(error) * (1 + 1e-6) for error in argument.errors])
+
+
+#: Higher orders have the same code, and more terms of the same series.
+FEW_ORDERS = [
+    name for name in TWO_SPEED if not name.rpartition("-update-")[1] or int(name.split("-")[-1]) <= 5
+]
+
+
+@pytest.mark.long
+def test_every_kernel_lowers_for_every_target():
+    assert len(FEW_ORDERS) == len(TWO_SPEED) - 3 * 15
+    for name in FEW_ORDERS:
+        program = lower(derive(name))
+        function = name.replace("-", "_")
+        for target in ("numpy", "c"):
+            assert generate(program, target).function.name == function
+        for word in (16, 32):
+            sources = generate(program, "c-fixed", Settings(word=word))
+            assert sources.fixed.settings.word == word
+            # Errors are below what 8 bits hold, but for a sign that rounding may turn over at half a turn.
+            if name != "euler-from-dcm-continuous":
+                for argument in sources.fixed.outputs:
+                    size = float(argument.high * argument.format.unit)
+                    assert all(0 <= float(error) < size / 2**8 for error in argument.errors), name

@@ -13,11 +13,13 @@ import strapgen
 from strapgen import algebra, derive
 from strapgen.backends import BACKENDS
 from strapgen.catalogue.kinematics import KINEMATICS
+from strapgen.fixedpoint import Settings
 from strapgen.targets import FIXED
 
 ORDERS = [1, 2, 3, 4, 5, 7, pytest.param(12, marks=pytest.mark.long)]
 PRECISE = mpmath.mp.clone()
 PRECISE.dps = 50
+EPS = 2.0**-52
 
 
 @pytest.mark.parametrize("order", ORDERS)
@@ -52,30 +54,39 @@ def test_both_series_begin_as_the_functions(order):
             assert sp.expand(algebra.wave_series(x**2, first, order) - whole) == 0
 
 
-def test_the_navigation_frame_of_second_order_is_the_sources():
-    # (6): B = I - (theta x) + (theta x)^2 / 2. (15): r = (-theta/2, 1 - (theta/2)^2 / 2).
+@pytest.mark.parametrize("order", [1, 2])
+def test_the_navigation_frame_is_the_sources(order):
+    # (6): B = I - (theta x) + (theta x)^2 / 2. (15): r = (-theta/2, 1 - (theta/2)^2 / 2). First order has no squares.
     theta = sp.Matrix(sp.symbols("theta_x theta_y theta_z", real=True))
-    made = derive("dcm-navigation-update-2")
+    made = derive(f"dcm-navigation-update-{order}")
     C = sp.Matrix(3, 3, [sp.Symbol(n, real=True) for n in made.inputs[0].elements])
     K = algebra.skew(theta)
-    wanted = (sp.eye(3) - K + K * K / 2) * C
+    wanted = (sp.eye(3) - K + (order - 1) * K * K / 2) * C
     assert (sp.Matrix(3, 3, made.expand()["next"]) - wanted).expand() == sp.zeros(3, 3)
-    made = derive("euler-navigation-update-2")
+    made = derive(f"euler-navigation-update-{order}")
     q = sp.Matrix([sp.Symbol(n, real=True) for n in made.inputs[0].elements])
-    r = sp.Matrix([*(-theta / 2), 1 - algebra.dot(theta, theta) / 8])
+    r = sp.Matrix([*(-theta / 2), 1 - (order - 1) * algebra.dot(theta, theta) / 8])
     wanted = algebra.quaternion_product(r, q)
     assert (sp.Matrix(made.expand()["next"]) - wanted).expand() == sp.zeros(4, 1)
 
 
 @pytest.mark.parametrize("order", ["", "-1", "-2"])
 def test_a_turn_of_both_frames_leaves_the_attitude(algorithm, order, rng):
-    # A body at the reference attitude that turns with the navigation frame stays there, but for what is cut off.
+    # A body at the reference attitude that turns with the navigation frame stays there, but for what is cut off:
+    # (I + K)(I - K) = I - K^2 and (I + K + K^2/2)(I - K + K^2/2) = I + K^4/4, K^2 = theta theta' - |theta|^2 and
+    # K^4 = -|theta|^2 K^2; with quaternions theta/2 stands for K, and its square is -|theta|^2/4.
     identity = np.array(KINEMATICS[algorithm].identity, float).squeeze()
     theta = rng.uniform(-1e-3, 1e-3, (20, 3))
     turned = strapgen.evaluator(f"{algorithm}-update{order}")(identity, theta)
     back = strapgen.evaluator(f"{algorithm}-navigation-update{order}")(turned, theta)
-    left = {"": 4e-16, "-1": 4e-6, "-2": 1e-8}[order]
-    assert np.abs(back - identity).max() <= left
+    square = (theta**2).sum(axis=-1)
+    if algorithm == "dcm":
+        squares = theta[:, :, None] * theta[:, None, :] - square[:, None, None] * identity
+        left = {"": 0 * squares, "-1": -squares, "-2": -square[:, None, None] * squares / 4}[order]
+    else:
+        left = {"": 0 * square, "-1": square / 4, "-2": square**2 / 64}[order][:, None] * identity
+    # Transitions next to the identity are rounded once each, their product once for each of two terms near 1 or less.
+    assert np.abs(back - identity - left).max() <= 2 * EPS
 
 
 def exact_transition(algorithm: str, phi: np.ndarray) -> list[mpmath.mpf]:
@@ -95,34 +106,63 @@ def exact_transition(algorithm: str, phi: np.ndarray) -> list[mpmath.mpf]:
     ]
 
 
-#: Angles around every switch: no angle, squares that vanish, and all sizes up to more than half a turn.
+#: Angles around every switch: no angle, squares that vanish, and all sizes up to the bound of the kernel's formats.
 SIZES = (0.0, 5e-324, 1e-200, 1e-154, 1e-30, 1e-16, 1.5e-8, 3e-5, 1e-3, 0.0625, 0.5, 0.999)
+
+
+DIRECTIONS = np.array([[1, 0, 0], [0, -1, 0], [0.6, 0, 0.8], [2 / 3, -1 / 3, 2 / 3]])
+
+
+def check_exact(update, algorithm: str, phi: np.ndarray, fixed: bool) -> None:
+    """Compare the rotation by each vector with that of many digits."""
+    identity = np.array(KINEMATICS[algorithm].identity, float).squeeze()
+    if fixed:
+        (state, given), (result,) = update.interface.inputs, update.interface.outputs
+        phi = update.numbers(given, update.integers(given, phi))
+        identity = update.numbers(state, update.integers(state, identity))
+        allowed = np.tile([float(error) for error in result.errors], (len(phi), 1))
+    else:
+        phi = phi.astype(update.dtype).astype(float)
+        # Sums and products of numbers up to 1, and twice what rounding makes of the angle: the square and its root.
+        size = np.linalg.norm(phi, axis=-1, keepdims=True)
+        allowed = (4 + 2 * np.where(size > 1, size, 0)) * np.finfo(update.dtype).eps
+        allowed = np.broadcast_to(allowed, (len(phi), identity.size))
+    made = update(identity.astype(update.dtype), phi.astype(update.dtype)).reshape(len(phi), -1)
+    for row, vector, bound in zip(made, phi, allowed, strict=True):
+        wanted = exact_transition(algorithm, vector)
+        apart = [abs(float(PRECISE.mpf(float(x)) - y)) for x, y in zip(row, wanted, strict=True)]
+        assert np.all(apart <= bound)
 
 
 def test_the_exact_form_needs_no_switch(algorithm, backend_name):
     # sin(x)/x is as good near 0 as elsewhere; only at 0 it must be 1. In fixed point a polynomial of the square takes
     # its place, and the bound is certified.
     update = strapgen.evaluator(f"{algorithm}-update", backend_name)
-    identity = np.array(KINEMATICS[algorithm].identity, float).squeeze()
-    directions = np.array([[1, 0, 0], [0, -1, 0], [0.6, 0, 0.8], [2, -1, 2]], float)
-    directions[3] /= 3
-    phi = np.concatenate([size * directions for size in SIZES])
-    if BACKENDS[backend_name].target in FIXED:
-        (given, result), (state, _) = (
-            (update.interface.inputs[1], update.interface.outputs[0]),
-            update.interface.inputs,
-        )
-        phi = update.numbers(given, update.integers(given, phi))
-        identity = update.numbers(state, update.integers(state, identity))
-        allowed = np.array([float(error) for error in result.errors])
-    else:
-        phi = phi.astype(update.dtype).astype(float)
-        allowed = np.full(identity.size, 4 * np.finfo(update.dtype).eps)
-    made = update(identity.astype(update.dtype), phi.astype(update.dtype)).reshape(len(phi), -1)
-    for row, vector in zip(made, phi, strict=True):
-        wanted = exact_transition(algorithm, vector)
-        apart = [abs(float(PRECISE.mpf(float(x)) - y)) for x, y in zip(row, wanted, strict=True)]
-        assert np.all(apart <= allowed)
+    phi = np.concatenate([size * DIRECTIONS for size in SIZES])
+    check_exact(update, algorithm, phi, BACKENDS[backend_name].target in FIXED)
+
+
+#: Up to half a turn, on the spot and beyond, to a whole one and beyond.
+LARGE = (1.5, 3.0, np.pi - 1e-9, np.pi, np.pi + 1e-9, 4.0, 2 * np.pi - 1e-9, 2 * np.pi, 7.0)
+
+
+@pytest.mark.parametrize("backend", ["numpy", "c"])
+def test_the_exact_form_holds_to_a_whole_turn(algorithm, backend):
+    phi = np.concatenate([size * DIRECTIONS for size in LARGE])
+    check_exact(strapgen.evaluator(f"{algorithm}-update", backend), algorithm, phi, fixed=False)
+
+
+@pytest.mark.parametrize("algorithm", ["dcm", "euler"])
+def test_the_exact_form_holds_beyond_half_a_turn_in_fixed_point(algorithm):
+    # Elements of up to 3 rad: their angle goes to 5.19 rad.
+    update = strapgen.evaluator(
+        f"{algorithm}-update", "c-q31", Settings(ranges={"rotation_vector": Fraction(3)})
+    )
+    directions = np.vstack([DIRECTIONS, np.array([1, -1, 1]) / np.sqrt(3)])
+    phi = np.concatenate([size * directions for size in (*SIZES, *LARGE, 5.19)])
+    phi = phi[np.abs(phi).max(axis=-1) <= 3]
+    assert np.linalg.norm(phi, axis=-1).max() > 5
+    check_exact(update, algorithm, phi, fixed=True)
 
 
 def test_small_turns_keep_their_digits(rng):
@@ -150,3 +190,82 @@ def test_orders_are_told():
     assert "up to degree 5" in derive("dcm-update-5").notes[0]
     assert derive("dcm-update-5").name == "dcm-update-5"
     assert derive("dcm-update").inputs[1].bound == Fraction(1)
+
+
+# What the source says of the size of the rotation, and of orthonormalization
+
+
+@pytest.mark.parametrize("order", range(1, 6))
+@pytest.mark.parametrize("name", ["dcm", "euler"])
+def test_what_is_cut_off_at_a_tenth_of_a_radian(name, order):
+    # The leading term from the series of sine and cosine beside what the kernel leaves. Of each further term of the
+    # series elements are no larger than the power over the factorial: of angle^(order + 2) and less, together.
+    x = sp.Symbol("x", positive=True)
+    axis = sp.Matrix([2, -1, 2]) / 3
+    update = derive(f"{name}-update-{order}")
+    identity = list(KINEMATICS[name].identity)
+    values = dict(zip(update.inputs[0].elements, identity, strict=True))
+    values |= dict(zip(update.inputs[1].elements, x * axis, strict=True))
+    made = [sp.expand(c) for c in update.expand(values)["next"]]
+    if name == "dcm":
+        K = algebra.skew(axis)
+        whole = list(sp.eye(3) + sp.sin(x) * K + (1 - sp.cos(x)) * K * K)
+    else:
+        whole = [*(sp.sin(x / 2) * axis), sp.cos(x / 2)]
+    left = [sp.series(c, x, 0, order + 2).removeO() - m for c, m in zip(whole, made, strict=True)]
+    leading = [sp.expand(c).coeff(x, order + 1) for c in left]
+    assert [sp.expand(c - y * x ** (order + 1)) for c, y in zip(left, leading, strict=True)] == [0] * len(
+        left
+    )
+    half = 1 if name == "dcm" else 2
+    size = sp.Rational(1, half ** (order + 1) * sp.factorial(order + 1))
+    assert 0 < max(abs(c) for c in leading) <= size
+    angle = 0.1
+    phi = angle * np.array([2, -1, 2]) / 3
+    found = strapgen.evaluator(update.name)(
+        np.array(identity, float).reshape(update.inputs[0].shape), phi
+    ).ravel()
+    error = np.array(
+        [float(y - PRECISE.mpf(float(c))) for y, c in zip(exact_transition(name, phi), found, strict=True)]
+    )
+    rest = 1.1 * (angle / half) ** (order + 2) / float(sp.factorial(order + 2))
+    assert np.abs(error - np.array(leading, float) * angle ** (order + 1)).max() <= rest + 2 * EPS
+    # What order three leaves of a tenth of a radian is below 5e-6, fifth order below 2e-9: the limit of the source.
+    assert np.abs(error).max() <= {1: 5e-3, 2: 2e-4, 3: 5e-6, 4: 1e-7, 5: 2e-9}[order]
+
+
+def stepped(update, state: np.ndarray, phi: np.ndarray) -> np.ndarray:
+    """Return a state after many calls of the generated C, one after the other."""
+    given, interface = [state, phi], getattr(update, "interface", None)
+    if interface is not None:
+        arguments = zip(interface.inputs, given, strict=True)
+        given = [update.integers(*pair).astype(update.word_type) for pair in arguments]
+    before, vectors = map(np.ascontiguousarray, given)
+    buffers = [update.pointer(array) for array in (before, np.empty_like(before))]
+    function, first = getattr(update.module.lib, update.function.name), update.pointer(vectors)
+    for k in range(len(phi)):
+        assert not function(buffers[k % 2], first + 3 * k, buffers[1 - k % 2])
+    assert len(phi) % 2 == 0
+    return before if interface is None else update.numbers(interface.outputs[0], before)
+
+
+@pytest.mark.parametrize("backend", ["c", "c-q31"])
+@pytest.mark.parametrize("name", ["dcm", "euler"])
+def test_exact_updates_need_no_orthonormalization(name, backend, rng):
+    # C'C - I, or the square of the length less 1, is turned by a step and not stretched: what steps add is summed.
+    # A step moves an element by what is certified, or by 8 units of round-off; C'C - I takes three elements of a
+    # column times those of another twice, the square of the length four elements, whose sum is at most 2, twice.
+    steps = 100_000
+    update = strapgen.evaluator(f"{name}-update", backend)
+    state = np.array(KINEMATICS[name].identity, float).squeeze()
+    state = stepped(update, state, rng.uniform(-0.1, 0.1, (steps, 3)))
+    left = np.abs(state.T @ state - (np.eye(3) if name == "dcm" else 1)).max()
+    interface = getattr(update, "interface", None)
+    error = 8 * EPS if interface is None else max(map(float, interface.outputs[0].errors))
+    a_step = 2 * (3 if name == "dcm" else 2) * error
+    assert left <= a_step * steps
+    # Rounding to the nearest has no preferred side, so what is left grows with the root of the steps: five times the
+    # deviation of such a walk, which is less than a quarter of the bound of a step.
+    assert left <= 5 * a_step / 4 * np.sqrt(steps)
+    # And it does turn: the attitude is far from where it began.
+    assert np.abs(state - np.array(KINEMATICS[name].identity, float).squeeze()).max() > 0.1
