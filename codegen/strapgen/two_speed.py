@@ -249,7 +249,8 @@ class _Door:
     def taken(self, name: str, values: Array, *, summed: bool = False) -> Array:
         """Return samples, (count, elements), as the loop takes them; sums of them lose no more than one rounding."""
         if name not in self.arguments:
-            return np.ascontiguousarray(values, self.dtype)
+            with np.errstate(over="ignore"):  # what does not stay finite is refused after the run
+                return np.ascontiguousarray(values, self.dtype)
         argument, kernel = self.arguments[name]
         if summed and argument.format.word < _EXACT_BITS:
             values = pulses(values[:, None], argument.format.unit)[:, 0]
