@@ -147,11 +147,11 @@ _TWO_SPEED = {
     "navigation-rotation": Recipe(
         "rotation of the navigation frame, trapezoidal", "updates", "navigation_rotation"
     ),
-    "coning-fast": Recipe("rotation vector by recursion: fast loop", "two_speed", "coning"),
-    "coning-slow": Recipe("rotation vector by recursion: slow loop", "two_speed", "rotation_vector"),
+    "coning-fast": Recipe("rotation vector by recursion: fast loop", "coning_sculling", "coning"),
+    "coning-slow": Recipe("rotation vector by recursion: slow loop", "coning_sculling", "rotation_vector"),
     **{
         f"sculling-fast-{form}": Recipe(
-            f"sculling integral S{form} by recursion: fast loop", "two_speed", "sculling", (form,)
+            f"sculling integral S{form} by recursion: fast loop", "coning_sculling", "sculling", (form,)
         )
         for form in (1, 2)
     },
@@ -168,18 +168,20 @@ _TWO_SPEED = {
         "velocity correction for the rotation of the navigation frame", "acceleration", "navigation_velocity"
     ),
     **{
-        f"two-speed-fast-{form}": Recipe(f"two speeds: fast loop with S{form}", "loops", "fast", (form,))
+        f"two-speed-fast-{form}": Recipe(f"two speeds: fast loop with S{form}", "two_speed", "fast", (form,))
         for form in (1, 2)
     },
     **{
         f"{name}-two-speed-slow-{form}": Recipe(
-            f"two speeds: slow loop with S{form}", "loops", "slow", (name, form)
+            f"two speeds: slow loop with S{form}", "two_speed", "slow", (name, form)
         )
         for name in ("dcm", "euler")
         for form in (1, 2)
     },
     **{
-        f"{name}-two-speed-navigation": Recipe("two speeds: navigation loop", "loops", "navigation", (name,))
+        f"{name}-two-speed-navigation": Recipe(
+            "two speeds: navigation loop", "two_speed", "navigation", (name,)
+        )
         for name in ("dcm", "euler")
     },
     "dcm-rows-orthogonalize": Recipe(

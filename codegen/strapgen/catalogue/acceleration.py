@@ -8,8 +8,8 @@ import sympy as sp
 
 from strapgen import algebra
 from strapgen.algebra import cross
+from strapgen.catalogue.coning_sculling import ANGLE_SUM, SCULLING, VELOCITY_SUM
 from strapgen.catalogue.kinematics import DCM_MEANING, KINEMATICS, SAVAGE, UNIT
-from strapgen.catalogue.two_speed import ANGLE_SUM, SCULLING, VELOCITY_SUM
 from strapgen.catalogue.updates import NAVIGATION_ROTATION
 from strapgen.kernel import Kernel, KernelBuilder
 from strapgen.signal import Signal

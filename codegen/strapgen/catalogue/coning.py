@@ -26,7 +26,7 @@ import sympy as sp
 from sympy.polys.matrices import DomainMatrix
 
 from strapgen import checks
-from strapgen.catalogue import rates, rotation_series
+from strapgen.catalogue import rotation_series
 from strapgen.catalogue.rotation_series import Scalars, fraction
 from strapgen.exceptions import InputError
 
@@ -192,10 +192,9 @@ def _compressed(samples: int, previous: int) -> Scalars:
 
 
 def _uncompressed(samples: int, previous: int) -> Scalars:
-    fit = rates.from_increments(samples, previous)
     total = samples + previous
-    table = [{k: fraction(w) for k, w in enumerate(fit.taylor(power))} for power in range(total)]
-    found = rotation_series.pairs(rotation_series.substituted(rotation_series.terms(total, 2)[1], table))
+    second = rotation_series.terms(total, 2)[1]
+    found = rotation_series.pairs(rotation_series.in_samples(second, samples, previous))
     return {pair: found.get(pair, Fraction(0)) for pair in _pairs(total)}
 
 

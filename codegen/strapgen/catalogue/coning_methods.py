@@ -220,11 +220,8 @@ def sample_terms(
     third, fourth : dict
         See `rotation_series.third` and `rotation_series.fourth`; vectors are numbered from the oldest sample, 0.
     """
-    fit = rates.from_increments(increments, previous)
-    count = increments + previous
-    table = [{k: fraction(w) for k, w in enumerate(fit.taylor(power))} for power in range(count)]
-    terms = rotation_series.terms(count, 4)
-    third, fourth = (rotation_series.substituted(words, table) for words in terms[2:])
+    terms = rotation_series.terms(increments + previous, 4)
+    third, fourth = (rotation_series.in_samples(words, increments, previous) for words in terms[2:])
     return rotation_series.third(third), rotation_series.fourth(fourth)
 
 

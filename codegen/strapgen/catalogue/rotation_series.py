@@ -100,6 +100,23 @@ def substituted(words: Words, table: Sequence[Mapping[int, Fraction]]) -> Words:
     return words
 
 
+def in_samples(terms: Words, increments: int, previous: int = 0) -> Words:
+    """Return a term in r_0, r_1, ... in the samples whose polynomial the rate is.
+
+    Parameters
+    ----------
+    terms : dict
+        Of `terms`, for as many vectors as there are samples.
+    increments, previous : int
+        Samples of the step, and those before it.
+    """
+    fit = rates.from_increments(increments, previous)
+    return substituted(
+        terms,
+        [{k: fraction(w) for k, w in enumerate(fit.taylor(j))} for j in range(increments + previous)],
+    )
+
+
 def cross(left: Words, right: Words) -> Words:
     """Return the cross product of two sums of words, as a sum of words.
 

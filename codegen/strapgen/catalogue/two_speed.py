@@ -1,197 +1,150 @@
-"""The fast and the slow loop of strapdown algorithms in two speeds: coning and sculling by recursion."""
+"""The three loops of a strapdown algorithm in two speeds: fast, slow, and that of the navigation frame."""
 
 from __future__ import annotations
 
-from fractions import Fraction
+from dataclasses import replace
 
-import sympy as sp
-
-from strapgen.algebra import cross
-from strapgen.catalogue.kinematics import SAVAGE
-from strapgen.catalogue.updates import ROTATION_VECTOR
+from strapgen.catalogue.acceleration import NAVIGATION_VELOCITY, compensated, frame_correction, rotated
+from strapgen.catalogue.coning_sculling import (
+    ANGLE_SUM,
+    CONING,
+    INCREMENT,
+    PREVIOUS,
+    SCULLING,
+    VELOCITY_INCREMENT,
+    VELOCITY_SUM,
+    FastLoop,
+    coned,
+    rotation_vector_of,
+    sculled,
+)
+from strapgen.catalogue.kinematics import KINEMATICS, SAVAGE
+from strapgen.catalogue.updates import (
+    NAVIGATION_ROTATION,
+    PREVIOUS_TURN,
+    ROTATION_VECTOR,
+    TURN,
+    rotation_sum,
+    transition,
+    turned_frame,
+)
 from strapgen.kernel import Kernel, KernelBuilder
 from strapgen.recursion import Recursion
 from strapgen.signal import Signal, after
 
-INCREMENT = Signal.vector(
-    "increment",
-    "d",
-    unit="rad",
-    meaning="angle increment of the fast cycle, body axes: exact integral of the body rate",
-    bound=Fraction(1, 8),
-)
-PREVIOUS = Signal.vector(
-    "previous_increment",
-    "past",
-    unit="rad",
-    meaning="angle increment of the fast cycle before; zero at the start",
-    bound=Fraction(1, 8),
-)
-ANGLE_SUM = Signal.vector(
-    "angle_sum",
-    "beta",
-    unit="rad",
-    meaning="sum of the angle increments since the slow cycle began",
-    bound=Fraction(1),
-)
-CONING = Signal.vector(
-    "coning",
-    "coning",
-    unit="rad",
-    meaning="coning correction since the slow cycle began",
-    bound=Fraction(1, 8),
-)
-VELOCITY_INCREMENT = Signal.vector(
-    "velocity_increment",
-    "dv",
-    unit="m/s",
-    meaning="velocity increment of the fast cycle, body axes: exact integral of the specific force",
-    bound=Fraction(1),
-)
-VELOCITY_SUM = Signal.vector(
-    "velocity_sum",
-    "u",
-    unit="m/s",
-    meaning="sum of the velocity increments since the slow cycle began",
-    bound=Fraction(8),
-)
-SCULLING = Signal.vector(
-    "sculling",
-    "eta",
-    unit="m/s",
-    meaning="sculling integral since the slow cycle began",
-    bound=Fraction(4),
-)
 
-
-class FastLoop:
-    """The inputs of a fast cycle, and the outputs that take their place in the next one.
-
-    Attributes
-    ----------
-    build : KernelBuilder
-    states : list of (str, str)
-        Inputs and outputs, pair by pair.
-    """
-
-    def __init__(self) -> None:
-        self.build = KernelBuilder()
-        self.states: list[tuple[str, str]] = []
-
-    def hand_on(self, signal: Signal, value: sp.Matrix) -> None:
-        """Make a value the state of the next cycle."""
-        self.states.append((signal.name, after(signal).name))
-        self.build.output(after(signal), value)
-
-    def kernel(self, name: str, title: str, source: str) -> Kernel:
-        """Finish the kernel: the increment before is kept when a slow cycle ends, all else begins anew."""
-        kept = tuple(state for state, _ in self.states if state == PREVIOUS.name)
-        return self.build.kernel(
-            name, title, f"{SAVAGE}, {source}", recursion=Recursion(tuple(self.states), kept)
-        )
-
-
-def coned(
-    build: KernelBuilder, coning: sp.Matrix, beta: sp.Matrix, past: sp.Matrix, d: sp.Matrix
-) -> sp.Matrix:
-    """Return the coning correction after a fast cycle, equation (26).
+def fast(form: int) -> Kernel:
+    """Return the fast loop: coning and sculling from angle and velocity increments, equations (26) and (55) or (56).
 
     Parameters
     ----------
-    build : KernelBuilder
-    coning, beta : Matrix, 3 x 1
-        Coning correction and sum of the increments before the cycle.
-    past, d : Matrix, 3 x 1
-        Increments of the cycle before and of this one.
-    """
-    arm = Signal.vector("arm", "arm", unit="rad", meaning="angle at the middle of the cycle, for coning")
-    return coning + cross(build.stage(arm, beta + past / 6), d) / 2
-
-
-def sculled(
-    build: KernelBuilder,
-    form: int,
-    eta: sp.Matrix,
-    beta: sp.Matrix,
-    u: sp.Matrix | None,
-    d: sp.Matrix,
-    dv: sp.Matrix,
-) -> sp.Matrix:
-    """Return the sculling integral after a fast cycle: S1 by equation (55), S2 by (56).
-
-    Parameters
-    ----------
-    build : KernelBuilder
     form : int
-        1 or 2.
-    eta, beta, u : Matrix, 3 x 1
-        Sculling integral, sums of the angle and velocity increments before the cycle; S1 takes no u.
-    d, dv : Matrix, 3 x 1
-        Angle and velocity increment of the cycle.
-    """
-    if form == 1:
-        middle = Signal.vector("middle", "middle", unit="rad", meaning="angle at the middle of the cycle")
-        return eta + cross(build.stage(middle, beta + d / 2), dv)
-    return eta + (cross(beta, dv) + cross(u, d)) / 2
-
-
-def coning() -> Kernel:
-    """Return the fast loop of the rotation vector, equation (26).
+        Which sculling integral: 1 or 2.
 
     Returns
     -------
     Kernel
-        Inputs ``angle_sum``, ``coning``, ``previous_increment`` and ``increment``, all (3,) in rad; outputs
-        ``next_angle_sum``, ``next_coning``, ``next_previous_increment``.
+        Inputs ``angle_sum``, ``coning``, ``previous_increment``, ``velocity_sum``, ``sculling``, which are handed on,
+        and ``increment``, ``velocity_increment``; angles in rad, velocities in m/s, all (3,).
     """
     loop = FastLoop()
-    beta, correction, past, d = map(loop.build.input, (ANGLE_SUM, CONING, PREVIOUS, INCREMENT))
+    beta, coning, past, u, eta, d, dv = map(
+        loop.build.input,
+        (ANGLE_SUM, CONING, PREVIOUS, VELOCITY_SUM, SCULLING, INCREMENT, VELOCITY_INCREMENT),
+    )
     loop.hand_on(ANGLE_SUM, beta + d)
-    loop.hand_on(CONING, coned(loop.build, correction, beta, past, d))
+    loop.hand_on(CONING, coned(loop.build, coning, beta, past, d))
     loop.hand_on(PREVIOUS, d)
-    return loop.kernel("coning-fast", "Rotation vector by recursion: fast loop", "equation (26)")
-
-
-def rotation_vector() -> Kernel:
-    """Return the slow loop of the rotation vector: the sum of increments and coning correction, equation (26).
-
-    Returns
-    -------
-    Kernel
-        Inputs ``angle_sum`` and ``coning`` (3,) in rad; output ``rotation_vector`` (3,) in rad.
-    """
-    build = KernelBuilder()
-    beta, correction = build.input(ANGLE_SUM), build.input(CONING)
-    build.output(ROTATION_VECTOR, beta + correction)
-    return build.kernel(
-        "coning-slow", "Rotation vector by recursion: slow loop", f"{SAVAGE}, equations (22) and (26)"
-    )
-
-
-def sculling(form: int) -> Kernel:
-    """Return the fast loop of the velocity: S1 by equation (55) for form 1, S2 by (56) for form 2.
-
-    Parameters
-    ----------
-    form : int
-        1 or 2.
-
-    Returns
-    -------
-    Kernel
-        Inputs ``angle_sum``, ``velocity_sum``, ``sculling``, ``increment``, ``velocity_increment``; outputs
-        ``next_angle_sum``, ``next_velocity_sum``, ``next_sculling``. Angles in rad, velocities in m/s, all (3,).
-    """
-    loop = FastLoop()
-    beta, u, eta, d, dv = map(
-        loop.build.input, (ANGLE_SUM, VELOCITY_SUM, SCULLING, INCREMENT, VELOCITY_INCREMENT)
-    )
-    loop.hand_on(ANGLE_SUM, beta + d)
     loop.hand_on(VELOCITY_SUM, u + dv)
     loop.hand_on(SCULLING, sculled(loop.build, form, eta, beta, u, d, dv))
-    title = "Sculling with rotation compensation apart" if form == 2 else "Sculling and rotation compensation"
+    equation = "(55)" if form == 1 else "(56)"
     return loop.kernel(
-        f"sculling-fast-{form}",
-        f"{title} by recursion: fast loop",
-        f"equation {'(56)' if form == 2 else '(55)'}",
+        f"two-speed-fast-{form}", f"Two speeds: fast loop with S{form}", f"equations (26) and {equation}"
     )
+
+
+def slow(name: str, form: int) -> Kernel:
+    """Return the slow loop: velocity in navigation axes, attitude by the rotation vector, rotation of the frame.
+
+    Parameters
+    ----------
+    name : str
+        "dcm" or "euler".
+    form : int
+        Which sculling integral the fast loop makes: 1 or 2.
+
+    Returns
+    -------
+    Kernel
+        Inputs ``state``, ``navigation_velocity``, ``navigation_rotation``, ``previous_turn``, which are handed on; the
+        sums of the fast loop, ``angle_sum``, ``coning``, ``velocity_sum``, ``sculling``; and ``turn``, the rate of the
+        navigation frame times the slow cycle in rad.
+    """
+    kinematics = KINEMATICS[name]
+    build = KernelBuilder()
+    state, v, theta, before = map(
+        build.input, (kinematics.state, NAVIGATION_VELOCITY, NAVIGATION_ROTATION, PREVIOUS_TURN)
+    )
+    beta, coning, u, eta, turn = map(build.input, (ANGLE_SUM, CONING, VELOCITY_SUM, SCULLING, TURN))
+    phi = build.stage(ROTATION_VECTOR, rotation_vector_of(beta, coning))
+    made = transition(build, kinematics, phi)
+    states = (
+        (kinematics.state, kinematics.next, kinematics.product(state, made)),
+        (
+            NAVIGATION_VELOCITY,
+            after(NAVIGATION_VELOCITY),
+            v + rotated(build, name, state, compensated(build, form, u, eta, beta)),
+        ),
+        (NAVIGATION_ROTATION, after(NAVIGATION_ROTATION), rotation_sum(theta, before, turn)),
+        (PREVIOUS_TURN, after(PREVIOUS_TURN), turn),
+    )
+    for _, signal, value in states:
+        build.output(signal, value)
+    return build.kernel(
+        f"{name}-two-speed-slow-{form}",
+        f"Two speeds: slow loop of the {_title(name)}",
+        f"{SAVAGE}, equations (2) to (14), (22), (27) and {'(51)' if form == 1 else '(52)'}",
+        recursion=Recursion(
+            tuple((held.name, signal.name) for held, signal, _ in states),
+            kept=(kinematics.state.name, PREVIOUS_TURN.name),
+        ),
+    )
+
+
+def navigation(name: str) -> Kernel:
+    """Return the loop of the navigation frame: the attitude after its rotation, the velocity corrected for that.
+
+    Parameters
+    ----------
+    name : str
+        "dcm" or "euler".
+
+    Returns
+    -------
+    Kernel
+        Inputs ``state``, which is handed on, ``navigation_rotation`` and ``navigation_velocity``; outputs ``next`` and
+        ``velocity_change`` (3,) in m/s, the integral of the specific force in navigation axes as they turn.
+    """
+    kinematics = KINEMATICS[name]
+    build = KernelBuilder()
+    state, theta, v = map(build.input, (kinematics.state, NAVIGATION_ROTATION, NAVIGATION_VELOCITY))
+    build.output(kinematics.next, turned_frame(build, kinematics, state, theta))
+    gained: Signal = replace(
+        NAVIGATION_VELOCITY,
+        name="velocity_change",
+        elements=tuple(f"change_{axis}" for axis in "xyz"),
+        meaning="integral of the specific force over the navigation cycle, navigation axes as they turn",
+    )
+    build.output(gained, v + frame_correction(theta, v))
+    return build.kernel(
+        f"{name}-two-speed-navigation",
+        f"Two speeds: navigation loop of the {_title(name)}",
+        f"{SAVAGE}, equations (5), (15) and (59)",
+        recursion=Recursion(((kinematics.state.name, kinematics.next.name),), kept=(kinematics.state.name,)),
+    )
+
+
+def _title(name: str) -> str:
+    """Return what the attitude is, as it stands within a sentence."""
+    title = KINEMATICS[name].title
+    return title.lower() if name == "dcm" else title

@@ -144,6 +144,11 @@ def navigation_update(name: str, order: int | None = None) -> Kernel:
     )
 
 
+def rotation_sum(theta: sp.Matrix, before: sp.Matrix, turn: sp.Matrix) -> sp.Matrix:
+    """Return the rotation of the navigation frame after one more cycle, by the trapezoidal rule, equation (27)."""
+    return theta + (before + turn) / 2
+
+
 def navigation_rotation() -> Kernel:
     """Return the trapezoidal sum of the navigation frame's rate, by cycles of the body frame's update.
 
@@ -155,7 +160,7 @@ def navigation_rotation() -> Kernel:
     """
     build = KernelBuilder()
     theta, before, turn = map(build.input, (NAVIGATION_ROTATION, PREVIOUS_TURN, TURN))
-    build.output(after(NAVIGATION_ROTATION), theta + (before + turn) / 2)
+    build.output(after(NAVIGATION_ROTATION), rotation_sum(theta, before, turn))
     build.output(after(PREVIOUS_TURN), turn)
     return build.kernel(
         "navigation-rotation",

@@ -1,4 +1,4 @@
-"""The fast and slow loops: derived from what they assume of the motion, and the drift that is known of them."""
+"""Coning and sculling by recursion: derived from what they assume of the motion, and the drift known of them."""
 
 from __future__ import annotations
 
