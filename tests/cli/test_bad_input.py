@@ -37,6 +37,13 @@ BAD = {
     "two-speed dcm --target c-fixed --word 24": "word",
     "two-speed dcm --target c-fixed --range arm=1": "no loop has an input 'arm'",
     "two-speed dcm --format csv": "format 'csv' is not known",
+    # Numbers as Python alone writes them
+    "two-speed dcm --sculling 0_2": "sculling is '0_2'; a whole number is needed",
+    "derive euler --increments 0_2": "increments is '0_2'; a whole number is needed",
+    "generate euler --target c-fixed --word 3_2": "word is '3_2'; a whole number is needed",
+    "generate euler --target c-fixed --max-angle-rad 0.1_2": "largest angle is '0.1_2'; a finite number is needed",
+    "study word-length --words 1_6": "words is '1_6'; a whole number is needed",
+    f"strapdown dcm {LOG} --fast-cycles 4 --initial-deg 1,2,1_0": "initial-deg is '1_0'; a finite number is needed",
     # The rate table
     "stress --duration 0": "duration is 0",
     "stress --duration long": "duration is 'long'",

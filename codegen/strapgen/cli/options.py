@@ -98,9 +98,4 @@ def print_json(data: Any) -> None:
 
 def whole(what: str, value: str | None) -> int | None:
     """Read an option that takes a whole number."""
-    if value is None:
-        return None
-    try:
-        return int(value)
-    except ValueError:
-        raise InputError(f"{what} is {value!r}; a whole number is needed") from None
+    return None if value is None else checks.whole(what, value)
