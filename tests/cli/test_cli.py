@@ -908,6 +908,14 @@ def test_tables_text(strapgen_says):
     assert "2.391" in said and "0.856" in said
 
 
+def test_a_footnote_is_printed_once_for_all_back_ends(monkeypatch, strapgen_says):
+    monkeypatch.setattr("strapgen.tables.DEFAULT_BACKENDS", ("numpy", "c", "c-q31"))
+    said = strapgen_says("tables")
+    assert len(re.findall(r"^    c-q31 ", said, flags=re.MULTILINE)) == 10
+    assert said.count("The thesis prints 2.391 deg") == 1
+    assert "(2.391 deg here)" in said
+
+
 # Speed, and life in a pipe
 
 
