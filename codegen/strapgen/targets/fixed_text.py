@@ -6,7 +6,7 @@ from fractions import Fraction
 
 from strapgen.fixedpoint import FixedProgram
 from strapgen.fixedpoint.code import Accumulation, Argument, Residual, Value
-from strapgen.fixedpoint.settings import DEFAULT_ALLOWANCE, DEFAULT_ANGLE
+from strapgen.fixedpoint.settings import DEFAULT_ALLOWANCE, DEFAULT_ANGLE, Settings
 from strapgen.program import Program
 
 
@@ -27,8 +27,12 @@ def argument_text(argument: Argument) -> str:
 
 def command(fixed: FixedProgram, target: str) -> str:
     """Return the command that generates a fixed-point program."""
-    settings = fixed.interface.settings
-    words = [f"strapgen generate {fixed.program.arguments} --target {target} --word {settings.word}"]
+    return f"strapgen generate {fixed.program.arguments} --target {target} {options(fixed.interface.settings)}"
+
+
+def options(settings: Settings) -> str:
+    """Return settings as options of the command line."""
+    words = [f"--word {settings.word}"]
     if settings.stated:
         words.append(settings.stated)
     elif settings.largest_angle != DEFAULT_ANGLE:
