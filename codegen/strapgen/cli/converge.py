@@ -76,7 +76,7 @@ def converge(
 
     \b
       strapgen converge euler --method rk1,rk2,rk4,butcher6 --increments enough \\
-        --plot orders.png
+        --plot out/orders.png
     """  # noqa: D301
     check_format(format, "csv")
     from strapgen import catalogue, checks

@@ -131,7 +131,7 @@ def simulate(
 
     \b
       strapgen simulate dcm --backend c --rates-csv gyro.csv \\
-        --rate-unit deg/s --resample-hz 100 --out attitude.csv
+        --rate-unit deg/s --resample-hz 100 --out out/attitude.csv
     """  # noqa: D301
     choice = chosen(algorithm, method, tableau, increments, previous)
     _check_names(backend, motion, format)

@@ -32,7 +32,7 @@ def stability(
     The square of the factor by which a step of the angle x = |w| h stretches the state across the axis, exactly, and
     the angles at which it is at most 1.
 
-    Example: strapgen stability dcm --method rk3,rk4,butcher5 --plot stability.png
+    Example: strapgen stability dcm --method rk3,rk4,butcher5 --plot out/stability.png
     """
     check_format(format)
     from strapgen import catalogue, checks, output
