@@ -27,7 +27,9 @@ def argument_text(argument: Argument) -> str:
 
 def command(fixed: FixedProgram, target: str) -> str:
     """Return the command that generates a fixed-point program."""
-    return f"strapgen generate {fixed.program.arguments} --target {target} {options(fixed.interface.settings)}"
+    return (
+        f"strapgen generate {fixed.program.arguments} --target {target} {options(fixed.interface.settings)}"
+    )
 
 
 def options(settings: Settings) -> str:
