@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen import checks
+from strapgen import checks, stages
 from strapgen.backends import Backend
 from strapgen.exceptions import InputError
 from strapgen.gyro import pulses, windows
@@ -353,6 +353,7 @@ def propagate(
     >>> history.states.shape, history.unused
     ((5, 4), 1)
     """
+    stages.require("propagate", backend, Backend)
     backend.need_increments()
     step = recording.interval * backend.increments
     steps, unused = divmod(max(0, len(recording.increments) - backend.previous), backend.increments)

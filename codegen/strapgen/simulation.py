@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen import checks
+from strapgen import checks, stages
 from strapgen.backends import Backend, evaluator
 from strapgen.exceptions import InputError
 from strapgen.gyro import pulses
@@ -181,6 +181,8 @@ def simulate(
     >>> round(float(np.degrees(run.mean_drift)), 4)
     0.2855
     """
+    stages.require("simulate", backend, Backend)
+    stages.require("simulate", motion, Motion)
     backend.need_increments()
     h = checks.number("step", step, positive=True)
     total = checks.number("duration", duration, positive=True)
