@@ -32,6 +32,11 @@ class Fit:
 
     basis: tuple[Coefficients, ...]
 
+    @property
+    def degree(self) -> int:
+        """Degree of the polynomial: one less than the number of samples."""
+        return len(self.basis) - 1
+
     def at(self, node: Fraction | sp.Expr) -> list[sp.Expr]:
         """Return the weights of the samples in the rate at a node."""
         t = exact(node)
