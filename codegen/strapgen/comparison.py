@@ -152,8 +152,9 @@ def _reference(make: Any, choice: Choice, reference: str, increments: Array) -> 
     """Return the states of the reference, in double."""
     if reference == EXACT:
         return exact.propagate(pipeline.lower(catalogue.derive(choice)), increments)
-    states: Array = make(reference).propagate(increments).astype(np.float64)
-    require_finite(states, np.arange(len(states), dtype=np.float64))
+    backend = make(reference)
+    states: Array = backend.propagate(increments).astype(np.float64)
+    require_finite(backend, states, np.arange(len(states), dtype=np.float64))
     return states
 
 
@@ -167,7 +168,7 @@ def _compared(
         start = time.perf_counter()
         run()
         seconds = min(seconds, time.perf_counter() - start)
-    require_finite(states, np.arange(1 + steps, dtype=np.float64))
+    require_finite(candidate, states, np.arange(1 + steps, dtype=np.float64))
     computed = attitude(candidate, states)
     angles = np.linalg.norm(drift_between(computed, matrices), axis=-1)
     drifts = drift_between(computed, matrices if truth is None else truth)

@@ -372,7 +372,7 @@ def propagate(
     states = backend.propagate(given, record_every, every)
     start = recording.start + recording.interval * backend.previous
     time: Array = start + step * record_every * np.arange(len(states), dtype=np.float64)
-    require_finite(states, time)
+    require_finite(backend, states, time)
     return History(time, states, step, unused)
 
 

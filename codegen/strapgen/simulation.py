@@ -91,11 +91,13 @@ def drift_between(computed: Any, other: Any) -> Array:
     return drift
 
 
-def require_finite(states: Any, time: Array) -> None:
+def require_finite(backend: Backend, states: Any, time: Array) -> None:
     """Refuse a run whose numbers have left the range of its back end.
 
     Parameters
     ----------
+    backend : Backend
+        What ran.
     states : array, (N, state shape)
     time : array, (N,)
         Time of each state in s.
@@ -103,12 +105,19 @@ def require_finite(states: Any, time: Array) -> None:
     Raises
     ------
     InputError
-        If a state is not finite; the message says from when on.
+        If a state is not finite; the message says from when on, and why.
     """
     broken = ~np.isfinite(states.reshape(len(states), -1)).all(axis=1)
     if broken.any():
+        cause = "the increments are too large for the method"
+        if backend.takes == "increments" and backend.samples > 2:
+            cause = (
+                f"the increments, or the rates of the polynomial through {backend.samples} of them, are too large for "
+                "the method"
+            )
         raise InputError(
-            f"the attitude is not finite from {time[broken][0]:.6g} s on; the increments are too large for the method"
+            f"the attitude is not finite from {time[broken][0]:.6g} s on; "
+            f"steps of {backend.kernel} lengthen it: {cause}"
         )
 
 
@@ -201,7 +210,7 @@ def simulate(
         increments = pulses(increments, pulse, backend.previous)
     states = backend.propagate(increments, record_every, every)
     time: Array = np.arange(len(states), dtype=np.float64) * float(interval)
-    require_finite(states, time)
+    require_finite(backend, states, time)
     true = motion.attitude(time)
     computed = attitude(backend, states)
     return Run(time, computed, true, *evaluator("error-matrix")(computed, true))
