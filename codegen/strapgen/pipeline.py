@@ -17,6 +17,7 @@ Run
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from strapgen import catalogue, fixedpoint, targets
@@ -97,7 +98,7 @@ def lower(kernel: Kernel) -> Program:
     """
     from strapgen.lowering import lower as lower_kernel
 
-    return lower_kernel(kernel)
+    return replace(lower_kernel(kernel), own=tuple(map(lower_kernel, kernel.own)))
 
 
 def quantize(program: Program, settings: Settings | None = None) -> FixedProgram:

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import sys
+import threading
+import time
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from typing import TypeVar
 
 Item = TypeVar("Item")
+#: Seconds after which something is said to take time, and from one word to the next.
+_PATIENCE, _INTERVAL = 1.0, 1.0
 
 
 def track(items: Iterable[Item], title: str, total: int) -> Iterator[Item]:
@@ -18,3 +23,31 @@ def track(items: Iterable[Item], title: str, total: int) -> Iterator[Item]:
     from rich.progress import track as rich_track
 
     yield from rich_track(items, title, total, console=Console(stderr=True), transient=True)
+
+
+@contextmanager
+def waiting(title: str) -> Iterator[None]:
+    """Show on a terminal's stderr for how long one thing has taken, once it takes more than a moment."""
+    stream = sys.stderr
+    if not stream.isatty():
+        yield
+        return
+    done, begin = threading.Event(), time.monotonic()
+
+    def show() -> None:
+        pause = _PATIENCE
+        while not done.wait(pause):
+            stream.write(f"\r\x1b[2K{title} {time.monotonic() - begin:.0f} s")
+            stream.flush()
+            pause = _INTERVAL
+        if time.monotonic() - begin > _PATIENCE:
+            stream.write("\r\x1b[2K")
+            stream.flush()
+
+    shown = threading.Thread(target=show, daemon=True)
+    shown.start()
+    try:
+        yield
+    finally:
+        done.set()
+        shown.join()
