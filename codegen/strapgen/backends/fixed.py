@@ -279,7 +279,7 @@ class CFixedBackend(FixedBackend):
         history = np.empty((runs, 1 + steps // record_every, initial.shape[-1]), kind)
         orthonormalizer = ffi.NULL
         if orthonormalize_every:
-            made = self._parts.evaluator(self._need_orthonormalization())
+            made = self.beside(self._need_orthonormalization())
             assert isinstance(made, CFixedEvaluator)
             orthonormalizer = ffi.cast(f"{self._function}_orthonormalizer", made.address())
         stopped = ffi.new("size_t[2]")
@@ -308,7 +308,7 @@ class ModelBackend(FixedBackend):
         """Propagate integers in Python."""
         step = self.evaluator
         assert isinstance(step, ModelEvaluator)
-        normalize = self._parts.evaluator(self._need_orthonormalization()) if orthonormalize_every else None
+        normalize = self.beside(self._need_orthonormalization()) if orthonormalize_every else None
         runs, steps = increments.shape[:2]
         single = runs == 1
         fresh = self.evaluator.fresh(runs)

@@ -148,6 +148,16 @@ class Backend(ABC):
         """Return what makes it again in another process: its class, and sources that need nothing else."""
         return type(self), (self._parts.complete(),)
 
+    def beside(self, kernel: str) -> Evaluator:
+        """Return a kernel that works on the same state, on the same target: an orthonormalization.
+
+        Parameters
+        ----------
+        kernel : str
+            One that the step brings, or of the catalogue.
+        """
+        return self._parts.evaluator(kernel)
+
     def matrices(self, states: Any) -> Array:
         """Return the attitude that states stand for.
 
@@ -244,7 +254,7 @@ class Backend(ABC):
         -------
         array, (..., state shape)
         """
-        result: Array = self._parts.evaluator(self._need_orthonormalization())(state)
+        result: Array = self.beside(self._need_orthonormalization())(state)
         return result
 
     def _need_orthonormalization(self) -> str:

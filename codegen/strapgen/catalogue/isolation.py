@@ -48,8 +48,8 @@ class Record:
     Parameters
     ----------
     files : dict of str to str
-        Digest of every file by its path, "" where there was none; without those of Python, of installed packages that
-        were loaded before, and of strapgen.
+        Digest of every file by its path, "" where there was none; without those of Python, of installed packages and of
+        strapgen, whose versions tell.
     modules : dict of str to str
         Where every module that was looked for on the path was found, "" where it was not.
     path : list of str
@@ -106,21 +106,10 @@ def _folders(paths: Iterable[str]) -> tuple[str, ...]:
 
 
 @cache
-def _library() -> tuple[str, ...]:
-    """Return the folders of Python's own modules; those of installed packages may lie within."""
-    paths = sysconfig.get_paths()
-    return _folders((paths["stdlib"], paths["platstdlib"]))
-
-
-@cache
-def _packages() -> tuple[str, ...]:
-    return _folders(installed_folders())
-
-
-@cache
 def _roots() -> tuple[str, ...]:
     """Return the folders of Python, of installed packages and of strapgen."""
-    return (*_library(), *_packages(), *_folders([str(PACKAGE)]))
+    paths = sysconfig.get_paths()
+    return _folders((paths["stdlib"], paths["platstdlib"], *installed_folders(), str(PACKAGE)))
 
 
 def installed_folders() -> list[str]:
@@ -254,7 +243,7 @@ def session(folder: Path | None = None, anew: tuple[str, ...] = ()) -> Iterator[
         for name in _removable(before, anew, record):
             del sys.modules[name]
         finder = _Finder(record, anew)
-        sys.meta_path.insert(_place_of_path_finder(), finder)  # type: ignore[arg-type]
+        sys.meta_path.insert(_place_of_path_finder(), finder)
         sys.path[:0] = [] if folder is None else [str(folder)]
         importlib.invalidate_caches()
         _watching.append(record)
@@ -264,7 +253,7 @@ def session(folder: Path | None = None, anew: tuple[str, ...] = ()) -> Iterator[
             _watching.pop()
             record.path = [entry for entry in sys.path if entry not in (*path, str(folder))]
             sys.path[:] = path
-            sys.meta_path.remove(finder)  # type: ignore[arg-type]
+            sys.meta_path.remove(finder)
             _put_back(before, anew, record)
 
 
@@ -301,17 +290,9 @@ def _put_back(before: dict[str, ModuleType], anew: tuple[str, ...], record: Reco
         place = _place(module)
         if place and not Path(place).exists():
             record.outside = f"imports {name} from an archive"
-        elif Path(place).is_file() and not _is_covered(place):
-            record.read(os.path.realpath(place))
-        if _is_users(name, module, anew):
+        if _is_users(name, module, anew):  # versions tell of all others
+            if Path(place).is_file():
+                record.read(os.path.realpath(place))
             del sys.modules[name]
     for name, module in before.items():
         sys.modules.setdefault(name, module)
-
-
-def _is_covered(path: str) -> bool:
-    """Tell whether a module is one of Python or of strapgen, whose versions are known."""
-    real = os.path.realpath(path)
-    if real.startswith(_packages()):
-        return False
-    return real.startswith((*_library(), *_folders([str(PACKAGE)])))
