@@ -76,7 +76,9 @@ def test_each_has_the_companions_that_it_brings(chosen, rng):
             wanted = strapgen.backend("euler", method, backend=name, orthonormalization=scheme)
             backend = of(chosen[method], name, orthonormalization="mend")
             np.testing.assert_array_equal(backend.propagate(d, 1, 5), wanted.propagate(d, 1, 5))
-    with pytest.raises(InputError, match=r"orthonormalization 'euler-normalize' is not known; allowed: mend$"):
+    with pytest.raises(
+        InputError, match=r"orthonormalization 'euler-normalize' is not known; allowed: mend$"
+    ):
         of(chosen["rk1"], orthonormalization="euler-normalize")
 
 

@@ -12,6 +12,8 @@ from typing import TypeVar
 Item = TypeVar("Item")
 #: Seconds after which something is said to take time, and from one word to the next.
 _PATIENCE, _INTERVAL = 1.0, 1.0
+#: Takes a terminal back to the beginning of an empty line.
+_WIPE = "\r\x1b[2K"
 
 
 def track(items: Iterable[Item], title: str, total: int) -> Iterator[Item]:
@@ -35,14 +37,15 @@ def waiting(title: str) -> Iterator[None]:
     done, begin = threading.Event(), time.monotonic()
 
     def show() -> None:
-        pause = _PATIENCE
-        while not done.wait(pause):
-            stream.write(f"\r\x1b[2K{title} {time.monotonic() - begin:.0f} s")
+        if done.wait(_PATIENCE):
+            return
+        while True:
+            stream.write(f"{_WIPE}{title} {time.monotonic() - begin:.0f} s")
             stream.flush()
-            pause = _INTERVAL
-        if time.monotonic() - begin > _PATIENCE:
-            stream.write("\r\x1b[2K")
-            stream.flush()
+            if done.wait(_INTERVAL):
+                break
+        stream.write(_WIPE)
+        stream.flush()
 
     shown = threading.Thread(target=show, daemon=True)
     shown.start()
