@@ -149,6 +149,11 @@ def test_a_kernel_with_a_class_of_its_own_is_derived_every_time(derives, file):
     assert [derives(file), derives(file)] == [(True, "one"), (True, "one")]
 
 
+def test_generated_c_in_the_process_is_no_module_of_the_user_s(derives, file):
+    strapgen.backend("euler", backend="c")
+    assert [derives(file), derives(file)] == [(True, "one"), (False, "one")]
+
+
 def test_what_fails_is_not_kept(derives, file):
     beside(file, base="WORD = '\\n'\n")
     for _ in range(2):

@@ -80,6 +80,7 @@ class Record:
                 return False
         except OSError:
             return False
+        importlib.invalidate_caches()
         search = [*([str(folder)] if folder else []), *self.path, *sys.path]
         return all(_origin(PathFinder.find_spec(name, search)) == at for name, at in self.modules.items())
 
@@ -261,10 +262,16 @@ def _place_of_path_finder() -> int:
     return sys.meta_path.index(PathFinder) if PathFinder in sys.meta_path else len(sys.meta_path)
 
 
+def _is_compiled(module: ModuleType | None) -> bool:
+    return isinstance(getattr(module, "__loader__", None), ExtensionFileLoader)
+
+
 def _is_users(name: str, module: ModuleType | None, anew: tuple[str, ...]) -> bool:
     top = name.partition(".")[0]
-    if top in ("strapgen", "__main__", "__mp_main__"):
-        return False
+    if top in ("strapgen", "__main__", "__mp_main__") or (
+        name.startswith("strapgen_") and _is_compiled(module)
+    ):
+        return False  # the last ones are generated C
     place = _place(module)
     return bool(place) and (top in anew or not _is_installed(place))
 
@@ -272,11 +279,7 @@ def _is_users(name: str, module: ModuleType | None, anew: tuple[str, ...]) -> bo
 def _removable(modules: dict[str, ModuleType], anew: tuple[str, ...], record: Record) -> list[str]:
     """Return the modules of no installed package; compiled ones cannot be loaded twice, nor can what goes with them."""
     users = [name for name, module in modules.items() if _is_users(name, module, anew)]
-    compiled = {
-        name.partition(".")[0]
-        for name in users
-        if isinstance(getattr(modules[name], "__loader__", None), ExtensionFileLoader)
-    }
+    compiled = {name.partition(".")[0] for name in users if _is_compiled(modules[name])}
     if compiled:
         record.outside = f"may import {', '.join(sorted(compiled))}, which is compiled and loaded already"
     return [name for name in users if name.partition(".")[0] not in compiled]
