@@ -73,13 +73,13 @@ class StepSources:
 
     def complete(self) -> StepSources:
         """Return the same with all that the step may need, so that no kernel has to be derived where it is taken."""
-        companions = self.step.companions
-        assert companions is not None, "checked when a back end is built"
+        names = self.step.companions
+        assert names is not None, "checked when a back end is built"
         target = self.step.target
-        needed = [(self.orthonormalization or companions.orthonormalize, target)]
-        needed += [(companions.attitude, "numpy")]
+        needed = [(self.orthonormalization or names.orthonormalize, target)]
+        needed += [(names.attitude, "numpy")]
         if target == "numpy":
-            needed += [(companions.product, target)]
+            needed += [(names.product, target)]
         beside: dict[tuple[str, str], Sources | str] = {}
         for kernel, language in needed:
             if kernel is not None:
