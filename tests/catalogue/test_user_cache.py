@@ -154,6 +154,15 @@ def test_generated_c_in_the_process_is_no_module_of_the_user_s(derives, file):
     assert [derives(file), derives(file)] == [(True, "one"), (False, "one")]
 
 
+def test_an_algorithm_that_is_made_of_another_one_follows_it(derives, file, tmp_path):
+    other = written(tmp_path / "other" / "own.py", "from helper import WORD")
+    beside(other, helper="WORD = 'inner'\n")
+    beside(file, helper=f"import strapgen\nWORD = strapgen.derive({other!r}).title + ' and outer'\n")
+    assert derives(file) == (True, "inner and outer")
+    beside(other, helper="WORD = 'changed'\n")
+    assert derives(file) == (True, "changed and outer")
+
+
 def test_what_fails_is_not_kept(derives, file):
     beside(file, base="WORD = '\\n'\n")
     for _ in range(2):

@@ -211,6 +211,13 @@ def _begin_watching() -> None:
     sys.addaudithook(_watch)
 
 
+def depends_on(what: str) -> None:
+    """Note that the code which runs, if any does, depends on more than it reads itself."""
+    record = _watching[-1] if _watching else None
+    if record is not None:
+        record.outside = what
+
+
 def load_source(path: Path, name: str, record: Record) -> ModuleType:
     """Run a file as a module, which `sys.modules` knows while the session lasts."""
     spec = importlib.util.spec_from_file_location(name, path, loader=_Loader(name, str(path), record))

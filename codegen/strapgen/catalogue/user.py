@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import inspect
+import os
 import shlex
 import sys
 import traceback
@@ -58,12 +59,13 @@ def load(name: str, **options: Any) -> Kernel:
     """
     arguments = _arguments(name, options)
     texts = [f"{option} {value!r} {getattr(value, 'file', '')}" for option, value in options.items()]
+    isolation.depends_on(f"loads {name}, another algorithm")
     find = _of_file if name.endswith(".py") else _of_entry_point
     return replace(find(name, options, texts), arguments=arguments)
 
 
 def _of_file(name: str, options: dict[str, Any], texts: list[str]) -> Kernel:
-    path = Path(name).resolve()
+    path = Path(os.path.realpath(name))  # which a circle of links does not stop
     if not path.is_file():
         raise InputError(f"algorithm {name} is no file; a Python file with a function {FUNCTION} is needed")
     try:
