@@ -18,6 +18,7 @@ Run
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from strapgen import catalogue, fixedpoint, stages, targets
@@ -104,7 +105,7 @@ def lower(kernel: Kernel) -> Program:
     from strapgen.lowering import lower as lower_kernel
 
     stages.require("lower", kernel, Kernel)
-    return lower_kernel(kernel)
+    return replace(lower_kernel(kernel), own=tuple(map(lower_kernel, kernel.own)))
 
 
 def quantize(program: Program, settings: Settings | None = None) -> FixedProgram:

@@ -141,6 +141,8 @@ class Program:
         What belongs to an attitude step; None for every other kernel.
     recursion : Recursion or None
         Which outputs are inputs of the next call.
+    own : tuple of Program
+        Kernels that a user's step brings.
 
     Raises
     ------
@@ -160,6 +162,7 @@ class Program:
     transition: Result | None = None
     companions: Companions | None = None
     recursion: Recursion | None = None
+    own: tuple[Program, ...] = ()
 
     def __post_init__(self) -> None:
         known = {element for signal in self.inputs for element in signal.elements} | {RESOLUTION}

@@ -67,11 +67,7 @@ def attitude(backend: Backend, states: Any) -> Array:
     array, (..., 3, 3)
         Direction cosine matrices, body to reference, in double.
     """
-    states = np.asarray(states, np.float64)
-    if backend.attitude is None:
-        return np.array(states)
-    result: Array = evaluator(backend.attitude)(states)
-    return result
+    return backend.matrices(states)
 
 
 def drift_between(computed: Any, other: Any) -> Array:

@@ -26,12 +26,6 @@ FOLDER = Path(__file__).resolve().parents[1] / "data" / "algorithms"
 CONING = "--motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 --step 0.125 --duration 5"
 
 
-@pytest.fixture(autouse=True)
-def own_kernels(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Give every test kernels of its own, so that none finds those of another."""
-    monkeypatch.setattr(user, "KERNELS", {})
-
-
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Return a folder with the algorithms of this test, in which the commands run."""
@@ -63,7 +57,6 @@ def test_a_file_is_an_algorithm(folder):
     assert kernel.name == "mrp-rk4-2"
     assert [made.name for made in kernel.own] == ["dcm-from-mrp"]
     assert kernel.arguments == "mrp.py"
-    assert user.KERNELS.keys() == {"mrp-rk4-2", "dcm-from-mrp"}
 
 
 @pytest.mark.parametrize(
@@ -304,7 +297,6 @@ def test_what_cannot_be_used_is_refused_in_one_line(case, tmp_path, monkeypatch,
     assert (stop.value.code, found.out) == (2, "")
     assert found.err.startswith("strapgen: mine.py") and found.err.count("\n") == 1
     assert said in found.err
-    assert user.KERNELS == {}
     assert {path.name for path in tmp_path.iterdir()} - {"__pycache__"} == {"mine.py"}
 
 

@@ -185,7 +185,7 @@ def constant_rate(choice: Choice) -> ConstantRate:
     turned = {name: ANGLE / share if k % 3 == 2 else sp.S.Zero for k, name in enumerate(samples.elements)}
     attitude = None
     if companions.attitude is not None:
-        attitude = catalogue.derive(catalogue.choose(companions.attitude))
+        attitude = catalogue.companion(kernel, companions.attitude)
     try:
         made = _rational(taken.domain, kernel, {**given, **turned}, attitude)
     except _NotRationalError:

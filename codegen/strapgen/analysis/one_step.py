@@ -202,7 +202,7 @@ def computed_matrix(taken: Step, ring: Any, rate: Rate, top: int) -> list[Powers
     companions = taken.kernel.companions
     if companions is None or companions.attitude is None:
         return elements
-    attitude = catalogue.derive(catalogue.choose(companions.attitude))
+    attitude = catalogue.companion(taken.kernel, companions.attitude)
     values = dict(zip(attitude.inputs[0].elements, elements, strict=True))
     return _evaluated(attitude, values, ring, top)
 

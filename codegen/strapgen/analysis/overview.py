@@ -159,7 +159,7 @@ def _row(choice: Choice) -> Row:
     counts = pipeline.lower(kernel).operations
     return Row(
         kernel.name,
-        catalogue.increments(choice),
+        choice.increments_per_step,
         general.order,
         sum(counts.values()),
         constant_power,

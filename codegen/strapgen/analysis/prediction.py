@@ -234,12 +234,13 @@ def _about_an_axis(found: ErrorRate, settings: list[Any], h: Any) -> Transfer:
 
 def _orthonormalization(choice: Choice) -> Callable[[Matrix], Matrix]:
     """Return what restores a computed matrix: the scheme of the algorithm, or the normalization of its parameters."""
-    companions = catalogue.derive(choice).companions
+    kernel = catalogue.derive(choice)
+    companions = kernel.companions
     assert companions is not None, "checked by error_rate"
     if companions.orthonormalize is None:
         return lambda computed: computed
     if companions.attitude is not None:
         # The matrix of parameters whose length is off is a rotation times a factor.
         return lambda computed: computed / mpmath.cbrt(mpmath.det(computed))
-    scheme = interpreter(companions.orthonormalize)
+    scheme = interpreter(companions.orthonormalize, kernel)
     return lambda computed: _matrix(scheme(list(computed)))

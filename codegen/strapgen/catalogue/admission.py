@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import keyword
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import sympy as sp
 
 from strapgen import checks
 from strapgen.algebra import Direction, Wrapped
+from strapgen.catalogue.derivation import companion as derived_companion
+from strapgen.catalogue.names import RESERVED
 from strapgen.exceptions import InputError
 from strapgen.kernel import Kernel
 from strapgen.program import RESOLUTION
@@ -33,35 +35,32 @@ ALLOWED = (
 )
 
 
-def require(kernel: Kernel, catalogue: frozenset[str], derived: Callable[[str], Kernel]) -> None:
-    """Check the kernel of an attitude step, and the kernels of its own.
+def require(kernel: Kernel) -> None:
+    """Check the kernel of an attitude step, and the kernels that it brings.
 
     Parameters
     ----------
     kernel : Kernel
-    catalogue : frozenset of str
-        Names that are taken.
-    derived : callable
-        Derives a kernel of the catalogue.
 
     Raises
     ------
     InputError
         If something is not as it must be.
     """
-    for made in (kernel, *kernel.own):
-        _require_names(made, catalogue)
-        _require_texts(made)
-        _require_formulas(made)
+    for each in (kernel, *kernel.own):
+        _require_names(each)
+        _require_texts(each)
+        _require_formulas(each)
+    names = [each.name for each in (kernel, *kernel.own)]
+    if repeated := next((name for name in names if names.count(name) > 1), None):
+        raise InputError(
+            f"kernel {kernel.name}: two of its kernels are called {repeated}; every one needs another name"
+        )
     _require_step(kernel)
-    own = {made.name: made for made in kernel.own}
-    for role, companion in _companions(kernel):
-        if companion in own:
-            _require_shapes(kernel, role, own[companion])
-        elif companion in catalogue:
-            _require_shapes(kernel, role, derived(companion))
-        else:
-            _refuse(kernel, f"its {role} {companion!r} is neither in the catalogue nor its own")
+    for role, name in _companions(kernel):
+        if name not in names[1:] and name not in RESERVED:
+            _refuse(kernel, f"its {role} {name!r} is neither in the catalogue nor its own")
+        _require_shapes(kernel, role, derived_companion(kernel, name))
 
 
 def _refuse(kernel: Kernel, reason: str) -> None:
@@ -72,7 +71,7 @@ def _signals(kernel: Kernel) -> list[Signal]:
     return [*kernel.inputs, *(stage.signal for stage in (*kernel.stages, *kernel.outputs))]
 
 
-def _require_names(kernel: Kernel, catalogue: frozenset[str]) -> None:
+def _require_names(kernel: Kernel) -> None:
     name = kernel.name
     if not isinstance(name, str) or not _NAME.fullmatch(name):
         raise InputError(
@@ -80,7 +79,7 @@ def _require_names(kernel: Kernel, catalogue: frozenset[str]) -> None:
         )
     if keyword.iskeyword(kernel.identifier) or kernel.identifier in _OF_C:
         raise InputError(f"kernel {name} has a name that C or Python use themselves; another one is needed")
-    if name in catalogue or re.match(r"(dcm|euler|cayley-klein)-.*-(\d+|rates)(-previous\d)?$", name):
+    if name in RESERVED or re.match(r"(dcm|euler|cayley-klein)-.*-(\d+|rates)(-previous\d)?$", name):
         raise InputError(
             f"kernel {name} is in the catalogue, or looks like one of its steps; another name is needed"
         )

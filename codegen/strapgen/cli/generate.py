@@ -123,7 +123,7 @@ def generate(
     from strapgen.targets import FIXED, TARGETS
 
     choice = chosen(algorithm, method, tableau, increments, previous, rates, step=False)
-    settings = read_settings(catalogue.increments(choice), **stated)
+    settings = read_settings(choice.increments_per_step, **stated)
     target = checks.choice("target", "numpy" if target is None else target, TARGETS)
     if settings is not None and target not in FIXED:
         raise InputError(

@@ -145,10 +145,10 @@ def simulate(
 
     import numpy as np
 
-    from strapgen import catalogue, output
+    from strapgen import output
     from strapgen.backends import of as make_backend
 
-    samples = catalogue.increments(choice), catalogue.previous(choice)
+    samples = choice.increments_per_step, choice.previous
 
     stated = {
         "word": word,

@@ -130,9 +130,8 @@ def checked(kernel: Any) -> Kernel:
 
 def _of_step(kernel: Kernel, taken: Sequence[Signal], nodes: Sequence[Fraction | sp.Expr]) -> System:
     assert kernel.companions is not None
-    own = {made.name: made for made in kernel.own}
     name = kernel.companions.attitude
-    attitude = None if name is None else own.get(name) or catalogue.derive(Choice(name))
+    attitude = None if name is None else catalogue.companion(kernel, name)
     expander = Expander([kernel] if attitude is None else [kernel, attitude])
     state, output = kernel.inputs[0], kernel.outputs[-1].signal
     begun = {
