@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import keyword
 import re
 from collections.abc import Callable, Iterator
 
@@ -13,17 +12,8 @@ from strapgen.algebra import Direction, Wrapped
 from strapgen.exceptions import InputError
 from strapgen.kernel import Kernel
 from strapgen.program import RESOLUTION
-from strapgen.signal import Signal
 
 _NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
-#: Words of C and of its library that a function may not be called.
-_WORDS = """
-auto break case char const continue default do double else enum extern float for goto if inline int long register
-restrict return short signed sizeof static struct switch typedef union unsigned void volatile while
-main printf puts exit abort malloc free signal time clock rand
-sin cos tan sqrt exp log pow floor ceil round fabs abs asin acos atan atan2 sinh cosh tanh gamma
-"""
-_OF_C = frozenset(_WORDS.split())
 #: Functions that can be generated.
 _FUNCTIONS = (sp.sin, sp.cos, sp.sinc, sp.atan2, sp.asin, sp.acos, Direction, Wrapped, sp.Max, sp.Piecewise)
 _COMPARISONS = (sp.Gt, sp.Ge, sp.Lt, sp.Le)
@@ -68,24 +58,22 @@ def _refuse(kernel: Kernel, reason: str) -> None:
     raise InputError(f"kernel {kernel.name}: {reason}")
 
 
-def _signals(kernel: Kernel) -> list[Signal]:
-    return [*kernel.inputs, *(stage.signal for stage in (*kernel.stages, *kernel.outputs))]
-
-
 def _require_names(kernel: Kernel, catalogue: frozenset[str]) -> None:
     name = kernel.name
     if not isinstance(name, str) or not _NAME.fullmatch(name):
         raise InputError(
             f"kernel {name!r} has no name for generated code; a-z, 0-9 and hyphens between them are allowed"
         )
-    if keyword.iskeyword(kernel.identifier) or kernel.identifier in _OF_C:
-        raise InputError(f"kernel {name} has a name that C or Python use themselves; another one is needed")
     if name in catalogue or re.match(r"(dcm|euler|cayley-klein)-.*-(\d+|rates)(-previous\d)?$", name):
         raise InputError(
             f"kernel {name} is in the catalogue, or looks like one of its steps; another name is needed"
         )
+    arguments = [*kernel.inputs, *(stage.signal for stage in kernel.outputs)]
+    for number, signal in enumerate(arguments):
+        if signal.name in (other.name for other in arguments[:number]):
+            _refuse(kernel, f"two of its arguments are called {signal.name}; each needs a name of its own")
     seen: set[str] = set()
-    for signal in _signals(kernel):
+    for signal in kernel.signals:
         for part in (signal.name, *signal.elements):
             if not (part.isascii() and part.isidentifier()):
                 _refuse(kernel, f"{part!r} is no name for generated code")
@@ -103,7 +91,7 @@ def _require_names(kernel: Kernel, catalogue: frozenset[str]) -> None:
 def _require_texts(kernel: Kernel) -> None:
     texts = {"title": kernel.title, "source": kernel.source}
     texts |= {f"note {number}": note for number, note in enumerate(kernel.notes, 1)}
-    for signal in _signals(kernel):
+    for signal in kernel.signals:
         texts |= {f"meaning of {signal.name}": signal.meaning, f"unit of {signal.name}": signal.unit}
     for what, text in texts.items():
         checks.text(f"kernel {kernel.name}: its {what}", text)
