@@ -227,6 +227,11 @@ WRONG = {
         'Signal.matrix("state", "next")',
         "two of its arguments are called state; each needs a name of its own",
     ),
+    "a function of another": (
+        'kernel("mine"',
+        'kernel("euler-product-float-array"',
+        "kernel euler-product-float-array: euler-product has a function of this name; another name is needed",
+    ),
     "of ours": (
         'kernel("mine"',
         'kernel("euler-rk4-2"',

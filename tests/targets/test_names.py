@@ -398,3 +398,17 @@ def test_functions_of_the_headers_that_generated_code_includes_are_no_kernels():
 @pytest.mark.parametrize("word", sorted({*keyword.kwlist, "__debug__"}))
 def test_keywords_of_python_are_no_names(word):
     assert not names.PYTHON.allows(word)
+
+
+def test_names_of_common_subexpressions_are_free_for_elements():
+    taken = [f"{front}_{number}" for front in ("shared", "factor") for number in range(1, 9)]
+    for elements in (tuple(taken), tuple(reversed(taken))):
+        check_python(step(HARMLESS._replace(elements=elements)))
+
+
+def test_a_function_is_found_in_its_module_whatever_the_process_has(tmp_path):
+    # No standard knows this function; the library of this process may.
+    kernel = step(HARMLESS._replace(kernel="gnu-get-libc-version", elements=HARMLESS.elements))
+    backend = strapgen.build(targets.emit(strapgen.lower(kernel), "c"))
+    assert backend.kernel == "gnu-get-libc-version"
+    np.testing.assert_allclose(backend.step(START, INCREMENTS[:1]), EXPECTED[1], rtol=0, atol=1e-14)

@@ -14,6 +14,10 @@ from strapgen.kernel import Kernel
 from strapgen.program import RESOLUTION
 
 _NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
+#: What the names of a kernel's functions end with, in some target.
+_FUNCTION_OF = re.compile(
+    r"(-float|-q\d+)?(-array|-batch|-propagate|-orthonormalizer|-transition)$|(-float|-q\d+)$"
+)
 #: Functions that can be generated.
 _FUNCTIONS = (sp.sin, sp.cos, sp.sinc, sp.atan2, sp.asin, sp.acos, Direction, Wrapped, sp.Max, sp.Piecewise)
 _COMPARISONS = (sp.Gt, sp.Ge, sp.Lt, sp.Le)
@@ -39,8 +43,10 @@ def require(kernel: Kernel, catalogue: frozenset[str], derived: Callable[[str], 
     InputError
         If something is not as it must be.
     """
-    for made in (kernel, *kernel.own):
+    several = (kernel, *kernel.own)
+    for made in several:
         _require_names(made, catalogue)
+        _require_functions(made, catalogue.union(other.name for other in several))
         _require_texts(made)
         _require_formulas(made)
     _require_step(kernel)
@@ -86,6 +92,13 @@ def _require_names(kernel: Kernel, catalogue: frozenset[str]) -> None:
                     f"{element} of {signal.name} is defined twice; every element needs a name of its own",
                 )
             seen.add(element)
+
+
+def _require_functions(kernel: Kernel, others: frozenset[str]) -> None:
+    """Check that none of a kernel's functions is called as one of another kernel: they go into one program."""
+    other = _FUNCTION_OF.sub("", kernel.name)
+    if other != kernel.name and other in others:
+        _refuse(kernel, f"{other} has a function of this name; another name is needed")
 
 
 def _require_texts(kernel: Kernel) -> None:
@@ -178,6 +191,8 @@ def _require_step(kernel: Kernel) -> None:
             kernel,
             f"its transition {kernel.transition!r} is none of its stages: {', '.join(stages) or 'none'}",
         )
+    if [stage.signal.name for stage in kernel.stages].count(kernel.transition) > 1:
+        _refuse(kernel, f"two of its stages are called {kernel.transition}, as its transition is")
     if companions.attitude is None and state.shape != (3, 3):
         _refuse(kernel, "attitude is None, but the state is no matrix (3, 3)")
 
