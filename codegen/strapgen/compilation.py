@@ -32,6 +32,9 @@ from strapgen.targets import Sources
 #: notes for debuggers, which Python's own flags ask for and which take a tenth of the time.
 C_FLAGS = ("-std=c99", "-O3", "-ffp-contract=off", "-g0")
 
+#: Flags of what is called from here: its functions are found in it, whatever the process has by their names.
+_MODULE_FLAGS = (*C_FLAGS, "-fvisibility=hidden")
+
 _loaded: dict[str, Any] = {}
 
 
@@ -99,7 +102,7 @@ def _compiled(sources: Sources) -> Any:
         [
             *sources.files,
             *sources.files.values(),
-            *C_FLAGS,
+            *_MODULE_FLAGS,
             _chosen_compiler(),
             f"{executable} {stat.st_size} {stat.st_mtime_ns}",
             f"{platform.machine()} {sys.platform} {sysconfig.get_config_var('SOABI')}",
@@ -157,7 +160,7 @@ def _compile(sources: Sources, name: str, path: str, draft: Path) -> None:
         "cdef": _declarations(sources.files[header]),
         "header": header,
         "sources": [str(draft / file) for file in sources.files if file.endswith(".c")],
-        "flags": C_FLAGS,
+        "flags": _MODULE_FLAGS,
         "libraries": [] if sys.platform == "win32" else ["m"],
         "folder": str(draft),
     }

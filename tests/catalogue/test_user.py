@@ -215,8 +215,16 @@ WRONG = {
         "holds the condition Eq(v_x, 0)",
     ),
     "twice": ('"twice", "v"', '"twice", "d"', "d_x of twice is defined twice"),
-    "of C": ('kernel("mine"', 'kernel("double"', "kernel double has a name that C or Python use themselves"),
-    "of Python": ('kernel("mine"', 'kernel("lambda"', "kernel lambda has a name that C or Python use"),
+    "two arguments of one name": (
+        'Signal.matrix("next", "next")',
+        'Signal.matrix("state", "next")',
+        "two of its arguments are called state; each needs a name of its own",
+    ),
+    "a function of another": (
+        'kernel("mine"',
+        'kernel("euler-product-float-array"',
+        "kernel euler-product-float-array: euler-product has a function of this name; another name is needed",
+    ),
     "of ours": (
         'kernel("mine"',
         'kernel("euler-rk4-2"',

@@ -7,6 +7,7 @@ gathered before they are multiplied by it; signs become subtractions.
 from __future__ import annotations
 
 from fractions import Fraction
+from itertools import count
 
 import sympy as sp
 from sympy.core.relational import GreaterThan, LessThan, StrictGreaterThan, StrictLessThan
@@ -37,7 +38,8 @@ def gate(kernel: Kernel, shared: Shared) -> Program:
     NotImplementedError
         If an expression holds a function that programs do not know.
     """
-    writer = _Writer()
+    taken = {name for signal in kernel.signals for name in signal.elements}
+    writer = _Writer(taken | {definition.symbol.name for definition in shared.definitions})
     for definition in shared.definitions:
         value = writer.node(definition.expression)
         writer.body.append(Assignment(definition.symbol.name, value, definition.meaning))
@@ -66,9 +68,9 @@ def gate(kernel: Kernel, shared: Shared) -> Program:
 class _Writer:
     """Turns expressions into nodes; names a value of its own only where a power needs it twice."""
 
-    def __init__(self) -> None:
+    def __init__(self, taken: set[str]) -> None:
         self.body: list[Assignment] = []
-        self._powers = 0
+        self._powers = (name for k in count(1) if (name := f"{FACTOR}{k}") not in taken)
 
     def node(self, expression: sp.Expr) -> Node:
         if expression.is_Symbol:
@@ -157,8 +159,7 @@ class _Writer:
         for assignment in self.body:
             if assignment.value == node:
                 return Reference(assignment.name)
-        self._powers += 1
-        name = f"{FACTOR}{self._powers}"
+        name = next(self._powers)
         self.body.append(Assignment(name, node))
         return Reference(name)
 

@@ -21,4 +21,5 @@ def is_unnamed(name: str) -> bool:
 def shared_names(program: Program) -> Iterator[str]:
     """Yield names for common subexpressions that a program does not use yet."""
     taken = {assignment.name for assignment in program.body}
+    taken |= {element for signal in program.inputs for element in signal.elements}
     return (name for k in count(1) if (name := f"{SHARED}{k}") not in taken)

@@ -62,7 +62,9 @@ def share(kernel: Kernel, common: bool = True) -> Shared:
                 meaning = ""
     if not common:
         return Shared(definitions, values)
-    names = sp.numbered_symbols(SHARED, start=1, real=True)
+    elements = (name for signal in kernel.signals for name in signal.elements)
+    taken = [sp.Symbol(name, real=True) for name in elements]
+    names = sp.numbered_symbols(SHARED, start=1, exclude=taken, real=True)
     found, reduced = sp.cse([d.expression for d in definitions], symbols=names, order="canonical")
     # A condition is no value that a program could hold: it goes back to where it is used.
     conditions = {symbol: expression for symbol, expression in found if expression.is_Relational}
