@@ -17,7 +17,7 @@ from strapgen.backends.fixed import ModelEvaluator
 from strapgen.catalogue import Choice, standard
 from strapgen.exceptions import InputError
 from strapgen.fixedpoint import Settings, can_lower
-from strapgen.fixedpoint.code import Sum
+from strapgen.fixedpoint.code import IntegerSum
 from strapgen.fixedpoint.derivation import quantities
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.program import Assignment, Constant, Operation, Program, Reference, Result
@@ -177,7 +177,7 @@ def test_products_meet_at_one_place_where_that_costs_nothing():
     values = {value.name: value for value in fixed.body}
     for name in ("p_x", "p_y", "p_z"):
         definition = values[name].definition
-        assert isinstance(definition, Sum)
+        assert isinstance(definition, IntegerSum)
         assert all(term.shift >= 0 for term in definition.fine)
     assert fixed.error_bounds["next"] < Fraction(52, 100) * Fraction(1, 2**30)
 
@@ -223,7 +223,7 @@ def test_no_value_and_no_partial_sum_leaves_its_type(choice, word):
             bits = word * (1 + value.wide)
             assert -(2 ** (bits - 1)) <= value.low <= value.high < 2 ** (bits - 1), value.name
             assert value.peak < 2 ** (2 * word - 1), value.name
-            if isinstance(value.definition, Sum):
+            if isinstance(value.definition, IntegerSum):
                 terms = (*value.definition.fine, *value.definition.coarse)
                 shifts = [value.definition.shift, value.definition.drop, *(abs(t.shift) for t in terms)]
                 assert max(shifts) < 2 * word, value.name

@@ -37,7 +37,7 @@ class Term:
 
 
 @dataclass(frozen=True)
-class Residual:
+class ErrorFeedback:
     """What lies below the last place of a value, kept for the next call: a word without a sign.
 
     It takes the place of what is added for rounding: the sum starts from it, and its low bits are the next one. A fresh
@@ -63,12 +63,12 @@ class Residual:
 
 
 @dataclass(frozen=True)
-class Given:
+class IntegerInput:
     """An element of an input."""
 
 
 @dataclass(frozen=True)
-class Sum:
+class IntegerSum:
     """Terms, divided by 2**shift with rounding, and terms that are added after that.
 
     Parameters
@@ -79,7 +79,7 @@ class Sum:
         Places that the rounding drops, 0 for none.
     coarse : tuple of Term
         What is exact at the result's own fraction.
-    residual : Residual or None
+    residual : ErrorFeedback or None
         What the rounding of the last call left; it is added in place of half a unit.
     drop : int
         Places below the last one of the residual, which are dropped before it is added.
@@ -88,7 +88,7 @@ class Sum:
     fine: tuple[Term, ...]
     shift: int = 0
     coarse: tuple[Term, ...] = ()
-    residual: Residual | None = None
+    residual: ErrorFeedback | None = None
     drop: int = 0
 
 
@@ -101,7 +101,7 @@ class Scaled:
 
 
 @dataclass(frozen=True)
-class Quotient:
+class IntegerQuotient:
     """``numerator / denominator``, rounded; the denominator has one sign."""
 
     numerator: Scaled
@@ -109,21 +109,21 @@ class Quotient:
 
 
 @dataclass(frozen=True)
-class Root:
+class IntegerRoot:
     """The square root of an integer that is not negative, rounded."""
 
     argument: Scaled
 
 
 @dataclass(frozen=True)
-class Largest:
+class IntegerMaximum:
     """The largest of several."""
 
     arguments: tuple[Scaled, ...]
 
 
 @dataclass(frozen=True)
-class Choice:
+class IntegerSelection:
     """The value of the first case whose left side is at least its right side, or another one.
 
     The two sides of a case have one fraction, and so have all values.
@@ -133,7 +133,9 @@ class Choice:
     otherwise: Scaled
 
 
-Definition = Given | Sum | Quotient | Root | Largest | Choice
+IntegerDefinition = (
+    IntegerInput | IntegerSum | IntegerQuotient | IntegerRoot | IntegerMaximum | IntegerSelection
+)
 
 
 @dataclass(frozen=True)
@@ -143,7 +145,7 @@ class Value:
     Parameters
     ----------
     name : str
-    definition : Definition
+    definition : IntegerDefinition
     fraction : int
     wide : bool
         Whether it takes a wide number.
@@ -162,7 +164,7 @@ class Value:
     """
 
     name: str
-    definition: Definition
+    definition: IntegerDefinition
     fraction: int
     wide: bool
     low: int
@@ -182,15 +184,15 @@ class Value:
 def used_by(value: Value) -> list[str]:
     """Return the names that a value is computed from."""
     definition = value.definition
-    if isinstance(definition, Sum):
+    if isinstance(definition, IntegerSum):
         return [name for term in (*definition.fine, *definition.coarse) for name in term.names]
-    if isinstance(definition, Quotient):
+    if isinstance(definition, IntegerQuotient):
         return [definition.denominator, *_named([definition.numerator])]
-    if isinstance(definition, Root):
+    if isinstance(definition, IntegerRoot):
         return _named([definition.argument])
-    if isinstance(definition, Largest):
+    if isinstance(definition, IntegerMaximum):
         return _named(definition.arguments)
-    if not isinstance(definition, Choice):
+    if not isinstance(definition, IntegerSelection):
         return []
     return _named([side for case in definition.cases for side in case] + [definition.otherwise])
 
@@ -248,7 +250,7 @@ class Argument:
 
 
 @dataclass(frozen=True)
-class Accumulation:
+class RoundingAccumulation:
     """How rounding adds up over the steps of a run, in the length of a state (of a row, for a matrix).
 
     Parameters
@@ -282,7 +284,7 @@ class Accumulation:
 
         Examples
         --------
-        >>> Accumulation(Fraction(1), Fraction(2), Fraction(0), Fraction(1)).bound(10)
+        >>> RoundingAccumulation(Fraction(1), Fraction(2), Fraction(0), Fraction(1)).bound(10)
         21.0
         """
         exponent = steps * float(self.growth - 1)
@@ -305,17 +307,17 @@ class Interface:
     ----------
     settings : Settings
     inputs, outputs : tuple of Argument
-    residuals : tuple of Residual
+    residuals : tuple of ErrorFeedback
         What is kept from call to call.
-    accumulation : Accumulation or None
+    accumulation : RoundingAccumulation or None
         For a step, how its rounding adds up.
     """
 
     settings: Settings
     inputs: tuple[Argument, ...]
     outputs: tuple[Argument, ...]
-    residuals: tuple[Residual, ...]
-    accumulation: Accumulation | None
+    residuals: tuple[ErrorFeedback, ...]
+    accumulation: RoundingAccumulation | None
 
     @property
     def companion_settings(self) -> Settings:
@@ -341,8 +343,8 @@ class Interface:
             Settings.from_dict(data["settings"]),
             tuple(map(Argument.from_dict, data["inputs"])),
             tuple(map(Argument.from_dict, data["outputs"])),
-            tuple(Residual(**residual) for residual in data["residuals"]),
-            adds_up and Accumulation(**{name: Fraction(value) for name, value in adds_up.items()}),
+            tuple(ErrorFeedback(**residual) for residual in data["residuals"]),
+            adds_up and RoundingAccumulation(**{name: Fraction(value) for name, value in adds_up.items()}),
         )
 
 

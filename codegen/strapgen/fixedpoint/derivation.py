@@ -17,15 +17,15 @@ from numpy.typing import NDArray
 from strapgen.exceptions import InputError
 from strapgen.fixedpoint.intervals import Interval, maximum
 from strapgen.fixedpoint.quantities import (
-    Choice,
     Definition,
-    Given,
-    Largest,
+    InputElement,
+    Maximum,
     Operand,
     Quantities,
     Quantity,
     Quotient,
-    Root,
+    Selection,
+    SquareRoot,
     Sum,
     Terms,
     combined,
@@ -91,7 +91,7 @@ class _Derivation:
         }
         for signal in program.inputs:
             for name in signal.elements:
-                self.items[name] = Quantity(name, Given(signal.name), Fraction(0), ranges[name])
+                self.items[name] = Quantity(name, InputElement(signal.name), Fraction(0), ranges[name])
 
     # What stands in the program
 
@@ -110,7 +110,9 @@ class _Derivation:
                 name = node.name if isinstance(node, Reference) else ""
                 # A choice between values may be longer than a word: it is rounded to one.
                 mine = (
-                    name and name not in held and not isinstance(self.items[name].definition, Given | Choice)
+                    name
+                    and name not in held
+                    and not isinstance(self.items[name].definition, InputElement | Selection)
                 )
                 if not mine or self.items[name].offset or self.items[name].beside:
                     name = self._free(element)
@@ -133,7 +135,7 @@ class _Derivation:
         for quantity in reversed(list(self.items.values())):
             if quantity.name in needed:
                 needed.update(used_by(quantity))
-            elif not isinstance(quantity.definition, Given):
+            elif not isinstance(quantity.definition, InputElement):
                 del self.items[quantity.name]
 
     # Sums of products
@@ -232,14 +234,14 @@ class _Derivation:
     def _is_exact(self, name: str) -> bool:
         """Tell whether a quantity is a sum of inputs without rounding."""
         quantity = self.items[name]
-        if isinstance(quantity.definition, Given):
+        if isinstance(quantity.definition, InputElement):
             return True
         return (
             isinstance(quantity.definition, Sum)
             and not quantity.offset
             and not quantity.beside
             and all(
-                len(m) == 1 and is_power_of_two(c) and isinstance(self.items[m[0]].definition, Given)
+                len(m) == 1 and is_power_of_two(c) and isinstance(self.items[m[0]].definition, InputElement)
                 for m, c in quantity.definition.terms
             )
         )
@@ -285,7 +287,7 @@ class _Derivation:
                 f"{self.program.kernel}: {argument} may be below 0, its range is {inside.text()}; it has no square root"
             )
         self._note(name, *(np.sqrt(np.maximum(s[argument], 0)) for s in (self.proper, self.any)))
-        self._other(name, Root(argument), inside.sqrt(), meaning)
+        self._other(name, SquareRoot(argument), inside.sqrt(), meaning)
 
     def _radicand(self, node: Node, name: str) -> Operand:
         """Return what a root is drawn from; a sum of squares as squares of words, so that it is not below 0."""
@@ -322,7 +324,7 @@ class _Derivation:
                 for s in (self.proper, self.any)
             ),
         )
-        self._other(name, Largest(arguments), enclosure, meaning)
+        self._other(name, Maximum(arguments), enclosure, meaning)
 
     def _select(self, name: str, node: Operation, meaning: str) -> None:
         cases: list[tuple[Operand, Operand, Operand]] = []
@@ -346,7 +348,7 @@ class _Derivation:
             return result
 
         self._note(name, chosen(self.proper), chosen(self.any))
-        self._other(name, Choice(tuple(cases), otherwise), enclosure, meaning)
+        self._other(name, Selection(tuple(cases), otherwise), enclosure, meaning)
 
     def _function(self, name: str, node: Operation, meaning: str) -> None:
         from strapgen.fixedpoint import functions  # it is written in the definitions of this module
@@ -375,12 +377,12 @@ class _Derivation:
         That is proved, or checked when the code runs if they keep one in proper use; 0 where nothing is known.
         """
         definitions = [self.items[argument].definition for argument in (ordinate, abscissa)]
-        if all(isinstance(definition, Given) for definition in definitions):
+        if all(isinstance(definition, InputElement) for definition in definitions):
             return Fraction(0)
         terms: Terms = {}
         for argument, definition in zip((ordinate, abscissa), definitions, strict=True):
             square: Terms = {(argument, argument): Fraction(1)}
-            if isinstance(definition, Root):
+            if isinstance(definition, SquareRoot):
                 square = self._value_of(definition.argument)
             terms = combined(terms, square, Fraction(1))
         free = self._free(f"{name}_distance")

@@ -16,19 +16,19 @@ from functools import cache, partial
 from strapgen.fixedpoint.formats import finest
 from strapgen.fixedpoint.intervals import Interval, maximum
 from strapgen.fixedpoint.quantities import (
-    Choice,
+    Computed,
     Definition,
-    Following,
-    Given,
-    Largest,
+    ErrorPropagation,
+    InputElement,
+    Maximum,
     Monomial,
-    Nearest,
+    NearestInteger,
     Operand,
     Quantity,
     Quotient,
-    Root,
+    Selection,
+    SquareRoot,
     Sum,
-    Taken,
 )
 
 #: Bits of `pi`, and a bound of what it lacks.
@@ -131,7 +131,7 @@ class _Chain:
         definition: Definition,
         enclosure: Interval,
         inexact: Fraction = Fraction(0),
-        follows: Following | None = None,
+        follows: ErrorPropagation | None = None,
     ) -> str:
         """Make a quantity, unless it is there; without a label it is the function's value."""
         if label and definition in self.same:
@@ -153,7 +153,7 @@ class _Chain:
         *terms: _Term,
         within: Interval | None = None,
         inexact: Fraction = Fraction(0),
-        follows: Following | None = None,
+        follows: ErrorPropagation | None = None,
     ) -> str:
         """Make a sum of products; `within` is a range that is known otherwise."""
         enclosure = Interval(0, 0)
@@ -181,17 +181,17 @@ class _Chain:
         enclosure = self.range(otherwise)
         for _, _, chosen in cases:
             enclosure = enclosure.join(self.range(chosen))
-        return self.add(label, Choice(cases, otherwise), enclosure)
+        return self.add(label, Selection(cases, otherwise), enclosure)
 
     def largest(self, label: str, *arguments: Operand) -> str:
         """Make the largest of several."""
-        return self.add(label, Largest(arguments), maximum(map(self.range, arguments)))
+        return self.add(label, Maximum(arguments), maximum(map(self.range, arguments)))
 
     def taken(self, argument: str) -> str:
         """Return an argument as it is computed, without an error of its own."""
-        if argument in self.known and isinstance(self.known[argument].definition, Given):
+        if argument in self.known and isinstance(self.known[argument].definition, InputElement):
             return argument
-        return self.add("taken", Taken(argument), self.range(argument))
+        return self.add("taken", Computed(argument), self.range(argument))
 
     def magnitude(self, label: str, argument: str) -> str:
         """Return the magnitude of a quantity."""
@@ -200,7 +200,7 @@ class _Chain:
             return argument
         negative = self.sum("negative", ((argument,), -_ONE))
         enclosure = Interval(0, Interval.of(inside.magnitude).high)
-        return self.add(label, Largest((argument, negative)), enclosure)
+        return self.add(label, Maximum((argument, negative)), enclosure)
 
     def polynomial(self, label: str, coefficients: Sequence[Fraction], variable: str) -> str:
         """Make a polynomial of two or more coefficients, from the last to the first."""
@@ -332,7 +332,7 @@ def _cosine(chain: _Chain, argument: str) -> None:
 def _finish(chain: _Chain, value: str, *slopes: tuple[str, Fraction | None]) -> None:
     """Make the last quantity the function's value, whose error follows those of what was taken as exact."""
     inside = chain.range(value)
-    follows = Following(slopes, inside.highest - inside.lowest)
+    follows = ErrorPropagation(slopes, inside.highest - inside.lowest)
     last = chain.made[-1] if chain.made else None
     if last is not None and last.name == value and isinstance(last.definition, Sum):
         del chain.same[last.definition]
@@ -368,7 +368,7 @@ def _reduced(chain: _Chain, angle: str) -> tuple[str, str]:
             f"words of {chain.word} bits are too short for the sine of angles up to {float(inside.magnitude):.6g} rad"
         )
     ends = [math.floor(end * factor + Fraction(1, 2)) for end in (inside.lowest, inside.highest)]
-    count = chain.add("quarters", Nearest(angle, factor), Interval.of(*ends))
+    count = chain.add("quarters", NearestInteger(angle, factor), Interval.of(*ends))
     # A quarter turn in two parts: the first is exact in a word, the second is what it lacks.
     coarse = Fraction(math.floor(pi() * grid / 4), grid // 2)
     rest = chain.sum(
@@ -382,7 +382,7 @@ def _reduced(chain: _Chain, angle: str) -> tuple[str, str]:
     if ends[0] >= -2 and ends[1] <= 1:
         return count, rest
     full = [math.floor(Fraction(end, 4) + Fraction(1, 2)) for end in ends]
-    whole = chain.add("turns", Nearest(count, Fraction(1, 4)), Interval.of(*full))
+    whole = chain.add("turns", NearestInteger(count, Fraction(1, 4)), Interval.of(*full))
     part = chain.sum("quarter_turns", ((count,), _ONE), ((whole,), Fraction(-4)), within=Interval.of(-2, 1))
     return part, rest
 
@@ -444,14 +444,14 @@ def _sinc(chain: _Chain, argument: str) -> None:
     is_near = inside.highest <= limit
     if not is_near:
         bounded = inside.meet(Interval.of(inside.lowest, limit))
-        near = chain.add("near", Choice(((limited, limit, limit),), limited), bounded)
+        near = chain.add("near", Selection(((limited, limit, limit),), limited), bounded)
     square = near if under_root is not None else _squared(chain, near)
     reach = max(chain.range(square).sqrt().highest, Fraction(1, 1 << chain.word))
     coefficients, left_out = sine_series(1, reach, chain.tolerance * reach)
     value = _even_series(chain, "series", coefficients, square, left_out / reach)
     if not is_near:
         if under_root is not None:
-            root = chain.add("root", Root(limited), inside.sqrt())
+            root = chain.add("root", SquareRoot(limited), inside.sqrt())
             size = chain.taken(root)
             slopes.append((root, _SINC_SLOPE))
         far = chain.largest("far", size, _NEAR_ZERO)
@@ -465,12 +465,12 @@ def _sinc(chain: _Chain, argument: str) -> None:
 def _under_root(chain: _Chain, argument: str) -> str | None:
     """Return the square of an argument that is a root, or an exact multiple of one."""
     definition = chain.known[argument].definition
-    if isinstance(definition, Root):
+    if isinstance(definition, SquareRoot):
         return definition.argument
     if isinstance(definition, Sum) and len(definition.terms) == 1:
         ((monomial, factor),) = definition.terms
         inner = chain.known[monomial[0]].definition if len(monomial) == 1 else None
-        if isinstance(inner, Root) and not chain.known[argument].offset:
+        if isinstance(inner, SquareRoot) and not chain.known[argument].offset:
             return chain.sum("under_root", ((inner.argument,), factor * factor))
     return None
 
@@ -484,7 +484,7 @@ def _arctangent(chain: _Chain, ordinate: str, abscissa: str, distance: Fraction,
     heights, widths = chain.range(height), chain.range(width)
     smaller = chain.add(
         "smaller",
-        Choice(((width, height, height),), width),
+        Selection(((width, height, height),), width),
         Interval(min(heights.low, widths.low), min(heights.high, widths.high)),
     )
     # At the origin the last place stands for the larger one: the angle is 0 there.
@@ -498,7 +498,7 @@ def _arctangent(chain: _Chain, ordinate: str, abscissa: str, distance: Fraction,
     zero, share = Fraction(0), sum(_OCTANT, Fraction(0))
     numerator = chain.add(
         "numerator",
-        Choice(((beyond, zero, below),), smaller),
+        Selection(((beyond, zero, below),), smaller),
         Interval.of(-(1 - share) * most, share * most),
     )
     denominator = chain.choice("denominator", (beyond, zero, both), otherwise=larger)
@@ -513,7 +513,7 @@ def _arctangent(chain: _Chain, ordinate: str, abscissa: str, distance: Fraction,
     )
     from_diagonal = _from(chain, Fraction(1, 4), angle, 1)
     angle = chain.add(
-        "octant", Choice(((beyond, zero, from_diagonal),), angle), Interval.of(0, pi() / 4 + PI_ERROR)
+        "octant", Selection(((beyond, zero, from_diagonal),), angle), Interval.of(0, pi() / 4 + PI_ERROR)
     )
     if heights.high > widths.low:
         angle = chain.choice(
@@ -554,7 +554,7 @@ def _wrap(chain: _Chain, argument: str) -> None:
             other = chain.sum("turned", ((angle,), _ONE), ((), sign * 2 * pi()), inexact=2 * PI_ERROR)
             cases.append((left, right, other))
     if cases:
-        value = chain.add("principal", Choice(tuple(cases), angle), within)
+        value = chain.add("principal", Selection(tuple(cases), angle), within)
     _finish(chain, value, (argument, _ONE))
 
 

@@ -98,7 +98,7 @@ class _Quantization:
         self.half = ROUNDINGS[settings.rounding]
         self.values: dict[str, code.Value] = {}
         self.body: list[code.Value] = []
-        self.residuals: list[code.Residual] = []
+        self.residuals: list[code.ErrorFeedback] = []
         self.begun_anew: set[str] = set()
         self.operations = dict.fromkeys(("add", "multiply", "shift", "divide", "sqrt", "compare"), 0)
         self.inputs: list[code.Argument] = []
@@ -107,7 +107,7 @@ class _Quantization:
             fraction, top = limit.places(guard_bits), limit.largest_integer(guard_bits)
             for name in signal.elements:
                 self.values[name] = code.Value(
-                    name, code.Given(), fraction, False, -top, top, Fraction(0), Fraction(0), top
+                    name, code.IntegerInput(), fraction, False, -top, top, Fraction(0), Fraction(0), top
                 )
             zeros = (Fraction(0),) * signal.size
             format_ = Format(self.word, fraction)
@@ -132,7 +132,7 @@ class _Quantization:
             if name not in self.exact.items:
                 values = ", ".join(dict.fromkeys([*known, *self.exact.items]))
                 raise InputError(f"{self.program.kernel} has no value {name!r}; its values are: {values}")
-            if isinstance(self.exact.items[name].definition, exact.Given):
+            if isinstance(self.exact.items[name].definition, exact.InputElement):
                 raise InputError(
                     f"the format of {name} is that of its input; give the format of the whole input"
                 )
@@ -182,7 +182,7 @@ class _Quantization:
             if not all(len(m) == 1 and is_power_of_two(c) for m, c in definition.terms):
                 continue
             if not all(
-                isinstance(self.exact.items[m[0]].definition, exact.Given) for m, _ in definition.terms
+                isinstance(self.exact.items[m[0]].definition, exact.InputElement) for m, _ in definition.terms
             ):
                 continue
             needed = max(self.values[m[0]].fraction - exponent(c) for m, c in definition.terms)
@@ -205,15 +205,15 @@ class _Quantization:
                 self._sum(quantity, carried.get(name))
             elif isinstance(definition, exact.Quotient):
                 self._quotient(quantity, definition)
-            elif isinstance(definition, exact.Root):
+            elif isinstance(definition, exact.SquareRoot):
                 self._root(quantity, definition)
-            elif isinstance(definition, exact.Largest):
+            elif isinstance(definition, exact.Maximum):
                 self._largest(quantity, definition)
-            elif isinstance(definition, exact.Choice):
+            elif isinstance(definition, exact.Selection):
                 self._choice(quantity, definition)
-            elif isinstance(definition, exact.Taken):
+            elif isinstance(definition, exact.Computed):
                 self._taken(quantity, definition)
-            elif isinstance(definition, exact.Nearest):
+            elif isinstance(definition, exact.NearestInteger):
                 self._nearest(quantity, definition)
         outputs = tuple(self._output(result.signal) for result in self.program.outputs)
         order = [name for name in carried if any(r.name == carried[name] for r in self.residuals)]
@@ -350,7 +350,7 @@ class _Quantization:
             if fits(made, peak, self.word, self.values):
                 break
             fraction -= 1
-        self._add(self._value(quantity, code.Sum(made), fraction, True, error, peak))
+        self._add(self._value(quantity, code.IntegerSum(made), fraction, True, error, peak))
 
     def _rounded(
         self,
@@ -358,7 +358,7 @@ class _Quantization:
         terms: list[Placed],
         fraction: int,
         residual: str | None,
-    ) -> tuple[code.Value, code.Residual | None]:
+    ) -> tuple[code.Value, code.ErrorFeedback | None]:
         """Return a sum as a word."""
         coarse = [item for item in terms if item.place <= fraction]
         fine = [item for item in terms if item.place > fraction]
@@ -370,9 +370,9 @@ class _Quantization:
             raise short
         if not fine:
             error = coarse_error
-            return self._value(quantity, code.Sum(added), fraction, False, error, coarse_peak), None
+            return self._value(quantity, code.IntegerSum(added), fraction, False, error, coarse_peak), None
         places = max(item.place for item in fine)
-        kept: code.Residual | None = None
+        kept: code.ErrorFeedback | None = None
         drop = 0
         while True:
             shift = places - fraction
@@ -383,7 +383,7 @@ class _Quantization:
             if residual is not None:
                 finer = fraction + self.word
                 fresh = 1 << (self.word - 1) if self.settings.rounding == "nearest" else 0
-                kept = code.Residual(residual, finer, min(0, places - finer), fresh)
+                kept = code.ErrorFeedback(residual, finer, min(0, places - finer), fresh)
                 extra = 1 << shift
                 drop = max(0, places - finer)
                 error += Fraction(2) ** -min(finer, places)
@@ -393,7 +393,7 @@ class _Quantization:
         rounding = self.half / Fraction(2) ** fraction
         # With a residual, the result is off by what was left before and what is left now.
         error += coarse_error + (2 * rounding if residual is not None else rounding)
-        definition = code.Sum(made, shift - drop, added, kept, drop)
+        definition = code.IntegerSum(made, shift - drop, added, kept, drop)
         low_level = max(peak + extra, coarse_peak + ((peak + extra) >> shift) + 1)
         if not fits(added, low_level, self.word, self.values):
             raise short
@@ -405,7 +405,7 @@ class _Quantization:
     def _value(
         self,
         quantity: exact.Quantity,
-        definition: code.Definition,
+        definition: code.IntegerDefinition,
         fraction: int,
         wide: bool,
         error: Fraction,
@@ -466,7 +466,7 @@ class _Quantization:
                 factors = {factor for monomial, _ in definition.terms for factor in monomial}
                 pending += factors - seen
                 seen |= factors
-            elif not isinstance(definition, exact.Given):
+            elif not isinstance(definition, exact.InputElement):
                 return True
         return False
 
@@ -564,7 +564,7 @@ class _Quantization:
                 )
         return scaled, fraction, error
 
-    def _taken(self, quantity: exact.Quantity, definition: exact.Taken) -> None:
+    def _taken(self, quantity: exact.Quantity, definition: exact.Computed) -> None:
         """Keep the computed value inside the range of the exact one, which brings it no farther from that."""
         name = self._word(definition.argument)
         value = self.values[name]
@@ -579,14 +579,14 @@ class _Quantization:
             if beyond:
                 limit = left if isinstance(left, int) else right
                 cases.append((code.Scaled(left), code.Scaled(right), code.Scaled(limit)))
-        kept: code.Definition = code.Choice(tuple(cases), code.Scaled(name))
+        kept: code.IntegerDefinition = code.IntegerSelection(tuple(cases), code.Scaled(name))
         if not cases:
-            kept = code.Sum((code.Term((name,), 1),))
+            kept = code.IntegerSum((code.Term((name,), 1),))
         limits = max(low, value.low), min(high, value.high)
         made = self._value(quantity, kept, value.fraction, False, Fraction(0), value.magnitude)
         self._add(replace(made, low=limits[0], high=limits[1]))
 
-    def _nearest(self, quantity: exact.Quantity, definition: exact.Nearest) -> None:
+    def _nearest(self, quantity: exact.Quantity, definition: exact.NearestInteger) -> None:
         """Round a multiple to an integer, halves up whatever the rounding of words is."""
         name = self._word(definition.argument)
         value = self.values[name]
@@ -600,7 +600,7 @@ class _Quantization:
             terms.append(code.Term((), half))
         made = self._value(
             quantity,
-            code.Sum(tuple(terms), shift),
+            code.IntegerSum(tuple(terms), shift),
             0,
             False,
             Fraction(0),
@@ -609,11 +609,11 @@ class _Quantization:
         ends = sorted((end * factor + half) >> shift for end in (value.low, value.high))
         self._add(replace(made, low=ends[0], high=ends[1]))
 
-    def _largest(self, quantity: exact.Quantity, definition: exact.Largest) -> None:
+    def _largest(self, quantity: exact.Quantity, definition: exact.Maximum) -> None:
         scaled, fraction, error = self._sides(definition.arguments)
-        self._finish(quantity, code.Largest(tuple(scaled)), fraction, error)
+        self._finish(quantity, code.IntegerMaximum(tuple(scaled)), fraction, error)
 
-    def _choice(self, quantity: exact.Quantity, definition: exact.Choice) -> None:
+    def _choice(self, quantity: exact.Quantity, definition: exact.Selection) -> None:
         values, fraction, error = self._sides(
             [*(case[2] for case in definition.cases), definition.otherwise], lossless=False
         )
@@ -624,17 +624,17 @@ class _Quantization:
             wrong = sum(self.values[side].error for side in (left, right) if isinstance(side, str))
             if wrong:  # the other branch may be taken
                 error += quantity.range.highest - quantity.range.lowest
-        self._finish(quantity, code.Choice(tuple(cases), values[-1]), fraction, error)
+        self._finish(quantity, code.IntegerSelection(tuple(cases), values[-1]), fraction, error)
 
     def _finish(
-        self, quantity: exact.Quantity, definition: code.Definition, fraction: int, error: Fraction
+        self, quantity: exact.Quantity, definition: code.IntegerDefinition, fraction: int, error: Fraction
     ) -> None:
         made = self._value(quantity, definition, fraction, True, error, 0)
         peak = made.magnitude
         wide = peak > Format(self.word, fraction).largest
         self._add(replace(made, wide=wide, peak=peak))
 
-    def _root(self, quantity: exact.Quantity, definition: exact.Root) -> None:
+    def _root(self, quantity: exact.Quantity, definition: exact.SquareRoot) -> None:
         argument = self.values[definition.argument]
         inside = self.exact.items[definition.argument].range
         # As many places below the argument as a wide number has room for, an even number of them in all.
@@ -649,7 +649,7 @@ class _Quantization:
         error += self.half / Fraction(2) ** fraction
         scaled = code.Scaled(definition.argument, shift)
         peak = argument.high << shift if shift > 0 else argument.high
-        made = self._value(quantity, code.Root(scaled), fraction, False, error, peak)
+        made = self._value(quantity, code.IntegerRoot(scaled), fraction, False, error, peak)
         self._add(replace(made, low=max(made.low, 0), high=min(made.high, 1 << (self.word - 1))))
         self._check_word(quantity.name)
 
@@ -678,7 +678,7 @@ class _Quantization:
             error += self.half / Fraction(2) ** fraction
             made = self._value(
                 quantity,
-                code.Quotient(code.Scaled(top.value, top.shift + shift), below_name),
+                code.IntegerQuotient(code.Scaled(top.value, top.shift + shift), below_name),
                 fraction,
                 False,
                 error,
@@ -708,7 +708,7 @@ class _Quantization:
     def _count(self, value: code.Value) -> None:
         """Count the integer operations of a value."""
         count, definition = self.operations, value.definition
-        if isinstance(definition, code.Sum):
+        if isinstance(definition, code.IntegerSum):
             terms = [*definition.fine, *definition.coarse]
             count["add"] += max(0, len(terms) - 1)
             count["multiply"] += sum(
@@ -720,11 +720,11 @@ class _Quantization:
             if definition.residual is not None:
                 count["add"] += 1
                 count["shift"] += bool(definition.residual.shift) * 2 + bool(definition.drop)
-        elif isinstance(definition, code.Quotient):
+        elif isinstance(definition, code.IntegerQuotient):
             count["divide"] += 1
-        elif isinstance(definition, code.Root):
+        elif isinstance(definition, code.IntegerRoot):
             count["sqrt"] += 1
-        elif isinstance(definition, code.Largest):
+        elif isinstance(definition, code.IntegerMaximum):
             count["compare"] += len(definition.arguments) - 1
-        elif isinstance(definition, code.Choice):
+        elif isinstance(definition, code.IntegerSelection):
             count["compare"] += len(definition.cases)
