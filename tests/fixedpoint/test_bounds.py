@@ -19,7 +19,7 @@ from strapgen.backends import evaluator as make_evaluator
 from strapgen.backends.fixed import ModelEvaluator
 from strapgen.catalogue import Choice, standard
 from strapgen.exceptions import InputError
-from strapgen.fixedpoint import Settings, can_lower, functions
+from strapgen.fixedpoint import Settings, can_lower, function_series
 from strapgen.fixedpoint.code import IntegerSum
 
 STEPS = [choice for choice in standard() if choice.method]
@@ -94,7 +94,7 @@ def test_every_value_keeps_its_range_and_its_error_bound(choice, word, rounding,
             computed = value.offset + seen[value.name] * Fraction(2) ** -value.fraction
             apart = abs(computed - known[value.name])
             if choice.name == "euler-angles-from-dcm":  # its angles are told without whole turns
-                apart = min(apart, abs(apart - 2 * functions.pi()))
+                apart = min(apart, abs(apart - 2 * function_series.pi()))
             assert apart <= value.error, value.name
             compared += 1
     # What functions are made of has no name in the program.
