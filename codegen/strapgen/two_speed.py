@@ -21,7 +21,7 @@ from strapgen.backends.fixed import FixedEvaluator, integers, numbers
 from strapgen.catalogue import Choice
 from strapgen.exceptions import InputError
 from strapgen.fixedpoint import Settings
-from strapgen.fixedpoint.code import Argument
+from strapgen.fixedpoint.interface import Argument
 from strapgen.gyro import pulses
 from strapgen.targets import FIXED, Sources
 from strapgen.targets.whole import LOOPS, recursion, whole, wiring

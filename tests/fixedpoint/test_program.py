@@ -158,6 +158,7 @@ def test_a_user_fixes_formats():
         ({"q_x": "Q0.31"}, "has no value 'q_x'; its values are: state, increments"),
         ({"d1_x": "Q0.31"}, "give the format of the whole input"),
         ({"state": "Q0.31"}, "format Q0.31 of state does not hold its range of \\+-1.0625"),
+        ({"next_x": "Q2.29"}, "elements of next share one format; fix the format of next, not of one element"),
     ],
 )
 def test_formats_that_do_not_hold_their_values(formats, said):
@@ -249,6 +250,12 @@ def test_interfaces_survive_json():
     data = json.loads(json.dumps(fixed.interface.as_dict()))
     assert type(fixed.interface).from_dict(data) == fixed.interface
     assert len(fixed.interface.residuals) == 8
+
+
+def test_a_division_by_zero_is_refused():
+    body = {"y": op("divide", "x_1", op("subtract", number(1), number(1)))}
+    with pytest.raises(InputError, match="made has no fixed point: a program divides by zero"):
+        quantize(hand_made(body, "y"), Settings(16))
 
 
 def test_a_constant_output_and_a_repeated_one():

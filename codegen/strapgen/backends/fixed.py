@@ -14,7 +14,7 @@ import numpy as np
 from strapgen import compilation
 from strapgen.backends.protocol import Array, Backend, Evaluator
 from strapgen.exceptions import InputError
-from strapgen.fixedpoint.code import Argument, Interface
+from strapgen.fixedpoint.interface import Argument, Interface
 from strapgen.targets import Sources
 
 

@@ -13,8 +13,9 @@ from fractions import Fraction
 from functools import lru_cache
 
 from strapgen.fixedpoint import quantities as exact
-from strapgen.fixedpoint.code import Argument, IntegerSum, RoundingAccumulation, Value
+from strapgen.fixedpoint.code import IntegerSum, Value
 from strapgen.fixedpoint.formats import ROUNDINGS
+from strapgen.fixedpoint.interface import Argument, RoundingAccumulation
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.fixedpoint.series import Series, Truncated
 from strapgen.fixedpoint.settings import Settings

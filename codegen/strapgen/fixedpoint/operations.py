@@ -81,7 +81,7 @@ def _divide(context: DerivationContext, name: str, node: Operation, meaning: str
     if isinstance(denominator, Fraction):
         if not denominator:
             raise ZeroDivisionError("a program divides by zero")
-        terms = stored_terms(context, numerator) if isinstance(numerator, str) else {(): numerator}
+        terms: Terms = stored_terms(context, numerator) if isinstance(numerator, str) else {(): numerator}
         store(context, name, scaled(terms, 1 / denominator), meaning, whole=name in context.outputs)
         return
     _check_range(context, denominator)
@@ -137,7 +137,7 @@ def _squared_names(node: Node) -> list[str]:
 def _maximum(context: DerivationContext, name: str, node: Operation, meaning: str) -> None:
     arguments = tuple(operand_of(context, argument, f"{name}_argument") for argument in _flat(node))
     enclosure = maximum(range_of(context, argument) for argument in arguments)
-    expansions = [
+    expansions: list[Terms | None] = [
         context.ranges.expanded.get(argument) if isinstance(argument, str) else {(): argument}
         for argument in arguments
     ]

@@ -131,7 +131,7 @@ def _with_plain_products(context: DerivationContext, name: str, terms: Terms) ->
 
 def _split(context: DerivationContext, terms: Terms) -> tuple[Terms, Terms]:
     """Return the exact sum of inputs that a sum differs little from, and the difference; else nothing and the sum."""
-    exact = {
+    exact: Terms = {
         monomial: c
         for monomial, c in terms.items()
         if len(monomial) == 1 and is_power_of_two(c) and _is_exact(context, monomial[0])

@@ -5,7 +5,8 @@ from __future__ import annotations
 from fractions import Fraction
 
 from strapgen.fixedpoint import FixedProgram
-from strapgen.fixedpoint.code import Argument, ErrorFeedback, RoundingAccumulation, Value
+from strapgen.fixedpoint.code import Value
+from strapgen.fixedpoint.interface import Argument, ErrorFeedback, RoundingAccumulation
 from strapgen.fixedpoint.settings import DEFAULT_ALLOWANCE, DEFAULT_ANGLE
 from strapgen.program import Program
 
