@@ -21,7 +21,7 @@ from strapgen.backends.fixed import FixedEvaluator, integers, numbers
 from strapgen.catalogue import Choice
 from strapgen.exceptions import InputError
 from strapgen.fixedpoint import Settings
-from strapgen.fixedpoint.code import Argument
+from strapgen.fixedpoint.interface import Argument
 from strapgen.fixedpoint.settings import DEFAULT_ANGLE
 from strapgen.gyro import pulses
 from strapgen.targets import FIXED, Sources

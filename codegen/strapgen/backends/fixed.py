@@ -15,7 +15,7 @@ from strapgen import compilation
 from strapgen.backends.protocol import Array, Backend, Evaluator
 from strapgen.backends.step_sources import StepSources
 from strapgen.exceptions import InputError
-from strapgen.fixedpoint.code import Argument, Interface
+from strapgen.fixedpoint.interface import Argument, Interface
 from strapgen.targets import Sources
 
 

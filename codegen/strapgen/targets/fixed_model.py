@@ -5,7 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from strapgen.fixedpoint import FixedProgram, Settings, quantize
-from strapgen.fixedpoint.code import Choice, Largest, Quotient, Root, Scaled, Sum, Term, Value
+from strapgen.fixedpoint.code import (
+    IntegerMaximum,
+    IntegerQuotient,
+    IntegerRoot,
+    IntegerSelection,
+    IntegerSum,
+    Scaled,
+    Term,
+    Value,
+)
 from strapgen.program import Program
 from strapgen.targets.names import PYTHON, printed
 from strapgen.targets.rendering import render
@@ -74,19 +83,19 @@ def _statements(value: Value, fixed: FixedProgram, other: Mapping[str, str]) -> 
     name, definition = value.name, value.definition
     said = other.get(name, name)
     lines = [f"# {value.meaning}"] if value.meaning else []
-    if isinstance(definition, Sum):
+    if isinstance(definition, IntegerSum):
         lines += _sum(value, definition, fixed, said)
     else:
-        if isinstance(definition, Quotient):
+        if isinstance(definition, IntegerQuotient):
             text = f"_quotient({_scaled(definition.numerator)}, {definition.denominator})"
-        elif isinstance(definition, Root):
+        elif isinstance(definition, IntegerRoot):
             text = f"_root({_scaled(definition.argument)})"
-        elif isinstance(definition, Largest):
+        elif isinstance(definition, IntegerMaximum):
             text = _scaled(definition.arguments[0])
             for argument in definition.arguments[1:]:
                 text = f"_larger({text}, {_scaled(argument)})"
         else:
-            assert isinstance(definition, Choice)
+            assert isinstance(definition, IntegerSelection)
             text = _scaled(definition.otherwise)
             for left, right, chosen in reversed(definition.cases):
                 text = f"_chosen({_scaled(left)} >= {_scaled(right)}, {_scaled(chosen)}, {text})"
@@ -96,7 +105,7 @@ def _statements(value: Value, fixed: FixedProgram, other: Mapping[str, str]) -> 
     return lines
 
 
-def _sum(value: Value, definition: Sum, fixed: FixedProgram, said: str) -> list[str]:
+def _sum(value: Value, definition: IntegerSum, fixed: FixedProgram, said: str) -> list[str]:
     name = value.name
     fine = [_term(term) for term in definition.fine]
     coarse = [_term(term) for term in definition.coarse]
