@@ -15,7 +15,7 @@ from strapgen.exceptions import InputError
 
 if TYPE_CHECKING:
     from strapgen.vibration import Assessment
-    from strapgen.vibration.assessment import Rates as MeanRates
+    from strapgen.vibration.mean_rates import Rates as MeanRates
 
 _Text = str | None
 

@@ -9,7 +9,7 @@ from derived import kernel, program
 from strapgen import catalogue
 from strapgen.catalogue import ALGORITHMS, STANDARD_METHODS, Choice
 from strapgen.lowering import candidates, canonical, lower
-from strapgen.lowering.names import is_unnamed
+from strapgen.lowering.names import is_temporary
 from strapgen.lowering.passes import optimize
 from strapgen.program import Program
 
@@ -41,8 +41,8 @@ def test_the_transition_is_that_of_the_stages(choice):
     assert is_the_kernel(made, choice)
     assert not any(made.operations[kind] for kind in ("divide", "sqrt", "select", "function"))
     # Where scalars and vectors have names nothing is left to be found that has none.
-    unnamed = [a.name for a in made.body if a.name.startswith(("shared_", "factor_"))]
-    assert choice.name == "dcm" or not unnamed
+    temporaries = [a.name for a in made.body if a.name.startswith(("shared_", "factor_"))]
+    assert choice.name == "dcm" or not temporaries
 
 
 @pytest.mark.parametrize(
@@ -112,8 +112,8 @@ def test_a_transition_depends_on_nothing_but_the_increments():
 @EVERY
 def test_values_are_named_after_what_they_are(choice):
     # Only partial sums and factors that a pass shares have no meaning: few in a matrix, none in a quaternion.
-    unnamed = [a.name for a in program(choice).body if is_unnamed(a.name)]
-    assert len(unnamed) <= (3 if choice.name == "dcm" else 0)
+    temporaries = [a.name for a in program(choice).body if is_temporary(a.name)]
+    assert len(temporaries) <= (3 if choice.name == "dcm" else 0)
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Plans as straight-line code on scalars."""
+"""Plans are written as straight-line code on scalars."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from strapgen.lowering.canonical.products import choose_products
 from strapgen.lowering.polynomials import Polynomial, ratio
 from strapgen.program import Assignment, Constant, Node, Operation, Reference
 
-#: A summand of a vector: its coefficient, its weight if that is no number, and the vector's name.
+#: A summand of a vector: its coefficient, its weight unless that is a number, and the name of the vector.
 _Summand = tuple[Fraction, Reference | None, str]
 
 
@@ -37,7 +37,7 @@ class Writer:
     ----------
     plan : Plan
     offered : sequence of str
-        Names of vectors, the basis among them and in its span, that scalar products may be taken of.
+        Names of vectors whose scalar products may be used: those of the basis, and others within its span.
     """
 
     def __init__(self, plan: Plan, offered: Sequence[str]) -> None:
@@ -114,7 +114,7 @@ class Writer:
         ]
 
     def _diagonal(self, axis: str) -> list[Node]:
-        """Return what outer products on one side have on the diagonal, the partners of a vector summed."""
+        """Return the diagonal elements of one-sided outer products, with the partners of each vector summed first."""
         partners: dict[str, list[Node]] = {}
         for o in self._plan.outers:
             if o.sides is not Sides.BOTH:
@@ -164,7 +164,7 @@ class Writer:
             self._assign(f"{definition.name}_{axis}", Operation("subtract", products))
 
     def _weight(self, polynomial: Polynomial, name: str, meaning: str) -> tuple[Fraction, Reference | None]:
-        """Return a weight as a number times a scalar that is computed, or as a number alone."""
+        """Return a weight as a number times a computed scalar, or as a number alone."""
         chosen = self._chosen[_key(polynomial)]
         if chosen.keys() <= {()}:
             return chosen.get((), Fraction(0)), None
