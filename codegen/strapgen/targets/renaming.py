@@ -8,20 +8,18 @@ from typing import NamedTuple, TypeVar
 
 from strapgen.fixedpoint import FixedProgram
 from strapgen.fixedpoint.code import (
-    Argument,
-    Choice,
-    Definition,
-    Given,
-    Interface,
-    Largest,
-    Quotient,
-    Residual,
-    Root,
+    IntegerDefinition,
+    IntegerInput,
+    IntegerMaximum,
+    IntegerQuotient,
+    IntegerRoot,
+    IntegerSelection,
+    IntegerSum,
     Scaled,
-    Sum,
     Term,
     Value,
 )
+from strapgen.fixedpoint.interface import Argument, ErrorFeedback, Interface
 from strapgen.program import Assignment, Node, Operation, Program, Reference, Result
 from strapgen.signal import Signal
 
@@ -136,34 +134,34 @@ class _Renaming:
         values = tuple(map(self.value, argument.values))
         return replace(argument, signal=self.signal(argument.signal), values=values)
 
-    def residual(self, residual: Residual) -> Residual:
+    def residual(self, residual: ErrorFeedback) -> ErrorFeedback:
         return replace(residual, name=self.names.get(Key("residual", residual.name), residual.name))
 
     def fixed_value(self, value: Value) -> Value:
         return replace(value, name=self.value(value.name), definition=self.definition(value.definition))
 
-    def definition(self, definition: Definition) -> Definition:
-        if isinstance(definition, Sum):
+    def definition(self, definition: IntegerDefinition) -> IntegerDefinition:
+        if isinstance(definition, IntegerSum):
             return replace(
                 definition,
                 fine=tuple(map(self.term, definition.fine)),
                 coarse=tuple(map(self.term, definition.coarse)),
                 residual=definition.residual and self.residual(definition.residual),
             )
-        if isinstance(definition, Quotient):
-            return Quotient(self.scaled(definition.numerator), self.value(definition.denominator))
-        if isinstance(definition, Root):
-            return Root(self.scaled(definition.argument))
-        if isinstance(definition, Largest):
-            return Largest(tuple(map(self.scaled, definition.arguments)))
-        if isinstance(definition, Given):
+        if isinstance(definition, IntegerQuotient):
+            return IntegerQuotient(self.scaled(definition.numerator), self.value(definition.denominator))
+        if isinstance(definition, IntegerRoot):
+            return IntegerRoot(self.scaled(definition.argument))
+        if isinstance(definition, IntegerMaximum):
+            return IntegerMaximum(tuple(map(self.scaled, definition.arguments)))
+        if isinstance(definition, IntegerInput):
             return definition
-        assert isinstance(definition, Choice)
+        assert isinstance(definition, IntegerSelection)
         cases = tuple(
             (self.scaled(left), self.scaled(right), self.scaled(value))
             for left, right, value in definition.cases
         )
-        return Choice(cases, self.scaled(definition.otherwise))
+        return IntegerSelection(cases, self.scaled(definition.otherwise))
 
     def term(self, term: Term) -> Term:
         return replace(term, names=tuple(map(self.value, term.names)))
