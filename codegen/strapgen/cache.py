@@ -78,9 +78,7 @@ def entry(kind: str, key: str, fill: Callable[[Path], None]) -> Path:
         If the cache folder cannot be written.
     """
     place = root() / kind / key
-    if _is_whole(place):
-        with contextlib.suppress(OSError):
-            os.utime(place)  # in use: not to be pruned
+    if present(kind, key) is not None:
         return place
     try:
         place.parent.mkdir(parents=True, exist_ok=True)
@@ -106,6 +104,16 @@ def entry(kind: str, key: str, fill: Callable[[Path], None]) -> Path:
     finally:
         shutil.rmtree(draft, ignore_errors=True)
     _prune(place.parent)
+    return place
+
+
+def present(kind: str, key: str) -> Path | None:
+    """Return the folder of a cache entry if it is there and whole; parameters are those of `entry`."""
+    place = root() / kind / key
+    if not _is_whole(place):
+        return None
+    with contextlib.suppress(OSError):
+        os.utime(place)  # in use: not to be pruned
     return place
 
 

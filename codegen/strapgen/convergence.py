@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import mpmath
 import numpy as np
 
-from strapgen import catalogue, checks, exact, pipeline
+from strapgen import catalogue, checks, exact, library
 from strapgen.backends import BACKENDS, of
 from strapgen.catalogue import Choice
 from strapgen.exceptions import InputError, InputTypeError
@@ -249,7 +249,7 @@ def interpreter(name: str) -> exact.Interpreter:
 
 @cache
 def _program(name: str) -> Program:
-    return pipeline.lower(catalogue.derive(catalogue.choose(name)))
+    return library.program(catalogue.choose(name))
 
 
 def _exactly(choice: Choice, motion: Motion, rounding: float) -> _Measure:
@@ -285,7 +285,7 @@ def exact_attitudes(
     callable
         ``run(step, count)``: the computed and the true matrix, row by row, at time 0 and after every step.
     """
-    program = pipeline.lower(catalogue.derive(choice))
+    program = library.program(choice)
     assert program.companions is not None, "checked by the caller"
     samples, previous = catalogue.increments(choice), catalogue.previous(choice)
 
