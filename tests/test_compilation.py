@@ -278,7 +278,7 @@ def test_a_module_of_many_that_is_gone_is_compiled_alone(kind, many, root, monke
 
 
 def test_many_without_a_compiler(many, without_compiler, root):
-    with pytest.raises(CompilerError, match="^no C compiler: 'cc' is not on the PATH"):
+    with pytest.raises(CompilerError, match=r"^no C compiler: 'cc' is not on the PATH"):
         compilation.compile_together(many)
     assert not (root / "builds").exists()
     compilation.compile_together([sources for sources in many if sources.target == "numpy"])

@@ -2,9 +2,9 @@
 
 Run as ``python -P extension.py``. Every line of standard input is a JSON object: the module's ``name``, the
 declarations ``cdef``, the ``header`` of its C text, the C ``sources``, ``libraries`` and ``flags``, the ``folder`` to
-work in and the ``environment``. For every line one is printed: an object with the ``path`` of the compiled module, or null,
-and what was ``said``. What setuptools and the compiler do to environment, folder and output stays in this process, and
-they are imported once.
+work in and the ``environment``. For every line one is printed: an object with the ``path`` of the compiled module, or
+null, and what was ``said``. What setuptools and the compiler do to environment, folder and output stays in this
+process, and they are imported once.
 """
 
 from __future__ import annotations
