@@ -112,7 +112,9 @@ class _Precise:
         self.program = pipeline.lower(kernel)
         self.identity = companions.identity
         self.restoring = companions.orthonormalize
-        self._attitude = None if companions.attitude is None else interpreter(companions.attitude, kernel)
+        self._attitude = (
+            None if companions.attitude is None else interpreter(companions.attitude, self.program)
+        )
 
     def attitude(self, state: list[Any]) -> Any:
         """Return the direction cosine matrix of a state."""

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen import catalogue, checks, compilation, exact, pipeline
+from strapgen import catalogue, checks, compilation, exact, library
 from strapgen.backends import BACKENDS, Backend, of
 from strapgen.catalogue import Choice
 from strapgen.catalogue.tableaux import Tableau
@@ -151,7 +151,7 @@ def compare_choice(
 def _reference(make: Any, choice: Choice, reference: str, increments: Array) -> Array:
     """Return the states of the reference, in double."""
     if reference == EXACT:
-        return exact.propagate(pipeline.lower(catalogue.derive(choice)), increments)
+        return exact.propagate(library.program(choice), increments)
     backend = make(reference)
     states: Array = backend.propagate(increments).astype(np.float64)
     require_finite(backend, states, np.arange(len(states), dtype=np.float64))

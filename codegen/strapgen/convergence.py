@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import mpmath
 import numpy as np
 
-from strapgen import catalogue, checks, exact, pipeline
+from strapgen import catalogue, checks, exact, library
 from strapgen.backends import BACKENDS, of
 from strapgen.catalogue import Choice
 from strapgen.exceptions import InputError, InputTypeError
@@ -242,16 +242,15 @@ def _on_backend(
     return measure
 
 
-def interpreter(name: str, step: Kernel | None = None) -> exact.Interpreter:
+def interpreter(name: str, step: Program | None = None) -> exact.Interpreter:
     """Return a kernel by name that runs in many digits: one that a step brings, or of the catalogue."""
-    if step is not None and name in (brought.name for brought in step.own):
-        return exact.Interpreter(pipeline.lower(catalogue.companion(step, name)))
-    return exact.Interpreter(_program(name))
+    programs = () if step is None else step.own
+    return exact.Interpreter(next((one for one in programs if one.kernel == name), None) or _program(name))
 
 
 @cache
 def _program(name: str) -> Program:
-    return pipeline.lower(catalogue.derive(Choice(name)))
+    return library.program(Choice(name))
 
 
 def _exactly(choice: Choice, motion: Motion, rounding: float) -> _Measure:
@@ -287,14 +286,13 @@ def exact_attitudes(
     callable
         ``run(step, count)``: the computed and the true matrix, row by row, at time 0 and after every step.
     """
-    kernel = catalogue.derive(choice)
-    program = pipeline.lower(kernel)
+    program = library.program(choice)
     assert program.companions is not None, "checked by the caller"
     samples, previous = choice.increments_per_step, choice.previous
 
     increment, truth = interpreter(f"{motion.name}-increments"), interpreter(f"{motion.name}-truth")
     named = program.companions.attitude
-    attitude = None if named is None else interpreter(named, kernel)
+    attitude = None if named is None else interpreter(named, program)
     identity = program.companions.identity
 
     def run(length: Fraction, count: int) -> Iterator[tuple[list[Any], list[Any]]]:

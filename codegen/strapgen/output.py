@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import secrets
 import stat
@@ -64,6 +65,30 @@ def write_files(folder: str | Path, files: Mapping[str, str | bytes]) -> list[Pa
             with contextlib.suppress(OSError):
                 draft_path.unlink()
     return places
+
+
+def check_folder(folder: str | Path) -> None:
+    """Check that files can be written into a folder, before the work that makes them; nothing is made.
+
+    Raises
+    ------
+    InputError
+        If a file stands in its way, or the place for it cannot be written.
+    """
+    folder = Path(folder)
+    for place in (folder, *folder.absolute().parents):
+        try:
+            mode = place.stat().st_mode
+        except FileNotFoundError:
+            continue
+        except OSError as error:
+            raise InputError(f"{folder} cannot be written ({error.strerror})") from None
+        number = 0 if os.access(place, os.W_OK) else errno.EACCES
+        if not stat.S_ISDIR(mode):
+            number = errno.ENOTDIR
+        if number:
+            raise InputError(f"{folder} cannot be written ({os.strerror(number)})")
+        return
 
 
 def _put_in_place(drafts: list[tuple[Path, Path]]) -> None:

@@ -924,12 +924,15 @@ def started(*words: str, **rest) -> subprocess.CompletedProcess[str]:
 
 
 def test_help_is_quick():
-    def seconds() -> float:
-        start = time.perf_counter()
-        assert started("--help").returncode == 0
-        return time.perf_counter() - start
+    """In time of the processor: other work on the machine takes its own."""
 
-    assert min(seconds() for _ in range(5)) < 0.5
+    def seconds() -> float:
+        start = os.times()
+        assert started("--help").returncode == 0
+        end = os.times()
+        return end.children_user + end.children_system - start.children_user - start.children_system
+
+    assert any(seconds() < 0.5 for _ in range(5))
 
 
 @pytest.mark.parametrize("words", [["--help"], ["simulate", "--help"], ["generate", "--check"]])

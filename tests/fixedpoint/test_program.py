@@ -158,7 +158,10 @@ def test_a_user_fixes_formats():
         ({"q_x": "Q0.31"}, "has no value 'q_x'; its values are: state, increments"),
         ({"d1_x": "Q0.31"}, "give the format of the whole input"),
         ({"state": "Q0.31"}, "format Q0.31 of state does not hold its range of \\+-1.0625"),
-        ({"next_x": "Q2.29"}, "elements of next share one format; fix the format of next, not of one element"),
+        (
+            {"next_x": "Q2.29"},
+            "elements of next share one format; fix the format of next, not of one element",
+        ),
     ],
 )
 def test_formats_that_do_not_hold_their_values(formats, said):

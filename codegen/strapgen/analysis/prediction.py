@@ -10,7 +10,7 @@ from typing import Any
 import mpmath
 import sympy as sp
 
-from strapgen import algebra, catalogue, checks, exact
+from strapgen import algebra, catalogue, checks, exact, library
 from strapgen.analysis.accumulation import antiderivative
 from strapgen.analysis.error_rate import ErrorRate, error_rate
 from strapgen.analysis.motion_rates import TIME, parameters
@@ -251,5 +251,5 @@ def _orthonormalization(choice: Choice) -> Callable[[Matrix], Matrix]:
     if step_kernels.attitude is not None:
         # If the length of the parameters is not 1, their matrix is a rotation times a factor.
         return lambda computed: computed / mpmath.cbrt(mpmath.det(computed))
-    scheme = interpreter(step_kernels.orthonormalize, kernel)
+    scheme = interpreter(step_kernels.orthonormalize, library.program(choice))
     return lambda computed: _matrix(scheme(list(computed)))
