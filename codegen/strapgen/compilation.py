@@ -22,6 +22,7 @@ import sysconfig
 import tempfile
 import threading
 from collections.abc import Iterable, Sequence
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -95,8 +96,12 @@ def compile_together(many: Iterable[Sources]) -> None:
         name = f"strapgen_{together}"
         folder = _build(list(group.values()), name, together)
         for key in group:
-            text = json.dumps({"name": name, "build": folder.name})
-            cache.entry(_SHARED, key, lambda draft, text=text: (draft / "module.json").write_text(text))
+            cache.entry(_SHARED, key, partial(_note_module, {"name": name, "build": folder.name}))
+
+
+def _note_module(module: dict[str, str], draft: Path) -> None:
+    """Write down in which module a source was compiled."""
+    (draft / "module.json").write_text(json.dumps(module))
 
 
 def _groups(missing: dict[str, Sources]) -> list[dict[str, Sources]]:

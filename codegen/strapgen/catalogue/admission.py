@@ -189,7 +189,7 @@ def _require_step(kernel: Kernel) -> None:
             kernel,
             f"its transition {kernel.transition!r} is none of its stages: {', '.join(stages) or 'none'}",
         )
-    if kernel.transition is not None and [s.signal.name for s in kernel.stages].count(kernel.transition) > 1:
+    if sum(stage.signal.name == kernel.transition for stage in kernel.stages) > 1:
         _refuse(kernel, f"two of its stages are called {kernel.transition}, as its transition is")
     if companions.attitude is None and state.shape != (3, 3):
         _refuse(kernel, "attitude is None, but the state is no matrix (3, 3)")
