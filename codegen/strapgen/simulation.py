@@ -208,5 +208,7 @@ def simulate(
     time: Array = np.arange(len(states), dtype=np.float64) * float(interval)
     require_finite(backend, states, time)
     true = motion.attitude(time)
-    computed = attitude(backend, states)
+    with np.errstate(over="ignore", invalid="ignore"):  # the squares of large states are refused instead
+        computed = attitude(backend, states)
+    require_finite(backend, computed, time)
     return Run(time, computed, true, *evaluator("error-matrix")(computed, true))
