@@ -22,6 +22,7 @@ import sysconfig
 import tempfile
 import threading
 from collections.abc import Iterable, Sequence
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -92,9 +93,13 @@ def compile_together(many: Iterable[Sources]) -> None:
         together = _key(group.values())
         name = f"strapgen_{together}"
         folder = _build(list(group.values()), name, together)
+        pointer = json.dumps({"name": name, "build": folder.name})
         for key in group:
-            text = json.dumps({"name": name, "build": folder.name})
-            cache.entry(_SHARED, key, lambda draft, text=text: (draft / "module.json").write_text(text))
+            cache.entry(_SHARED, key, partial(_point, pointer))
+
+
+def _point(pointer: str, draft: Path) -> None:
+    (draft / "module.json").write_text(pointer)
 
 
 def _groups(missing: dict[str, Sources]) -> list[dict[str, Sources]]:
