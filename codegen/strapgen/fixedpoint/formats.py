@@ -44,10 +44,10 @@ class Format:
         InputError
             If the text is no format of the word.
         """
-        found = re.fullmatch(r"Q(-?\d{1,4})\.(-?\d{1,4})", text)
-        if found is None:
+        match = re.fullmatch(r"Q(-?\d{1,4})\.(-?\d{1,4})", text)
+        if match is None:
             raise InputError(f"format {text!r} is not known; Qm.n is needed, as in Q1.{word - 2}")
-        whole, fraction = map(int, found.groups())
+        whole, fraction = map(int, match.groups())
         if whole + fraction + 1 != word:
             raise InputError(
                 f"format {text} has {whole + fraction + 1} bits with its sign; {word} are needed, as in "

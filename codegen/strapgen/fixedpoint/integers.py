@@ -83,9 +83,9 @@ def lowered(program: Program, settings: Settings) -> FixedProgram:
         context, fixed = shorter, aligned
     if program.companions is None or program.transition is None:
         return fixed
-    interface = fixed.interface
-    adds_up = accumulation(program, settings, quantities, context.values, interface.inputs, interface.outputs)
-    return replace(fixed, interface=replace(interface, accumulation=adds_up))
+    (result,) = fixed.interface.outputs
+    adds_up = accumulation(context, program.transition, result)
+    return replace(fixed, interface=replace(fixed.interface, accumulation=adds_up))
 
 
 def _planned(program: Program, settings: Settings) -> tuple[Quantities, FormatPlan]:

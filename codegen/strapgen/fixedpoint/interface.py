@@ -169,7 +169,7 @@ class Interface:
             "settings": self.settings.as_dict(),
             "inputs": [argument.as_dict() for argument in self.inputs],
             "outputs": [argument.as_dict() for argument in self.outputs],
-            "residuals": [asdict(residual) for residual in self.residuals],
+            "residuals": [asdict(feedback) for feedback in self.residuals],
             "accumulation": adds_up and {name: str(value) for name, value in asdict(adds_up).items()},
         }
 
@@ -181,6 +181,6 @@ class Interface:
             Settings.from_dict(data["settings"]),
             tuple(map(Argument.from_dict, data["inputs"])),
             tuple(map(Argument.from_dict, data["outputs"])),
-            tuple(ErrorFeedback(**residual) for residual in data["residuals"]),
+            tuple(ErrorFeedback(**feedback) for feedback in data["residuals"]),
             adds_up and RoundingAccumulation(**{name: Fraction(value) for name, value in adds_up.items()}),
         )

@@ -153,26 +153,18 @@ class Quantities:
         return quantity.range.magnitude + sum(beside, Fraction(0))
 
     def factors(self) -> set[str]:
-        """Return the quantities that are multiplied by something that is no power of two."""
-        return {
-            name
-            for quantity in self.items.values()
-            if isinstance(quantity.definition, Sum)
-            for monomial, coefficient in quantity.definition.terms
-            if len(monomial) == 2 or not is_power_of_two(coefficient)
-            for name in monomial
-        } | {
-            name
-            for quantity in self.items.values()
-            for name in (
-                *(m[0] for m, _ in quantity.beside),
-                *(
-                    [quantity.definition.argument]
-                    if isinstance(quantity.definition, Computed | NearestInteger)
-                    else []
-                ),
-            )
-        }
+        """Return the quantities that must be words: factors of products, exact parts beside others, and arguments."""
+        names: set[str] = set()
+        for quantity in self.items.values():
+            names.update(monomial[0] for monomial, _ in quantity.beside)
+            match quantity.definition:
+                case Sum(terms):
+                    for monomial, coefficient in terms:
+                        if len(monomial) == 2 or not is_power_of_two(coefficient):
+                            names.update(monomial)
+                case Computed(argument) | NearestInteger(argument):
+                    names.add(argument)
+        return names
 
 
 def is_power_of_two(value: Fraction) -> bool:
@@ -199,20 +191,20 @@ def is_dyadic(value: Fraction) -> bool:
 
 def used_by(quantity: Quantity) -> list[str]:
     """Return the quantities that another rests on."""
-    definition = quantity.definition
-    used: list[Operand] = [m[0] for m, _ in quantity.beside]
+    used: list[Operand] = [monomial[0] for monomial, _ in quantity.beside]
     if quantity.follows is not None:
         used += [name for name, _ in quantity.follows.slopes]
-    if isinstance(definition, Sum):
-        used += [name for monomial, _ in definition.terms for name in monomial]
-    elif isinstance(definition, Quotient):
-        used += [definition.numerator, definition.denominator]
-    elif isinstance(definition, SquareRoot | Computed | NearestInteger):
-        used.append(definition.argument)
-    elif isinstance(definition, Maximum):
-        used += definition.arguments
-    elif isinstance(definition, Selection):
-        used += [operand for case in definition.cases for operand in case] + [definition.otherwise]
+    match quantity.definition:
+        case Sum(terms):
+            used += [name for monomial, _ in terms for name in monomial]
+        case Quotient(numerator, denominator):
+            used += [numerator, denominator]
+        case SquareRoot(argument) | Computed(argument) | NearestInteger(argument):
+            used.append(argument)
+        case Maximum(arguments):
+            used += arguments
+        case Selection(cases, otherwise):
+            used += [operand for case in cases for operand in case] + [otherwise]
     return [name for name in used if isinstance(name, str)]
 
 

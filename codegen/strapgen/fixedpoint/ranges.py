@@ -100,7 +100,7 @@ class Ranges:
             return enclosure
         goal = Fraction(2) ** bits
         needed = self._needed(definition)
-        pending, kept, spent = [self.box], Interval(0, 0), 0
+        pending, proved, spent = [self.box], Interval(0, 0), 0
         names = [n for n in self.box if n in needed]
         if not names or 2 ** len(names) > _MOST_BOXES:  # not even a cut of every side in two
             return enclosure
@@ -108,7 +108,7 @@ class Ranges:
             box = pending.pop()
             inside = self._on(box, definition, needed)
             if inside.magnitude <= goal:
-                kept = kept.join(inside)
+                proved = proved.join(inside)
                 continue
             spent += 2
             if spent > _MOST_BOXES:
@@ -119,7 +119,7 @@ class Ranges:
                 key=lambda n: Fraction(box[n].high - box[n].low, max(1, self.box[n].high - self.box[n].low)),
             )
             pending += [box | {widest: half} for half in box[widest].halves()]
-        return enclosure.meet(kept)
+        return enclosure.meet(proved)
 
     def _needed(self, definition: Sum) -> set[str]:
         needed = {name for monomial, _ in definition.terms for name in monomial}

@@ -77,8 +77,8 @@ class Truncated:
     def product(self, one: Series, other: Series) -> Series:
         """Return a product."""
         terms: dict[int, dict[Monomial, int]] = {}
-        own, others = self.size(one), self.size(other)
-        rest = one.rest * others + (own - one.rest) * other.rest
+        size, others = self.size(one), self.size(other)
+        rest = one.rest * others + (size - one.rest) * other.rest
         rounded = 0
         for a, first in one.terms.items():
             for b, second in other.terms.items():
@@ -104,6 +104,7 @@ class Truncated:
         return total
 
     def _combined(self, one: Series, other: Series, sign: int) -> Series:
+        """Return a series plus or minus another."""
         terms = {degree: dict(part) for degree, part in one.terms.items()}
         for degree, part in other.terms.items():
             into = terms.setdefault(degree, {})
@@ -112,18 +113,15 @@ class Truncated:
         return Series(_without_zeros(terms), one.rest + other.rest)
 
     def _size(self, part: dict[Monomial, int]) -> Fraction:
-        return (
-            sum(
-                (
-                    abs(c) * math.prod((self.sizes[place] for place in key), start=Fraction(1))
-                    for key, c in part.items()
-                ),
-                Fraction(0),
-            )
-            * _UNIT
+        """Return a bound of the magnitude of terms."""
+        products = (
+            abs(c) * math.prod((self.sizes[place] for place in key), start=Fraction(1))
+            for key, c in part.items()
         )
+        return sum(products, Fraction(0)) * _UNIT
 
 
 def _without_zeros(terms: dict[int, dict[Monomial, int]]) -> dict[int, dict[Monomial, int]]:
-    kept = {degree: {key: c for key, c in part.items() if c} for degree, part in terms.items()}
-    return {degree: part for degree, part in kept.items() if part}
+    """Drop the terms that have cancelled."""
+    nonzero = {degree: {key: c for key, c in part.items() if c} for degree, part in terms.items()}
+    return {degree: part for degree, part in nonzero.items() if part}
