@@ -71,7 +71,7 @@ def lowered(program: Program, settings: Settings) -> FixedProgram:
     Raises
     ------
     InputError
-        If an input has no known range, a format that is asked for does not hold its values, or the word is too short.
+        If an input has no known range, a stated format does not hold its values, or the word is too short.
     """
     quantities, plan = _planned(program, settings)
     finest = _walked(program, settings, quantities, plan, {})

@@ -1,6 +1,6 @@
-"""Truncated series: polynomials of bounded variables up to a degree, with a bound of all that is left out.
+"""Truncated series: polynomials of bounded variables up to a degree, with a bound of all terms that are left out.
 
-Coefficients are integers in units of 2^-192: what they round away is counted with what is left out.
+Coefficients are integers in units of 2^-192; the bound includes what their rounding loses.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-#: Binary places of a coefficient: rounding it is nothing beside what is left out.
+#: Binary places of a coefficient, so many that its rounding does not count beside the terms left out.
 _PLACES = 192
 _UNIT = Fraction(1, 1 << _PLACES)
 
@@ -20,7 +20,7 @@ Monomial = tuple[int, ...]
 
 @dataclass(frozen=True)
 class Series:
-    """A polynomial and a bound of its distance from what it stands for.
+    """A polynomial, and a bound of its distance from the function that it approximates.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class Truncated:
     sizes : sequence of Fraction
         Largest magnitude of every variable.
     most : int
-        Most terms of a series; the degree follows.
+        Largest number of terms of a series, from which the degree follows.
     """
 
     def __init__(self, sizes: Sequence[Fraction], most: int) -> None:
@@ -63,7 +63,7 @@ class Truncated:
         return Series({1: {(place,): 1 << _PLACES}}, Fraction(0))
 
     def size(self, series: Series) -> Fraction:
-        """Return a bound of the magnitude of what a series stands for."""
+        """Return a bound of the magnitude of the function that a series approximates."""
         return series.rest + sum((self._size(part) for part in series.terms.values()), Fraction(0))
 
     def sum(self, one: Series, other: Series) -> Series:

@@ -1,4 +1,4 @@
-"""Terms of sums as integers: brought to one place, with the bound of their partial sums and what shifts lose."""
+"""Terms of sums as integers at one place, with bounds of their partial sums and of what shifts lose."""
 
 from __future__ import annotations
 
