@@ -16,7 +16,18 @@ from strapgen.signal import Signal
 
 @dataclass(frozen=True)
 class Limit:
-    """Range of one input as the user states it, and its finest format."""
+    """Range of one input as the user states it, and its finest format.
+
+    Parameters
+    ----------
+    signal : Signal
+    largest : Fraction
+        Largest magnitude of an element.
+    fraction : int
+        Fraction bits of the finest format, or of the one that the user states.
+    fixed : bool
+        Whether the user states it.
+    """
 
     signal: Signal
     largest: Fraction
@@ -38,7 +49,16 @@ class Limit:
 
 
 def limits(program: Program, settings: Settings) -> list[Limit]:
-    """Return range and finest format of every input of a program.
+    """Return the range and the finest format of every input of a program.
+
+    Parameters
+    ----------
+    program : Program
+    settings : Settings
+
+    Returns
+    -------
+    list of Limit
 
     Raises
     ------

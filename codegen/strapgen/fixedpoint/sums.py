@@ -28,6 +28,12 @@ from strapgen.fixedpoint.terms import Aligned, Placed, aligned, largest_wide, ne
 def lower_sum(context: Quantization, quantity: Quantity, definition: Sum) -> None:
     """Lower a sum of products to a word, or to a wide number where no word is needed.
 
+    Parameters
+    ----------
+    context : Quantization
+    quantity : Quantity
+    definition : Sum
+
     Raises
     ------
     InputError
