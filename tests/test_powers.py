@@ -6,7 +6,7 @@ import pytest
 import sympy as sp
 
 from strapgen import algebra
-from strapgen.powers import Powers, Root, function
+from strapgen.powers import Powers, SeriesRoot, function
 
 RING, X, Y = sp.ring("x y", sp.QQ)
 TOP = 7
@@ -22,7 +22,7 @@ def evaluated(expression: sp.Expr) -> sp.Expr:
     """Return an expression of a = h x and b = h^2 y as a series."""
     values = {"a": Powers(RING, {1: X}, TOP), "b": Powers(RING, {2: Y}, TOP)}
     made = algebra.evaluate(expression, values, number, function)
-    assert not isinstance(made, Root)
+    assert not isinstance(made, SeriesRoot)
     return sum(part.as_expr() * H**power for power, part in made.parts.items())
 
 
@@ -102,7 +102,7 @@ def test_what_has_no_series_says_so(expression, says):
 
 
 def test_an_odd_power_of_a_root_is_no_series():
-    root = Root(Powers(RING, {2: X * X}, TOP))
+    root = SeriesRoot(Powers(RING, {2: X * X}, TOP))
     assert (root**2).parts == {2: X**2}
     with pytest.raises(ArithmeticError, match="odd power"):
         root**3

@@ -1,8 +1,7 @@
-"""Exact algebra of rotations: skew matrices, quaternions, Pauli matrices, on SymPy expressions.
+"""Exact algebra of rotations on SymPy expressions: skew matrices, quaternions and Pauli matrices.
 
 Vectors are 3 x 1 matrices. Quaternions are 4 x 1 matrices with the scalar **last**, as the Euler parameters.
-But for `rotation` and `quaternion`, everything is built from sums and products alone and also holds for
-polynomials and numbers.
+All functions but `rotation` and `quaternion` use only sums and products, so they also take polynomials and numbers.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ import sympy as sp
 
 
 def exact(number: Fraction | sp.Expr) -> sp.Expr:
-    """Return a fraction as SymPy's number; other exact numbers as they are."""
+    """Return a fraction as a number of SymPy, and any other exact number unchanged."""
     return sp.Rational(number.numerator, number.denominator) if isinstance(number, Fraction) else number
 
 
@@ -42,7 +41,7 @@ def skew(v: sp.Matrix) -> sp.Matrix:
     return sp.Matrix(columns).T
 
 
-#: The cross product u x v has the elements u[i] v[j] - u[j] v[i], for these i and j.
+#: Index pairs (i, j) of the cross product: its elements are u[i] v[j] - u[j] v[i].
 CROSS = ((1, 2), (2, 0), (0, 1))
 
 
@@ -57,21 +56,23 @@ def cross(u: sp.Matrix, v: sp.Matrix) -> sp.Matrix:
 
 
 def dot(u: Sequence[Any], v: Sequence[Any]) -> Any:
-    """Return the sum of products of the elements of two vectors of any length: symbols, polynomials or numbers."""
+    """Return the scalar product of two vectors of the same length, of symbols, polynomials or numbers."""
     first, *rest = (a * b for a, b in zip(u, v, strict=True))
     return sum(rest, first)
 
 
 def quaternion_product(p: sp.Matrix, q: sp.Matrix) -> sp.Matrix:
-    """Return the quaternion product p q, scalar last: the rotation q followed, in reference axes, by p.
+    """Return the quaternion product p q: the rotation q followed by the rotation p, both in reference axes.
 
     Parameters
     ----------
     p, q : Matrix, 4 x 1
+        Quaternions, scalar last.
 
     Returns
     -------
     Matrix, 4 x 1
+        Scalar last.
 
     Examples
     --------
@@ -134,16 +135,16 @@ def cayley_klein_parameters(U: sp.Matrix) -> sp.Matrix:
 
 
 def wave_series(square: Any, first: int, order: int) -> Any:
-    """Return sin(x)/x, (1 - cos x)/x^2 or cos x in the square of x, cut off.
+    """Return the truncated series of sin(x)/x, (1 - cos x)/x^2 or cos x in the square of x.
 
     Parameters
     ----------
     square : Expr or ring element
         x^2.
     first : int
-        1, 2 or 0: the power of x by which the function is multiplied where it stands.
+        1, 2 or 0 for these functions: the power of x that multiplies the function in the caller's formula.
     order : int
-        Highest power of x that is kept, these included.
+        Highest power of x in that product, so that the series itself ends at ``order - first``.
 
     Examples
     --------
@@ -157,10 +158,10 @@ def wave_series(square: Any, first: int, order: int) -> Any:
 
 
 def rotation(v: sp.Matrix, order: int | None = None, square: sp.Expr | None = None) -> sp.Matrix:
-    """Return exp(skew(v)), the rotation by the rotation vector v, without a singularity at v = 0.
+    """Return exp(skew(v)), the rotation matrix of the rotation vector v, without a singularity at v = 0.
 
-    I + (sin x)/x skew(v) + (1 - cos x)/x^2 skew(v)^2 with x = |v|, where (1 - cos x)/x^2 is written as
-    half the square of sin(x/2)/(x/2).
+    The matrix is I + (sin x)/x skew(v) + (1 - cos x)/x^2 skew(v)^2 with x = |v|. The last factor is written as half
+    the square of sin(x/2)/(x/2).
 
     Parameters
     ----------
@@ -184,7 +185,7 @@ def rotation(v: sp.Matrix, order: int | None = None, square: sp.Expr | None = No
 
 
 def quaternion(v: sp.Matrix, order: int | None = None, square: sp.Expr | None = None) -> sp.Matrix:
-    """Return the unit quaternion of the rotation by the rotation vector v, without a singularity at v = 0.
+    """Return the unit quaternion of the rotation vector v, without a singularity at v = 0.
 
     Parameters
     ----------
@@ -208,7 +209,7 @@ def quaternion(v: sp.Matrix, order: int | None = None, square: sp.Expr | None = 
 
 
 class Direction(sp.Function):  # type: ignore[misc]
-    """The angle atan2(y, x) where whole turns do not count: -pi is as good as pi.
+    """The angle atan2(y, x) up to whole turns, so that -pi and pi are equivalent.
 
     Examples
     --------
@@ -220,12 +221,12 @@ class Direction(sp.Function):  # type: ignore[misc]
 
     @classmethod
     def eval(cls, y: sp.Expr, x: sp.Expr) -> sp.Expr | None:
-        """Return the value of numbers."""
+        """Return the angle of two numbers; None for other arguments, which stay unevaluated."""
         return sp.atan2(y, x) if y.is_number and x.is_number else None
 
 
 class Wrapped(sp.Function):  # type: ignore[misc]
-    """An angle of up to a turn and a half, brought to -pi to pi by a whole turn.
+    """An angle of at most one and a half turns, reduced to -pi to pi by a whole turn.
 
     Examples
     --------
@@ -237,7 +238,7 @@ class Wrapped(sp.Function):  # type: ignore[misc]
 
     @classmethod
     def eval(cls, angle: sp.Expr) -> sp.Expr | None:
-        """Return the value of a number."""
+        """Return the reduced angle of a number; None for other arguments, which stay unevaluated."""
         if not angle.is_number:
             return None
         turns = int(bool(angle > sp.pi)) - int(bool(angle < -sp.pi))
@@ -258,18 +259,18 @@ def evaluate(
 ) -> Any:
     """Evaluate an expression with the given values for its symbols.
 
-    Unlike `subs` this never rearranges: sums and products are carried out with the values' own operators,
-    so polynomials stay polynomials and numbers stay exact.
+    Unlike `subs` this does not rearrange the expression. It applies the operators of the values to each sum and
+    product, so polynomials stay polynomials and numbers stay exact.
 
     Parameters
     ----------
     expression : Expr
     values : mapping of str to number, polynomial or Expr
     number : callable, optional
-        What stands for a rational number where the values do not combine with those of SymPy.
+        Converts a rational number of SymPy if the values do not combine with it.
     function : callable, optional
-        ``function(expression, arguments)``: what stands for what is neither sum, product nor whole power, by default
-        SymPy's own. Of a condition it says whether it holds, and then one branch alone is evaluated.
+        ``function(expression, arguments)`` evaluates an expression that is no sum, product or whole power, by default
+        as SymPy does. It returns whether a condition holds, and then only one branch is evaluated.
 
     Returns
     -------
@@ -291,7 +292,7 @@ def evaluate(
     if expression.is_Rational:
         return number(expression) if number else expression
     if function is not None and isinstance(expression, sp.Piecewise):
-        # One branch after the other: what another one says may have no value here.
+        # Branches are tried in order, since a later one may have no value here.
         for value, condition in expression.args:
             if condition == sp.true or evaluate(condition, values, number, function):
                 return evaluate(value, values, number, function)
@@ -299,7 +300,7 @@ def evaluate(
     if expression.is_Add or expression.is_Mul:
         result = arguments[0]
         for argument in arguments[1:]:
-            # The polynomial, if one of the two is, must be asked first: a SymPy number would take it for a symbol.
+            # A polynomial must come first: a SymPy number on the left would treat it as a symbol.
             first, second = (argument, result) if isinstance(result, sp.Rational) else (result, argument)
             result = first + second if expression.is_Add else first * second
         return result

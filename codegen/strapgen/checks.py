@@ -1,4 +1,4 @@
-"""Checks on what a caller hands over: names, numbers and arrays."""
+"""Checks of the names, numbers and arrays that a caller passes in."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from strapgen.exceptions import InputError, InputTypeError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-#: Steps, samples or records of the longest run: what it holds still fits into some gigabytes.
+#: Most steps, samples or records of a run, whose arrays then still fit into a few gigabytes of memory.
 MOST = 20_000_000
 
-#: Characters of the longest text.
+#: Most characters of a text.
 MOST_TEXT = 500
 
-#: What would begin or end a comment or a text of generated code, or escape its end.
+#: Character sequences that could begin or end a comment or a string in generated code, or escape its end.
 _MARKS = ("/*", "*/", '"""', "\\")
 
 
@@ -42,25 +42,69 @@ def choice(what: str, value: str, allowed: Iterable[str]) -> str:
     return value
 
 
-def number(what: str, value: str | float | Fraction, *, positive: bool = False) -> Fraction:
-    """Read a finite number exactly: decimals stay decimals.
+def double(text: str) -> float:
+    """Return the number that a text writes, in double precision; nan if it writes none.
 
-    A float is taken at its shortest decimal form, so that 0.1 means 1/10. What is too small for a double is 0.
+    Every number that a file or a command line holds is read here or by `whole`: digits are 0 to 9, without underscores.
+
+    Examples
+    --------
+    >>> double(" -2.5e3 "), double("1_0")
+    (-2500.0, nan)
+    """
+    if not _is_plain(text):
+        return math.nan
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
+
+
+def whole(what: str, text: str) -> int:
+    """Return the whole number that a text writes.
 
     Raises
     ------
     InputError
-        If it is no number, not finite, or not positive where that is asked.
+        If it writes none.
+
+    Examples
+    --------
+    >>> whole("increments", "12")
+    12
+    """
+    try:
+        if _is_plain(text):
+            return int(text)
+    except ValueError:
+        pass
+    raise InputError(f"{what} is {text!r}; a whole number is needed")
+
+
+def _is_plain(text: str) -> bool:
+    """Return whether a text holds none of the characters that Python alone takes for parts of a number."""
+    return "_" not in text and text.strip().isascii()
+
+
+def number(what: str, value: str | float | Fraction, *, positive: bool = False) -> Fraction:
+    """Read a finite number exactly.
+
+    A float stands for its shortest decimal form, so that 0.1 means 1/10. A number too small for a double is read as 0.
+
+    Raises
+    ------
+    InputError
+        If it is no number, not finite, or not positive although `positive` is true.
 
     Examples
     --------
     >>> number("step", "0.125", positive=True)
     Fraction(1, 8)
     """
-    text = str(value).strip().replace("_", "?")  # Python reads 1_0 as 10, nobody else does
+    text = str(value).strip()
     try:
-        # In double first: exact, a number like 1e-999999999 would be written out digit by digit.
-        near = float(Fraction(text) if "/" in text else text)
+        # Double comes first, because exact arithmetic would write out all digits of a number like 1e-999999999.
+        near = float(Fraction(text)) if "/" in text and _is_plain(text) else double(text)
         exact = Fraction(text if near and math.isfinite(near) else 0)
     except (ValueError, ZeroDivisionError, OverflowError):
         near = math.nan
@@ -108,12 +152,12 @@ def multiple(what: str, value: Fraction, of: str, unit: Fraction) -> int:
 
 
 def text(what: str, value: Any) -> str:
-    """Return `value` as a text that may stand in a comment of generated code: one line, and no end of a comment.
+    """Return `value` if it is one line of text that is safe in a comment of generated code.
 
     Raises
     ------
     InputError
-        If it is none.
+        If it is no text, too long, or holds characters with a meaning in generated code.
 
     Examples
     --------
@@ -143,7 +187,7 @@ def real_array(what: str, value: Any, tail: tuple[int, ...], dtype: Any = float)
     >>> real_array("increments", [[1e-3, 0.0, 0.0]], (3,)).shape
     (1, 3)
     """
-    import numpy as np  # here, so that the command line answers without it
+    import numpy as np  # imported here, since most commands do not need numpy and start faster without it
 
     if np.ma.isMaskedArray(value):
         raise InputTypeError(f"{what} is a masked array; an array without missing values is needed")
@@ -154,9 +198,9 @@ def real_array(what: str, value: Any, tail: tuple[int, ...], dtype: Any = float)
     if array.dtype.kind != "f":
         raise InputTypeError(f"{what} has dtype {array.dtype}; a floating-point dtype is needed")
     if array.shape[array.ndim - len(tail) :] != tail or array.ndim < len(tail):
-        wanted = ", ".join(["...", *map(str, tail)])
-        raise InputError(f"{what} has shape {array.shape}; ({wanted}) is needed")
-    # A sum is finite if every term is, and runs faster than a test of each; it may overflow, so look again.
+        needed = ", ".join(["...", *map(str, tail)])
+        raise InputError(f"{what} has shape {array.shape}; ({needed}) is needed")
+    # If the sum is finite, so is every term, and it is faster than a test of each; an overflow needs the full test.
     with np.errstate(over="ignore", invalid="ignore"):
         if not np.isfinite(array.sum()) and not np.isfinite(array).all():
             worst = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])

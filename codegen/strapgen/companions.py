@@ -1,4 +1,4 @@
-"""Companions: the kernels that an attitude step needs beside it."""
+"""The attitude step's kernels: product, orthonormalization and conversion to a direction cosine matrix."""
 
 from __future__ import annotations
 
@@ -8,23 +8,23 @@ from fractions import Fraction
 
 @dataclass(frozen=True)
 class Companions:
-    """Kernels that go with an attitude step: what a back end needs beside it.
+    """The kernels and properties of an attitude step that a back end needs in addition to the step itself.
 
     Parameters
     ----------
     product : str or None
-        Kernel that advances a state by a transition, and one transition by the next; None for a step that is not
+        Kernel that multiplies a state by a transition, and one transition by the next; None for a step that is not
         linear in the state.
     orthonormalize : str or None
-        Kernel that restores the state's norm or orthogonality; None where nothing has to be restored.
+        Kernel that restores the norm or the orthogonality of the state; None if nothing has to be restored.
     attitude : str or None
-        Kernel that turns the state into a direction cosine matrix; None where the state is one.
+        Kernel that converts the state to a direction cosine matrix; None if the state is one.
     identity : tuple of Fraction
         The state of zero rotation, row-major.
     previous : int
-        How many of the increments that a step takes are those before it, kept from earlier steps.
+        Number of increments from before the step that it takes in addition to its own.
     isometry : bool
-        Whether the exact transition is a rotation whatever the increments are.
+        Whether the exact transition is a rotation for any increments.
     """
 
     product: str | None

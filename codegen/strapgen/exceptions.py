@@ -1,4 +1,4 @@
-"""What strapgen raises. Each message is one line that names the thing and what is allowed."""
+"""The exceptions of strapgen; each message is one line that names the value at fault and what is allowed."""
 
 
 class StrapgenError(Exception):

@@ -1,4 +1,4 @@
-"""Kernels: exact symbolic algorithms, the one place where a formula is written."""
+"""Kernels are exact symbolic algorithms; each formula is written once, in a kernel."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from strapgen.program import RESOLUTION
 from strapgen.recursion import Recursion
 from strapgen.signal import Signal
 
-#: The step from 1 to the next number of the target that a kernel is lowered for; 0 in exact arithmetic.
+#: The distance from 1 to the next number of the target that a kernel is lowered for; 0 in exact arithmetic.
 resolution = sp.Symbol(RESOLUTION, real=True)
 
 
@@ -33,7 +33,15 @@ def symbols(signal: Signal) -> sp.Matrix:
 
 @dataclass(frozen=True)
 class Stage:
-    """A named intermediate quantity: symbols, what they stand for, and its meaning in the field's terms."""
+    """A named quantity and the expressions of its elements.
+
+    Parameters
+    ----------
+    signal : Signal
+        Name, elements, unit and meaning.
+    expressions : tuple of Expr
+        One for each element, in row-major order.
+    """
 
     signal: Signal
     expressions: tuple[sp.Expr, ...]
@@ -45,15 +53,16 @@ def evaluate_stages(
     number: Callable[[sp.Rational], Any] | None = None,
     function: Callable[[sp.Expr, list[Any]], Any] | None = None,
 ) -> dict[str, Any]:
-    """Return the given values and those of all elements of stages, each of which may use what stands before it.
+    """Return the given values together with those of all elements of the stages.
 
     Parameters
     ----------
     stages : iterable of Stage
+        Each may use the inputs and the stages before it.
     values : mapping of str to number or ring element
         A value for every symbol that no stage defines.
     number, function : callable, optional
-        What stands for a rational number and for a function, see `algebra.evaluate`.
+        Convert rational numbers and evaluate functions, as for `algebra.evaluate`.
 
     Returns
     -------
@@ -87,13 +96,13 @@ class Kernel:
     transition : str or None
         Name of the stage on which the state's update depends linearly, see `Program.transition`.
     companions : Companions or None
-        What belongs to an attitude step.
+        The kernels of an attitude step; None for every other kernel.
     order : Order or None
         Order of an attitude step.
     recursion : Recursion or None
-        Which outputs are inputs of the next call.
+        The pairs of an output and the input that it becomes in the next call.
     own : tuple of Kernel
-        Kernels that its companions name and the catalogue does not have.
+        Kernels that `companions` names and the catalogue does not have.
     arguments : str
         Name and options on the command line; by default the name alone.
     notes : tuple of str
@@ -119,6 +128,11 @@ class Kernel:
         """The name in generated code."""
         return self.name.replace("-", "_")
 
+    @property
+    def signals(self) -> tuple[Signal, ...]:
+        """Inputs, stages and outputs."""
+        return (*self.inputs, *(stage.signal for stage in (*self.stages, *self.outputs)))
+
     def expand(
         self, values: Mapping[str, Any] | None = None, number: Callable[[sp.Rational], Any] | None = None
     ) -> dict[str, list[Any]]:
@@ -130,7 +144,7 @@ class Kernel:
             A value for every input element: numbers, polynomials or symbols. By default the inputs' own
             symbols, which gives each output as one expression of the inputs.
         number : callable, optional
-            What stands for a rational number, see `algebra.evaluate`.
+            Converts a rational number, as for `algebra.evaluate`.
 
         Returns
         -------
@@ -144,6 +158,11 @@ class Kernel:
 
     def polynomials(self) -> dict[str, list[Any]]:
         """Return every output element as a polynomial of the inputs, with rational coefficients.
+
+        Returns
+        -------
+        dict of str to list of ring element
+            For each output its elements, row-major.
 
         Raises
         ------
@@ -160,7 +179,7 @@ class Kernel:
 
 
 class KernelBuilder:
-    """Collects the stages of a kernel while its formulas are written down.
+    """Collects the inputs, stages and outputs of a kernel as its formulas are written.
 
     Examples
     --------
@@ -186,12 +205,12 @@ class KernelBuilder:
         return self.input(signal)[0]
 
     def stage(self, signal: Signal, expressions: Iterable[Any]) -> sp.Matrix:
-        """Give an intermediate quantity its name and return its symbols."""
+        """Name an intermediate quantity and return its symbols, which later expressions may use."""
         self.stages.append(Stage(signal, _expressions(expressions)))
         return symbols(signal)
 
     def value(self, name: str, expression: Any, meaning: str = "") -> sp.Symbol:
-        """Give a scalar intermediate quantity its name and return its symbol."""
+        """Name a scalar intermediate quantity and return its symbol."""
         return self.stage(Signal.scalar(name, meaning=meaning), [expression])[0]
 
     def output(self, signal: Signal, expressions: Iterable[Any]) -> sp.Matrix:
@@ -200,7 +219,7 @@ class KernelBuilder:
         return symbols(signal)
 
     def kernel(self, name: str, title: str, source: str, **rest: Any) -> Kernel:
-        """Finish the kernel."""
+        """Return the kernel; `rest` are further fields of `Kernel`."""
         return Kernel(
             name, title, source, tuple(self.inputs), tuple(self.outputs), tuple(self.stages), **rest
         )

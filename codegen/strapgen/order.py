@@ -1,4 +1,4 @@
-"""The order of an attitude step: what the method allows, and what the samples allow."""
+"""The order of an attitude step, which the method or the samples limit."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Order:
-    """Orders of a step: with the order p, the attitude at a given time is off by the p-th power of the step length.
+    """The orders of a step; with the order p, the error at a fixed time is proportional to the p-th power of the step.
 
     Parameters
     ----------
     method : int
-        Classical order of the method, for any differential equation.
+        Classical order of the method, which holds for any differential equation.
     attitude : int
-        Order of the method on the kinematics at hand, given the rate; for x' = A(t) x it can exceed the classical one.
+        Order of the method on attitude kinematics with a known rate; for x' = A(t) x it can exceed the classical one.
     extraction : int or None
-        Order of the error of an extracted rate at an instant; None for a step that is given rates.
+        Order of the error of an extracted rate at an instant; None for a step that takes rates.
     step : int
-        Order of the step as a whole. The integral of an extracted rate over the step is exact, so that its errors
-        cancel to one or two orders beyond `extraction`.
+        Order of the whole step. It exceeds `extraction` by one or two, because the integral of an extracted rate over
+        the step is exact and most of the errors cancel.
 
     Examples
     --------
@@ -34,13 +34,13 @@ class Order:
 
     @property
     def limited(self) -> bool:
-        """Whether the samples limit the order, not the method."""
+        """Whether the samples, and not the method, limit the order."""
         return self.step < self.attitude
 
     def __str__(self) -> str:
-        own = f"method order {self.method}"
+        text = f"method order {self.method}"
         if self.attitude != self.method:
-            own += f" ({self.attitude} on attitude kinematics)"
+            text += f" ({self.attitude} on attitude kinematics)"
         if self.extraction is not None:
-            own += f", rate extraction order {self.extraction}"
-        return f"{own}: the step is of order {self.step}"
+            text += f", rate extraction order {self.extraction}"
+        return f"{text}: the step is of order {self.step}"

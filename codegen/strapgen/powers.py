@@ -1,6 +1,6 @@
-"""Power series in a small quantity, cut at a power: what kernels compute of them, exactly.
+"""Truncated power series in a small quantity, and exact evaluation of kernels on them.
 
-The small quantity is the length of a step, or the size of whatever is small; coefficients are polynomials.
+The small quantity is the length of a step or, in general, the size of the inputs. Coefficients are polynomials.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class Powers:
     parts : mapping of int to ring element
         Coefficients by power; those beyond `top` are dropped.
     top : int
-        The last power that is kept.
+        The last power of the series.
 
     Examples
     --------
@@ -46,7 +46,7 @@ class Powers:
         self.parts = {power: part for power, part in sorted(parts.items()) if part and power <= top}
 
     def _of(self, other: Any) -> Powers:
-        if isinstance(other, Root):
+        if isinstance(other, SeriesRoot):
             raise ArithmeticError(_NO_SERIES)
         return other if isinstance(other, Powers) else Powers(self.ring, {0: self.ring(other)}, self.top)
 
@@ -57,7 +57,7 @@ class Powers:
         return Powers(self.ring, total, self.top)
 
     def __mul__(self, other: Any) -> Powers:
-        if isinstance(other, Root):
+        if isinstance(other, SeriesRoot):
             return NotImplemented
         total: dict[int, Any] = {}
         for n, a in self.parts.items():
@@ -70,8 +70,8 @@ class Powers:
     __radd__, __rmul__ = __add__, __mul__
 
     def __neg__(self) -> Powers:
-        made: Powers = self * self.ring(-1)
-        return made
+        negative: Powers = self * self.ring(-1)
+        return negative
 
     def __sub__(self, other: Any) -> Powers:
         return self + -self._of(other)
@@ -94,7 +94,7 @@ class Powers:
         return self._of(other) * self.inverse()
 
     def equals(self, other: Any) -> bool:
-        """Return whether all coefficients are those of another series."""
+        """Return whether another series has the same coefficients."""
         return isinstance(other, Powers) and not (self - other).parts
 
     @property
@@ -103,21 +103,20 @@ class Powers:
         return self.parts.get(0, self.ring.zero)
 
     def inverse(self) -> Powers:
-        """Return one over a series that begins with a number.
+        """Return the reciprocal of a series that begins with a number.
 
         Raises
         ------
         ArithmeticError
-            If it begins with 0, or with what is no number.
+            If it begins with 0 or with a polynomial.
         """
         start = self._number()
         if not start:
             raise ArithmeticError("a series that begins with 0 has no inverse")
         rest = self * (self.ring.domain.one / start) - 1
-        made: Powers = self.composed([(-1) ** k for k in range(self.top + 1)], rest) * (
-            self.ring.domain.one / start
-        )
-        return made
+        geometric = self.composed([(-1) ** k for k in range(self.top + 1)], rest)
+        reciprocal: Powers = geometric * (self.ring.domain.one / start)
+        return reciprocal
 
     def root(self) -> Powers:
         """Return the square root of a series that begins with the square of a number of the field.
@@ -125,7 +124,7 @@ class Powers:
         Raises
         ------
         ArithmeticError
-            If it does not.
+            If it begins with anything else.
         """
         start = self.ring.domain.to_sympy(self._number())
         try:
@@ -136,8 +135,8 @@ class Powers:
             raise ArithmeticError(f"a series that begins with {start} has no series as its root")
         rest = self * (self.ring.domain.one / (factor * factor)) - 1
         coefficients = [sp.binomial(sp.Rational(1, 2), k) for k in range(self.top + 1)]
-        made: Powers = self.composed(coefficients, rest) * factor
-        return made
+        root: Powers = self.composed(coefficients, rest) * factor
+        return root
 
     def composed(self, coefficients: Sequence[Any], inner: Powers) -> Powers:
         """Return sum_k coefficients[k] inner^k for a series that begins with 0."""
@@ -150,29 +149,29 @@ class Powers:
         return total
 
     def _number(self) -> Any:
-        """Return the coefficient that the series begins with as an element of the field."""
+        """Return the coefficient of the power 0 as an element of the field."""
         if not self.start.is_ground:
             raise ArithmeticError("a series that begins with a polynomial has neither inverse nor root")
         return self.start.LC if self.start else self.ring.domain.zero
 
 
-class Root:
-    """The square root of a series that begins with 0: no series itself, but even functions of it are."""
+class SeriesRoot:
+    """The square root of a series that begins with 0; it is no power series, but its even functions are."""
 
     __slots__ = ("square",)
 
     def __init__(self, square: Powers) -> None:
         self.square = square
 
-    def __add__(self, other: Any) -> Root:
+    def __add__(self, other: Any) -> SeriesRoot:
         raise ArithmeticError(_NO_SERIES)
 
     __radd__ = __add__
 
-    def __mul__(self, factor: Any) -> Root:
-        if isinstance(factor, Root):
+    def __mul__(self, factor: Any) -> SeriesRoot:
+        if isinstance(factor, SeriesRoot):
             raise ArithmeticError(_NO_SERIES)
-        return Root(self.square * factor * factor)
+        return SeriesRoot(self.square * factor * factor)
 
     __rmul__ = __mul__
 
@@ -188,7 +187,7 @@ def constant(ring: Any, value: Any, top: int) -> Powers:
 
 
 def field(expressions: Iterable[sp.Expr]) -> Any:
-    """Return the field of the numbers in expressions: the rational ones, and what roots there are."""
+    """Return the smallest field that holds the numbers of some expressions: the rationals, extended by their roots."""
     roots = {
         root
         for expression in expressions
@@ -199,7 +198,7 @@ def field(expressions: Iterable[sp.Expr]) -> Any:
 
 
 def outputs(kernel: Kernel, values: Mapping[str, Powers], ring: Any, top: int) -> dict[str, list[Powers]]:
-    """Return what a kernel computes of series, by output.
+    """Return the outputs of a kernel whose inputs are series.
 
     Parameters
     ----------
@@ -209,7 +208,12 @@ def outputs(kernel: Kernel, values: Mapping[str, Powers], ring: Any, top: int) -
     ring : PolyRing
         Ring of the coefficients.
     top : int
-        The last power that is kept.
+        The last power of the outputs.
+
+    Returns
+    -------
+    dict of str to list of Powers
+        For each output its elements, row-major.
 
     Raises
     ------
@@ -220,26 +224,33 @@ def outputs(kernel: Kernel, values: Mapping[str, Powers], ring: Any, top: int) -
     --------
     >>> from strapgen import derive
     >>> ring, x, y, z = sp.ring("x y z", sp.QQ)
-    >>> made = derive("euler-update")
-    >>> begun = {name: constant(ring, int(k == 3), 3) for k, name in enumerate(made.inputs[0].elements)}
-    >>> turned = {name: Powers(ring, {1: e}, 3) for name, e in zip(made.inputs[1].elements, (x, y, z))}
-    >>> outputs(made, begun | turned, ring, 3)["next"][2].parts
+    >>> update = derive("euler-update")
+    >>> state = {name: constant(ring, int(k == 3), 3) for k, name in enumerate(update.inputs[0].elements)}
+    >>> turn = {name: Powers(ring, {1: e}, 3) for name, e in zip(update.inputs[1].elements, (x, y, z))}
+    >>> outputs(update, state | turn, ring, 3)["next"][2].parts
     {1: 1/2*z, 3: -1/48*x**2*z - 1/48*y**2*z - 1/48*z**3}
     """
 
     def number(value: Any) -> Powers:
         return constant(ring, value, top)
 
-    given = {RESOLUTION: number(0), **values}
-    known = evaluate_stages((*kernel.stages, *kernel.outputs), given, number, function)
-    found = {stage.signal.name: [known[name] for name in stage.signal.elements] for stage in kernel.outputs}
-    if not all(isinstance(element, Powers) for elements in found.values() for element in elements):
+    inputs = {RESOLUTION: number(0), **values}
+    known = evaluate_stages((*kernel.stages, *kernel.outputs), inputs, number, function)
+    results = {stage.signal.name: [known[name] for name in stage.signal.elements] for stage in kernel.outputs}
+    if not all(isinstance(element, Powers) for elements in results.values() for element in elements):
         raise ArithmeticError(_NO_SERIES)
-    return found
+    return results
 
 
 def function(expression: sp.Expr, arguments: list[Any]) -> Any:
-    """Return a function of series, for `strapgen.algebra.evaluate`.
+    """Evaluate a function of series, as `strapgen.algebra.evaluate` expects it.
+
+    Parameters
+    ----------
+    expression : Expr
+        The function, power, maximum or condition.
+    arguments : list of Powers or SeriesRoot
+        Its evaluated arguments.
 
     Raises
     ------
@@ -257,7 +268,7 @@ def function(expression: sp.Expr, arguments: list[Any]) -> Any:
     if expression.func in (sp.cos, sp.sinc):
         return _even(expression, arguments[0])
     if expression.func in (sp.sin, sp.asin, sp.atan2, Direction, Wrapped):
-        if any(isinstance(argument, Root) for argument in arguments):
+        if any(isinstance(argument, SeriesRoot) for argument in arguments):
             raise ArithmeticError(f"{expression.func.__name__} of it: {_NO_SERIES}")
         if not arguments[0].start:
             return _odd(expression, *arguments)
@@ -268,24 +279,24 @@ def _power(base: Any, exponent: sp.Expr) -> Any:
     if exponent.is_Integer:
         return base ** int(exponent)
     if (2 * exponent).is_Integer and isinstance(base, Powers):
-        root = base.root() if base.start else Root(base)
+        root = base.root() if base.start else SeriesRoot(base)
         return root if exponent == sp.S.Half else root ** int(2 * exponent)
     raise ArithmeticError(f"the power {exponent} is no power series here")
 
 
 def _even(expression: sp.Expr, argument: Any) -> Powers:
     """Return a cosine, or sin(x)/x."""
-    if not isinstance(argument, Root) and argument.start:
+    if not isinstance(argument, SeriesRoot) and argument.start:
         raise ArithmeticError(f"{expression} is no series with rational coefficients")
-    square = argument.square if isinstance(argument, Root) else argument * argument
+    square = argument.square if isinstance(argument, SeriesRoot) else argument * argument
     first = int(expression.func is sp.sinc)
     coefficients = [sp.Rational((-1) ** k, math.factorial(2 * k + first)) for k in range(square.top // 2 + 1)]
-    made: Powers = square.composed(coefficients, square)
-    return made
+    even: Powers = square.composed(coefficients, square)
+    return even
 
 
 def _odd(expression: sp.Expr, angle: Powers, across: Powers | None = None) -> Powers:
-    """Return an odd function of what is small, or the direction of what is nearly across."""
+    """Return an odd function of a small angle, or the direction of the vector (across, angle)."""
     if across is not None:
         if _begins(across) <= 0:
             raise ArithmeticError(
@@ -312,7 +323,7 @@ def _largest(expression: sp.Expr, arguments: list[Any]) -> Any:
 
 
 def _compared(expression: sp.Expr, left: Any, right: Any) -> tuple[Any, Any]:
-    """Return the numbers by which two series are compared: those that they begin with."""
+    """Return the numbers that decide a comparison of two series: their coefficients of the power 0."""
     numbers = _begins(left), _begins(right)
     if numbers[0] == numbers[1] and not (isinstance(left, Powers) and left.equals(right)):
         raise ArithmeticError(f"{expression} is decided by a value at its very limit")
@@ -320,5 +331,5 @@ def _compared(expression: sp.Expr, left: Any, right: Any) -> tuple[Any, Any]:
 
 
 def _begins(value: Any) -> Any:
-    """Return the number that a series begins with, as SymPy's."""
-    return sp.S.Zero if isinstance(value, Root) else value.ring.domain.to_sympy(value._number())
+    """Return the coefficient of the power 0 as a number of SymPy."""
+    return sp.S.Zero if isinstance(value, SeriesRoot) else value.ring.domain.to_sympy(value._number())

@@ -1,7 +1,7 @@
-"""Programs: straight-line code on scalars, the form between symbolic kernels and printed sources.
+"""A program is straight-line code on scalars, the form between symbolic kernels and printed sources.
 
-A program is a list of single static assignments. The right side of each is a small tree of operations over
-constants (exact rationals), inputs and names assigned before it. Nothing here knows SymPy or a target.
+It is a list of single static assignments. The right side of each is a small tree of operations over constants
+(exact rationals), inputs and names assigned before it. This module depends neither on SymPy nor on a target.
 """
 
 from __future__ import annotations
@@ -52,12 +52,12 @@ def _wrap(x: Any) -> Any:
     return x - math.tau if x > math.pi else x + math.tau if x < -math.pi else x
 
 
-#: The name that stands for the step from 1 to the next number of a target, wherever a program uses it.
+#: The name that stands in programs for the distance from 1 to the next number of the target.
 RESOLUTION = "resolution"
 #: The resolution of a double.
 DOUBLE_RESOLUTION = Fraction(1, 1 << 52)
 
-#: What each operation means, on any ordered numbers; the integer, exact and float interpreters share it.
+#: The function of each operation, on any ordered numbers; the integer, exact and float interpreters share it.
 OPERATIONS: dict[str, Callable[..., Any]] = {
     "add": operator.add,
     "subtract": operator.sub,
@@ -69,8 +69,8 @@ OPERATIONS: dict[str, Callable[..., Any]] = {
     "cos": math.cos,
     "sinc": _sinc,  # sin(x)/x, 1 at 0
     "atan2": math.atan2,
-    "direction": math.atan2,  # atan2 where whole turns do not count
-    "wrap": _wrap,  # an angle of up to a turn and a half, brought to -pi to pi by a whole turn
+    "direction": math.atan2,  # atan2 up to whole turns
+    "wrap": _wrap,  # an angle of at most one and a half turns, reduced to -pi to pi
     "maximum": max,
     "at_least": operator.ge,  # a condition: first >= second
     "select": lambda condition, yes, no: yes if condition else no,
@@ -98,7 +98,7 @@ COUNTED_AS = {
 
 @dataclass(frozen=True)
 class Assignment:
-    """``name = value``; `meaning` is said where a named stage of the algorithm begins."""
+    """``name = value``; the first assignment of a named stage of the algorithm has its `meaning`."""
 
     name: str
     value: Node
@@ -107,7 +107,7 @@ class Assignment:
 
 @dataclass(frozen=True)
 class Result:
-    """An output signal and, element by element, the reference or constant that holds it."""
+    """An output signal and, for each element, the reference or constant that holds it."""
 
     signal: Signal
     nodes: tuple[Node, ...]
@@ -134,13 +134,15 @@ class Program:
     body : tuple of Assignment
         The code.
     outputs : tuple of Result
-        What comes out.
+        Outputs, with the node that holds each element.
     transition : Result or None
         For a step that is linear in the state, the part that depends on the increments alone.
     companions : Companions or None
-        What belongs to an attitude step; None for every other kernel.
+        The kernels of an attitude step; None for every other program.
     recursion : Recursion or None
-        Which outputs are inputs of the next call.
+        The pairs of an output and the input that it becomes in the next call.
+    own : tuple of Program
+        Kernels that a user's step brings.
 
     Raises
     ------
@@ -160,6 +162,7 @@ class Program:
     transition: Result | None = None
     companions: Companions | None = None
     recursion: Recursion | None = None
+    own: tuple[Program, ...] = ()
 
     def __post_init__(self) -> None:
         known = {element for signal in self.inputs for element in signal.elements} | {RESOLUTION}
@@ -208,17 +211,17 @@ class Program:
     ) -> dict[str, list[Any]]:
         """Execute the program on numbers of any kind.
 
-        Sums, products and quotients are the numbers' own, exact for `Fraction`; roots and functions are
-        computed in double, unless `operations` has others.
+        Sums, products and quotients use the operators of the numbers, so they are exact for `Fraction`. Roots and
+        functions are computed in double unless `operations` replaces them.
 
         Parameters
         ----------
         values : mapping of str to number
-            A value for every input element; another resolution than that of doubles too.
+            A value for every input element; `RESOLUTION` may be among them, otherwise it is that of a double.
         number : callable, optional
-            What stands for a constant; by default the exact rational itself.
+            Converts a constant; by default it stays an exact `Fraction`.
         operations : mapping of str to callable, optional
-            What each operation means.
+            The function of each operation.
 
         Returns
         -------
@@ -240,20 +243,20 @@ class Program:
         return {result.signal.name: [value(node) for node in result.nodes] for result in self.outputs}
 
     def used(self, results: Iterable[Result] | None = None) -> set[str]:
-        """Return the names that the given results need, by default all of them."""
-        wanted = {
+        """Return the names that some results need, by default all results."""
+        needed = {
             name
             for result in (self.results if results is None else results)
             for node in result.nodes
             for name in references(node)
         }
         for assignment in reversed(self.body):
-            if assignment.name in wanted:
-                wanted.update(references(assignment.value))
-        return wanted
+            if assignment.name in needed:
+                needed.update(references(assignment.value))
+        return needed
 
     def transition_program(self) -> Program:
-        """Return the part that turns the increments into the transition, as a program of its own.
+        """Return the part that computes the transition from the increments, as a separate program.
 
         Raises
         ------
@@ -275,15 +278,15 @@ class Program:
         )
 
     def split(self) -> tuple[Program, Program]:
-        """Cut the program in two: what does not depend on the first input, and the rest.
+        """Split the program into a part that does not depend on the first input, and the rest.
 
-        Run over many steps, the first part can be done for several steps at once; only the second waits for
-        the state of the step before.
+        In a run of many steps the first part can be computed for several steps at once; only the second part has to
+        wait for the state of the previous step.
 
         Returns
         -------
         tuple of Program
-            The first part, whose one output is called ``prepared``, and the second, which takes the first
+            The first part, whose only output is ``prepared``, and the second part, which takes the first
             input and ``prepared``.
         """
         first = self.inputs[0]

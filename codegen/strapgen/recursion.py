@@ -1,4 +1,4 @@
-"""Recursions: which outputs of a kernel are inputs of its next call."""
+"""A recursion lists the outputs of a kernel that are inputs of its next call."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Recursion:
-    """What a kernel hands on from call to call.
+    """The feedback pairs of a kernel: the values that it carries from call to call.
 
     Parameters
     ----------
     states : tuple of (str, str)
-        Names of an input, and of the output that takes its place in the next call, pair by pair.
+        Pairs of names: an input, and the output that takes its place in the next call.
     kept : tuple of str
-        Inputs of these pairs that go on over the end of a cycle of the slower loop; the others begin again from zero.
+        Inputs of these pairs that continue over the end of a cycle of the slower loop; the others are reset to zero.
 
     Examples
     --------
@@ -38,10 +38,10 @@ class Recursion:
 
     @property
     def begun_anew(self) -> tuple[str, ...]:
-        """The inputs that are zero at the start of a cycle of the slower loop."""
+        """The inputs that are reset to zero at the start of each cycle of the slower loop."""
         return tuple(name for name, _ in self.states if name not in self.kept)
 
     @property
     def inputs(self) -> dict[str, str]:
-        """The input that an output is in the next call, by the output's name."""
+        """The input that each output becomes in the next call, by the name of the output."""
         return {output: name for name, output in self.states}

@@ -1,4 +1,4 @@
-"""Signals: the typed inputs and outputs of kernels, programs and generated functions."""
+"""Signals are the typed inputs and outputs of kernels, programs and generated functions."""
 
 from __future__ import annotations
 
@@ -24,12 +24,17 @@ class Signal:
     unit : str
         Unit, "1" for a pure number.
     meaning : str
-        What it is, in the field's terms, with its frame.
+        Description in the terms of the field, with the frame.
     bound : Fraction or None
-        Largest magnitude of an element in proper use; None where the algorithm sets no limit.
+        Largest magnitude of an element in proper use; None if the algorithm sets no limit.
     constraint : str
-        What holds between the elements in proper use: "unit" (a vector of length 1), "rotation" (a rotation
-        matrix), or nothing.
+        Relation between the elements in proper use: "unit" (a vector of length 1), "rotation" (a rotation
+        matrix), or "" if there is none.
+
+    Raises
+    ------
+    ValueError
+        If the shape does not have as many elements as are named.
 
     Examples
     --------
@@ -51,23 +56,23 @@ class Signal:
 
     @classmethod
     def labelled(cls, name: str, prefix: str, labels: Iterable[str], **rest: Any) -> Signal:
-        """Make a one-dimensional signal whose elements are `prefix` with each of `labels`."""
+        """Return a one-dimensional signal whose elements are named ``prefix_label`` for each of `labels`."""
         elements = tuple(f"{prefix}_{label}" for label in labels)
         return cls(name, (len(elements),), elements, **rest)
 
     @classmethod
     def scalar(cls, name: str, **rest: Any) -> Signal:
-        """Make a scalar signal."""
+        """Return a scalar signal."""
         return cls(name, (), (name,), **rest)
 
     @classmethod
     def vector(cls, name: str, prefix: str, **rest: Any) -> Signal:
-        """Make a 3-vector with elements x, y, z."""
+        """Return a 3-vector with elements x, y, z."""
         return cls.labelled(name, prefix, "xyz", **rest)
 
     @classmethod
     def matrix(cls, name: str, prefix: str, **rest: Any) -> Signal:
-        """Make a 3 x 3 matrix with elements 11 to 33."""
+        """Return a 3 x 3 matrix with elements 11 to 33."""
         elements = tuple(f"{prefix}_{row}{column}" for row in "123" for column in "123")
         return cls(name, (3, 3), elements, **rest)
 
@@ -95,7 +100,7 @@ class Signal:
 
 
 def after(signal: Signal) -> Signal:
-    """Return the signal of what a state is after a call: its names with ``next_`` before them.
+    """Return the signal of a state after a call, whose names begin with ``next_``.
 
     Examples
     --------

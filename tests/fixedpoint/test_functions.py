@@ -12,6 +12,7 @@ import mpmath
 import numpy as np
 import pytest
 from derived import programs
+from gathering import each
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -177,9 +178,9 @@ def _precise(value: Fraction) -> Any:
 # One function
 
 
-@pytest.mark.parametrize("rounding", ["nearest", "truncation"])
-@pytest.mark.parametrize("word", MODEL_WORDS)
-@pytest.mark.parametrize("case", CASES)
+@each("rounding", ["nearest", "truncation"])
+@each("word", MODEL_WORDS)
+@each("case", CASES)
 def test_error_stays_below_its_bound(case, word, rounding):
     kind, _, places = CASES[case]
     lowered, evaluator = fixed(case, word, rounding), model(case, word, rounding)

@@ -6,17 +6,17 @@ import pytest
 from derived import program
 
 from strapgen.catalogue import Choice
-from strapgen.lowering.names import FACTOR, SHARED, is_unnamed, shared_names
+from strapgen.lowering.names import FACTOR, SHARED, is_temporary, shared_names
 
 
 @pytest.mark.parametrize("name", [f"{SHARED}1", f"{FACTOR}2"])
 def test_names_of_common_parts_stand_for_nothing(name):
-    assert is_unnamed(name)
+    assert is_temporary(name)
 
 
 @pytest.mark.parametrize("name", ["sigma_x", "factor", "next_s", "partner_shared_x"])
 def test_names_of_quantities_stand_for_something(name):
-    assert not is_unnamed(name)
+    assert not is_temporary(name)
 
 
 def test_names_on_offer_are_free_and_differ():
@@ -24,4 +24,4 @@ def test_names_on_offer_are_free_and_differ():
     taken = {assignment.name for assignment in made.body}
     assert f"{SHARED}1" in taken
     offered = list(islice(shared_names(made), 5))
-    assert len(set(offered)) == 5 and not taken & set(offered) and all(map(is_unnamed, offered))
+    assert len(set(offered)) == 5 and not taken & set(offered) and all(map(is_temporary, offered))

@@ -23,7 +23,7 @@ from strapgen.signal import Signal, after
 from strapgen.simulation import attitude
 from strapgen.two_speed import TwoSpeed
 from strapgen.vibration import systems
-from strapgen.vibration.assessment import D_Y, PARTS, PHI, THETA_X, THETA_Y
+from strapgen.vibration.mean_rates import D_Y, PARTS, PHI, THETA_X, THETA_Y
 from strapgen.vibration.systems import T_L, T_M, F, T
 
 choose = catalogue.choose

@@ -1,1 +1,1 @@
-"""Analysis: what an algorithm loses, as power series in the step length."""
+"""Analysis of the errors of an algorithm, as power series in the step length."""

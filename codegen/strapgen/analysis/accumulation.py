@@ -1,8 +1,9 @@
-"""From one step to a run: the drift that grows with time, and the part that stays bounded.
+"""The drift of a run has a part that grows with time and a part that stays bounded; both follow from the error rate.
 
-To first order in the error the error matrix of a run is the integral of the error rate, carried along with the motion.
-Where the frame turns evenly about an axis s, what lies along s adds up and the rest swings with |s| t.
-Orthonormalization leaves the drift as it is, to that order, and keeps scale and skew from adding up.
+To first order in the error, the error matrix of a run is the integral of the error rate, carried along with the motion.
+If the frame turns at a constant rate about an axis s, the component of the drift rate along s accumulates, and the
+components across it oscillate with the angle |s| t. To the same order, orthonormalization does not change the drift,
+and it prevents scale and skew from accumulating.
 """
 
 from __future__ import annotations
@@ -22,18 +23,18 @@ from strapgen.powers import Powers
 
 
 @dataclass(frozen=True)
-class Accumulation:
+class RunDrift:
     """The drift of a run that begins at time 0.
 
     Parameters
     ----------
     kernel, motion : str
     secular : dict of int to Matrix, 3 x 1
-        Drift in rad that is gained in a second, reference axes: coefficients by power of the step length.
+        Drift rate in rad/s, reference axes: coefficients by power of the step length.
     bounded : dict of int to Matrix, 3 x 1
-        What swings about it, as a function of the time t, zero at time 0; to first order in the error.
+        Oscillating part of the drift in rad as a function of the time t, zero at time 0; to first order in the error.
     growth : dict of int to Expr
-        What the logarithm of the scale across the drift gains in a second.
+        Rate in 1/s at which the logarithm of the scale across the drift grows, by power of the step length.
     """
 
     kernel: str
@@ -43,7 +44,7 @@ class Accumulation:
     growth: dict[int, sp.Expr]
 
     def drift(self, time: sp.Expr = TIME) -> list[sp.Expr]:
-        """Return the drift after a time as a sum of the terms that are known, x, y, z."""
+        """Return the drift in rad on x, y, z after a time in s, as the sum of the known terms."""
         total = sp.zeros(3, 1)
         for power, row in self.secular.items():
             total += time * row * STEP**power
@@ -52,7 +53,7 @@ class Accumulation:
         return list(total)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the terms as plain JSON data: three sums each, in the symbols h and t."""
+        """Return the terms as plain JSON data: a sum for each axis, in the symbols h and t."""
 
         def sums(rows: dict[int, sp.Matrix]) -> list[str]:
             return [
@@ -67,7 +68,7 @@ class Accumulation:
         }
 
 
-def accumulate(choice: Choice, motion: str, terms: int = 2) -> Accumulation:
+def accumulate(choice: Choice, motion: str, terms: int = 2) -> RunDrift:
     """Derive the drift of a run on a motion of the catalogue.
 
     Parameters
@@ -76,17 +77,17 @@ def accumulate(choice: Choice, motion: str, terms: int = 2) -> Accumulation:
         An attitude step that is linear in its state.
     motion : str
     terms : int, optional
-        How many terms of the drift that grows and of the one that is bounded. They are looked for among the first
-        powers of the error rate, twice as many: every other one may be zero.
+        Number of terms of the growing and of the bounded drift. The search covers twice as many powers of the error
+        rate, since every other one may be zero.
 
     Returns
     -------
-    Accumulation
+    RunDrift
 
     Raises
     ------
     InputError
-        If a name or number is not allowed, or the step has no closed form of a run.
+        If a name or number is not allowed, or the algorithm has no closed form of a run.
 
     Examples
     --------
@@ -97,13 +98,13 @@ def accumulate(choice: Choice, motion: str, terms: int = 2) -> Accumulation:
     """
     checks.choice("motion", motion, catalogue.MOTIONS)
     checks.count("terms", terms, largest=MOST_TERMS)
-    found = error_rate(choice, motion, 2 * terms)
-    made = _steady(found) if found.steady else _about_an_axis(found)
+    error = error_rate(choice, motion, 2 * terms)
+    run = _steady(error) if error.steady else _about_an_axis(error)
     return replace(
-        made,
-        secular=_first(made.secular, terms),
-        bounded=_first(made.bounded, terms),
-        growth=_first(made.growth, terms),
+        run,
+        secular=_first(run.secular, terms),
+        bounded=_first(run.bounded, terms),
+        growth=_first(run.growth, terms),
     )
 
 
@@ -111,31 +112,31 @@ def _first(rows: dict[int, Any], terms: int) -> dict[int, Any]:
     return dict(list(rows.items())[:terms])
 
 
-def _steady(found: ErrorRate) -> Accumulation:
-    """Return the drift of a motion whose frame turns evenly.
+def _steady(error: ErrorRate) -> RunDrift:
+    """Return the drift of a motion whose frame turns at a constant rate.
 
-    The eigenvalues of turning and error rate together are those of the run. Their imaginary part, less the turning, is
-    the secular drift to all orders in the error.
+    The sum of the frame's rate and the error rate has the eigenvalues of the run. Their imaginary part, minus the
+    frame's rate, is the secular drift to all orders in the error.
     """
-    powers = list(found.matrices)
+    powers = list(error.matrices)
     if not powers:
-        return Accumulation(found.kernel, found.motion, {}, {}, {})
-    shifts = _eigenvalue(found, max(powers))
+        return RunDrift(error.kernel, error.motion, {}, {}, {})
+    shifts = _eigenvalue(error, max(powers))
     secular, growth = {}, {}
     for power, (real, imaginary) in shifts.items():
-        row = (-imaginary * found.axis).applyfunc(_short)
+        row = (-imaginary * error.axis).applyfunc(_short)
         if any(row):
             secular[power] = row
         if real := _short(real):
             growth[power] = real
     bounded = {}
-    # Products of two errors are of twice the first power: where that is not the second one, all of the second is there.
+    # From twice the first power on, products of two errors are missing, so the bounded drift ends before that power.
     known = [power for power in powers if power < 2 * powers[0]]
-    for power in known if found.motion != "constant" else ():
-        row = _swing(_drift(found.matrices[power]), found.axis)
+    for power in known if error.motion != "constant" else ():
+        row = _swing(_drift(error.matrices[power]), error.axis)
         if any(row):
             bounded[power] = row
-    return Accumulation(found.kernel, found.motion, secular, bounded, growth)
+    return RunDrift(error.kernel, error.motion, secular, bounded, growth)
 
 
 def _drift(matrix: sp.Matrix) -> sp.Matrix:
@@ -143,7 +144,7 @@ def _drift(matrix: sp.Matrix) -> sp.Matrix:
 
 
 def _swing(drift: sp.Matrix, axis: sp.Matrix) -> sp.Matrix:
-    """Return what swings when a drift rate turns with a frame: its part across the axis, integrated."""
+    """Return the integral of a drift rate that turns with a frame, without its component along the axis."""
     square = algebra.dot(axis, axis)
     across = drift - algebra.dot(drift, axis) / square * axis
     turned = algebra.cross(axis, drift)
@@ -154,23 +155,24 @@ def _swing(drift: sp.Matrix, axis: sp.Matrix) -> sp.Matrix:
 
 
 def _short(expression: sp.Expr) -> sp.Expr:
-    """Return an expression in lowest terms and factors, where its numbers are short fractions."""
+    """Return an expression in lowest terms and factored if its numbers are short fractions, otherwise unchanged."""
     return sp.factor(sp.cancel(expression)) if is_plain(expression) else expression
 
 
-def _eigenvalue(found: ErrorRate, top: int) -> dict[int, tuple[sp.Expr, sp.Expr]]:
-    """Return the eigenvalue of the run next to i |s|, as pairs u, v by power of the step: u + i |s| v.
+def _eigenvalue(error: ErrorRate, top: int) -> dict[int, tuple[sp.Expr, sp.Expr]]:
+    """Return the eigenvalue of the run near i |s| as pairs (u, v) by power of the step, for u + i |s| v.
 
-    With y = i |s| the characteristic polynomial at power 0 is y^3 + S y, whose derivative is -2 S; so every further
-    coefficient follows from those before it by one division.
+    With y = i |s| and S = s . s the characteristic polynomial at power 0 is y^3 + S y, and its derivative is -2 S.
+    Each further coefficient therefore follows from those before it by one division.
     """
-    ring = found.ring
-    first = min(found.matrices)
+    ring = error.ring
+    first = min(error.matrices)
     names = [str(symbol) for symbol in ring.symbols]
     extended, y, half, *_ = sp.ring(["y", "half_over_S", *names], ring.domain)
 
     def lifted(element: Powers) -> Powers:
-        # log(M R')/h: one power less. What lies below the first power of the error rate is zero but for rounding.
+        # Division of log(M R') by h lowers each power by one. Below the first power of the error rate only rounding
+        # is left.
         parts = {
             power - 1: part.set_ring(extended)
             for power, part in element.parts.items()
@@ -178,14 +180,14 @@ def _eigenvalue(found: ErrorRate, top: int) -> dict[int, tuple[sp.Expr, sp.Expr]
         }
         return Powers(extended, parts, top)
 
-    m = [[lifted(element) for element in row] for row in found.raw]
+    m = [[lifted(element) for element in row] for row in error.raw]
     trace = m[0][0] + m[1][1] + m[2][2]
     minors = sum(
         (m[i][i] * m[j][j] - m[i][j] * m[j][i] for i, j in ((0, 1), (0, 2), (1, 2))),
         Powers(extended, {}, top),
     )
     determinant = algebra.dot(m[0], algebra.cross_elements(m[1], m[2]))
-    axis = [extended.from_expr(sp.expand(x)) for x in found.axis]
+    axis = [extended.from_expr(sp.expand(x)) for x in error.axis]
     square = algebra.dot(axis, axis)
     value = Powers(extended, {0: y}, top)
     known = 1 / (2 * square.as_expr())
@@ -200,25 +202,25 @@ def _eigenvalue(found: ErrorRate, top: int) -> dict[int, tuple[sp.Expr, sp.Expr]
     return {power: pair for power, pair in shifts.items() if any(pair)}
 
 
-def _about_an_axis(found: ErrorRate) -> Accumulation:
-    """Return the drift of a rate that keeps its axis: the integral of the error rate."""
+def _about_an_axis(error: ErrorRate) -> RunDrift:
+    """Return the drift of a motion about a fixed axis, which is the integral of the error rate."""
     secular, bounded, growth = {}, {}, {}
-    for power, matrix in found.matrices.items():
-        mean, swing = _integrated(_drift(matrix), found)
+    for power, matrix in error.matrices.items():
+        mean, swing = _integrated(_drift(matrix), error)
         if any(mean):
             secular[power] = mean
         if any(swing):
             bounded[power] = swing
         across = (matrix[0, 0] + matrix[2, 2]) / 2
-        (gained,), _ = _integrated(sp.Matrix([across]), found)
+        (gained,), _ = _integrated(sp.Matrix([across]), error)
         if gained:
             growth[power] = gained
-    return Accumulation(found.kernel, found.motion, secular, bounded, growth)
+    return RunDrift(error.kernel, error.motion, secular, bounded, growth)
 
 
-def _integrated(rates: sp.Matrix, found: ErrorRate) -> tuple[sp.Matrix, sp.Matrix]:
-    """Return the mean of rates and the integral of what is left, zero at time 0; of a polynomial there is no mean."""
-    if found.motion == "polynomial":
+def _integrated(rates: sp.Matrix, error: ErrorRate) -> tuple[sp.Matrix, sp.Matrix]:
+    """Return the mean of rates, for a polynomial zero, and the integral from time 0 of the rest."""
+    if error.motion == "polynomial":
         return sp.zeros(*rates.shape), rates.applyfunc(lambda x: sp.Poly(x, TIME).integrate().as_expr())
     b = sp.Symbol("b")
     means, swings = [], []
@@ -229,9 +231,21 @@ def _integrated(rates: sp.Matrix, found: ErrorRate) -> tuple[sp.Matrix, sp.Matri
     return sp.Matrix(means), sp.Matrix(swings)
 
 
-def antiderivative(matrix: sp.Matrix, found: ErrorRate) -> sp.Matrix:
-    """Return the integral from time 0 to t of a term of the error rate of a motion about a fixed axis."""
-    mean, swing = _integrated(matrix, found)
+def antiderivative(matrix: sp.Matrix, error: ErrorRate) -> sp.Matrix:
+    """Return the integral from time 0 to t of a term of the error rate of a motion about a fixed axis.
+
+    Parameters
+    ----------
+    matrix : Matrix, 3 x 3
+        The term in 1/s, a function of the time t.
+    error : ErrorRate
+        The error rate to which it belongs.
+
+    Returns
+    -------
+    Matrix, 3 x 3
+    """
+    mean, swing = _integrated(matrix, error)
     return mean.reshape(*matrix.shape) * TIME + swing.reshape(*matrix.shape)
 
 

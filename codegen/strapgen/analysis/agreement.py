@@ -1,4 +1,7 @@
-"""Predicted against simulated drift, as the step is halved: in many digits, so that rounding hides nothing."""
+"""Comparison of predicted and simulated drift while the step is halved.
+
+Both are computed in many digits, so that rounding does not hide a difference.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,7 @@ from typing import Any
 
 import mpmath
 
-from strapgen import catalogue, checks, exact
+from strapgen import checks, exact
 from strapgen.analysis.error_rate import error_rate
 from strapgen.analysis.prediction import Prediction, parts_of, predict
 from strapgen.catalogue import Choice
@@ -21,8 +24,8 @@ from strapgen.motions import Motion
 
 
 @dataclass(frozen=True)
-class Rung:
-    """One step length.
+class StepAgreement:
+    """Predicted and simulated drift for one step length.
 
     Parameters
     ----------
@@ -47,28 +50,28 @@ class Rung:
 
 @dataclass(frozen=True)
 class Agreement:
-    """Predicted against simulated drift on a ladder of steps.
+    """Predicted and simulated drift for a sequence of step lengths.
 
     Parameters
     ----------
     kernel, motion : str
     terms : int
-        Powers of the step that the prediction keeps.
+        Number of powers of the step in the prediction.
     order : int or None
-        The first power of the error rate; None where nothing is lost.
-    rungs : tuple of Rung
-        From the longest step to the shortest.
+        The first power of the error rate; None if there is no error.
+    rungs : tuple of StepAgreement
+        One for each step length, from the longest to the shortest.
     """
 
     kernel: str
     motion: str
     terms: int
     order: int | None
-    rungs: tuple[Rung, ...]
+    rungs: tuple[StepAgreement, ...]
 
     @property
     def slopes(self) -> list[float]:
-        """Slope of the difference from each step to the next."""
+        """Slope of the difference against the step in a log-log plot, from each step to the next."""
         return [
             math.log(long.difference / short.difference) / math.log(long.step_s / short.step_s)
             for long, short in pairwise(self.rungs)
@@ -83,7 +86,7 @@ def agreement(
     duration: float | str | Fraction,
     terms: int = 2,
 ) -> Agreement:
-    """Hold predicted against simulated drift.
+    """Compare predicted with simulated drift.
 
     Parameters
     ----------
@@ -91,11 +94,11 @@ def agreement(
         An attitude step that takes increments and is linear in its state.
     motion : Motion
     steps : sequence of number
-        Steps in s, each a divisor of the longest one, and that of the duration.
+        Steps in s; each divides the longest one, and that divides the duration.
     duration : number
         In s.
     terms : int, optional
-        Powers of the step that the prediction keeps: the difference falls with the next one.
+        Number of powers of the step in the prediction; the difference is proportional to the next power.
 
     Returns
     -------
@@ -104,10 +107,11 @@ def agreement(
     Raises
     ------
     InputError
-        If the step has no closed form of a run, or a number is not allowed.
+        If the algorithm has no closed form of a run, or a number is not allowed.
 
     Examples
     --------
+    >>> from strapgen import catalogue
     >>> from strapgen.motions import motion
     >>> turn = motion("constant", y_rad_s=1)
     >>> found = agreement(catalogue.choose("dcm", "rk2", 1), turn, ["1/8", "1/16"], 1, terms=1)
@@ -132,14 +136,14 @@ def agreement(
             split = parts_of()
             states = list(run(length, int(total / length)))[::every]
             drifts = [split(computed, true)[2] for computed, true in states]
-            rungs.append(_rung(length, expected, drifts))
+            rungs.append(_at_step(length, expected, drifts))
     order = error_rate(choice, motion.name, 1).order
     return Agreement(kernel.name, motion.name, terms, order, tuple(rungs))
 
 
-def _rung(length: Fraction, expected: Prediction, drifts: list[list[Any]]) -> Rung:
+def _at_step(length: Fraction, expected: Prediction, drifts: list[list[Any]]) -> StepAgreement:
     rows = list(zip(expected.drift, drifts, strict=True))
-    return Rung(
+    return StepAgreement(
         float(length),
         [float(time) for time in expected.times],
         [[float(x) for x in row] for row in drifts],
@@ -165,7 +169,7 @@ def as_text(found: Agreement) -> str:
     return "\n".join(lines)
 
 
-#: Parameters of the motions where none are named, of about 1 rad/s.
+#: Default parameters of the motions, with rates of about 1 rad/s.
 SETTINGS: dict[str, dict[str, str]] = {
     "constant": {"x_rad_s": "0.5", "y_rad_s": "0.7", "z_rad_s": "-0.3"},
     "sinusoidal": {"a_rad_s": "1", "b_rad_s": "1.5"},
@@ -175,9 +179,7 @@ SETTINGS: dict[str, dict[str, str]] = {
 
 
 def default_steps(choice: Choice) -> tuple[str, ...]:
-    """Return a ladder of steps in s on which the next term shows."""
+    """Return steps in s, halved from one to the next, on which the term after the predicted ones can be seen."""
     return (
-        ("1/4", "1/8", "1/16", "1/32")
-        if catalogue.increments(choice) > 4
-        else ("1/8", "1/16", "1/32", "1/64")
+        ("1/4", "1/8", "1/16", "1/32") if choice.increments_per_step > 4 else ("1/8", "1/16", "1/32", "1/64")
     )

@@ -1,8 +1,8 @@
-"""A constant rate in closed form: what a step loses there, exactly, and the errors after any number of steps.
+"""The errors at a constant rate, in closed form, for one step and for any number of steps.
 
-A step by the angle x turns the plane across the axis by atan2(s, c) and stretches it by (s^2 + c^2)^(1/2), where s and
-c are what the method makes of sin x and cos x. Every step is the same and all commute: after N steps the angle lost is
-N times as large, the stretch its N-th power.
+A step by the angle x rotates the plane across the axis by atan2(s, c) and stretches it by (s^2 + c^2)^(1/2), where s
+and c are the approximations of sin x and cos x by the method. All steps are equal and commute, so N steps lose N times
+the angle and stretch by the N-th power.
 """
 
 from __future__ import annotations
@@ -32,21 +32,22 @@ STEPS = sp.Symbol("N", positive=True, integer=True)
 
 @dataclass(frozen=True)
 class ConstantRate:
-    """What a step does at a constant rate, as functions of the angle x of the step.
+    """The effect of one step at a constant rate, as functions of the angle x of the step.
 
     Parameters
     ----------
     kernel : str
     cosine, sine : Expr
-        What the method makes of cos x and sin x; for Euler and Cayley-Klein parameters of cos(x/2) and sin(x/2).
+        Approximations of cos x and sin x by the method; for Euler and Cayley-Klein parameters, of cos(x/2) and
+        sin(x/2).
     stretch_squared : Expr
         Square of the factor by which the state grows across the axis.
     parameters : bool
-        Whether the state are such parameters, whose matrix is of second degree in them.
+        Whether the state consists of Euler or Cayley-Klein parameters, so that the matrix is quadratic in it.
     along : Expr
         Factor along the axis, 1 for a rotation.
     lowest : int
-        The first power of an error that is more than the rounding of published coefficients.
+        The lowest power of an error that does not come from the rounding of published coefficients.
     """
 
     kernel: str
@@ -59,7 +60,7 @@ class ConstantRate:
 
     @property
     def angle_lost(self) -> sp.Expr:
-        """Angle in rad by which the step stays behind: positive when the computed attitude lags."""
+        """Angle in rad by which the computed attitude lags behind the true one in a step."""
         angle = ANGLE / 2 if self.parameters else ANGLE
         if (self.cosine, self.sine) == (sp.cos(angle), sp.sin(angle)):
             return sp.S.Zero
@@ -68,7 +69,7 @@ class ConstantRate:
 
     @property
     def stretch(self) -> sp.Expr:
-        """Factor by which the matrix grows across the axis: 1 and the scale of one step."""
+        """Factor by which the matrix grows across the axis, which is 1 plus the scale error of one step."""
         return self.stretch_squared if self.parameters else sp.sqrt(self.stretch_squared)
 
     def series(self, terms: int = 2) -> dict[int, sp.Rational]:
@@ -100,21 +101,21 @@ class ConstantRate:
                 - factor * ring.domain.to_sympy(slope.parts.get(power, ring.zero).LC) / (power + 1)
                 for power in range(top - 1)
             }
-            found = {power: value for power, value in lost.items() if value and power >= self.lowest}
-            if self.lowest:  # its coefficients are rounded: so is what follows from them
-                found = {power: sp.Rational(f"{float(value):.11e}") for power, value in found.items()}
-            if len(found) >= terms or top >= _TOP:
-                return dict(list(found.items())[:terms])
+            leading = {power: value for power, value in lost.items() if value and power >= self.lowest}
+            if self.lowest:  # with rounded coefficients the results have no more than 12 digits
+                leading = {power: sp.Rational(f"{float(value):.11e}") for power, value in leading.items()}
+            if len(leading) >= terms or top >= _TOP:
+                return dict(list(leading.items())[:terms])
 
     def errors(self) -> dict[str, list[sp.Expr]]:
         """Return the nine errors after N steps without orthonormalization: "drift", "scale" and "skew", three each.
 
-        In the symbols w_x, w_y, w_z, h and N; with exact orthonormalization the factors, stretch and along, are 1.
+        The expressions use the symbols w_x, w_y, w_z in rad/s, h in s and N.
         """
         return self._errors(self.stretch, self.along)
 
     def errors_orthonormalized(self) -> dict[str, list[sp.Expr]]:
-        """Return the nine errors after N steps where the matrix is made a rotation again, as often as one likes."""
+        """Return the nine errors after N steps if the matrix is orthonormalized exactly, any number of times."""
         return self._errors(sp.S.One, sp.S.One)
 
     def _errors(self, stretch: sp.Expr, along: sp.Expr) -> dict[str, list[sp.Expr]]:
@@ -128,12 +129,12 @@ class ConstantRate:
         return {part: split[part] for part in PARTS}
 
 
-#: The last power that is looked at for an angle lost.
+#: The last power of the series of the angle lost.
 _TOP = 40
 
 
 def _product(stretch: sp.Expr, along: sp.Expr, lost: sp.Expr, steps: sp.Expr, *axis: sp.Expr) -> sp.Matrix:
-    """Return the product of computed and true matrix, transposed, after a number of steps about a unit vector."""
+    """Return the computed matrix times the transposed true one, after a number of steps about a unit vector."""
     u = sp.Matrix(axis)
     projection = u * u.T
     turned = sp.cos(steps * lost) * (sp.eye(3) - projection) - sp.sin(steps * lost) * algebra.skew(u)
@@ -141,7 +142,7 @@ def _product(stretch: sp.Expr, along: sp.Expr, lost: sp.Expr, steps: sp.Expr, *a
 
 
 def _slope(series: Powers) -> Powers:
-    """Return the derivative of a series."""
+    """Return the derivative of a series with respect to its small quantity."""
     return Powers(
         series.ring,
         {power - 1: part * power for power, part in series.parts.items() if power},
@@ -150,7 +151,7 @@ def _slope(series: Powers) -> Powers:
 
 
 def constant_rate(choice: Choice) -> ConstantRate:
-    """Derive what a step does at a constant rate.
+    """Derive the effect of one step at a constant rate.
 
     Parameters
     ----------
@@ -164,7 +165,7 @@ def constant_rate(choice: Choice) -> ConstantRate:
     Raises
     ------
     InputError
-        If the step is not.
+        If the step is not linear in its state.
 
     Examples
     --------
@@ -173,29 +174,29 @@ def constant_rate(choice: Choice) -> ConstantRate:
     >>> constant_rate(catalogue.choose("euler", "rk2")).stretch_squared
     x**4/64 + 1
     """
-    taken = one_step.linear_step(choice)
-    kernel, companions = taken.kernel, taken.kernel.companions
-    assert companions is not None, "checked by `linear_step`"
+    attitude_step = one_step.linear_step(choice)
+    kernel, step_kernels = attitude_step.kernel, attitude_step.kernel.companions
+    assert step_kernels is not None, "checked by `linear_step`"
     state, samples = kernel.inputs
-    share = 1 if taken.nodes is not None else samples.shape[0] - companions.previous
-    given = {
+    share = 1 if attitude_step.nodes is not None else samples.shape[0] - step_kernels.previous
+    identity = {
         name: sp.Rational(x.numerator, x.denominator)
-        for name, x in zip(state.elements, companions.identity, strict=True)
+        for name, x in zip(state.elements, step_kernels.identity, strict=True)
     }
     turned = {name: ANGLE / share if k % 3 == 2 else sp.S.Zero for k, name in enumerate(samples.elements)}
     attitude = None
-    if companions.attitude is not None:
-        attitude = catalogue.derive(catalogue.choose(companions.attitude))
+    if step_kernels.attitude is not None:
+        attitude = catalogue.companion(kernel, step_kernels.attitude)
     try:
-        made = _rational(taken.domain, kernel, {**given, **turned}, attitude)
+        result = _rational(attitude_step.domain, kernel, {**identity, **turned}, attitude)
     except _NotRationalError:
-        made = _simplified(kernel, {**given, **turned}, attitude)
-    scalar = next((k for k, x in enumerate(companions.identity) if x), 0)
-    return ConstantRate(kernel.name, *made.part(scalar), taken.lowest)
+        result = _simplified(kernel, {**identity, **turned}, attitude)
+    scalar = next((k for k, x in enumerate(step_kernels.identity) if x), 0)
+    return ConstantRate(kernel.name, *result.part(scalar), attitude_step.lowest)
 
 
 @dataclass(frozen=True)
-class _Made:
+class _StepResult:
     """A state and its direction cosine matrix after a step by the angle x about z, in lowest terms.
 
     Parameters
@@ -210,7 +211,7 @@ class _Made:
     squares: tuple[sp.Expr, sp.Expr]
 
     def part(self, scalar: int) -> tuple[sp.Expr, sp.Expr, sp.Expr, bool, sp.Expr]:
-        """Return cosine, sine, square of the stretch, whether they are of half the angle, and the factor along z."""
+        """Return cosine, sine, squared stretch, whether these belong to half the angle, and the factor along z."""
         used = [k for k, x in enumerate(self.state) if x]
         if len(self.state) == 4 and len(used) == 2:
             vector = next(k for k in used if k != scalar)
@@ -219,11 +220,13 @@ class _Made:
 
 
 class _NotRationalError(Exception):
-    """A step calls functions of the angle."""
+    """The step is no rational function of the angle."""
 
 
-def _rational(domain: Any, kernel: Kernel, values: dict[str, sp.Expr], attitude: Kernel | None) -> _Made:
-    """Return what a step makes that is a rational function of the angle."""
+def _rational(
+    domain: Any, kernel: Kernel, values: dict[str, sp.Expr], attitude: Kernel | None
+) -> _StepResult:
+    """Return the result of a step that is a rational function of the angle."""
     rational, _ = sp.field([ANGLE], domain)
 
     def number(value: sp.Expr) -> Any:
@@ -236,27 +239,27 @@ def _rational(domain: Any, kernel: Kernel, values: dict[str, sp.Expr], attitude:
             return arguments[0] ** int(expression.exp)
         raise _NotRationalError
 
-    def evaluated(made: Kernel, taken: dict[str, Any]) -> list[Any]:
-        known = evaluate_stages((*made.stages, *made.outputs), taken, number, function)
-        return [known[name] for name in made.outputs[-1].signal.elements]
+    def evaluated(each: Kernel, inputs: dict[str, Any]) -> list[Any]:
+        known = evaluate_stages((*each.stages, *each.outputs), inputs, number, function)
+        return [known[name] for name in each.outputs[-1].signal.elements]
 
     state = evaluated(kernel, {name: rational.from_expr(value) for name, value in values.items()})
     matrix = state
     if attitude is not None:
         matrix = evaluated(attitude, dict(zip(attitude.inputs[0].elements, state, strict=True)))
     squares = (sum((x * x for x in state), rational.zero), matrix[0] ** 2 + matrix[3] ** 2)
-    return _Made(
+    return _StepResult(
         [x.as_expr() for x in state],
         [x.as_expr() for x in matrix],
         (sp.expand(squares[0].as_expr()), sp.expand(squares[1].as_expr())),
     )
 
 
-def _simplified(kernel: Kernel, values: dict[str, Any], attitude: Kernel | None) -> _Made:
-    """Return what a step makes that calls functions of the angle, as SymPy simplifies it."""
+def _simplified(kernel: Kernel, values: dict[str, Any], attitude: Kernel | None) -> _StepResult:
+    """Return the result of a step that uses functions of the angle, simplified by SymPy."""
 
-    def evaluated(made: Kernel, taken: dict[str, Any]) -> list[sp.Expr]:
-        rows = made.expand(taken)[made.outputs[-1].signal.name]
+    def evaluated(each: Kernel, inputs: dict[str, Any]) -> list[sp.Expr]:
+        rows = each.expand(inputs)[each.outputs[-1].signal.name]
         return [sp.simplify(sp.sympify(x).rewrite(sp.sin)) for x in rows]
 
     state = evaluated(kernel, values)
@@ -264,11 +267,11 @@ def _simplified(kernel: Kernel, values: dict[str, Any], attitude: Kernel | None)
     if attitude is not None:
         matrix = evaluated(attitude, dict(zip(attitude.inputs[0].elements, state, strict=True)))
     squares = sum(x**2 for x in state), matrix[0] ** 2 + matrix[3] ** 2
-    return _Made(state, matrix, (sp.simplify(squares[0]), sp.simplify(squares[1])))
+    return _StepResult(state, matrix, (sp.simplify(squares[0]), sp.simplify(squares[1])))
 
 
 def _plain(expression: sp.Expr) -> sp.Expr:
-    """Return an expression in the plain symbol x, for evaluation by name."""
+    """Return an expression in the symbol x without assumptions, for evaluation by name."""
     return expression.subs(ANGLE, sp.Symbol("x"))
 
 
@@ -280,7 +283,7 @@ def errors_after(
     orthonormalize: float | str | Fraction | None = None,
     record: float | str | Fraction | None = None,
 ) -> Prediction:
-    """Return the exact errors of a run at a constant rate, by powers and no step.
+    """Return the exact errors of a run at a constant rate, from powers of one step.
 
     Parameters
     ----------
@@ -289,8 +292,17 @@ def errors_after(
     motion : Motion
         A constant motion.
     step, duration, orthonormalize, record : number
-        As for `simulation.simulate`; without `record` the beginning and the end are given. The scheme is that of the
-        algorithm.
+        As for `simulation.simulate`, with the orthonormalization of the algorithm. Without `record` there are results
+        at the beginning and the end alone.
+
+    Returns
+    -------
+    Prediction
+
+    Raises
+    ------
+    InputError
+        If the step is not linear in its state, or a time is not allowed.
 
     Examples
     --------
@@ -299,10 +311,13 @@ def errors_after(
     >>> round(float(found.scale[-1][0]), 4), round(float(found.drift[-1][1]), 6)
     (0.4086, 0.007019)
     """
-    found = constant_rate(choice)
+    closed_form = constant_rate(choice)
     names = sp.symbols("stretch along lost steps axis_x axis_y axis_z")
     product = sp.lambdify(names, _product(*names), "mpmath")
-    parts = [sp.lambdify(ANGLE, part, "mpmath") for part in (found.stretch, found.along, found.angle_lost)]
+    parts = [
+        sp.lambdify(ANGLE, part, "mpmath")
+        for part in (closed_form.stretch, closed_form.along, closed_form.angle_lost)
+    ]
     rate = [mpmath.mpf(value) for value in motion.parameters.values()]
 
     def transfer(h: Fraction) -> Transfer:

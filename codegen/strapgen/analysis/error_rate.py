@@ -1,10 +1,11 @@
-"""The error rate: what an algorithm adds to the angular rate, as a power series in the step length.
+"""The error rate is the rate that an algorithm in effect adds to the angular rate, as a series in the step length.
 
-A run of an algorithm is the exact motion of another rate. Where the rate of a motion keeps its length and turns evenly
-(constant rate, coning), every step is the same one seen from a turning frame: with M the step's matrix at time 0 and R
-the turning, the N-th computed matrix is (M R')^N R^N, and log(M R')/h = W + error rate, W the skew matrix of the axis
-about which the frame turns. Where the rate keeps its axis, all matrices commute, and the logarithms of the error
-matrices add up: by the formula of Euler and Maclaurin their sum is an integral over time.
+A run of an algorithm is the exact motion of a slightly different rate. If the rate of a motion has a constant length
+and rotates uniformly (constant rate, coning), all steps are equal in a frame that rotates with it. With the matrix M of
+the step at time 0 and the rotation R of the frame in a step, the N-th computed matrix is (M R')^N R^N, and
+log(M R')/h = W + error rate, where W is the skew matrix of the rate of the frame. If the axis of the rate is fixed, all
+matrices commute and the logarithms of the error matrices add up; the formula of Euler and Maclaurin turns their sum
+into an integral over time.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from strapgen.analysis import motion_rates, one_step
 from strapgen.analysis.invariants import invariants
 from strapgen.analysis.motion_rates import TIME
 from strapgen.analysis.one_step import Step
-from strapgen.catalogue import Choice, user
+from strapgen.catalogue import Choice
 from strapgen.exceptions import InputError
 from strapgen.lowering.canonical.decomposition import NotCovariantError
 from strapgen.powers import Powers
@@ -30,23 +31,22 @@ _Matrix = list[list[Powers]]
 
 @dataclass(frozen=True)
 class ErrorRate:
-    """What a step adds to the angular rate of a motion.
+    """The rate that an algorithm in effect adds to the angular rate of a motion.
 
     Parameters
     ----------
     kernel, motion : str
     axis : Matrix, 3 x 1
-        The vector about which the frame turns, in rad/s and reference axes; for a rate that keeps its axis, the rate at
-        time t.
+        Rate of the rotating frame in rad/s, reference axes; for a motion about a fixed axis, the rate at time t.
     steady : bool
-        Whether the error rate is constant in the turning frame: constant rate and coning. Else it is a function of the
-        time t, about a fixed axis.
+        True if the error rate is constant in the rotating frame (constant rate and coning); otherwise it is a function
+        of the time t, about a fixed axis.
     matrices : dict of int to Matrix, 3 x 3
-        Coefficients by power of the step length, in 1/s: for a steady motion in the axes of time 0.
+        Coefficients by power of the step length, in 1/s; for a steady motion in the axes of time 0.
     ring : PolyRing or None
         Ring of the coefficients of a steady motion.
-    raw : list of list of Powers
-        For a steady motion the sum of turning and error rate in that ring.
+    raw : tuple of tuple of Powers
+        For a steady motion the sum of the skew matrix of `axis` and the error rate, times the step, in that ring.
     """
 
     kernel: str
@@ -73,7 +73,7 @@ def error_rate(choice: Choice, motion: str, terms: int = 2) -> ErrorRate:
     motion : str
         A motion of the catalogue.
     terms : int, optional
-        How many powers of the step length from the first one on.
+        Number of powers of the step length, counted from the first one that is not zero.
 
     Returns
     -------
@@ -82,7 +82,7 @@ def error_rate(choice: Choice, motion: str, terms: int = 2) -> ErrorRate:
     Raises
     ------
     InputError
-        If the step is not linear in its state, does not turn with its inputs, or has no series.
+        If the step is not linear in its state, does not commute with rotations of its inputs, or has no series.
 
     Examples
     --------
@@ -91,50 +91,53 @@ def error_rate(choice: Choice, motion: str, terms: int = 2) -> ErrorRate:
     >>> found.order, found.matrices[1][0, 0]
     (1, a**2*cos(b*t)**2/2)
     """
-    taken = one_step.linear_step(choice)
-    order = taken.kernel.order
+    attitude_step = one_step.linear_step(choice)
+    order = attitude_step.kernel.order
     try:
-        if choice.name in user.KERNELS:
-            _require_covariance(taken)
+        if choice.user_kernel is not None:
+            _require_covariance(attitude_step)
         top = 1 + (order.step if order else 1) + terms
         most = top + one_step.PATIENCE
         while True:
-            found = _rate(taken, motion, top)
-            if found.order is not None and found.order + terms <= top:
+            rates = _rate(attitude_step, motion, top)
+            if rates.order is not None and rates.order + terms <= top:
                 break
             if top >= most:
                 break
             top += 1
     except ArithmeticError as error:
-        raise InputError(f"kernel {taken.kernel.name} has no series in the step length: {error}") from None
+        raise InputError(
+            f"kernel {attitude_step.kernel.name} has no series in the step length: {error}"
+        ) from None
     except NotCovariantError:
         raise InputError(
-            f"kernel {taken.kernel.name} does not turn with its inputs: what it loses in a run depends on the axes"
+            f"kernel {attitude_step.kernel.name} does not turn with its inputs: "
+            "what it loses in a run depends on the axes"
         ) from None
-    if found.order is None:
-        return found
-    last = found.order + terms
-    kept = {power: matrix for power, matrix in found.matrices.items() if power < last}
-    return ErrorRate(found.kernel, motion, found.axis, found.steady, kept, found.ring, found.raw)
+    if rates.order is None:
+        return rates
+    last = rates.order + terms
+    leading = {power: matrix for power, matrix in rates.matrices.items() if power < last}
+    return ErrorRate(rates.kernel, motion, rates.axis, rates.steady, leading, rates.ring, rates.raw)
 
 
-def _rate(taken: Step, motion: str, top: int) -> ErrorRate:
+def _rate(attitude_step: Step, motion: str, top: int) -> ErrorRate:
     if motion_rates.model(motion).turning is not None:
-        return _steady(taken, motion, top)
-    return _about_an_axis(taken, motion, top)
+        return _steady(attitude_step, motion, top)
+    return _about_an_axis(attitude_step, motion, top)
 
 
-def _steady(taken: Step, motion: str, top: int) -> ErrorRate:
-    """Return the error rate of a motion whose rate turns evenly, up to the power top - 1."""
+def _steady(attitude_step: Step, motion: str, top: int) -> ErrorRate:
+    """Return the error rate of a motion whose rate rotates uniformly, up to the power top - 1."""
     symbols = motion_rates.parameters(motion)
-    rate = motion_rates.at_start(motion, top, taken.domain)
+    rate = motion_rates.at_start(motion, top, attitude_step.domain)
     ring = rate.ring
     model = motion_rates.model(motion)
     assert model.turning is not None, "checked by the caller"
     turning = model.turning(*symbols)
     error = [
-        Powers(ring, {power: one_step.shown(taken, part) for power, part in one.parts.items()}, top)
-        for one in one_step.errors(taken, ring, rate.derivatives, top)["error"]
+        Powers(ring, {power: one_step.shown(attitude_step, part) for power, part in one.parts.items()}, top)
+        for one in one_step.errors(attitude_step, ring, rate.derivatives, top)["error"]
     ]
     one = Powers(ring, {0: ring.one}, top)
     step = [[x + one if i == j else x for j, x in enumerate(row)] for i, row in enumerate(_square(error))]
@@ -151,36 +154,40 @@ def _steady(taken: Step, motion: str, top: int) -> ErrorRate:
             matrices[power] = matrix
     first = sp.Matrix([[x.parts.get(1, ring.zero).as_expr() for x in row] for row in raw])
     if not (first - skew).expand().is_zero_matrix:
-        raise InputError(f"kernel {taken.kernel.name} does not follow a {motion} motion: it is of order 0")
-    return ErrorRate(taken.kernel.name, motion, axis, True, matrices, ring, tuple(map(tuple, raw)))
+        raise InputError(
+            f"kernel {attitude_step.kernel.name} does not follow a {motion} motion: it is of order 0"
+        )
+    return ErrorRate(attitude_step.kernel.name, motion, axis, True, matrices, ring, tuple(map(tuple, raw)))
 
 
-def _about_an_axis(taken: Step, motion: str, top: int) -> ErrorRate:
+def _about_an_axis(attitude_step: Step, motion: str, top: int) -> ErrorRate:
     """Return the error rate of a motion about a fixed axis, as a function of time, up to the power top - 1."""
-    rate = motion_rates.at_time(motion, top, taken.domain)
-    made = one_step.errors(taken, rate.ring, rate.derivatives, top)
+    rate = motion_rates.at_time(motion, top, attitude_step.domain)
+    error_parts = one_step.errors(attitude_step, rate.ring, rate.derivatives, top)
     one = Powers(rate.ring, {0: rate.ring.one}, top)
-    error = _square(made["error"])
+    error = _square(error_parts["error"])
     logs = _logarithm([[x + one if i == j else x for j, x in enumerate(row)] for i, row in enumerate(error)])
-    found: dict[int, sp.Matrix] = {}
+    sums: dict[int, sp.Matrix] = {}
     for power in range(1, top + 1):
         parts = [[row_element.parts.get(power, rate.ring.zero) for row_element in row] for row in logs]
-        matrix = sp.Matrix([[rate.expression(one_step.shown(taken, x)) for x in row] for row in parts])
+        matrix = sp.Matrix(
+            [[rate.expression(one_step.shown(attitude_step, x)) for x in row] for row in parts]
+        )
         # Euler and Maclaurin: h sum f = integral of f - h f'/2 + h^2 f''/12 - ...
         for derivative in range(top - power + 1):
             share = _bernoulli(derivative) / sp.factorial(derivative)
             if share and any(matrix):
-                total = found.get(power - 1 + derivative, sp.zeros(3))
-                found[power - 1 + derivative] = total + share * matrix
+                total = sums.get(power - 1 + derivative, sp.zeros(3))
+                sums[power - 1 + derivative] = total + share * matrix
             matrix = matrix.diff(TIME)
     matrices = {}
-    for power, matrix in sorted(found.items()):
+    for power, matrix in sorted(sums.items()):
         reduced = matrix.applyfunc(sp.expand)
         if any(reduced) and power:
             matrices[power] = reduced
     symbols = motion_rates.parameters(motion)
     return ErrorRate(
-        taken.kernel.name, motion, motion_rates.model(motion).rate(TIME, *symbols), False, matrices
+        attitude_step.kernel.name, motion, motion_rates.model(motion).rate(TIME, *symbols), False, matrices
     )
 
 
@@ -189,13 +196,13 @@ def _bernoulli(number: int) -> sp.Expr:
     return -sp.Rational(1, 2) if number == 1 else sp.bernoulli(number)
 
 
-def _require_covariance(taken: Step) -> None:
-    """Refuse a user's step that does not turn with its inputs, as far as its first powers show."""
-    count = 2 + (taken.kernel.order.step if taken.kernel.order else 1)
-    frame, ring, rate = one_step.general_rate(taken, count)
-    made = one_step.computed_matrix(taken, ring, rate, count)
+def _require_covariance(attitude_step: Step) -> None:
+    """Refuse a user's step whose first powers do not commute with rotations of its inputs."""
+    count = 2 + (attitude_step.kernel.order.step if attitude_step.kernel.order else 1)
+    frame, ring, rate = one_step.general_rate(attitude_step, count)
+    computed = one_step.computed_matrix(attitude_step, ring, rate, count)
     for power in range(1, count + 1):
-        invariants(frame, [element.parts.get(power, ring.zero) for element in made])
+        invariants(frame, [element.parts.get(power, ring.zero) for element in computed])
 
 
 def _square(elements: Sequence[Powers]) -> _Matrix:

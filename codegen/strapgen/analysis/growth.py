@@ -1,4 +1,7 @@
-"""Growth: by what a step changes the length of a state or the determinant of a matrix, and where it keeps it small."""
+"""The growth of the length of a state, or of the determinant of a matrix, in a step.
+
+`growth` derives its series, and `stability` the steps at a constant rate for which no state grows.
+"""
 
 from __future__ import annotations
 
@@ -27,16 +30,16 @@ _DIGITS = 60
 
 @dataclass(frozen=True)
 class Growth:
-    """What one step adds to a length or a determinant that should stay 1.
+    """The change in one step of a length and of a determinant that should both stay 1.
 
     Parameters
     ----------
     kernel, motion : str
     length, determinant : dict of int to Expr
-        The first terms that are not zero, by power of the step length: of the length of the state, where that is four
-        parameters, and of the determinant of the direction cosine matrix.
+        The first terms that are not zero, by power of the step length, of the length of a state of four parameters
+        (None for other states) and of the determinant of the direction cosine matrix.
     invariant : dict of str to dict
-        For a general rate the same terms in scalar products, of "length" and "determinant".
+        For a general rate the terms of "length" and "determinant" in scalar products.
     """
 
     kernel: str
@@ -61,7 +64,7 @@ class Growth:
 
 
 def growth(choice: Choice, motion: str = "constant", terms: int = 2) -> Growth:
-    """Derive by what one step changes the length of the state and the determinant of the matrix.
+    """Derive the change of the length of the state and of the determinant of the matrix in one step.
 
     Parameters
     ----------
@@ -70,7 +73,7 @@ def growth(choice: Choice, motion: str = "constant", terms: int = 2) -> Growth:
     motion : str, optional
         "general", or a motion of the catalogue.
     terms : int, optional
-        How many terms that are not zero.
+        Number of terms that are not zero.
 
     Returns
     -------
@@ -90,57 +93,61 @@ def growth(choice: Choice, motion: str = "constant", terms: int = 2) -> Growth:
     """
     checks.choice("motion", motion, MOTIONS)
     checks.count("terms", terms, largest=MOST_TERMS)
-    taken = one_step.step(choice)
-    order = taken.kernel.order
+    attitude_step = one_step.step(choice)
+    order = attitude_step.kernel.order
     top = 2 + (order.step if order else 1) + terms
     most = top + one_step.PATIENCE
     try:
         while True:
-            found = _growth(taken, motion, terms, top)
-            known = [x for x in (found.length, found.determinant) if x is not None]
+            candidate = _growth(attitude_step, motion, terms, top)
+            known = [x for x in (candidate.length, candidate.determinant) if x is not None]
             if top >= most or all(len(x) >= terms for x in known):
-                return found
+                return candidate
             top += 1
     except ArithmeticError as error:
-        raise InputError(f"kernel {taken.kernel.name} has no series in the step length: {error}") from None
+        raise InputError(
+            f"kernel {attitude_step.kernel.name} has no series in the step length: {error}"
+        ) from None
 
 
-def _growth(taken: Step, motion: str, terms: int, top: int) -> Growth:
+def _growth(attitude_step: Step, motion: str, terms: int, top: int) -> Growth:
     frame = None
     if motion == "general":
-        frame, ring, rate = one_step.general_rate(taken, top)
+        frame, ring, rate = one_step.general_rate(attitude_step, top)
     else:
-        made = motion_rates.at_time(motion, top, taken.domain)
-        ring, rate = made.ring, made.derivatives
-    matrix = one_step.computed_matrix(taken, ring, rate, top)
+        motion_rate = motion_rates.at_time(motion, top, attitude_step.domain)
+        ring, rate = motion_rate.ring, motion_rate.derivatives
+    matrix = one_step.computed_matrix(attitude_step, ring, rate, top)
     sizes = {"determinant": dot(matrix[:3], cross_elements(matrix[3:6], matrix[6:]))}
-    state = taken.kernel.inputs[0]
+    state = attitude_step.kernel.inputs[0]
     if state.shape == (4,):
-        elements = one_step.computed_state(taken, ring, rate, top)
+        elements = one_step.computed_state(attitude_step, ring, rate, top)
         sizes["length"] = dot(elements, elements).root()
-    found: dict[str, dict[int, sp.Expr]] = {}
+    expressions: dict[str, dict[int, sp.Expr]] = {}
     invariant: dict[str, dict[int, Polynomial]] = {}
     for name, size in sizes.items():
         parts = {
-            power: one_step.shown(taken, part)
+            power: one_step.shown(attitude_step, part)
             for power, part in size.parts.items()
-            if power and power >= taken.lowest
+            if power and power >= attitude_step.lowest
         }
         if frame is None:
-            rows = {power: made.expression(part) for power, part in parts.items()}
-            found[name] = dict([(power, x) for power, x in rows.items() if x][:terms])
+            rows = {power: motion_rate.expression(part) for power, part in parts.items()}
+            expressions[name] = dict([(power, x) for power, x in rows.items() if x][:terms])
         else:
-            kept = dict([(power, part) for power, part in parts.items() if part][:terms])
-            invariant[name] = {power: scalar(frame, part) for power, part in kept.items()}
+            leading = dict([(power, part) for power, part in parts.items() if part][:terms])
+            invariant[name] = {power: scalar(frame, part) for power, part in leading.items()}
             vectors = [[sp.Symbol(f"w{j}_{axis}") for axis in "xyz"] for j in range(top)]
-            found[name] = {
+            expressions[name] = {
                 power: sp.expand(scalar_value(one, vectors)) for power, one in invariant[name].items()
             }
-    return Growth(taken.kernel.name, motion, found.get("length"), found["determinant"], invariant)
+    return Growth(
+        attitude_step.kernel.name, motion, expressions.get("length"), expressions["determinant"], invariant
+    )
 
 
 def contraction(found: ConstantRate) -> list[tuple[float, float | None]] | None:
-    """Return where a step at a constant rate lets no state grow: intervals of its angle x = |w| h in rad.
+    """Return the intervals of the angle x = |w| h in rad for which a step at a constant rate lets no state grow.
 
     Parameters
     ----------
@@ -149,8 +156,13 @@ def contraction(found: ConstantRate) -> list[tuple[float, float | None]] | None:
     Returns
     -------
     list of (float, float or None) or None
-        Intervals on which the stretch is at most 1, without the single point 0; an open end is None. The whole answer
-        is None where the length is kept exactly.
+        Intervals on which the stretch is at most 1, without the single point 0; None stands for an open end. The result
+        is None if the step preserves the length exactly.
+
+    Raises
+    ------
+    InputError
+        If the growth is no polynomial of the angle.
 
     Examples
     --------
@@ -166,8 +178,8 @@ def contraction(found: ConstantRate) -> list[tuple[float, float | None]] | None:
         raise InputError(
             f"kernel {found.kernel}: its growth at a constant rate is no polynomial of the angle"
         )
-    # Irrational coefficients are rounded, for roots that are printed with 16 digits; what the rounding of published
-    # coefficients leaves below the order of a method is no growth.
+    # Irrational coefficients are rounded, since the roots have 16 digits. Terms below the order of the method come from
+    # the rounding of published coefficients and are no growth.
     polynomial = sp.Poly.from_dict(
         {
             (power,): number if number.is_Rational else sp.Rational(sp.N(number, _DIGITS))
@@ -191,7 +203,7 @@ def contraction(found: ConstantRate) -> list[tuple[float, float | None]] | None:
 
 @dataclass(frozen=True)
 class Stability:
-    """What a step does to the length of a state at a constant rate.
+    """The change of the length of a state in a step at a constant rate.
 
     Parameters
     ----------
@@ -199,7 +211,7 @@ class Stability:
     stretch_squared : Expr
         Square of the factor by which the state grows across the axis, a function of the angle x of the step.
     contractive : list of (float, float or None) or None
-        What `contraction` returns.
+        The intervals from `contraction`.
     """
 
     kernel: str
@@ -207,13 +219,13 @@ class Stability:
     contractive: list[tuple[float, float | None]] | None
 
     def stretch(self, angles: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the factor at angles in rad."""
+        """Return the factor for angles in rad, an array of any shape."""
         squares = sp.lambdify(ANGLE, self.stretch_squared, "numpy")(angles)
         factors: NDArray[np.float64] = np.sqrt(np.broadcast_to(np.asarray(squares, np.float64), angles.shape))
         return factors
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the answer as plain JSON data."""
+        """Return the stability as plain JSON data."""
         return {
             "kernel": self.kernel,
             "stretch_squared": sp.sstr(self.stretch_squared),
@@ -222,12 +234,21 @@ class Stability:
 
 
 def stability(choice: Choice) -> Stability:
-    """Derive what a step does to the length of a state at a constant rate.
+    """Derive the change of the length of a state in a step at a constant rate.
 
     Parameters
     ----------
     choice : Choice
-        An attitude step.
+        An attitude step that is linear in its state.
+
+    Returns
+    -------
+    Stability
+
+    Raises
+    ------
+    InputError
+        If the step is not linear in its state, or its growth is no polynomial of the angle.
 
     Examples
     --------
@@ -235,8 +256,8 @@ def stability(choice: Choice) -> Stability:
     >>> stability(catalogue.choose("euler", "rk3")).as_dict()["contractive"]
     [(0.0, 3.4641016151377544)]
     """
-    found = constant_rate(choice)
-    return Stability(found.kernel, found.stretch_squared, contraction(found))
+    closed_form = constant_rate(choice)
+    return Stability(closed_form.kernel, closed_form.stretch_squared, contraction(closed_form))
 
 
 def as_intervals(found: Sequence[tuple[float, float | None]] | None) -> str:

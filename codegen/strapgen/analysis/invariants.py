@@ -1,7 +1,7 @@
 """Errors in vector-invariant form: sums of vectors and cross products of the rate and its derivatives.
 
-That form is not unique: three vectors in a plane are dependent, and so are the products of four. What is found is the
-first solution in a fixed order of terms, the one of `Frame`.
+The form is not unique, because any four vectors, and their products, are linearly dependent. The result is the first
+solution in the fixed order of terms of `Frame`.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ class Invariants:
         Coefficients of the vectors i and of the cross products (i, j), where i is the i-th derivative of the rate; each
         a polynomial in scalar products.
     symmetric : Coefficients
-        Coefficients of the unit matrix () and of the symmetrized products a b' + b a': (i, j), and (i, j, k) of i and
-        j x k.
+        Coefficients of the unit matrix (), and of the symmetrized products a b' + b a': those of i and j as (i, j),
+        those of i and j x k as (i, j, k).
     """
 
     drift: Coefficients
@@ -49,24 +49,34 @@ def invariants(
     ----------
     frame : Frame
     matrix : sequence of ring element
-        Row by row, in the coordinates of the frame; over the rational numbers or a field of roots, whose elements are
-        decomposed one power of its generator after the other.
+        Row by row, in the coordinates of the frame; over the rational numbers or a field of roots. In such a field
+        each power of the generator is decomposed separately.
     shown : callable, optional
-        Rounds a rational coefficient; what it makes zero is left out.
+        Rounds a rational coefficient; coefficients that become zero are omitted.
+
+    Returns
+    -------
+    Invariants
+
+    Raises
+    ------
+    NotCovariantError
+        If the matrix does not commute with rotations of the vectors.
     """
     domain = matrix[0].ring.domain
     if domain == sp.QQ:
-        found = frame.matrix(list(matrix))
+        decomposition = frame.matrix(list(matrix))
         return Invariants(
-            _scaled(_rounded(found.vector, shown), Fraction(-1)), _rounded(found.symmetric, shown)
+            _scaled(_rounded(decomposition.vector, shown), Fraction(-1)),
+            _rounded(decomposition.symmetric, shown),
         )
     drift: Coefficients = {}
     symmetric: Coefficients = {}
     for power in range(domain.mod.degree()):
         share = domain.ext.as_expr() ** power
-        found = frame.matrix([_share(frame, element, power) for element in matrix])
-        _add(drift, _scaled(found.vector, -share))
-        _add(symmetric, _scaled(found.symmetric, share))
+        decomposition = frame.matrix([_share(frame, element, power) for element in matrix])
+        _add(drift, _scaled(decomposition.vector, -share))
+        _add(symmetric, _scaled(decomposition.symmetric, share))
     return Invariants(drift, symmetric)
 
 
@@ -78,7 +88,7 @@ def _rounded(coefficients: Coefficients, shown: Callable[[Fraction], Fraction]) 
 
 
 def _share(frame: Frame, element: Any, power: int) -> Any:
-    """Return the rational polynomial that belongs to a power of the generator of a field of roots."""
+    """Return the rational polynomial that multiplies a power of the generator of a field of roots."""
     terms = {}
     for place, number in element.terms():
         numbers = number.to_list()[::-1]
@@ -105,39 +115,39 @@ def _scaled(coefficients: Coefficients, factor: Any) -> Coefficients:
 
 
 def matrix(found: Invariants, vectors: Sequence[Sequence[Any]]) -> list[Any]:
-    """Return the error matrix row by row for given vectors: numbers, symbols or polynomials."""
+    """Return the error matrix row by row for vectors of numbers, symbols or polynomials."""
     return Decomposition(None, _scaled(found.drift, Fraction(-1)), found.symmetric).evaluate(
         [list(vector) for vector in vectors]
     )
 
 
 def scalar(frame: Frame, element: Any) -> Polynomial:
-    """Return a scalar, given in the coordinates of a frame, as a polynomial in scalar products.
+    """Return a scalar as a polynomial in scalar products.
 
     Parameters
     ----------
     frame : Frame
     element : ring element
-        Over the rational numbers or a field of roots.
+        The scalar in the coordinates of the frame, over the rational numbers or a field of roots.
     """
     domain = element.ring.domain
     if domain == sp.QQ:
         return frame.quaternion([frame.ring.zero] * 3, element).scalar or {}
     total: Coefficients = {}
     for power in range(domain.mod.degree()):
-        found = frame.quaternion([frame.ring.zero] * 3, _share(frame, element, power)).scalar or {}
-        _add(total, _scaled({(): found}, domain.ext.as_expr() ** power))
+        part = frame.quaternion([frame.ring.zero] * 3, _share(frame, element, power)).scalar or {}
+        _add(total, _scaled({(): part}, domain.ext.as_expr() ** power))
     return total.get((), {})
 
 
 def scalar_value(polynomial: Polynomial, vectors: Sequence[Sequence[Any]]) -> Any:
-    """Return the value of a polynomial in scalar products for given vectors: numbers, symbols or polynomials."""
+    """Return the value of a polynomial in scalar products for vectors of numbers, symbols or polynomials."""
     return Decomposition(polynomial, {}, {}).evaluate([list(vector) for vector in vectors])[3]
 
 
 @dataclass(frozen=True)
 class Notation:
-    """How invariants are written.
+    """Patterns in which invariants are written.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The rates of the catalogue's motions and their derivatives, as polynomials that series are made of."""
+"""The rates of the catalogue's motions and their derivatives, as polynomials for the coefficients of series."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from strapgen.catalogue.motions import MOTIONS, MotionModel
 
 #: Time at the beginning of a step.
 TIME = sp.Symbol("t")
-#: Denominators from here on are those of decimals.
+#: From this denominator on a fraction is taken for a decimal.
 _LONG = 10**15
-#: Parameters of the motion "constant" as series show them.
+#: Symbols of the parameters of the motion "constant" in series.
 CONSTANT = sp.symbols("w_x w_y w_z")
 
 
@@ -29,7 +29,7 @@ class MotionRate:
     derivatives : list of list of ring element
         The rate and its derivatives at the beginning of a step.
     expression : callable
-        Returns a ring element as an expression in the motion's parameters and the time.
+        ``expression(element)`` returns a ring element as an expression in the motion's parameters and the time.
     """
 
     ring: Any
@@ -54,9 +54,13 @@ def at_time(motion: str, count: int, domain: Any = sp.QQ) -> MotionRate:
     ----------
     motion : str
     count : int
-        How many, with the rate itself.
+        Number of derivatives, counting the rate itself.
     domain : Domain, optional
         Field of the numbers.
+
+    Returns
+    -------
+    MotionRate
     """
     if motion == "polynomial":
         return _polynomial(count, domain)
@@ -74,7 +78,7 @@ def at_time(motion: str, count: int, domain: Any = sp.QQ) -> MotionRate:
     back = {wave: function for function, wave in waves.items()}
 
     def expression(element: Any) -> sp.Expr:
-        # Squares of sines are written as cosines, which tells what is zero.
+        # Squares of sines are replaced by cosines, so that equal expressions cancel.
         reduced = element if unity is None else element.rem([unity])
         return _factored(reduced).subs(back)
 
@@ -82,7 +86,7 @@ def at_time(motion: str, count: int, domain: Any = sp.QQ) -> MotionRate:
 
 
 def at_start(motion: str, count: int, domain: Any = sp.QQ) -> MotionRate:
-    """Return the rate of a motion and its derivatives at time 0: what `at_time` does, without waves."""
+    """Return the rate of a motion and its derivatives at time 0, where no sines and cosines are left."""
     symbols = parameters(motion)
     ring, *_ = sp.ring(symbols, domain)
     vector = MOTIONS[motion].rate(TIME, *symbols)
@@ -94,7 +98,7 @@ def at_start(motion: str, count: int, domain: Any = sp.QQ) -> MotionRate:
 
 
 def _polynomial(count: int, domain: Any) -> MotionRate:
-    """Return the rate about one axis; its derivatives are put in at the end, or products explode."""
+    """Return the rate about one axis, with symbols for its derivatives, since expanded products would get too long."""
     symbols = parameters("polynomial")
     (_, rate, _) = MOTIONS["polynomial"].rate(TIME, *symbols)
     ring, *r = sp.ring([f"r{j}" for j in range(min(count, len(symbols)))], domain)  # the others are zero
@@ -105,15 +109,15 @@ def _polynomial(count: int, domain: Any) -> MotionRate:
 
 
 def _factored(element: Any) -> sp.Expr:
-    """Return a ring element as an expression, in factors where its numbers are short fractions."""
+    """Return a ring element as an expression, factored if its numbers are short fractions."""
     expression = element.as_expr()
     return sp.factor(expression) if is_plain(expression) else expression
 
 
 def is_plain(expression: sp.Expr) -> bool:
-    """Tell whether the numbers of an expression are fractions of whole numbers, neither roots nor long decimals.
+    """Return whether all numbers of an expression are fractions of whole numbers, and none a root or a long decimal.
 
-    Only such are factored: with others it takes long and shows nothing.
+    Only such expressions are factored: with other numbers it takes long and makes them no shorter.
     """
     numbers = (x for x in sp.preorder_traversal(expression) if x.is_number)
     return all(x.is_Rational and x.q < _LONG for x in numbers if not x.is_Integer)

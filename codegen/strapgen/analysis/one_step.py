@@ -1,6 +1,6 @@
-"""What one step loses: the error matrix of a kernel as a power series in the step length, for any smooth rate.
+"""The error matrix of one step as a power series in the step length, for any smooth rate.
 
-The rate is w(t) = w_0 + w_1 t + w_2 t^2/2 + ..., its increments are exact, and so is the true transition.
+The rate is w(t) = w_0 + w_1 t + w_2 t^2/2 + ...; its increments and the true transition are exact.
 """
 
 from __future__ import annotations
@@ -20,29 +20,29 @@ from strapgen.kernel import Kernel
 from strapgen.lowering.canonical.decomposition import Frame
 from strapgen.powers import Powers, constant, field, outputs
 
-#: Of a method whose coefficients are published with 17 digits or so: digits of its error, and what may be zero.
+#: For methods whose coefficients are published with about 17 digits: digits of an error, and the largest that may be 0.
 _DIGITS = 12
 _LEAST = Fraction(1, 10**14)
 
-#: Powers beyond the order that are looked at where a series does not begin.
+#: Number of further powers that are tried if a series has no term where its order says it should.
 PATIENCE = 4
 
-#: A vector of polynomials for every derivative of the rate.
+#: The rate and its derivatives, each a vector of polynomials.
 Rate = Sequence[Sequence[Any]]
 
 
 @dataclass(frozen=True)
 class Step:
-    """An attitude step, and what it is to be given.
+    """An attitude step and the samples that it takes.
 
     Parameters
     ----------
     kernel : Kernel
     nodes : tuple of number or None
-        Nodes at which it is given the rate; None for one that takes increments.
+        Nodes at which it takes the rate, as fractions of the step; None for a step that takes increments.
     lowest : int
-        For a method whose published coefficients are rounded the power of the step at which its error begins but for
-        that; 0 where they are exact.
+        For a method with rounded coefficients, the power of the step at which its error would begin with exact ones;
+        0 if the coefficients are exact.
     """
 
     kernel: Kernel
@@ -50,14 +50,14 @@ class Step:
     lowest: int = 0
 
     def shown(self, number: Fraction) -> Fraction:
-        """Return a coefficient of the error: where those of the method are rounded, as far as it can be known."""
+        """Return a coefficient of the error, rounded to the digits that the coefficients of the method support."""
         if not self.lowest:
             return number
         return Fraction(f"{float(number):.{_DIGITS - 1}e}") if abs(number) > _LEAST else Fraction(0)
 
     @property
     def domain(self) -> Any:
-        """The field of the step's numbers: the rational ones, and what roots it has."""
+        """The smallest field that holds the numbers of the step."""
         expressions = [algebra.exact(node) for node in self.nodes or ()]
         for stage in (*self.kernel.stages, *self.kernel.outputs):
             expressions += stage.expressions
@@ -70,7 +70,7 @@ def step(choice: Choice) -> Step:
     Raises
     ------
     InputError, InputTypeError
-        If it is no attitude step, or no choice is given.
+        If it is no attitude step, or `choice` is no `Choice`.
     """
     if not isinstance(choice, Choice):
         raise InputTypeError(f"choice is {choice!r}; what catalogue.choose returns is needed")
@@ -83,36 +83,37 @@ def step(choice: Choice) -> Step:
 
 
 def linear_step(choice: Choice) -> Step:
-    """Return a chosen attitude step that is linear in its state, so that it loses the same at any attitude.
+    """Return a chosen attitude step that is linear in its state, so that its error is the same at any attitude.
 
     Raises
     ------
     InputError, InputTypeError
-        If it is not, or no attitude step.
+        If it is not linear in its state, or no attitude step.
     """
-    taken = step(choice)
-    if taken.kernel.transition is None:
+    attitude_step = step(choice)
+    if attitude_step.kernel.transition is None:
         raise InputError(
-            f"kernel {taken.kernel.name} is not linear in its state: what it loses in a run depends on the attitude"
+            f"kernel {attitude_step.kernel.name} is not linear in its state: "
+            "what it loses in a run depends on the attitude"
         )
-    return taken
+    return attitude_step
 
 
-def general_rate(taken: Step, count: int) -> tuple[Frame, Any, list[list[Any]]]:
-    """Return what a general rate is given in: a rotated frame, a ring over the step's field, the rate's derivatives.
+def general_rate(attitude_step: Step, count: int) -> tuple[Frame, Any, list[list[Any]]]:
+    """Return a general rate: a rotated frame, a ring over the field of the step, and the rate with its derivatives.
 
     Parameters
     ----------
     taken : Step
     count : int
-        How many derivatives, with the rate itself.
+        Number of derivatives, counting the rate itself.
     """
     frame = Frame(count)
-    ring = frame.ring.clone(domain=taken.domain)
+    ring = frame.ring.clone(domain=attitude_step.domain)
     return frame, ring, [[element.set_ring(ring) for element in vector] for vector in frame.vectors]
 
 
-def errors(taken: Step, ring: Any, rate: Rate, top: int) -> dict[str, list[Powers]]:
+def errors(attitude_step: Step, ring: Any, rate: Rate, top: int) -> dict[str, list[Powers]]:
     """Return the error matrix of one step from zero rotation, and its parts, up to a power of the step.
 
     Parameters
@@ -121,9 +122,9 @@ def errors(taken: Step, ring: Any, rate: Rate, top: int) -> dict[str, list[Power
     ring : PolyRing
         Ring of the coefficients, over the step's own field.
     rate : sequence of sequence of ring element
-        The rate and its derivatives at the beginning of the step; those that are left out are zero.
+        The rate and its derivatives at the beginning of the step; further derivatives are zero.
     top : int
-        The last power that is kept.
+        The last power of the series.
 
     Returns
     -------
@@ -131,29 +132,30 @@ def errors(taken: Step, ring: Any, rate: Rate, top: int) -> dict[str, list[Power
         "error", nine elements row by row, "scale", "skew" and "drift", three each: the outputs of the kernel
         error-matrix.
     """
-    both = (computed_matrix(taken, ring, rate, top), true_matrix(ring, rate, top))
+    both = (computed_matrix(attitude_step, ring, rate, top), true_matrix(ring, rate, top))
     split = _error_matrix()
     values: dict[str, Any] = {}
     for signal, elements in zip(split.inputs, both, strict=True):
         values |= zip(signal.elements, elements, strict=True)
-    made: dict[str, list[Powers]] = split.expand(values, lambda value: constant(ring, value, top))
-    if taken.lowest:
-        made = {
+    parts: dict[str, list[Powers]] = split.expand(values, lambda value: constant(ring, value, top))
+    if attitude_step.lowest:
+        parts = {
             name: [
-                Powers(ring, {p: x for p, x in one.parts.items() if p >= taken.lowest}, top)
+                Powers(ring, {p: x for p, x in one.parts.items() if p >= attitude_step.lowest}, top)
                 for one in elements
             ]
-            for name, elements in made.items()
+            for name, elements in parts.items()
         }
-    return made
+    return parts
 
 
-def shown(taken: Step, element: Any) -> Any:
-    """Return a ring element with its coefficients as they are shown."""
-    if not taken.lowest:
+def shown(attitude_step: Step, element: Any) -> Any:
+    """Return a ring element with its coefficients rounded as by `Step.shown`."""
+    if not attitude_step.lowest:
         return element
     terms = {
-        place: taken.shown(Fraction(int(x.numerator), int(x.denominator))) for place, x in element.terms()
+        place: attitude_step.shown(Fraction(int(x.numerator), int(x.denominator)))
+        for place, x in element.terms()
     }
     return element.ring.from_dict(
         {place: sp.QQ(x.numerator, x.denominator) for place, x in terms.items() if x}
@@ -161,11 +163,17 @@ def shown(taken: Step, element: Any) -> Any:
 
 
 def split(error: Sequence[Any]) -> dict[str, list[Any]]:
-    """Return scale, skew and drift of an error matrix that is given row by row in expressions.
+    """Return the scale, skew and drift of an error matrix.
 
     Parameters
     ----------
     error : sequence of Expr
+        Nine elements, row by row.
+
+    Returns
+    -------
+    dict of str to list of Expr
+        "scale", "skew" and "drift", three elements each.
     """
     kernel = _error_matrix()
     computed, true = (signal.elements for signal in kernel.inputs)
@@ -178,57 +186,57 @@ def _error_matrix() -> Kernel:
     return catalogue.derive(catalogue.choose("error-matrix"))
 
 
-def computed_state(taken: Step, ring: Any, rate: Rate, top: int) -> list[Powers]:
+def computed_state(attitude_step: Step, ring: Any, rate: Rate, top: int) -> list[Powers]:
     """Return the state after one step from zero rotation, row by row."""
-    kernel, companions = taken.kernel, taken.kernel.companions
-    assert companions is not None, "checked by `step`"
+    kernel, step_kernels = attitude_step.kernel, attitude_step.kernel.companions
+    assert step_kernels is not None, "checked by `step`"
     state, samples = kernel.inputs
     values: dict[str, Any] = {
         name: constant(ring, sp.Rational(x.numerator, x.denominator), top)
-        for name, x in zip(state.elements, companions.identity, strict=True)
+        for name, x in zip(state.elements, step_kernels.identity, strict=True)
     }
-    if taken.nodes is None:
-        count, previous = samples.shape[0] - companions.previous, companions.previous
-        given = increments(ring, rate, count, previous, top)
+    if attitude_step.nodes is None:
+        count, previous = samples.shape[0] - step_kernels.previous, step_kernels.previous
+        sampled = increments(ring, rate, count, previous, top)
     else:
-        given = turns(ring, rate, taken.nodes, top)
-    values |= dict(zip(samples.elements, given, strict=True))
+        sampled = turns(ring, rate, attitude_step.nodes, top)
+    values |= dict(zip(samples.elements, sampled, strict=True))
     return _evaluated(kernel, values, ring, top)
 
 
-def computed_matrix(taken: Step, ring: Any, rate: Rate, top: int) -> list[Powers]:
+def computed_matrix(attitude_step: Step, ring: Any, rate: Rate, top: int) -> list[Powers]:
     """Return the direction cosine matrix after one step from zero rotation, row by row."""
-    elements = computed_state(taken, ring, rate, top)
-    companions = taken.kernel.companions
-    if companions is None or companions.attitude is None:
+    elements = computed_state(attitude_step, ring, rate, top)
+    step_kernels = attitude_step.kernel.companions
+    if step_kernels is None or step_kernels.attitude is None:
         return elements
-    attitude = catalogue.derive(catalogue.choose(companions.attitude))
+    attitude = catalogue.companion(attitude_step.kernel, step_kernels.attitude)
     values = dict(zip(attitude.inputs[0].elements, elements, strict=True))
     return _evaluated(attitude, values, ring, top)
 
 
 def _evaluated(kernel: Kernel, values: dict[str, Any], ring: Any, top: int) -> list[Powers]:
-    """Return the elements of a kernel's last output."""
+    """Return the elements of the last output of a kernel."""
     return outputs(kernel, values, ring, top)[kernel.outputs[-1].signal.name]
 
 
 def increments(ring: Any, rate: Rate, count: int, previous: int, top: int) -> list[Powers]:
-    """Return the elements of the exact increments that a step takes, row by row."""
-    found = []
+    """Return the elements of the exact increments of a step in rad, row by row."""
+    elements = []
     for k in range(-previous, count):
         begin, end = sp.Rational(k, count), sp.Rational(k + 1, count)
         shares = [(end ** (j + 1) - begin ** (j + 1)) / sp.factorial(j + 1) for j in range(len(rate))]
-        found += _moments(ring, rate, shares, top)
-    return found
+        elements += _moments(ring, rate, shares, top)
+    return elements
 
 
 def turns(ring: Any, rate: Rate, nodes: Sequence[Number], top: int) -> list[Powers]:
     """Return the elements of the rate at nodes of the step, times its length, row by row."""
-    found = []
+    elements = []
     for node in nodes:
         shares = [algebra.exact(node) ** j / sp.factorial(j) for j in range(len(rate))]
-        found += _moments(ring, rate, shares, top)
-    return found
+        elements += _moments(ring, rate, shares, top)
+    return elements
 
 
 def _moments(ring: Any, rate: Rate, shares: Sequence[sp.Expr], top: int) -> list[Powers]:
@@ -243,7 +251,7 @@ def _moments(ring: Any, rate: Rate, shares: Sequence[sp.Expr], top: int) -> list
 def true_matrix(ring: Any, rate: Rate, top: int) -> list[Powers]:
     """Return the true direction cosine matrix after the step, row by row.
 
-    With the rate sum_j g_j t^j, dC/dt = C skew(w) gives (n + 1) C_(n+1) = sum_j C_(n-j) skew(g_j).
+    For the rate sum_j g_j t^j, dC/dt = C skew(w) leads to (n + 1) C_(n+1) = sum_j C_(n-j) skew(g_j).
     """
     zero, one = ring.zero, ring.one
     skews = [

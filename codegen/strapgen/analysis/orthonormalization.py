@@ -1,4 +1,4 @@
-"""What orthonormalization does to a small error: appendix B of the thesis for every scheme of the catalogue."""
+"""The effect of orthonormalization on a small error: appendix B of the thesis for every scheme of the catalogue."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from strapgen import catalogue, checks
 from strapgen.exceptions import InputError
 from strapgen.powers import Powers, outputs
 
-#: The error of the computed matrix: it is (I + s P) C with C the true one and s the size of the error.
+#: The error P of the computed matrix (I + s P) C, where C is the true matrix and s the size of the error.
 ERROR = sp.Matrix(3, 3, sp.symbols("p11 p12 p13 p21 p22 p23 p31 p32 p33"))
 
 
 def effect(scheme: str, order: int = 2) -> dict[int, sp.Matrix]:
-    """Return the error that a scheme of orthonormalization leaves, by power of the error that it is given.
+    """Return the error after a scheme of orthonormalization, as a series in the error before it.
 
-    The computed matrix is (I + s P) C, the orthonormalized one (I + s F_1(P) + s^2 F_2(P) + ...) C. To first order
-    every scheme leaves the skew part of P, so scale and skew vanish and the drift is unchanged (B.4); to second order
-    the nearest rotation changes the drift by -(K Y + Y K)/2, K and Y the skew and symmetric parts of P (B.14).
+    The scheme changes the matrix (I + s P) C into (I + s F_1(P) + s^2 F_2(P) + ...) C. To first order every scheme
+    leaves the skew part of P: scale and skew vanish, and the drift does not change (B.4). To second order the nearest
+    rotation changes the drift by -(K Y + Y K)/2, where K and Y are the skew and symmetric parts of P (B.14).
 
     Parameters
     ----------
@@ -34,8 +34,8 @@ def effect(scheme: str, order: int = 2) -> dict[int, sp.Matrix]:
     Raises
     ------
     InputError
-        If the kernel is none of these, or has no series: the one of the nearest rotation, whose series is that of
-        dcm-orthonormalize-first-order and dcm-orthonormalize-second-order to their orders.
+        If the kernel is no such scheme or has no series. The scheme of the nearest rotation has none; to their orders,
+        dcm-orthonormalize-first-order and dcm-orthonormalize-second-order agree with it.
 
     Examples
     --------
@@ -53,10 +53,10 @@ def effect(scheme: str, order: int = 2) -> dict[int, sp.Matrix]:
         for k, (name, element) in enumerate(zip(computed.elements, elements, strict=True))
     }
     try:
-        made = outputs(kernel, values, ring, order)
+        results = outputs(kernel, values, ring, order)
     except ArithmeticError as error:
         raise InputError(f"kernel {scheme} has no series in the error: {error}") from None
-    result = made[kernel.outputs[-1].signal.name]
+    result = results[kernel.outputs[-1].signal.name]
     return {
         power: sp.Matrix(3, 3, [x.parts.get(power, ring.zero).as_expr() for x in result])
         for power in range(1, order + 1)

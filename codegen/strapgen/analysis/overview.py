@@ -1,4 +1,4 @@
-"""The catalogue side by side: order, leading terms, operations of a step, and what an operation buys."""
+"""Overview of the catalogue: order, leading error terms, operations of a step, and error at equal work."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 import sympy as sp
 
-from strapgen import catalogue, pipeline
+from strapgen import catalogue, library
 from strapgen.analysis.accumulation import accumulate
 from strapgen.analysis.constant_rate import constant_rate
 from strapgen.analysis.growth import as_intervals, contraction
@@ -19,19 +19,19 @@ from strapgen.analysis.series import series
 from strapgen.catalogue import Choice
 from strapgen.catalogue.tableaux import TABLEAUX
 
-#: Taylor methods of higher orders lose less than any gyro shows.
+#: Highest order of a Taylor method in the overview; with higher orders the error is far below that of any gyro.
 _HIGHEST_TAYLOR = 8
-#: Rates a, b and g of coning, in deg/s, and step in s that numbers are given for: those of the thesis's table 5.
+#: Rates a, b and g of coning in deg/s, and step in s, for numerical values: those of table 5 of the thesis.
 CONING_DEG_S, STEP_S = 10.0, 0.125
-#: Operations a second that equal work means: those of fourth order in Euler parameters at that step.
+#: Operations per second at equal work: those of the fourth-order step of Euler parameters at `STEP_S`.
 WORK = 544.0
-#: Terms beyond which a vector is not written out in a table.
+#: Most terms of a vector that a table shows.
 _SHORT = 3
 
 
 @dataclass(frozen=True)
-class Row:
-    """What one algorithm loses and costs.
+class OverviewRow:
+    """The errors and the operations of one algorithm.
 
     Parameters
     ----------
@@ -42,9 +42,11 @@ class Row:
     operations : int
         Operations of a step, of all kinds.
     constant_power, constant : int, Expr or None
-        At a constant rate the angle lost in a step is constant x^constant_power, x = |w| h; None where none is lost.
+        At a constant rate the angle in rad lost in a step is ``constant x^constant_power`` with x = |w| h; None if no
+        angle is lost.
     coning_power, coning : int, Expr or None
-        On coning the secular drift rate about the axis (0, b + g, a) is that vector times coning h^coning_power.
+        On coning the secular drift rate is the vector (0, b + g, a) times ``coning h^coning_power``; None if there is
+        no drift.
     general : str
         Leading term of the drift of a step on a general motion.
     contractive : str
@@ -63,7 +65,7 @@ class Row:
     contractive: str
 
     def coning_rate(self, step: float = STEP_S) -> float | None:
-        """Return the leading secular drift rate in rad/s for the motion of the thesis's table 5 at a step in s."""
+        """Return the leading secular drift rate in rad/s on the motion of table 5 of the thesis, for a step in s."""
         if self.coning is None or self.coning_power is None:
             return None
         rate = math.radians(CONING_DEG_S)
@@ -72,13 +74,13 @@ class Row:
 
     @property
     def per_operation(self) -> float | None:
-        """Leading secular drift of a step over its operations, in rad."""
+        """Leading secular drift of a step in rad, divided by its operations."""
         rate = self.coning_rate()
         return None if rate is None else rate * STEP_S / self.operations
 
     @property
     def at_equal_work(self) -> float | None:
-        """Leading secular drift rate in rad/s where the step is so long that `WORK` operations a second do."""
+        """Leading secular drift rate in rad/s if the step is so long that it takes `WORK` operations per second."""
         return self.coning_rate(self.operations / WORK)
 
     def as_dict(self) -> dict[str, Any]:
@@ -104,7 +106,7 @@ class Row:
 
 
 def methods() -> list[str]:
-    """Return the methods of the catalogue that are worth comparing."""
+    """Return the methods of the catalogue, without Taylor methods of very high order."""
     others = [
         name
         for name in catalogue.INTEGRATORS
@@ -116,7 +118,18 @@ def methods() -> list[str]:
 def choices(
     algorithms: Sequence[str] = tuple(catalogue.ALGORITHMS), names: Iterable[str] | None = None
 ) -> list[Choice]:
-    """Return every algorithm by every method, on as many increments as its order needs."""
+    """Return every algorithm with every method, on as many increments as its order needs.
+
+    Parameters
+    ----------
+    algorithms : sequence of str, optional
+    names : iterable of str, optional
+        Methods; by default those of `methods`.
+
+    Returns
+    -------
+    list of Choice
+    """
     return [
         catalogue.choose(algorithm, name, catalogue.enough(name))
         for algorithm in algorithms
@@ -124,7 +137,7 @@ def choices(
     ]
 
 
-def overview(chosen: Iterable[Choice]) -> Iterator[Row]:
+def overview(chosen: Iterable[Choice]) -> Iterator[OverviewRow]:
     """Derive the rows of a comparison.
 
     Parameters
@@ -134,7 +147,7 @@ def overview(chosen: Iterable[Choice]) -> Iterator[Row]:
 
     Yields
     ------
-    Row
+    OverviewRow
 
     Examples
     --------
@@ -146,7 +159,7 @@ def overview(chosen: Iterable[Choice]) -> Iterator[Row]:
         yield _row(choice)
 
 
-def _row(choice: Choice) -> Row:
+def _row(choice: Choice) -> OverviewRow:
     kernel = catalogue.derive(choice)
     general = series(choice, "general", 1)
     fixed = constant_rate(choice)
@@ -156,10 +169,10 @@ def _row(choice: Choice) -> Row:
     coning_power, coning = next(iter(run.secular.items()), (None, None))
     a = parameters("coning")[0]
     drift = min(general.drift, default=None)
-    counts = pipeline.lower(kernel).operations
-    return Row(
+    counts = library.program(choice).operations
+    return OverviewRow(
         kernel.name,
-        catalogue.increments(choice),
+        choice.increments_per_step,
         general.order,
         sum(counts.values()),
         constant_power,
@@ -172,12 +185,12 @@ def _row(choice: Choice) -> Row:
 
 
 def _along(vector: sp.Matrix, a: sp.Symbol) -> sp.Expr:
-    """Return by what the axis (0, b + g, a) is multiplied."""
+    """Return the factor of a vector along the axis (0, b + g, a)."""
     factor = vector[2] / a
     return sp.factor(sp.cancel(factor)) if is_plain(factor) else factor
 
 
-def as_table(rows: Sequence[Row]) -> str:
+def as_table(rows: Sequence[OverviewRow]) -> str:
     """Return rows as a table for a person."""
     head = [
         "algorithm",

@@ -1,4 +1,4 @@
-"""The thesis's tables as the series predict them, without a simulation."""
+"""The tables of the thesis, predicted from series without a simulation."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from strapgen.tables import ALGORITHMS, DURATION, INTERVAL, ORDERS, STEP, TABLES
 
 
 @dataclass(frozen=True)
-class Entry:
+class PredictedEntry:
     """One figure of a table.
 
     Parameters
@@ -27,11 +27,11 @@ class Entry:
     order : int
         Order of the integration.
     drift_deg, normalised : float
-        Predicted drift in degrees, and over that of the direction cosine matrix as the table has it.
+        Predicted drift in degrees, and its ratio to that of the direction cosine matrix, as in the table.
     simulated_deg, simulated : float
-        The same of the run in numpy.
+        The same two numbers from a run in numpy.
     thesis : str
-        What the thesis prints.
+        The ratio as the thesis prints it.
     agrees : bool
         Whether `normalised` has the printed digits.
     """
@@ -48,7 +48,7 @@ class Entry:
 
     @property
     def deviation(self) -> float:
-        """By what the predicted figure is off the simulated one, relative."""
+        """Relative difference of the predicted ratio from the simulated one."""
         return self.normalised / self.simulated - 1
 
     def as_dict(self) -> dict[str, Any]:
@@ -60,8 +60,8 @@ class Entry:
         }
 
 
-def predicted(tables: Sequence[Table] = TABLES) -> Iterator[Entry]:
-    """Predict tables from two powers of the error rate, and hold them against the simulation.
+def predicted(tables: Sequence[Table] = TABLES) -> Iterator[PredictedEntry]:
+    """Predict tables from two powers of the error rate, and compare them with the simulation.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def predicted(tables: Sequence[Table] = TABLES) -> Iterator[Entry]:
 
     Yields
     ------
-    Entry
+    PredictedEntry
     """
     for table in tables:
         profile = motion(table.motion, **table.settings)
@@ -79,14 +79,14 @@ def predicted(tables: Sequence[Table] = TABLES) -> Iterator[Entry]:
                 choice = catalogue.choose(algorithm, f"rk{order}", 2)
                 expected = predict(choice, profile, STEP, DURATION, INTERVAL, INTERVAL)
                 drifts[algorithm, order] = _drift_deg(table, expected)
-                made = backend(algorithm, f"rk{order}", 2, "numpy")
+                stepper = backend(algorithm, f"rk{order}", 2, "numpy")
                 runs[algorithm, order] = drift_deg(
-                    table, simulate(made, profile, STEP, DURATION, INTERVAL, INTERVAL)
+                    table, simulate(stepper, profile, STEP, DURATION, INTERVAL, INTERVAL)
                 )
                 base = ("dcm", order if table.by_order else 1)
                 printed = table.printed[algorithm][ORDERS.index(order)]
                 normalised = drifts[algorithm, order] / drifts[base]
-                yield Entry(
+                yield PredictedEntry(
                     table.number,
                     algorithm,
                     order,
@@ -104,7 +104,7 @@ def _drift_deg(table: Table, expected: Prediction) -> float:
     return math.degrees(expected.mean_drift if table.mean else max(expected.drift_by_axis))
 
 
-def as_text(found: Sequence[Entry]) -> str:
+def as_text(found: Sequence[PredictedEntry]) -> str:
     """Return predicted tables as text."""
     lines = []
     for table in TABLES:

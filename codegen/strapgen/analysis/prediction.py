@@ -1,4 +1,4 @@
-"""The errors of a run as the series predict them: no step is taken."""
+"""Errors of a run, predicted from the series of the error rate instead of a simulation."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 import mpmath
 import sympy as sp
 
-from strapgen import algebra, catalogue, checks, exact
+from strapgen import algebra, catalogue, checks, exact, library
 from strapgen.analysis.accumulation import antiderivative
 from strapgen.analysis.error_rate import ErrorRate, error_rate
 from strapgen.analysis.motion_rates import TIME, parameters
@@ -18,23 +18,23 @@ from strapgen.catalogue import Choice
 from strapgen.convergence import interpreter
 from strapgen.motions import Motion
 
-#: A 3 x 3 matrix of mpmath, and the factor that it gains over a span of time.
+#: A 3 x 3 matrix of mpmath, and the function that returns its growth factor from one time to another.
 Matrix = Any
 Transfer = Callable[[Fraction, Fraction], Matrix]
 
 
 @dataclass(frozen=True)
 class Prediction:
-    """Predicted errors of a run, in many digits.
+    """Predicted errors of a run in many digits, reference axes.
 
     Parameters
     ----------
     times : list of mpf
         In s, the first one 0.
     errors : list of list of mpf
-        Error matrices row by row, reference axes.
+        Error matrices, row by row.
     scale, skew, drift : list of list of mpf
-        Their parts on x, y, z.
+        Their parts on x, y, z; scale dimensionless, skew and drift in rad.
     """
 
     times: list[Any]
@@ -65,8 +65,8 @@ def predict(
 ) -> Prediction:
     """Predict the errors of a run from the series of its error rate.
 
-    The computed attitude is that of a body that turns at the true rate and the error rate together, in closed form; so
-    products of errors, which matter at low orders, are in it, and so is what orthonormalization does.
+    The computed attitude is the closed form of a motion at the sum of the true rate and the error rate. It therefore
+    includes products of errors, which matter at low orders, and the effect of orthonormalization.
 
     Parameters
     ----------
@@ -74,9 +74,9 @@ def predict(
         An attitude step that is linear in its state.
     motion : Motion
     step, duration, orthonormalize, record : number
-        As for `simulation.simulate`; without `record` the beginning and the end are given.
+        As for `simulation.simulate`. Without `record` there are results at the beginning and the end alone.
     terms : int, optional
-        Powers of the step that are kept, from the first one on.
+        Number of powers of the step, counted from the first one.
 
     Returns
     -------
@@ -85,7 +85,7 @@ def predict(
     Raises
     ------
     InputError
-        If the step has no closed form of a run, or a time is not allowed.
+        If the algorithm has no closed form of a run, or a time is not allowed.
 
     Examples
     --------
@@ -94,11 +94,11 @@ def predict(
     >>> round(float(mpmath.degrees(found.drift[-1][1])), 3)
     0.286
     """
-    found = error_rate(choice, motion.name, terms)
+    rates = error_rate(choice, motion.name, terms)
 
     def transfer(h: Fraction) -> Transfer:
         settings = [mpmath.mpf(value) for value in motion.parameters.values()]
-        return (_turning if found.steady else _about_an_axis)(found, settings, exact.number(h))
+        return (_turning if rates.steady else _about_an_axis)(rates, settings, exact.number(h))
 
     return follow(choice, motion, transfer, step, duration, orthonormalize, record)
 
@@ -112,17 +112,26 @@ def follow(
     orthonormalize: float | str | Fraction | None = None,
     record: float | str | Fraction | None = None,
 ) -> Prediction:
-    """Return the errors of a run whose error over any span of time is known, orthonormalized now and then.
+    """Return the errors of a run from the growth of its error between orthonormalizations.
 
     Parameters
     ----------
     choice : Choice
     motion : Motion
     transfer : callable
-        For the step in s ``transfer(begin, end)``: the factor by which the product of computed and true matrix, the
-        latter transposed, grows over a span.
+        ``transfer(step)`` returns a function of two times in s, ``(begin, end)``, which returns the factor that the
+        computed matrix times the transposed true one gains between them.
     step, duration, orthonormalize, record : number
         As for `predict`.
+
+    Returns
+    -------
+    Prediction
+
+    Raises
+    ------
+    InputError
+        If a time is not allowed.
     """
     h = checks.number("step", step, positive=True)
     total = checks.number("duration", duration, positive=True)
@@ -154,7 +163,7 @@ def _follow(
         {k * interval for k in range(int(total / interval) + 1)}
         | {k * every for k in range(int(total / every) + 1)}
     )
-    # Computed matrix = product * true matrix: the error matrix and the identity.
+    # The product is the computed matrix times the transposed true one: identity plus error matrix.
     product, before = mpmath.eye(3), Fraction(0)
     prediction = Prediction([], [], [], [], [])
     for time in stops:
@@ -178,37 +187,37 @@ def _matrix(elements: list[Any]) -> Matrix:
 
 
 def parts_of() -> Callable[[Sequence[Any], Sequence[Any]], tuple[list[Any], list[Any], list[Any]]]:
-    """Return what splits the error of a computed matrix against a true one into scale, skew and drift.
+    """Return a function that splits the error of a computed matrix into scale, skew and drift.
 
-    ``split(computed, true)``, both row by row: the outputs of the kernel error-matrix, in many digits.
+    ``split(computed, true)`` takes both matrices row by row and runs the kernel error-matrix in many digits.
     """
     kernel = interpreter("error-matrix")
 
     def split(computed: Sequence[Any], true: Sequence[Any]) -> tuple[list[Any], list[Any], list[Any]]:
-        made = kernel.outputs(computed, true)
-        return made["scale"], made["skew"], made["drift"]
+        results = kernel.outputs(computed, true)
+        return results["scale"], results["skew"], results["drift"]
 
     return split
 
 
-def _sum(found: ErrorRate, matrices: dict[int, sp.Matrix], h: Any) -> Callable[..., Matrix]:
-    """Return the sum of a series as a function of the motion's parameters, and of what else its terms depend on."""
-    symbols = [*parameters(found.motion), TIME]
-    made = {power: sp.lambdify(symbols, matrix, "mpmath") for power, matrix in matrices.items()}
+def _sum(rates: ErrorRate, matrices: dict[int, sp.Matrix], h: Any) -> Callable[..., Matrix]:
+    """Return the sum of a series as a function of the parameters of the motion and the time."""
+    symbols = [*parameters(rates.motion), TIME]
+    functions = {power: sp.lambdify(symbols, matrix, "mpmath") for power, matrix in matrices.items()}
 
     def value(*arguments: Any) -> Matrix:
         total = mpmath.zeros(3)
-        for power, function in made.items():
+        for power, function in functions.items():
             total += h**power * function(*arguments)
         return total
 
     return value
 
 
-def _turning(found: ErrorRate, settings: list[Any], h: Any) -> Transfer:
-    """Return what the product gains over a span of time where the frame turns evenly."""
-    axis = sp.lambdify(parameters(found.motion), algebra.skew(found.axis), "mpmath")(*settings)
-    whole = axis + _sum(found, found.matrices, h)(*settings, mpmath.mpf(0))
+def _turning(rates: ErrorRate, settings: list[Any], h: Any) -> Transfer:
+    """Return the growth of the product between two times for a frame that turns at a constant rate."""
+    axis = sp.lambdify(parameters(rates.motion), algebra.skew(rates.axis), "mpmath")(*settings)
+    whole = axis + _sum(rates, rates.matrices, h)(*settings, mpmath.mpf(0))
     spans: dict[Fraction, Matrix] = {}
 
     def transfer(begin: Fraction, end: Fraction) -> Matrix:
@@ -221,10 +230,10 @@ def _turning(found: ErrorRate, settings: list[Any], h: Any) -> Transfer:
     return transfer
 
 
-def _about_an_axis(found: ErrorRate, settings: list[Any], h: Any) -> Transfer:
-    """Return what the product gains over a span of time where the rate keeps its axis."""
-    gained = {power: antiderivative(matrix, found) for power, matrix in found.matrices.items()}
-    value = _sum(found, gained, h)
+def _about_an_axis(rates: ErrorRate, settings: list[Any], h: Any) -> Transfer:
+    """Return the growth of the product between two times for a motion about a fixed axis."""
+    gained = {power: antiderivative(matrix, rates) for power, matrix in rates.matrices.items()}
+    value = _sum(rates, gained, h)
 
     def transfer(begin: Fraction, end: Fraction) -> Matrix:
         return mpmath.expm(value(*settings, exact.number(end)) - value(*settings, exact.number(begin)))
@@ -233,13 +242,14 @@ def _about_an_axis(found: ErrorRate, settings: list[Any], h: Any) -> Transfer:
 
 
 def _orthonormalization(choice: Choice) -> Callable[[Matrix], Matrix]:
-    """Return what restores a computed matrix: the scheme of the algorithm, or the normalization of its parameters."""
-    companions = catalogue.derive(choice).companions
-    assert companions is not None, "checked by error_rate"
-    if companions.orthonormalize is None:
+    """Return the function that orthonormalizes a computed matrix, by the scheme of the algorithm."""
+    kernel = catalogue.derive(choice)
+    step_kernels = kernel.companions
+    assert step_kernels is not None, "checked by error_rate"
+    if step_kernels.orthonormalize is None:
         return lambda computed: computed
-    if companions.attitude is not None:
-        # The matrix of parameters whose length is off is a rotation times a factor.
+    if step_kernels.attitude is not None:
+        # If the length of the parameters is not 1, their matrix is a rotation times a factor.
         return lambda computed: computed / mpmath.cbrt(mpmath.det(computed))
-    scheme = interpreter(companions.orthonormalize)
+    scheme = interpreter(step_kernels.orthonormalize, library.program(choice))
     return lambda computed: _matrix(scheme(list(computed)))

@@ -1,4 +1,4 @@
-"""Two algorithms side by side: the exact ratio of what they lose, with its next term."""
+"""Comparison of two algorithms by the exact ratio of their errors, with its next term."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from strapgen.catalogue import Choice
 
 #: The angle of a step at a constant rate, |w| h.
 _ANGLE = sp.Symbol("x")
-#: Terms of a quotient beyond which it is left as it is.
+#: Most terms of a quotient that is reduced and factored.
 _LONG = 100
-#: Drift by power of the step or of the angle: vectors, or numbers in one row.
+#: Coefficients of a drift by power of the step or of the angle; each is a vector, or one number in a tuple.
 Terms = Mapping[int, Sequence[sp.Expr]]
 
 
 @dataclass(frozen=True)
 class Ratio:
-    """What one algorithm loses over what another one does.
+    """The ratio of the errors of two algorithms.
 
     Parameters
     ----------
@@ -33,14 +33,14 @@ class Ratio:
         The kernels.
     motion : str
     quantity : str
-        What is compared.
+        The compared quantity and its unit.
     symbol : Symbol
-        What both are series in.
+        The variable of both series.
     terms : tuple of dict
         The terms of both, by power of the symbol.
     ratio : dict of int to Expr or None
-        The first terms of the quotient by power of the symbol; None where there is none: one of the two loses nothing,
-        or their drifts are not parallel.
+        The first terms of the quotient by power of the symbol; None if one of the two has no error, or their drifts
+        are not parallel.
     """
 
     first: str
@@ -82,18 +82,17 @@ def _sum(row: Mapping[int, sp.Expr], symbol: sp.Symbol) -> str:
 
 
 def versus(first: Choice, second: Choice, motion: str = "general", terms: int = 2) -> Ratio:
-    """Compare what two algorithms lose on a motion.
+    """Compare the errors of two algorithms on a motion.
 
     Parameters
     ----------
     first, second : Choice
         Attitude steps.
     motion : str, optional
-        At a "constant" rate the angles lost in a step are compared, as functions of the angle x = |w| h; on "coning"
-        the secular drift rates; on a motion about a fixed axis the drifts after the time t; on "general" motion the
-        drifts of a step.
+        "constant" compares the angles lost in a step, as functions of the angle x = |w| h; "coning" the secular drift
+        rates; a motion about a fixed axis the drifts after the time t; "general" the drifts of a step.
     terms : int, optional
-        How many terms of each.
+        Number of terms of each series.
 
     Returns
     -------
@@ -147,14 +146,14 @@ def quotient(first: Terms, second: Terms, terms: int = 2) -> dict[int, sp.Expr] 
     Parameters
     ----------
     first, second : mapping of int to sequence of Expr
-        Coefficients by power; powers that are missing up to the last one given are zero.
+        Coefficients by power; missing powers below the last one are zero.
     terms : int, optional
-        How many powers of the quotient are looked at; those that are zero are left out.
+        Number of terms of the quotient that are not zero.
 
     Returns
     -------
     dict of int to Expr or None
-        None where a series is empty or the vectors are not parallel.
+        Coefficients by power; None if a series is empty or the vectors are not parallel.
 
     Examples
     --------
@@ -178,30 +177,30 @@ def quotient(first: Terms, second: Terms, terms: int = 2) -> dict[int, sp.Expr] 
             row[power] = vector[place]
         rows.append(row)
     upper, lower = rows
-    # Terms are known as far as both series go; a single term says nothing of what follows it.
+    # The quotient is known only as far as both series are; after a single term nothing is known.
     reach = min(max(upper) - min(upper), max(lower) - begin)
-    found: dict[int, sp.Expr] = {}
+    leading: dict[int, sp.Expr] = {}
     for power in range(min(upper) - begin, min(upper) - begin + reach + 1):
         rest = upper.get(power + begin, sp.S.Zero)
         rest -= sum(
-            (x * lower.get(power + begin - other, sp.S.Zero) for other, x in found.items()), sp.S.Zero
+            (x * lower.get(power + begin - other, sp.S.Zero) for other, x in leading.items()), sp.S.Zero
         )
         value = _reduced(sp.expand(rest), lower[begin])
         if value:
-            found[power] = value
-    return dict(list(found.items())[:terms])
+            leading[power] = value
+    return dict(list(leading.items())[:terms])
 
 
 def _reduced(upper: sp.Expr, lower: sp.Expr) -> sp.Expr:
-    """Return a quotient in lowest terms: the number that it is, or in factors unless that is too long to be read."""
+    """Return a quotient as a number if it is one, otherwise in lowest terms and factored unless it is too long."""
     if not upper:
         return sp.S.Zero
-    term, wanted = sp.expand(lower).as_coefficients_dict(), upper.as_coefficients_dict()
-    first = next(iter(wanted))
-    number = wanted[first] / term[first] if first in term else None
+    denominator, numerator = sp.expand(lower).as_coefficients_dict(), upper.as_coefficients_dict()
+    first = next(iter(numerator))
+    number = numerator[first] / denominator[first] if first in denominator else None
     if number is not None and sp.expand(upper - number * lower) == 0:
         return number
-    if len(wanted) + len(term) > _LONG:
+    if len(numerator) + len(denominator) > _LONG:
         return upper / lower
     reduced = sp.factor(sp.cancel(upper / lower))
     return sp.trigsimp(reduced) if reduced.has(sp.cos) else reduced
@@ -220,8 +219,12 @@ def as_text(found: Ratio) -> str:
     return "\n".join(lines)
 
 
-def _no_ratio(found: Ratio) -> str:
-    empty = [n for n, terms in zip((found.first, found.second), found.terms, strict=True) if not terms]
+def _no_ratio(comparison: Ratio) -> str:
+    empty = [
+        n
+        for n, terms in zip((comparison.first, comparison.second), comparison.terms, strict=True)
+        if not terms
+    ]
     return (
         f"no ratio: {' and '.join(empty)} loses nothing"
         if empty
@@ -244,11 +247,12 @@ def as_latex(found: Ratio) -> str:
 
 @dataclass(frozen=True)
 class Claim:
-    """A ratio that the thesis states, derived.
+    """A ratio that the thesis states, with its derived value.
 
     Parameters
     ----------
     statement : str
+        What is compared.
     ratio : dict of int to Expr
         Its first terms by power of the angle x = |w| h of a step.
     """
@@ -272,12 +276,12 @@ def claims_as_text(found: Sequence[Claim]) -> str:
 
 
 def claims() -> list[Claim]:
-    """Derive the ratios at a constant rate that section 5 of the thesis reads from its tables.
+    """Derive the ratios at a constant rate that section 5 of the thesis takes from its tables.
 
     Returns
     -------
     list of Claim
-        Each with its leading term and the next one in x^2, x = |w| h.
+        Each has its leading term and the next one in x^2, where x = |w| h.
 
     Examples
     --------
@@ -286,19 +290,19 @@ def claims() -> list[Claim]:
     """
 
     def lost(algorithm: str, order: int) -> Terms:
-        found = constant_rate(catalogue.choose(algorithm, f"rk{order}", 2)).series(3)
-        return {power: (x,) for power, x in found.items()}
+        leading = constant_rate(catalogue.choose(algorithm, f"rk{order}", 2)).series(3)
+        return {power: (x,) for power, x in leading.items()}
 
-    made = []
+    ratios = []
     for order in (1, 2, 3, 4):
         ratio = quotient(lost("euler", order), lost("dcm", order))
-        made.append((f"Euler parameters over direction cosines, order {order}", ratio))
-    made.append(("second order over first", quotient(lost("dcm", 2), lost("dcm", 1))))
-    made.append(("fourth order over third", quotient(lost("dcm", 4), lost("dcm", 3))))
+        ratios.append((f"Euler parameters over direction cosines, order {order}", ratio))
+    ratios.append(("second order over first", quotient(lost("dcm", 2), lost("dcm", 1))))
+    ratios.append(("fourth order over third", quotient(lost("dcm", 4), lost("dcm", 3))))
     fourth = quotient(lost("dcm", 4), lost("dcm", 1))
     assert fourth is not None
-    # |w| is 3^(1/2) times as large when all three axes turn at the rate of the one.
+    # Equal rates on three axes make |w| larger than one of them by the factor 3^(1/2).
     three = {power: (sp.sqrt(3) ** power * x,) for power, x in fourth.items()}
     one = {power: (x,) for power, x in fourth.items()}
-    made.append(("fourth order over first, three equal axes over one axis", quotient(three, one)))
-    return [Claim(statement, ratio) for statement, ratio in made if ratio is not None]
+    ratios.append(("fourth order over first, three equal axes over one axis", quotient(three, one)))
+    return [Claim(statement, ratio) for statement, ratio in ratios if ratio is not None]

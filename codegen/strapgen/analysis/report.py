@@ -1,4 +1,4 @@
-"""All that series say of one algorithm on one motion, for a program and for a person."""
+"""The complete series report of one algorithm on one motion, as data and as text."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 import sympy as sp
 
-from strapgen.analysis.accumulation import Accumulation, accumulate
+from strapgen.analysis.accumulation import RunDrift, accumulate
 from strapgen.analysis.constant_rate import ConstantRate, constant_rate
 from strapgen.analysis.growth import Growth, as_intervals, contraction, growth
 from strapgen.analysis.invariants import LATEX, as_text, scalar_as_text
@@ -20,35 +20,35 @@ from strapgen.exceptions import InputError
 
 @dataclass(frozen=True)
 class Report:
-    """What an algorithm loses on a motion.
+    """The errors of an algorithm on a motion.
 
     Parameters
     ----------
     step : ErrorSeries
-        In one step.
+        Errors of one step.
     growth : Growth
-        What a step adds to length and determinant.
-    run : Accumulation or None
-        In a run; None for a general motion, and where `no_run` says why.
+        Change of length and determinant in a step.
+    run : RunDrift or None
+        Drift of a run; None for a general motion, or for the reason in `no_run`.
     constant : ConstantRate or None
-        In closed form, at a constant rate.
+        Closed form of the errors at a constant rate.
     no_run : str
-        Why there is no closed form of a run.
+        The reason why there is no closed form of a run; "" if there is one.
     """
 
     step: ErrorSeries
     growth: Growth
-    run: Accumulation | None
+    run: RunDrift | None
     constant: ConstantRate | None
     no_run: str = ""
 
     @property
     def growth_powers(self) -> list[int]:
-        """Powers of the step by which anything is gained in a second."""
+        """Powers of the step in the growth of the errors per second."""
         return [power - 1 for part in PARTS for power in self.step.coefficients(part)]
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the report as plain JSON data; expressions as text that SymPy reads."""
+        """Return the report as plain JSON data, with expressions as text that SymPy can read."""
         data = self.step.as_dict()
         data["growth"] = self.growth.as_dict()
         if self.run is not None:
@@ -69,7 +69,7 @@ def _texts(errors: Mapping[str, Sequence[sp.Expr]]) -> dict[str, list[str]]:
 
 
 def report(choice: Choice, motion: str = "general", terms: int = 2) -> Report:
-    """Derive all that series say of an algorithm on a motion.
+    """Derive the series, the growth and the drift of an algorithm on a motion.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def report(choice: Choice, motion: str = "general", terms: int = 2) -> Report:
     motion : str, optional
         "general", or a motion of the catalogue.
     terms : int, optional
-        How many terms that are not zero.
+        Number of terms that are not zero.
 
     Returns
     -------
@@ -144,14 +144,14 @@ def as_report(found: Report) -> str:
     return "\n".join(lines)
 
 
-def _growth_lines(found: Growth) -> Iterator[str]:
+def _growth_lines(gain: Growth) -> Iterator[str]:
     yield "growth in a step"
     for name, title in (("length", "length of the state - 1"), ("determinant", "determinant of C - 1")):
-        terms = getattr(found, name)
+        terms = getattr(gain, name)
         if terms is None:
             continue
-        if found.invariant:
-            rows = found.invariant[name]
+        if gain.invariant:
+            rows = gain.invariant[name]
             text = " + ".join(f"h^{power} ({scalar_as_text(one)})" for power, one in rows.items())
             yield f"{title} = {text or 0}"
         else:

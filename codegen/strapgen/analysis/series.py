@@ -1,7 +1,7 @@
-"""Truncation-error series: what an algorithm loses in one step, as a power series in the step length h.
+"""Truncation-error series: the error of one step as a power series in the step length h.
 
-For a general smooth rate, whose derivatives at the beginning of the step are w0, w1, ..., and for the motions of the
-catalogue in their own symbols, where t is the time at the beginning of the step.
+Series exist for a general smooth rate, whose derivatives at the beginning of the step are w0, w1, ..., and for the
+motions of the catalogue in the symbols of their parameters, where t is the time at the beginning of the step.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from strapgen.catalogue import Choice
 from strapgen.exceptions import InputError
 from strapgen.powers import Powers
 
-#: Motions that a series is made for.
+#: Motions for which a series can be derived.
 MOTIONS = ("general", *catalogue.MOTIONS)
 #: Most terms of a series.
 MOST_TERMS = 6
@@ -34,16 +34,16 @@ Coefficients = dict[int, tuple[sp.Expr, sp.Expr, sp.Expr]]
 
 @dataclass(frozen=True)
 class ErrorSeries:
-    """What one step loses.
+    """The error of one step.
 
     Parameters
     ----------
     kernel, motion : str
     drift, scale, skew : dict of int to tuple of Expr
-        The first terms that are not zero: for every power of the step three coefficients. A dict is empty where
-        nothing is lost up to the power `known`.
+        The first terms that are not zero, three coefficients for each power of the step; scale dimensionless, skew and
+        drift in rad. A dict is empty if all terms up to the power `known` are zero.
     known : int
-        The last power that was looked at.
+        The last power of the step that was derived.
     invariant : dict of int to Invariants
         For a general rate the same powers in vector-invariant form.
     """
@@ -58,14 +58,14 @@ class ErrorSeries:
 
     @property
     def order(self) -> int | None:
-        """Order of the step on this motion: one less than the first power that is lost; None where nothing is lost."""
+        """Order of the step on this motion, one less than the first power of its error; None if there is no error."""
         powers = [*self.drift, *self.scale, *self.skew]
         return min(powers) - 1 if powers else None
 
     def coefficients(self, part: str) -> Coefficients:
         """Return the coefficients of "drift", "scale" or "skew"."""
-        found: Coefficients = getattr(self, part)
-        return found
+        rows: Coefficients = getattr(self, part)
+        return rows
 
     def expressions(self, part: str) -> list[sp.Expr]:
         """Return the three sums of terms of "drift", "scale" or "skew"."""
@@ -73,7 +73,7 @@ class ErrorSeries:
         return [sp.Add(*(row[axis] * STEP**power for power, row in rows)) for axis in range(3)]
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the series as plain JSON data; expressions as text that SymPy reads."""
+        """Return the series as plain JSON data, with expressions as text that SymPy can read."""
         data: dict[str, Any] = {"kernel": self.kernel, "motion": self.motion, "order": self.order}
         for part in PARTS:
             data[part] = [sp.sstr(expression, order="lex") for expression in self.expressions(part)]
@@ -81,26 +81,26 @@ class ErrorSeries:
         if self.motion == "general":
             data["invariant"] = {
                 str(power): {
-                    "drift": as_text(found.drift),
-                    "scale_and_skew": as_text(found.symmetric, symmetric=True),
+                    "drift": as_text(one.drift),
+                    "scale_and_skew": as_text(one.symmetric, symmetric=True),
                 }
-                for power, found in self.invariant.items()
+                for power, one in self.invariant.items()
             }
         return data
 
 
 def series(choice: Choice, motion: str = "general", terms: int = 2) -> ErrorSeries:
-    """Derive the series of what a step loses.
+    """Derive the series of the error of a step.
 
     Parameters
     ----------
     choice : Choice
-        An attitude step, whose increments or rates are exact. It starts from zero rotation: for every step that turns
-        with its state, as all of the catalogue do, that is what it loses anywhere, in the axes of the beginning.
+        An attitude step, whose increments or rates are exact. It starts from zero rotation. The steps of the catalogue
+        commute with rotations of the reference axes, so the result holds at any attitude, in the axes of the beginning.
     motion : str, optional
         "general", or a motion of the catalogue.
     terms : int, optional
-        How many terms of drift, scale and skew, each from its first one that is not zero.
+        Number of terms of drift, scale and skew, each counted from its first one that is not zero.
 
     Returns
     -------
@@ -109,7 +109,7 @@ def series(choice: Choice, motion: str = "general", terms: int = 2) -> ErrorSeri
     Raises
     ------
     InputError
-        If a name or number is not allowed, or the step has no series: it calls functions that have none there.
+        If a name or number is not allowed, or the step uses functions that have no series at zero rotation.
 
     Examples
     --------
@@ -119,64 +119,74 @@ def series(choice: Choice, motion: str = "general", terms: int = 2) -> ErrorSeri
     """
     checks.choice("motion", motion, MOTIONS)
     checks.count("terms", terms, largest=MOST_TERMS)
-    taken = one_step.step(choice)
-    order = taken.kernel.order
+    attitude_step = one_step.step(choice)
+    order = attitude_step.kernel.order
     # At a constant rate every other power is missing.
     top = 1 + (order.step if order else 0) + terms * (2 if motion == "constant" else 1)
     most = top + one_step.PATIENCE
     try:
         while True:
-            found = _general(taken, terms, top) if motion == "general" else _named(taken, motion, terms, top)
-            parts = [found.coefficients(part) for part in PARTS]
+            candidate = (
+                _general(attitude_step, terms, top)
+                if motion == "general"
+                else _named(attitude_step, motion, terms, top)
+            )
+            parts = [candidate.coefficients(part) for part in PARTS]
             enough = all(len(part) >= terms for part in parts if part)
             if top >= most or (enough and any(parts[:2])):
-                return found
+                return candidate
             top = top + 1 if any(parts) else most
     except ArithmeticError as error:
-        raise InputError(f"kernel {taken.kernel.name} has no series in the step length: {error}") from None
+        raise InputError(
+            f"kernel {attitude_step.kernel.name} has no series in the step length: {error}"
+        ) from None
 
 
-def _general(taken: Step, terms: int, top: int) -> ErrorSeries:
+def _general(attitude_step: Step, terms: int, top: int) -> ErrorSeries:
     """Derive the series for a general rate, in the rotated frame of its vectors."""
-    frame, ring, rate = one_step.general_rate(taken, top)
-    made = errors(taken, ring, rate, top)
-    powers = {part: _powers(made[part])[:terms] for part in PARTS}
-    # Scale and skew are parts of one matrix: each axis looks different in the frame, so all their powers are kept.
+    frame, ring, rate = one_step.general_rate(attitude_step, top)
+    error_parts = errors(attitude_step, ring, rate, top)
+    powers = {part: _powers(error_parts[part])[:terms] for part in PARTS}
+    # Scale and skew are parts of one matrix and differ between axes of the frame, so both need the powers of either.
     symmetric = sorted({*powers["scale"], *powers["skew"]})[:terms]
-    wanted = sorted({*powers["drift"], *symmetric})
+    powers_shown = sorted({*powers["drift"], *symmetric})
     invariant = {
         power: invariants(
-            frame, [element.parts.get(power, ring.zero) for element in made["error"]], taken.shown
+            frame,
+            [element.parts.get(power, ring.zero) for element in error_parts["error"]],
+            attitude_step.shown,
         )
-        for power in wanted
+        for power in powers_shown
     }
     vectors = [[sp.Symbol(f"w{j}_{axis}") for axis in "xyz"] for j in range(top)]
     parts: dict[str, Coefficients] = {part: {} for part in PARTS}
-    for power in wanted:
+    for power in powers_shown:
         split = one_step.split([sp.expand(element) for element in matrix(invariant[power], vectors)])
         for part in PARTS:
             row = (sp.expand(split[part][0]), sp.expand(split[part][1]), sp.expand(split[part][2]))
             if power in (powers["drift"] if part == "drift" else symmetric) and any(row):
                 parts[part][power] = row
     return ErrorSeries(
-        taken.kernel.name, "general", parts["drift"], parts["scale"], parts["skew"], top, invariant
+        attitude_step.kernel.name, "general", parts["drift"], parts["scale"], parts["skew"], top, invariant
     )
 
 
-def _named(taken: Step, motion: str, terms: int, top: int) -> ErrorSeries:
-    """Derive the series for a motion of the catalogue, in its own symbols."""
-    rate = motion_rates.at_time(motion, top, taken.domain)
-    made = errors(taken, rate.ring, rate.derivatives, top)
+def _named(attitude_step: Step, motion: str, terms: int, top: int) -> ErrorSeries:
+    """Derive the series for a motion of the catalogue, in the symbols of its parameters."""
+    rate = motion_rates.at_time(motion, top, attitude_step.domain)
+    error_parts = errors(attitude_step, rate.ring, rate.derivatives, top)
     parts: dict[str, Coefficients] = {}
     for part in PARTS:
         rows: Coefficients = {}
-        for power in _powers(made[part]):
-            elements = [one_step.shown(taken, x.parts.get(power, rate.ring.zero)) for x in made[part]]
+        for power in _powers(error_parts[part]):
+            elements = [
+                one_step.shown(attitude_step, x.parts.get(power, rate.ring.zero)) for x in error_parts[part]
+            ]
             row = (rate.expression(elements[0]), rate.expression(elements[1]), rate.expression(elements[2]))
             if any(row) and len(rows) < terms:
                 rows[power] = row
         parts[part] = rows
-    return ErrorSeries(taken.kernel.name, motion, parts["drift"], parts["scale"], parts["skew"], top)
+    return ErrorSeries(attitude_step.kernel.name, motion, parts["drift"], parts["scale"], parts["skew"], top)
 
 
 def _powers(elements: Sequence[Powers]) -> list[int]:

@@ -1,9 +1,9 @@
 """Lowering: an exact kernel becomes straight-line code.
 
-SymPy ends here. The transition of an attitude step is brought into `canonical` form, in several bases; everything
-else goes through `share`, which finds common subexpressions while formulas are still symbolic, and `gate`, which
-writes them as a `Program`. The passes that follow are pure functions from program to program. Of all the programs
-for one kernel the one with the fewest operations is taken.
+No stage after this one uses SymPy. `canonical` writes the transition of an attitude step in several bases. All other
+formulas go through `share`, which finds common subexpressions while they are still symbolic, and `gate`, which
+writes them as a `Program`. The passes then save operations; each is a pure function from program to program.
+`lower` returns the candidate with the fewest operations.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ __all__ = ["PASSES", "candidates", "lower"]
 
 
 def lower(kernel: Kernel) -> Program:
-    """Turn a kernel into straight-line code with the fewest operations that are known for it.
+    """Turn a kernel into straight-line code; of several candidates the one with the fewest operations.
 
     Parameters
     ----------
@@ -34,11 +34,14 @@ def lower(kernel: Kernel) -> Program:
     Returns
     -------
     Program
+        With the inputs, outputs and transition of the kernel, in its units and frames.
 
     Raises
     ------
     NotImplementedError
-        If an expression holds a function that programs do not know.
+        If an expression uses a function for which programs have no operation.
+    ArithmeticError
+        If a canonical form differs from the transition it was derived from.
 
     Examples
     --------
@@ -48,7 +51,7 @@ def lower(kernel: Kernel) -> Program:
     (38, 30)
     """
     rational = rationalized(kernel)
-    # Rounded constants would leave terms that cancel exactly: such a transition is not expanded.
+    # With rounded constants, terms that should cancel would stay: such a transition is not expanded.
     core = canonical.extract_core(kernel) if rational is kernel else None
     kernel = rational
     if core is not None and (reason := canonical.expansion(core)):
@@ -62,7 +65,20 @@ def lower(kernel: Kernel) -> Program:
 
 
 def candidates(kernel: Kernel, core: canonical.Core | None) -> Iterator[Program]:
-    """Yield programs for a kernel, before the passes: its formulas, with CSE and without, or canonical forms."""
+    """Yield programs for a kernel on which no pass has run yet.
+
+    Parameters
+    ----------
+    kernel : Kernel
+    core : Core or None
+        The kernel's transition for canonical forms; None for programs of the formulas as they stand.
+
+    Yields
+    ------
+    Program
+        First the formulas with common subexpressions shared; then the formulas without sharing if there is no core,
+        otherwise one program for each canonical form.
+    """
     yield gate(kernel, share(kernel))
     if core is None:
         yield gate(kernel, share(kernel, common=False))
@@ -72,31 +88,33 @@ def candidates(kernel: Kernel, core: canonical.Core | None) -> Iterator[Program]
     )
     after = gate(update, share(update))
     transition = Result(core.transition, tuple(map(Reference, core.transition.elements)))
-    taken = {name for signal in kernel.inputs for name in signal.elements} | {a.name for a in after.body}
+    reserved = {name for signal in kernel.inputs for name in signal.elements} | {a.name for a in after.body}
     for form in canonical.forms(core):
-        body = _renamed(form, taken)
+        body = _renamed(form, reserved)
         yield replace(after, inputs=kernel.inputs, body=(*body, *after.body), transition=transition)
 
 
 def _behind(kernel: Kernel, core: canonical.Core) -> tuple[Stage, ...]:
-    """Return the stages that the outputs need beside the transition."""
-    wanted = {symbol.name for stage in kernel.outputs for e in stage.expressions for symbol in e.free_symbols}
-    wanted -= set(core.transition.elements)
+    """Return the stages that the outputs need in addition to the transition."""
+    open_names = {
+        symbol.name for stage in kernel.outputs for e in stage.expressions for symbol in e.free_symbols
+    }
+    open_names -= set(core.transition.elements)
     needed: list[Stage] = []
     for stage in reversed(kernel.stages):
-        if stage.signal.name != kernel.transition and wanted & set(stage.signal.elements):
+        if stage.signal.name != kernel.transition and open_names & set(stage.signal.elements):
             needed.insert(0, stage)
-            wanted |= {symbol.name for e in stage.expressions for symbol in e.free_symbols}
-            wanted -= set(core.transition.elements)
+            open_names |= {symbol.name for e in stage.expressions for symbol in e.free_symbols}
+            open_names -= set(core.transition.elements)
     return tuple(needed)
 
 
-def _renamed(body: list[Assignment], taken: set[str]) -> tuple[Assignment, ...]:
-    """Give names that the kernel itself uses for something else another ending."""
+def _renamed(body: list[Assignment], reserved: set[str]) -> tuple[Assignment, ...]:
+    """Append a number to each name in the body that the kernel uses for another quantity."""
     names = {a.name for a in body}
     new: dict[str, str] = {}
-    for name in sorted(names & taken):
-        new[name] = next(n for k in count(2) if (n := f"{name}_{k}") not in names | taken)
+    for name in sorted(names & reserved):
+        new[name] = next(n for k in count(2) if (n := f"{name}_{k}") not in names | reserved)
     if not new:
         return tuple(body)
 

@@ -1,4 +1,7 @@
-"""Sums, products and polynomials as nodes: how arithmetic is written down, in one place."""
+"""Sums, products and polynomials as trees of nodes.
+
+Every module that writes arithmetic builds it here, so that signs, constants and equal coefficients are treated alike.
+"""
 
 from __future__ import annotations
 
@@ -10,10 +13,10 @@ from typing import Any
 from strapgen.lowering.polynomials import Polynomial
 from strapgen.program import Constant, Node, Operation
 
-#: A node and whether it is added or subtracted.
+#: A sign, True for plus, and the node that is added or subtracted.
 Term = tuple[bool, Node]
 
-#: Horner's scheme tries every equally good factor of polynomials with at most so many terms.
+#: Most terms of a polynomial for which `horner` tries every factor that occurs equally often.
 _MOST_TRIED = 10
 
 
@@ -26,7 +29,7 @@ def chain(kind: str, nodes: list[Node]) -> Node:
 
 
 def signed_sum(terms: list[Term]) -> Term:
-    """Add and subtract terms in order, a positive one first; all negative ones are added and the sign told."""
+    """Add and subtract terms, the first positive one in front; if all are negative, return their sum and a minus."""
     if not any(positive for positive, _ in terms):
         return False, chain("add", [node for _, node in terms])
     first = next(k for k, (positive, _) in enumerate(terms) if positive)
@@ -37,7 +40,7 @@ def signed_sum(terms: list[Term]) -> Term:
 
 
 def plain(term: Term) -> Node:
-    """Return a signed node as a node."""
+    """Return a term as one node, with a negation if it is subtracted."""
     positive, node = term
     if positive:
         return node
@@ -52,7 +55,7 @@ def scaled(coefficient: Fraction, node: Node) -> Term:
 
 
 def gathered(terms: Iterable[tuple[Fraction, Node]]) -> list[Term]:
-    """Multiply terms by their coefficients; those with the same coefficient are summed before."""
+    """Multiply nodes by their coefficients; nodes with the same coefficient are summed first."""
     groups: dict[Fraction, list[Term]] = {}
     for coefficient, node in terms:
         groups.setdefault(abs(coefficient), []).append((coefficient > 0, node))
@@ -83,15 +86,20 @@ def expanded(polynomial: Polynomial, node: Callable[[Any], Node]) -> Term:
 def horner(polynomial: Polynomial, node: Callable[[Any], Node]) -> Term:
     """Write a polynomial by Horner's scheme in several variables.
 
-    The atom that occurs in most terms is taken out of them, and so on for what it multiplies and for the
-    rest. Of atoms that occur equally often, in a short polynomial, every one is tried, and the fewest operations win.
+    The atom that occurs in most terms is factored out, and both the factor and the remaining terms are treated in the
+    same way. In a short polynomial, all atoms that occur equally often are tried and the fewest operations win.
 
     Parameters
     ----------
     polynomial : Polynomial
-        In atoms of any kind.
+        Its atoms can be of any kind that can be ordered.
     node : callable
-        Gives the node of an atom.
+        ``node(atom)`` returns the node that stands for an atom.
+
+    Returns
+    -------
+    Term
+        The sign and the tree of operations.
 
     Examples
     --------
@@ -120,7 +128,7 @@ def horner(polynomial: Polynomial, node: Callable[[Any], Node]) -> Term:
         if len(p) > _MOST_TRIED:
             del candidates[1:]
         tried = (take_out(p, name) for name in candidates)
-        return min(tried, key=lambda found: sum(operation_count(tree) + 1 for _, tree in found))
+        return min(tried, key=lambda outcome: sum(operation_count(tree) + 1 for _, tree in outcome))
 
     def take_out(p: Polynomial, name: Any) -> list[Term]:
         inside: Polynomial = {}

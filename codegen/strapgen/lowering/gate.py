@@ -1,12 +1,13 @@
 """The gate: SymPy expressions become the nodes of a program.
 
-Sums are written with the pure number last, so that it is rounded once; terms with the same coefficient are
-gathered before they are multiplied by it; signs become subtractions.
+A sum ends with its constant, so that the constant is rounded once. Terms with the same coefficient are summed before
+they are multiplied by it, and negative terms are subtracted.
 """
 
 from __future__ import annotations
 
 from fractions import Fraction
+from itertools import count
 
 import sympy as sp
 from sympy.core.relational import GreaterThan, LessThan, StrictGreaterThan, StrictLessThan
@@ -30,14 +31,26 @@ _FUNCTIONS = {
 
 
 def gate(kernel: Kernel, shared: Shared) -> Program:
-    """Return the program of a kernel whose common subexpressions have been named.
+    """Return the program of a kernel whose common subexpressions have names.
+
+    Parameters
+    ----------
+    kernel : Kernel
+        Its name, inputs, outputs and notes go into the program.
+    shared : Shared
+        Its formulas, from `share`.
+
+    Returns
+    -------
+    Program
 
     Raises
     ------
     NotImplementedError
-        If an expression holds a function that programs do not know.
+        If an expression uses a function, a power or a condition for which programs have no operation.
     """
-    writer = _Writer()
+    taken = {name for signal in kernel.signals for name in signal.elements}
+    writer = _Writer(taken | {definition.symbol.name for definition in shared.definitions})
     for definition in shared.definitions:
         value = writer.node(definition.expression)
         writer.body.append(Assignment(definition.symbol.name, value, definition.meaning))
@@ -64,11 +77,11 @@ def gate(kernel: Kernel, shared: Shared) -> Program:
 
 
 class _Writer:
-    """Turns expressions into nodes; names a value of its own only where a power needs it twice."""
+    """Turns expressions into nodes; it adds a temporary where a power or an inverse function needs a value twice."""
 
-    def __init__(self) -> None:
+    def __init__(self, taken: set[str]) -> None:
         self.body: list[Assignment] = []
-        self._powers = 0
+        self._powers = (name for k in count(1) if (name := f"{FACTOR}{k}") not in taken)
 
     def node(self, expression: sp.Expr) -> Node:
         if expression.is_Symbol:
@@ -133,7 +146,7 @@ class _Writer:
         return self._repeated(self._named(self.node(base)), int(exponent))
 
     def _inverse(self, expression: sp.Expr) -> Node:
-        """Write an arcsine or arccosine by atan2: accurate up to the ends, and no error just beyond them."""
+        """Write an arcsine or arccosine with atan2, which stays accurate near 1 and -1 and defined just beyond."""
         value, one = self._named(self.node(expression.args[0])), Constant(Fraction(1))
         # Two roots: multiplied out, 1 - x^2 would lose its digits where x is near 1.
         sides = (Operation(kind, (one, value)) for kind in ("subtract", "add"))
@@ -143,7 +156,7 @@ class _Writer:
         return Operation("atan2", (value, other) if expression.func is sp.asin else (other, value))
 
     def _repeated(self, base: Node, exponent: int) -> Node:
-        """Multiply by squaring."""
+        """Return a whole power by repeated squaring."""
         if exponent == 1:
             return base
         if exponent % 2:
@@ -157,8 +170,7 @@ class _Writer:
         for assignment in self.body:
             if assignment.value == node:
                 return Reference(assignment.name)
-        self._powers += 1
-        name = f"{FACTOR}{self._powers}"
+        name = next(self._powers)
         self.body.append(Assignment(name, node))
         return Reference(name)
 

@@ -1,4 +1,4 @@
-"""Irrational constants: rounded once, to so many digits that no target sees it."""
+"""Irrational constants are rounded once, to so many digits that no target can tell the difference."""
 
 from __future__ import annotations
 
@@ -8,16 +8,21 @@ import sympy as sp
 
 from strapgen.kernel import Kernel, Stage
 
-#: Decimal digits that are kept: twice those of the arithmetic that programs are compared with.
+#: Decimal digits of a rounded constant: twice those of the arithmetic that programs are compared with.
 DIGITS = 80
 
 
 def rationalized(kernel: Kernel) -> Kernel:
-    """Return a kernel whose constants are rational; the kernel itself if they are.
+    """Return a kernel whose constants are rational: the kernel itself if they all are.
 
     Parameters
     ----------
     kernel : Kernel
+
+    Returns
+    -------
+    Kernel
+        With a note on the rounding if there was any.
 
     Examples
     --------
@@ -45,10 +50,10 @@ def _rounded(expression: sp.Expr) -> sp.Expr:
     """Return an expression with its irrational numbers rounded."""
     numbers = expression.atoms(sp.Pow, sp.NumberSymbol, sp.Function)
     if not any(part.is_number and not part.is_Rational for part in numbers):
-        return expression  # as it is: written anew, SymPy might multiply it out
+        return expression  # rebuilding it could make SymPy multiply it out
     if expression.is_number:
         return sp.Rational(sp.N(expression, DIGITS))
-    if expression.is_Mul:  # its numbers together are one constant
+    if expression.is_Mul:  # all its numbers together are one constant
         numbers, rest = expression.as_independent(*expression.free_symbols, as_Add=False)
         if numbers != 1:
             return sp.Mul(_rounded(numbers), _rounded(rest))

@@ -1,4 +1,4 @@
-"""Names that stand for no quantity of the algorithm: passes may drop, split or change what they hold."""
+"""Names of temporaries, which stand for no quantity of the algorithm: passes may drop, split or rescale them."""
 
 from __future__ import annotations
 
@@ -7,18 +7,19 @@ from itertools import count
 
 from strapgen.program import Program
 
-#: How names begin that common subexpressions get.
+#: Prefix of the temporaries that hold common subexpressions.
 SHARED = "shared_"
-#: How names begin that partial products of a power get.
+#: Prefix of the temporaries that hold partial products of a power.
 FACTOR = "factor_"
 
 
-def is_unnamed(name: str) -> bool:
-    """Tell whether a name stands for no quantity of the algorithm."""
+def is_temporary(name: str) -> bool:
+    """Return whether a name is that of a temporary, which stands for no quantity of the algorithm."""
     return name.startswith((SHARED, FACTOR))
 
 
 def shared_names(program: Program) -> Iterator[str]:
-    """Yield names for common subexpressions that a program does not use yet."""
-    taken = {assignment.name for assignment in program.body}
-    return (name for k in count(1) if (name := f"{SHARED}{k}") not in taken)
+    """Yield names for further common subexpressions, none of which the program uses yet."""
+    names = {assignment.name for assignment in program.body}
+    names |= {element for signal in program.inputs for element in signal.elements}
+    return (name for k in count(1) if (name := f"{SHARED}{k}") not in names)

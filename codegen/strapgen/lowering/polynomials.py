@@ -1,8 +1,8 @@
 """Sparse polynomials with rational coefficients in any atoms that can be ordered.
 
-A polynomial is a dictionary from monomials to coefficients; a monomial is the sorted tuple of its atoms, each as
-often as it occurs. The search for the cheapest form tries hundreds of small substitutions: SymPy's rings fix their
-generators beforehand and take longer to set up than the work takes here.
+A polynomial is a dictionary from monomials to coefficients, and a monomial is the sorted tuple of its atoms, repeated
+by their powers. SymPy's rings would not do for the search for the cheapest form, which tries hundreds of small
+substitutions: a ring must know its generators beforehand and takes longer to set up than a substitution takes here.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def substitute(p: Polynomial, value: Callable[[Any], Polynomial]) -> Polynomial:
 
 
 def atoms(polynomials: Iterable[Polynomial]) -> set[Any]:
-    """Return the atoms that occur."""
+    """Return all atoms that occur in some polynomials."""
     return {name for p in polynomials for monomial in p for name in monomial}
 
 

@@ -1,4 +1,4 @@
-"""Common subexpressions of a kernel, across all its stages and outputs."""
+"""Common subexpressions of a kernel are named across all its stages and outputs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from strapgen.lowering.names import SHARED
 
 @dataclass(frozen=True)
 class Definition:
-    """``symbol = expression``, in the order of computation."""
+    """One line of a computation: ``symbol = expression``."""
 
     symbol: sp.Symbol
     expression: sp.Expr
@@ -29,7 +29,7 @@ class Shared:
     definitions : list of Definition
         Stages, outputs and common subexpressions, each before its first use.
     values : dict of Symbol to Expr
-        Elements that need no computation: a number or another symbol, negated perhaps inside the kernel.
+        Elements that need no computation: each is a number or another symbol, inside the kernel possibly negated.
     """
 
     definitions: list[Definition]
@@ -39,14 +39,18 @@ class Shared:
 def share(kernel: Kernel, common: bool = True) -> Shared:
     """Name the common subexpressions of a kernel.
 
+    Elements are visited in the order of their names, so that two kernels that differ only in the order in
+    which they store a state get the same arithmetic.
+
     Parameters
     ----------
     kernel : Kernel
     common : bool, optional
-        False leaves the formulas as they are.
+        Whether common subexpressions are named; if not, the formulas stay as they are.
 
-    Elements are taken in the order of their names, so that two kernels that differ only in the order in
-    which they store a state get the same arithmetic.
+    Returns
+    -------
+    Shared
     """
     values: dict[sp.Symbol, sp.Expr] = {}
     definitions: list[Definition] = []
@@ -62,11 +66,13 @@ def share(kernel: Kernel, common: bool = True) -> Shared:
                 meaning = ""
     if not common:
         return Shared(definitions, values)
-    names = sp.numbered_symbols(SHARED, start=1, real=True)
-    found, reduced = sp.cse([d.expression for d in definitions], symbols=names, order="canonical")
-    # A condition is no value that a program could hold: it goes back to where it is used.
-    conditions = {symbol: expression for symbol, expression in found if expression.is_Relational}
-    pending = {s: e.xreplace(conditions) for s, e in found if s not in conditions}
+    elements = (name for signal in kernel.signals for name in signal.elements)
+    excluded = [sp.Symbol(name, real=True) for name in elements]
+    names = sp.numbered_symbols(SHARED, start=1, exclude=excluded, real=True)
+    common_parts, reduced = sp.cse([d.expression for d in definitions], symbols=names, order="canonical")
+    # A program cannot assign a condition to a name, so each condition goes back to where it is used.
+    conditions = {symbol: expression for symbol, expression in common_parts if expression.is_Relational}
+    pending = {s: e.xreplace(conditions) for s, e in common_parts if s not in conditions}
     reduced = [expression.xreplace(conditions) for expression in reduced]
     ordered: list[Definition] = []
 

@@ -22,6 +22,7 @@ from strapgen.fixedpoint.code import (
     used_by,
 )
 from strapgen.program import Program
+from strapgen.targets.names import C, external, printed
 from strapgen.targets.printer import fill_expression
 from strapgen.targets.rendering import render
 from strapgen.targets.sources import Function, Sources
@@ -84,9 +85,30 @@ def emit(program: Program | FixedProgram, target: str, settings: Settings | None
         allowed = ", ".join(map(str, WORDS))
         raise InputError(f"word is {chosen.word}; in C it is {allowed} bits; the integer model takes any")
     fixed = program if isinstance(program, FixedProgram) else quantize(program, chosen)
-    interface, word = fixed.interface, WORDS[chosen.word]
+    interface, name = fixed.interface, external(fixed.name)
+    arguments = (*interface.inputs, *interface.outputs)
+    scalars = [argument.signal.name for argument in arguments if not argument.signal.shape]
+    _, files = printed(fixed, lambda named, _: _files(named, name), C, scalars)
+    function = Function(
+        name, *(tuple(a.signal for a in side) for side in (interface.inputs, interface.outputs))
+    )
+    return Sources(
+        fixed.program.kernel,
+        target,
+        files,
+        function,
+        fixed.operations,
+        fixed.temporaries,
+        fixed.program.companions,
+        interface,
+        fixed.program.recursion,
+    )
+
+
+def _files(fixed: FixedProgram, name: str) -> dict[str, str]:
+    """Return the header and the source of a program whose names are as they are printed."""
+    interface, word = fixed.interface, WORDS[fixed.word]
     printer = _Printer(fixed, word)
-    name = fixed.name
     signals = [(a.signal, "const ") for a in interface.inputs] + [(a.signal, "") for a in interface.outputs]
     residuals = len(interface.residuals)
     pieces = [f"{constant}{word.type} {s.name}[{s.size}]" for s, constant in signals]
@@ -119,31 +141,17 @@ def emit(program: Program | FixedProgram, target: str, settings: Settings | None
         "names": ", ".join(names),
         "code": printer.code(),
         "counts": ", ".join(f"{number} {kind}" for kind, number in fixed.operations.items() if number),
-        "nearest": chosen.rounding == "nearest",
-        "fresh": dict.fromkeys(f"UINT{chosen.word}_C({r.fresh})" for r in interface.residuals),
+        "nearest": interface.settings.rounding == "nearest",
+        "fresh": dict.fromkeys(f"UINT{fixed.word}_C({r.fresh})" for r in interface.residuals),
         "uses_shift": printer.uses_shift,
         "uses_root": any(isinstance(d, IntegerRoot) for d in definitions),
         "uses_quotient": any(isinstance(d, IntegerQuotient) for d in definitions),
         "guarded": tuple(value for value in fixed.body if value.guarded),
     }
-    files = {
+    return {
         f"{name}.h": render("c_fixed/header.h.j2", **values),
         f"{name}.c": render("c_fixed/source.c.j2", **values),
     }
-    function = Function(
-        name, *(tuple(a.signal for a in side) for side in (interface.inputs, interface.outputs))
-    )
-    return Sources(
-        fixed.program.kernel,
-        target,
-        files,
-        function,
-        fixed.operations,
-        fixed.temporaries,
-        fixed.program.companions,
-        interface,
-        fixed.program.recursion,
-    )
 
 
 class _Printer:

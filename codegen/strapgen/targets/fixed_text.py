@@ -7,7 +7,7 @@ from fractions import Fraction
 from strapgen.fixedpoint import FixedProgram
 from strapgen.fixedpoint.code import Value
 from strapgen.fixedpoint.interface import Argument, ErrorFeedback, RoundingAccumulation
-from strapgen.fixedpoint.settings import DEFAULT_ALLOWANCE, DEFAULT_ANGLE
+from strapgen.fixedpoint.settings import DEFAULT_ALLOWANCE, DEFAULT_ANGLE, Settings
 from strapgen.program import Program
 
 
@@ -28,8 +28,14 @@ def argument_text(argument: Argument) -> str:
 
 def command(fixed: FixedProgram, target: str) -> str:
     """Return the command that generates a fixed-point program."""
-    settings = fixed.interface.settings
-    words = [f"strapgen generate {fixed.program.arguments} --target {target} --word {settings.word}"]
+    return (
+        f"strapgen generate {fixed.program.arguments} --target {target} {options(fixed.interface.settings)}"
+    )
+
+
+def options(settings: Settings) -> str:
+    """Return settings as options of the command line."""
+    words = [f"--word {settings.word}"]
     if settings.stated:
         words.append(settings.stated)
     elif settings.largest_angle != DEFAULT_ANGLE:

@@ -1,14 +1,14 @@
-"""Vibration: the mean drift and sculling rates that an algorithm computes of it, derived from its kernel.
+"""The mean drift and sculling rates that an algorithm computes under vibration, derived from its kernel.
 
 Source: P. G. Savage, Strapdown System Algorithms, AGARD Lecture Series 133 (1984), paper 3, equations (65) to (83).
 """
 
-from strapgen.vibration.assessment import Assessment as Assessment
-from strapgen.vibration.assessment import Rates as Rates
 from strapgen.vibration.assessment import drift as drift
 from strapgen.vibration.assessment import of as of
 from strapgen.vibration.assessment import sculling as sculling
 from strapgen.vibration.assessment import two_speed as two_speed
+from strapgen.vibration.mean_rates import Assessment as Assessment
+from strapgen.vibration.mean_rates import Rates as Rates
 from strapgen.vibration.spectrum import RandomRates as RandomRates
 from strapgen.vibration.spectrum import Spectrum as Spectrum
 from strapgen.vibration.spectrum import random_rates as random_rates

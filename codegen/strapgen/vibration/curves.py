@@ -1,4 +1,4 @@
-"""Rates against frequency, at amplitudes that stay."""
+"""Mean rates as functions of frequency, at constant amplitudes."""
 
 from __future__ import annotations
 
@@ -10,25 +10,27 @@ from numpy.typing import NDArray
 
 from strapgen import checks
 from strapgen.exceptions import InputError
-from strapgen.vibration.assessment import Assessment
+from strapgen.vibration.mean_rates import Assessment
 
 Array = NDArray[np.float64]
 
-#: Frequencies of a curve.
+#: Default number of frequencies of a curve.
 POINTS = 400
 
 
 @dataclass(frozen=True)
 class Curve:
-    """The mean rates of an algorithm against frequency.
+    """The mean rates of an algorithm as functions of frequency.
 
     Parameters
     ----------
     label : str
+        Name of the kernel.
     unit : str
         "rad/s" or "m/s^2".
     frequencies_hz : array, (N,)
     continuous, error : array, (N,)
+        The true rate, and the error of the algorithm, in that unit.
     """
 
     label: str
@@ -39,7 +41,22 @@ class Curve:
 
 
 def frequencies(low: float | str | Fraction, high: float | str | Fraction, points: int = POINTS) -> Array:
-    """Return frequencies in Hz with even ratios, both ends included.
+    """Return frequencies in Hz at equal ratios from one end to the other.
+
+    Parameters
+    ----------
+    low, high : number
+        Ends in Hz, above 0.
+    points : int, optional
+
+    Returns
+    -------
+    array, (points,)
+
+    Raises
+    ------
+    InputError
+        If an end is not above 0, or the ends do not rise.
 
     Examples
     --------
@@ -49,8 +66,8 @@ def frequencies(low: float | str | Fraction, high: float | str | Fraction, point
     first, last = (float(checks.number("frequency", end, positive=True)) for end in (low, high))
     if not first < last:
         raise InputError(f"frequencies {low} to {high} Hz do not rise")
-    found: Array = np.geomspace(first, last, points)
-    return found
+    hertz: Array = np.geomspace(first, last, points)
+    return hertz
 
 
 def curve(
@@ -64,13 +81,13 @@ def curve(
     acceleration_y: float | str | Fraction = 0,
     cycles: int | None = None,
 ) -> Curve:
-    """Return the rates of an algorithm for the vibration of (65) or (70), at frequencies.
+    """Return the rates of an algorithm for the vibration of equation (65) or (70), at many frequencies.
 
     Parameters
     ----------
     assessment : Assessment
     hertz : array, (N,)
-        Frequencies, above 0.
+        Frequencies in Hz, above 0.
     step, theta_x, theta_y, phase, acceleration_y, cycles
         As for `Assessment.rates`.
 

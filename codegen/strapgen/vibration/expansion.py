@@ -1,4 +1,4 @@
-"""Kernels to second order: what they compute of small inputs, in exact numbers."""
+"""Expansion of kernels to second order in small inputs, in exact numbers."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from strapgen.powers import Powers
 
 #: An exact number: an element of a field of SymPy.
 Number = Any
-#: Names of two inputs, in the order of the alphabet.
+#: Names of two inputs, in alphabetical order.
 Pair = tuple[str, str]
 _ORDER = 2
 
 
 class Expansion(NamedTuple):
-    """A polynomial of second degree in named inputs: what is left of a function where they are small.
+    """A polynomial of second degree in named inputs, which approximates a function of small inputs.
 
     Parameters
     ----------
@@ -56,15 +56,15 @@ class Expander:
     >>> from strapgen import derive
     >>> expander = Expander([derive("coning-slow")])
     >>> inputs = {name: expander.variable(name) for name in ("beta_x", "coning_x")}
-    >>> made = map(expander.expansion, expander(derive("coning-slow"), inputs)["rotation_vector"])
-    >>> [sorted(element.linear) for element in made]
+    >>> elements = map(expander.expansion, expander(derive("coning-slow"), inputs)["rotation_vector"])
+    >>> [sorted(element.linear) for element in elements]
     [['beta_x', 'coning_x'], [], []]
     """
 
     def __init__(self, kernels: Iterable[Kernel]) -> None:
         self._kernels = {kernel.name: kernel for kernel in kernels}
         if any(_is_transcendental(expression) for expression in self._expressions()):
-            # Rounded to so many digits that nobody sees the difference.
+            # They are rounded to so many digits that the results do not differ.
             self._kernels = {name: rationalized(kernel) for name, kernel in self._kernels.items()}
         self.domain = powers.field(self._expressions())
         signals = chain.from_iterable(kernel.inputs for kernel in self._kernels.values())
@@ -85,14 +85,14 @@ class Expander:
         return powers.constant(self._ring, value, _ORDER)
 
     def variable(self, name: str, at: Any = 0) -> Powers:
-        """Return an input of one of the kernels that departs a little from a number."""
+        """Return an input of a kernel as a series: a number plus a small variable."""
         small = self._ring.gens[self._names.index(name)]
         return Powers(self._ring, {0: self._ring(self.number(at)), 1: small}, _ORDER)
 
     def expansion(self, series: Powers) -> Expansion:
-        """Return the coefficients of a series."""
+        """Return the coefficients of a series as an expansion."""
         parts = [series.parts.get(power, self._ring.zero) for power in range(_ORDER + 1)]
-        found: list[dict[tuple[str, ...], Number]] = []
+        coefficients: list[dict[tuple[str, ...], Number]] = []
         for part in parts:
             terms = {}
             for exponents, c in part.terms() if part else ():
@@ -100,8 +100,8 @@ class Expander:
                     (name,) * count for name, count in zip(self._names, exponents, strict=True) if count
                 )
                 terms[tuple(chain.from_iterable(chosen))] = c
-            found.append(terms)
-        constant, linear, square = found
+            coefficients.append(terms)
+        constant, linear, square = coefficients
         return Expansion(
             constant.get((), self.domain.zero),
             {name: c for (name,), c in linear.items()},
@@ -109,7 +109,7 @@ class Expander:
         )
 
     def __call__(self, kernel: Kernel, inputs: Mapping[str, Powers]) -> dict[str, list[Powers]]:
-        """Return the outputs of a kernel, row-major; elements of inputs that are not given are zero.
+        """Return the outputs of a kernel, row-major; missing elements of inputs are zero.
 
         Raises
         ------
@@ -118,15 +118,15 @@ class Expander:
         """
         exact = self._kernels[kernel.name]
         names = chain.from_iterable(signal.elements for signal in exact.inputs)
-        given = {name: inputs.get(name) or self.constant(0) for name in names}
+        values = {name: inputs.get(name) or self.constant(0) for name in names}
         try:
-            return powers.outputs(exact, given, self._ring, _ORDER)
+            return powers.outputs(exact, values, self._ring, _ORDER)
         except ArithmeticError as error:
             raise InputError(f"kernel {kernel.name} has no expansion to second order: {error}") from None
 
 
 def _is_transcendental(expression: sp.Expr) -> bool:
-    """Return whether a number in an expression is no root of a polynomial, or not known to be one."""
+    """Return whether an expression holds a number that is not known to be algebraic."""
     if expression.is_number:
         return expression.is_algebraic is not True
     return any(_is_transcendental(argument) for argument in expression.args)

@@ -1,4 +1,4 @@
-"""Integrals over frequency, refined where it is needed, with an estimate of their error."""
+"""Adaptive integration over frequency, with an estimate of the error."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from strapgen.exceptions import InputError
 
 Array = NDArray[np.float64]
 
-#: Points of the two Gauss rules that are compared on every panel; the second one counts.
+#: Points of the two Gauss rules on every panel; the second one gives the value, their difference the error.
 _POINTS = (8, 15)
-#: How often a panel is halved, and how many panels there may be in all.
+#: Most halvings of a panel, and most panels in all.
 _MOST_HALVINGS = 60
 _MOST_PANELS = 100_000
 
@@ -28,8 +28,8 @@ class Integral(NamedTuple):
     ----------
     values : array, (n,)
     errors : array, (n,)
-        Sum over the panels of the difference between a rule and one of half as many points: far above the error of the
-        value, which is that of the better rule.
+        Sum over the panels of the difference between a rule and one with about half as many points. The values are
+        those of the better rule, so their error is far smaller.
     """
 
     values: Array
@@ -49,13 +49,13 @@ def integrate(
     Parameters
     ----------
     function : callable
-        ``function(x)``, x of shape (N,): array (n, N) of the values of n functions.
+        ``function(x)`` takes x of shape (N,) and returns the values of n functions, (n, N).
     edges : sequence of float
-        Where the range begins, where a function or its slope jumps, and where the range ends.
+        The beginning and the end of the range, and between them all points where a function or its slope jumps.
     width : float
-        Widest panel to begin with: about a period of the fastest oscillation.
+        Width of the widest panel at the start; choose about a period of the fastest oscillation.
     tolerance : float, optional
-        Error that is allowed, relative to the integral of the magnitude of each function.
+        Allowed error relative to the integral of the magnitude of each function.
 
     Returns
     -------
@@ -68,11 +68,11 @@ def integrate(
 
     Examples
     --------
-    >>> found = integrate(lambda x: np.array([np.sin(x), x**2]), [0, np.pi], 1.0)
-    >>> found.values.round(9), bool(np.all(found.errors < 1e-10))
+    >>> integral = integrate(lambda x: np.array([np.sin(x), x**2]), [0, np.pi], 1.0)
+    >>> integral.values.round(9), bool(np.all(integral.errors < 1e-10))
     (array([ 2.        , 10.33542556]), True)
     """
-    with np.errstate(all="ignore"):  # what is not finite is refused
+    with np.errstate(all="ignore"):  # values that are not finite are refused later
         return _integrate(function, edges, width, tolerance)
 
 
@@ -129,7 +129,7 @@ def _too_many() -> InputError:
 def _on_panels(
     function: Callable[[Array], Array], panels: Array, nodes: Array, weights: Array
 ) -> tuple[Array, Array]:
-    """Return the integral and that of the magnitude by a rule, (n, panels) each."""
+    """Return the integrals of the functions and of their magnitudes by a rule, (n, panels) each."""
     half, middle = (panels[1] - panels[0]) / 2, panels.mean(axis=0)
     points = middle[:, None] + half[:, None] * nodes
     values = function(points.ravel())

@@ -1,4 +1,4 @@
-"""The mean growth that a kernel computes of a vibration, to second order in its amplitudes, in closed form."""
+"""The mean growth that a kernel computes under vibration, in closed form to second order in the amplitudes."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ Pair = tuple[str, str]
 
 
 class Form(NamedTuple):
-    """The complex factor H of a pair of channels: the mean rate is the real part of H a b*, a and b their amplitudes.
+    """The complex factor H of two channels with amplitudes a and b, whose mean rate is the real part of H a b*.
 
     Parameters
     ----------
     real, imaginary : Expr
-        In the frequency f in Hz and the times of the algorithm in s.
+        Functions of the frequency f in Hz and the times of the algorithm in s.
     """
 
     real: sp.Expr
@@ -30,7 +30,7 @@ class Form(NamedTuple):
 
 
 class _Motion(NamedTuple):
-    """An element to first order: the oscillation that follows the samples, and what is constant over a slow cycle."""
+    """A state to first order: its oscillation with the samples, and the part that is constant over a slow cycle."""
 
     wave: dict[str, Wave]
     constant: dict[str, Wave]
@@ -39,14 +39,23 @@ class _Motion(NamedTuple):
 def forms(system: System) -> dict[Pair, Form]:
     """Return the factors of all pairs of channels, averaged over the phase of the vibration.
 
-    The samples are s_k(l) = Re(sigma_k z^l), z = exp(j omega T), and the states to first order follow from
-    x(l + 1) = P x(l) + R s(l): x(l) = Re(U z^l + V), U = (z I - P)^-1 R sigma, with V so that what begins anew is zero.
-    Into what is watched the states and the samples then enter by pairs, Re(u z^l) Re(v z^l) having the mean Re(u v*)/2.
+    The samples are s_k(l) = Re(sigma_k z^l) with z = exp(j omega T). To first order the states follow from
+    x(l + 1) = P x(l) + R s(l), so x(l) = Re(U z^l + V) with U = (z I - P)^-1 R sigma; V makes a state that is reset
+    start from zero. The watched sum grows by products of two states or samples, and the mean of Re(u z^l) Re(v z^l) is
+    Re(u v*)/2.
+
+    Parameters
+    ----------
+    system : System
+
+    Returns
+    -------
+    dict of (str, str) to Form
 
     Raises
     ------
     InputError
-        If the states do not settle so, or what is watched is not summed up.
+        If the states do not follow this form, or the kernel does not accumulate the watched sum.
     """
     states = list(system.following)
     domain = system.domain
@@ -67,14 +76,14 @@ def forms(system: System) -> dict[Pair, Form]:
         if c:
             _collect(system, steady, ending, motions[a], motions[b], half * c)
     cycle = T if system.slow_cycle is None else T_L
-    found = {}
+    factors = {}
     for pair in sorted({*steady, *ending}, key=lambda pair: tuple(map(CHANNELS.index, pair))):
         parts = [(steady.get(pair), cycle), (ending.get(pair), T_M)]
-        made = [_form(system, wave, time) for wave, time in parts if wave is not None and wave.terms]
-        form = Form(sp.Add(*(m.real for m in made)), sp.Add(*(m.imaginary for m in made)))
+        parts_in_time = [_form(system, wave, time) for wave, time in parts if wave is not None and wave.terms]
+        form = Form(sp.Add(*(m.real for m in parts_in_time)), sp.Add(*(m.imaginary for m in parts_in_time)))
         if form != (0, 0):
-            found[pair] = form
-    return found
+            factors[pair] = form
+    return factors
 
 
 def _require_sum(system: System, states: list[str], matrix: list[list[Number]]) -> None:
@@ -112,7 +121,7 @@ def _motions(
         }
         for name in states
     }
-    found: dict[str, _Motion] = {}
+    motions: dict[str, _Motion] = {}
     for i, name in enumerate(states):
         waves = {}
         for channel in channels:
@@ -127,17 +136,17 @@ def _motions(
         constant = {}
         if name in system.begun_anew:
             constant = {channel: wave.scaled(-one) for channel, wave in waves.items()}
-        found[name] = _Motion(waves, constant)
-    for i, name in enumerate(states):  # what is constant must stay so
+        motions[name] = _Motion(waves, constant)
+    for i, name in enumerate(states):  # a constant part must not change within a slow cycle
         for channel in channels:
-            held = [(matrix[i][k], found[other].constant.get(channel)) for k, other in enumerate(states)]
+            held = [(matrix[i][k], motions[other].constant.get(channel)) for k, other in enumerate(states)]
             moved = combined(system.cycle, [(c, wave) for c, wave in held if wave is not None])
-            own = found[name].constant.get(channel) or Wave(system.cycle, {})
-            if (moved + own.scaled(-one)).terms:
+            constant_after = motions[name].constant.get(channel) or Wave(system.cycle, {})
+            if (moved + constant_after.scaled(-one)).terms:
                 raise InputError(
                     f"kernel {system.kernel.name} grows to first order within a slow cycle, or forgets what begins anew"
                 )
-    return found
+    return motions
 
 
 def _collect(
@@ -148,7 +157,7 @@ def _collect(
     right: _Motion,
     factor: Number,
 ) -> None:
-    """Add the mean of a product: what it is in every cycle, and what the sum over a slow cycle has beside that."""
+    """Add the mean of a product, both the part of every cycle and the part of a slow cycle as a whole."""
     for a in left.wave:
         for b in right.wave:
             pair, swapped = ((a, b), False) if CHANNELS.index(a) <= CHANNELS.index(b) else ((b, a), True)
@@ -168,16 +177,16 @@ def _collect(
 
 
 def _over_cycles(system: System, wave: Wave) -> Wave:
-    """Return the sum of wave z^l over the cycles of a slow one: wave (exp(j omega T_m) - 1)/(z - 1)."""
+    """Return the sum of wave z^l over the cycles of a slow cycle, which is wave (exp(j omega T_m) - 1)/(z - 1)."""
     assert system.slow_cycle is not None
     one = system.domain.one
     return (wave.shifted(system.slow_cycle) + wave.scaled(-one)).summed()
 
 
 def _form(system: System, wave: Wave, time: sp.Symbol) -> Form:
-    """Write a wave over a time in sines and cosines.
+    """Write a wave, divided by a time, in sines and cosines.
 
-    1/(z - 1) is exp(-j omega T/2)/(2 j sin(omega T/2)).
+    It uses 1/(z - 1) = exp(-j omega T/2)/(2 j sin(omega T/2)).
     """
     cycle = _time(system, wave.cycle)
     cosines: dict[sp.Expr, sp.Expr] = {}
@@ -192,7 +201,7 @@ def _form(system: System, wave: Wave, time: sp.Symbol) -> Form:
         sines[angle] = sines.get(angle, sp.S.Zero) + sign * number
     real = sp.Add(*(sp.expand(c) * sp.cos(angle) for angle, c in cosines.items()))
     imaginary = sp.Add(*(sp.expand(c) * sp.sin(angle) for angle, c in sines.items()))
-    for _ in range(wave.poles):  # over j
+    for _ in range(wave.poles):  # each divides by j
         real, imaginary = imaginary, -real
     below = time * (2 * sp.sin(sp.pi * F * cycle)) ** wave.poles
     above = (2 * sp.pi * F * cycle) ** 2 if system.rates else sp.S.One
@@ -213,10 +222,14 @@ def true_forms(kind: str, endless: bool) -> dict[Pair, Form]:
     Parameters
     ----------
     kind : str
-        "coning": half the integral of beta x w, equation (22); "S1": of beta x a; "S2": half that of
-        beta x a + u x w, (50); beta and u being the integrals of w and a since the slow cycle began.
+        "coning" is half the integral of beta x w, equation (22); "S1" the integral of beta x a; "S2" half the integral
+        of beta x a + u x w, equation (50). Here beta and u are the integrals of w and a since the slow cycle began.
     endless : bool
-        What is left over a long time, in place of the slow cycle T_m.
+        Whether the mean is taken over a very long time instead of the slow cycle T_m.
+
+    Returns
+    -------
+    dict of (str, str) to Form
     """
     t, omega = sp.Symbol("t", positive=True), sp.Symbol("omega", positive=True)
     # beta or u over its amplitude is exp(j omega t) - 1, w or a is its derivative; the conjugate of the latter:

@@ -1,4 +1,4 @@
-"""Random vibration: spectra from functions or a file, and the mean rates under them, equations (68) to (83)."""
+"""Random vibration: spectra from functions or files, and the mean rates that they cause, equations (68) to (83)."""
 
 from __future__ import annotations
 
@@ -19,40 +19,39 @@ from numpy.typing import NDArray
 
 from strapgen import checks
 from strapgen.exceptions import InputError, InputTypeError
-from strapgen.vibration.assessment import Assessment, Rates
+from strapgen.vibration.mean_rates import Assessment, Rates
 from strapgen.vibration.quadrature import integrate
 
 Array = NDArray[Any]
 
-#: What a transfer function leads to, and its unit for an input of unit 1.
+#: Outputs of the transfer functions, with the unit of each for an input of unit 1.
 TRANSFERS = {"angle_x": "rad", "angle_y": "rad", "acceleration_x": "m_s2", "acceleration_y": "m_s2"}
 
 
 @dataclass(frozen=True)
 class Spectrum:
-    """A stationary random input and what it shakes.
+    """A stationary random input, and the angles and accelerations that it excites.
 
-    The input n has the one-sided power spectral density P, E[n^2] being the integral of P over frequencies in Hz.
-    An angle or acceleration follows it by its transfer function H: for n = Re(c exp(j omega t)) it is
-    Re(H c exp(j omega t)). All functions take an array of frequencies in Hz, (N,), and return one of that shape, or one
-    number.
+    The input n has the one-sided power spectral density P, so that E[n^2] is the integral of P over frequencies in Hz.
+    The transfer function H of an angle or acceleration turns n = Re(c exp(j omega t)) into Re(H c exp(j omega t)).
+    Each function takes an array of frequencies in Hz, (N,), and returns an array of that shape or one number.
 
     Parameters
     ----------
     density : callable
-        P in the unit of n squared, per Hz; not below 0.
+        P in the unit of n squared per Hz; not below 0.
     transfers : dict of str to callable
-        Complex transfer functions: "angle_x" and "angle_y" in rad, "acceleration_x" and "acceleration_y" in m/s^2, each
-        per unit of n. What is left out does not move; one is needed.
+        Complex transfer functions, per unit of n: "angle_x" and "angle_y" in rad, "acceleration_x" and
+        "acceleration_y" in m/s^2. At least one is needed; a missing one means no motion.
     edges : tuple of float
-        Rising frequencies in Hz: the lowest and the highest, and between them all where a function or its slope jumps.
+        Rising frequencies in Hz: the lowest, all at which a function or its slope jumps, and the highest.
 
     Raises
     ------
     InputTypeError
-        If something is no function, or the edges are no numbers.
+        If a density or transfer function is no function, or an edge is no number.
     InputError
-        If a transfer function has another name or there is none, or the edges do not rise from 0 or above.
+        If a transfer function has an unknown name, there is none, or the edges do not rise from 0 or above.
 
     Examples
     --------
@@ -101,16 +100,16 @@ class Spectrum:
         InputError
             If it returns another shape, or a number below 0.
         """
-        found = _returned("density", self.density(hertz), hertz, "fiu").astype(float)
-        if (found < 0).any():
-            place = int(np.argmax(found < 0))
+        density = _returned("density", self.density(hertz), hertz, "fiu").astype(float)
+        if (density < 0).any():
+            place = int(np.argmax(density < 0))
             raise InputError(
-                f"density is {found[place]:g} at {hertz[place]:.9g} Hz; no number below 0 is allowed"
+                f"density is {density[place]:g} at {hertz[place]:.9g} Hz; no number below 0 is allowed"
             )
-        return found
+        return density
 
     def amplitudes(self, hertz: Array) -> dict[str, Array]:
-        """Return the transfer functions of the channels: angles, and velocities in place of accelerations.
+        """Return the transfer functions of the channels at frequencies, with velocities instead of accelerations.
 
         Raises
         ------
@@ -119,17 +118,17 @@ class Spectrum:
         InputError
             If one returns another shape.
         """
-        found = {}
+        channels = {}
         for name, function in self.transfers.items():
             values = _returned(name, function(hertz), hertz, "fiuc").astype(complex)
             if name.startswith("acceleration"):
                 values = values / (2j * np.pi * hertz)
-            found[name.replace("acceleration", "velocity")] = values
-        return found
+            channels[name.replace("acceleration", "velocity")] = values
+        return channels
 
 
 def _returned(what: str, values: Any, hertz: Array, kinds: str) -> Array:
-    """Return what a function made of frequencies, with a shape like theirs."""
+    """Return the values of a function, broadcast to the shape of the frequencies."""
     try:
         array = np.asarray(values)
     except ValueError:
@@ -143,13 +142,13 @@ def _returned(what: str, values: Any, hertz: Array, kinds: str) -> Array:
 
 
 class RandomRates(NamedTuple):
-    """Mean rates under a spectrum, with the error that their integrals may have.
+    """Mean rates under a spectrum, with the estimated errors of their integrals.
 
     Parameters
     ----------
     rates : Rates
     quadrature : Rates
-        Estimated error of the integral of each; for that of computed the sum of both others.
+        Estimated error of the integral of each; that of `computed` is the sum of the other two.
     """
 
     rates: Rates
@@ -166,8 +165,9 @@ def random_rates(
 ) -> RandomRates:
     """Return the mean rates about z under a random vibration.
 
-    An oscillation of amplitude c in a band df is as strong as P df = |c|^2/2: the integrand is twice the real part of
-    the factor of each pair of channels times one transfer function and the conjugate of the other, times P.
+    In a band df the spectrum is equivalent to an oscillation of amplitude c with |c|^2/2 = P df. The integrand is
+    therefore 2 P times the real part of the factor of each pair of channels, times the transfer function of one and
+    the conjugate of the other.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ def random_rates(
     step, cycles
         As for `Assessment.rates`.
     tolerance : float, optional
-        Error that is allowed to the integrals, relative to those of the magnitudes.
+        Allowed error of the integrals, relative to the integrals of the magnitudes.
 
     Returns
     -------
@@ -185,9 +185,9 @@ def random_rates(
     Raises
     ------
     InputTypeError
-        If something is not of its type, or a function of the spectrum returns no numbers.
+        If an argument has the wrong type, or a function of the spectrum returns no numbers.
     InputError
-        If a function or an integral is not finite, a density is below 0, or an integral does not settle.
+        If a function or an integral is not finite, a density is below 0, or an integral does not converge.
     """
     if not isinstance(assessment, Assessment):
         raise InputTypeError(f"assessment is {assessment!r}; what vibration.of returns is needed")
@@ -209,14 +209,14 @@ def random_rates(
                 total = total + 2 * (factor * moved[first] * moved[second].conj()).real
         return (total * spectrum.densities(hertz))[None]
 
-    # The true rate first: its factors take no more than double nearly everywhere, so that what does not settle is soon
-    # found; those of the error take many digits.
-    found = {
+    # The true rate comes first, since its factors need no more than double nearly everywhere. A spectrum that does not
+    # converge is thus refused early, before the factors of the error, which need many digits.
+    integrals = {
         part: integrate(partial(rate, part), spectrum.edges, 1 / longest, allowed)
         for part in ("continuous", "error")
     }
-    continuous, error = (float(one.values[0]) for one in found.values())
-    spread = [float(one.errors[0]) for one in found.values()]
+    continuous, error = (float(one.values[0]) for one in integrals.values())
+    spread = [float(one.errors[0]) for one in integrals.values()]
     rates = Rates(continuous, continuous + error, error)
     if not np.isfinite(rates).all():
         raise InputError(f"{assessment.kernel}: the rates are beyond the range of double")
@@ -228,10 +228,11 @@ def read_spectrum(path: str | Path) -> Spectrum:
 
     The first line names the columns: ``frequency_hz``; ``density``, in the unit of the input squared per Hz; and any
     of ``angle_x_rad``, ``angle_y_rad``, ``acceleration_x_m_s2``, ``acceleration_y_m_s2``, the magnitudes of the
-    transfer functions per unit of the input, each with its phase in rad beside it, for instance ``angle_y_phase_rad``;
-    a phase that is left out is zero. Between the rows, whose frequencies rise, the logarithm of the density is a
-    straight line against that of frequency, as vibration is specified, or the density where it is zero at an end;
-    magnitudes and phases are straight lines against frequency. Outside the rows nothing vibrates.
+    transfer functions per unit of the input. Each may have a column for its phase in rad, for instance
+    ``angle_y_phase_rad``; without it the phase is zero. Frequencies rise from row to row. Between two rows the
+    logarithm of the density is linear in that of frequency, as vibration is usually specified; if a density is zero at
+    either end, the density itself is linear in frequency. Magnitudes and phases are linear in frequency. Outside the
+    rows there is no vibration.
 
     Parameters
     ----------
@@ -244,9 +245,9 @@ def read_spectrum(path: str | Path) -> Spectrum:
     Raises
     ------
     InputTypeError
-        If the path is none.
+        If `path` is no path.
     InputError
-        If the file cannot be read, or a column, a number or the order of the rows is not as it must be.
+        If the file cannot be read, or a column, a number or the order of the rows is not allowed.
     """
     if not isinstance(path, str | os.PathLike):
         raise InputTypeError(f"spectrum is {path!r}; the path of a file is needed")
@@ -333,13 +334,10 @@ def _neighbours(values: Array) -> tuple[Array, Array]:
 def _numbers(path: Path, line: int, row: list[str], header: list[str]) -> list[float]:
     if len(row) != len(header):
         raise InputError(f"{path}, line {line}: {len(row)} cells; {len(header)} are needed")
-    found = []
+    numbers = []
     for cell, name in zip(row, header, strict=True):
-        try:
-            number = float(cell)
-        except ValueError:
-            number = math.nan
+        number = checks.double(cell)
         if not math.isfinite(number):
             raise InputError(f"{path}, line {line}: {name} is {cell.strip()!r}; a finite number is needed")
-        found.append(number)
-    return found
+        numbers.append(number)
+    return numbers

@@ -1,4 +1,4 @@
-"""What is assessed, as one recursion: states that are handed on, samples of the vibration, and what is watched."""
+"""The kernel under assessment as a recursion, with its states, samples of the vibration, and a watched sum."""
 
 from __future__ import annotations
 
@@ -23,22 +23,22 @@ from strapgen.vibration.waves import Shift, Wave
 #: Frequency in Hz, step of an attitude algorithm, fast and slow cycle of a recursion in s.
 F, T, T_L, T_M = sp.symbols("f T T_l T_m", positive=True)
 
-#: What oscillates: angles in rad and velocities in m/s on the axes x and y.
+#: Oscillating channels: angles in rad and velocities in m/s on the axes x and y.
 ANGLES, VELOCITIES = ("angle_x", "angle_y"), ("velocity_x", "velocity_y")
 CHANNELS = (*ANGLES, *VELOCITIES)
-#: Inputs that are samples of it.
+#: Names of inputs that are samples of the vibration.
 SAMPLES = ("increments", "increment", "turns", "velocity_increments", "velocity_increment")
-#: Kernels of the catalogue that sum over a slow cycle.
+#: Kernels of the catalogue that accumulate sums over a slow cycle.
 RECURSIONS = ("coning-fast", "sculling-fast-1", "sculling-fast-2", "two-speed-fast-1", "two-speed-fast-2")
-#: What can be assessed of the catalogue.
+#: Kernels of the catalogue that can be assessed.
 NAMES = (*catalogue.ALGORITHMS, *catalogue.VECTORS, *RECURSIONS)
-#: The kernel that follows a rotation vector and a sculling term: attitude and velocity after a step.
+#: The kernel that computes attitude and velocity after a step from its rotation vector and sculling term.
 _SLOW_LOOP = "dcm-two-speed-slow-2"
 
 
 @dataclass(frozen=True)
 class System:
-    """A kernel to second order, with its samples.
+    """A kernel to second order, with the samples that drive it.
 
     Parameters
     ----------
@@ -46,23 +46,23 @@ class System:
     domain : domain of SymPy
         The field of all numbers.
     following : dict of str to Expansion
-        Every element of the states after a call, as it depends on the elements before and on the samples.
+        Every element of the states after a call as a function of the elements before it and of the samples.
     begun_anew : frozenset of str
-        Elements that begin at zero in every slow cycle; empty if there is none.
+        Elements that are reset to zero in every slow cycle; may be empty.
     samples : dict of str to dict of str to Wave
-        For every element of the samples what it holds of every channel.
+        The response of every element of the samples to every channel.
     cycle : tuple of int
         The time from call to call as a shift.
     slow_cycle : tuple of int or None
-        The slow cycle as a shift; None where the recursion never ends.
+        The slow cycle as a shift; None if the recursion has no end.
     times : tuple of Expr
         Basic times of the shifts in s.
     watched : dict of str to number
-        The sum of elements whose growth is assessed.
+        Weights of the elements in the sum whose growth is assessed.
     unit : str
         Its unit: rad or m/s.
     rates : bool
-        Whether the samples are rates times the cycle: the waves are to be multiplied by j omega T.
+        Whether the samples are rates times the cycle, so that the waves have to be multiplied by j omega T.
     """
 
     kernel: Kernel
@@ -86,61 +86,64 @@ def of(
     Parameters
     ----------
     kernel : Kernel
-        An attitude step; the rotation vector or the sculling term of one; or a recursion that sums such terms over a
+        An attitude step, the rotation vector or the sculling term of one, or a recursion that sums such terms over a
         slow cycle.
     unit : str, optional
-        Of a recursion that makes both what is assessed: rad or m/s.
+        For a recursion that sums coning and sculling, the one to assess: "rad" or "m/s".
     nodes : sequence of Fraction or Expr, optional
         Nodes of a step that takes rates.
     previous : int, optional
-        How many samples of the vector of a step are those before it; an attitude step says so itself.
+        Number of samples from before the step, for the vector of a step; an attitude step has this number.
+
+    Returns
+    -------
+    System
 
     Raises
     ------
     InputTypeError
-        If it is no kernel.
+        If `kernel` is no `Kernel`.
     InputError
         If the kernel is none of these, or has no expansion to second order.
     """
-    taken = [signal for signal in checked(kernel).inputs if signal.name in SAMPLES]
-    if not any(signal.unit == "rad" for signal in taken):
+    sampled = [signal for signal in checked(kernel).inputs if signal.name in SAMPLES]
+    if not any(signal.unit == "rad" for signal in sampled):
         raise InputError(
             f"kernel {kernel.name} takes no samples of a vibration; allowed: {', '.join(NAMES)}, or a kernel of your "
             "own that takes angle increments"
         )
     if kernel.companions is not None:
-        return _of_step(kernel, taken, nodes)
+        return _of_step(kernel, sampled, nodes)
     if kernel.recursion is not None:
-        return _of_recursion(kernel, taken, unit)
-    return _of_vector(kernel, taken, nodes, previous)
+        return _of_recursion(kernel, sampled, unit)
+    return _of_vector(kernel, sampled, nodes, previous)
 
 
 def checked(kernel: Any) -> Kernel:
-    """Return a kernel if it is one.
+    """Return the argument if it is a kernel.
 
     Raises
     ------
     InputTypeError
-        If it is none.
+        If it is no kernel.
     """
     if not isinstance(kernel, Kernel):
         raise InputTypeError(f"kernel is {kernel!r}; a Kernel is needed")
     return kernel
 
 
-def _of_step(kernel: Kernel, taken: Sequence[Signal], nodes: Sequence[Fraction | sp.Expr]) -> System:
+def _of_step(kernel: Kernel, sampled: Sequence[Signal], nodes: Sequence[Fraction | sp.Expr]) -> System:
     assert kernel.companions is not None
-    own = {made.name: made for made in kernel.own}
     name = kernel.companions.attitude
-    attitude = None if name is None else own.get(name) or catalogue.derive(Choice(name))
+    attitude = None if name is None else catalogue.companion(kernel, name)
     expander = Expander([kernel] if attitude is None else [kernel, attitude])
     state, output = kernel.inputs[0], kernel.outputs[-1].signal
     begun = {
         element: expander.variable(element, exact(value))
         for element, value in zip(state.elements, kernel.companions.identity, strict=True)
     }
-    samples, times, cycle = _waves(expander, kernel, taken, kernel.companions.previous, nodes)
-    made = expander(kernel, begun | _variables(expander, samples))[output.name]
+    samples, times, cycle = _waves(expander, kernel, sampled, kernel.companions.previous, nodes)
+    following = expander(kernel, begun | _variables(expander, samples))[output.name]
     if attitude is None:
         matrix = list(begun.values())
     else:
@@ -149,7 +152,7 @@ def _of_step(kernel: Kernel, taken: Sequence[Signal], nodes: Sequence[Fraction |
     return System(
         kernel=kernel,
         domain=expander.domain,
-        following=_handed_on(kernel, expander, begun, dict(zip(state.elements, made, strict=True))),
+        following=_handed_on(kernel, expander, begun, dict(zip(state.elements, following, strict=True))),
         begun_anew=frozenset(),
         samples=samples,
         cycle=cycle,
@@ -157,17 +160,17 @@ def _of_step(kernel: Kernel, taken: Sequence[Signal], nodes: Sequence[Fraction |
         times=times,
         watched=_turned(expander, matrix),
         unit="rad",
-        rates=taken[0].name == "turns",
+        rates=sampled[0].name == "turns",
     )
 
 
 def _turned(expander: Expander, matrix: Sequence[Powers]) -> dict[str, Number]:
-    """Return the rotation about z in the elements of the state: (C21 - C12)/2."""
+    """Return the rotation about z, (C21 - C12)/2, to first order in the elements of the state."""
     return expander.expansion((matrix[3] - matrix[1]) * expander.number(sp.S.Half)).linear
 
 
 def _of_vector(
-    kernel: Kernel, taken: Sequence[Signal], nodes: Sequence[Fraction | sp.Expr], previous: int
+    kernel: Kernel, sampled: Sequence[Signal], nodes: Sequence[Fraction | sp.Expr], previous: int
 ) -> System:
     slow = catalogue.derive(Choice(_SLOW_LOOP))
     assert slow.recursion is not None
@@ -175,9 +178,9 @@ def _of_vector(
     output = kernel.outputs[-1].signal
     if output.shape != (3,) or output.unit not in ("rad", "m/s"):
         raise InputError(f"kernel {kernel.name} gives {output.name}; a vector in rad or m/s can be assessed")
-    most = taken[0].size // 3
+    most = sampled[0].size // 3
     count = most - checks.count("previous", previous, smallest=0, largest=most - 1)
-    samples, times, cycle = _waves(expander, kernel, taken, previous, nodes)
+    samples, times, cycle = _waves(expander, kernel, sampled, previous, nodes)
     variables = _variables(expander, samples)
     vector = expander(kernel, variables)[output.name]
     inputs = {signal.name: signal for signal in slow.inputs}
@@ -189,10 +192,10 @@ def _of_vector(
     for k in (0, 4, 8):
         element = inputs["state"].elements[k]
         begun[element] = expander.variable(element, 1)
-    given = dict(begun)
+    slow_inputs = dict(begun)
     sums = {"angle_sum": vector} if output.unit == "rad" else {"sculling": vector}
     if output.unit == "m/s":
-        for signal in taken:
+        for signal in sampled:
             name = "angle_sum" if signal.unit == "rad" else "velocity_sum"
             rows = [signal.elements[3 * k : 3 * k + 3] for k in range(previous, previous + count)]
             zero = expander.constant(0)
@@ -200,12 +203,12 @@ def _of_vector(
                 sum((variables.get(e, zero) for e in axis), zero) for axis in zip(*rows, strict=True)
             ]
     for name, elements in sums.items():
-        given |= dict(zip(inputs[name].elements, elements, strict=True))
-    made = expander(slow, given)
+        slow_inputs |= dict(zip(inputs[name].elements, elements, strict=True))
+    slow_outputs = expander(slow, slow_inputs)
     following = {
         element: value
         for name, after in slow.recursion.states
-        for element, value in zip(inputs[name].elements, made[after], strict=True)
+        for element, value in zip(inputs[name].elements, slow_outputs[after], strict=True)
     }
     if output.unit == "rad":
         watched = _turned(expander, [begun[e] for e in inputs["state"].elements])
@@ -222,16 +225,18 @@ def _of_vector(
         times=times,
         watched=watched,
         unit=output.unit,
-        rates=taken[0].name == "turns",
+        rates=sampled[0].name == "turns",
     )
 
 
-def _of_recursion(kernel: Kernel, taken: Sequence[Signal], unit: str) -> System:
+def _of_recursion(kernel: Kernel, sampled: Sequence[Signal], unit: str) -> System:
     assert kernel.recursion is not None
     checks.choice("unit", unit, ("rad", "m/s"))
     expander = Expander([kernel])
     inputs = {signal.name: signal for signal in kernel.inputs}
-    other = inputs.keys() - {name for name, _ in kernel.recursion.states} - {signal.name for signal in taken}
+    other = (
+        inputs.keys() - {name for name, _ in kernel.recursion.states} - {signal.name for signal in sampled}
+    )
     if other:
         raise InputError(f"kernel {kernel.name} takes {', '.join(sorted(other))}, which is no sample")
     begun = {
@@ -239,17 +244,17 @@ def _of_recursion(kernel: Kernel, taken: Sequence[Signal], unit: str) -> System:
         for name, _ in kernel.recursion.states
         for element in inputs[name].elements
     }
-    samples, times, cycle = _waves(expander, kernel, taken, 0, (), T_L)
-    made = expander(kernel, begun | _variables(expander, samples))
+    samples, times, cycle = _waves(expander, kernel, sampled, 0, (), T_L)
+    outputs = expander(kernel, begun | _variables(expander, samples))
     following: dict[str, Powers] = {}
     summed = []
     for name, after in kernel.recursion.states:
         signal = inputs[name]
-        following |= dict(zip(signal.elements, made[after], strict=True))
+        following |= dict(zip(signal.elements, outputs[after], strict=True))
         if (
             signal.unit == unit
             and signal.shape == (3,)
-            and any(expander.expansion(element).square for element in made[after])
+            and any(expander.expansion(element).square for element in outputs[after])
         ):
             summed.append(signal)
     if len(summed) != 1:
@@ -276,7 +281,7 @@ def _of_recursion(kernel: Kernel, taken: Sequence[Signal], unit: str) -> System:
 
 
 def _with_end(wave: Wave) -> Wave:
-    """Return a wave with one more basic time, the slow cycle."""
+    """Return a wave with the slow cycle as a further basic time."""
     return Wave((*wave.cycle, 0), {(*shift, 0): c for shift, c in wave.terms.items()}, wave.poles)
 
 
@@ -287,7 +292,7 @@ def _variables(expander: Expander, samples: Iterable[str]) -> dict[str, Powers]:
 def _handed_on(
     kernel: Kernel, expander: Expander, begun: Mapping[str, Powers], following: Mapping[str, Powers]
 ) -> dict[str, Expansion]:
-    """Return the elements after a call as expansions; without samples they must stay where they begin."""
+    """Return the elements after a call as expansions; refuse a kernel that changes them without samples."""
     for name, value in following.items():
         if value.start != begun[name].start:
             raise InputError(f"kernel {kernel.name} does not rest: {name} changes without any motion")
@@ -297,27 +302,27 @@ def _handed_on(
 def _waves(
     expander: Expander,
     kernel: Kernel,
-    taken: Sequence[Signal],
+    sampled: Sequence[Signal],
     previous: int,
     nodes: Sequence[Fraction | sp.Expr],
     cycle: sp.Symbol = T,
 ) -> tuple[dict[str, dict[str, Wave]], tuple[sp.Expr, ...], Shift]:
-    """Return what elements of the samples hold of the channels, the basic times and the cycle."""
-    if taken[0].name == "turns":
-        return _waves_of_rates(expander, kernel, taken[0], nodes, cycle)
-    counts = {signal.size // 3 - previous for signal in taken}
+    """Return the responses of the samples to the channels, the basic times in s, and the cycle as a shift."""
+    if sampled[0].name == "turns":
+        return _waves_of_rates(expander, kernel, sampled[0], nodes, cycle)
+    counts = {signal.size // 3 - previous for signal in sampled}
     if len(counts) != 1:
         raise InputError(f"kernel {kernel.name} takes different numbers of angle and velocity increments")
     (count,) = counts
     one = expander.domain.one
-    found: dict[str, dict[str, Wave]] = {}
-    for signal in taken:
+    waves: dict[str, dict[str, Wave]] = {}
+    for signal in sampled:
         channels = ANGLES if signal.unit == "rad" else VELOCITIES
         for k in range(signal.size // 3):
             wave = Wave((count,), {(k - previous + 1,): one, (k - previous,): -one})
             for axis, channel in enumerate(channels):
-                found[signal.elements[3 * k + axis]] = {channel: wave}
-    return found, (cycle / count,), (count,)
+                waves[signal.elements[3 * k + axis]] = {channel: wave}
+    return waves, (cycle / count,), (count,)
 
 
 def _waves_of_rates(
@@ -336,7 +341,7 @@ def _waves_of_rates(
     others = list(dict.fromkeys(value for value in values if not value.is_Rational))
     size = 1 + len(others)
     period = (whole, *(0 for _ in others))
-    found = {}
+    waves = {}
     for k, value in enumerate(values):
         shift = [0] * size
         if value.is_Rational:
@@ -345,5 +350,5 @@ def _waves_of_rates(
             shift[1 + others.index(value)] = 1
         for axis, channel in enumerate(ANGLES):
             wave = Wave(period, {tuple(shift): expander.domain.one})
-            found[signal.elements[3 * k + axis]] = {channel: wave}
-    return found, (cycle / whole, *(cycle * value for value in others)), period
+            waves[signal.elements[3 * k + axis]] = {channel: wave}
+    return waves, (cycle / whole, *(cycle * value for value in others)), period

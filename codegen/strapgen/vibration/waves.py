@@ -1,4 +1,4 @@
-"""Sums of shifts in time of one oscillation, and their response through a linear recursion, exact."""
+"""Sums of time shifts of one oscillation, and their exact response through a linear recursion."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-#: A time as whole multiples of basic times.
+#: A time as whole multiples of the basic times.
 Shift = tuple[int, ...]
 Matrix = list[list[Any]]
 
 
 @dataclass(frozen=True)
 class Wave:
-    """A sum of terms c exp(j omega t), t a shift in time, over a power of exp(j omega T) - 1, T the cycle.
+    """A sum of terms c exp(j omega t) with shifts t, divided by a power of exp(j omega T) - 1, where T is the cycle.
 
     Parameters
     ----------
@@ -22,7 +22,7 @@ class Wave:
     terms : dict of tuple of int to number
         Real coefficients by shifts.
     poles : int
-        The power below the line; no smaller one would do.
+        The power in the denominator; the fraction is reduced.
 
     Examples
     --------
@@ -47,21 +47,21 @@ class Wave:
         return _reduced(self.cycle, _product(self.terms, other.terms), self.poles + other.poles)
 
     def scaled(self, factor: Any) -> Wave:
-        """Return this times a number."""
+        """Return the wave times a number."""
         terms = {shift: factor * c for shift, c in self.terms.items()} if factor else {}
         return Wave(self.cycle, terms, self.poles if factor else 0)
 
     def shifted(self, shift: Shift) -> Wave:
-        """Return this, later by a shift."""
-        return Wave(self.cycle, {_plus(own, shift): c for own, c in self.terms.items()}, self.poles)
+        """Return the wave, later by a shift."""
+        return Wave(self.cycle, {_plus(other, shift): c for other, c in self.terms.items()}, self.poles)
 
     def conjugate(self) -> Wave:
-        """Return the complex conjugate: 1/(z - 1) becomes -z/(z - 1), z being of length 1."""
+        """Return the complex conjugate, in which 1/(z - 1) becomes -z/(z - 1) because |z| = 1."""
         turned = {_minus(shift): c * (-1) ** self.poles for shift, c in self.terms.items()}
         return Wave(self.cycle, turned, self.poles).shifted(_times(self.cycle, self.poles))
 
     def summed(self) -> Wave:
-        """Return this over z - 1: the sum over cycles of what it is at each."""
+        """Return the wave divided by z - 1, which is its sum over all earlier cycles."""
         return _reduced(self.cycle, self.terms, self.poles + 1)
 
     def _over(self, poles: int) -> dict[Shift, Any]:
@@ -93,7 +93,7 @@ def _product(left: dict[Shift, Any], right: dict[Shift, Any]) -> dict[Shift, Any
 
 
 def _reduced(cycle: Shift, terms: dict[Shift, Any], poles: int) -> Wave:
-    """Divide by z - 1 as often as that goes."""
+    """Return the fraction in lowest terms: z - 1 is divided out as often as possible."""
     terms = {shift: c for shift, c in terms.items() if c}
     while poles:
         quotient = _quotient(cycle, terms)
@@ -104,9 +104,9 @@ def _reduced(cycle: Shift, terms: dict[Shift, Any], poles: int) -> Wave:
 
 
 def _quotient(cycle: Shift, terms: dict[Shift, Any]) -> dict[Shift, Any] | None:
-    """Return terms over z - 1; None if something is left over.
+    """Return terms divided by z - 1; None if there is a remainder.
 
-    Shifts that whole cycles lie between make a chain, along which the quotient is minus the sum of what came before.
+    Shifts that differ by whole cycles form a chain, and the quotient at each is minus the sum of the terms up to it.
     """
     place = next(k for k, length in enumerate(cycle) if length)
     chains: dict[Shift, dict[int, Any]] = {}
@@ -128,13 +128,13 @@ def _quotient(cycle: Shift, terms: dict[Shift, Any]) -> dict[Shift, Any] | None:
 def resolvent(matrix: Matrix, one: Any) -> tuple[list[Matrix], int, int] | None:
     """Return adj(z I - P) in powers of z, and the powers of z and of z - 1 in det(z I - P).
 
-    By Faddeev and Le Verrier; None if the matrix has other eigenvalues than 0 and 1.
+    The algorithm is that of Faddeev and Le Verrier. The result is None if P has other eigenvalues than 0 and 1.
 
     Parameters
     ----------
     matrix : list of list of number, n x n
     one : number
-        1 of their field.
+        The number 1 of their field.
 
     Examples
     --------
@@ -166,7 +166,7 @@ def resolvent(matrix: Matrix, one: Any) -> tuple[list[Matrix], int, int] | None:
         ones += 1
         quotient = []
         total = zero
-        for c in rest[:0:-1]:  # by z - 1, from the highest power
+        for c in rest[:0:-1]:  # division by z - 1, from the highest power
             total = total + c
             quotient.append(total)
         rest = list(reversed(quotient))
@@ -184,7 +184,7 @@ def _matrix_product(left: Matrix, right: Matrix, zero: Any) -> Matrix:
 
 
 def combined(cycle: Shift, parts: Sequence[tuple[Any, Wave]]) -> Wave:
-    """Return a sum of waves, each times a number."""
+    """Return the sum of waves, each multiplied by a number."""
     total = Wave(cycle, {})
     for factor, wave in parts:
         if factor:
@@ -193,5 +193,5 @@ def combined(cycle: Shift, parts: Sequence[tuple[Any, Wave]]) -> Wave:
 
 
 def mapped(wave: Wave, change: Callable[[Any], Any]) -> list[tuple[Shift, Any]]:
-    """Return the terms with their coefficients changed, in the order of the shifts."""
+    """Return the shifts in order, each with its coefficient after a change."""
     return [(shift, change(c)) for shift, c in sorted(wave.terms.items())]

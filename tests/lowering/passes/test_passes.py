@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from strapgen.lowering.names import FACTOR, SHARED, is_unnamed
+from strapgen.lowering.names import FACTOR, SHARED, is_temporary
 from strapgen.lowering.passes import PASSES, cost, optimize, remove_unused
 from strapgen.program import (
     Assignment,
@@ -62,7 +62,7 @@ def programs(draw: st.DrawFn) -> Program:
         if not prefix and sum(1 for _ in walk(node)) > LARGEST:
             prefix = SHARED
         if prefix:
-            body.append(Assignment(f"{prefix}{k}", node, "" if is_unnamed(prefix) else "a stage"))
+            body.append(Assignment(f"{prefix}{k}", node, "" if is_temporary(prefix) else "a stage"))
             node = Reference(f"{prefix}{k}")
         known.append(node)
     if isinstance(known[-1], Operation):
@@ -88,7 +88,7 @@ def results(program: Program, point: dict[str, Fraction]) -> dict[str, list[Frac
 
 
 def named(program: Program) -> list[Assignment]:
-    return [assignment for assignment in program.body if not is_unnamed(assignment.name)]
+    return [assignment for assignment in program.body if not is_temporary(assignment.name)]
 
 
 def stages(program: Program, point: dict[str, Fraction]) -> dict[str, list[Fraction]]:
@@ -148,7 +148,7 @@ def test_all_passes_together_invent_no_meanings(program):
     assert after.items() <= before.items()
     # What a result refers to by a name that means something is still called so.
     held = {name for r in program.results for node in r.nodes for name in references(node)} & before.keys()
-    assert {name for name in held if not is_unnamed(name)} <= after.keys()
+    assert {name for name in held if not is_temporary(name)} <= after.keys()
 
 
 def test_cost_counts_all_operations_and_of_these_the_multiplications(parse):

@@ -1,8 +1,8 @@
 """The canonical form of an attitude step: the transition in the vectors and products in which it is shortest.
 
-General code generators see scalars. A step is more: its transition turns with its inputs, so it is a sum of a
-few vectors and cross products whose weights are polynomials in a few scalar products. That form is derived here
-for any kernel with a transition, in every basis that the kernel suggests.
+A general code generator works on scalars alone. The transition of a step commutes with rotations of its inputs, so it
+is a sum of a few vectors and cross products whose weights are polynomials in a few scalar products. This package
+derives that form for any kernel with a transition, in every basis that the kernel suggests.
 """
 
 from __future__ import annotations
@@ -14,20 +14,20 @@ from strapgen.lowering.canonical.core import Core, decompose, extract, verify
 from strapgen.lowering.canonical.decomposition import NotCovariantError
 from strapgen.lowering.canonical.search import plans
 from strapgen.lowering.canonical.vectors import independent
-from strapgen.lowering.canonical.writing import Writer
+from strapgen.lowering.canonical.writing import NameClashError, Writer
 from strapgen.program import Assignment
 
 __all__ = ["Core", "expansion", "extract_core", "forms", "verify"]
 
-#: How many of the plans that look cheapest are written out.
+#: How many plans are written as code, those with the lowest estimates first.
 _WRITTEN = 5
-#: Most terms of an expanded transition that has been seen to be shorter than its stages: in one or two vectors, the
-#: degree 13 of an eighth-order method; in three or more, the degree 4 of a fourth-order one.
+#: Most terms of an expanded transition that is worth while. In tests, expanding paid up to degree 13 in one or two
+#: vectors (a method of eighth order), and up to degree 4 in three or more (a method of fourth order).
 _MOST_TERMS = {"few": 320, "many": 120}
 
 
 def extract_core(kernel: Kernel) -> Core | None:
-    """Return the transition of a kernel as a polynomial of vectors; None if it is no such function."""
+    """Return the transition of a kernel as a polynomial of vectors; None if it is not one."""
     if kernel.transition is None:
         return None
     try:
@@ -39,10 +39,10 @@ def extract_core(kernel: Kernel) -> Core | None:
 
 
 def expansion(core: Core) -> str:
-    """Tell why a transition should not be expanded; "" if it should.
+    """Return the reason why a transition should not be expanded; "" if it should.
 
-    The number of terms is known beforehand: of n vectors there are n (n + 1) / 2 scalar products, and the terms are
-    all products of these to the degree of the transition, with each vector and each cross product.
+    The number of terms follows from the number n of vectors and the degree: n vectors have n (n + 1) / 2 scalar
+    products, and the terms are all products of these up to the degree, with each vector and each cross product.
 
     Raises
     ------
@@ -53,7 +53,7 @@ def expansion(core: Core) -> str:
     products = vectors * (vectors + 1) // 2
 
     def scalars(most: int) -> int:
-        """Return the number of products of scalar products up to a degree in the vectors."""
+        """Return the number of monomials in the scalar products up to a degree in the vectors."""
         return math.comb(most // 2 + products, products) if most >= 0 else 0
 
     crosses = vectors * (vectors - 1) // 2
@@ -76,19 +76,22 @@ def forms(core: Core) -> list[list[Assignment]]:
     Returns
     -------
     list of list of Assignment
-        Each assigns all elements of the transition; empty if the transition does not turn with its inputs.
+        Each assigns all elements of the transition; empty if it does not commute with rotations of its inputs.
     """
     try:
-        found = plans(core, decompose(core))
+        ranked = plans(core, decompose(core))
     except NotCovariantError:
         return []
     base, elements = core.base(), core.transition.elements
     written = []
-    for plan in found[:_WRITTEN]:
+    for plan in ranked[:_WRITTEN]:
         vectors = plan.pool.vectors.values()
         writer = Writer(plan, [v.name for v in vectors if len(independent([*base, v.form])) == len(base)])
-        if core.transition.shape == (3, 3):
-            written.append(writer.matrix(elements))
-        else:
-            written.append(writer.quaternion({element[-1]: element for element in elements}))
+        try:
+            if core.transition.shape == (3, 3):
+                written.append(writer.matrix(elements))
+            else:
+                written.append(writer.quaternion({element[-1]: element for element in elements}))
+        except NameClashError:  # another basis has other names, and the stages have their own
+            continue
     return written

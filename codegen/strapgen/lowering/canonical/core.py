@@ -1,4 +1,4 @@
-"""The core of a kernel: its transition as a function of a few vectors that are linear in the inputs."""
+"""The core of a kernel is its transition as a function of a few vectors that are linear in the inputs."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from strapgen.signal import Signal
 
 @dataclass(frozen=True)
 class _Degree:
-    """The degree of a polynomial, where only that is looked at."""
+    """The degree of a polynomial; sums and products of degrees follow those of the polynomials."""
 
     value: int
 
@@ -40,11 +40,11 @@ class Core:
     inputs : list of str
         Names of the input vectors.
     vectors : dict of str to (Signal, Form)
-        Elements, meaning, and coefficients along the inputs, of the vectors that the transition needs.
+        The vectors that the transition needs, by name: the signal, and the coefficients along the inputs.
     stages : list of Stage
-        From these vectors to the transition, which is the last.
+        Stages that lead from these vectors to the transition, which is the last.
     whole : Form or None
-        The sum of the increments of the step, where the inputs are increments in the order of time.
+        The sum of the increments of the step if the inputs are increments in the order of time.
     """
 
     inputs: list[str]
@@ -58,12 +58,12 @@ class Core:
         return self.stages[-1].signal
 
     def evaluate(self, values: dict[str, Any]) -> list[Any]:
-        """Return the transition's elements from values for the elements of the vectors."""
+        """Return the elements of the transition for given elements of the vectors."""
         known = evaluate_stages(self.stages, values)
         return [known[name] for name in self.transition.elements]
 
     def degree(self) -> int:
-        """Return a bound of the degree of the transition in the vectors.
+        """Return an upper bound of the degree of the transition in the vectors.
 
         Raises
         ------
@@ -78,13 +78,22 @@ class Core:
             raise NotCovariantError("the transition is no polynomial") from None
 
     def base(self) -> list[Form]:
-        """Return vectors that are independent and span the others."""
+        """Return independent vectors that span all the others."""
         forms = [form for _, form in self.vectors.values()]
         return [forms[k] for k in independent(forms)]
 
 
 def extract(kernel: Kernel) -> Core:
     """Separate the stages of a kernel that are linear in its input vectors from the rest.
+
+    Parameters
+    ----------
+    kernel : Kernel
+        With a transition; all its inputs but the first, the state, are increments or rates.
+
+    Returns
+    -------
+    Core
 
     Raises
     ------
@@ -109,16 +118,21 @@ def extract(kernel: Kernel) -> Core:
         form = _linear(stage, columns)
         if form is None:
             stages.append(stage)
+        elif stage.signal.name in vectors:
+            raise NotCovariantError(f"two vectors are called {stage.signal.name}")
         else:
             vectors[stage.signal.name] = stage.signal, form
         if stage.signal.name == kernel.transition:
             break
-    labels = {element.rsplit("_", 1)[-1] for element in stages[-1].signal.elements}
-    if stages[-1].signal.shape != (3, 3) and labels != set("xyzs"):
+    elements = stages[-1].signal.elements
+    prefix = elements[0].rpartition("_")[0]
+    if stages[-1].signal.shape != (3, 3) and {*elements} != {f"{prefix}_{label}" for label in "xyzs"}:
         raise NotCovariantError(f"the transition of {kernel.name} is neither a quaternion nor a matrix")
     used = set().union(*(e.free_symbols for stage in stages for e in stage.expressions))
     for k, (name, vector) in enumerate(inputs.items()):
         if used & {column[k] for column in columns}:
+            if name in vectors:
+                raise NotCovariantError(f"two vectors are called {name}")
             vectors[name] = vector, tuple(Fraction(int(j == k)) for j in range(len(inputs)))
     needed = {symbol.name for symbol in used}
     vectors = {name: (s, form) for name, (s, form) in vectors.items() if needed & set(s.elements)}
@@ -134,36 +148,35 @@ def extract(kernel: Kernel) -> Core:
 def decompose(core: Core) -> Decomposition:
     """Return the covariant decomposition of a core's transition in the vectors of its base.
 
-    It is found in a rotated frame and checked in all coordinates.
+    The coefficients are solved for in a rotated frame, where many coordinates are zero, and checked in all coordinates.
 
     Raises
     ------
     NotCovariantError
-        If the transition does not turn with its vectors, or is no polynomial.
+        If the transition does not commute with rotations of its vectors, or is no polynomial.
     """
     base = core.base()
     frame = Frame(len(base))
     elements = _transition(core, base, frame.ring, frame.vectors)
     if core.transition.shape == (3, 3):
-        found = frame.matrix(elements)
+        decomposition = frame.matrix(elements)
     else:
         by_label = dict(zip((e[-1] for e in core.transition.elements), elements, strict=True))
-        found = frame.quaternion([by_label[axis] for axis in "xyz"], by_label["s"])
+        decomposition = frame.quaternion([by_label[axis] for axis in "xyz"], by_label["s"])
     ring, vectors = _coordinates(len(base))
     expected = _transition(core, base, ring, vectors)
-    values = found.evaluate(vectors)
-    if found.scalar is not None:
+    values = decomposition.evaluate(vectors)
+    if decomposition.scalar is not None:
         values = [dict(zip("xyzs", values, strict=True))[e[-1]] for e in core.transition.elements]
     if [ring(value) for value in values] != expected:
         raise NotCovariantError("the transition does not turn with its vectors")
-    return found
+    return decomposition
 
 
 def verify(core: Core, program: Program) -> None:
     """Check that a program computes the transition of a core, as an identity between polynomials.
 
-    The identity is in all elements of all inputs, in coordinates in which the transition needs as few of them
-    as possible.
+    The identity covers all elements of all inputs, in coordinates of which the transition needs as few as possible.
 
     Raises
     ------
@@ -187,7 +200,7 @@ def verify(core: Core, program: Program) -> None:
 
 
 def _coordinates(count: int) -> tuple[Any, list[list[Any]]]:
-    """Return a ring of polynomials in the coordinates of so many vectors, and the vectors."""
+    """Return the ring of polynomials in the coordinates of `count` vectors, and the vectors in it."""
     ring, *generators = sp.ring([f"y{k}_{axis}" for k in range(count) for axis in "xyz"], sp.QQ)
     return ring, [generators[3 * k : 3 * k + 3] for k in range(count)]
 
@@ -218,7 +231,7 @@ def _transition(core: Core, base: list[Form], ring: Any, vectors: list[list[Any]
 
 
 def _linear(stage: Stage, columns: list[list[sp.Symbol]]) -> Form | None:
-    """Return the coefficients of a stage that is the same combination of the input vectors on every axis."""
+    """Return the coefficients of a stage along the input vectors; None if they differ between the axes."""
     if len(stage.expressions) != 3:
         return None
     forms = []

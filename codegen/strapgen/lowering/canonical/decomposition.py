@@ -1,10 +1,10 @@
-"""Covariant decomposition: a transition in terms of scalar and cross products of its vectors.
+"""Covariant decomposition writes a transition in terms of scalar and cross products of its vectors.
 
-Every transition here turns with its inputs. So its scalars are polynomials in the scalar products (and triple
-products) of the vectors, its vectors are sums of vectors and cross products with such coefficients, and its
-symmetric matrices are sums of the unit matrix and of symmetrized products of two vectors. The coefficients are
-found in a rotated frame, where the first vector lies along x and the second in the xy plane: one small linear
-system for every degree in each vector.
+A transition that commutes with rotations of its inputs has scalars that are polynomials in the scalar products (and
+triple products) of the vectors, vectors that are sums of vectors and cross products with such coefficients, and
+symmetric matrices that are sums of the unit matrix and of symmetrized products of two vectors. The coefficients
+follow from one small linear system for every degree in each vector, in a rotated frame whose x axis lies along the
+first vector and whose xy plane contains the second.
 """
 
 from __future__ import annotations
@@ -22,8 +22,9 @@ from sympy.polys.matrices import DomainMatrix
 from strapgen.algebra import cross_elements, dot, exact
 from strapgen.lowering.polynomials import Monomial, Polynomial, add, substitute
 
-#: What a coefficient belongs to: () a scalar or the unit matrix; (i,) vector i; (i, j) the cross product i x j in
-#: a vector, the symmetrized product of i and j in a matrix; (i, j, k) the symmetrized product of i and j x k.
+#: The covariant that a coefficient multiplies: () is a scalar or the unit matrix; (i,) is vector i; (i, j) is the cross
+#: product i x j in a vector and the symmetrized product of i and j in a matrix; (i, j, k) is the symmetrized product
+#: of i and j x k.
 Covariant = tuple[int, ...]
 #: The coefficient of every covariant, a polynomial in the products (i, j) = i . j and (i, j, k) = i . (j x k).
 Coefficients = dict[Covariant, Polynomial]
@@ -35,7 +36,7 @@ _UNIT = [1, 0, 0, 1, 0, 1]
 
 
 class NotCovariantError(ValueError):
-    """A transition does not turn with its inputs."""
+    """A transition does not commute with rotations of its inputs."""
 
 
 @dataclass(frozen=True)
@@ -58,11 +59,11 @@ class Decomposition:
 
     def coefficients(self) -> list[Polynomial]:
         """Return all polynomials."""
-        own = [] if self.scalar is None else [self.scalar]
-        return [*own, *self.vector.values(), *self.symmetric.values()]
+        scalars = [] if self.scalar is None else [self.scalar]
+        return [*scalars, *self.vector.values(), *self.symmetric.values()]
 
     def evaluate(self, vectors: list[list[Any]]) -> list[Any]:
-        """Return the transition's elements, x, y, z, scalar or row by row, for vectors of numbers or polynomials."""
+        """Return the elements of the transition (x, y, z, s, or row by row) for vectors of numbers or polynomials."""
 
         def value(polynomial: Polynomial) -> Any:
             total: Any = 0
@@ -96,7 +97,7 @@ class Decomposition:
 
 
 class Frame:
-    """Vectors in a rotated frame: polynomials in the coordinates that are not zero there.
+    """Vectors in a rotated frame, as polynomials in those coordinates that are not zero in it.
 
     Parameters
     ----------
@@ -115,22 +116,34 @@ class Frame:
         self._values: dict[Monomial, Any] = {(): self.ring.one}
 
     def quaternion(self, vector: list[Any], scalar: Any) -> Decomposition:
-        """Decompose a quaternion, given by its polynomials in the frame's coordinates.
+        """Decompose a quaternion.
+
+        Parameters
+        ----------
+        vector : list of ring element
+            Its vector part, three polynomials in the coordinates of the frame.
+        scalar : ring element
+            Its scalar part.
 
         Raises
         ------
         NotCovariantError
-            If it does not turn with the vectors.
+            If it does not commute with rotations of the vectors.
         """
         return Decomposition(self._solve([scalar], self._scalars).get((), {}), self._vector(vector), {})
 
     def matrix(self, m: list[Any]) -> Decomposition:
-        """Decompose a 3 x 3 matrix, given row by row.
+        """Decompose a 3 x 3 matrix.
+
+        Parameters
+        ----------
+        m : list of ring element
+            Its nine elements, row by row, as polynomials in the coordinates of the frame.
 
         Raises
         ------
         NotCovariantError
-            If it does not turn with the vectors.
+            If it does not commute with rotations of the vectors.
         """
         half = sp.Rational(1, 2)
         skew = [(m[7] - m[5]) * half, (m[2] - m[6]) * half, (m[3] - m[1]) * half]
@@ -144,8 +157,8 @@ class Frame:
         yield (), [self.ring.one], degree
 
     def _vectors(self, degree: _Degree) -> Iterator[tuple[Covariant, list[Any], _Degree]]:
-        # With products of two as coefficients the vectors are odd, the cross products even; triple products
-        # would add nothing: (a . b x c) d is a sum of cross products, (a . b x c) d x e one of vectors.
+        # Scalar products have an even degree, so odd degrees need vectors and even degrees cross products. Triple
+        # products would add nothing: (a . b x c) d is a sum of cross products, (a . b x c) d x e a sum of vectors.
         u = self.vectors
         if sum(degree) % 2:
             for i in range(self.count):
@@ -155,7 +168,7 @@ class Frame:
                 yield (i, j), cross_elements(u[i], u[j]), _less(degree, i, j)
 
     def _symmetrics(self, degree: _Degree) -> Iterator[tuple[Covariant, list[Any], _Degree]]:
-        # Products with the first vector come first: where several sums are equal, they are preferred.
+        # Products with the first vector come first, so that they are preferred where several sums are equal.
         u = self.vectors
         for i in range(self.count):
             if sum(degree) % 2:
@@ -169,7 +182,7 @@ class Frame:
     def _solve(
         self, elements: list[Any], ansatz: Callable[[_Degree], Iterator[tuple[Covariant, list[Any], _Degree]]]
     ) -> Coefficients:
-        found: Coefficients = {}
+        solved: Coefficients = {}
         for degree, target in self._by_degree(elements).items():
             labels: list[tuple[Covariant, Monomial]] = []
             rows: dict[Any, dict[int, Any]] = {}
@@ -192,8 +205,8 @@ class Frame:
                 if coefficient:
                     covariant, monomial = labels[pivot]
                     value = Fraction(int(coefficient.numerator), int(coefficient.denominator))
-                    found.setdefault(covariant, {})[monomial] = value
-        return found
+                    solved.setdefault(covariant, {})[monomial] = value
+        return solved
 
     def _by_degree(self, elements: list[Any]) -> dict[_Degree, dict[Any, Any]]:
         parts: dict[_Degree, dict[Any, Any]] = {}
@@ -220,9 +233,9 @@ def invariants(degree: _Degree, triple: bool = False) -> tuple[Monomial, ...]:
     Parameters
     ----------
     degree : tuple of int
-        How often each vector occurs; none exist where one is negative.
+        How often each vector occurs; with a negative number there are no products.
     triple : bool, optional
-        Whether one triple product may occur: two are a sum of products of scalar products.
+        Whether a triple product may occur; one is enough, since two are a sum of products of scalar products.
     """
     if min(degree) < 0:
         return ()
@@ -258,7 +271,11 @@ def transform(decomposition: Decomposition, matrix: list[list[Fraction]]) -> Dec
     ----------
     decomposition : Decomposition
     matrix : list of list of Fraction
-        Row i has the components of the old vector i along the new ones.
+        Row i holds the components of the old vector i along the new ones.
+
+    Returns
+    -------
+    Decomposition
     """
     expansions = {(i,): {(j,): c for j, c in enumerate(row) if c} for i, row in enumerate(matrix)}
 
@@ -284,16 +301,16 @@ def transform(decomposition: Decomposition, matrix: list[list[Fraction]]) -> Dec
     def coefficients(
         old: Coefficients, canonical: Callable[[Covariant], tuple[Covariant, int]]
     ) -> Coefficients:
-        found: Coefficients = {}
+        transformed: Coefficients = {}
         for covariant, polynomial in old.items():
             moved = substitute(polynomial, product_of)
             for (new,), factor in expand(covariant, canonical).items():
-                total = add(found.get(new, {}), moved, factor)
+                total = add(transformed.get(new, {}), moved, factor)
                 if total:
-                    found[new] = total
+                    transformed[new] = total
                 else:
-                    found.pop(new, None)
-        return found
+                    transformed.pop(new, None)
+        return transformed
 
     return Decomposition(
         None if decomposition.scalar is None else substitute(decomposition.scalar, product_of),

@@ -1,4 +1,4 @@
-"""Plans: a decomposition in a chosen basis as vectors to compute, before it becomes scalar code."""
+"""A plan lists the vectors to compute for a decomposition in a chosen basis, before they become scalar code."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Weighted:
 
 
 class Opened(Enum):
-    """Which cross products in the skew part go into outer products: u z' - z u' is the skew matrix of z x u."""
+    """The cross products in the skew part that go into outer products; u z' - z u' is the skew matrix of z x u."""
 
     NONE = "none"
     PLAIN = "those of two vectors"
@@ -41,7 +41,7 @@ class Opened(Enum):
 
 
 class Sides(Enum):
-    """Which outer products of a vector u of the basis and its partner y a matrix has."""
+    """The outer products that a matrix has of a vector u of the basis and its partner y."""
 
     BOTH = "u y' + y u'"
     PARALLEL = "u y', y along u"
@@ -51,7 +51,7 @@ class Sides(Enum):
 
 @dataclass(frozen=True)
 class Outer:
-    """A part of a matrix: outer products of a vector of the basis and its partner."""
+    """Outer products of a vector of the basis and its partner, as one part of a matrix."""
 
     vector: str
     partner: str
@@ -60,7 +60,7 @@ class Outer:
 
 @dataclass
 class Plan:
-    """What a transition is computed from.
+    """The vectors, weights and outer products from which a transition is computed.
 
     Parameters
     ----------
@@ -68,6 +68,12 @@ class Plan:
         Vectors that are linear in the inputs.
     basis : list of str
         Names of the vectors to which the products in the weights refer.
+    definitions : list of Cross or Weighted
+        Cross products and weighted sums, in the order of computation.
+    scalars : dict of str to (Polynomial, str)
+        The scalar part of a quaternion or the diagonal of a matrix, with its meaning.
+    outers : list of Outer
+        The outer products of a matrix; empty for a quaternion.
     """
 
     pool: Pool
@@ -92,12 +98,12 @@ class Planner:
     Parameters
     ----------
     plan : Plan
-        With pool and basis.
+        Holds a pool and a basis; the rest is filled in.
     weighted : bool
-        Whether weights are applied before cross products that share a factor, which saves cross products; or
-        after, which lets sums share them.
+        If true, weights are applied before cross products that share a factor, which saves cross products; if
+        false, they are applied after, so that sums can share the cross products.
     opened : Opened, optional
-        Which cross products in the skew part of a matrix are taken into its outer products.
+        Which cross products in the skew part of a matrix move into its outer products.
     """
 
     def __init__(self, plan: Plan, weighted: bool, opened: Opened = Opened.NONE) -> None:
@@ -107,13 +113,13 @@ class Planner:
         self._degrees: Counter[int] = Counter()
 
     def quaternion(self, decomposition: Decomposition, name: str) -> None:
-        """Plan a quaternion: its vector part, under the quaternion's own name, and its scalar part."""
+        """Plan the vector part of a quaternion, under the name of the quaternion, and its scalar part."""
         self._count_edges([decomposition.vector])
         self.plan.scalars["scalar"] = (decomposition.scalar or {}, "its scalar part")
         self._sum(name, decomposition.vector, "the step applied to the identity: its vector part")
 
     def matrix(self, decomposition: Decomposition) -> None:
-        """Plan a matrix: the vector of its skew part, and outer products of vectors of the basis and partners."""
+        """Plan the vector of the skew part of a matrix, and outer products of vectors and their partners."""
         symmetric, skew = decomposition.symmetric, dict(decomposition.vector)
         names = self.plan.basis
         chosen = _axes(symmetric)
@@ -158,9 +164,14 @@ class Planner:
             shared, common = [(ONE, f"{name}_common")], {}
         for side, kind in zip(sides, (Sides.RIGHT, Sides.LEFT), strict=True):
             if side or shared or common:
-                own = f"{name}_{kind.name.lower()}"
-                self._sum(own, side | common, f"{kind.name.lower()} of {vector} in an outer product", shared)
-                self.plan.outers.append(Outer(vector, own, kind))
+                partner_name = f"{name}_{kind.name.lower()}"
+                self._sum(
+                    partner_name,
+                    side | common,
+                    f"{kind.name.lower()} of {vector} in an outer product",
+                    shared,
+                )
+                self.plan.outers.append(Outer(vector, partner_name, kind))
 
     def _count_edges(self, vectors: Iterable[Coefficients]) -> None:
         for coefficients in vectors:
@@ -205,7 +216,7 @@ class Planner:
             self.plan.definitions.append(definition)
 
     def _grouped(self, columns: dict[int, Polynomial]) -> list[tuple[Polynomial, str]]:
-        """Return weights and vectors; vectors with proportional weights are summed first where it pays."""
+        """Return weights and vectors, with vectors of proportional weights summed first where that saves operations."""
         groups: list[tuple[Polynomial, list[tuple[Fraction, int]]]] = []
         for index, polynomial in columns.items():
             for first, members in groups:
@@ -222,18 +233,18 @@ class Planner:
                 whole = tuple(
                     sum((c * forms[i][k] for c, i in members), Fraction(0)) for k in range(len(forms[0]))
                 )
-                found = self.plan.pool.find(whole)
-                if found is None and all(abs(c) == 1 for c, _ in members):
-                    found = self.plan.pool.define(whole)
-                if found is not None:
-                    terms.append((scale(polynomial, found[1]), found[0]))
+                known = self.plan.pool.find(whole)
+                if known is None and all(abs(c) == 1 for c, _ in members):
+                    known = self.plan.pool.define(whole)
+                if known is not None:
+                    terms.append((scale(polynomial, known[1]), known[0]))
                     continue
             terms += [(scale(polynomial, c), self.plan.basis[i]) for c, i in members]
         return terms
 
 
 def _take_lever(skew: Coefficients, axis: int) -> Coefficients:
-    """Take the cross products z x u with a vector u of the basis out of a skew part and return z."""
+    """Remove the cross products z x u with a vector u of the basis from a skew part and return z."""
     lever: Coefficients = {}
     for covariant in [c for c in skew if len(c) == 2 and axis in c]:
         i, j = covariant
@@ -243,18 +254,18 @@ def _take_lever(skew: Coefficients, axis: int) -> Coefficients:
 
 
 def _take_triple(skew: Coefficients, axis: int, partner: Coefficients, sign: int) -> Coefficients:
-    """Take (a x b) x u, for cross products a x b in a partner of u, out of a skew part and return the a x b.
+    """Remove (a x b) x u, for cross products a x b in a partner of u, from a skew part and return the a x b.
 
     (a x b) x u is (a . u) b - (b . u) a. The weights are those in the partner, or their negatives.
     """
     lever: Coefficients = {c: scale(p, sign) for c, p in partner.items() if len(c) == 2}
     for covariant, polynomial in lever.items():
         a, b = covariant
-        for kept, other, factor in ((b, a, -1), (a, b, 1)):
+        for remaining, other, factor in ((b, a, -1), (a, b, 1)):
             product = {tuple(sorted((*m, tuple(sorted((other, axis)))))): c for m, c in polynomial.items()}
-            total = add(skew.pop((kept,), {}), product, factor)
+            total = add(skew.pop((remaining,), {}), product, factor)
             if total:
-                skew[kept,] = total
+                skew[remaining,] = total
     return lever
 
 
@@ -270,10 +281,10 @@ def _axes(symmetric: Coefficients) -> list[int]:
 
 
 def without_triples(decomposition: Decomposition) -> list[Decomposition]:
-    """Return those with the fewest axes of a decomposition and its equals by the relation of triple products.
+    """Return the forms with the fewest axes of a decomposition; an axis is a first factor of outer products.
 
     u1 (u2 x u3)' + u2 (u3 x u1)' + u3 (u1 x u2)', symmetrized, is twice the triple product times the unit
-    matrix: any one of the three can be exchanged for the others. An axis is a first factor of outer products.
+    matrix, so each of the three terms can be exchanged for the other two.
     """
     variants = [decomposition]
     for covariant, coefficient in decomposition.symmetric.items():

@@ -1,4 +1,7 @@
-"""Which scalar products to compute: the same polynomial is short in some and long in others."""
+"""The choice of scalar products to compute.
+
+The same polynomial can be short in some scalar products and long in others.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,7 @@ from fractions import Fraction
 from strapgen.lowering.canonical.vectors import Form, components
 from strapgen.lowering.polynomials import Polynomial, atom, atoms, substitute
 
-#: The operations that a scalar product takes, in units of those that a term of a polynomial takes.
+#: The weight of a scalar product in the cost, in factors of a term.
 _PRODUCT = 3
 
 
@@ -18,7 +21,7 @@ def choose_products(
 ) -> list[Polynomial]:
     """Rewrite polynomials in the scalar products in which they are shortest.
 
-    One product after the other is exchanged for a product of vectors on offer, as long as that saves
+    One product after another is exchanged for another product of the vectors on offer, as long as that saves
     operations.
 
     Parameters
@@ -28,16 +31,16 @@ def choose_products(
     basis : sequence of (str, Form)
         Names and coefficients of the basis.
     offered : dict of str to Form
-        Vectors that products may be taken of, the basis among them; none outside its span.
+        Vectors whose products may be used: those of the basis, and others within its span.
 
     Returns
     -------
     list of Polynomial
-        In products of names.
+        In products (name, name) and (name, name, name), in the order of `polynomials`.
     """
     names = [name for name, _ in basis]
     current = [substitute(p, lambda factor: atom(tuple(names[k] for k in factor))) for p in polynomials]
-    # Every product on offer in the products of the basis, and so in those that stand for them.
+    # Every product on offer is written in products of the basis; each exchange rewrites these expansions too.
     expansions: dict[tuple[str, ...], Polynomial] = {}
     along = {name: components(form, [form for _, form in basis]) for name, form in offered.items()}
     for a, b in itertools.combinations_with_replacement(offered, 2):
@@ -60,8 +63,8 @@ def choose_products(
                 value = {m: -c / coefficient for m, c in expansion.items() if m != (old,)}
                 value[new,] = 1 / coefficient
                 tried = [_exchange(p, old, value) for p in current]
-                if (found := _cost(tried)) < cost:
-                    cost, best = found, (new, old, value, tried)
+                if (reduced := _cost(tried)) < cost:
+                    cost, best = reduced, (new, old, value, tried)
         if best is None:
             return current
         new, old, value, current = best

@@ -1,4 +1,4 @@
-"""The search for the basis in which a transition takes the fewest operations."""
+"""Search for the basis in which a transition takes the fewest operations."""
 
 from __future__ import annotations
 
@@ -21,22 +21,27 @@ from strapgen.lowering.canonical.vectors import (
 from strapgen.lowering.canonical.writing import unsigned
 from strapgen.lowering.polynomials import Polynomial, atoms
 
-#: How many bases that look cheap are planned in every way.
+#: How many bases, those with the lowest first guess, are planned in every way.
 _PLANNED = 30
-#: Most products of vectors that are expanded to look at bases.
+#: Most products of vectors that are expanded in order to compare bases.
 _EXPANSIONS = 300_000
-#: A decomposition with more terms gains nothing over the stages.
+#: Most terms of a decomposition that can still be shorter than the stages.
 _MOST_TERMS = 500
 
 
 def plans(core: Core, decomposition: Decomposition) -> list[Plan]:
-    """Return plans for a transition, the one that looks cheapest first; none where the stages must be cheaper.
+    """Return plans for a transition, the one with the lowest estimate first.
 
     Parameters
     ----------
     core : Core
     decomposition : Decomposition
         In the vectors of the core's base.
+
+    Returns
+    -------
+    list of Plan
+        Empty if the decomposition has so many terms that the stages must be cheaper.
     """
     base = core.base()
     count = len(base)
@@ -45,15 +50,15 @@ def plans(core: Core, decomposition: Decomposition) -> list[Plan]:
         return []
     expansions = sum(count ** sum(map(len, monomial)) for monomial in terms)
     forms, names = _candidates(core)
-    found: list[tuple[int, tuple[Form, ...], Decomposition]] = []
+    bases: list[tuple[int, tuple[Form, ...], Decomposition]] = []
     choices = (c for c in itertools.combinations(forms, count) if len(independent(c)) == count)
     for basis in itertools.islice(choices, 1 + _EXPANSIONS // expansions):
         moved = transform(decomposition, [components(form, basis) for form in base])
-        found.append((_outlook(moved) + 3 * sum(map(_terms, basis)), basis, moved))
-    found.sort(key=lambda entry: entry[0])
+        bases.append((_outlook(moved) + 3 * sum(map(_terms, basis)), basis, moved))
+    bases.sort(key=lambda entry: entry[0])
     ranked = [
         (_estimate(plan), plan)
-        for _, basis, moved in found[:_PLANNED]
+        for _, basis, moved in bases[:_PLANNED]
         for plan in _plans(core, basis, moved, names)
     ]
     ranked.sort(key=lambda entry: entry[0])
@@ -61,7 +66,7 @@ def plans(core: Core, decomposition: Decomposition) -> list[Plan]:
 
 
 def _candidates(core: Core) -> tuple[list[Form], dict[Form, tuple[str, str]]]:
-    """Return vectors that may stand in a basis, and what they are called."""
+    """Return vectors that may stand in a basis, and the name and meaning of those that have one."""
     span = core.base()
     count = len(core.inputs)
     names: dict[Form, tuple[str, str]] = {}
@@ -126,7 +131,7 @@ def _terms(form: Form) -> int:
 
 
 def _outlook(decomposition: Decomposition) -> int:
-    """Return a first guess at the operations of a decomposition."""
+    """Return a first guess at the number of operations of a decomposition."""
     polynomials = decomposition.coefficients()
     vectors = len(decomposition.vector) + len(decomposition.symmetric)
     axes = {c[0] for c in decomposition.symmetric if c}
@@ -136,7 +141,7 @@ def _outlook(decomposition: Decomposition) -> int:
 
 
 def _estimate(plan: Plan) -> int:
-    """Return about how many operations a plan takes."""
+    """Return an estimate of the number of operations of a plan."""
     total = sum({Sides.BOTH: 21, Sides.PARALLEL: 12}.get(outer.sides, 15) for outer in plan.outers)
     weights: dict[object, Polynomial] = {}
     needed: list[str] = []

@@ -21,8 +21,9 @@ class Vector:
     form : tuple of Fraction
         Its coefficients along the input vectors.
     parts : tuple of (Fraction, str)
-        The sum by which it is computed; empty for an input.
+        Coefficients and names of the vectors whose sum it is; empty for an input.
     meaning : str
+        What it is, for the reader of generated code; "" if there is nothing to say.
     """
 
     name: str
@@ -32,7 +33,7 @@ class Vector:
 
     @property
     def operations(self) -> int:
-        """Operations on scalars that computing it takes."""
+        """Number of scalar operations that the vector takes."""
         products = sum(abs(coefficient) != 1 for coefficient, _ in self.parts)
         return 3 * (products + max(len(self.parts) - 1, 0))
 
@@ -61,7 +62,7 @@ def mirrored(form: Form) -> Form:
 
 
 def independent(forms: Sequence[Form]) -> list[int]:
-    """Return the places of the first forms that span all of them."""
+    """Return the indices of the first forms that span all of them."""
     rows: list[list[Fraction]] = []
     chosen = []
     for place, form in enumerate(forms):
@@ -108,7 +109,7 @@ class Pool:
     inputs : list of str
         Names of the input vectors.
     names : dict of Form to (str, str)
-        Name and meaning of forms that have one in the field.
+        Name and meaning of the forms that have a name in the field.
     """
 
     def __init__(self, inputs: list[str], names: dict[Form, tuple[str, str]]) -> None:
@@ -126,7 +127,7 @@ class Pool:
         return other
 
     def operations(self, names: Iterable[str]) -> int:
-        """Return how many operations on scalars the vectors of given names take; others are none of the pool's."""
+        """Return the number of scalar operations of vectors and their parts; names outside the pool are free."""
         needed = set(names)
         for vector in reversed(self.vectors.values()):
             if vector.name in needed:
@@ -134,7 +135,7 @@ class Pool:
         return sum(vector.operations for vector in self.vectors.values() if vector.name in needed)
 
     def find(self, form: Form) -> tuple[str, Fraction] | None:
-        """Return the vector that is proportional to a form, and form / vector."""
+        """Return the vector that is proportional to a form, and the ratio form / vector; None if there is none."""
         for vector in self.vectors.values():
             factor = proportion(form, vector.form)
             if factor is not None:
@@ -142,16 +143,16 @@ class Pool:
         return None
 
     def define(self, form: Form) -> tuple[str, Fraction]:
-        """Return the vector that is proportional to a form and form / vector; define it if it is new."""
-        found = self.find(form)
-        if found:
-            return found
+        """Return the vector that is proportional to a form, and the ratio form / vector; define it if it is new."""
+        known = self.find(form)
+        if known:
+            return known
         unit = normalized(form)
         self._add(unit, self._sum_of_two(unit) or self._sum_of_pairs(unit) or self._sum_of_inputs(unit))
         return self.define(form)
 
     def define_mirrored(self, form: Form) -> None:
-        """Define a form and its mirror image together: the sum and the difference of two halves."""
+        """Define a form and its mirror image together, as the sum and the difference of their even and odd halves."""
         other = mirrored(form)
         halves = [tuple((x + s * y) / 2 for x, y in zip(form, other, strict=True)) for s in (1, -1)]
         if not all(map(any, halves)):
@@ -161,11 +162,11 @@ class Pool:
         odd = tuple(scale * x for x in halves[1])
         names = []
         for half in (even, odd):
-            found = self.find(half)
-            if found is None:
+            known = self.find(half)
+            if known is None:
                 names.append(self._add(half, self._sum_of_pairs(half) or self._sum_of_inputs(half)))
-            elif found[1] == 1:
-                names.append(found[0])
+            elif known[1] == 1:
+                names.append(known[0])
             else:
                 return
         for sign in (1, -1):
@@ -179,7 +180,7 @@ class Pool:
         return name
 
     def _sum_of_two(self, form: Form) -> tuple[tuple[Fraction, str], ...] | None:
-        """Return a form as the sum or difference of two vectors that have a name already."""
+        """Return a form as the sum or difference of two vectors of the pool; None if it is not one."""
         names = list(self.vectors)
         for k, first in enumerate(names):
             for second in names[k + 1 :]:
@@ -191,7 +192,7 @@ class Pool:
         return None
 
     def _sum_of_pairs(self, form: Form) -> tuple[tuple[Fraction, str], ...] | None:
-        """Return a form that is even or odd in time through sums or differences of pairs of inputs."""
+        """Return a form that is even or odd in time as sums or differences of pairs of inputs; None for others."""
         sign = next((s for s in (1, -1) if form == tuple(s * x for x in mirrored(form))), None)
         count = len(form)
         if sign is None or sum(map(bool, form)) < 3:

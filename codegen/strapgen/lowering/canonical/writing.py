@@ -1,4 +1,4 @@
-"""Plans as straight-line code on scalars."""
+"""Plans are written as straight-line code on scalars."""
 
 from __future__ import annotations
 
@@ -22,8 +22,12 @@ from strapgen.lowering.canonical.products import choose_products
 from strapgen.lowering.polynomials import Polynomial, ratio
 from strapgen.program import Assignment, Constant, Node, Operation, Reference
 
-#: A summand of a vector: its coefficient, its weight if that is no number, and the vector's name.
+#: A summand of a vector: its coefficient, its weight unless that is a number, and the name of the vector.
 _Summand = tuple[Fraction, Reference | None, str]
+
+
+class NameClashError(ValueError):
+    """A vector of the kernel has the name of a quantity that canonical forms have."""
 
 
 class Writer:
@@ -33,13 +37,17 @@ class Writer:
     ----------
     plan : Plan
     offered : sequence of str
-        Names of vectors, the basis among them and in its span, that scalar products may be taken of.
+        Names of vectors whose scalar products may be used: those of the basis, and others within its span.
     """
 
     def __init__(self, plan: Plan, offered: Sequence[str]) -> None:
         self._plan = plan
         self._body: list[Assignment] = []
-        self._names: set[str] = set()
+        inputs = (v.name for v in plan.pool.vectors.values() if not v.parts)
+        self._names: dict[str, Node] = {
+            n: Reference(n) for v in inputs for n in (f"{v}_{axis}" for axis in "xyz")
+        }
+        self._scalar_products: set[str] = set()
         self._scalars: list[tuple[Polynomial, str]] = []
         vectors = plan.pool.vectors
         polynomials = plan.polynomials()
@@ -106,7 +114,7 @@ class Writer:
         ]
 
     def _diagonal(self, axis: str) -> list[Node]:
-        """Return what outer products on one side have on the diagonal, the partners of a vector summed."""
+        """Return the diagonal elements of one-sided outer products, with the partners of each vector summed first."""
         partners: dict[str, list[Node]] = {}
         for o in self._plan.outers:
             if o.sides is not Sides.BOTH:
@@ -132,8 +140,7 @@ class Writer:
                 factor, weight = self._weight(polynomial, name, meaning)
                 if weight is not None and uses[unsigned(self._chosen[_key(polynomial)]), vector] > 1:
                     product = f"{vector}_times_{weight.name}"
-                    if f"{product}_x" not in self._names:
-                        self._vector(product, [(Fraction(1), weight, vector)], "")
+                    self._vector(product, [(Fraction(1), weight, vector)], "")
                     weight, vector = None, product
                 summands.append((factor, weight, vector))
             self._vector(definition.name, summands, definition.meaning)
@@ -157,7 +164,7 @@ class Writer:
             self._assign(f"{definition.name}_{axis}", Operation("subtract", products))
 
     def _weight(self, polynomial: Polynomial, name: str, meaning: str) -> tuple[Fraction, Reference | None]:
-        """Return a weight as a number times a scalar that is computed, or as a number alone."""
+        """Return a weight as a number times a computed scalar, or as a number alone."""
         chosen = self._chosen[_key(polynomial)]
         if chosen.keys() <= {()}:
             return chosen.get((), Fraction(0)), None
@@ -183,7 +190,8 @@ class Writer:
 
     def _product_node(self, factor: tuple[str, ...]) -> Node:
         name = "_dot_".join(factor[:2]) + "".join(f"_cross_{n}" for n in factor[2:])
-        if name not in self._names:
+        if name not in self._scalar_products:
+            self._scalar_products.add(name)
             if len(factor) == 3:
                 crosses = [d for d in self._plan.definitions if isinstance(d, Cross)]
                 for k in range(3):
@@ -193,8 +201,7 @@ class Writer:
                 else:
                     one, left, right = factor
                 cross = Cross(f"{left}_cross_{right}", left, right)
-                if f"{cross.name}_x" not in self._names:
-                    self._cross(cross)
+                self._cross(cross)
                 pair = (one, cross.name)
             else:
                 pair = (factor[0], factor[1])
@@ -203,8 +210,10 @@ class Writer:
         return Reference(name)
 
     def _assign(self, name: str, node: Node, meaning: str = "") -> None:
-        if name not in self._names:
-            self._names.add(name)
+        known = self._names.setdefault(name, node)
+        if known != node:
+            raise NameClashError(f"{name} would stand for two quantities")
+        if known is node:
             self._body.append(Assignment(name, node, meaning))
 
 

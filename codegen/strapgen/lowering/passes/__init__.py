@@ -1,4 +1,4 @@
-"""The passes: pure functions from program to program that keep every value and save operations."""
+"""Passes are pure functions from program to program that leave every result unchanged and save operations."""
 
 from __future__ import annotations
 
@@ -26,13 +26,22 @@ PASSES: tuple[Pass, ...] = (
     remove_unused,
 )
 
-
-#: What a division, a root or a function costs beyond a sum.
+#: The extra cost of a division, a root or a function, in sums.
 _LONG = 9
 
 
 def optimize(program: Program) -> Program:
-    """Run all passes, again and again while that saves operations; a pass that would cost some is left out."""
+    """Run all passes repeatedly, as long as that saves operations.
+
+    Parameters
+    ----------
+    program : Program
+
+    Returns
+    -------
+    Program
+        With the same results. The outcome of a pass that would add operations is discarded.
+    """
     while True:
         before = program
         for run in PASSES:
@@ -44,9 +53,9 @@ def optimize(program: Program) -> Program:
 
 
 def cost(program: Program) -> tuple[int, int]:
-    """Return what is to be small: all operations, and of these the multiplications.
+    """Return the cost of a program: first its weighted number of operations, then its number of multiplications.
 
-    A division, root or function takes a processor as long as several sums and products.
+    A division, root or function has a higher weight, since it takes a processor as long as several sums.
     """
     operations = program.operations
     long = sum(operations[kind] for kind in ("divide", "sqrt", "function"))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from strapgen.lowering.names import is_unnamed
+from strapgen.lowering.names import is_temporary
 from strapgen.lowering.passes.rewriting import rewritten, with_values
 from strapgen.program import Constant, Node, Operation, Program, Reference
 
@@ -12,7 +12,7 @@ _EVEN = ("cos", "sinc")
 
 
 def absorb_negations(program: Program) -> Program:
-    """Move signs up the trees until a sum or a constant takes them in; drop those of names that stand for nothing.
+    """Move signs up the trees until a sum or a constant absorbs them; a temporary hands its sign to its users.
 
     Examples
     --------
@@ -31,7 +31,7 @@ def absorb_negations(program: Program) -> Program:
     }
     for place in range(len(program.body)):
         name, inner = program.body[place].name, _inside(program.body[place].value)
-        if inner is None or not is_unnamed(name) or name in results:
+        if inner is None or not is_temporary(name) or name in results:
             continue
 
         def rule(node: Node, name: str = name) -> Node:
@@ -45,18 +45,18 @@ def absorb_negations(program: Program) -> Program:
 
 
 def _inside(node: Node) -> Node | None:
-    """Return what a negation negates."""
+    """Return the argument of a negation; None for other nodes."""
     return node.arguments[0] if isinstance(node, Operation) and node.kind == "negate" else None
 
 
 def _with_signed_constant(value: Node) -> Node:
-    """Give a sign that no sum takes in to a constant factor, if there is one that can carry it."""
+    """Put a sign that no sum has absorbed into a constant factor, if there is one."""
     inner = _inside(value)
     return (_by_constant(inner) or value) if inner is not None else value
 
 
 def _by_constant(node: Node) -> Node | None:
-    """Return the negative of a node without a further operation, the sign in a constant factor."""
+    """Return the negative of a node with the sign in a constant factor; None if it has none."""
     if not isinstance(node, Operation):
         return None
     left, *rest = node.arguments
@@ -64,9 +64,9 @@ def _by_constant(node: Node) -> Node | None:
         return Operation("multiply", (Constant(-left.value), *rest))
     if node.kind == "add":
         for one, other in (node.arguments, node.arguments[::-1]):
-            found = _by_constant(one)
-            if found is not None:
-                return Operation("subtract", (found, other))
+            negative = _by_constant(one)
+            if negative is not None:
+                return Operation("subtract", (negative, other))
     return None
 
 

@@ -1,16 +1,16 @@
-"""The pass `drop_copies`."""
+"""The pass `drop_copies` removes temporaries that are copies of other values."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-from strapgen.lowering.names import is_unnamed
+from strapgen.lowering.names import is_temporary
 from strapgen.lowering.passes.rewriting import rewritten
 from strapgen.program import Constant, Node, Program, Reference, Result
 
 
 def drop_copies(program: Program) -> Program:
-    """Use what a name that stands for nothing was copied from: another name, or a number."""
+    """Replace each temporary that is a copy of a name or of a number by the original."""
     copies: dict[str, Node] = {}
 
     def rule(node: Node) -> Node:
@@ -19,7 +19,7 @@ def drop_copies(program: Program) -> Program:
     body = []
     for assignment in program.body:
         value = rewritten(assignment.value, rule)
-        if isinstance(value, Reference | Constant) and is_unnamed(assignment.name):
+        if isinstance(value, Reference | Constant) and is_temporary(assignment.name):
             copies[assignment.name] = value
         else:
             body.append(replace(assignment, value=value))

@@ -1,8 +1,8 @@
-"""The pass `fold_constants`: numbers meet numbers at derivation time, exactly.
+"""The pass `fold_constants` carries out operations on constants exactly, when code is generated.
 
-Divisions by a constant become multiplications by its reciprocal, which is rounded once, when a target prints it.
-Constants of a product are gathered in front of it; a name that is only ever multiplied by constants gives them its
-own.
+A division by a constant becomes a multiplication by its reciprocal, which is rounded once, when a target prints it.
+The constants of a product become one factor in front of it. If all uses of a temporary multiply it by constants, its
+own constant factor moves into them.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections import defaultdict
 from dataclasses import replace
 from fractions import Fraction
 
-from strapgen.lowering.names import is_unnamed
+from strapgen.lowering.names import is_temporary
 from strapgen.lowering.passes.rewriting import rewritten, uses, with_values
 from strapgen.program import OPERATIONS, Constant, Node, Operation, Program, Reference, references, walk
 
@@ -19,7 +19,7 @@ _EXACT = ("add", "subtract", "multiply", "divide", "negate")
 
 
 def fold_constants(program: Program) -> Program:
-    """Carry out what can be carried out on constants.
+    """Replace operations on constants by their exact values.
 
     Examples
     --------
@@ -82,7 +82,7 @@ def _product(node: Operation) -> Node:
 
 
 def scaling(node: Node) -> tuple[Fraction, Node | None]:
-    """Return a node as a number times something; None where it is the number alone."""
+    """Return a node as a number times another node; None stands for the latter if the node is a number."""
     if isinstance(node, Constant):
         return node.value, None
     if isinstance(node, Operation):
@@ -95,11 +95,11 @@ def scaling(node: Node) -> tuple[Fraction, Node | None]:
 
 
 def _scalings_moved(program: Program) -> Program:
-    """Drop the scaling of names that stand for nothing and are only ever scaled again."""
+    """Move the constant factor of a temporary into its uses if all of these multiply it by constants."""
     scaled = {}
     for assignment in program.body:
         coefficient, rest = scaling(assignment.value)
-        if rest is not None and coefficient != 1 and is_unnamed(assignment.name):
+        if rest is not None and coefficient != 1 and is_temporary(assignment.name):
             scaled[assignment.name] = coefficient, rest
     if not scaled:
         return program

@@ -1,4 +1,4 @@
-"""The pass `horner_schemes`: polynomials are written with nested products."""
+"""The pass `horner_schemes` writes polynomials with nested products."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from strapgen.lowering.passes.rewriting import with_values
 from strapgen.lowering.polynomials import ONE, Polynomial, add, atom, multiply, scale
 from strapgen.program import Constant, Node, Operation, Program
 
-#: Polynomials with more terms are left as they are: expanding them takes long and gains nothing.
+#: Most terms of a polynomial that is rewritten: expanding a longer one takes long and saves no operations.
 _MOST_TERMS = 60
 
 _POLYNOMIAL = ("add", "subtract", "multiply", "negate")
@@ -47,7 +47,7 @@ def _written(node: Node) -> Node:
 
 
 def _polynomial(node: Node, atoms: dict[Node, int]) -> Polynomial | None:
-    """Return a node as a polynomial in what is no sum or product; None where it has too many terms."""
+    """Return a node as a polynomial in those nodes that are no sums or products; None if it has too many terms."""
     if isinstance(node, Constant):
         return scale(ONE, node.value)
     if not isinstance(node, Operation) or node.kind not in _POLYNOMIAL:

@@ -1,4 +1,4 @@
-"""The pass `remove_unused`."""
+"""The pass `remove_unused` drops assignments that no result needs."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""The pass `reuse_values`: equal operations are computed once.
+"""The pass `reuse_values` computes equal operations once.
 
-`share` finds common subexpressions of formulas; once sums and products have been ordered and powers unrolled, a few
-more operations turn out to be equal. They are found here, node by node.
+`share` finds common subexpressions of formulas. After sums and products have been ordered and powers unrolled, a few
+more operations are equal; this pass compares node by node and finds them.
 """
 
 from __future__ import annotations
@@ -50,13 +50,13 @@ def reuse_values(program: Program) -> Program:
 
 
 def _occurrences(program: Program) -> Counter[Node]:
-    """Count equal operations; what stands below one that has been seen is not counted again."""
+    """Count equal operations; the arguments of an operation that occurs again are not counted again."""
     seen: Counter[Node] = Counter()
 
     def visit(node: Node) -> None:
         if not isinstance(node, Operation):
             return
-        if node.kind != "at_least":  # a condition is no value that could be named
+        if node.kind != "at_least":  # a condition cannot be assigned to a name
             seen[node] += 1
         if seen[node] < 2:
             for argument in node.arguments:

@@ -1,4 +1,4 @@
-"""Rewriting the trees of a program from the leaves upwards: what several passes share."""
+"""Functions that rewrite the trees of a program from the leaves upwards, for use in several passes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from strapgen.program import Node, Operation, Program, references
 
 
 def rewritten(node: Node, rule: Callable[[Node], Node]) -> Node:
-    """Return a node with a rule applied to everything in it, arguments before what they belong to."""
+    """Return a node after a rule has been applied to all nodes in it, to arguments before their operation."""
     if isinstance(node, Operation):
         arguments = tuple(rewritten(argument, rule) for argument in node.arguments)
         if any(new is not old for new, old in zip(arguments, node.arguments, strict=True)):
@@ -30,7 +30,7 @@ def with_values(program: Program, change: Callable[[Node], Node]) -> Program:
 
 
 def uses(program: Program) -> Counter[str]:
-    """Count how often each name is used, results included."""
+    """Count how often each name is used, in assignments and in results."""
     counts: Counter[str] = Counter()
     for assignment in program.body:
         counts.update(references(assignment.value))

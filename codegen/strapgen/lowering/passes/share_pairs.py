@@ -1,7 +1,7 @@
-"""The pass `share_pairs`: pairs of terms or factors that occur together are computed once.
+"""The pass `share_pairs` computes pairs of terms or factors that occur together once.
 
-x^2 + y^2 in one sum and x^2 + y^2 + z^2 in another are different trees, and no comparison of trees finds what they
-have in common. Here sums and products are sets: the pair that occurs in most of them gets a name, and so on.
+A comparison of trees does not find what x^2 + y^2 and x^2 + y^2 + z^2 have in common. This pass treats sums and
+products as sets of members: it names the pair that occurs in most of them and repeats this until no pair occurs twice.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 from strapgen.lowering.arithmetic import Term, chain, plain, signed_sum
-from strapgen.lowering.names import is_unnamed, shared_names
+from strapgen.lowering.names import is_temporary, shared_names
 from strapgen.lowering.passes.rewriting import rewritten, uses
 from strapgen.program import Assignment, Node, Operation, Program, Reference, references
 
-#: A pair of members and whether their signs are equal; products have no signs.
+#: The kind of the sum or product, two members, and whether their signs are equal; those of factors always are.
 _Pair = tuple[str, Node, Node, bool]
 
 
@@ -63,7 +63,7 @@ def share_pairs(program: Program) -> Program:
 
 
 def _inlined(program: Program) -> Program:
-    """Put names that stand for nothing, and are used once, back into the tree that uses them."""
+    """Put temporaries that are used once back into the tree that uses them."""
     counts = uses(program)
     held = {name for result in program.results for node in result.nodes for name in references(node)}
     values: dict[str, Node] = {}
@@ -74,7 +74,7 @@ def _inlined(program: Program) -> Program:
 
     for assignment in program.body:
         value = rewritten(assignment.value, rule)
-        if counts[assignment.name] == 1 and is_unnamed(assignment.name) and assignment.name not in held:
+        if counts[assignment.name] == 1 and is_temporary(assignment.name) and assignment.name not in held:
             values[assignment.name] = value
         else:
             body.append(replace(assignment, value=value))
@@ -134,7 +134,7 @@ def _pairs(many: _Many) -> Iterator[_Pair]:
 
 
 def _most_frequent(trees: Iterator[Node | _Many]) -> _Pair | None:
-    """Return the pair that occurs in most sums or products, of several the first; None if none occurs twice."""
+    """Return the pair that occurs in most sums or products, the first of several; None if none occurs twice."""
     counts: Counter[_Pair] = Counter()
     for tree in trees:
         for many in _inside(tree):
@@ -146,9 +146,9 @@ def _most_frequent(trees: Iterator[Node | _Many]) -> _Pair | None:
 
 
 def _replace(tree: Node | _Many, pair: _Pair, name: Reference) -> bool:
-    """Replace a pair wherever it occurs, once in each sum or product."""
+    """Replace a pair once in each sum or product that holds it, and return whether there was one."""
     kind, a, b, equal = pair
-    found = False
+    replaced = False
     for many in list(_inside(tree)):
         if many.kind != kind:
             continue
@@ -161,5 +161,5 @@ def _replace(tree: Node | _Many, pair: _Pair, name: Reference) -> bool:
             i, j = places[0]
             many.members[i] = many.members[i][0], name
             del many.members[j]
-            found = True
-    return found
+            replaced = True
+    return replaced
