@@ -93,6 +93,16 @@ class Spectrum:
     def densities(self, hertz: Array) -> Array:
         """Return the density at frequencies.
 
+        Parameters
+        ----------
+        hertz : array, (N,)
+            Frequencies in Hz.
+
+        Returns
+        -------
+        array, (N,)
+            In the unit of the input squared per Hz.
+
         Raises
         ------
         InputTypeError
@@ -110,6 +120,16 @@ class Spectrum:
 
     def amplitudes(self, hertz: Array) -> dict[str, Array]:
         """Return the transfer functions of the channels at frequencies, with velocities instead of accelerations.
+
+        Parameters
+        ----------
+        hertz : array, (N,)
+            Frequencies in Hz, above 0.
+
+        Returns
+        -------
+        dict of str to array, (N,)
+            Complex amplitudes per unit of the input: angles in rad, velocities in m/s.
 
         Raises
         ------
