@@ -151,16 +151,16 @@ class Assessment:
     def _products(self, part: str) -> list[tuple[sp.Expr, sp.Expr]]:
         """Return pairs of an ideal rate from the amplitudes, and its factor, which depends on the times alone."""
         omega = 2 * sp.pi * F
-        held = {
+        amplitudes = {
             "angle_x": (THETA_X, sp.S.Zero),
             "angle_y": (THETA_Y, PHI),
             "velocity_y": (D_Y / omega, PHI - sp.pi / 2),
         }
         terms = []
         for (first, second), form in self.forms(part).items():
-            if second not in held or first not in held:
+            if second not in amplitudes or first not in amplitudes:
                 continue  # this channel does not move
-            (a, alpha), (b, beta) = held[first], held[second]
+            (a, alpha), (b, beta) = amplitudes[first], amplitudes[second]
             size = a * b * omega / 2
             for value, wave in (
                 (form.real, size * sp.cos(alpha - beta)),

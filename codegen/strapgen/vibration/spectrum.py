@@ -222,11 +222,11 @@ def random_rates(
         )
 
     def rate(part: str, hertz: Array) -> Array:
-        moved = spectrum.amplitudes(hertz)
+        channels = spectrum.amplitudes(hertz)
         total = np.zeros(len(hertz))
         for (first, second), factor in assessment.factors(part, hertz, step, cycles).items():
-            if first in moved and second in moved:
-                total = total + 2 * (factor * moved[first] * moved[second].conj()).real
+            if first in channels and second in channels:
+                total = total + 2 * (factor * channels[first] * channels[second].conj()).real
         return (total * spectrum.densities(hertz))[None]
 
     # The true rate comes first, since its factors need no more than double nearly everywhere. A spectrum that does not
