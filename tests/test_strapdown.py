@@ -17,7 +17,7 @@ from strapgen.fixedpoint import Settings
 from strapgen.motions import motion
 from strapgen.recording import InertialRecording, read_inertial
 from strapgen.simulation import drift_between
-from strapgen.strapdown import course
+from strapgen.strapdown import NavigationFrame, course
 from strapgen.two_speed import ALGORITHMS
 
 LOG = Path(__file__).resolve().parents[1] / "examples" / "inertial_log.csv"
@@ -55,7 +55,9 @@ def test_a_wobble_on_one_spot(algorithm, sculling, backend_name, wobble):
 
 def test_the_frame_turns_the_other_way():
     """Without any motion of the body in space, a frame that turns to the left sees it turn to the right."""
-    made = course("euler", still(100), fast_cycles=5, slow_cycles=4, frame_rate=[0, 0, 0.1])
+    made = course(
+        "euler", still(100), fast_cycles=5, slow_cycles=4, frame=NavigationFrame(frame_rate=[0, 0, 0.1])
+    )
     np.testing.assert_allclose(made.angles[:, 2], -0.1 * made.time, atol=1e-9)
 
 
@@ -63,7 +65,7 @@ def test_initial_angles():
     """A body on its nose feels the reaction to gravity along its tail; roll and heading stay what they were."""
     start = [0.3, np.pi / 2, 1.0]
     forward = -GRAVITY * 0.01
-    made = course("dcm", still(20, (forward, 0, 0)), fast_cycles=4, initial_angles=start)
+    made = course("dcm", still(20, (forward, 0, 0)), fast_cycles=4, frame=NavigationFrame(start))
     np.testing.assert_allclose(made.angles, np.tile(start, (5, 1)), atol=1e-15)
     np.testing.assert_allclose(made.velocity_changes, np.tile([0, 0, 4 * GRAVITY * 0.01], (5, 1)), atol=1e-15)
 
@@ -90,9 +92,9 @@ def test_ranges_that_are_stated_hold(wobble):
         ({"slow_cycles": 300}, "the recording holds 1000 increments; a navigation cycle needs 1200"),
         ({"sculling": 3}, "sculling"),
         ({"backend": "c-q7"}, "backend 'c-q7' is not known"),
-        ({"initial_angles": [0, 0]}, "initial_angles has 2 numbers; 3 are needed"),
-        ({"initial_angles": ["up", 0, 0]}, "initial_angles is 'up'"),
-        ({"frame_rate": [0, np.nan, 0]}, "frame_rate"),
+        ({"frame": NavigationFrame([0, 0])}, "initial_angles has 2 numbers; 3 are needed"),
+        ({"frame": NavigationFrame(["up", 0, 0])}, "initial_angles is 'up'"),
+        ({"frame": NavigationFrame(frame_rate=[0, np.nan, 0])}, "frame_rate"),
         ({"settings": Settings()}, "numpy"),
     ],
 )

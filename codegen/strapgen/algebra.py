@@ -85,7 +85,16 @@ def quaternion_product(p: sp.Matrix, q: sp.Matrix) -> sp.Matrix:
 
 
 def quaternion_conjugate(q: sp.Matrix) -> sp.Matrix:
-    """Return the conjugate of a quaternion, scalar last."""
+    """Return the conjugate of a quaternion, scalar last.
+
+    Parameters
+    ----------
+    q : Matrix, 4 x 1
+
+    Returns
+    -------
+    Matrix, 4 x 1
+    """
     return sp.Matrix([-q[0], -q[1], -q[2], q[3]])
 
 
@@ -129,7 +138,17 @@ def cayley_klein_matrix(a: sp.Matrix) -> sp.Matrix:
 
 
 def cayley_klein_parameters(U: sp.Matrix) -> sp.Matrix:
-    """Return the real parameters of U, the inverse of `cayley_klein_matrix`."""
+    """Return the real parameters of U, the inverse of `cayley_klein_matrix`.
+
+    Parameters
+    ----------
+    U : Matrix, 2 x 2
+
+    Returns
+    -------
+    Matrix, 4 x 1
+        Scalar **first**.
+    """
     parts = [U.trace() / 2, *((U * s).trace() / (2 * sp.I) for s in PAULI)]
     return sp.Matrix([sp.expand(part) for part in parts])
 
@@ -246,7 +265,16 @@ class Wrapped(sp.Function):  # type: ignore[misc]
 
 
 def adjugate(A: sp.Matrix) -> sp.Matrix:
-    """Return the adjugate of a 3 x 3 matrix, from cross products of its columns."""
+    """Return the adjugate of a 3 x 3 matrix, from cross products of its columns.
+
+    Parameters
+    ----------
+    A : Matrix, 3 x 3
+
+    Returns
+    -------
+    Matrix, 3 x 3
+    """
     a, b, c = A[:, 0], A[:, 1], A[:, 2]
     return sp.Matrix([cross_elements(b, c), cross_elements(c, a), cross_elements(a, b)])
 

@@ -1,8 +1,8 @@
-"""The cache: folders of generated and compiled files, addressed by the content that made them.
+"""The cache holds folders of generated and compiled files under a hash of everything that they depend on.
 
-An entry is filled in a folder of its own and then renamed into place: two processes may make the same one at once,
-and a killed or failed one leaves nothing that is ever read. Every entry holds the hashes of its files; one that was
-damaged is made again.
+An entry is filled in a separate folder and then renamed into place. Two processes can therefore create the same entry
+at once, and a process that is killed or fails leaves nothing that is ever read. Every entry holds the hashes of its
+files, and a damaged one is created again.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def root() -> Path:
     Raises
     ------
     InputError
-        If it would lie in the user's home folder, and there is none.
+        If the folder would be in the user's home folder, but there is none.
     """
     try:
         chosen = os.environ.get("STRAPGEN_CACHE_DIR")
@@ -46,7 +46,17 @@ def root() -> Path:
 
 
 def digest(parts: Iterable[str | bytes]) -> str:
-    """Return a hash of a sequence of texts."""
+    """Return a hash of a sequence of texts or bytes.
+
+    Parameters
+    ----------
+    parts : iterable of str or bytes
+
+    Returns
+    -------
+    str
+        24 hexadecimal digits.
+    """
     total = hashlib.sha256()
     for part in parts:
         data = part.encode() if isinstance(part, str) else part
@@ -56,7 +66,7 @@ def digest(parts: Iterable[str | bytes]) -> str:
 
 @cache
 def generator_digest() -> str:
-    """Return a hash of all that decides what is generated: this package, its templates, and SymPy."""
+    """Return a hash of everything that determines generated code: this package, its templates, and SymPy's version."""
     return digest([version("sympy"), *(path.read_bytes() for path in resources.package_files())])
 
 
@@ -82,16 +92,20 @@ def discard(kind: str, key: str) -> None:
 
 
 def entry(kind: str, key: str, fill: Callable[[Path], None]) -> Path:
-    """Return the folder of a cache entry, made by `fill` if it is not there yet.
+    """Return the folder of a cache entry; if there is none, create it by `fill`.
 
     Parameters
     ----------
     kind : str
-        Kind of entry, a folder of the cache.
+        Kind of entry, which is the name of a folder in the cache.
     key : str
         Hash of everything that the content depends on.
     fill : callable
-        Fills the empty folder that it is given.
+        ``fill(folder)`` writes the files of the entry into an empty folder.
+
+    Returns
+    -------
+    Path
 
     Raises
     ------
@@ -142,7 +156,7 @@ def _is_whole(place: Path) -> bool:
 
 
 def _prune(folder: Path) -> None:
-    """Remove what was made long ago: entries of older versions, and drafts of killed processes."""
+    """Remove entries that have not been used for long, and drafts of processes that were killed."""
     oldest = time.time() - _UNUSED_DAYS * 86400
     for path in folder.iterdir():
         with contextlib.suppress(OSError):

@@ -26,6 +26,17 @@ _MARKS = ("/*", "*/", '"""', "\\")
 def choice(what: str, value: str, allowed: Iterable[str]) -> str:
     """Return `value` if it is one of `allowed`.
 
+    Parameters
+    ----------
+    what : str
+        Name of the value in an error message.
+    value : str
+    allowed : iterable of str
+
+    Returns
+    -------
+    str
+
     Raises
     ------
     InputError
@@ -91,6 +102,19 @@ def number(what: str, value: str | float | Fraction, *, positive: bool = False) 
 
     A float stands for its shortest decimal form, so that 0.1 means 1/10. A number too small for a double is read as 0.
 
+    Parameters
+    ----------
+    what : str
+        Name of the value in an error message.
+    value : str, float or Fraction
+        A decimal, a fraction such as "1/8", or a number.
+    positive : bool, optional
+        Whether the number must be above 0.
+
+    Returns
+    -------
+    Fraction
+
     Raises
     ------
     InputError
@@ -118,6 +142,18 @@ def number(what: str, value: str | float | Fraction, *, positive: bool = False) 
 def count(what: str, value: Any, *, smallest: int = 1, largest: int | None = None) -> int:
     """Return `value` as a whole number from `smallest` to `largest`.
 
+    Parameters
+    ----------
+    what : str
+        Name of the value in an error message.
+    value : int
+    smallest, largest : int, optional
+        Allowed range, ends included; without `largest` there is no upper end.
+
+    Returns
+    -------
+    int
+
     Raises
     ------
     InputError
@@ -132,6 +168,21 @@ def count(what: str, value: Any, *, smallest: int = 1, largest: int | None = Non
 
 def multiple(what: str, value: Fraction, of: str, unit: Fraction) -> int:
     """Return ``value / unit``, which must be a whole number from 1 to `MOST`.
+
+    Parameters
+    ----------
+    what : str
+        Name of the value in an error message.
+    value : Fraction
+        A time in s.
+    of : str
+        Name of the unit in an error message.
+    unit : Fraction
+        The time in s that must divide it.
+
+    Returns
+    -------
+    int
 
     Raises
     ------
@@ -154,6 +205,16 @@ def multiple(what: str, value: Fraction, of: str, unit: Fraction) -> int:
 def text(what: str, value: Any) -> str:
     """Return `value` if it is one line of text that is safe in a comment of generated code.
 
+    Parameters
+    ----------
+    what : str
+        Name of the value in an error message.
+    value : str
+
+    Returns
+    -------
+    str
+
     Raises
     ------
     InputError
@@ -174,6 +235,21 @@ def text(what: str, value: Any) -> str:
 
 def real_array(what: str, value: Any, tail: tuple[int, ...], dtype: Any = float) -> NDArray[Any]:
     """Return `value` as a finite array of `dtype` whose last axes have the shape `tail`.
+
+    Parameters
+    ----------
+    what : str
+        Name of the value in an error message.
+    value : array_like
+    tail : tuple of int
+        Shape of the last axes; any axes may come before them.
+    dtype : dtype, optional
+        Of the result.
+
+    Returns
+    -------
+    array, (..., *tail)
+        In C order.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Building: source text becomes a module that can be called.
+"""Building turns source text into a module that can be called.
 
 The numpy target is imported as it is. C is compiled through cffi in API mode and cached by content, so that
 a second call compiles nothing. Many sources compile together into one module: the compiler's start, Python's headers
@@ -31,8 +31,8 @@ from strapgen import cache
 from strapgen.exceptions import CompilerError
 from strapgen.targets import Sources
 
-#: Flags beside the compiler's own: no contraction to fused multiply-add, so that every machine gives the same bits; no
-#: notes for debuggers, which Python's own flags ask for and which take a tenth of the time.
+#: Flags in addition to those of Python. Without contraction to fused multiply-add every machine computes the same bits.
+#: Without notes for debuggers, which Python's flags switch on, compiling takes a tenth less time.
 C_FLAGS = ("-std=c99", "-O3", "-ffp-contract=off", "-g0")
 
 #: The functions of a module are found in it, whatever the process has by their names.
@@ -50,7 +50,7 @@ _modules: dict[Path, Any] = {}
 
 
 def load(sources: Sources) -> Any:
-    """Return what the generated function is called through.
+    """Return the module through which a generated function is called.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def compiler() -> str:
     Raises
     ------
     CompilerError
-        If there is none.
+        If there is no such program.
     """
     chosen = _chosen_compiler() or "cc"
     try:
@@ -201,12 +201,21 @@ def _build(many: Sequence[Sources], name: str, key: str) -> Path:
 
 
 def code_size(sources: Sources) -> int | None:
-    """Return the bytes of code and constants that a C source compiles to; None where nobody can tell.
+    """Return the size in bytes of the code and constants of a compiled C source; None if it cannot be determined.
 
     Parameters
     ----------
     sources : Sources
-        Of any target; Python has no object code.
+        Sources of any target; those of Python have no object code.
+
+    Returns
+    -------
+    int or None
+
+    Raises
+    ------
+    CompilerError
+        If there is no C compiler.
     """
     if not any(name.endswith(".c") for name in sources.files):
         return None
@@ -221,8 +230,8 @@ def code_size(sources: Sources) -> int | None:
         if subprocess.run(command, cwd=folder, capture_output=True, check=False).returncode:
             return None
         said = subprocess.run([counter, "code.o"], cwd=folder, capture_output=True, text=True, check=False)
-    found = re.match(r"\s*(\d+)\s", said.stdout.partition("\n")[2])
-    return int(found[1]) if found else None
+    match = re.match(r"\s*(\d+)\s", said.stdout.partition("\n")[2])
+    return int(match[1]) if match else None
 
 
 def _cffi_version() -> str:
@@ -236,7 +245,7 @@ def _compile(many: Sequence[Sources], name: str, path: str, draft: Path) -> None
     for file, text in files.items():
         (draft / file).write_text(text)
     headers = [next(file for file in sources.files if file.endswith(".h")) for sources in many]
-    wanted = {
+    request = {
         "name": name,
         "cdef": "\n".join(_declarations(files[header]) for header in headers),
         "header": "".join(f'#include "{header}"\n' for header in headers) + _UNOPTIMIZED,
@@ -245,12 +254,12 @@ def _compile(many: Sequence[Sources], name: str, path: str, draft: Path) -> None
         "libraries": [] if sys.platform == "win32" else ["m"],
         "folder": str(draft),
     }
-    # Flags of the environment would change the bits of the result without being seen in the cache's key.
+    # Flags in the environment would change the bits of the result, but the key of the cache does not include them.
     environment = {
         k: v for k, v in os.environ.items() if k not in ("CFLAGS", "CPPFLAGS", "LDFLAGS", "LDSHARED")
     }
     with _one_at_a_time:
-        answer = _service().ask(wanted | {"environment": environment | {"CC": _chosen_compiler() or path}})
+        answer = _service().ask(request | {"environment": environment | {"CC": _chosen_compiler() or path}})
     built = Path(answer["path"] or draft)
     if not built.is_file():
         said = answer["said"].splitlines()
@@ -268,7 +277,7 @@ def _compile(many: Sequence[Sources], name: str, path: str, draft: Path) -> None
 
 
 class _Service:
-    """The process that compiles, for as long as this one lives."""
+    """A process that compiles one request after another until this process ends."""
 
     def __init__(self) -> None:
         self._owner = os.getpid()
@@ -282,15 +291,15 @@ class _Service:
 
     @property
     def serves(self) -> bool:
-        """Whether it runs, for this very process: a fork must not share its pipes."""
+        """Whether it runs and this process started it; a fork must not share its pipes."""
         return self._owner == os.getpid() and self._process.poll() is None
 
-    def ask(self, wanted: dict[str, Any]) -> dict[str, Any]:
-        """Compile and return the answer; if interrupted, or if the process dies, nothing of it is left."""
+    def ask(self, request: dict[str, Any]) -> dict[str, Any]:
+        """Send a request and return the answer; after an interruption or a failure the process is stopped."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         try:
-            print(json.dumps(wanted), file=self._process.stdin, flush=True)
+            print(json.dumps(request), file=self._process.stdin, flush=True)
             answer: dict[str, Any] = json.loads(self._process.stdout.readline())
         except BaseException as error:
             self.stop()
@@ -312,7 +321,7 @@ _one_at_a_time = threading.Lock()
 
 
 def _service() -> _Service:
-    """Return the process that compiles; a new one if there is none."""
+    """Return the process that compiles; start one if none runs."""
     if not _running or not _running[0].serves:
         _running[:] = [_Service()]
     return _running[0]

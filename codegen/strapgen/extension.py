@@ -1,4 +1,4 @@
-"""Compiles cffi extensions, in a process of its own that serves one after the other.
+"""Compiles cffi extensions one after another, in a separate process.
 
 Run as ``python -P extension.py``. Every line of standard input is a JSON object: the module's ``name``, the
 declarations ``cdef``, the ``header`` of its C text, the C ``sources``, ``libraries`` and ``flags``, the ``folder`` to
@@ -18,18 +18,18 @@ from typing import Any
 
 
 def main() -> None:
-    """Compile what standard input describes, until it ends."""
+    """Answer the requests on standard input until it ends."""
     answers = os.fdopen(os.dup(1), "w")
     for line in sys.stdin:
-        wanted = json.loads(line)
+        request = json.loads(line)
         os.environ.clear()
-        os.environ.update(wanted["environment"])
+        os.environ.update(request["environment"])
         with tempfile.TemporaryFile("w+", errors="replace") as said:
             for stream in (1, 2):
                 os.dup2(said.fileno(), stream)
             path = None
             try:
-                path = _compiled(wanted)
+                path = _compiled(request)
             except BaseException:  # setuptools raises SystemExit too
                 traceback.print_exc()
             sys.stdout.flush()
@@ -38,20 +38,20 @@ def main() -> None:
             print(json.dumps({"path": path, "said": said.read()}), file=answers, flush=True)
 
 
-def _compiled(wanted: dict[str, Any]) -> str:
+def _compiled(request: dict[str, Any]) -> str:
     from cffi import FFI
 
     ffi = FFI()
-    ffi.cdef(wanted["cdef"])
+    ffi.cdef(request["cdef"])
     ffi.set_source(
-        wanted["name"],
-        wanted["header"],
-        sources=wanted["sources"],
-        include_dirs=[wanted["folder"]],
-        extra_compile_args=wanted["flags"],
-        libraries=wanted["libraries"],
+        request["name"],
+        request["header"],
+        sources=request["sources"],
+        include_dirs=[request["folder"]],
+        extra_compile_args=request["flags"],
+        libraries=request["libraries"],
     )
-    return str(ffi.compile(tmpdir=wanted["folder"]))
+    return str(ffi.compile(tmpdir=request["folder"]))
 
 
 if __name__ == "__main__":

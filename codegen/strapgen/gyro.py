@@ -1,4 +1,4 @@
-"""The gyro between motion and algorithm: increments as whole numbers of pulses, increments kept for later steps."""
+"""The gyro between motion and algorithm: pulse quantization, and increments that several steps share."""
 
 from __future__ import annotations
 
@@ -11,25 +11,31 @@ from numpy.typing import NDArray
 from strapgen import checks
 from strapgen.exceptions import InputError
 
-#: The longest run of pulses that is counted: doubles hold every whole number up to here.
+#: Most pulses that can be counted, since a double represents every whole number up to here.
 _MOST_PULSES = 2**53
 
 
 def windows(increments: Any, count: int, previous: int = 0) -> NDArray[np.float64]:
-    """Cut increments in a row into what each step takes.
+    """Cut a row of increments into the increments of each step.
 
     Parameters
     ----------
     increments : array_like, (previous + N count, 3)
         Angle increments in rad, body axes.
     count : int
-        Increments that belong to a step.
+        Increments per step.
     previous : int, optional
-        Increments before the step that it takes too.
+        Increments from before each step that it takes in addition.
 
     Returns
     -------
     array, (N, previous + count, 3)
+        Angle increments in rad, body axes, oldest first.
+
+    Raises
+    ------
+    InputError
+        If a number is not allowed, or the row does not consist of whole steps.
 
     Examples
     --------
@@ -53,10 +59,10 @@ def windows(increments: Any, count: int, previous: int = 0) -> NDArray[np.float6
 
 
 def pulses(increments: Any, size: float | str | Fraction, previous: int = 0) -> NDArray[np.float64]:
-    """Return increments as a gyro that counts pulses gives them: what makes no whole pulse is carried on.
+    """Return increments as a gyro that counts pulses measures them.
 
-    The angle since the start is rounded to the nearest pulse, and differences are taken: no angle is ever lost, each
-    sum of increments is off by at most a pulse.
+    The angle since the start is rounded to the nearest pulse, and each increment is a difference of rounded angles.
+    Fractions of a pulse are thus carried on, and the error of a sum of increments is at most one pulse.
 
     Parameters
     ----------
@@ -65,7 +71,7 @@ def pulses(increments: Any, size: float | str | Fraction, previous: int = 0) -> 
     size : number
         Angle of a pulse in rad.
     previous : int, optional
-        How many of the K increments of a step are those before it, which `windows` repeats.
+        Number of the K increments of a step that come from before it, as `windows` repeats them.
 
     Returns
     -------
@@ -75,7 +81,7 @@ def pulses(increments: Any, size: float | str | Fraction, previous: int = 0) -> 
     Raises
     ------
     InputError
-        If the size is no number above 0, or the angle takes more pulses than can be counted.
+        If the size is not above 0, or the angle is more pulses than can be counted.
 
     Examples
     --------

@@ -22,6 +22,15 @@ resolution = sp.Symbol(RESOLUTION, real=True)
 def symbols(signal: Signal) -> sp.Matrix:
     """Return the real symbols of a signal as a column vector, or as a matrix if it is one.
 
+    Parameters
+    ----------
+    signal : Signal
+
+    Returns
+    -------
+    Matrix
+        3 x 3 for a matrix, otherwise one column.
+
     Examples
     --------
     >>> symbols(Signal.vector("rate", "w")).T

@@ -1,6 +1,6 @@
-"""Motions with known attitude: exact increments to feed an algorithm, and the truth to hold against it.
+"""Motions with known attitude: exact increments for an algorithm, and the true attitude to compare with its result.
 
-The formulas are kernels of the catalogue; here they get their parameters and run as generated numpy code.
+The formulas are kernels of the catalogue, and run here as generated numpy code with the parameters of a motion.
 """
 
 from __future__ import annotations
@@ -20,12 +20,26 @@ from strapgen.gyro import windows
 
 Array = NDArray[np.float64]
 
-#: Parameters that stand for zero when only others of the motion are given.
+#: Motions whose parameters are zero by default, as long as one of them is set.
 _MAY_BE_LEFT_OUT = ("constant", "polynomial")
 
 
 def keys(name: str) -> dict[str, dict[str, float]]:
-    """Return, for every parameter of a motion, the keys that set it and the factor to SI of each.
+    """Return, for every parameter of a motion, the keys that set it and the factor of each to SI units.
+
+    Parameters
+    ----------
+    name : str
+        Name of the motion.
+
+    Returns
+    -------
+    dict of str to dict of str to float
+
+    Raises
+    ------
+    InputError
+        If the motion is unknown.
 
     Examples
     --------
@@ -41,14 +55,14 @@ def keys(name: str) -> dict[str, dict[str, float]]:
 
 @dataclass(frozen=True)
 class Motion:
-    """A motion with its parameters.
+    """A motion of the catalogue with numbers for its parameters.
 
     Parameters
     ----------
     name : str
         Name of the motion.
     parameters : dict of str to float
-        Its parameters in SI.
+        Its parameters in SI units.
     """
 
     name: str
@@ -64,9 +78,9 @@ class Motion:
         steps : int
             Number of steps from t = 0.
         samples : int
-            Increments a step.
+            Increments per step.
         previous : int, optional
-            Increments before the step that it takes too; the first are those of the motion before t = 0.
+            Increments from before each step that it takes in addition; those of the first step lie before t = 0.
 
         Returns
         -------
@@ -127,9 +141,9 @@ def motion(name: str, /, **settings: float | str | Fraction) -> Motion:
     Parameters
     ----------
     name : str
-        "constant" (keys x, y, z), "sinusoidal" (a, b), "coning" (a, b, g): each key with its unit, as in
+        "constant" (keys x, y, z), "sinusoidal" (a, b) or "coning" (a, b, g), whose keys end with a unit, as in
         ``a_deg_s`` or ``a_rad_s``; or "polynomial" (a0, ..., a4, in deg/s^(k+1)). For "constant" and
-        "polynomial" what is left out is zero, if at least one is given.
+        "polynomial" missing parameters are zero, but one is needed.
     **settings : number
         The parameters.
 
@@ -155,12 +169,12 @@ def motion(name: str, /, **settings: float | str | Fraction) -> Motion:
         raise InputError(f"motion {name} needs parameters; allowed: {', '.join(allowed)}")
     parameters: dict[str, float] = {}
     for parameter, choices in known.items():
-        given = [key for key in choices if key in settings]
-        if len(given) > 1:
-            raise InputError(f"motion {name}: {' and '.join(given)} are both given; one is needed")
-        if not given and name not in _MAY_BE_LEFT_OUT:
+        used = [key for key in choices if key in settings]
+        if len(used) > 1:
+            raise InputError(f"motion {name}: {' and '.join(used)} are both given; one is needed")
+        if not used and name not in _MAY_BE_LEFT_OUT:
             raise InputError(f"motion {name} lacks {' or '.join(choices)}")
         parameters[parameter] = 0.0
-        for key in given:
+        for key in used:
             parameters[parameter] = float(checks.number(key, settings[key])) * choices[key]
     return Motion(name, parameters)

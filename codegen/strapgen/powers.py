@@ -182,7 +182,21 @@ class SeriesRoot:
 
 
 def constant(ring: Any, value: Any, top: int) -> Powers:
-    """Return a number of SymPy as a series."""
+    """Return a number of SymPy as a series.
+
+    Parameters
+    ----------
+    ring : PolyRing
+        Ring of the coefficients.
+    value : Expr or number
+        Exact number in the field of the ring.
+    top : int
+        The last power of the series.
+
+    Returns
+    -------
+    Powers
+    """
     return Powers(ring, {0: ring(ring.domain.from_sympy(sp.sympify(value)))}, top)
 
 

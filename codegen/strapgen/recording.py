@@ -1,4 +1,4 @@
-"""Recorded gyro data: reading files of increments or rates, and propagating them."""
+"""Recorded gyro data: files of increments or rates are read, and propagated by an algorithm."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ RATE_UNITS = {"rad/s": 1.0, "deg/s": math.radians(1)}
 
 _INCREMENT_COLUMNS = ("t", "dx", "dy", "dz")
 _INERTIAL_COLUMNS = (*_INCREMENT_COLUMNS, "dvx", "dvy", "dvz")
-#: Columns of recorded rates, by place: the time and three rates.
+#: Number of columns of recorded rates, found by position: the time and three rates.
 _RATE_COLUMNS = 4
-#: Largest departure of an interval from the median, as a part of it, that counts as even.
+#: Largest relative departure of an interval from the median in an even recording.
 _EVEN = 1e-3
-#: An interval this many times the median is a gap: nothing is known of the motion inside.
+#: From this multiple of the median on, an interval is a gap in which the motion is not known.
 _GAP = 10
 
 
@@ -40,9 +40,9 @@ class Recording:
     Parameters
     ----------
     start : float
-        Beginning of the first increment in s.
+        Time in s at which the first increment begins.
     interval : float
-        Time from sample to sample in s.
+        Sampling interval in s.
     increments : array, (N, 3)
         Angle increments in rad, body axes.
     """
@@ -77,13 +77,13 @@ class History:
     Parameters
     ----------
     time : array, (N,)
-        Times in s, on the recording's clock.
+        Times in s, on the clock of the recording.
     states : array, (N, state shape)
         States of the back end.
     step : float
         Step length in s.
     unused : int
-        Increments at the end that make no whole step.
+        Number of increments at the end that do not fill a step.
     """
 
     time: Array
@@ -93,7 +93,7 @@ class History:
 
 
 def _rows(path: Path, names: tuple[str, ...] | None) -> tuple[Array, list[int]]:
-    """Read columns of numbers, by name if there is a header with names, and the line number of each row."""
+    """Read columns of numbers, found by name if there is a header, and the line number of each row."""
     values: list[list[float]] = []
     lines: list[int] = []
     places = list(range(_RATE_COLUMNS if names is None else len(names)))
@@ -118,7 +118,7 @@ def _rows(path: Path, names: tuple[str, ...] | None) -> tuple[Array, list[int]]:
 
 def _numbered(reader: Any) -> Iterator[tuple[int, list[str]]]:
     for row in reader:
-        # A blank line is skipped; a row of empty cells is not: its data are missing.
+        # A blank line is skipped, but a row of empty cells lacks its data and is refused later.
         if len(row) > 1 or any(cell.strip() for cell in row):
             yield reader.line_num, row
 
@@ -151,7 +151,7 @@ def _number(path: Path, line: int, row: list[str], place: int) -> float:
 
 
 def _intervals(path: Path, time: Array, lines: list[int]) -> tuple[Array, float]:
-    """Return the intervals and their median; refuse times that do not rise, and gaps."""
+    """Return the intervals and their median in s; refuse times that do not rise, and gaps."""
     if not math.isfinite(float(time[-1]) - float(time[0])):
         raise InputError(f"{path}: times from {time[0]:g} s to {time[-1]:g} s are too far apart")
     intervals = np.diff(time)
@@ -245,7 +245,7 @@ def read_inertial(path: str | Path) -> InertialRecording:
 
 
 def _even_increments(path: Path, names: tuple[str, ...]) -> tuple[float, float, Array]:
-    """Return when the first increment begins, the interval, and the increments."""
+    """Return the time at which the first increment begins, the interval, and the increments."""
     values, lines = _rows(path, names)
     intervals, median = _intervals(path, values[:, 0], lines)
     _require_even(path, intervals, median, lines, "increments are needed at even times")
@@ -254,17 +254,17 @@ def _even_increments(path: Path, names: tuple[str, ...]) -> tuple[float, float, 
 
 
 def read_rates(path: str | Path, unit: str, resample_hz: float | str | None = None) -> Recording:
-    r"""Read a file of body rates and integrate them, taken as linear from sample to sample.
+    r"""Read a file of body rates and integrate them, with linear interpolation between samples.
 
     Parameters
     ----------
     path : path
-        Comma-separated values: time in s and the rates about x, y, z in the first four columns, whatever a
-        header calls them; other columns are ignored.
+        Comma-separated values: time in s and the rates about x, y, z in the first four columns, with or without a
+        header; further columns are ignored.
     unit : str
         Unit of the rates, a key of `RATE_UNITS`.
     resample_hz : number, optional
-        Integrate over an even grid of this frequency, as times that are not even need.
+        Frequency of an even grid to integrate over, needed if the times are not even.
 
     Returns
     -------
@@ -273,8 +273,8 @@ def read_rates(path: str | Path, unit: str, resample_hz: float | str | None = No
     Raises
     ------
     InputError
-        If the file cannot be read, a value is no finite number, there is a gap, or the times are not even
-        and `resample_hz` is not given; the message names the line.
+        If the file cannot be read, a value is no finite number, there is a gap, or the times are not even and there
+        is no `resample_hz`; the message names the line.
 
     Examples
     --------
@@ -322,16 +322,16 @@ def propagate(
 ) -> History:
     """Run an algorithm over recorded increments, from zero rotation.
 
-    An algorithm that takes increments from before its step starts after the first ones.
+    An algorithm that takes increments from before its step starts after as many of them.
 
     Parameters
     ----------
     backend : Backend
-        The algorithm; each of its steps takes as many increments as it was built for.
+        The algorithm, which also determines the number of increments per step.
     recording : Recording
     orthonormalize, record : number, optional
-        Time in s from orthonormalization to orthonormalization (never by default) and from record to record
-        (every step by default), multiples of the step to a hundredth of a step.
+        Intervals in s of orthonormalization (by default there is none) and of records (by default every step), each a
+        multiple of the step to a hundredth of a step.
     pulse : number, optional
         Angle of a gyro pulse in rad, see `gyro.pulses`; by default increments are not quantized.
 
@@ -366,10 +366,10 @@ def propagate(
     if record_every > steps:
         raise InputError(f"record {record} s is longer than the recording, {steps * step:.6g} s")
     used = recording.increments[: backend.previous + steps * backend.increments]
-    given = windows(used, backend.increments, backend.previous)
+    samples = windows(used, backend.increments, backend.previous)
     if pulse is not None:
-        given = pulses(given, pulse, backend.previous)
-    states = backend.propagate(given, record_every, every)
+        samples = pulses(samples, pulse, backend.previous)
+    states = backend.propagate(samples, record_every, every)
     start = recording.start + recording.interval * backend.previous
     time: Array = start + step * record_every * np.arange(len(states), dtype=np.float64)
     require_finite(backend, states, time)

@@ -102,6 +102,14 @@ class Signal:
 def after(signal: Signal) -> Signal:
     """Return the signal of a state after a call, whose names begin with ``next_``.
 
+    Parameters
+    ----------
+    signal : Signal
+
+    Returns
+    -------
+    Signal
+
     Examples
     --------
     >>> after(Signal.vector("sum", "s")).elements

@@ -1,4 +1,4 @@
-"""The simulator: an algorithm run on a motion and held against the truth."""
+"""The simulator runs an algorithm on a motion and compares the result with the true attitude."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Run:
-    """What a simulation recorded.
+    """The records of a simulation.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ class Run:
     computed, true : array, (N, 3, 3)
         Direction cosine matrices, body to reference.
     error : array, (N, 3, 3)
-        Error matrices, computed times true transposed less the identity; reference axes.
+        Error matrices in reference axes: computed times transposed true matrix, minus the identity.
     scale, skew, drift : array, (N, 3)
         Their parts on the axes x, y, z; scale dimensionless, skew and drift in rad.
     """
@@ -50,12 +50,12 @@ class Run:
 
     @property
     def mean_drift(self) -> float:
-        """Mean drift of the run in rad: the root of the sum of squares of `drift_by_axis` (chapter 5)."""
+        """Mean drift of the run in rad, the root of the sum of squares of `drift_by_axis` (chapter 5 of the thesis)."""
         return float(np.linalg.norm(self.drift_by_axis))
 
 
 def attitude(backend: Backend, states: Any) -> Array:
-    """Return the attitude that states of a back end stand for.
+    """Return the attitude of states of a back end.
 
     Parameters
     ----------
@@ -81,14 +81,14 @@ def drift_between(computed: Any, other: Any) -> Array:
     Returns
     -------
     array, (..., 3)
-        In rad, reference axes; the length of each is the angle between the attitudes, to first order.
+        In rad, reference axes. To first order, the length of each is the angle between the attitudes.
     """
     drift: Array = evaluator("error-matrix")(computed, other)[3]
     return drift
 
 
 def require_finite(backend: Backend, states: Any, time: Array) -> None:
-    """Refuse a run whose numbers have left the range of its back end.
+    """Refuse a run whose states are beyond the range of its back end.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def require_finite(backend: Backend, states: Any, time: Array) -> None:
     Raises
     ------
     InputError
-        If a state is not finite; the message says from when on, and why.
+        If a state is not finite; the message has the time of the first one, and the cause.
     """
     broken = ~np.isfinite(states.reshape(len(states), -1)).all(axis=1)
     if broken.any():
@@ -125,7 +125,7 @@ def largest_increment(
     pulse: float | str | Fraction | None = None,
     previous: int = 0,
 ) -> float:
-    """Return the largest element of an angle increment that a simulation feeds to its algorithm, in rad.
+    """Return the largest magnitude of an element of the angle increments of a simulation, in rad.
 
     Parameters
     ----------
@@ -133,7 +133,16 @@ def largest_increment(
     step, duration, pulse : number
         As for `simulate`.
     samples, previous : int
-        Increments a step, and those before it that it takes too.
+        Increments per step, and increments from before it that it takes in addition.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    InputError
+        If a number is not allowed.
     """
     h = checks.number("step", step, positive=True)
     steps = checks.multiple("duration", checks.number("duration", duration, positive=True), "step", h)
@@ -159,13 +168,13 @@ def simulate(
     backend : Backend
         The algorithm.
     motion : Motion
-        The motion; its increments are exact.
+        The motion, which supplies exact increments.
     step, duration : number
-        Step and duration in s; the step divides the duration. Decimals are taken exactly.
+        Step and duration in s; the step divides the duration. Decimals are exact.
     orthonormalize : number, optional
-        Time from orthonormalization to orthonormalization in s, a multiple of the step; never by default.
+        Interval of orthonormalization in s, a multiple of the step; by default there is none.
     record : number, optional
-        Time from record to record in s, a multiple of the step; by default every step is recorded.
+        Interval of records in s, a multiple of the step; by default every step is recorded.
     pulse : number, optional
         Angle of a gyro pulse in rad, see `gyro.pulses`; by default increments are not quantized.
 

@@ -1,4 +1,4 @@
-"""Algorithms in two speeds along recorded gyro and accelerometer increments: attitude and velocity, cycle by cycle."""
+"""Algorithms in two speeds along recorded gyro and accelerometer increments, cycle by cycle."""
 
 from __future__ import annotations
 
@@ -21,22 +21,22 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Course:
-    """What an algorithm makes of a recording, navigation cycle by navigation cycle.
+    """Attitude and velocity along a recording, after each navigation cycle.
 
     Parameters
     ----------
     time : array, (N,)
-        Ends of the navigation cycles in s, on the recording's clock.
+        Ends of the navigation cycles in s, on the clock of the recording.
     states : array, (N, state shape)
         Attitude at these times, body to navigation axes.
     angles : array, (N, 3)
-        The same as roll, pitch, heading in rad.
+        The attitude as roll, pitch, heading in rad.
     velocity_changes : array, (N, 3)
-        Integral of the specific force over each cycle in m/s, navigation axes as they turn.
+        Integral of the specific force over each cycle in m/s, in the rotating navigation axes.
     elements : tuple of str
         Names of the elements of a state.
     unused : int
-        Increments at the end that make no whole cycle.
+        Number of increments at the end that do not fill a navigation cycle.
     """
 
     time: Array
@@ -45,6 +45,26 @@ class Course:
     velocity_changes: Array
     elements: tuple[str, ...]
     unused: int
+
+
+@dataclass(frozen=True)
+class NavigationFrame:
+    """The navigation frame of a run: the attitude of the body in it at the start, and its rate.
+
+    Parameters
+    ----------
+    initial_angles : iterable of float, (3,), optional
+        Roll, pitch, heading at the start in rad.
+    frame_rate : iterable of float, (3,), optional
+        Rate of the navigation frame in rad/s, navigation axes.
+    """
+
+    initial_angles: Iterable[float] = (0.0, 0.0, 0.0)
+    frame_rate: Iterable[float] = (0.0, 0.0, 0.0)
+
+
+#: A frame that does not rotate, with which the body is aligned at the start.
+RESTING = NavigationFrame()
 
 
 def course(
@@ -56,31 +76,28 @@ def course(
     sculling: int = 2,
     backend: str = "numpy",
     settings: Settings | None = None,
-    initial_angles: Iterable[float] = (0.0, 0.0, 0.0),
-    frame_rate: Iterable[float] = (0.0, 0.0, 0.0),
+    frame: NavigationFrame = RESTING,
 ) -> Course:
     """Run an algorithm in two speeds along a recording.
 
-    The first fast cycle takes the increment before it as zero, as at a start from rest.
+    For the first fast cycle the previous increment is zero, as at a start from rest.
 
     Parameters
     ----------
     algorithm : str
         "dcm" or "euler".
     recording : InertialRecording
-        An increment each fast cycle.
+        One increment for each fast cycle.
     fast_cycles, slow_cycles : int
-        Fast cycles in a slow cycle, slow cycles in a navigation cycle.
+        Number of fast cycles in a slow cycle, and of slow cycles in a navigation cycle.
     sculling : int, optional
-        1 or 2, as for `TwoSpeed`.
+        Form of the sculling integral, 1 or 2, as for `TwoSpeed`.
     backend : str, optional
         A key of `strapgen.backends.BACKENDS`.
     settings : Settings, optional
-        For fixed point; ranges that it does not state are made for the recording.
-    initial_angles : iterable of float, (3,), optional
-        Roll, pitch, heading at the start in rad.
-    frame_rate : iterable of float, (3,), optional
-        Rate of the navigation frame in rad/s, navigation axes.
+        Settings of fixed point; ranges that they do not state are derived from the recording.
+    frame : NavigationFrame, optional
+        Attitude at the start and rate of the frame; by default both are zero.
 
     Returns
     -------
@@ -89,18 +106,18 @@ def course(
     Raises
     ------
     InputError
-        If a name or a number is not allowed, the recording is shorter than a navigation cycle, or the numbers leave the
-        range of the back end.
+        If a name or a number is not allowed, the recording is shorter than a navigation cycle, or a result is beyond
+        the range of the back end.
 
     Examples
     --------
-    Level, at rest but for a turn about the vertical; what is felt is the reaction to gravity:
+    The body is level and turns about the vertical; its specific force is the reaction to gravity:
 
     >>> level = InertialRecording(0.0, 0.01, np.tile([0, 0, 1e-3], (40, 1)), np.tile([0, 0, 0.0981], (40, 1)))
-    >>> made = course("dcm", level, fast_cycles=4, slow_cycles=5)
-    >>> made.time, made.angles[:, 2].round(6)
+    >>> along = course("dcm", level, fast_cycles=4, slow_cycles=5)
+    >>> along.time, along.angles[:, 2].round(6)
     (array([0.2, 0.4]), array([0.02, 0.04]))
-    >>> made.velocity_changes[-1].round(6)
+    >>> along.velocity_changes[-1].round(6)
     array([0.   , 0.   , 1.962])
     """
     checks.choice("backend", backend, BACKENDS)
@@ -120,13 +137,13 @@ def course(
             float(np.abs(angles).max()), float(np.abs(velocities).max()), fast_cycles, slow_cycles
         )
         settings = replace(settings, ranges={**needed, **settings.ranges})
-    made = two_speed.TwoSpeed(algorithm, sculling, backend, settings)
-    turns = np.tile(_vector("frame_rate", frame_rate), (cycles * slow_cycles + 1, 1))
-    start = _vector("initial_angles", initial_angles)
+    runner = two_speed.TwoSpeed(algorithm, sculling, backend, settings)
+    turns = np.tile(_vector("frame_rate", frame.frame_rate), (cycles * slow_cycles + 1, 1))
+    start = _vector("initial_angles", frame.initial_angles)
     begin = backends.evaluator("dcm-from-euler-angles")(start)
     if algorithm != "dcm":
         begin = backends.evaluator(f"{algorithm}-from-dcm")(begin)
-    run = made.run(
+    run = runner.run(
         angles,
         velocities,
         fast_cycles=fast_cycles,
@@ -140,8 +157,7 @@ def course(
     if algorithm != "dcm":
         matrices = backends.evaluator(f"dcm-from-{algorithm}")(matrices)
     changes = np.asarray(run.velocity_changes, np.float64)
-    found = _euler_angles(matrices, start)
-    return Course(time, states, found, changes, made.state.elements, unused)
+    return Course(time, states, _euler_angles(matrices, start), changes, runner.state.elements, unused)
 
 
 def _vector(name: str, values: Iterable[float]) -> Array:
@@ -152,10 +168,10 @@ def _vector(name: str, values: Iterable[float]) -> Array:
 
 
 def _euler_angles(matrices: Array, before: Array) -> Array:
-    """Return the angles of matrices one after the other, so that roll stays what it was where pitch is vertical."""
+    """Return the angles of matrices one after the other, so that roll does not change where pitch is vertical."""
     convert = backends.evaluator("euler-angles-from-dcm")
-    found = []
+    angles = []
     for matrix in matrices:
         before = convert(matrix, before)
-        found.append(before)
-    return np.array(found)
+        angles.append(before)
+    return np.array(angles)

@@ -117,7 +117,7 @@ _FRACTION_TOLERANCE = 5e-3
 
 
 @dataclass(frozen=True)
-class Entry:
+class TableEntry:
     """One figure of a table.
 
     Parameters
@@ -194,7 +194,7 @@ def table_settings(table: Table, backend_name: str, settings: Settings | None) -
     return (settings or Settings()).for_increments(largest_increment(profile, STEP, DURATION, 2))
 
 
-def entries(table: Table, backend_name: str, settings: Settings | None = None) -> Iterator[Entry]:
+def entries(table: Table, backend_name: str, settings: Settings | None = None) -> Iterator[TableEntry]:
     """Run every case of a table on one back end.
 
     Parameters
@@ -233,7 +233,7 @@ def entries(table: Table, backend_name: str, settings: Settings | None = None) -
                 f"({plain}). With it, which the ratios of the table need, it is {value:.3f} deg."
             )
         double = value if backend_name == "numpy" else run(backend(algorithm, f"rk{order}", 2, "numpy"))
-        yield Entry(
+        yield TableEntry(
             table.number,
             backend_name,
             algorithm,
@@ -273,7 +273,7 @@ def build_all(
 
 def run_tables(
     backends: tuple[str, ...] = DEFAULT_BACKENDS, settings: Settings | None = None
-) -> Iterator[Entry]:
+) -> Iterator[TableEntry]:
     """Run all tables on the given back ends, table by table.
 
     Parameters
@@ -284,7 +284,7 @@ def run_tables(
 
     Yields
     ------
-    Entry
+    TableEntry
     """
     for table in TABLES:
         for name in backends:

@@ -48,7 +48,7 @@ _SUMMED = {
 }
 
 
-class Run(NamedTuple):
+class TwoSpeedRun(NamedTuple):
     """What a run gives.
 
     Parameters
@@ -348,7 +348,7 @@ class TwoSpeed:
         turns: Any = None,
         initial: Any = None,
         previous: Any = None,
-    ) -> Run:
+    ) -> TwoSpeedRun:
         """Run whole navigation cycles.
 
         Parameters
@@ -370,7 +370,7 @@ class TwoSpeed:
 
         Returns
         -------
-        Run
+        TwoSpeedRun
 
         Raises
         ------
@@ -415,7 +415,7 @@ class TwoSpeed:
                 attitudes, changes = self.run_loops(samples, begun, fast_cycles, slow_cycles)
             else:
                 attitudes, changes = self._run_in_c(self._whole, samples, begun, fast_cycles, slow_cycles)
-        run = Run(
+        run = TwoSpeedRun(
             door.given("state", attitudes).reshape(-1, *self.state.shape),
             door.given("velocity_change", changes),
         )

@@ -29,7 +29,7 @@ from strapgen.cli import main
 from strapgen.motions import motion as make_motion
 from strapgen.recording import read_inertial
 from strapgen.simulation import largest_increment
-from strapgen.strapdown import course
+from strapgen.strapdown import NavigationFrame, course
 from strapgen.tables import TABLES
 from strapgen.targets import FIXED, TARGETS
 
@@ -1111,8 +1111,7 @@ def test_strapdown_is_the_course_of_python(strapgen_says, tmp_path):
         read_inertial(log),
         fast_cycles=4,
         slow_cycles=50,
-        initial_angles=np.radians([10, 20, 30]),
-        frame_rate=np.radians([0, 0, 15]) / 3600,
+        frame=NavigationFrame(np.radians([10, 20, 30]), np.radians([0, 0, 15]) / 3600),
     )
     assert said["attitude"] == made.states.tolist()
     assert said["velocity_changes_m_s"] == made.velocity_changes.tolist()

@@ -44,7 +44,17 @@ class RunDrift:
     growth: dict[int, sp.Expr]
 
     def drift(self, time: sp.Expr = TIME) -> list[sp.Expr]:
-        """Return the drift in rad on x, y, z after a time in s, as the sum of the known terms."""
+        """Return the drift in rad on x, y, z after a time in s, as the sum of the known terms.
+
+        Parameters
+        ----------
+        time : Expr, optional
+            By default the symbol t.
+
+        Returns
+        -------
+        list of Expr
+        """
         total = sp.zeros(3, 1)
         for power, row in self.secular.items():
             total += time * row * STEP**power

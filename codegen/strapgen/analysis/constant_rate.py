@@ -75,6 +75,16 @@ class ConstantRate:
     def series(self, terms: int = 2) -> dict[int, sp.Rational]:
         """Return the first terms of the angle lost in powers of x.
 
+        Parameters
+        ----------
+        terms : int, optional
+            Number of terms that are not zero.
+
+        Returns
+        -------
+        dict of int to Rational
+            Coefficients by power of x, in rad.
+
         Examples
         --------
         >>> constant_rate(catalogue.choose("dcm", "rk1")).series(3)

@@ -219,7 +219,17 @@ class Stability:
     contractive: list[tuple[float, float | None]] | None
 
     def stretch(self, angles: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the factor for angles in rad, an array of any shape."""
+        """Return the factor for angles in rad, an array of any shape.
+
+        Parameters
+        ----------
+        angles : array, (...)
+            Angles of the step in rad.
+
+        Returns
+        -------
+        array, (...)
+        """
         squares = sp.lambdify(ANGLE, self.stretch_squared, "numpy")(angles)
         factors: NDArray[np.float64] = np.sqrt(np.broadcast_to(np.asarray(squares, np.float64), angles.shape))
         return factors

@@ -86,7 +86,20 @@ def at_time(motion: str, count: int, domain: Any = sp.QQ) -> MotionRate:
 
 
 def at_start(motion: str, count: int, domain: Any = sp.QQ) -> MotionRate:
-    """Return the rate of a motion and its derivatives at time 0, where no sines and cosines are left."""
+    """Return the rate of a motion and its derivatives at time 0, where no sines and cosines are left.
+
+    Parameters
+    ----------
+    motion : str
+    count : int
+        Number of derivatives, counting the rate itself.
+    domain : Domain, optional
+        Field of the numbers.
+
+    Returns
+    -------
+    MotionRate
+    """
     symbols = parameters(motion)
     ring, *_ = sp.ring(symbols, domain)
     vector = MOTIONS[motion].rate(TIME, *symbols)

@@ -67,6 +67,14 @@ class Step:
 def step(choice: Choice) -> Step:
     """Return a chosen attitude step.
 
+    Parameters
+    ----------
+    choice : Choice
+
+    Returns
+    -------
+    Step
+
     Raises
     ------
     InputError, InputTypeError
@@ -84,6 +92,14 @@ def step(choice: Choice) -> Step:
 
 def linear_step(choice: Choice) -> Step:
     """Return a chosen attitude step that is linear in its state, so that its error is the same at any attitude.
+
+    Parameters
+    ----------
+    choice : Choice
+
+    Returns
+    -------
+    Step
 
     Raises
     ------
@@ -187,7 +203,23 @@ def _error_matrix() -> Kernel:
 
 
 def computed_state(attitude_step: Step, ring: Any, rate: Rate, top: int) -> list[Powers]:
-    """Return the state after one step from zero rotation, row by row."""
+    """Return the state after one step from zero rotation, row by row.
+
+    Parameters
+    ----------
+    attitude_step : Step
+    ring : PolyRing
+        Ring of the coefficients, over the field of the step.
+    rate : sequence of sequence of ring element
+        The rate in rad/s and its derivatives at the beginning of the step.
+    top : int
+        The last power of the series.
+
+    Returns
+    -------
+    list of Powers
+        The elements of the state, row-major.
+    """
     kernel, step_kernels = attitude_step.kernel, attitude_step.kernel.companions
     assert step_kernels is not None, "checked by `step`"
     state, samples = kernel.inputs
@@ -205,7 +237,23 @@ def computed_state(attitude_step: Step, ring: Any, rate: Rate, top: int) -> list
 
 
 def computed_matrix(attitude_step: Step, ring: Any, rate: Rate, top: int) -> list[Powers]:
-    """Return the direction cosine matrix after one step from zero rotation, row by row."""
+    """Return the direction cosine matrix after one step from zero rotation, row by row.
+
+    Parameters
+    ----------
+    attitude_step : Step
+    ring : PolyRing
+        Ring of the coefficients, over the field of the step.
+    rate : sequence of sequence of ring element
+        The rate in rad/s and its derivatives at the beginning of the step.
+    top : int
+        The last power of the series.
+
+    Returns
+    -------
+    list of Powers
+        Nine elements, body to reference axes.
+    """
     elements = computed_state(attitude_step, ring, rate, top)
     step_kernels = attitude_step.kernel.companions
     if step_kernels is None or step_kernels.attitude is None:
@@ -221,7 +269,24 @@ def _evaluated(kernel: Kernel, values: dict[str, Any], ring: Any, top: int) -> l
 
 
 def increments(ring: Any, rate: Rate, count: int, previous: int, top: int) -> list[Powers]:
-    """Return the elements of the exact increments of a step in rad, row by row."""
+    """Return the elements of the exact increments of a step in rad, row by row.
+
+    Parameters
+    ----------
+    ring : PolyRing
+        Ring of the coefficients.
+    rate : sequence of sequence of ring element
+        The rate in rad/s and its derivatives at the beginning of the step.
+    count, previous : int
+        Increments of the step, and increments from before it.
+    top : int
+        The last power of the series.
+
+    Returns
+    -------
+    list of Powers
+        Three elements for each increment, oldest first.
+    """
     elements = []
     for k in range(-previous, count):
         begin, end = sp.Rational(k, count), sp.Rational(k + 1, count)
@@ -231,7 +296,24 @@ def increments(ring: Any, rate: Rate, count: int, previous: int, top: int) -> li
 
 
 def turns(ring: Any, rate: Rate, nodes: Sequence[Number], top: int) -> list[Powers]:
-    """Return the elements of the rate at nodes of the step, times its length, row by row."""
+    """Return the elements of the rate at nodes of the step, times its length, row by row.
+
+    Parameters
+    ----------
+    ring : PolyRing
+        Ring of the coefficients.
+    rate : sequence of sequence of ring element
+        The rate in rad/s and its derivatives at the beginning of the step.
+    nodes : sequence of Fraction or Expr
+        Nodes as fractions of the step.
+    top : int
+        The last power of the series.
+
+    Returns
+    -------
+    list of Powers
+        Three elements for each node, in rad.
+    """
     elements = []
     for node in nodes:
         shares = [algebra.exact(node) ** j / sp.factorial(j) for j in range(len(rate))]
@@ -252,6 +334,20 @@ def true_matrix(ring: Any, rate: Rate, top: int) -> list[Powers]:
     """Return the true direction cosine matrix after the step, row by row.
 
     For the rate sum_j g_j t^j, dC/dt = C skew(w) leads to (n + 1) C_(n+1) = sum_j C_(n-j) skew(g_j).
+
+    Parameters
+    ----------
+    ring : PolyRing
+        Ring of the coefficients.
+    rate : sequence of sequence of ring element
+        The rate in rad/s and its derivatives at the beginning of the step.
+    top : int
+        The last power of the series.
+
+    Returns
+    -------
+    list of Powers
+        Nine elements, body to reference axes.
     """
     zero, one = ring.zero, ring.one
     skews = [

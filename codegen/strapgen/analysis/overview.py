@@ -65,7 +65,18 @@ class OverviewRow:
     contractive: str
 
     def coning_rate(self, step: float = STEP_S) -> float | None:
-        """Return the leading secular drift rate in rad/s on the motion of table 5 of the thesis, for a step in s."""
+        """Return the leading secular drift rate in rad/s on the motion of table 5 of the thesis, for a step in s.
+
+        Parameters
+        ----------
+        step : float, optional
+            In s.
+
+        Returns
+        -------
+        float or None
+            None if there is no drift.
+        """
         if self.coning is None or self.coning_power is None:
             return None
         rate = math.radians(CONING_DEG_S)

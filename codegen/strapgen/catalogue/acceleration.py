@@ -1,4 +1,4 @@
-"""The acceleration transformation: velocity increments from body to navigation axes."""
+"""The acceleration transformation takes velocity increments from body to navigation axes."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ NAVIGATION_VELOCITY = Signal.vector(
 
 
 def rotated(build: KernelBuilder, name: str, state: sp.Matrix, u: sp.Matrix) -> sp.Matrix:
-    """Return a vector of body axes in navigation axes: C u, or q u q*.
+    """Return a vector in navigation axes instead of body axes: C u, or q u q*.
 
     Parameters
     ----------
@@ -35,7 +35,13 @@ def rotated(build: KernelBuilder, name: str, state: sp.Matrix, u: sp.Matrix) -> 
     name : str
         "dcm" or "euler".
     state : Matrix
+        Attitude, body to navigation axes.
     u : Matrix, 3 x 1
+        The vector in body axes.
+
+    Returns
+    -------
+    Matrix, 3 x 1
     """
     if name == "dcm":
         return state * u
@@ -46,7 +52,7 @@ def rotated(build: KernelBuilder, name: str, state: sp.Matrix, u: sp.Matrix) -> 
 def compensated(
     build: KernelBuilder, form: int, u: sp.Matrix, sculling: sp.Matrix, beta: sp.Matrix | None
 ) -> sp.Matrix:
-    """Name the velocity increment of a slow cycle in the body axes of its start: u + S1, or u + beta x u / 2 + S2.
+    """Return the velocity increment of a slow cycle in the body axes of its start: u + S1, or u + beta x u / 2 + S2.
 
     Parameters
     ----------
@@ -54,9 +60,9 @@ def compensated(
     form : int
         1 or 2.
     u, sculling : Matrix, 3 x 1
-        Sum of the velocity increments and sculling integral at the end of the cycle.
+        Sum of the velocity increments and sculling integral at the end of the cycle, in m/s.
     beta : Matrix, 3 x 1
-        Sum of the angle increments at the end of the cycle, for form 2.
+        Sum of the angle increments at the end of the cycle in rad, for form 2.
     """
     meaning = "velocity increment, body axes at the start of the slow cycle"
     named = Signal.vector("compensated", "w", unit="m/s", meaning=meaning)
@@ -95,14 +101,14 @@ def transformation(name: str) -> Kernel:
 
 
 def velocity(name: str, form: int) -> Kernel:
-    """Return the slow loop of the velocity: with S1, equations (51) and (57), or S2, equations (52) and (58).
+    """Return the slow loop of the velocity, with S1 by equations (51) and (57) or S2 by equations (52) and (58).
 
     Parameters
     ----------
     name : str
         "dcm" or "euler".
     form : int
-        1, where the sculling integral holds the rotation compensation, or 2, where that is worked out here.
+        1 if the sculling integral includes the rotation compensation, 2 if this kernel computes it.
 
     Returns
     -------
@@ -123,7 +129,7 @@ def velocity(name: str, form: int) -> Kernel:
 
 
 def frame_correction(theta: sp.Matrix, v: sp.Matrix) -> sp.Matrix:
-    """Return what the rotation of the navigation frame adds to the velocity over its cycle, equation (59)."""
+    """Return the change of velocity due to the rotation of the navigation frame over its cycle, equation (59)."""
     return -cross(theta, v) / 2
 
 

@@ -1,7 +1,7 @@
-"""Coefficients as text, read exactly: fractions, decimals, and expressions with square roots.
+"""Exact reading of coefficients from text: fractions, decimals, and expressions with square roots.
 
-A rational is a `Fraction`; anything else is a SymPy expression. SymPy is loaded when the first irrational appears,
-so that rational tableaux are read, and all of them listed, without it.
+A rational number is a `Fraction`, any other a SymPy expression. SymPy is loaded with the first irrational number, so
+that rational tableaux can be read, and all tableaux listed, without it.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
 #: An exact number.
 Number: TypeAlias = "Fraction | sp.Expr"
 
-#: Characters of the longest text, and the largest exponent in it. Far beyond any coefficient that was published.
+#: Most characters of a text, and the largest exponent in it; both are far beyond any published coefficient.
 MOST_CHARACTERS = 1000
 MOST_EXPONENT = 100
 
-#: Binary digits of the longest numerator or denominator.
+#: Most binary digits of a numerator or denominator.
 MOST_BITS = 2048
 
-#: Degree of the largest field: three square roots, beside or inside each other. A product in it takes 0.1 ms.
+#: Largest degree of a field, that of three square roots, nested or not. A product in it takes 0.1 ms.
 MOST_DEGREE = 8
 
 _CHARACTERS = re.compile(r"[0-9a-z+\-*/(). ]*", re.IGNORECASE)
@@ -35,7 +35,7 @@ _LITERAL = re.compile(r"(\d+\.?\d*|\.\d+)(e([+-]?\d+))?", re.IGNORECASE)
 
 
 class _NotAllowedError(Exception):
-    """What is wrong with a text, in words."""
+    """The reason why a text is no allowed number."""
 
 
 def number(what: str, value: Any) -> Number:
@@ -46,18 +46,18 @@ def number(what: str, value: Any) -> Number:
     what : str
         Its name in an error message.
     value : str or int
-        A whole number, a fraction, a decimal, which is taken exactly, or an expression of such with + - * /,
-        parentheses, whole powers (``**``) and ``sqrt``.
+        A whole number, a fraction, a decimal, or an expression of these with + - * /, parentheses, whole powers
+        (``**``) and ``sqrt``. Decimals are exact.
 
     Returns
     -------
     Fraction or sympy.Expr
-        The latter if it is irrational, as a sum of multiples of square roots.
+        An irrational number is a SymPy expression, a sum of multiples of square roots.
 
     Raises
     ------
     InputError
-        If it is no such number, is not real, or is out of all proportion.
+        If it is no such number, not real, or too long.
 
     Examples
     --------
@@ -113,7 +113,7 @@ def _parsed(source: str) -> ast.expr:
 
 
 def _value(node: ast.expr, source: str) -> Number:
-    """Evaluate an expression; only what stands here can be in it."""
+    """Evaluate an expression; any syntax that is not listed here is refused."""
     match node:
         case ast.Constant():
             return _literal(ast.get_source_segment(source.strip(), node) or "")
@@ -130,10 +130,10 @@ def _value(node: ast.expr, source: str) -> Number:
 
 
 def _literal(source: str) -> Fraction:
-    found = _LITERAL.fullmatch(source)
-    if not found:
+    match = _LITERAL.fullmatch(source)
+    if not match:
         raise _NotAllowedError(f"{source!r} is no number")
-    if found[3] and abs(int(found[3])) > MOST_EXPONENT:
+    if match[3] and abs(int(match[3])) > MOST_EXPONENT:
         raise _NotAllowedError(f"an exponent is at most {MOST_EXPONENT}")
     return _bounded(Fraction(source))
 
@@ -151,7 +151,7 @@ def _operation(operator: ast.operator, left: Number, right: Number) -> Number:
         result = left * right
     if isinstance(result, Fraction):
         return _bounded(result)
-    # A product of many sums has to be multiplied out as it grows, or it takes for ever.
+    # Products of sums are multiplied out at once, because a long product would take very long at the end.
     return _settled(result) if isinstance(operator, ast.Mult) else result
 
 
@@ -171,7 +171,7 @@ def _power(base: Number, exponent: Number) -> Number:
 
 
 def _inverse(value: Number) -> Number:
-    """Return one over a number, irrational ones without roots below the line: SymPy would hide a zero in those."""
+    """Return the reciprocal of a number, with a rational denominator, since a zero could hide in an irrational one."""
     value = _settled(value)
     if value == 0:
         raise _NotAllowedError("it divides by zero")
@@ -184,7 +184,7 @@ def _inverse(value: Number) -> Number:
 
 
 def _root(square: Number) -> Number:
-    """Return the root of a settled number."""
+    """Return the square root of a number in the form that `_settled` returns."""
     if (square if isinstance(square, Fraction) else square.evalf(50)) < 0:
         raise _NotAllowedError("it holds the root of a negative number")
     if isinstance(square, Fraction):
@@ -193,7 +193,7 @@ def _root(square: Number) -> Number:
             return root
     import sympy as sp
 
-    # Without this, sqrt(3 + 2 sqrt(2)) and 1 + sqrt(2) would be two nodes.
+    # Without denesting, sqrt(3 + 2 sqrt(2)) and 1 + sqrt(2) would be two different nodes.
     return sp.sqrtdenest(sp.sqrt(_expression(square)))
 
 
@@ -210,7 +210,7 @@ def _bounded(value: Fraction) -> Fraction:
 
 
 def _settled(value: Number) -> Number:
-    """Return a rational as a `Fraction`, anything else as a sum of multiples of roots: both decided exactly."""
+    """Return a rational number as a `Fraction`, any other as a sum of multiples of roots; the decision is exact."""
     if isinstance(value, Fraction):
         return value
     import sympy as sp
@@ -220,7 +220,7 @@ def _settled(value: Number) -> Number:
         raise _NotAllowedError("at most three different square roots are allowed")
     value = sp.expand(value)
     powers = value.atoms(sp.Pow)
-    # With one root of a rational, 1 and the root are independent: nothing can hide.
+    # With a single root of a rational number no simplification is needed, since 1 and the root are independent.
     if any(not power.base.is_Rational for power in powers) or len(powers) > 1:
         domain, (element,) = construct_domain([value], extension=True)
         value = sp.expand(domain.to_sympy(element))
@@ -230,7 +230,7 @@ def _settled(value: Number) -> Number:
 
 
 def degree_bound(values: list[Any]) -> int:
-    """Return a bound of the degree of the field that expressions lie in: every root doubles it at most."""
+    """Return an upper bound of the degree of the field of expressions: the product of the indices of their roots."""
     import sympy as sp
 
     roots = {

@@ -1,16 +1,16 @@
-"""Coning coefficients: the second-order term of the rotation vector from cross products of increments, designed.
+"""Design of coning coefficients, which give the second-order term of the rotation vector from cross products.
 
-The term is half the integral of (integral of the rate) x (rate). A design gives a weight to the cross product of
-every two samples. Samples do not determine the term, and forms differ in the rates for which they are exact:
+The term is half the integral of (integral of the rate) x (rate). A design has a weight for the cross product of every
+two samples. Samples do not determine the term, and the forms of a design differ in the rates for which they are exact:
 
-- uncompressed: any rate that is a polynomial through the samples;
-- compressed: coning, to the highest power of frequency times sampling interval, the newest sample being crossed with a
-  weighted sum of the older ones. On other motion three and more samples are then of third order alone;
-- combined: coning to the same power and polynomials to the same order in the step as uncompressed. What freedom is left
-  goes into being nearest to the uncompressed coefficients, in the sum of squares.
+- uncompressed is exact for the polynomial rate through the samples;
+- compressed crosses the newest sample with a weighted sum of the older ones, and is exact on coning to the highest
+  power of frequency times sampling interval. With three or more samples it is only of third order on other motion;
+- combined is exact on coning to the same power, and on polynomials to the same order in the step as uncompressed. Among
+  all such designs it is the one nearest to the uncompressed coefficients, in the sum of squares.
 
-Sculling, half the integral of (integral of the rate) x a + (integral of a) x (rate), a the acceleration, is the same
-bilinear form with one of its sides replaced: the coefficients are those of coning.
+Sculling is half the integral of (integral of the rate) x a + (integral of a) x (rate), with the acceleration a. It is
+the same bilinear form with one side replaced, so it has the coefficients of coning.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ SOURCES = {
     "combined": "M. Song, W. Wu, X. Pan, J. Guid. Control Dyn. 36 (2013) 1872-1880, for polynomials and coning",
 }
 FORMS = tuple(SOURCES)
-#: Samples of a slow cycle, and kept ones, beyond which a design would take long.
+#: Most samples of a slow cycle, and most samples from before it, since a larger design would take long.
 MOST_SAMPLES, MOST_KEPT = 12, 3
 
 
@@ -49,10 +49,10 @@ class Design:
     form : str
         "compressed", "uncompressed" or "combined".
     samples, previous : int
-        Samples of the slow cycle, and those before it that are kept.
+        Samples of the slow cycle, and samples from before it.
     pairs : dict
-        The coefficient of older sample x newer sample, by their numbers from the oldest, which is 0; ordered by the
-        newer sample, then by the older one.
+        The coefficient of each cross product older x newer, by the numbers of the two samples; the oldest is 0. The
+        order is by the newer sample, then by the older one.
     """
 
     form: str
@@ -62,45 +62,46 @@ class Design:
 
     @cached_property
     def degree(self) -> int:
-        """Return the total degree to which products of two powers of time in the rate are integrated exactly."""
+        """Return the total degree up to which products of two powers of time in the rate are integrated exactly."""
         for total in count(1):
             for row, value in _polynomial(self.samples, self.previous, total):
                 if sum(row[pair] * c for pair, c in self.pairs.items()) != value:
                     return total - 1
         raise AssertionError("the samples are finite in number")
 
-    def residual(self) -> Residual:
-        """Return what the design leaves of the drift of coning."""
+    def residual(self) -> ResidualDrift:
+        """Return the drift on coning that the design does not compensate."""
         sines: dict[int, Fraction] = {self.samples: Fraction(1, 2)}
         for (older, newer), c in self.pairs.items():
             distance = newer - older
             for multiple, weight in ((distance, 2), (distance + 1, -1), (distance - 1, -1)):
                 sines[multiple] = sines.get(multiple, Fraction(0)) + weight * c
-        kept = {m: c for m, c in sorted(sines.items()) if m and c}
-        return Residual(self.samples, kept)
+        nonzero = {m: c for m, c in sorted(sines.items()) if m and c}
+        return ResidualDrift(self.samples, nonzero)
 
 
 @dataclass(frozen=True)
-class Residual:
-    """The mean drift that is left on coning, to second order in the cone's half-angle, computed minus true.
+class ResidualDrift:
+    """The mean residual drift on coning, computed minus true, to second order in the half-angle of the cone.
 
-    The body's rotation vector is alpha (cos omega t, sin omega t, 0), samples lie T apart, lambda = omega T. Over a
-    slow cycle of N samples the term of second order is alpha^2 (N lambda - sin(N lambda)) / 2 about the third axis,
-    and the cross product of two samples that are m apart 2 alpha^2 (1 - cos lambda) sin(m lambda). The drift in rad/s
-    is alpha^2 / (N T) times the sum of the coefficients times sin(m lambda), less N lambda / 2.
+    The rotation vector of the body is alpha (cos omega t, sin omega t, 0); samples are T apart, and lambda = omega T.
+    Over a slow cycle of N samples the second-order term is alpha^2 (N lambda - sin(N lambda)) / 2 about the third axis.
+    The cross product of two samples m apart is 2 alpha^2 (1 - cos lambda) sin(m lambda). The drift in rad/s is
+    alpha^2 / (N T) times the sum of c_m sin(m lambda), minus N lambda / 2.
 
     Parameters
     ----------
     samples : int
+        N.
     sines : dict of int to Fraction
-        The coefficient of sin(m lambda), by m.
+        The coefficients c_m, by m.
     """
 
     samples: int
     sines: dict[int, Fraction]
 
     def series(self) -> Iterator[tuple[int, Fraction]]:
-        """Yield powers of lambda and their coefficients in the drift over alpha^2 / (N T), those that are not zero."""
+        """Yield the powers of lambda with nonzero coefficients in the drift, in units of alpha^2 / (N T)."""
         for q in count():
             power = 2 * q + 1
             total = sum((c * m**power for m, c in self.sines.items()), Fraction(0))
@@ -111,12 +112,12 @@ class Residual:
 
     @property
     def leading(self) -> tuple[int, Fraction]:
-        """The lowest power of lambda and its coefficient in the drift over alpha^2 / (N T)."""
+        """The lowest power of lambda and its coefficient in the drift, in units of alpha^2 / (N T)."""
         return next(self.series())
 
     @property
     def expression(self) -> str:
-        """The drift in rad/s as SymPy reads it, in alpha (rad), omega (rad/s) and T (s)."""
+        """The drift in rad/s as text that SymPy can read, in alpha (rad), omega (rad/s) and T (s)."""
         interval = _times(self.samples, "T")
         terms = [f"-{_times(Fraction(self.samples, 2), 'omega*T')}"]
         for m, c in self.sines.items():
@@ -143,7 +144,7 @@ def design(samples: int, previous: int = 0, form: str = "compressed") -> Design:
     samples : int
         Samples of the slow cycle.
     previous : int, optional
-        Samples before it that are kept.
+        Samples from before it.
     form : str, optional
         "compressed", "uncompressed" or "combined".
 
@@ -154,7 +155,7 @@ def design(samples: int, previous: int = 0, form: str = "compressed") -> Design:
     Raises
     ------
     InputError
-        If the form is unknown, or a number is out of range: up to 12 samples, up to 3 kept ones.
+        If the form is unknown, or there are more than 12 samples or more than 3 from before the cycle.
 
     Examples
     --------
@@ -164,8 +165,8 @@ def design(samples: int, previous: int = 0, form: str = "compressed") -> Design:
     ['57/80', '33/80', '57/80']
     """
     count = checks.count("samples", samples, largest=MOST_SAMPLES)
-    kept = checks.count("previous", previous, smallest=0, largest=MOST_KEPT)
-    return _designed(count, kept, checks.choice("form", form, FORMS))
+    before = checks.count("previous", previous, smallest=0, largest=MOST_KEPT)
+    return _designed(count, before, checks.choice("form", form, FORMS))
 
 
 @cache
@@ -175,7 +176,18 @@ def _designed(samples: int, previous: int, form: str) -> Design:
 
 
 def powers(samples: int, previous: int, power: int) -> list[Fraction]:
-    """Return the samples of the rate t^power, t from 0 to 1 over the slow cycle, from the oldest."""
+    """Return the samples of the rate t^power, oldest first, where t runs from 0 to 1 over the slow cycle.
+
+    Parameters
+    ----------
+    samples, previous : int
+        Samples of the slow cycle, and samples from before it.
+    power : int
+
+    Returns
+    -------
+    list of Fraction
+    """
     integral = [Fraction(k, samples) ** (power + 1) / (power + 1) for k in range(-previous, samples + 1)]
     return [b - a for a, b in pairwise(integral)]
 
@@ -194,8 +206,8 @@ def _compressed(samples: int, previous: int) -> Scalars:
 def _uncompressed(samples: int, previous: int) -> Scalars:
     total = samples + previous
     second = rotation_series.terms(total, 2)[1]
-    found = rotation_series.pairs(rotation_series.in_samples(second, samples, previous))
-    return {pair: found.get(pair, Fraction(0)) for pair in _pairs(total)}
+    coefficients = rotation_series.pairs(rotation_series.in_samples(second, samples, previous))
+    return {pair: coefficients.get(pair, Fraction(0)) for pair in _pairs(total)}
 
 
 def _combined(samples: int, previous: int) -> Scalars:
@@ -210,9 +222,9 @@ def _combined(samples: int, previous: int) -> Scalars:
 
 
 def _polynomial(samples: int, previous: int, total: int) -> Iterator[tuple[Scalars, Fraction]]:
-    """Yield, for products of two powers of time of a total degree, the term from each pair of samples, and its truth.
+    """Yield conditions for polynomial rates: the coefficients of the pairs of samples and the true value.
 
-    Rates that are sums of powers up to some degree make all such products.
+    There is one condition for each product of two different powers of time with the given total degree.
     """
     truth = rotation_series.pairs(rotation_series.terms(total + 1, 2)[1])
     for j in range((total + 1) // 2):
@@ -223,10 +235,10 @@ def _polynomial(samples: int, previous: int, total: int) -> Iterator[tuple[Scala
 
 
 def _coning(samples: int, previous: int) -> Iterator[tuple[Scalars, Fraction]]:
-    """Yield, for as many powers of lambda as there are distances, the coefficient from each pair, and the true one.
+    """Yield conditions for coning, one for each power of lambda: the coefficients of the pairs and the true value.
 
-    They are those of the sines in `Residual`: sin(m lambda) has (-1)^q m^(2q+1) / (2q+1)! lambda^(2q+1); the common
-    factor is left out.
+    They follow from the sines in `ResidualDrift`: the coefficient of lambda^(2q+1) in sin(m lambda) is
+    (-1)^q m^(2q+1) / (2q+1)!, whose factor without m is common to both sides and left out.
     """
     total = samples + previous
     for q in range(1, total):
@@ -239,7 +251,7 @@ def _coning(samples: int, previous: int) -> Iterator[tuple[Scalars, Fraction]]:
 
 
 def _nearest(conditions: list[tuple[list[Fraction], Fraction]], start: list[Fraction]) -> list[Fraction]:
-    """Return the solution of linear conditions that is nearest to a point in the sum of squares."""
+    """Return the solution of linear conditions that is nearest to a point, in the sum of squares."""
     if not conditions:
         return start
     system = [

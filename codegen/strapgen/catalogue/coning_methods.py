@@ -1,4 +1,4 @@
-"""Steps by coning coefficients: the rotation vector from increments and their cross products; its dual, sculling."""
+"""Attitude steps by coning coefficients, from increments and their cross products, and the dual for sculling."""
 
 from __future__ import annotations
 
@@ -22,15 +22,14 @@ from strapgen.catalogue.steps import (
 from strapgen.kernel import Kernel, KernelBuilder
 from strapgen.signal import Signal
 
-#: Legendre coefficients of the rate from which the terms of third and fourth order are computed, at most.
+#: Most Legendre coefficients of the rate in the terms of third and fourth order.
 MOST_COEFFICIENTS = 6
 
-#: Order of a step that keeps the terms of second order alone, and of one that keeps those of fourth order.
+#: Order of a step with terms up to second order in the rate, and of one with terms up to fourth order.
 _SECOND, _FOURTH = 4, 6
 
-
-#: Methods by the end of their name: the form of the coefficients, and whether the terms of third and fourth order,
-#: those of the polynomial through the samples, are kept.
+#: Methods by the suffix of their name: the form of the coefficients, and whether the step has the terms of third and
+#: fourth order of the polynomial through the samples.
 _METHODS = {
     "compressed": ("compressed", False),
     "uncompressed": ("uncompressed", False),
@@ -45,14 +44,14 @@ def method(name: str) -> Method:
     Parameters
     ----------
     name : str
-        "compressed", "uncompressed", "combined", which keeps the terms of third and fourth order too, or "polynomial":
-        uncompressed with these terms.
+        "compressed" and "uncompressed" have terms up to second order. "combined" and "polynomial", the latter with
+        uncompressed coefficients, also have the terms of third and fourth order.
     """
     form, terms = _METHODS[name]
     order = _FOURTH if terms else _SECOND
 
     def limit(increments: int, previous: int) -> int:
-        # The first product that is not integrated exactly is of the local order three above the total degree.
+        # The first product with an error has a total degree one higher; its local order is that degree plus two.
         return min(order, coning.design(increments, previous, form).degree + 2)
 
     return exponential(
@@ -68,14 +67,14 @@ def method(name: str) -> Method:
 def sculling(method: Method, increments: int, previous: int = 0) -> Kernel:
     """Derive the sculling term of a step, by duality with the coning coefficients of a method.
 
-    The term is half the integral of (integral of w) x a + (integral of a) x w; body axes.
+    The term is half the integral of (integral of w) x a + (integral of a) x w, in body axes.
 
     Parameters
     ----------
     method : Method
-        Of `method`.
+        A result of the function `method`.
     increments, previous : int
-        Samples of the step, and those before it that it takes too.
+        Samples of the step, and samples from before it.
 
     Returns
     -------
@@ -119,18 +118,18 @@ def sculling(method: Method, increments: int, previous: int = 0) -> Kernel:
         ),
         total,
     )
-    suffix, option, given = chosen(method, increments, previous)
-    given = given.replace("angle ", "angle and velocity ")
+    suffix, option, samples_text = chosen(method, increments, previous)
+    samples_text = samples_text.replace("angle ", "angle and velocity ")
     return build.kernel(
         f"sculling-{suffix}",
-        f"Sculling term of a step by {form} coning coefficients from {given}",
+        f"Sculling term of a step by {form} coning coefficients from {samples_text}",
         f"{coning.SOURCES[form]}; by duality: K. M. Roscoe, J. Guid. Control Dyn. 24 (2001) 201-205",
         arguments=f"sculling {option}",
     )
 
 
 def _of_pairs(build: KernelBuilder, samples: Samples, form: str) -> sp.Matrix:
-    """Write the rotation vector in the increments themselves: their sum and their cross products."""
+    """Return the rotation vector as the sum of the increments and of weighted cross products of them."""
     increments = samples.increments
     assert increments is not None, "rates are refused before"
     pairs = coning.design(increments, samples.previous, form).pairs
@@ -153,7 +152,7 @@ def _of_pairs(build: KernelBuilder, samples: Samples, form: str) -> sp.Matrix:
 
 
 def _with_terms(build: KernelBuilder, samples: Samples, form: str) -> sp.Matrix:
-    """Write the rotation vector in the Legendre coefficients of the rate, where half of the coefficients vanish."""
+    """Return the rotation vector in the Legendre coefficients of the rate, where half of the weights vanish."""
     assert samples.increments is not None, "rates are refused before"
     pairs = coning.design(samples.increments, samples.previous, form).pairs
     count = len(samples.fit.basis)
@@ -209,16 +208,17 @@ def _with_terms(build: KernelBuilder, samples: Samples, form: str) -> sp.Matrix:
 def sample_terms(
     increments: int, previous: int = 0
 ) -> tuple[dict[int, Scalars], dict[tuple[int, int], Scalars]]:
-    """Return the terms of third and fourth order of the polynomial through samples, in these.
+    """Return the terms of third and fourth order of the polynomial through samples, in terms of the samples.
 
     Parameters
     ----------
     increments, previous : int
+        Samples of the step, and samples from before it.
 
     Returns
     -------
     third, fourth : dict
-        See `rotation_series.third` and `rotation_series.fourth`; vectors are numbered from the oldest sample, 0.
+        As from `rotation_series.third` and `rotation_series.fourth`; the oldest sample is number 0.
     """
     terms = rotation_series.terms(increments + previous, 4)
     third, fourth = (rotation_series.in_samples(words, increments, previous) for words in terms[2:])
@@ -226,18 +226,19 @@ def sample_terms(
 
 
 def in_legendre(pairs: Scalars, increments: int, previous: int) -> Scalars:
-    """Return coefficients of cross products of samples as those of cross products of the rate's Legendre coefficients.
+    """Convert coefficients of cross products of samples to those of the rate's Legendre coefficients.
 
     Parameters
     ----------
     pairs : dict
-        By the numbers of the samples.
+        By the numbers of two samples.
     increments, previous : int
+        Samples of the step, and samples from before it.
 
     Returns
     -------
     dict
-        By the numbers of the coefficients; those that are not zero.
+        By the numbers of two Legendre coefficients, without zeros.
     """
     count = increments + previous
     powers = [coning.powers(increments, previous, j) for j in range(count)]

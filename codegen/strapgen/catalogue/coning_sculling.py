@@ -1,4 +1,4 @@
-"""Coning and sculling by recursion: what a fast loop sums, and the rotation vector that comes of it."""
+"""Coning and sculling by recursion: the sums of a fast loop, and the rotation vector that follows from them."""
 
 from __future__ import annotations
 
@@ -65,13 +65,13 @@ SCULLING = Signal.vector(
 
 
 class FastLoop:
-    """The inputs of a fast cycle, and the outputs that take their place in the next one.
+    """A fast loop under construction: its inputs, and the outputs that take their place in the next cycle.
 
     Attributes
     ----------
     build : KernelBuilder
     states : list of (str, str)
-        Inputs and outputs, pair by pair.
+        Feedback pairs: an input and the output that takes its place.
     """
 
     def __init__(self) -> None:
@@ -79,15 +79,15 @@ class FastLoop:
         self.states: list[tuple[str, str]] = []
 
     def hand_on(self, signal: Signal, value: sp.Matrix) -> None:
-        """Make a value the state of the next cycle."""
+        """Add a feedback pair: the value becomes this input in the next cycle."""
         self.states.append((signal.name, after(signal).name))
         self.build.output(after(signal), value)
 
     def kernel(self, name: str, title: str, source: str) -> Kernel:
-        """Finish the kernel: the increment before is kept when a slow cycle ends, all else begins anew."""
-        kept = tuple(state for state, _ in self.states if state == PREVIOUS.name)
+        """Return the kernel; at the end of a slow cycle all states but the previous increment are reset."""
+        continued = tuple(state for state, _ in self.states if state == PREVIOUS.name)
         return self.build.kernel(
-            name, title, f"{SAVAGE}, {source}", recursion=Recursion(tuple(self.states), kept)
+            name, title, f"{SAVAGE}, {source}", recursion=Recursion(tuple(self.states), continued)
         )
 
 
@@ -100,9 +100,9 @@ def coned(
     ----------
     build : KernelBuilder
     coning, beta : Matrix, 3 x 1
-        Coning correction and sum of the increments before the cycle.
+        Coning correction and sum of the increments before the cycle, in rad.
     past, d : Matrix, 3 x 1
-        Increments of the cycle before and of this one.
+        Increments of the previous cycle and of this one, in rad.
     """
     arm = Signal.vector("arm", "arm", unit="rad", meaning="angle at the middle of the cycle, for coning")
     return coning + cross(build.stage(arm, beta + past / 6), d) / 2
@@ -125,7 +125,8 @@ def sculled(
     form : int
         1 or 2.
     eta, beta, u : Matrix, 3 x 1
-        Sculling integral, sums of the angle and velocity increments before the cycle; S1 takes no u.
+        Sculling integral in m/s, and the sums of the angle increments in rad and of the velocity increments in m/s
+        before the cycle; S1 does not use u.
     d, dv : Matrix, 3 x 1
         Angle and velocity increment of the cycle.
     """
@@ -153,12 +154,12 @@ def coning() -> Kernel:
 
 
 def rotation_vector_of(beta: sp.Matrix, correction: sp.Matrix) -> sp.Matrix:
-    """Return the rotation vector of a slow cycle from the sum of increments and the coning correction, (22)."""
+    """Return the rotation vector of a slow cycle, the sum of increments plus coning correction, equation (22)."""
     return beta + correction
 
 
 def rotation_vector() -> Kernel:
-    """Return the slow loop of the rotation vector: the sum of increments and coning correction, equation (26).
+    """Return the slow loop of the rotation vector, which adds increments and coning correction, equation (26).
 
     Returns
     -------

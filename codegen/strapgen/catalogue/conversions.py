@@ -20,7 +20,7 @@ _CONVERTED = Signal.matrix(
 
 
 def _result(kinematics: Kinematics) -> Signal:
-    """Return the state of an algorithm as the result of a conversion."""
+    """Return the signal of a state that results from a conversion."""
     state = kinematics.state
     elements = tuple(f"next_{element.split('_')[1]}" for element in state.elements)
     return Signal(
@@ -67,7 +67,7 @@ def dcm_from_cayley_klein() -> Kernel:
 
 
 def _largest_column(build: KernelBuilder) -> tuple[sp.Matrix, sp.Symbol, sp.Matrix]:
-    """Name the column of 4 e e' through its largest diagonal element; 4 e e' is linear in the matrix.
+    """Return the column of 4 e e' through its largest diagonal element; 4 e e' is linear in the matrix.
 
     Returns
     -------
@@ -76,6 +76,7 @@ def _largest_column(build: KernelBuilder) -> tuple[sp.Matrix, sp.Symbol, sp.Matr
     largest : Symbol
         The diagonal element.
     diagonal : Matrix, 4 x 1
+        All diagonal elements, scalar last.
     """
     C = build.input(DCM.state)
     trace = build.value("trace", C.trace(), "trace of C")
@@ -98,12 +99,12 @@ def _largest_column(build: KernelBuilder) -> tuple[sp.Matrix, sp.Symbol, sp.Matr
 
 
 def _of_largest(values: Sequence[Any], diagonal: Sequence[sp.Symbol], largest: sp.Symbol) -> sp.Piecewise:
-    """Return that of four values, scalar last, which stands where the diagonal is largest; the scalar comes first."""
+    """Return the one of four values whose diagonal element is largest; of equal ones the scalar (the last) wins."""
     return sp.Piecewise(*((values[k], diagonal[k] >= largest) for k in (3, 0, 1)), (values[2], True))
 
 
 def _sign(expression: sp.Expr) -> sp.Piecewise:
-    """Return 1, or -1 below zero."""
+    """Return 1 for a number from zero up, otherwise -1."""
     return sp.Piecewise((sp.Integer(1), expression >= 0), (sp.Integer(-1), True))
 
 
@@ -135,13 +136,14 @@ _PREVIOUS = replace(
 
 
 def euler_from_dcm_followed(rule: str) -> Kernel:
-    """Return Euler parameters of a direction cosine matrix, with the sign of those before.
+    """Return Euler parameters of a direction cosine matrix, with a sign continuous from call to call.
 
     Parameters
     ----------
     rule : str
-        "element": the largest element keeps its sign, equation (18), good for turns of less than 60 degrees since
-        the call before; "product": the scalar product with the parameters before is not negative, good to 180 degrees.
+        "element" preserves the sign of the largest element, equation (18), which is correct for rotations of less than
+        60 degrees since the previous call. "product" makes the scalar product with the previous parameters not
+        negative, which is correct up to 180 degrees.
 
     Returns
     -------

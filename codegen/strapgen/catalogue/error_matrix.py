@@ -1,4 +1,4 @@
-"""The error matrix of a computed attitude and its split into scale, skew and drift."""
+"""The error matrix of a computed attitude, and its parts: scale, skew and drift."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from strapgen.signal import Signal
 def error_matrix() -> Kernel:
     """Derive E = C_computed C_true' - I and its parts.
 
-    Scale is the diagonal, skew the symmetric part off the diagonal, drift the skew-symmetric part: for
-    C_computed = exp(skew(eps)) C_true the drift is -eps to first order.
+    Scale is the diagonal, skew the symmetric part off the diagonal, and drift the skew-symmetric part. If
+    C_computed = exp(skew(eps)) C_true, the drift is -eps to first order.
 
     Returns
     -------

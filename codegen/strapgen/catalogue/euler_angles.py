@@ -1,4 +1,4 @@
-"""Euler angles: roll, pitch and heading, rotations in the order heading, pitch, roll, from and to the matrix."""
+"""Conversions between direction cosine matrix and Euler angles: rotations by heading, then pitch, then roll."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ ANGLES = Signal(
     meaning="Euler angles: roll, pitch, heading",
     bound=Fraction(355, 113),
 )
-#: From this pitch on, heading is found beside roll, by their sum or difference: where the cosine squared is below.
+#: Squared cosine of pitch below which heading is computed from its sum or difference with roll.
 _STEEP = sp.Rational(1, 4)
-#: The cosine of pitch up to which nothing tells roll from heading, in steps of the resolution.
+#: Cosine of pitch, in units of the resolution, up to which the matrix does not determine roll and heading separately.
 _VERTICAL = 2
 
 
@@ -55,15 +55,15 @@ def dcm_from_euler_angles() -> Kernel:
 def euler_angles_from_dcm() -> Kernel:
     """Return the Euler angles of a direction cosine matrix, equations (61) to (63).
 
-    (63) holds at every pitch: C23 - C12 and C13 + C22 are 1 + sin(pitch) times the sine and cosine of heading - roll.
-    It is used at steep pitch, so that heading - roll, or their sum, is as good as the matrix where neither is by
-    itself. Where the pitch is vertical to the last place, roll stays what it was.
+    Equation (63) holds at every pitch: C23 - C12 and C13 + C22 are 1 + sin(pitch) times the sine and cosine of
+    heading - roll. It is used at steep pitch, so that heading - roll (or their sum) is as accurate as the matrix even
+    where neither angle is by itself. If the pitch is vertical to the last digit, roll does not change.
 
     Returns
     -------
     Kernel
-        Inputs ``state`` (3, 3) and ``previous`` (3,), the angles of the call before in rad; output ``next`` (3,): roll
-        and heading from -pi to pi, pitch from -pi/2 to pi/2.
+        Inputs ``state`` (3, 3) and ``previous`` (3,), the angles of the previous call in rad; output ``next`` (3,) in
+        rad, roll and heading from -pi to pi, pitch from -pi/2 to pi/2.
     """
     build = KernelBuilder()
     C = build.input(DCM.state)

@@ -1,8 +1,8 @@
-"""Kinematics of the attitude representations: how each state turns with the body rate.
+"""Kinematics of the attitude representations: the differential equation of each state.
 
-Every state here obeys a linear equation dx/dt = f(x, g) with the generator g = scale * w, w the body rate,
-and is advanced by a product: a step applied to the identity gives the transition, and the product of state
-and transition is the same step applied to the state.
+Every state obeys a linear equation dx/dt = f(x, g) with the generator g = scale * w, where w is the body rate. A step
+applied to the identity is the transition, and the product of state and transition is the same step applied to the
+state.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ class Kinematics:
     name : str
         Name of the algorithm on the command line.
     title : str
-        The field's name of the state.
+        Name of the state in the field.
     source : str
-        Where the equation stands.
+        Source of the equation.
     state, transition, next : Signal
         The state, the transition over one step, and the state after it.
     identity : Matrix
@@ -39,15 +39,15 @@ class Kinematics:
     scale : Rational
         Factor of the body rate in the generator.
     derivative : callable
-        ``derivative(x, g)``: dx/dt for the generator g, bilinear.
+        ``derivative(x, g)`` returns dx/dt for the generator g; bilinear.
     product : callable
-        ``product(x, p)``: the state x after the transition p, bilinear.
+        ``product(x, p)`` returns the state x after the transition p; bilinear.
     exponential : callable
-        ``exponential(v, order, square)``: the transition of the rotation by the rotation vector v; with an order,
-        without the products of its elements above that degree; square may name v . v.
+        ``exponential(v, order, square)`` returns the transition of the rotation vector v in rad. With an order it
+        omits products of the elements of v above that degree; ``square`` is v . v if that has a name.
     orthonormalize, attitude : str, str or None
-        Names of the kernels that restore the state's constraint and that turn it into a direction
-        cosine matrix.
+        Names of the kernels that restore the constraint of the state and that convert it to a direction cosine
+        matrix; the latter is None if the state is one.
     """
 
     name: str
@@ -66,13 +66,13 @@ class Kinematics:
 
 
 def cayley_klein_derivative(a: sp.Matrix, g: sp.Matrix) -> sp.Matrix:
-    """Return da/dt from dU/dt = i (g . s) U, g half the body rate."""
+    """Return da/dt from dU/dt = i (g . s) U, where g is half the body rate."""
     turning = sp.I * sum((g[k] * algebra.PAULI[k] for k in range(3)), sp.zeros(2, 2))
     return algebra.cayley_klein_parameters(turning * algebra.cayley_klein_matrix(a))
 
 
 def cayley_klein_product(a: sp.Matrix, p: sp.Matrix) -> sp.Matrix:
-    """Return the parameters of the matrix product P U, P the transition and U the state."""
+    """Return the parameters of the matrix product P U of the transition P and the state U."""
     return algebra.cayley_klein_parameters(algebra.cayley_klein_matrix(p) * algebra.cayley_klein_matrix(a))
 
 

@@ -1,6 +1,6 @@
 """Motions with a closed-form attitude: body rate, exact angle increments, true direction cosine matrix.
 
-Each formula is regular where its textbook form is 0/0: sin(x)/x stands for every removable singularity.
+Where the textbook form of a formula is 0/0, it is written with sin(x)/x, which has a value there.
 """
 
 from __future__ import annotations
@@ -26,17 +26,17 @@ class MotionModel:
     Parameters
     ----------
     name, title : str
-        Name on the command line, one line that describes it.
+        Name on the command line, and a description in one line.
     rate : callable
-        ``rate(t, *parameters)``: body rate in rad/s.
+        ``rate(t, *parameters)`` returns the body rate in rad/s, body axes.
     increment : callable
-        ``increment(m, d, *parameters)``: the rate's integral over [m - d/2, m + d/2] in rad.
+        ``increment(m, d, *parameters)`` returns the integral of the rate over [m - d/2, m + d/2] in rad.
     attitude : callable
-        ``attitude(t, *parameters)``: the direction cosine matrix, the identity at t = 0.
+        ``attitude(t, *parameters)`` returns the direction cosine matrix, body to reference; the identity at t = 0.
     turning : callable or None
-        ``turning(*parameters)``: for a rate that keeps its length and turns evenly, the constant vector n, in rad/s,
-        about which it turns: the body rate is that of time 0 turned by -n t, and the attitude is the rotation by
-        (rate at time 0 + n) t times the one by -n t. None for other motions.
+        For a rate of constant length that rotates uniformly, ``turning(*parameters)`` returns the constant vector n in
+        rad/s about which it rotates; None for other motions. The body rate is that of time 0 rotated by -n t, and the
+        attitude is the rotation by (rate at time 0 + n) t times the rotation by -n t.
     """
 
     name: str
@@ -48,7 +48,7 @@ class MotionModel:
 
 
 def _about_y(angle: sp.Expr) -> sp.Matrix:
-    """Return the rotation about y; cosine and sine of one angle are cheaper than the general form."""
+    """Return the rotation about y; its cosine and sine of one angle are cheaper than the general form."""
     c, s = sp.cos(angle), sp.sin(angle)
     return sp.Matrix([[c, 0, s], [0, 1, 0], [-s, 0, c]])
 
@@ -58,12 +58,12 @@ def _polynomial_angle(t: sp.Expr, *a: sp.Expr) -> sp.Expr:
 
 
 def _polynomial_increment(m: sp.Expr, d: sp.Expr, *a: sp.Expr) -> sp.Expr:
-    # Expanded about the middle of the interval: no difference of large numbers is left.
+    # The expansion about the middle of the interval leaves no difference of large numbers.
     return sp.expand(_polynomial_angle(m + d / 2, *a) - _polynomial_angle(m - d / 2, *a))
 
 
 def _chord(m: sp.Expr, d: sp.Expr, b: sp.Expr, wave: Callable[[sp.Expr], sp.Expr]) -> sp.Expr:
-    """Return the integral of wave(b t), a sine or a cosine, over [m - d/2, m + d/2]."""
+    """Return the integral over [m - d/2, m + d/2] of wave(b t), a sine or a cosine."""
     return d * sp.sinc(b * d / 2) * wave(b * m)
 
 
@@ -124,6 +124,11 @@ def truth(name: str) -> Kernel:
     ----------
     name : str
         A key of `MOTIONS`.
+
+    Returns
+    -------
+    Kernel
+        Inputs ``time`` in s and the parameters; outputs ``rate`` (3,) in rad/s, body axes, and ``attitude`` (3, 3).
     """
     motion = MOTIONS[name]
     build = KernelBuilder()
@@ -146,6 +151,12 @@ def increments(name: str) -> Kernel:
     ----------
     name : str
         A key of `MOTIONS`.
+
+    Returns
+    -------
+    Kernel
+        Inputs ``middle`` and ``width`` of the interval in s, and the parameters; output ``increment`` (3,) in rad, body
+        axes.
     """
     motion = MOTIONS[name]
     build = KernelBuilder()

@@ -1,4 +1,4 @@
-"""Runge-Kutta-Munthe-Kaas methods: a tableau applied to the rotation vector of the step, and its exponential."""
+"""Runge-Kutta-Munthe-Kaas methods apply a tableau to the rotation vector of the step, then take its exponential."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from strapgen.signal import Signal
 
 
 def method(order: int) -> Method:
-    """Return the method of order 4, on the classical tableau.
+    """Return the method of an order on the classical tableau `rk<order>`.
 
     Parameters
     ----------
@@ -47,8 +47,8 @@ def method(order: int) -> Method:
 def bortz(phi: sp.Matrix, turn: sp.Matrix, products: int) -> sp.Matrix:
     """Return the derivative of the rotation vector by Bortz's equation, as a series of cross products.
 
-    dphi/dt = sum_k (-1)^k B_k/k! phi x (phi x ... w), B_k Bernoulli's numbers with B_1 = -1/2:
-    w + phi x w/2 + phi x (phi x w)/12 + ... (J. E. Bortz, IEEE Trans. Aerosp. Electron. Syst. 7 (1971) 61-66).
+    The equation is dphi/dt = sum_k (-1)^k B_k/k! phi x (phi x ... w) with Bernoulli's numbers B_k, B_1 = -1/2, which
+    begins w + phi x w/2 + phi x (phi x w)/12 (J. E. Bortz, IEEE Trans. Aerosp. Electron. Syst. 7 (1971) 61-66).
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def bortz(phi: sp.Matrix, turn: sp.Matrix, products: int) -> sp.Matrix:
     turn : Matrix, 3 x 1
         Body rate, or body rate times the step.
     products : int
-        How many cross products are kept.
+        Largest number of nested cross products.
 
     Returns
     -------
@@ -71,8 +71,8 @@ def bortz(phi: sp.Matrix, turn: sp.Matrix, products: int) -> sp.Matrix:
 
 
 def bortz_coefficient(products: int) -> sp.Rational:
-    """Return the coefficient of so many nested cross products in Bortz's equation, see `bortz`."""
-    # SymPy's B_1 is +1/2 or -1/2 by its release; with its sign taken out it does not matter.
+    """Return the coefficient of a number of nested cross products in Bortz's equation, see `bortz`."""
+    # B_1 of SymPy is +1/2 or -1/2, depending on its release.
     if products == 1:
         return abs(sp.bernoulli(1))
     return sp.bernoulli(products) / sp.factorial(products)

@@ -1,16 +1,17 @@
 """Order conditions of Runge-Kutta methods, decided exactly.
 
-For any equation the conditions of order p are those of the rooted trees with p nodes (Butcher): b' Phi(t) = 1/gamma(t).
+For general equations the conditions of order p belong to the rooted trees with p nodes: b' Phi(t) = 1/gamma(t), after
+Butcher.
 
-For linear equations x' = A(t) x most of them coincide or fall away. A word (k_1, ..., k_m) stands for the product
-A^(k_1) A^(k_2) ... A^(k_m) of derivatives of A, and is of order p = sum (k_i + 1): there are 2^(p - 1) of them. The
-exact solution, a series of iterated integrals (Peano and Baker), holds it with the coefficient
+For linear equations x' = A(t) x most of them coincide or are not needed. A word (k_1, ..., k_m) stands for the product
+A^(k_1) A^(k_2) ... A^(k_m) of derivatives of A. Its order is p = sum (k_i + 1), and there are 2^(p - 1) words of this
+order. In the exact solution, a series of iterated integrals (Peano and Baker), its coefficient is
 
     int_0^1 s_1^k_1 int_0^s_1 s_2^k_2 ... int_0^s_(m-1) s_m^k_m ds_m ... ds_1 = prod_i 1 / sum_(j >= i) (k_j + 1)
 
-and the method, C being the diagonal matrix of the nodes, with b' C^k_1 A C^k_2 A ... C^k_m 1; a factor
-1/(k_1! ... k_m!) is common to both. Attitude kinematics is linear. It may stand as x' = x A too: all products are then
-written the other way round, on both sides, and the conditions are the same.
+and in the method it is b' C^k_1 A C^k_2 A ... C^k_m 1 with the diagonal matrix C of the nodes; a factor
+1/(k_1! ... k_m!) is common to both. Attitude kinematics is linear. In the form x' = x A all products are reversed on
+both sides, and the conditions are the same.
 """
 
 from __future__ import annotations
@@ -27,10 +28,10 @@ if TYPE_CHECKING:
     from strapgen.catalogue.coefficients import Number
     from strapgen.catalogue.tableaux import Tableau
 
-#: A rooted tree: its root's subtrees, in a fixed order.
+#: A rooted tree as the tuple of the subtrees of its root, in a fixed order.
 Tree: TypeAlias = "tuple[Tree, ...]"
 
-#: A product of derivatives of A(t): which derivatives, the last in time first.
+#: A product of derivatives of A(t), as the tuple of the orders of the derivatives, the last in time first.
 Word: TypeAlias = tuple[int, ...]
 
 
@@ -39,7 +40,7 @@ Word: TypeAlias = tuple[int, ...]
 
 @cache
 def trees(order: int) -> tuple[Tree, ...]:
-    """Return the rooted trees with as many nodes as the order, the bushy one first.
+    """Return the rooted trees with as many nodes as the order, the tree with all leaves on the root first.
 
     Examples
     --------
@@ -58,7 +59,7 @@ def trees(order: int) -> tuple[Tree, ...]:
 
 
 def _partitions(total: int, largest: int) -> Iterator[tuple[int, ...]]:
-    """Give the ways of writing a number as a sum, smallest parts first."""
+    """Yield the partitions of a number, with the parts of each in ascending order."""
     if total == 0:
         yield ()
     for last in range(1, min(total, largest) + 1):
@@ -68,13 +69,13 @@ def _partitions(total: int, largest: int) -> Iterator[tuple[int, ...]]:
 
 @cache
 def size(tree: Tree) -> int:
-    """Return the number of nodes, which is the order of the tree's condition."""
+    """Return the number of nodes of a tree, which is the order of its condition."""
     return 1 + sum(map(size, tree))
 
 
 @cache
 def density(tree: Tree) -> int:
-    """Return gamma: the product of the sizes of all subtrees, the tree itself among them.
+    """Return gamma, the product of the sizes of a tree and of all its subtrees.
 
     Examples
     --------
@@ -86,7 +87,7 @@ def density(tree: Tree) -> int:
 
 @cache
 def symmetry(tree: Tree) -> int:
-    """Return sigma: in how many ways the tree's branches can be exchanged without a change.
+    """Return sigma, the number of exchanges of branches that leave a tree unchanged.
 
     Examples
     --------
@@ -101,7 +102,7 @@ def symmetry(tree: Tree) -> int:
 
 
 def weight_text(tree: Tree) -> str:
-    """Return the elementary weight of a tree as numerical analysts write it.
+    """Return the elementary weight of a tree in the usual notation.
 
     Examples
     --------
@@ -112,12 +113,12 @@ def weight_text(tree: Tree) -> str:
 
     def factors(tree: Tree, at: str) -> list[str]:
         leaves = tree.count(())
-        found = [f"c_{at}" + (f"^{leaves}" if leaves > 1 else "")] if leaves else []
+        parts = [f"c_{at}" + (f"^{leaves}" if leaves > 1 else "")] if leaves else []
         for subtree in tree:
             if subtree:
                 below = next(letters)
-                found += [f"a_{at}{below}", *factors(subtree, below)]
-        return found
+                parts += [f"a_{at}{below}", *factors(subtree, below)]
+        return parts
 
     root = next(letters)
     return " ".join(["sum", f"b_{root}", *factors(tree, root)])
@@ -127,7 +128,18 @@ def weight_text(tree: Tree) -> str:
 
 
 def words(order: int, derivatives: int | None = None) -> list[Word]:
-    """Return the products of derivatives of A(t) of an order, with no derivative above `derivatives` if that is given.
+    """Return the products of derivatives of A(t) of an order, without derivatives above `derivatives` if it is set.
+
+    Parameters
+    ----------
+    order : int
+    derivatives : int, optional
+        Highest derivative.
+
+    Returns
+    -------
+    list of Word
+        The shortest first.
 
     Examples
     --------
@@ -139,8 +151,8 @@ def words(order: int, derivatives: int | None = None) -> list[Word]:
     if order == 0:
         return [()]
     highest = order - 1 if derivatives is None else min(derivatives, order - 1)
-    found = [(k, *rest) for k in range(highest, -1, -1) for rest in words(order - 1 - k, derivatives)]
-    return sorted(found, key=len)
+    products = [(k, *rest) for k in range(highest, -1, -1) for rest in words(order - 1 - k, derivatives)]
+    return sorted(products, key=len)
 
 
 def word_coefficient(word: Word) -> Fraction:
@@ -158,9 +170,9 @@ def word_coefficient(word: Word) -> Fraction:
 
 
 class _Stages:
-    """The coefficients of a tableau in its own field, and vectors with an element a stage.
+    """The coefficients of a tableau in the smallest field that holds them, and vectors with one element per stage.
 
-    Sums are in fractions, or in the algebraic field that the square roots lie in: what is zero is known.
+    Arithmetic is exact in fractions or in an algebraic field, so that a zero is recognized.
     """
 
     def __init__(self, tableau: Tableau) -> None:
@@ -175,8 +187,8 @@ class _Stages:
 
             values = [sp.sympify(value) for row in rows for value in row]
             domain, elements = construct_domain(values, extension=True, field=True)
-            taken = iter(elements)
-            converted = [[next(taken) for _ in row] for row in rows]
+            rest_of_elements = iter(elements)
+            converted = [[next(rest_of_elements) for _ in row] for row in rows]
             self.rational = lambda value: domain.from_sympy(sp.Rational(value.numerator, value.denominator))
             self.number = domain.to_sympy
         self.nodes, self.weights, *self.matrix = converted
@@ -186,14 +198,14 @@ class _Stages:
         self.words: dict[Word, list[Any]] = {(): self.ones}
 
     def applied(self, vector: list[Any]) -> list[Any]:
-        """Return A times a vector."""
+        """Return the matrix of the tableau times a vector."""
         return [self.sum(row, vector[: len(row)]) for row in self.matrix]
 
     def sum(self, left: Sequence[Any], right: Sequence[Any]) -> Any:
         return sum((x * y for x, y in zip(left, right, strict=True) if x and y), self.zero)
 
     def tree(self, tree: Tree) -> list[Any]:
-        """Return the product over the subtrees of A times their vectors; a leaf gives the nodes themselves."""
+        """Return the product over the subtrees of the matrix times their vectors, or the nodes for a leaf."""
         if tree not in self.trees:
             vector = self.ones
             for subtree in tree:
@@ -214,7 +226,7 @@ class _Stages:
         return self.words[word]
 
     def residual(self, vector: list[Any], exact: Fraction) -> Any:
-        """Return b' times a vector, less what it should be."""
+        """Return b' times a vector, minus the exact value."""
         return self.sum(self.weights, vector) - self.rational(exact)
 
     def tree_residual(self, tree: Tree) -> Any:
@@ -229,22 +241,31 @@ def _stages(tableau: Tableau) -> _Stages:
     return _Stages(tableau)
 
 
-def _holds(tableau: Tableau, residual: Any) -> bool:
-    """Tell whether a residual is nothing, or what the tableau says its rounded coefficients may leave."""
-    if not residual:
+def _holds(tableau: Tableau, defect: Any) -> bool:
+    """Return whether a residual is zero, or within the tableau's tolerance for rounded coefficients."""
+    if not defect:
         return True
-    return bool(tableau.tolerance) and abs(_stages(tableau).number(residual)) <= tableau.tolerance
+    return bool(tableau.tolerance) and abs(_stages(tableau).number(defect)) <= tableau.tolerance
 
 
 def row_residuals(tableau: Tableau) -> list[Number]:
-    """Return for every stage the sum of its row less its node."""
+    """Return for every stage the sum of its row minus its node."""
     stages = _stages(tableau)
     sums = stages.applied(stages.ones)
     return [stages.number(total - node) for total, node in zip(sums, stages.nodes, strict=True)]
 
 
 def residuals(tableau: Tableau, order: int) -> list[tuple[Tree, Number]]:
-    """Return for every tree of an order its elementary weight less 1/gamma: zero where the condition holds.
+    """Return for every tree of an order its elementary weight minus 1/gamma, which is zero if the condition holds.
+
+    Parameters
+    ----------
+    tableau : Tableau
+    order : int
+
+    Returns
+    -------
+    list of (Tree, number)
 
     Examples
     --------
@@ -257,17 +278,26 @@ def residuals(tableau: Tableau, order: int) -> list[tuple[Tree, Number]]:
 
 
 def first_failure(tableau: Tableau, order: int) -> tuple[Tree, Number] | None:
-    """Return the first condition of an order that does not hold, and by how much; None if all of them hold."""
+    """Return the tree and the residual of the first condition of an order that fails; None if all hold."""
     stages = _stages(tableau)
     for tree in trees(order):
-        residual = stages.tree_residual(tree)
-        if not _holds(tableau, residual):
-            return tree, stages.number(residual)
+        defect = stages.tree_residual(tree)
+        if not _holds(tableau, defect):
+            return tree, stages.number(defect)
     return None
 
 
 def order(tableau: Tableau, most: int = 20) -> int:
-    """Return the classical order of a method, looking no further than `most`.
+    """Return the classical order of a method, at most `most`.
+
+    Parameters
+    ----------
+    tableau : Tableau
+    most : int, optional
+
+    Returns
+    -------
+    int
 
     Examples
     --------
@@ -287,15 +317,15 @@ def embedded_order(tableau: Tableau) -> int:
 def attitude_order(tableau: Tableau, derivatives: int | None = None) -> int:
     """Return the order of a method on attitude kinematics, or on any x' = A(t) x.
 
-    It is never below the classical order, and can exceed it: fewer products have to be matched. Relations among the
-    matrices of one representation, such as the square of an angular rate being a scalar for quaternions, are not used.
+    It is at least the classical order and can exceed it, since fewer products have to agree. Relations among the
+    matrices of one representation are not used, for instance that the square of a rate is a scalar for quaternions.
 
     Parameters
     ----------
     tableau : Tableau
     derivatives : int, optional
-        The rate is a polynomial of this degree: only words without higher derivatives matter. For a constant rate, 0,
-        the order is that to which the step agrees with the exponential.
+        Degree of a polynomial rate, for which only words without higher derivatives count. For a constant rate, 0, the
+        result is the order to which the step agrees with the exponential.
 
     Examples
     --------
@@ -304,7 +334,7 @@ def attitude_order(tableau: Tableau, derivatives: int | None = None) -> int:
     (4, 5)
     """
     stages = _stages(tableau)
-    # With s stages the word (0, ..., 0) of order s + 1 has no weight at all, so no order is above s.
+    # With s stages the weight of the word (0, ..., 0) of order s + 1 is zero, so the order is at most s.
     most = len(tableau.nodes)
     return next(
         (
@@ -318,7 +348,7 @@ def attitude_order(tableau: Tableau, derivatives: int | None = None) -> int:
 
 
 def principal_error_norm(tableau: Tableau) -> float:
-    """Return the 2-norm of the error coefficients of the first order that fails, each (Phi - 1/gamma)/sigma.
+    """Return the 2-norm of the error coefficients (Phi - 1/gamma)/sigma of the first order that fails.
 
     Examples
     --------
@@ -334,12 +364,12 @@ def principal_error_norm(tableau: Tableau) -> float:
 
 
 def conditions(tableau: Tableau) -> int:
-    """Return the number of conditions behind a tableau's order: row sums, and trees up to the order."""
+    """Return the number of conditions for a tableau's order: its row sums, and the trees up to the order."""
     return len(tableau.nodes) + sum(len(trees(p)) for p in range(1, tableau.order + 1))
 
 
 def largest_residual(tableau: Tableau) -> Number:
     """Return the largest residual of the row sums and the conditions up to the order, in absolute value."""
-    found = [abs(residual) for residual in row_residuals(tableau)]
-    found += [abs(residual) for p in range(1, tableau.order + 1) for _, residual in residuals(tableau, p)]
-    return max(found)
+    defects = [abs(defect) for defect in row_residuals(tableau)]
+    defects += [abs(defect) for p in range(1, tableau.order + 1) for _, defect in residuals(tableau, p)]
+    return max(defects)

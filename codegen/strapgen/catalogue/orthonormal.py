@@ -1,4 +1,4 @@
-"""Orthonormalization: restoring the constraint that a computed attitude has lost to truncation and round-off."""
+"""Orthonormalization restores the constraint that a computed attitude has lost to truncation and rounding."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def cayley_klein() -> Kernel:
 
 
 def dcm() -> Kernel:
-    """Return the thesis's scheme: to each row its dual is added, then each row is divided by its length."""
+    """Return the scheme of the thesis, which adds its dual to each row and divides the sum by its length."""
     build = KernelBuilder()
     C = build.input(_COMPUTED)
     rows = [C[k, :].T for k in range(3)]
@@ -67,7 +67,7 @@ def dcm() -> Kernel:
 
 
 def _symmetric(build: KernelBuilder, name: str, meaning: str, A: sp.Matrix) -> sp.Matrix:
-    """Name the six different elements of a symmetric matrix and return the matrix of their symbols."""
+    """Name the six independent elements of a symmetric matrix and return the matrix of their symbols."""
     places = [(i, j) for i in range(3) for j in range(i, 3)]
     elements = tuple(f"{name}_{i + 1}{j + 1}" for i, j in places)
     signal = Signal(name, (6,), elements, meaning=meaning)
@@ -76,11 +76,11 @@ def _symmetric(build: KernelBuilder, name: str, meaning: str, A: sp.Matrix) -> s
 
 
 def dcm_optimal() -> Kernel:
-    """Return the rotation nearest to the computed matrix: C (C'C)^(-1/2).
+    """Return the rotation nearest to the computed matrix, C (C'C)^(-1/2).
 
-    With U = (C'C)^(1/2), its invariants i1, i2, i3 and G = C'C, the theorem of Cayley and Hamilton gives
-    U (G + i2 I) = i1 G + i3 I, so the inverse root is (G + i2 I) (i1 G + i3 I)^-1. The eigenvalues of G come
-    from the trigonometric solution of the cubic; atan2 keeps it free of singularities at equal eigenvalues.
+    Let G = C'C and let i1, i2, i3 be the invariants of U = G^(1/2). The theorem of Cayley and Hamilton leads to
+    U (G + i2 I) = i1 G + i3 I, so the inverse root is (G + i2 I) (i1 G + i3 I)^-1. The eigenvalues of G follow from the
+    trigonometric solution of the cubic, which atan2 makes regular at equal eigenvalues.
     """
     build = KernelBuilder()
     C = build.input(_COMPUTED)
@@ -144,17 +144,17 @@ def _expansion(order: int) -> Kernel:
 
 
 def dcm_first_order() -> Kernel:
-    """Return the optimal orthonormalization to first order: C (I - S/2), S = C'C - I."""
+    """Return the optimal orthonormalization to first order, C (I - S/2) with S = C'C - I."""
     return _expansion(1)
 
 
 def dcm_second_order() -> Kernel:
-    """Return the optimal orthonormalization to second order: C (I - S/2 + 3/8 S^2), S = C'C - I."""
+    """Return the optimal orthonormalization to second order, C (I - S/2 + 3/8 S^2) with S = C'C - I."""
     return _expansion(2)
 
 
 def rows_orthogonalized() -> Kernel:
-    """Return the rows of a matrix, each less half its projections on the others, equations (28) and (29)."""
+    """Return the rows of a matrix, each minus half its projections on the others, equations (28) and (29)."""
     build = KernelBuilder()
     C = build.input(_COMPUTED)
     rows = [C[k, :] for k in range(3)]
@@ -178,7 +178,7 @@ def rows_orthogonalized() -> Kernel:
 
 
 def rows_normalized() -> Kernel:
-    """Return the rows of a matrix with their lengths brought to 1 to first order, equations (30) and (31)."""
+    """Return the rows of a matrix, normalized to length 1 to first order, equations (30) and (31)."""
     build = KernelBuilder()
     C = build.input(_COMPUTED)
     corrected = []

@@ -1,7 +1,7 @@
-"""The rotation vector of a step as a series in the rate: its terms of first, second, third and higher order.
+"""The rotation vector of a step as a series in the rate, with terms of first, second and higher order.
 
-Bortz's equation is integrated term by term for a rate that is a sum of vectors, each times a function of time. Its
-terms are sums of nested cross products a x (b x (c x d)); such a product is a word, the tuple of the numbers of its
+Bortz's equation is integrated term by term for a rate that is a sum of vectors, each times a function of time. The
+terms are sums of nested cross products a x (b x (c x d)). Such a product is a word: the tuple of the numbers of its
 vectors, from left to right.
 """
 
@@ -18,19 +18,19 @@ from strapgen.catalogue.munthe_kaas import bortz_coefficient
 
 SOURCE = "W. Magnus, Commun. Pure Appl. Math. 7 (1954) 649-673; K.-T. Chen, Ann. Math. 65 (1957) 163-178"
 
-#: A vector of a sum by its number; nested cross products of such vectors, and the coefficient of each.
+#: A nested cross product of numbered vectors, and a sum of such products with their coefficients.
 Word = tuple[int, ...]
 Words = dict[Word, Fraction]
-#: Coefficients of scalar products, and of a vector or a cross product each times those.
+#: Coefficients by the numbers of two vectors, of scalar products or of cross products.
 Scalars = dict[tuple[int, int], Fraction]
 
 
 @cache
 def terms(vectors: int, order: int) -> tuple[Words, ...]:
-    """Return the terms of first to given order for the rate sum_j r_j t^j, the step being from time 0 to 1.
+    """Return the terms up to an order for the rate sum_j r_j t^j, for a step from time 0 to time 1.
 
-    dphi/dt = sum_k b_k phi x (phi x ... w), k products, is solved order by order in the rate w: what stands on the
-    right in the order m is made of terms of lower orders alone.
+    The equation dphi/dt = sum_k b_k phi x (phi x ... w) with k products is solved order by order in the rate w. The
+    right-hand side of order m only needs the terms of lower orders.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def terms(vectors: int, order: int) -> tuple[Words, ...]:
     Returns
     -------
     tuple of dict
-        For every order its words in the r_j.
+        The words in the r_j of each order.
 
     Examples
     --------
@@ -50,8 +50,8 @@ def terms(vectors: int, order: int) -> tuple[Words, ...]:
     ({(0,): Fraction(1, 1), (1,): Fraction(1, 2)}, Fraction(1, 12))
     """
     rate: Words = {(j,): Fraction(1) for j in range(vectors)}
-    found = [_integral(rate)]
-    nested: list[dict[int, Words]] = [{1: rate}]  # for k products their parts of every order
+    solved = [_integral(rate)]
+    nested: list[dict[int, Words]] = [{1: rate}]  # by number of products, the parts of every order
     for m in range(2, order + 1):
         derivative: Words = {}
         for k in range(1, m):
@@ -60,20 +60,20 @@ def terms(vectors: int, order: int) -> tuple[Words, ...]:
             part: Words = {}
             for a in range(1, m):
                 if m - a in nested[k - 1]:
-                    _add(part, cross(found[a - 1], nested[k - 1][m - a]))
+                    _add(part, cross(solved[a - 1], nested[k - 1][m - a]))
             nested[k][m] = part
             b = bortz_coefficient(k)
             _add(derivative, part, Fraction(int(b.p), int(b.q)))
-        found.append(_integral(derivative))
-    return tuple(found)
+        solved.append(_integral(derivative))
+    return tuple(solved)
 
 
 @cache
 def legendre_terms(vectors: int, order: int) -> tuple[Words, ...]:
-    """Return the terms for the rate sum_m l_m P_m, P_m the Legendre polynomials of the step.
+    """Return the terms for the rate sum_m l_m P_m with the Legendre polynomials P_m of the step.
 
-    Parameters and result are as in `terms`. Here many coefficients vanish: reversing time changes the sign of the
-    rotation vector.
+    Parameters and result are those of `terms`. Many coefficients vanish here, because reversing time changes the sign
+    of the rotation vector.
     """
     table = [
         {m: fraction(rates.legendre(m)[j]) for m in range(j, vectors)} for j in range(vectors)
@@ -82,13 +82,13 @@ def legendre_terms(vectors: int, order: int) -> tuple[Words, ...]:
 
 
 def substituted(words: Words, table: Sequence[Mapping[int, Fraction]]) -> Words:
-    """Return words with each of their vectors replaced by a sum of others.
+    """Return words in which each vector is replaced by a sum of others.
 
     Parameters
     ----------
     words : dict
     table : sequence of mapping
-        For every vector the coefficients of others in it.
+        For every vector the coefficients of the others in its sum.
     """
     length = max(map(len, words), default=0)
     for place in range(length):
@@ -101,14 +101,14 @@ def substituted(words: Words, table: Sequence[Mapping[int, Fraction]]) -> Words:
 
 
 def in_samples(terms: Words, increments: int, previous: int = 0) -> Words:
-    """Return a term in r_0, r_1, ... in the samples whose polynomial the rate is.
+    """Return a term in r_0, r_1, ... as a term in the samples through which the polynomial rate goes.
 
     Parameters
     ----------
     terms : dict
-        Of `terms`, for as many vectors as there are samples.
+        One term from `terms`, for as many vectors as there are samples.
     increments, previous : int
-        Samples of the step, and those before it.
+        Samples of the step, and samples from before it.
     """
     fit = rates.from_increments(increments, previous)
     return substituted(
@@ -133,48 +133,59 @@ def cross(left: Words, right: Words) -> Words:
 
 
 def pairs(words: Words) -> Scalars:
-    """Return words of two vectors as coefficients of r_i x r_j, i < j."""
-    found: Words = {}
+    """Return words of two vectors as coefficients of r_i x r_j, i < j.
+
+    Parameters
+    ----------
+    words : dict
+
+    Returns
+    -------
+    dict
+        Coefficients by (i, j), without zeros.
+    """
+    collected: Words = {}
     for (i, j), c in words.items():
         if i != j:
-            _add(found, {(min(i, j), max(i, j)): c if i < j else -c})
-    return {(i, j): c for (i, j), c in sorted(found.items()) if c}
+            _add(collected, {(min(i, j), max(i, j)): c if i < j else -c})
+    return {(i, j): c for (i, j), c in sorted(collected.items()) if c}
 
 
 def third(words: Words) -> dict[int, Scalars]:
     """Return words of three vectors as vectors r_k, each times a sum of scalar products r_i . r_j, i <= j.
 
-    a x (b x c) = b (a . c) - c (a . b). The vectors being any, the coefficients are unique.
+    It uses a x (b x c) = b (a . c) - c (a . b). The coefficients are unique, since the vectors are arbitrary.
 
     Returns
     -------
     dict
-        For k the coefficients of the scalar products, by (i, j).
+        For each k the coefficients of the scalar products, by (i, j).
     """
-    found: dict[int, Scalars] = {}
+    collected: dict[int, Scalars] = {}
     for (a, b, c), weight in words.items():
-        _collect(found.setdefault(b, {}), a, c, weight)
-        _collect(found.setdefault(c, {}), a, b, -weight)
-    return {k: weights for k, row in sorted(found.items()) if (weights := _nonzero(row))}
+        _collect(collected.setdefault(b, {}), a, c, weight)
+        _collect(collected.setdefault(c, {}), a, b, -weight)
+    return {k: weights for k, row in sorted(collected.items()) if (weights := _nonzero(row))}
 
 
 def fourth(words: Words) -> dict[tuple[int, int], Scalars]:
     """Return words of four vectors as products r_k x r_l, k < l, each times a sum of scalar products r_i . r_j.
 
-    a x (b x (c x d)) = (b . d) a x c - (b . c) a x d. The vectors being any, the coefficients are unique.
+    It uses a x (b x (c x d)) = (b . d) a x c - (b . c) a x d. The coefficients are unique, since the vectors are
+    arbitrary.
 
     Returns
     -------
     dict
-        For (k, l) the coefficients of the scalar products, by (i, j), i <= j.
+        For each (k, l) the coefficients of the scalar products, by (i, j), i <= j.
     """
-    found: dict[tuple[int, int], Scalars] = {}
+    collected: dict[tuple[int, int], Scalars] = {}
     for (a, b, c, d), weight in words.items():
         for left, other, sign in ((c, d, 1), (d, c, -1)):
             if left != a:
                 key, turned = (min(a, left), max(a, left)), sign if a < left else -sign
-                _collect(found.setdefault(key, {}), b, other, turned * weight)
-    return {key: weights for key, row in sorted(found.items()) if (weights := _nonzero(row))}
+                _collect(collected.setdefault(key, {}), b, other, turned * weight)
+    return {key: weights for key, row in sorted(collected.items()) if (weights := _nonzero(row))}
 
 
 def fraction(number: sp.Expr) -> Fraction:
@@ -183,19 +194,19 @@ def fraction(number: sp.Expr) -> Fraction:
 
 
 def _product(word: Word, other: Word) -> Words:
-    """Return the cross product of two words: (a x p) x q = a x (p x q) - p x (a x q), a one vector."""
+    """Return the cross product of two words, by (a x p) x q = a x (p x q) - p x (a x q) for a single vector a."""
     if len(word) == 1:
         return {} if word == other else {word + other: Fraction(1)}
     head, rest = word[:1], word[1:]
-    found: Words = {head + inner: c for inner, c in _product(rest, other).items()}
-    _add(found, _product(rest, head + other), Fraction(-1))
-    return found
+    collected: Words = {head + inner: c for inner, c in _product(rest, other).items()}
+    _add(collected, _product(rest, head + other), Fraction(-1))
+    return collected
 
 
 def _integral(words: Words) -> Words:
-    """Integrate from 0 to 1 what stands for t to the power of sum (j + 1) - 1, j the vectors of a word.
+    """Return the integrals of words from time 0, as coefficients of the next power of time.
 
-    Kept as the coefficient of the next power: what a later term needs of the integral to any time.
+    A word of the vectors j comes with t to the power sum (j + 1) - 1.
     """
     return {word: c / sum(j + 1 for j in word) for word, c in words.items() if c}
 

@@ -1,4 +1,4 @@
-"""Explicit Runge-Kutta methods: the stages of a tableau on any differential equation."""
+"""Explicit Runge-Kutta methods: the stages of a tableau for any differential equation."""
 
 from __future__ import annotations
 
@@ -48,16 +48,16 @@ def method(tableau: Tableau) -> Method:
 
 
 def staged_step(kinematics: Kinematics, tableau: Tableau, increments: int | None) -> Kernel:
-    """Write one integration step as textbooks do: slopes of the state itself, no transition.
+    """Return one integration step in the textbook form, with slopes of the state instead of a transition.
 
-    The step from `method` is the same polynomial of its inputs. This form is for comparison.
+    The step from `method` is the same polynomial of its inputs; this form is for comparison.
 
     Parameters
     ----------
     kinematics : Kinematics
     tableau : Tableau
     increments : int or None
-        Angle increments a step; None for a step that is given the rate at every node.
+        Angle increments per step; None for a step that takes the rate at every node.
     """
     build = KernelBuilder()
     state = build.input(kinematics.state)
@@ -90,22 +90,22 @@ def advance(
     like: Signal,
     origin: str,
 ) -> sp.Matrix:
-    """Write the stages of a tableau into a kernel under construction and return where they lead.
+    """Write the stages of a tableau into a kernel under construction and return the state after the step.
 
     Parameters
     ----------
     build : KernelBuilder
     tableau : Tableau
     turns : mapping of node to Matrix
-        What the derivative needs at each node, the body rate for one, times the step length.
+        The input of the derivative at each node, such as the body rate, times the step length.
     start : Matrix
         A state, of numbers or symbols.
     derivative : callable
-        ``derivative(x, turn)``: dx/dt times the step length.
+        ``derivative(x, turn)`` returns dx/dt times the step length.
     like : Signal
-        The state: its shape and the labels of its elements are those of the stages.
+        The state, whose shape and element labels the stages have too.
     origin : str
-        What the start is called in the meanings of the stages.
+        Words for the start in the meanings of the stages.
 
     Returns
     -------
@@ -133,13 +133,13 @@ def advance(
 
 
 def nodes(tableau: Tableau) -> tuple[Number, ...]:
-    """Return the distinct nodes at which the result needs the rate."""
+    """Return the distinct nodes at which the result needs the rate, as fractions of the step."""
     used = _used(tableau)
     return tuple(dict.fromkeys(node for place, node in enumerate(tableau.nodes) if place in used))
 
 
 def _used(tableau: Tableau) -> set[int]:
-    """Return the stages that the result depends on: some serve the embedded weights alone."""
+    """Return the indices of the stages that the result needs; others only serve the embedded weights."""
     used: set[int] = set()
     for place in reversed(range(len(tableau.nodes))):
         behind = (tableau.matrix[later][place] for later in used)

@@ -1,4 +1,4 @@
-"""Butcher tableaux of explicit Runge-Kutta methods: data in files, those of `methods/` and a user's own."""
+"""Butcher tableaux of explicit Runge-Kutta methods, read from the files of `methods/` or of a user."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from strapgen.exceptions import InputError
 if TYPE_CHECKING:
     from strapgen.catalogue.coefficients import Number
 
-#: Keys of a file, and those of them that may be left out.
+#: Keys of a file, and those of them that are optional.
 KEYS = ("name", "source", "order", "nodes", "matrix", "weights", "embedded_weights", "tolerance")
 OPTIONAL = ("embedded_weights", "tolerance")
 
-#: No method of a higher order is known with so few stages, and trees grow nearly threefold from order to order.
+#: Highest order and most stages. The number of trees grows nearly threefold from order to order.
 MOST_ORDER = 10
 MOST_STAGES = 20
 
-#: Largest tolerance of a user's file: rounding to double precision leaves less than this, a wrong coefficient more.
+#: Largest tolerance of a user's file; rounding to double precision stays below it, a wrong coefficient does not.
 MOST_TOLERANCE = Fraction(1, 10**12)
 
-#: Bytes of the largest file; twenty stages of long expressions take far less.
+#: Most bytes of a file; twenty stages of long expressions take far less.
 MOST_BYTES = 200_000
 
 
@@ -45,7 +45,7 @@ class Tableau:
     order : int
         Classical order of the method.
     nodes : tuple of Fraction or sympy.Expr
-        c_i, in steps. A number is an expression only where it is irrational.
+        c_i, as fractions of the step. Only an irrational number is an expression.
     matrix : tuple of tuple of Fraction or sympy.Expr
         a_ij below the diagonal, the first row empty.
     weights : tuple of Fraction or sympy.Expr
@@ -53,9 +53,9 @@ class Tableau:
     embedded_weights : tuple of Fraction or sympy.Expr, optional
         Weights of a second method on the same stages.
     tolerance : Fraction
-        Largest residual of a condition that the rounding of published coefficients explains; 0: they are exact.
+        Largest residual of a condition that the rounding of published coefficients explains; 0 if they are exact.
     file : str
-        Where it was read; empty for one of the catalogue.
+        Path of the file; empty for a tableau of the catalogue.
 
     Examples
     --------
@@ -76,7 +76,7 @@ class Tableau:
 
     @property
     def option(self) -> str:
-        """How the command line names it."""
+        """The option that chooses it on the command line."""
         return f"--tableau {shlex.quote(self.file)}" if self.file else f"--method {self.name}"
 
     @property
@@ -87,14 +87,14 @@ class Tableau:
 
     @cached_property
     def largest_residual(self) -> Number:
-        """The largest residual of row sums and order conditions: 0, or what rounded coefficients leave."""
+        """The largest residual of row sums and order conditions; not 0 only for rounded coefficients."""
         return order_conditions.largest_residual(self)
 
 
 class _BuiltIn(Mapping[str, Tableau]):
-    """The tableaux of a folder by name; a file is read when its tableau is asked for.
+    """The tableaux of a folder by name; each file is read when its tableau is first used.
 
-    The order is that of the methods, the thesis's own first among equals. The files are not verified here: tests do.
+    They are sorted by order, with those of the thesis first within an order. Tests verify the files.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -103,7 +103,7 @@ class _BuiltIn(Mapping[str, Tableau]):
 
     @cached_property
     def titles(self) -> dict[str, str]:
-        """Name in the literature, by name: without a coefficient read."""
+        """Names in the literature, by name; no coefficient is read for them."""
         files = {path.stem: tomllib.loads(path.read_text("utf-8")) for path in self._folder.glob("*.toml")}
 
         def place(name: str) -> tuple[int, bool, int, str]:
@@ -136,7 +136,7 @@ TITLES: Mapping[str, str] = _BUILT_IN.titles
 
 
 def read(path: str | Path) -> Tableau:
-    """Read a tableau from a file and verify it: it is explicit, its rows sum to its nodes, its order is the stated one.
+    """Read a tableau from a file and check that it is explicit, its rows sum to its nodes, and it has the stated order.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ def read(path: str | Path) -> Tableau:
             raise InputError(f"name {data['name']!r} is that of the method {name}; another one is needed")
         tableau = replace(_tableau(data, name), file=checks.text("the name of the file", str(path)))
         verify(tableau)
-        # A file may understate the order: what holds is what is told of it.
+        # A file may state less than the actual order.
         tableau = replace(tableau, order=order_conditions.order(tableau, MOST_ORDER))
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
@@ -218,7 +218,7 @@ def _slug(title: str) -> str:
 
 
 def _tableau(data: Mapping[str, Any], name: str) -> Tableau:
-    """Return a tableau from the content of a file whose keys are there; its numbers and its shape are checked."""
+    """Return a tableau from the content of a file with all keys, after a check of its numbers and its shape."""
     nodes = _numbers("nodes", _list("nodes", data["nodes"]))
     stages = len(nodes)
     if not 1 <= stages <= MOST_STAGES:
@@ -289,25 +289,29 @@ def _check_roots(tableau: Tableau) -> None:
 def verify(tableau: Tableau) -> None:
     """Check row sums and order conditions exactly.
 
+    Parameters
+    ----------
+    tableau : Tableau
+
     Raises
     ------
     InputError
         If one does not hold; the message names the first.
     """
-    for number, residual in enumerate(order_conditions.row_residuals(tableau), 1):
-        if residual != 0 and not (tableau.tolerance and abs(residual) <= tableau.tolerance):
+    for number, defect in enumerate(order_conditions.row_residuals(tableau), 1):
+        if defect != 0 and not (tableau.tolerance and abs(defect) <= tableau.tolerance):
             node = tableau.nodes[number - 1]
             raise InputError(
-                f"matrix row {number} sums to {_shown(node + residual)}; its node is {_shown(node)}"
+                f"matrix row {number} sums to {_shown(node + defect)}; its node is {_shown(node)}"
             )
     for order in range(1, tableau.order + 1):
         failure = order_conditions.first_failure(tableau, order)
         if failure:
-            tree, residual = failure
+            tree, defect = failure
             needed = Fraction(1, order_conditions.density(tree))
             raise InputError(
-                f"order {order}: {order_conditions.weight_text(tree)} = {_shown(needed + residual)}, "
-                f"{needed} is needed (off by {_shown(residual)})"
+                f"order {order}: {order_conditions.weight_text(tree)} = {_shown(needed + defect)}, "
+                f"{needed} is needed (off by {_shown(defect)})"
             )
     if tableau.embedded_weights is not None and order_conditions.embedded_order(tableau) < 1:
         total = sum(tableau.embedded_weights)
@@ -315,7 +319,7 @@ def verify(tableau: Tableau) -> None:
 
 
 def _shown(value: Number) -> str:
-    """Return a number exactly if that is short, otherwise rounded."""
+    """Return a number as text, exact if that is short, otherwise rounded."""
     if not isinstance(value, Fraction):
         import sympy as sp
 

@@ -1,4 +1,4 @@
-"""The three loops of a strapdown algorithm in two speeds: fast, slow, and that of the navigation frame."""
+"""The three loops of a strapdown algorithm in two speeds: the fast, the slow and the navigation loop."""
 
 from __future__ import annotations
 
@@ -39,13 +39,13 @@ def fast(form: int) -> Kernel:
     Parameters
     ----------
     form : int
-        Which sculling integral: 1 or 2.
+        Form of the sculling integral: 1 or 2.
 
     Returns
     -------
     Kernel
-        Inputs ``angle_sum``, ``coning``, ``previous_increment``, ``velocity_sum``, ``sculling``, which are handed on,
-        and ``increment``, ``velocity_increment``; angles in rad, velocities in m/s, all (3,).
+        The states ``angle_sum``, ``coning``, ``previous_increment``, ``velocity_sum``, ``sculling`` and the inputs
+        ``increment``, ``velocity_increment``; angles in rad, velocities in m/s, all (3,).
     """
     loop = FastLoop()
     beta, coning, past, u, eta, d, dv = map(
@@ -64,21 +64,21 @@ def fast(form: int) -> Kernel:
 
 
 def slow(name: str, form: int) -> Kernel:
-    """Return the slow loop: velocity in navigation axes, attitude by the rotation vector, rotation of the frame.
+    """Return the slow loop, which updates attitude, velocity in navigation axes and rotation of the frame.
 
     Parameters
     ----------
     name : str
         "dcm" or "euler".
     form : int
-        Which sculling integral the fast loop makes: 1 or 2.
+        Form of the sculling integral of the fast loop: 1 or 2.
 
     Returns
     -------
     Kernel
-        Inputs ``state``, ``navigation_velocity``, ``navigation_rotation``, ``previous_turn``, which are handed on; the
-        sums of the fast loop, ``angle_sum``, ``coning``, ``velocity_sum``, ``sculling``; and ``turn``, the rate of the
-        navigation frame times the slow cycle in rad.
+        The states ``state``, ``navigation_velocity``, ``navigation_rotation``, ``previous_turn``; the inputs
+        ``angle_sum``, ``coning``, ``velocity_sum``, ``sculling``, which are sums of the fast loop, and ``turn``, the
+        rate of the navigation frame times the slow cycle in rad.
     """
     kinematics = KINEMATICS[name]
     build = KernelBuilder()
@@ -87,9 +87,9 @@ def slow(name: str, form: int) -> Kernel:
     )
     beta, coning, u, eta, turn = map(build.input, (ANGLE_SUM, CONING, VELOCITY_SUM, SCULLING, TURN))
     phi = build.stage(ROTATION_VECTOR, rotation_vector_of(beta, coning))
-    made = transition(build, kinematics, phi)
+    step_transition = transition(build, kinematics, phi)
     states = (
-        (kinematics.state, kinematics.next, kinematics.product(state, made)),
+        (kinematics.state, kinematics.next, kinematics.product(state, step_transition)),
         (
             NAVIGATION_VELOCITY,
             after(NAVIGATION_VELOCITY),
@@ -112,7 +112,7 @@ def slow(name: str, form: int) -> Kernel:
 
 
 def navigation(name: str) -> Kernel:
-    """Return the loop of the navigation frame: the attitude after its rotation, the velocity corrected for that.
+    """Return the loop of the navigation frame, which corrects attitude and velocity for its rotation.
 
     Parameters
     ----------
@@ -122,8 +122,8 @@ def navigation(name: str) -> Kernel:
     Returns
     -------
     Kernel
-        Inputs ``state``, which is handed on, ``navigation_rotation`` and ``navigation_velocity``; outputs ``next`` and
-        ``velocity_change`` (3,) in m/s, the integral of the specific force in navigation axes as they turn.
+        Inputs ``state``, which is a state, ``navigation_rotation`` and ``navigation_velocity``; outputs ``next`` and
+        ``velocity_change`` (3,) in m/s, the integral of the specific force in the rotating navigation axes.
     """
     kinematics = KINEMATICS[name]
     build = KernelBuilder()
@@ -145,6 +145,6 @@ def navigation(name: str) -> Kernel:
 
 
 def _title(name: str) -> str:
-    """Return what the attitude is, as it stands within a sentence."""
+    """Return the title of the attitude representation for use within a sentence."""
     title = KINEMATICS[name].title
     return title.lower() if name == "dcm" else title

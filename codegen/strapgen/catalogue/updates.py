@@ -1,4 +1,4 @@
-"""Attitude updates from a rotation vector: of the body frame, of the navigation frame, exact or cut off."""
+"""Attitude updates by the rotation vectors of the body and the navigation frame, exact or truncated."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ TURN, PREVIOUS_TURN = (
     )
     for name, prefix, when in (("turn", "turn", "at its end"), ("previous_turn", "before", "at its start"))
 )
-#: Where an attitude update stands in the source, by the size of the state: cut off, navigation frame.
+#: Equations of the source by the size of the state: update of the body frame, update of the navigation frame.
 _EQUATIONS = {9: ("(2) to (4)", "(5) and (6)"), 4: ("(9) to (14)", "(15)")}
 
 
 def transition(
     build: KernelBuilder, kinematics: Kinematics, phi: sp.Matrix, order: int | None = None
 ) -> sp.Matrix:
-    """Name the transition of the rotation by a rotation vector, and return its symbols.
+    """Name the transition of a rotation vector, and return its symbols.
 
     Parameters
     ----------
@@ -48,14 +48,14 @@ def transition(
     phi : Matrix, 3 x 1
         Rotation vector in rad.
     order : int, optional
-        Highest degree of the products of its elements that are kept; exact by default.
+        Highest degree of products of its elements in the transition; exact by default.
     """
     square = build.value("angle_squared", algebra.dot(phi, phi), "square of the angle")
     return build.stage(kinematics.transition, kinematics.exponential(phi, order, square))
 
 
 def _described(kinematics: Kinematics, order: int | None, which: int) -> tuple[str, str, tuple[str, ...]]:
-    """Return title, source and notes that tell the order."""
+    """Return the end of the title, the source and the notes for an order."""
     equations = _EQUATIONS[kinematics.state.size][which]
     if order is None:
         return ", exact", f"{SAVAGE}, equations {equations} with all terms", ()
@@ -64,16 +64,16 @@ def _described(kinematics: Kinematics, order: int | None, which: int) -> tuple[s
 
 
 def update(name: str, order: int | None = None) -> Kernel:
-    """Return the kernel that turns an attitude by the rotation vector of a cycle.
+    """Return the kernel that rotates an attitude by the rotation vector of a cycle, equations (2) to (4), (9) to (14).
 
-    sin(x)/x takes its place at every angle, also where it is small: rounded, it is as good there as elsewhere.
+    The exact kernel uses sin(x)/x at all angles, since its rounding error is no larger at small ones.
 
     Parameters
     ----------
     name : str
         Name of the attitude algorithm.
     order : int, optional
-        Highest degree in the rotation vector of the products that are kept; exact by default.
+        Highest degree of products of elements of the rotation vector; exact by default.
 
     Returns
     -------
@@ -83,8 +83,8 @@ def update(name: str, order: int | None = None) -> Kernel:
     kinematics = KINEMATICS[name]
     build = KernelBuilder()
     state, phi = build.input(kinematics.state), build.input(ROTATION_VECTOR)
-    made = transition(build, kinematics, phi, order)
-    build.output(kinematics.next, kinematics.product(state, made))
+    step_transition = transition(build, kinematics, phi, order)
+    build.output(kinematics.next, kinematics.product(state, step_transition))
     words, source, notes = _described(kinematics, order, 0)
     return build.kernel(
         f"{name}-update" + (f"-{order}" if order else ""),
@@ -99,13 +99,14 @@ def update(name: str, order: int | None = None) -> Kernel:
 def turned_frame(
     build: KernelBuilder, kinematics: Kinematics, state: sp.Matrix, theta: sp.Matrix, order: int | None = None
 ) -> sp.Matrix:
-    """Return a state against the navigation frame after that has turned by theta.
+    """Return a state relative to the navigation frame after the frame has rotated by theta.
 
     Parameters
     ----------
     build : KernelBuilder
     kinematics : Kinematics
     state : Matrix
+        Attitude relative to the frame before its rotation.
     theta : Matrix, 3 x 1
         Rotation vector of the navigation frame in rad, navigation axes.
     order : int, optional
@@ -116,14 +117,14 @@ def turned_frame(
 
 
 def navigation_update(name: str, order: int | None = None) -> Kernel:
-    """Return the kernel that refers an attitude to the navigation frame after its rotation.
+    """Return the kernel that refers an attitude to the rotated navigation frame, equations (5), (6) and (15).
 
     Parameters
     ----------
     name : str
         Name of the attitude algorithm.
     order : int, optional
-        Highest degree in the rotation of the products that are kept; exact by default.
+        Highest degree of products of elements of the rotation; exact by default.
 
     Returns
     -------
@@ -150,13 +151,14 @@ def rotation_sum(theta: sp.Matrix, before: sp.Matrix, turn: sp.Matrix) -> sp.Mat
 
 
 def navigation_rotation() -> Kernel:
-    """Return the trapezoidal sum of the navigation frame's rate, by cycles of the body frame's update.
+    """Return the trapezoidal integral of the rate of the navigation frame, equation (27).
 
     Returns
     -------
     Kernel
-        Inputs ``navigation_rotation``, the sum so far, ``previous_turn`` and ``turn``: the rate before and after the
-        cycle, each times its length in rad; outputs ``next_navigation_rotation`` and ``next_previous_turn``.
+        Inputs ``navigation_rotation``, the sum up to this cycle, and ``previous_turn`` and ``turn``, the rates before
+        and after the cycle times its length, all (3,) in rad; outputs
+        ``next_navigation_rotation`` and ``next_previous_turn``.
     """
     build = KernelBuilder()
     theta, before, turn = map(build.input, (NAVIGATION_ROTATION, PREVIOUS_TURN, TURN))

@@ -84,7 +84,7 @@ def strapdown(
     import numpy as np
 
     from strapgen import output, recording, reports
-    from strapgen.strapdown import course
+    from strapgen.strapdown import NavigationFrame, course
 
     words = {"word": word, "rounding": rounding, "carry": carry}
     check_fixed(backend, words | {"range": ranges, "fix": fix})
@@ -104,8 +104,7 @@ def strapdown(
             sculling=whole("sculling", sculling) or 0,
             backend=backend,
             settings=settings,
-            initial_angles=begin,
-            frame_rate=rate / 3600,
+            frame=NavigationFrame(begin, rate / 3600),
         )
     named: dict[str, Any] = {
         "algorithm": f"{algorithm} in two speeds",

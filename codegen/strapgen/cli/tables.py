@@ -13,7 +13,7 @@ from strapgen.cli.progress import track
 from strapgen.exceptions import InputError
 
 if TYPE_CHECKING:
-    from strapgen.tables import Entry, Table
+    from strapgen.tables import Table, TableEntry
 
 
 def tables(
@@ -101,7 +101,7 @@ def _runnable() -> tuple[str, ...]:
     return DEFAULT_BACKENDS
 
 
-def _mark(entry: Entry) -> str:
+def _mark(entry: TableEntry) -> str:
     """Return what stands behind a figure: round-off says more than that the figure is not the thesis's."""
     return "r" if entry.roundoff_dominates else "" if entry.agrees else "*"
 
@@ -109,7 +109,7 @@ def _mark(entry: Entry) -> str:
 _NAMES = {"dcm": "direction cosines", "euler": "Euler parameters"}
 
 
-def _print_table(table: Table, entries: list[Entry]) -> None:
+def _print_table(table: Table, entries: list[TableEntry]) -> None:
     """Print one table: for each algorithm the thesis's line, then one for each back end."""
     from strapgen.tables import ALGORITHMS, ORDERS
 

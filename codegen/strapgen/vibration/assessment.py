@@ -164,6 +164,14 @@ def two_speed(quantity: str = "drift") -> Assessment:
 def quantities(choice: Choice) -> tuple[str, ...]:
     """Return which of "drift" and "sculling" can be assessed for a kernel of the catalogue; at least one can.
 
+    Parameters
+    ----------
+    choice : Choice
+
+    Returns
+    -------
+    tuple of str
+
     Raises
     ------
     InputError

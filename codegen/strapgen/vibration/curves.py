@@ -100,7 +100,7 @@ def curve(
     InputError
         If a number is not allowed, or the rates are beyond the range of double.
     """
-    amplitude_x, amplitude_y, turn, amplitude = (
+    amplitude_x, amplitude_y, angle, amplitude = (
         float(checks.number(what, value))
         for what, value in (
             ("theta-x-rad", theta_x),
@@ -109,19 +109,19 @@ def curve(
             ("acceleration-y", acceleration_y),
         )
     )
-    turned = np.exp(1j * turn)
-    held = {
+    shift = np.exp(1j * angle)
+    amplitudes = {
         "angle_x": amplitude_x + 0 * hertz,
-        "angle_y": amplitude_y * turned + 0 * hertz,
-        "velocity_y": amplitude * turned / (2j * np.pi * hertz),
+        "angle_y": amplitude_y * shift + 0 * hertz,
+        "velocity_y": amplitude * shift / (2j * np.pi * hertz),
     }
     rates = {}
     for part in ("continuous", "error"):
         rates[part] = np.zeros(len(hertz))
         for (first, second), factor in assessment.factors(part, hertz, step, cycles).items():
-            if first in held and second in held:
+            if first in amplitudes and second in amplitudes:
                 with np.errstate(all="ignore"):
-                    rates[part] += (factor * held[first] * np.conj(held[second])).real
+                    rates[part] += (factor * amplitudes[first] * np.conj(amplitudes[second])).real
                 if not np.isfinite(rates[part][np.isfinite(factor)]).all():
                     raise InputError(
                         f"{assessment.kernel}: the rates of the curve are beyond the range of double"

@@ -102,7 +102,22 @@ class Assessment:
         return (T_L, T_M) if self.recursion else (T,)
 
     def forms(self, part: str) -> dict[Pair, Form]:
-        """Return the factors of one of `PARTS`."""
+        """Return the factors of one of `PARTS`.
+
+        Parameters
+        ----------
+        part : str
+            One of `PARTS`.
+
+        Returns
+        -------
+        dict of (str, str) to Form
+
+        Raises
+        ------
+        InputError
+            If the part is unknown.
+        """
         return {"continuous": self.continuous, "computed": self.computed, "error": self.error}[
             checks.choice("part", part, PARTS)
         ]
@@ -136,16 +151,16 @@ class Assessment:
     def _products(self, part: str) -> list[tuple[sp.Expr, sp.Expr]]:
         """Return pairs of an ideal rate from the amplitudes, and its factor, which depends on the times alone."""
         omega = 2 * sp.pi * F
-        held = {
+        amplitudes = {
             "angle_x": (THETA_X, sp.S.Zero),
             "angle_y": (THETA_Y, PHI),
             "velocity_y": (D_Y / omega, PHI - sp.pi / 2),
         }
         terms = []
         for (first, second), form in self.forms(part).items():
-            if second not in held or first not in held:
+            if second not in amplitudes or first not in amplitudes:
                 continue  # this channel does not move
-            (a, alpha), (b, beta) = held[first], held[second]
+            (a, alpha), (b, beta) = amplitudes[first], amplitudes[second]
             size = a * b * omega / 2
             for value, wave in (
                 (form.real, size * sp.cos(alpha - beta)),
@@ -211,7 +226,24 @@ class Assessment:
         return Rates(*values)
 
     def lengths(self, step: float | str | Fraction, cycles: int | None = None) -> dict[sp.Symbol, Fraction]:
-        """Return the values in s of the symbols of time from the step, or from the slow cycle and its fast cycles."""
+        """Return the values in s of the symbols of time from the step, or from the slow cycle and its fast cycles.
+
+        Parameters
+        ----------
+        step : number
+            Step in s; for a recursion its slow cycle.
+        cycles : int, optional
+            Fast cycles in the slow cycle of a recursion.
+
+        Returns
+        -------
+        dict of Symbol to Fraction
+
+        Raises
+        ------
+        InputError
+            If a number is not allowed, or `cycles` is set for a step or missing for a recursion.
+        """
         whole = checks.number("step", step, positive=True)
         if not self.recursion:
             if cycles is not None:

@@ -93,6 +93,16 @@ class Spectrum:
     def densities(self, hertz: Array) -> Array:
         """Return the density at frequencies.
 
+        Parameters
+        ----------
+        hertz : array, (N,)
+            Frequencies in Hz.
+
+        Returns
+        -------
+        array, (N,)
+            In the unit of the input squared per Hz.
+
         Raises
         ------
         InputTypeError
@@ -110,6 +120,16 @@ class Spectrum:
 
     def amplitudes(self, hertz: Array) -> dict[str, Array]:
         """Return the transfer functions of the channels at frequencies, with velocities instead of accelerations.
+
+        Parameters
+        ----------
+        hertz : array, (N,)
+            Frequencies in Hz, above 0.
+
+        Returns
+        -------
+        dict of str to array, (N,)
+            Complex amplitudes per unit of the input: angles in rad, velocities in m/s.
 
         Raises
         ------
@@ -202,11 +222,11 @@ def random_rates(
         )
 
     def rate(part: str, hertz: Array) -> Array:
-        moved = spectrum.amplitudes(hertz)
+        channels = spectrum.amplitudes(hertz)
         total = np.zeros(len(hertz))
         for (first, second), factor in assessment.factors(part, hertz, step, cycles).items():
-            if first in moved and second in moved:
-                total = total + 2 * (factor * moved[first] * moved[second].conj()).real
+            if first in channels and second in channels:
+                total = total + 2 * (factor * channels[first] * channels[second].conj()).real
         return (total * spectrum.densities(hertz))[None]
 
     # The true rate comes first, since its factors need no more than double nearly everywhere. A spectrum that does not

@@ -138,33 +138,33 @@ def _of_step(kernel: Kernel, sampled: Sequence[Signal], nodes: Sequence[Fraction
     attitude = None if name is None else catalogue.companion(kernel, name)
     expander = Expander([kernel] if attitude is None else [kernel, attitude])
     state, output = kernel.inputs[0], kernel.outputs[-1].signal
-    begun = {
+    initial = {
         element: expander.variable(element, exact(value))
         for element, value in zip(state.elements, kernel.companions.identity, strict=True)
     }
     samples, times, cycle = _waves(expander, kernel, sampled, kernel.companions.previous, nodes)
-    following = expander(kernel, begun | _variables(expander, samples))[output.name]
+    following = expander(kernel, initial | _variables(expander, samples))[output.name]
     if attitude is None:
-        matrix = list(begun.values())
+        matrix = list(initial.values())
     else:
         shown = attitude.inputs[0].elements
-        (matrix,) = expander(attitude, dict(zip(shown, begun.values(), strict=True))).values()
+        (matrix,) = expander(attitude, dict(zip(shown, initial.values(), strict=True))).values()
     return System(
         kernel=kernel,
         domain=expander.domain,
-        following=_handed_on(kernel, expander, begun, dict(zip(state.elements, following, strict=True))),
+        following=_states_after(kernel, expander, initial, dict(zip(state.elements, following, strict=True))),
         begun_anew=frozenset(),
         samples=samples,
         cycle=cycle,
         slow_cycle=None,
         times=times,
-        watched=_turned(expander, matrix),
+        watched=_rotation_about_z(expander, matrix),
         unit="rad",
         rates=sampled[0].name == "turns",
     )
 
 
-def _turned(expander: Expander, matrix: Sequence[Powers]) -> dict[str, Number]:
+def _rotation_about_z(expander: Expander, matrix: Sequence[Powers]) -> dict[str, Number]:
     """Return the rotation about z, (C21 - C12)/2, to first order in the elements of the state."""
     return expander.expansion((matrix[3] - matrix[1]) * expander.number(sp.S.Half)).linear
 
@@ -184,15 +184,15 @@ def _of_vector(
     variables = _variables(expander, samples)
     vector = expander(kernel, variables)[output.name]
     inputs = {signal.name: signal for signal in slow.inputs}
-    begun = {
+    initial = {
         element: expander.variable(element)
         for name, _ in slow.recursion.states
         for element in inputs[name].elements
     }
     for k in (0, 4, 8):
         element = inputs["state"].elements[k]
-        begun[element] = expander.variable(element, 1)
-    slow_inputs = dict(begun)
+        initial[element] = expander.variable(element, 1)
+    slow_inputs = dict(initial)
     sums = {"angle_sum": vector} if output.unit == "rad" else {"sculling": vector}
     if output.unit == "m/s":
         for signal in sampled:
@@ -211,13 +211,13 @@ def _of_vector(
         for element, value in zip(inputs[name].elements, slow_outputs[after], strict=True)
     }
     if output.unit == "rad":
-        watched = _turned(expander, [begun[e] for e in inputs["state"].elements])
+        watched = _rotation_about_z(expander, [initial[e] for e in inputs["state"].elements])
     else:
         watched = {inputs["navigation_velocity"].elements[2]: expander.domain.one}
     return System(
         kernel=kernel,
         domain=expander.domain,
-        following=_handed_on(kernel, expander, begun, following),
+        following=_states_after(kernel, expander, initial, following),
         begun_anew=frozenset(),
         samples=samples,
         cycle=cycle,
@@ -239,13 +239,13 @@ def _of_recursion(kernel: Kernel, sampled: Sequence[Signal], unit: str) -> Syste
     )
     if other:
         raise InputError(f"kernel {kernel.name} takes {', '.join(sorted(other))}, which is no sample")
-    begun = {
+    initial = {
         element: expander.variable(element)
         for name, _ in kernel.recursion.states
         for element in inputs[name].elements
     }
     samples, times, cycle = _waves(expander, kernel, sampled, 0, (), T_L)
-    outputs = expander(kernel, begun | _variables(expander, samples))
+    outputs = expander(kernel, initial | _variables(expander, samples))
     following: dict[str, Powers] = {}
     summed = []
     for name, after in kernel.recursion.states:
@@ -266,7 +266,7 @@ def _of_recursion(kernel: Kernel, sampled: Sequence[Signal], unit: str) -> Syste
     return System(
         kernel=kernel,
         domain=expander.domain,
-        following=_handed_on(kernel, expander, begun, following),
+        following=_states_after(kernel, expander, initial, following),
         begun_anew=anew,
         samples={
             name: {channel: _with_end(wave) for channel, wave in waves.items()}
@@ -289,12 +289,12 @@ def _variables(expander: Expander, samples: Iterable[str]) -> dict[str, Powers]:
     return {name: expander.variable(name) for name in samples}
 
 
-def _handed_on(
-    kernel: Kernel, expander: Expander, begun: Mapping[str, Powers], following: Mapping[str, Powers]
+def _states_after(
+    kernel: Kernel, expander: Expander, initial: Mapping[str, Powers], following: Mapping[str, Powers]
 ) -> dict[str, Expansion]:
     """Return the elements after a call as expansions; refuse a kernel that changes them without samples."""
     for name, value in following.items():
-        if value.start != begun[name].start:
+        if value.start != initial[name].start:
             raise InputError(f"kernel {kernel.name} does not rest: {name} changes without any motion")
     return {name: expander.expansion(value) for name, value in following.items()}
 

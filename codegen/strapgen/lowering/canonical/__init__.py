@@ -27,7 +27,16 @@ _MOST_TERMS = {"few": 320, "many": 120}
 
 
 def extract_core(kernel: Kernel) -> Core | None:
-    """Return the transition of a kernel as a polynomial of vectors; None if it is not one."""
+    """Return the transition of a kernel as a polynomial of vectors; None if it is not one.
+
+    Parameters
+    ----------
+    kernel : Kernel
+
+    Returns
+    -------
+    Core or None
+    """
     if kernel.transition is None:
         return None
     try:
@@ -43,6 +52,14 @@ def expansion(core: Core) -> str:
 
     The number of terms follows from the number n of vectors and the degree: n vectors have n (n + 1) / 2 scalar
     products, and the terms are all products of these up to the degree, with each vector and each cross product.
+
+    Parameters
+    ----------
+    core : Core
+
+    Returns
+    -------
+    str
 
     Raises
     ------

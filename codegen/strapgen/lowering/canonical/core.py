@@ -150,6 +150,14 @@ def decompose(core: Core) -> Decomposition:
 
     The coefficients are solved for in a rotated frame, where many coordinates are zero, and checked in all coordinates.
 
+    Parameters
+    ----------
+    core : Core
+
+    Returns
+    -------
+    Decomposition
+
     Raises
     ------
     NotCovariantError
@@ -177,6 +185,11 @@ def verify(core: Core, program: Program) -> None:
     """Check that a program computes the transition of a core, as an identity between polynomials.
 
     The identity covers all elements of all inputs, in coordinates of which the transition needs as few as possible.
+
+    Parameters
+    ----------
+    core : Core
+    program : Program
 
     Raises
     ------

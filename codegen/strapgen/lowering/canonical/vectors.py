@@ -81,6 +81,16 @@ def independent(forms: Sequence[Form]) -> list[int]:
 def components(form: Form, basis: Sequence[Form]) -> list[Fraction]:
     """Return the components of a form along a basis.
 
+    Parameters
+    ----------
+    form : Form
+    basis : sequence of Form
+        Independent forms.
+
+    Returns
+    -------
+    list of Fraction
+
     Raises
     ------
     ValueError
