@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from strapgen.motions import motion
+import strapgen
 
 LOG = Path(__file__).parent / "inertial_log.csv"
 GRAVITY = np.array([0.0, 0.0, 9.80665])
@@ -20,7 +20,7 @@ WOBBLE = {"a_deg_s": 20, "b_deg_s": 200, "g_deg_s": 5}
 
 def increments(seconds=10, rate_hz=100):
     """Return ends of the increments in s, angle increments in rad and velocity increments in m/s, body axes."""
-    wobble = motion("coning", **WOBBLE)
+    wobble = strapgen.motion("coning", **WOBBLE)
     step, count = Fraction(1, rate_hz), seconds * rate_hz
     angles = wobble.increments(step, count, 1)[:, 0]
     # Gauss: exact to the last place of what is printed.

@@ -10,13 +10,17 @@ from fractions import Fraction
 
 import sympy as sp
 
-from strapgen import algebra
-from strapgen.catalogue.runge_kutta import advance, nodes
-from strapgen.catalogue.steps import Samples
-from strapgen.catalogue.tableaux import TABLEAUX, Tableau
-from strapgen.companions import Companions
-from strapgen.kernel import Kernel, KernelBuilder
-from strapgen.signal import Signal
+from strapgen import (
+    TABLEAUX,
+    Companions,
+    Kernel,
+    KernelBuilder,
+    Samples,
+    Signal,
+    Tableau,
+    algebra,
+    runge_kutta,
+)
 
 SOURCE = "H. Schaub, J. L. Junkins, J. Astronaut. Sci. 44 (1996) 1-19"
 
@@ -58,8 +62,8 @@ def algorithm(method: Tableau = TABLEAUX["rk4"], increments: int = 2, previous: 
     build = KernelBuilder()
     state = build.input(STATE)
     samples = Samples(build, increments, previous)
-    turns = {node: samples.turn(node) for node in nodes(method)}
-    end = advance(build, method, turns, state, derivative, like=STATE, origin="the state")
+    turns = {node: samples.turn(node) for node in runge_kutta.nodes(method)}
+    end = runge_kutta.advance(build, method, turns, state, derivative, like=STATE, origin="the state")
     moved = build.stage(Signal.vector("moved", "moved", meaning="parameters before they are switched"), end)
     after = Signal.vector("next", "next", meaning=f"{STATE.meaning}, after the step", bound=Fraction(1))
     build.output(after, switched(moved))

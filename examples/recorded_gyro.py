@@ -10,17 +10,16 @@ from pathlib import Path
 import numpy as np
 
 import strapgen
-from strapgen.backends import BACKENDS
-from strapgen.recording import propagate, read_rates
 
 LOG = Path(__file__).parent / "gyro_log.csv"
 
 
 def main(log=LOG):
-    recording = read_rates(log, "deg/s", resample_hz=100)
+    recording = strapgen.read_rates(log, "deg/s", resample_hz=100)
     print(f"{len(recording.increments)} increments of {recording.interval} s")
-    for name in BACKENDS:
-        history = propagate(strapgen.backend("euler", "rk4", 2, name), recording, orthonormalize=1)
+    for name in strapgen.BACKENDS:
+        backend = strapgen.backend("euler", "rk4", 2, name)
+        history = strapgen.propagate(backend, recording, orthonormalize=1)
         e = history.states[-1].astype(float)
         turned = 2 * math.degrees(math.atan2(np.linalg.norm(e[:3]), abs(e[3])))
         print(f"{name:<8} e = {np.array2string(e, precision=9)}, turned by {turned:.6f} deg in all")

@@ -6,8 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from gathering import SEED
 
 import strapgen
+from strapgen import compilation
 from strapgen.backends import BACKENDS, Backend
 from strapgen.catalogue import ALGORITHMS
 from strapgen.fixedpoint import Settings
@@ -36,6 +38,20 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if left:
         config.hook.pytest_deselected(items=left)
         items[:] = [item for item in items if item not in set(left)]
+
+
+@pytest.fixture(scope="session", autouse=True)
+def optimization(pytestconfig: pytest.Config) -> Iterator[None]:
+    """Compile with less optimization what is not about it: without contraction it leaves every bit as it is.
+
+    The long tests compile as a user does, and so do the tests of the C text itself.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        if pytestconfig.getoption("markexpr") == "not long":
+            flags = tuple("-O1" if flag == "-O3" else flag for flag in compilation.C_FLAGS)
+            assert flags != compilation.C_FLAGS
+            patch.setattr(compilation, "_flags", flags)
+        yield
 
 
 @pytest.fixture(params=BACKEND_NAMES)
@@ -76,4 +92,4 @@ def make(backend_name: str):
 @pytest.fixture
 def rng() -> Iterator[np.random.Generator]:
     """A generator of random numbers that gives the same ones each time."""
-    yield np.random.default_rng(1969)
+    yield np.random.default_rng(SEED)

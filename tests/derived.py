@@ -1,4 +1,4 @@
-"""Kernels and programs, derived once for all tests of a process."""
+"""Kernels, derived once for all tests of a process, and programs, derived once for all processes of a session."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from functools import cache
 import mpmath
 import sympy as sp
 
-from strapgen import catalogue, generate, lower, standard_tree
+from strapgen import catalogue, generate, library
 from strapgen.backends import BACKENDS, fitted
 from strapgen.catalogue import Choice
 from strapgen.kernel import Kernel
@@ -21,15 +21,14 @@ def kernel(choice: Choice) -> Kernel:
     return catalogue.derive(choice)
 
 
-@cache
 def program(choice: Choice) -> Program:
-    return lower(kernel(choice))
+    return library.program(choice)
 
 
 @cache
 def programs() -> dict[str, Program]:
     """Return the standard catalogue by the names of its kernels."""
-    return {made.kernel: made for made in standard_tree.programs()}
+    return {choice.kernel: program(choice) for choice in catalogue.standard()}
 
 
 def precisely(kernel: Kernel, values: Mapping[str, mpmath.mpf]) -> dict[str, mpmath.mpf]:

@@ -6,7 +6,7 @@ import ast
 import re
 from pathlib import Path
 
-import pytest
+from gathering import each
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "codegen" / "strapgen"
@@ -48,9 +48,7 @@ def test_every_part_stands_in_the_table():
     assert parts - {"__init__", "__main__"} == set(LAYERS)
 
 
-@pytest.mark.parametrize(
-    "path", sorted(PACKAGE.rglob("*.py")), ids=lambda p: p.relative_to(PACKAGE).as_posix()
-)
+@each("path", sorted(PACKAGE.rglob("*.py")), ids=lambda p: p.relative_to(PACKAGE).as_posix())
 def test_imports_point_up_the_table(path):
     own = path.relative_to(PACKAGE).parts[0].removesuffix(".py")
     if own in ("__init__", "__main__"):  # the package's front offers everything

@@ -250,8 +250,12 @@ def test_processes_may_build_the_same_at_once(root):
     assert [process.returncode for process in processes] == [0] * 4, results
     assert len({out for out, _ in results}) == 1
     assert len(json.loads(results[0][0])) == 6
-    # The step and the normalization, and of each its sources and its build.
-    assert {kind: len(names(root / kind)) for kind in names(root)} == {"sources": 2, "builds": 2}
+    # The step and the normalization, and of each its program, its sources and its build.
+    assert {kind: len(names(root / kind)) for kind in names(root)} == {
+        "programs": 2,
+        "sources": 2,
+        "builds": 2,
+    }
     for place in (root / "builds").iterdir():
         assert len([path for path in place.iterdir() if path.name != "manifest.json"]) == 1
 

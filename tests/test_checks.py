@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from fractions import Fraction
 
 import numpy as np
@@ -66,6 +67,10 @@ def test_number_of_a_float_is_its_shortest_decimal(value):
             "1,5",
             "--1",
             "1_0",
+            "1_0/8",
+            "1/1_0",
+            "٣",
+            "٣/٤",
         ),
         *(math.nan, -math.inf, np.nan, None, True, [1.0], 1j, "1/00000"),
     ],
@@ -73,6 +78,19 @@ def test_number_of_a_float_is_its_shortest_decimal(value):
 def test_no_number(value):
     with pytest.raises(InputError, match=r"^step is .*; a finite number is needed$"):
         checks.number("step", value)
+
+
+def test_double_reads_what_number_reads():
+    assert [checks.double(text) for text in ("1", " -2.5e3 ", "\t.5", "1e999")] == [1, -2500, 0.5, math.inf]
+    unread = ("", "x", "1_0", "1e1_0", "٣", "1/8", "0x10", "nan")
+    assert [text for text in unread if not math.isnan(checks.double(text))] == []
+
+
+def test_whole_reads_digits_alone():
+    assert [checks.whole("word", text) for text in ("16", " 16 ", "-3", "+007")] == [16, 16, -3, 7]
+    for text in ("", "x", "1_0", "٣", "1.0", "1e3", "0x10", "1 2"):
+        with pytest.raises(InputError, match=rf"^word is {re.escape(repr(text))}; a whole number is needed$"):
+            checks.whole("word", text)
 
 
 @pytest.mark.parametrize("value", ["0", -0.0, "-1e-9", Fraction(-1, 3), "1e-400"])

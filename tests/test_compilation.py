@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import strapgen
-from strapgen import compilation, pipeline
+from strapgen import backends, compilation, pipeline
 from strapgen.cli import main
 from strapgen.exceptions import CompilerError
 from strapgen.targets import Sources
@@ -25,6 +25,7 @@ def root(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Start with an empty cache, on disk and in memory, and the machine's own compiler."""
     monkeypatch.setenv("STRAPGEN_CACHE_DIR", str(tmp_path / "cache"))
     monkeypatch.setattr(compilation, "_loaded", {})
+    monkeypatch.setattr(compilation, "_modules", {})
     monkeypatch.delenv("CC", raising=False)
     return tmp_path / "cache"
 
@@ -208,6 +209,92 @@ def test_a_compiler_that_makes_nothing(sources, root, monkeypatch):
     with pytest.raises(CompilerError, match="failed on"):
         compilation.load(sources)
     assert not list((root / "builds").iterdir())
+
+
+# Many in one module
+
+
+@pytest.fixture(scope="module")
+def many() -> list[Sources]:
+    names = ("euler-normalize", "euler-product", "dcm-from-euler")
+    lowered = [pipeline.lower(pipeline.derive(name)) for name in names]
+    return [pipeline.generate(program, target) for target in ("c", "c-float", "numpy") for program in lowered]
+
+
+def test_many_sources_become_one_module_of_two_commands_for_each_and_two_for_all(many, counting, root):
+    """One to compile each kernel, one for the wrapper and one to link."""
+    compilation.compile_together(many)
+    assert counting() == 6 + 2
+    (place,) = (root / "builds").iterdir()
+    modules = {compilation.load(sources) for sources in many if sources.target != "numpy"}
+    assert {Path(module.__file__).parent for module in modules} == {place}
+    assert len(modules) == 1
+    assert counting() == 6 + 2
+
+
+def test_each_function_of_a_module_is_the_one_that_it_is_alone(many, counting, monkeypatch, tmp_path):
+    together = compilation.compile_together(many) or [backends.of_sources(sources) for sources in many]
+    monkeypatch.setenv("STRAPGEN_CACHE_DIR", str(tmp_path / "other"))
+    monkeypatch.setattr(compilation, "_loaded", {})
+    rng = np.random.default_rng(7)
+    for sources, function in zip(many, together, strict=True):
+        alone = backends.of_sources(sources)
+        values = [
+            rng.normal(size=(9, *signal.shape)).astype(alone.dtype) for signal in sources.function.inputs
+        ]
+        np.testing.assert_array_equal(function(*values), alone(*values))
+        if sources.target != "numpy":
+            assert function.module.__file__ != alone.module.__file__
+
+
+def test_what_is_there_is_not_compiled_again(many, counting):
+    first, *rest = many
+    compilation.load(first)
+    calls = counting()
+    compilation.compile_together([first])
+    assert counting() == calls
+    compilation.compile_together(many)
+    assert counting() == calls + len([s for s in rest if s.target != "numpy"]) + 2
+    calls = counting()
+    compilation.compile_together(many)
+    assert counting() == calls
+
+
+def test_functions_of_one_name_go_into_two_modules(sources, counting, root):
+    pair = [sources, other(sources, 1)]
+    compilation.compile_together(pair)
+    assert len(list((root / "builds").iterdir())) == 2
+    assert len({compilation.load(one).__file__ for one in pair}) == 2
+
+
+@pytest.mark.parametrize("kind", ["builds", "shared"])
+def test_a_module_of_many_that_is_gone_is_compiled_alone(kind, many, root, monkeypatch):
+    compilation.compile_together(many)
+    for place in (root / kind).iterdir():
+        shutil.rmtree(place)
+    module = compilation.load(many[0])
+    assert module.lib.euler_normalize
+    assert Path(module.__file__).name.startswith("strapgen_euler_normalize")
+
+
+def test_many_without_a_compiler(many, without_compiler, root):
+    with pytest.raises(CompilerError, match=r"^no C compiler: 'cc' is not on the PATH"):
+        compilation.compile_together(many)
+    assert not (root / "builds").exists()
+    compilation.compile_together([sources for sources in many if sources.target == "numpy"])
+
+
+def test_one_of_many_that_does_not_compile(many, root):
+    first = many[0]
+    files = {name: text.replace("#include", "#error no") for name, text in first.files.items()}
+    broken = Sources.restore(first.interface(), files)
+    with pytest.raises(CompilerError, match=r"error.* no"):
+        compilation.compile_together([broken, *many[1:]])
+    assert not list((root / "builds").iterdir())
+    assert not (root / "shared").exists()
+
+
+# The process that compiles
 
 
 def other(sources: Sources, number: int) -> Sources:

@@ -6,6 +6,9 @@ import doctest
 import re
 import runpy
 import shlex
+import subprocess
+from collections.abc import Iterable
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -57,6 +60,43 @@ def test_readme_shows_every_command():
     assert "`strapgen tables`" in README
 
 
+def not_ignored(paths: Iterable[str]) -> list[str]:
+    """Return which paths of a checkout would be new files that git does not ignore."""
+    git = ["git", "-C", str(ROOT)]
+    names = sorted(paths)
+    try:
+        known = subprocess.run([*git, "ls-files", *names], capture_output=True, text=True, check=True)
+    except (FileNotFoundError, subprocess.CalledProcessError):
+        pytest.skip("no git, or no checkout")
+    asked = "\n".join(names)
+    ignored = subprocess.run([*git, "check-ignore", "--stdin"], input=asked, capture_output=True, text=True)
+    return sorted({*names} - {*known.stdout.splitlines(), *ignored.stdout.splitlines()})
+
+
+def shown_commands() -> list[str]:
+    """Return every command of README, docs, examples and help texts, each on one line."""
+    pages = [ROOT / "README.md", *(ROOT / "docs").glob("*.md"), *(ROOT / "examples").glob("*.py")]
+    pages += (ROOT / "codegen" / "strapgen" / "cli").glob("*.py")
+    texts = (re.sub(r"\\+\n\s*", "", page.read_text()) for page in pages)
+    return [
+        line
+        for text in texts
+        for line in re.findall(r"^ +(?:Example: )?(strapgen [a-z].*)$", text, re.MULTILINE)
+    ]
+
+
+def test_no_command_writes_into_the_checkout_what_git_does_not_ignore():
+    written = {}
+    for command in shown_commands():
+        words = shlex.split(command)
+        for option, value in pairwise(words):
+            if option in ("--out", "--plot"):
+                written[f"{value}/file.c" if words[1] in ("generate", "two-speed") else value] = command
+        assert words[1] not in ("generate", "two-speed") or {"--out", "--all"} & {*words}, command
+    assert len(written) >= 9
+    assert [written[path] for path in not_ignored(written)] == []
+
+
 #: Commands that take seconds: many kernels, or many terms.
 LONG = (
     "strapgen stress ",
@@ -78,6 +118,8 @@ def test_readme_command(command, tmp_path, monkeypatch, capsys):
     with pytest.raises(SystemExit) as stop:
         main(shlex.split(command)[1:])
     assert stop.value.code == 0, capsys.readouterr().err
+    (tmp_path / "examples").unlink()
+    assert not_ignored(str(p.relative_to(tmp_path)) for p in tmp_path.rglob("*") if p.is_file()) == []
 
 
 def cells(line: str) -> list[str]:

@@ -107,10 +107,48 @@ def test_permissions_are_those_of_an_ordinary_file(umask, tmp_path):
     before = os.umask(umask)
     try:
         (path,) = output.write_files(tmp_path, {"a": "x"})
-        assert os.umask(umask) == umask, "the umask is put back"
     finally:
         os.umask(before)
     assert stat.S_IMODE(path.stat().st_mode) == 0o666 & ~umask
+
+
+@pytest.mark.parametrize("mode", [0o600, 0o640, 0o666, 0o755])
+def test_a_file_that_exists_keeps_its_permissions(mode, tmp_path):
+    path = output.write_file(tmp_path / "a", "x")
+    path.chmod(mode)
+    output.write_file(path, "y")
+    assert (path.read_text(), stat.S_IMODE(path.stat().st_mode)) == ("y", mode)
+
+
+def test_a_link_s_target_keeps_its_permissions(tmp_path):
+    target = output.write_file(tmp_path / "target", "x")
+    target.chmod(0o600)
+    (tmp_path / "link").symlink_to(target)
+    output.write_file(tmp_path / "link", "y")
+    assert (target.read_text(), stat.S_IMODE(target.stat().st_mode)) == ("y", 0o600)
+
+
+def test_what_replaces_a_private_file_is_private_before_it_is_whole(tmp_path, monkeypatch):
+    path = output.write_file(tmp_path / "a", "x")
+    path.chmod(0o600)
+    modes = []
+
+    def watched(handle: int, mode: str, fdopen=os.fdopen):
+        modes.append(stat.S_IMODE(os.fstat(handle).st_mode))
+        return fdopen(handle, mode)
+
+    monkeypatch.setattr(output.os, "fdopen", watched)
+    output.write_file(path, "y")
+    assert modes == [0o600]
+
+
+def test_the_umask_of_the_process_stays_alone(tmp_path, monkeypatch):
+    def forbidden(_: int) -> int:
+        raise AssertionError("another thread would create its files without a umask")
+
+    monkeypatch.setattr(os, "umask", forbidden)
+    output.write_files(tmp_path, FILES)
+    output.write_files(tmp_path, FILES)
 
 
 def test_folder_under_a_file(tmp_path):

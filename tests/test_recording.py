@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from gathering import each
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
@@ -177,8 +178,8 @@ def changed(line: int, column: int, cell: str) -> list[list[str]]:
     return rows
 
 
-@pytest.mark.parametrize("cell", ["nan", "NaN", "inf", "-Infinity", "1e999", "", "twelve", "1.2.3", "0x1f"])
-@pytest.mark.parametrize(("line", "column"), [(2, 1), (4, 1), (5, 3), (7, 4)])
+@each("cell", ["nan", "NaN", "inf", "-Infinity", "1e999", "", "twelve", "1.2.3", "0x1f", "1_0", "٣"])
+@each(("line", "column"), [(2, 1), (4, 1), (5, 3), (7, 4)])
 def test_cell_that_is_no_finite_number(cell, line, column, write, read):
     path = write(changed(line, column, cell))
     refused(read, path, f"line {line}: column {column} is {cell!r}; a finite number is needed")
@@ -193,6 +194,11 @@ def test_line_numbers_count_blank_lines(write, read):
 def test_first_row_with_a_bad_time_is_no_header(cell, write, read):
     rows = changed(2, 1, cell)[1:]
     refused(read, write(rows), f"line 1: column 1 is {cell!r}")
+
+
+def test_first_row_of_numbers_with_underscores_is_no_header(write, read):
+    path = write([["1_0", "1_0", "2_0", "3_0"], ["20", "1", "2", "3"], ["30", "1", "2", "3"]])
+    refused(read, path, "line 1: column 1 is '1_0'; a finite number is needed")
 
 
 def test_times_that_are_too_far_apart(write, read):
@@ -388,7 +394,7 @@ def test_recording_shorter_than_a_step(even):
         propagate(strapgen.backend("euler", "rk4", 4, "numpy"), short)
 
 
-@pytest.mark.parametrize(
+@each(
     ("options", "said"),
     [
         ({"record": "0.3"}, "record 0.3 s is not a whole multiple of the step 0.25 s"),

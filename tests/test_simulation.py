@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from tolerances import certified
@@ -63,3 +65,20 @@ def test_decimals_are_exact(make):
 def test_times_that_cannot_be_used(times, words):
     with pytest.raises(InputError, match=words.replace("(", r"\(")):
         simulate(strapgen.backend("euler"), strapgen.motion("constant", y_deg_s=1), **times)
+
+
+def test_a_run_that_overflows_names_the_samples_that_the_rate_is_extracted_from():
+    # A cone of 5 degrees at 20 Hz, sampled at 100 Hz: the polynomial through eight samples swings far beyond the rate.
+    omega, half_angle = 2 * math.pi * 20, math.radians(5)
+    cone = strapgen.motion(
+        "coning",
+        a_rad_s=omega * math.sin(half_angle),
+        b_rad_s=omega,
+        g_rad_s=-omega * (1 - math.cos(half_angle)),
+    )
+    said = (
+        r"^the attitude is not finite from 240 s on; steps of euler-rk2-8 lengthen it: "
+        r"the increments, or the rates of the polynomial through 8 of them, are too large for the method$"
+    )
+    with pytest.raises(InputError, match=said):
+        strapgen.simulate(strapgen.backend("euler", "rk2", 8), cone, "0.08", 240, record=240)

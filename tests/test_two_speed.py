@@ -184,6 +184,32 @@ def test_c_and_model_agree_bit_for_bit(carry, rng):
         np.testing.assert_array_equal(one, other)
 
 
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_error_feedback_in_the_memory_of_the_c_is_that_of_the_model(algorithm):
+    """Words of 16 bits, rounded down, on a long vibration: bit for bit, and not what runs without feedback."""
+    angles, velocities = vibration(60)
+    attitudes = {}
+    for carry in ("none", "full"):
+        settings = Settings(word=16, carry=carry, rounding="truncation")
+        runners = [TwoSpeed(algorithm, 2, name, settings) for name in ("c-q15", "fixed-model")]
+        whole, parts = (
+            one.run(angles[1:], velocities[1:], fast_cycles=10, slow_cycles=4, previous=angles[0])
+            for one in runners
+        )
+        for one, other in zip(whole, parts, strict=True):
+            np.testing.assert_array_equal(one, other)
+        attitudes[carry] = whole.attitudes
+    assert (attitudes["full"] != attitudes["none"]).any()
+
+
+def test_generated_files_are_the_command_s_whatever_largest_angle_is_stated():
+    # No loop has the increments of a step: what bounds them goes into neither the code nor its header.
+    plain = sources("euler", 2, "c-fixed", Settings(carry="full")).files
+    assert sources("euler", 2, "c-fixed", Settings(carry="full").fitted(0.01)).files == plain
+    assert "--word 32 --carry full\n" in plain["euler_two_speed_2_q31.h"]
+    assert sources("euler", 2, "c-fixed").files == sources("euler", 2, "c-fixed", Settings()).files
+
+
 def test_formats_of_loops_fit_together_and_sums_are_exact():
     ranges = {"angle_sum": Fraction(1, 4)}
     made_loops = loops("dcm", 2, "c-fixed", Settings(ranges=ranges))

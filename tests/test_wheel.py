@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import tarfile
 import venv
 import zipfile
 from pathlib import Path
@@ -46,9 +47,23 @@ def test_templates_and_generated_sources_are_in_the_wheel(wheel):
         }
         assert shipped
         assert shipped <= names
-    assert "strapgen/cli/generate.py" in names
+    assert {"strapgen/cli/generate.py", "strapgen/py.typed"} <= names
     assert {f"strapgen/catalogue/methods/{method}.toml" for method in TABLEAUX} <= names
     assert not any("__pycache__" in name or name.startswith(("tests/", "codegen/")) for name in names)
+
+
+def test_the_source_archive_has_what_a_wheel_is_built_from(tmp_path):
+    run(sys.executable, "-m", "build", "--sdist", "--outdir", tmp_path, resources.checkout(), cwd=tmp_path)
+    (built,) = tmp_path.glob("strapgen-*.tar.gz")
+    with tarfile.open(built) as archive:
+        names = {name.partition("/")[2] for name in archive.getnames()}
+    assert {
+        "codegen/strapgen/py.typed",
+        "codegen/strapgen/__init__.py",
+        "pyproject.toml",
+        "README.md",
+    } <= names
+    assert {"templates/two_speed/source.c.j2", "generated/c/euler_rk4_2.c"} <= names
 
 
 @pytest.fixture(scope="module")

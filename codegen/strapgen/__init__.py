@@ -4,43 +4,136 @@ The stages in order: `derive` a kernel, `lower` it to straight-line code, `gener
 end, `simulate` it against a closed-form motion. `backend` does the first four at once, from the cache.
 """
 
-from __future__ import annotations
-
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+import importlib as _importlib
+import typing as _typing
 
 __version__ = "0.1.0"
 
-if TYPE_CHECKING:
+# For type checkers; a test holds it against the table below, from which Python loads a name when it is first used.
+if _typing.TYPE_CHECKING:
+    from strapgen import algebra as algebra
+    from strapgen import exact as exact
+    from strapgen import formulas as formulas
+    from strapgen import gyro as gyro
+    from strapgen import study as study
+    from strapgen import vibration as vibration
+    from strapgen.backends import BACKENDS as BACKENDS
+    from strapgen.backends import Backend as Backend
+    from strapgen.backends import Evaluator as Evaluator
     from strapgen.backends import backend as backend
     from strapgen.backends import evaluator as evaluator
+    from strapgen.behaviour import Finding as Finding
+    from strapgen.behaviour import check as check
+    from strapgen.catalogue import Choice as Choice
+    from strapgen.catalogue import choose as choose
+    from strapgen.catalogue import choose_step as choose_step
+    from strapgen.catalogue import runge_kutta as runge_kutta
+    from strapgen.catalogue import tableaux as tableaux
+    from strapgen.catalogue.kinematics import CAYLEY_KLEIN as CAYLEY_KLEIN
+    from strapgen.catalogue.kinematics import DCM as DCM
+    from strapgen.catalogue.kinematics import EULER as EULER
+    from strapgen.catalogue.kinematics import Kinematics as Kinematics
+    from strapgen.catalogue.steps import Samples as Samples
+    from strapgen.catalogue.steps import increments_signal as increments_signal
+    from strapgen.catalogue.tableaux import TABLEAUX as TABLEAUX
+    from strapgen.catalogue.tableaux import Tableau as Tableau
+    from strapgen.companions import Companions as Companions
+    from strapgen.comparison import Comparison as Comparison
+    from strapgen.comparison import compare as compare
+    from strapgen.convergence import Convergence as Convergence
+    from strapgen.convergence import converge as converge
+    from strapgen.exceptions import CompilerError as CompilerError
+    from strapgen.exceptions import InputError as InputError
+    from strapgen.exceptions import InputTypeError as InputTypeError
+    from strapgen.exceptions import MissingExtraError as MissingExtraError
+    from strapgen.exceptions import StrapgenError as StrapgenError
+    from strapgen.fixedpoint import FixedProgram as FixedProgram
+    from strapgen.fixedpoint import Format as Format
     from strapgen.fixedpoint import Settings as Settings
+    from strapgen.kernel import Kernel as Kernel
+    from strapgen.kernel import KernelBuilder as KernelBuilder
+    from strapgen.kernel import Stage as Stage
+    from strapgen.kernel import resolution as resolution
+    from strapgen.motions import Motion as Motion
     from strapgen.motions import motion as motion
+    from strapgen.order import Order as Order
     from strapgen.pipeline import build as build
     from strapgen.pipeline import derive as derive
     from strapgen.pipeline import generate as generate
     from strapgen.pipeline import lower as lower
     from strapgen.pipeline import quantize as quantize
+    from strapgen.program import Program as Program
+    from strapgen.recording import History as History
+    from strapgen.recording import InertialRecording as InertialRecording
+    from strapgen.recording import Recording as Recording
+    from strapgen.recording import propagate as propagate
+    from strapgen.recording import read_increments as read_increments
+    from strapgen.recording import read_inertial as read_inertial
+    from strapgen.recording import read_rates as read_rates
+    from strapgen.recursion import Recursion as Recursion
+    from strapgen.signal import Signal as Signal
+    from strapgen.simulation import Run as Run
     from strapgen.simulation import simulate as simulate
+    from strapgen.strapdown import Course as Course
+    from strapgen.strapdown import course as course
+    from strapgen.targets import TARGETS as TARGETS
+    from strapgen.targets import Sources as Sources
+    from strapgen.two_speed import TwoSpeed as TwoSpeed
 
-_EXPORTS = {
-    "derive": "pipeline",
-    "lower": "pipeline",
-    "quantize": "pipeline",
-    "generate": "pipeline",
-    "build": "pipeline",
-    "simulate": "simulation",
-    "motion": "motions",
-    "Settings": "fixedpoint",
-    "backend": "backends",
-    "evaluator": "backends",
+#: Public names by the modules that define them.
+_NAMES = {
+    "backends": ("BACKENDS", "Backend", "Evaluator", "backend", "evaluator"),
+    "behaviour": ("Finding", "check"),
+    "catalogue": ("Choice", "choose", "choose_step"),
+    "catalogue.kinematics": ("CAYLEY_KLEIN", "DCM", "EULER", "Kinematics"),
+    "catalogue.steps": ("Samples", "increments_signal"),
+    "catalogue.tableaux": ("TABLEAUX", "Tableau"),
+    "companions": ("Companions",),
+    "comparison": ("Comparison", "compare"),
+    "convergence": ("Convergence", "converge"),
+    "exceptions": ("CompilerError", "InputError", "InputTypeError", "MissingExtraError", "StrapgenError"),
+    "fixedpoint": ("FixedProgram", "Format", "Settings"),
+    "kernel": ("Kernel", "KernelBuilder", "Stage", "resolution"),
+    "motions": ("Motion", "motion"),
+    "order": ("Order",),
+    "pipeline": ("build", "derive", "generate", "lower", "quantize"),
+    "program": ("Program",),
+    "recording": (
+        *("History", "InertialRecording", "Recording"),
+        *("propagate", "read_increments", "read_inertial", "read_rates"),
+    ),
+    "recursion": ("Recursion",),
+    "signal": ("Signal",),
+    "simulation": ("Run", "simulate"),
+    "strapdown": ("Course", "course"),
+    "targets": ("TARGETS", "Sources"),
+    "two_speed": ("TwoSpeed",),
 }
+#: Modules whose functions belong together, by the names that they have here.
+_NAMESPACES = {
+    "algebra": "algebra",
+    "exact": "exact",
+    "formulas": "formulas",
+    "gyro": "gyro",
+    "runge_kutta": "catalogue.runge_kutta",
+    "study": "study",
+    "tableaux": "catalogue.tableaux",
+    "vibration": "vibration",
+}
+_EXPORTS = {name: module for module, names in _NAMES.items() for name in names}
 
-__all__ = ["__version__", *_EXPORTS]
+__all__ = ["__version__", *_EXPORTS, *_NAMESPACES]
+
+if not _typing.TYPE_CHECKING:  # a type checker would take any name for one that is here
+
+    def __getattr__(name: str) -> object:
+        # Loaded when first used: the command line answers before SymPy or numpy are imported.
+        if name in _EXPORTS:
+            return getattr(_importlib.import_module(f"{__name__}.{_EXPORTS[name]}"), name)
+        if name in _NAMESPACES:
+            return _importlib.import_module(f"{__name__}.{_NAMESPACES[name]}")
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
-def __getattr__(name: str) -> Any:
-    # Loaded when first used: the command line answers before SymPy or numpy are imported.
-    if name in _EXPORTS:
-        return getattr(import_module(f"{__name__}.{_EXPORTS[name]}"), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+def __dir__() -> list[str]:
+    return sorted(__all__)

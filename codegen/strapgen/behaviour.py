@@ -19,6 +19,7 @@ from strapgen.convergence import GENERAL, converge, interpreter, step_of_increme
 from strapgen.exceptions import CompilerError, InputError
 from strapgen.fixedpoint import Settings
 from strapgen.gyro import windows
+from strapgen.kernel import Kernel
 from strapgen.motions import motion
 from strapgen.program import Program
 from strapgen.simulation import attitude, drift_between, simulate
@@ -83,7 +84,7 @@ def check(choice: Choice) -> Iterator[Finding]:
     >>> found["order"], found["at rest"]
     (True, True)
     """
-    step = _Precise(pipeline.lower(step_of_increments(choice)))
+    step = _Precise(step_of_increments(choice))
     looks: dict[str, Callable[[], Iterable[Finding]]] = {
         "no rotation": lambda: [_no_rotation(step)],
         "at rest": lambda: [_at_rest(step)],
@@ -105,13 +106,15 @@ def check(choice: Choice) -> Iterator[Finding]:
 class _Precise:
     """A step and its attitude in many digits."""
 
-    def __init__(self, program: Program) -> None:
-        companions = program.companions
+    def __init__(self, kernel: Kernel) -> None:
+        companions = kernel.companions
         assert companions is not None, "checked before"
-        self.program = program
+        self.program = pipeline.lower(kernel)
         self.identity = companions.identity
         self.restoring = companions.orthonormalize
-        self._attitude = None if companions.attitude is None else interpreter(companions.attitude)
+        self._attitude = (
+            None if companions.attitude is None else interpreter(companions.attitude, self.program)
+        )
 
     def attitude(self, state: list[Any]) -> Any:
         """Return the direction cosine matrix of a state."""

@@ -70,6 +70,27 @@ def generator_digest() -> str:
     return digest([version("sympy"), *(path.read_bytes() for path in resources.package_files())])
 
 
+def lookup(kind: str, key: str) -> Path | None:
+    """Return the folder of a cache entry; None if there is none, or if it is damaged.
+
+    Parameters
+    ----------
+    kind, key : str
+        As for `entry`.
+    """
+    place = root() / kind / key
+    if not _is_whole(place):
+        return None
+    with contextlib.suppress(OSError):
+        os.utime(place)  # in use: not to be pruned
+    return place
+
+
+def discard(kind: str, key: str) -> None:
+    """Remove a cache entry whose content no longer holds."""
+    shutil.rmtree(root() / kind / key, ignore_errors=True)
+
+
 def entry(kind: str, key: str, fill: Callable[[Path], None]) -> Path:
     """Return the folder of a cache entry; if there is none, create it by `fill`.
 
@@ -91,11 +112,9 @@ def entry(kind: str, key: str, fill: Callable[[Path], None]) -> Path:
     InputError
         If the cache folder cannot be written.
     """
+    if (there := lookup(kind, key)) is not None:
+        return there
     place = root() / kind / key
-    if _is_whole(place):
-        with contextlib.suppress(OSError):
-            os.utime(place)  # in use: not to be pruned
-        return place
     try:
         place.parent.mkdir(parents=True, exist_ok=True)
         if place.is_dir():

@@ -53,6 +53,50 @@ def choice(what: str, value: str, allowed: Iterable[str]) -> str:
     return value
 
 
+def double(text: str) -> float:
+    """Return the number that a text writes, in double precision; nan if it writes none.
+
+    Every number that a file or a command line holds is read here or by `whole`: digits are 0 to 9, without underscores.
+
+    Examples
+    --------
+    >>> double(" -2.5e3 "), double("1_0")
+    (-2500.0, nan)
+    """
+    if not _is_plain(text):
+        return math.nan
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
+
+
+def whole(what: str, text: str) -> int:
+    """Return the whole number that a text writes.
+
+    Raises
+    ------
+    InputError
+        If it writes none.
+
+    Examples
+    --------
+    >>> whole("increments", "12")
+    12
+    """
+    try:
+        if _is_plain(text):
+            return int(text)
+    except ValueError:
+        pass
+    raise InputError(f"{what} is {text!r}; a whole number is needed")
+
+
+def _is_plain(text: str) -> bool:
+    """Return whether a text holds none of the characters that Python alone takes for parts of a number."""
+    return "_" not in text and text.strip().isascii()
+
+
 def number(what: str, value: str | float | Fraction, *, positive: bool = False) -> Fraction:
     """Read a finite number exactly.
 
@@ -81,10 +125,10 @@ def number(what: str, value: str | float | Fraction, *, positive: bool = False) 
     >>> number("step", "0.125", positive=True)
     Fraction(1, 8)
     """
-    text = str(value).strip().replace("_", "?")  # Python would read 1_0 as 10, which other programs do not
+    text = str(value).strip()
     try:
         # Double comes first, because exact arithmetic would write out all digits of a number like 1e-999999999.
-        near = float(Fraction(text) if "/" in text else text)
+        near = float(Fraction(text)) if "/" in text and _is_plain(text) else double(text)
         exact = Fraction(text if near and math.isfinite(near) else 0)
     except (ValueError, ZeroDivisionError, OverflowError):
         near = math.nan

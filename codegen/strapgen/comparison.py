@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen import catalogue, checks, compilation, exact, pipeline
+from strapgen import catalogue, checks, compilation, exact, library
 from strapgen.backends import BACKENDS, Backend, of
 from strapgen.catalogue import Choice
 from strapgen.catalogue.tableaux import Tableau
@@ -151,9 +151,10 @@ def compare_choice(
 def _reference(make: Any, choice: Choice, reference: str, increments: Array) -> Array:
     """Return the states of the reference, in double."""
     if reference == EXACT:
-        return exact.propagate(pipeline.lower(catalogue.derive(choice)), increments)
-    states: Array = make(reference).propagate(increments).astype(np.float64)
-    require_finite(states, np.arange(len(states), dtype=np.float64))
+        return exact.propagate(library.program(choice), increments)
+    backend = make(reference)
+    states: Array = backend.propagate(increments).astype(np.float64)
+    require_finite(backend, states, np.arange(len(states), dtype=np.float64))
     return states
 
 
@@ -167,7 +168,7 @@ def _compared(
         start = time.perf_counter()
         run()
         seconds = min(seconds, time.perf_counter() - start)
-    require_finite(states, np.arange(1 + steps, dtype=np.float64))
+    require_finite(candidate, states, np.arange(1 + steps, dtype=np.float64))
     computed = attitude(candidate, states)
     angles = np.linalg.norm(drift_between(computed, matrices), axis=-1)
     drifts = drift_between(computed, matrices if truth is None else truth)

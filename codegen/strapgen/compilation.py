@@ -1,7 +1,8 @@
 """Building turns source text into a module that can be called.
 
 The numpy target is imported as it is. C is compiled through cffi in API mode and cached by content, so that
-a second call compiles nothing.
+a second call compiles nothing. Many sources compile together into one module: the compiler's start, Python's headers
+and the linker, which cost more than a kernel does, are paid once.
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ import sys
 import sysconfig
 import tempfile
 import threading
+from collections.abc import Iterable, Sequence
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -32,7 +35,18 @@ from strapgen.targets import Sources
 #: Without notes for debuggers, which Python's flags switch on, compiling takes a tenth less time.
 C_FLAGS = ("-std=c99", "-O3", "-ffp-contract=off", "-g0")
 
+#: A module calls its own functions, whatever other functions of the same names the process has.
+_VISIBILITY = "-fvisibility=hidden"
+#: The flags in effect; tests that are not about optimization compile with less of it.
+_flags: tuple[str, ...] = C_FLAGS
+#: Text after the headers. The wrappers of cffi only pass arguments on and are not worth optimizing.
+_UNOPTIMIZED = '#if defined(__GNUC__) && !defined(__clang__)\n#pragma GCC optimize ("O0")\n#endif\n'
+
+#: Kind of cache entry that says in which module of many a source was compiled.
+_SHARED = "shared"
+
 _loaded: dict[str, Any] = {}
+_modules: dict[Path, Any] = {}
 
 
 def load(sources: Sources) -> Any:
@@ -45,7 +59,7 @@ def load(sources: Sources) -> Any:
     Returns
     -------
     module
-        For Python the generated module; for C a cffi module with ``ffi`` and ``lib``.
+        For Python the generated module; for C a cffi module with ``ffi`` and ``lib``, which may hold others too.
 
     Raises
     ------
@@ -56,6 +70,61 @@ def load(sources: Sources) -> Any:
     if key not in _loaded:
         _loaded[key] = _compiled(sources) if sources.target.startswith("c") else _import_text(sources)
     return _loaded[key]
+
+
+def compile_together(many: Iterable[Sources]) -> None:
+    """Compile what is not in the cache yet into as few modules as names allow, for `load` to find.
+
+    Parameters
+    ----------
+    many : iterable of Sources
+        Of any target; Python needs no compiling. Two functions of one name go into two modules.
+
+    Raises
+    ------
+    CompilerError
+        If there is no C compiler, or it fails.
+    """
+    missing: dict[str, Sources] = {}
+    for sources in many:
+        if sources.target.startswith("c"):
+            key = _key([sources])
+            if _shared(key) is None and cache.lookup("builds", key) is None:
+                missing[key] = sources
+    for group in _groups(missing):
+        together = _key(group.values())
+        name = f"strapgen_{together}"
+        folder = _build(list(group.values()), name, together)
+        for key in group:
+            cache.entry(_SHARED, key, partial(_note_module, {"name": name, "build": folder.name}))
+
+
+def _note_module(module: dict[str, str], draft: Path) -> None:
+    """Write down in which module a source was compiled."""
+    (draft / "module.json").write_text(json.dumps(module))
+
+
+def _groups(missing: dict[str, Sources]) -> list[dict[str, Sources]]:
+    """Return sources by their keys, in groups in each of which no file and no function has its name twice."""
+    groups: list[dict[str, Sources]] = []
+    for key, sources in missing.items():
+        for group in groups:
+            if not any(sources.files.keys() & other.files.keys() for other in group.values()):
+                group[key] = sources
+                break
+        else:
+            groups.append({key: sources})
+    return groups
+
+
+def _shared(key: str) -> Path | None:
+    """Return the module of many in which a source was compiled, if it is still there."""
+    place = cache.lookup(_SHARED, key)
+    if place is None:
+        return None
+    module = json.loads((place / "module.json").read_text())
+    folder = cache.lookup("builds", module["build"])
+    return folder and folder / _library(module["name"])
 
 
 def _import_text(sources: Sources) -> ModuleType:
@@ -91,30 +160,44 @@ def _chosen_compiler() -> str:
 
 
 def _compiled(sources: Sources) -> Any:
-    # Compiling with another compiler, or for another Python, makes another entry.
-    path = compiler()
-    executable = Path(path).resolve()
+    key = _key([sources])
+    name = f"strapgen_{sources.function.name}"
+    file = _shared(key) or _build([sources], name, key) / _library(name)
+    if file not in _modules:
+        _modules[file] = _import_file(file)
+    return _modules[file]
+
+
+def _import_file(file: Path) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(file.name.partition(".")[0], file)
+    if spec is None or spec.loader is None:
+        raise CompilerError(f"{file} cannot be loaded")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def _key(many: Iterable[Sources]) -> str:
+    """Return the key of a build: compiling with another compiler, or for another Python, makes another entry."""
+    executable = Path(compiler()).resolve()
     stat = executable.stat()
-    key = cache.digest(
+    return cache.digest(
         [
-            *sources.files,
-            *sources.files.values(),
-            *C_FLAGS,
+            *(part for sources in many for part in (*sources.files, *sources.files.values())),
+            *_flags,
+            _VISIBILITY,
+            _UNOPTIMIZED,
             _chosen_compiler(),
             f"{executable} {stat.st_size} {stat.st_mtime_ns}",
             f"{platform.machine()} {sys.platform} {sysconfig.get_config_var('SOABI')}",
             _cffi_version(),
         ]
     )
-    name = f"strapgen_{sources.function.name}"
-    folder = cache.entry("builds", key, lambda draft: _compile(sources, name, path, draft))
-    file = folder / _library(name)
-    spec = importlib.util.spec_from_file_location(name, file)
-    if spec is None or spec.loader is None:
-        raise CompilerError(f"{file} cannot be loaded")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+
+
+def _build(many: Sequence[Sources], name: str, key: str) -> Path:
+    """Return the folder of a compiled module."""
+    return cache.entry("builds", key, lambda draft: _compile(many, name, compiler(), draft))
 
 
 def code_size(sources: Sources) -> int | None:
@@ -157,16 +240,17 @@ def _cffi_version() -> str:
     return str(_cffi_backend.__version__)
 
 
-def _compile(sources: Sources, name: str, path: str, draft: Path) -> None:
-    for file, text in sources.files.items():
+def _compile(many: Sequence[Sources], name: str, path: str, draft: Path) -> None:
+    files = {file: text for sources in many for file, text in sources.files.items()}
+    for file, text in files.items():
         (draft / file).write_text(text)
-    header = next(file for file in sources.files if file.endswith(".h"))
+    headers = [next(file for file in sources.files if file.endswith(".h")) for sources in many]
     request = {
         "name": name,
-        "cdef": _declarations(sources.files[header]),
-        "header": header,
-        "sources": [str(draft / file) for file in sources.files if file.endswith(".c")],
-        "flags": C_FLAGS,
+        "cdef": "\n".join(_declarations(files[header]) for header in headers),
+        "header": "".join(f'#include "{header}"\n' for header in headers) + _UNOPTIMIZED,
+        "sources": [str(draft / file) for file in files if file.endswith(".c")],
+        "flags": [*_flags, _VISIBILITY],
         "libraries": [] if sys.platform == "win32" else ["m"],
         "folder": str(draft),
     }

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import mpmath
 import numpy as np
 
-from strapgen import catalogue, checks, exact, pipeline
+from strapgen import catalogue, checks, exact, library
 from strapgen.backends import BACKENDS, of
 from strapgen.catalogue import Choice
 from strapgen.exceptions import InputError, InputTypeError
@@ -223,7 +223,7 @@ def _on_backend(
     choice: Choice, motion: Motion, total: Fraction, backend: str, settings: Settings | None
 ) -> _Measure:
     """Return what measures the error of a step length on a back end, and the error that rounding may make."""
-    samples, previous = catalogue.increments(choice), catalogue.previous(choice)
+    samples, previous = choice.increments_per_step, choice.previous
 
     def measure(length: Fraction, count: int) -> tuple[float | None, float]:
         chosen = None
@@ -242,14 +242,15 @@ def _on_backend(
     return measure
 
 
-def interpreter(name: str) -> exact.Interpreter:
-    """Return a kernel by name that runs in many digits."""
-    return exact.Interpreter(_program(name))
+def interpreter(name: str, step: Program | None = None) -> exact.Interpreter:
+    """Return a kernel by name that runs in many digits: one that a step brings, or of the catalogue."""
+    programs = () if step is None else step.own
+    return exact.Interpreter(next((one for one in programs if one.kernel == name), None) or _program(name))
 
 
 @cache
 def _program(name: str) -> Program:
-    return pipeline.lower(catalogue.derive(catalogue.choose(name)))
+    return library.program(Choice(name))
 
 
 def _exactly(choice: Choice, motion: Motion, rounding: float) -> _Measure:
@@ -285,12 +286,13 @@ def exact_attitudes(
     callable
         ``run(step, count)``: the computed and the true matrix, row by row, at time 0 and after every step.
     """
-    program = pipeline.lower(catalogue.derive(choice))
+    program = library.program(choice)
     assert program.companions is not None, "checked by the caller"
-    samples, previous = catalogue.increments(choice), catalogue.previous(choice)
+    samples, previous = choice.increments_per_step, choice.previous
 
     increment, truth = interpreter(f"{motion.name}-increments"), interpreter(f"{motion.name}-truth")
-    attitude = interpreter(program.companions.attitude) if program.companions.attitude else None
+    named = program.companions.attitude
+    attitude = None if named is None else interpreter(named, program)
     identity = program.companions.identity
 
     def run(length: Fraction, count: int) -> Iterator[tuple[list[Any], list[Any]]]:

@@ -10,6 +10,7 @@ import mpmath
 import numpy as np
 from numpy.typing import NDArray
 
+from strapgen import stages
 from strapgen.program import OPERATIONS, Program
 
 #: Decimal digits: a million steps lose six of them.
@@ -116,6 +117,7 @@ def propagate(program: Program, increments: Any, initial: Any = None) -> NDArray
     >>> propagate(lower(derive("euler")), np.full((2, 2, 3), 0.01))[-1].round(6)
     array([0.019996, 0.019996, 0.019996, 0.9994  ])
     """
+    stages.require("propagate", program, Program)
     if program.companions is None:
         raise ValueError(f"{program.name} is no attitude step")
     state, samples = program.inputs

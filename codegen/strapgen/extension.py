@@ -1,10 +1,10 @@
 """Compiles cffi extensions one after another, in a separate process.
 
 Run as ``python -P extension.py``. Every line of standard input is a JSON object: the module's ``name``, the
-declarations ``cdef``, the ``header`` to include, the C ``sources``, ``libraries`` and ``flags``, the ``folder`` to work
-in and the ``environment``. For every line one is printed: an object with the ``path`` of the compiled module, or null,
-and what was ``said``. What setuptools and the compiler do to environment, folder and output stays in this process, and
-they are imported once.
+declarations ``cdef``, the ``header`` of its C text, the C ``sources``, ``libraries`` and ``flags``, the ``folder`` to
+work in and the ``environment``. For every line one is printed: an object with the ``path`` of the compiled module, or
+null, and what was ``said``. What setuptools and the compiler do to environment, folder and output stays in this
+process, and they are imported once.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def _compiled(request: dict[str, Any]) -> str:
     ffi.cdef(request["cdef"])
     ffi.set_source(
         request["name"],
-        f'#include "{request["header"]}"',
+        request["header"],
         sources=request["sources"],
         include_dirs=[request["folder"]],
         extra_compile_args=request["flags"],

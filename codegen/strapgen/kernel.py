@@ -137,6 +137,11 @@ class Kernel:
         """The name in generated code."""
         return self.name.replace("-", "_")
 
+    @property
+    def signals(self) -> tuple[Signal, ...]:
+        """Inputs, stages and outputs."""
+        return (*self.inputs, *(stage.signal for stage in (*self.stages, *self.outputs)))
+
     def expand(
         self, values: Mapping[str, Any] | None = None, number: Callable[[sp.Rational], Any] | None = None
     ) -> dict[str, list[Any]]:

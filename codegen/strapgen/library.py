@@ -1,18 +1,54 @@
-"""The library: generated sources by name, made when first asked for and cached.
+"""The library: lowered programs and generated sources by name, made when first asked for and cached.
 
 The key is the generator itself, its code and templates: a change of either makes new sources, so what runs is
-never out of step with the derivation. A second use loads neither SymPy nor Jinja.
+never out of step with the derivation. A second use loads neither SymPy nor Jinja; another target or other settings of
+the same kernel derive nothing again.
 """
 
 from __future__ import annotations
 
 import json
+import pickle
 from pathlib import Path
 
 from strapgen import cache
 from strapgen.catalogue import Choice, derive
 from strapgen.fixedpoint import Settings
+from strapgen.program import Program
 from strapgen.targets import Sources, emit
+
+_programs: dict[str, Program] = {}
+
+
+def program(choice: Choice) -> Program:
+    """Return a kernel of the catalogue as straight-line code, derived once for all targets and settings.
+
+    Parameters
+    ----------
+    choice : Choice
+        What `strapgen.catalogue.choose` returned.
+
+    Returns
+    -------
+    Program
+
+    Examples
+    --------
+    >>> from strapgen.catalogue import choose
+    >>> program(choose("euler")).operations["divide"]
+    0
+    """
+
+    def fill(draft: Path) -> None:
+        from strapgen import pipeline  # imported here, as SymPy is: a program in the cache needs neither
+
+        (draft / "program.pickle").write_bytes(pickle.dumps(pipeline.lower(derive(choice))))
+
+    key = cache.digest([cache.generator_digest(), choice.identity])
+    if key not in _programs:
+        folder = cache.entry("programs", key, fill)
+        _programs[key] = pickle.loads((folder / "program.pickle").read_bytes())
+    return _programs[key]
 
 
 def sources(choice: Choice, target: str, settings: Settings | None = None) -> Sources:
@@ -33,10 +69,7 @@ def sources(choice: Choice, target: str, settings: Settings | None = None) -> So
     """
 
     def fill(draft: Path) -> None:
-        # Imported here: with the sources in the cache, SymPy and Jinja stay unloaded.
-        from strapgen.lowering import lower
-
-        made = emit(lower(derive(choice)), target, settings)
+        made = emit(program(choice), target, settings)
         for name, text in made.files.items():
             (draft / name).write_text(text)
         (draft / "interface.json").write_text(json.dumps(made.interface()))

@@ -17,17 +17,20 @@ Run
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import os
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
-from strapgen import catalogue, fixedpoint, targets
+from strapgen import catalogue, fixedpoint, stages, targets
+from strapgen.exceptions import InputTypeError
 from strapgen.fixedpoint import FixedProgram, Settings
+from strapgen.program import Program
+from strapgen.targets import Sources
 
 if TYPE_CHECKING:
     from strapgen.backends import Backend
     from strapgen.catalogue.tableaux import Tableau
     from strapgen.kernel import Kernel
-    from strapgen.program import Program
-    from strapgen.targets import Sources
 
 
 def derive(
@@ -71,6 +74,7 @@ def derive(
     >>> derive("euler", method="rk4", rates=True).inputs[1].elements[:4]
     ('turn_0_x', 'turn_0_y', 'turn_0_z', 'turn_1_2_x')
     """
+    stages.require("derive", algorithm, str, os.PathLike)
     return catalogue.derive(catalogue.choose(algorithm, method, increments, rates, previous))
 
 
@@ -87,6 +91,8 @@ def lower(kernel: Kernel) -> Program:
 
     Raises
     ------
+    InputTypeError
+        If it is no kernel; the message names the stage that is missing. So do all stages.
     NotImplementedError
         If an expression holds a function that programs do not know.
 
@@ -95,9 +101,11 @@ def lower(kernel: Kernel) -> Program:
     >>> lower(derive("euler")).operations["divide"]
     0
     """
+    from strapgen.kernel import Kernel
     from strapgen.lowering import lower as lower_kernel
 
-    return lower_kernel(kernel)
+    stages.require("lower", kernel, Kernel)
+    return replace(lower_kernel(kernel), own=tuple(map(lower_kernel, kernel.own)))
 
 
 def quantize(program: Program, settings: Settings | None = None) -> FixedProgram:
@@ -124,6 +132,8 @@ def quantize(program: Program, settings: Settings | None = None) -> FixedProgram
     >>> str(fixed.formats["state"]), float(fixed.error_bounds["next"] * 2**30) < 1
     ('Q1.30', True)
     """
+    stages.require("quantize", program, Program)
+    _require_settings(settings)
     return fixedpoint.quantize(program, settings or Settings())
 
 
@@ -154,6 +164,12 @@ def generate(program: Program | FixedProgram, target: str, settings: Settings | 
     >>> sorted(generate(lower(derive("euler")), "c").files)
     ['euler_rk4_2.c', 'euler_rk4_2.h']
     """
+    stages.require("generate", program, Program, FixedProgram)
+    if not isinstance(target, str):
+        raise InputTypeError(
+            f"target is {stages.describe(target)}; a name is needed: {', '.join(targets.TARGETS)}"
+        )
+    _require_settings(settings)
     return targets.emit(program, target, settings)
 
 
@@ -182,4 +198,10 @@ def build(sources: Sources) -> Backend:
     """
     from strapgen.backends import build as build_backend
 
+    stages.require("build", sources, Sources)
     return build_backend(sources)
+
+
+def _require_settings(settings: Any) -> None:
+    if settings is not None and not isinstance(settings, Settings):
+        raise InputTypeError(f"settings is {stages.describe(settings)}; strapgen.Settings is needed")

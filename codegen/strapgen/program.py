@@ -141,6 +141,8 @@ class Program:
         The kernels of an attitude step; None for every other program.
     recursion : Recursion or None
         The pairs of an output and the input that it becomes in the next call.
+    own : tuple of Program
+        Kernels that a user's step brings.
 
     Raises
     ------
@@ -160,6 +162,7 @@ class Program:
     transition: Result | None = None
     companions: Companions | None = None
     recursion: Recursion | None = None
+    own: tuple[Program, ...] = ()
 
     def __post_init__(self) -> None:
         known = {element for signal in self.inputs for element in signal.elements} | {RESOLUTION}

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen import checks
+from strapgen import checks, stages
 from strapgen.backends import Backend
 from strapgen.exceptions import InputError
 from strapgen.gyro import pulses, windows
@@ -100,7 +100,7 @@ def _rows(path: Path, names: tuple[str, ...] | None) -> tuple[Array, list[int]]:
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             for count, (line, row) in enumerate(_numbered(csv.reader(file))):
-                if count == 0 and not any(map(_is_number, row)):
+                if count == 0 and not any(map(_resembles_number, row)):
                     header = [cell.strip().lower() for cell in row]
                     if names is not None:
                         places = [_place(path, line, header, name, names) for name in names]
@@ -123,7 +123,8 @@ def _numbered(reader: Any) -> Iterator[tuple[int, list[str]]]:
             yield reader.line_num, row
 
 
-def _is_number(cell: str) -> bool:
+def _resembles_number(cell: str) -> bool:
+    """Return whether a cell is data: 1_0 is refused as a number, not skipped as a header."""
     try:
         float(cell)
     except ValueError:
@@ -142,10 +143,11 @@ def _place(path: Path, line: int, header: list[str], name: str, names: tuple[str
 def _number(path: Path, line: int, row: list[str], place: int) -> float:
     if place >= len(row):
         raise InputError(f"{path}, line {line}: {len(row)} columns; column {place + 1} is needed")
-    if not _is_number(row[place]) or not math.isfinite(float(row[place])):
+    number = checks.double(row[place])
+    if not math.isfinite(number):
         cell = row[place].strip()
         raise InputError(f"{path}, line {line}: column {place + 1} is {cell!r}; a finite number is needed")
-    return float(row[place])
+    return number
 
 
 def _intervals(path: Path, time: Array, lines: list[int]) -> tuple[Array, float]:
@@ -351,6 +353,7 @@ def propagate(
     >>> history.states.shape, history.unused
     ((5, 4), 1)
     """
+    stages.require("propagate", backend, Backend)
     backend.need_increments()
     step = recording.interval * backend.increments
     steps, unused = divmod(max(0, len(recording.increments) - backend.previous), backend.increments)
@@ -369,7 +372,7 @@ def propagate(
     states = backend.propagate(samples, record_every, every)
     start = recording.start + recording.interval * backend.previous
     time: Array = start + step * record_every * np.arange(len(states), dtype=np.float64)
-    require_finite(states, time)
+    require_finite(backend, states, time)
     return History(time, states, step, unused)
 
 

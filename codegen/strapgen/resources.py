@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-_PACKAGE = Path(__file__).resolve().parent
-_INSTALLED = _PACKAGE / "_data"
-_CHECKOUT = _PACKAGE.parent.parent
+PACKAGE = Path(__file__).resolve().parent
+_INSTALLED = PACKAGE / "_data"
+_CHECKOUT = PACKAGE.parent.parent
 
 
 def checkout() -> Path | None:
@@ -23,7 +23,7 @@ def folder(name: str) -> Path:
 def package_files() -> list[Path]:
     """Return every file whose content decides what is generated, in a fixed order."""
     code = [
-        path for kind in ("*.py", "*.toml") for path in _PACKAGE.rglob(kind) if _INSTALLED not in path.parents
+        path for kind in ("*.py", "*.toml") for path in PACKAGE.rglob(kind) if _INSTALLED not in path.parents
     ]
     templates = [path for path in folder("templates").rglob("*") if path.is_file()]
     return sorted(code) + sorted(templates)

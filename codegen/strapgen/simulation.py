@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen import checks
+from strapgen import checks, stages
 from strapgen.backends import Backend, evaluator
 from strapgen.exceptions import InputError
 from strapgen.gyro import pulses
@@ -67,11 +67,7 @@ def attitude(backend: Backend, states: Any) -> Array:
     array, (..., 3, 3)
         Direction cosine matrices, body to reference, in double.
     """
-    states = np.asarray(states, np.float64)
-    if backend.attitude is None:
-        return np.array(states)
-    result: Array = evaluator(backend.attitude)(states)
-    return result
+    return backend.matrices(states)
 
 
 def drift_between(computed: Any, other: Any) -> Array:
@@ -91,11 +87,13 @@ def drift_between(computed: Any, other: Any) -> Array:
     return drift
 
 
-def require_finite(states: Any, time: Array) -> None:
+def require_finite(backend: Backend, states: Any, time: Array) -> None:
     """Refuse a run whose states are beyond the range of its back end.
 
     Parameters
     ----------
+    backend : Backend
+        The back end of the run.
     states : array, (N, state shape)
     time : array, (N,)
         Time of each state in s.
@@ -103,12 +101,19 @@ def require_finite(states: Any, time: Array) -> None:
     Raises
     ------
     InputError
-        If a state is not finite; the message has the time of the first one.
+        If a state is not finite; the message has the time of the first one, and the reason.
     """
     broken = ~np.isfinite(states.reshape(len(states), -1)).all(axis=1)
     if broken.any():
+        cause = "the increments are too large for the method"
+        if backend.takes == "increments" and backend.samples > 2:
+            cause = (
+                f"the increments, or the rates of the polynomial through {backend.samples} of them, are too large for "
+                "the method"
+            )
         raise InputError(
-            f"the attitude is not finite from {time[broken][0]:.6g} s on; the increments are too large for the method"
+            f"the attitude is not finite from {time[broken][0]:.6g} s on; "
+            f"steps of {backend.kernel} lengthen it: {cause}"
         )
 
 
@@ -190,6 +195,8 @@ def simulate(
     >>> round(float(np.degrees(run.mean_drift)), 4)
     0.2855
     """
+    stages.require("simulate", backend, Backend)
+    stages.require("simulate", motion, Motion)
     backend.need_increments()
     h = checks.number("step", step, positive=True)
     total = checks.number("duration", duration, positive=True)
@@ -208,7 +215,9 @@ def simulate(
         increments = pulses(increments, pulse, backend.previous)
     states = backend.propagate(increments, record_every, every)
     time: Array = np.arange(len(states), dtype=np.float64) * float(interval)
-    require_finite(states, time)
+    require_finite(backend, states, time)
     true = motion.attitude(time)
-    computed = attitude(backend, states)
+    with np.errstate(over="ignore", invalid="ignore"):  # the squares of large states are refused instead
+        computed = attitude(backend, states)
+    require_finite(backend, computed, time)
     return Run(time, computed, true, *evaluator("error-matrix")(computed, true))

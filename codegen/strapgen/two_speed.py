@@ -21,9 +21,11 @@ from strapgen.backends.fixed import FixedEvaluator, integers, numbers
 from strapgen.catalogue import Choice
 from strapgen.exceptions import InputError
 from strapgen.fixedpoint import Settings
-from strapgen.fixedpoint.code import Argument
+from strapgen.fixedpoint.interface import Argument
+from strapgen.fixedpoint.settings import DEFAULT_ANGLE
 from strapgen.gyro import pulses
 from strapgen.targets import FIXED, Sources
+from strapgen.targets.fixed_text import options
 from strapgen.targets.whole import LOOPS, recursion, whole, wiring
 
 Array = NDArray[Any]
@@ -160,7 +162,7 @@ def loops(
             raise InputError(f"target {target} takes no fixed-point settings; these do: {', '.join(FIXED)}")
         fast, slow, navigation = (library.sources(Choice(name), target) for name in names)
         return fast, slow, navigation
-    asked = settings or Settings()
+    asked = _without_largest_angle(settings or Settings())
     inputs = [{s.name for s in library.sources(Choice(name), "numpy").function.inputs} for name in names]
     for what, given in (("range", asked.ranges), ("format", asked.formats)):
         unknown = set(given) - set().union(*inputs)
@@ -180,7 +182,11 @@ def loops(
             ranges={name: value for name, value in stated.items() if name in own},
             formats={name: text for name, text in formats.items() if name in own},
         )
-        return library.sources(Choice(names[number]), target, chosen)
+        loop = library.sources(Choice(names[number]), target, chosen)
+        if chosen.carry == "none" or loop.fixed is None or loop.fixed.residuals:
+            return loop
+        # A loop that rounds nothing to carry on is the one that `strapgen generate` makes without the option.
+        return library.sources(Choice(names[number]), target, replace(chosen, carry="none"))
 
     formats = dict(asked.formats)
     natural = _formats(made(0, formats))
@@ -224,15 +230,19 @@ def sources(
     ['dcm_two_speed_2.h', 'dcm_two_speed_2.c']
     """
     checks.choice("target", target, ("c", "c-float", "c-fixed"))
-    words = [f"strapgen two-speed {algorithm} --sculling {sculling} --target {target}"]
+    if target in FIXED:
+        settings = _without_largest_angle(settings or Settings())
+    parts = loops(algorithm, sculling, target, settings)
+    command = f"strapgen two-speed {algorithm} --sculling {sculling} --target {target}"
     if settings is not None:
-        words.append(f"--word {settings.word}")
-        words += [] if settings.rounding == "nearest" else [f"--rounding {settings.rounding}"]
-        words += [f"--range {name}={value}" for name, value in settings.ranges.items()]
-        words += [f"--fix {name}={value}" for name, value in settings.formats.items()]
-    made = loops(algorithm, sculling, target, settings)
+        command += f" {options(settings)}"
     title = f"Two speeds: {ALGORITHMS[algorithm]}, sculling {SCULLING[sculling]}"
-    return whole(f"{algorithm}-two-speed-{sculling}", title, " ".join(words), made)
+    return whole(f"{algorithm}-two-speed-{sculling}", title, command, parts)
+
+
+def _without_largest_angle(settings: Settings) -> Settings:
+    """Return settings without the largest angle of a step's increments, which no loop has."""
+    return replace(settings, largest_angle=DEFAULT_ANGLE, stated="")
 
 
 class _Door:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from derived import generated
+from gathering import each
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from tolerances import one_call, roundoff
@@ -111,7 +112,7 @@ def test_increments_per_step_from_1_to_8(make, backend_name, algorithm, rng):
         assert np.abs(backend.propagate(turn) - wanted).max() <= roundoff(backend, 10)
 
 
-@pytest.mark.parametrize("shape", [(0, 7, 2, 3), (3, 0, 2, 3), (2, 0, 4, 2, 3), (0, 2, 3)])
+@each("shape", [(0, 7, 2, 3), (3, 0, 2, 3), (2, 0, 4, 2, 3), (0, 2, 3)])
 def test_no_runs_and_no_steps(make, algorithm, shape):
     backend = make(algorithm)
     history = backend.propagate(np.zeros(shape))
@@ -160,7 +161,7 @@ def test_step_broadcasts_leading_axes(make, algorithm, rng):
     np.testing.assert_array_equal(together[3, 2], backend.step(state, d[3, 2]))
 
 
-@pytest.mark.parametrize(
+@each(
     ("increments", "error", "words"),
     [
         (np.zeros((4, 3, 3)), InputError, ["increments", "(4, 3, 3)", "(..., 2, 3)"]),
@@ -178,7 +179,7 @@ def test_increments_that_cannot_be_used(make, increments, error, words):
     assert all(word in str(caught.value) for word in words)
 
 
-@pytest.mark.parametrize(
+@each(
     "options",
     [
         {"record_every": 0},
@@ -269,7 +270,7 @@ def test_every_orthonormalization_restores_the_constraint(make, rng):
         after = np.linalg.norm(np.swapaxes(restored, 1, 2) @ restored - np.eye(3), ord=2, axis=(1, 2))
         # 100 units: some dozens of operations on numbers near 1, all well conditioned. An error of the elements is
         # one of twice its spectral norm, at most six times as much, in C'C.
-        allowed = one_call(backend._evaluate(scheme), 100 / 6)
+        allowed = one_call(backend.beside(scheme), 100 / 6)
         assert np.all(after <= residue(excess) + 6 * allowed), scheme
 
 

@@ -5,6 +5,7 @@ import sys
 
 import pytest
 import sympy as sp
+from gathering import each
 
 from strapgen import catalogue
 from strapgen.catalogue import ALGORITHMS, KERNELS, METHODS, MOST_INCREMENTS, STANDARD_METHODS, Choice, choose
@@ -12,7 +13,7 @@ from strapgen.exceptions import InputError
 from strapgen.program import RESOLUTION
 
 STANDARD = catalogue.standard()
-EVERY = pytest.mark.parametrize("choice", STANDARD, ids=lambda choice: choice.kernel)
+EVERY = each("choice", STANDARD, ids=lambda choice: choice.kernel)
 
 
 def test_the_default_is_fourth_order_on_two_increments():

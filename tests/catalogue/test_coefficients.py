@@ -7,6 +7,7 @@ from fractions import Fraction
 
 import pytest
 import sympy as sp
+from gathering import each
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -110,7 +111,7 @@ def test_any_text_is_a_number_or_an_error_of_one_line(written):
         assert str(error).startswith("x is ") and "\n" not in str(error)
 
 
-@pytest.mark.parametrize(
+@each(
     ("written", "said"),
     [
         (0.5, 'is 0.5, which is not exact; a string such as "9/44"'),

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import sympy as sp
 from derived import program as lowered
+from gathering import each
 from peano_baker import generic_rate, local_error
 from tolerances import one_call
 
@@ -58,7 +59,7 @@ def test_published_coefficients(samples, previous, form, published):
 
 
 @FORM
-@pytest.mark.parametrize(("samples", "previous"), ALL)
+@each(("samples", "previous"), ALL)
 def test_pairs_are_ordered_by_the_newer_sample_the_newest_pair_last(samples, previous, form):
     total = samples + previous
     pairs = list(design(samples, previous, form).pairs)
@@ -75,7 +76,7 @@ def test_compressed_coefficients_leave_what_the_literature_says(samples):
     assert found == (2 * samples + 1, -size)
 
 
-@pytest.mark.parametrize(("samples", "previous"), ALL)
+@each(("samples", "previous"), ALL)
 def test_compressed_and_combined_annul_coning_as_far_as_there_are_distances(samples, previous):
     residual = design(samples, previous).residual()
     assert residual.leading[0] == 2 * (samples + previous) + 1
@@ -135,7 +136,7 @@ def times(a: list[Fraction], b: list[Fraction]) -> list[Fraction]:
     return out
 
 
-@pytest.mark.parametrize(("samples", "previous"), ALL)
+@each(("samples", "previous"), ALL)
 def test_uncompressed_coefficients_are_exact_for_polynomials_through_the_samples(samples, previous):
     rate = polynomials(samples + previous)
     ends = [Fraction(k, samples) for k in range(-previous, samples + 1)]
@@ -152,7 +153,7 @@ def test_uncompressed_coefficients_are_exact_for_polynomials_through_the_samples
     assert computed == true
 
 
-@pytest.mark.parametrize(("samples", "previous"), ALL)
+@each(("samples", "previous"), ALL)
 def test_combined_coefficients_keep_the_order_of_uncompressed_ones(samples, previous):
     assert design(samples, previous, "combined").degree == design(samples, previous, "uncompressed").degree
 

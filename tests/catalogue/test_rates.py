@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import pytest
 import sympy as sp
+from gathering import each
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from peano_baker import Series, angle, generic_rate, lowest_difference, rotation, true_rotation
@@ -138,8 +139,8 @@ def test_k_and_m_increments_are_exact_on_rates_of_degree_k_plus_m_minus_1(case, 
     assert weighed(fit.moment(power), given_) == exactly(expected)
 
 
-@pytest.mark.parametrize("previous", range(MOST_PREVIOUS + 1))
-@pytest.mark.parametrize("count", range(1, MOST_INCREMENTS + 1))
+@each("previous", range(MOST_PREVIOUS + 1))
+@each("count", range(1, MOST_INCREMENTS + 1))
 def test_a_fit_tells_the_same_as_weights_taylor_and_moments(count, previous):
     fit, number = from_increments(count, previous), count + previous
     assert len(fit.basis) == len(fit.at(Fraction(0))) == number
@@ -157,8 +158,8 @@ def test_a_fit_tells_the_same_as_weights_taylor_and_moments(count, previous):
         assert fit.moment(power) == list(map(exactly, expected))
 
 
-@pytest.mark.parametrize("previous", range(MOST_PREVIOUS + 1))
-@pytest.mark.parametrize("count", range(1, MOST_INCREMENTS + 1))
+@each("previous", range(MOST_PREVIOUS + 1))
+@each("count", range(1, MOST_INCREMENTS + 1))
 def test_the_integral_of_the_rate_is_the_sum_of_the_increments_of_the_step(count, previous):
     assert from_increments(count, previous).moment(0) == [0] * previous + [1] * count
 
@@ -255,8 +256,8 @@ def test_step_orders_as_the_literature_has_them():
             assert step_order(count, previous) == count + previous + 1
 
 
-@pytest.mark.parametrize("previous", range(MOST_PREVIOUS + 1))
-@pytest.mark.parametrize("count", range(1, MOST_INCREMENTS + 1))
+@each("previous", range(MOST_PREVIOUS + 1))
+@each("count", range(1, MOST_INCREMENTS + 1))
 def test_equal_increments_give_a_constant_rate(count, previous):
     # Methods see the samples through the fit alone, so at a constant rate none depends on how many there are.
     fit = from_increments(count, previous)

@@ -7,6 +7,7 @@ from random import Random
 import numpy as np
 import pytest
 import sympy as sp
+from gathering import each
 from peano_baker import generic_rate, local_error
 
 from strapgen import derive
@@ -169,7 +170,7 @@ def test_cayley_klein_equals_euler_after_renaming(method):
 RATE = generic_rate(3)
 
 
-@pytest.mark.parametrize("increments", [2, 3, 5, MOST_INCREMENTS])
+@each("increments", [2, 3, 5, MOST_INCREMENTS])
 @ALGORITHM
 @METHOD
 def test_the_local_error_is_one_order_above_the_method(algorithm, method, increments):

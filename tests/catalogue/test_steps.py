@@ -9,6 +9,7 @@ from random import Random
 
 import pytest
 import sympy as sp
+from gathering import each
 
 from strapgen import catalogue, derive, lower
 from strapgen.catalogue import ALGORITHMS, INTEGRATORS, MOST_INCREMENTS, MOST_PREVIOUS
@@ -224,8 +225,8 @@ def values_of(kernel: Kernel, state: list, samples: list) -> dict[str, object]:
     )
 
 
-@pytest.mark.parametrize(("count", "previous"), [(1, 1), (1, 3), (2, 1), (3, 2), (8, 3)])
-@pytest.mark.parametrize("method", ["rk2", "rk4", "nystrom5"])
+@each(("count", "previous"), [(1, 1), (1, 3), (2, 1), (3, 2), (8, 3)])
+@each("method", ["rk2", "rk4", "nystrom5"])
 @ALGORITHM
 def test_with_previous_increments_a_step_is_that_of_the_rates_they_fit(algorithm, method, count, previous):
     # On a rate of degree K + m - 1, as polynomials in the step length.

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 import sympy as sp
+from gathering import each
 
 from strapgen import resources
 from strapgen.catalogue import METHODS, STANDARD_METHODS, tableaux
@@ -239,7 +240,7 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize("said", WRONG)
+@each("said", WRONG)
 def test_what_is_wrong_is_told_in_one_line(said, written):
     with pytest.raises(InputError) as caught:
         read(written(**WRONG[said]))

@@ -26,12 +26,6 @@ FOLDER = Path(__file__).resolve().parents[1] / "data" / "algorithms"
 CONING = "--motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 --step 0.125 --duration 5"
 
 
-@pytest.fixture(autouse=True)
-def own_kernels(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Give every test kernels of its own, so that none finds those of another."""
-    monkeypatch.setattr(user, "KERNELS", {})
-
-
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Return a folder with the algorithms of this test, in which the commands run."""
@@ -63,7 +57,6 @@ def test_a_file_is_an_algorithm(folder):
     assert kernel.name == "mrp-rk4-2"
     assert [made.name for made in kernel.own] == ["dcm-from-mrp"]
     assert kernel.arguments == "mrp.py"
-    assert user.KERNELS.keys() == {"mrp-rk4-2", "dcm-from-mrp"}
 
 
 @pytest.mark.parametrize(
@@ -222,8 +215,16 @@ WRONG = {
         "holds the condition Eq(v_x, 0)",
     ),
     "twice": ('"twice", "v"', '"twice", "d"', "d_x of twice is defined twice"),
-    "of C": ('kernel("mine"', 'kernel("double"', "kernel double has a name that C or Python use themselves"),
-    "of Python": ('kernel("mine"', 'kernel("lambda"', "kernel lambda has a name that C or Python use"),
+    "two arguments of one name": (
+        'Signal.matrix("next", "next")',
+        'Signal.matrix("state", "next")',
+        "two of its arguments are called state; each needs a name of its own",
+    ),
+    "a function of another": (
+        'kernel("mine"',
+        'kernel("euler-product-float-array"',
+        "kernel euler-product-float-array: euler-product has a function of this name; another name is needed",
+    ),
     "of ours": (
         'kernel("mine"',
         'kernel("euler-rk4-2"',
@@ -304,7 +305,6 @@ def test_what_cannot_be_used_is_refused_in_one_line(case, tmp_path, monkeypatch,
     assert (stop.value.code, found.out) == (2, "")
     assert found.err.startswith("strapgen: mine.py") and found.err.count("\n") == 1
     assert said in found.err
-    assert user.KERNELS == {}
     assert {path.name for path in tmp_path.iterdir()} - {"__pycache__"} == {"mine.py"}
 
 
@@ -455,5 +455,5 @@ def test_what_lies_beside_a_file_can_be_imported_and_what_it_prints_is_no_output
 
 
 def test_a_name_that_is_none():
-    with pytest.raises(InputTypeError, match="algorithm is None; a name or the path"):
+    with pytest.raises(InputTypeError, match="derive takes a name or a path, not None"):
         strapgen.derive(None)

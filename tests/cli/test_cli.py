@@ -908,6 +908,14 @@ def test_tables_text(strapgen_says):
     assert "2.391" in said and "0.856" in said
 
 
+def test_a_footnote_is_printed_once_for_all_back_ends(monkeypatch, strapgen_says):
+    monkeypatch.setattr("strapgen.tables.DEFAULT_BACKENDS", ("numpy", "c", "c-q31"))
+    said = strapgen_says("tables")
+    assert len(re.findall(r"^    c-q31 ", said, flags=re.MULTILINE)) == 10
+    assert said.count("The thesis prints 2.391 deg") == 1
+    assert "(2.391 deg here)" in said
+
+
 # Speed, and life in a pipe
 
 
@@ -916,12 +924,15 @@ def started(*words: str, **rest) -> subprocess.CompletedProcess[str]:
 
 
 def test_help_is_quick():
-    def seconds() -> float:
-        start = time.perf_counter()
-        assert started("--help").returncode == 0
-        return time.perf_counter() - start
+    """In time of the processor: other work on the machine takes its own."""
 
-    assert min(seconds() for _ in range(5)) < 0.5
+    def seconds() -> float:
+        start = os.times()
+        assert started("--help").returncode == 0
+        end = os.times()
+        return end.children_user + end.children_system - start.children_user - start.children_system
+
+    assert any(seconds() < 0.5 for _ in range(5))
 
 
 @pytest.mark.parametrize("words", [["--help"], ["simulate", "--help"], ["generate", "--check"]])

@@ -19,8 +19,8 @@ from strapgen.backends import evaluator as make_evaluator
 from strapgen.backends.fixed import ModelEvaluator
 from strapgen.catalogue import Choice, standard
 from strapgen.exceptions import InputError
-from strapgen.fixedpoint import Settings, can_lower, functions
-from strapgen.fixedpoint.code import Sum
+from strapgen.fixedpoint import Settings, can_lower, function_series
+from strapgen.fixedpoint.code import IntegerSum
 
 STEPS = [choice for choice in standard() if choice.method]
 OTHERS = [choice for choice in standard() if not choice.method and can_lower(program(choice))]
@@ -94,7 +94,7 @@ def test_every_value_keeps_its_range_and_its_error_bound(choice, word, rounding,
             computed = value.offset + seen[value.name] * Fraction(2) ** -value.fraction
             apart = abs(computed - known[value.name])
             if choice.name == "euler-angles-from-dcm":  # its angles are told without whole turns
-                apart = min(apart, abs(apart - 2 * functions.pi()))
+                apart = min(apart, abs(apart - 2 * function_series.pi()))
             assert apart <= value.error, value.name
             compared += 1
     # What functions are made of has no name in the program.
@@ -309,7 +309,7 @@ def test_a_transition_kept_beside_the_increments_needs_no_residual():
     plain = lowered(Choice("euler", "rk4", 2), Settings(16, Fraction(1, 76)))
     (whole,) = (value for value in plain.body if value.name == "p_x")
     assert rest.error < whole.error / 15
-    assert isinstance(rest.definition, Sum) and rest.definition.residual is None
+    assert isinstance(rest.definition, IntegerSum) and rest.definition.residual is None
 
 
 def test_guards_refuse_what_is_too_far_from_a_proper_input():

@@ -30,7 +30,8 @@ def test_the_finest_format_holds_its_magnitude_and_none_finer_does(largest, word
 
 
 @pytest.mark.parametrize(
-    ("text", "said"), [("Q1.31", "33 bits"), ("q1.30", "Qm.n is needed"), ("1.30", "Qm.n"), ("", "Qm.n")]
+    ("text", "said"),
+    [("Q1.31", "33 bits"), ("q1.30", "Qm.n is needed"), ("1.30", "Qm.n"), ("", "Qm.n"), ("Q١.30", "Qm.n")],
 )
 def test_formats_that_cannot_be_used(text, said):
     with pytest.raises(InputError, match=said):

@@ -12,12 +12,13 @@ import mpmath
 import numpy as np
 import pytest
 from derived import programs
+from gathering import each
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from strapgen.backends.fixed import CFixedEvaluator, FixedEvaluator, ModelEvaluator
 from strapgen.exceptions import InputError
-from strapgen.fixedpoint import FixedProgram, Settings, can_lower, functions, quantize
+from strapgen.fixedpoint import FixedProgram, Settings, can_lower, function_series, quantize
 from strapgen.program import Assignment, Constant, Operation, Program, Reference, Result
 from strapgen.signal import Signal
 from strapgen.targets import emit
@@ -145,7 +146,7 @@ def worst_error(lowered: FixedProgram, inputs: list[np.ndarray], integers: np.nd
 @pytest.mark.parametrize("bits", [9, 17, 33, 65])
 @pytest.mark.parametrize("reach", [Fraction(1, 10), Fraction(4, 5), Fraction(2)])
 def test_sine_series_leaves_out_no_more_than_it_says(first, bits, reach):
-    coefficients, left_out = functions.sine_series(first, reach, Fraction(1, 2**bits))
+    coefficients, left_out = function_series.sine_series(first, reach, Fraction(1, 2**bits))
     assert left_out <= Fraction(1, 2**bits)
     function = PRECISE.sin if first else PRECISE.cos
     for k in range(-20, 21):
@@ -157,7 +158,7 @@ def test_sine_series_leaves_out_no_more_than_it_says(first, bits, reach):
 
 @pytest.mark.parametrize("bits", [9, 17, 33, 65])
 def test_arctangent_series_leaves_out_no_more_than_it_says(bits):
-    coefficients, left_out = functions.arctangent_series(Fraction(1, 2**bits))
+    coefficients, left_out = function_series.arctangent_series(Fraction(1, 2**bits))
     assert left_out <= Fraction(1, 2**bits)
     for k in range(-40, 41):
         u = Fraction(7, 16) * k / 40
@@ -166,8 +167,8 @@ def test_arctangent_series_leaves_out_no_more_than_it_says(bits):
 
 
 def test_pi_is_below_by_less_than_its_bound():
-    lacking = PRECISE.pi - _precise(functions.pi())
-    assert 0 < lacking < _precise(functions.PI_ERROR)
+    lacking = PRECISE.pi - _precise(function_series.pi())
+    assert 0 < lacking < _precise(function_series.PI_ERROR)
 
 
 def _precise(value: Fraction) -> Any:
@@ -177,9 +178,9 @@ def _precise(value: Fraction) -> Any:
 # One function
 
 
-@pytest.mark.parametrize("rounding", ["nearest", "truncation"])
-@pytest.mark.parametrize("word", MODEL_WORDS)
-@pytest.mark.parametrize("case", CASES)
+@each("rounding", ["nearest", "truncation"])
+@each("word", MODEL_WORDS)
+@each("case", CASES)
 def test_error_stays_below_its_bound(case, word, rounding):
     kind, _, places = CASES[case]
     lowered, evaluator = fixed(case, word, rounding), model(case, word, rounding)

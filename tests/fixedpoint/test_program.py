@@ -17,7 +17,7 @@ from strapgen.backends.fixed import ModelEvaluator
 from strapgen.catalogue import Choice, standard
 from strapgen.exceptions import InputError
 from strapgen.fixedpoint import Settings, can_lower
-from strapgen.fixedpoint.code import Sum
+from strapgen.fixedpoint.code import IntegerSum
 from strapgen.fixedpoint.derivation import quantities
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.program import Assignment, Constant, Operation, Program, Reference, Result
@@ -158,6 +158,10 @@ def test_a_user_fixes_formats():
         ({"q_x": "Q0.31"}, "has no value 'q_x'; its values are: state, increments"),
         ({"d1_x": "Q0.31"}, "give the format of the whole input"),
         ({"state": "Q0.31"}, "format Q0.31 of state does not hold its range of \\+-1.0625"),
+        (
+            {"next_x": "Q2.29"},
+            "elements of next share one format; fix the format of next, not of one element",
+        ),
     ],
 )
 def test_formats_that_do_not_hold_their_values(formats, said):
@@ -177,7 +181,7 @@ def test_products_meet_at_one_place_where_that_costs_nothing():
     values = {value.name: value for value in fixed.body}
     for name in ("p_x", "p_y", "p_z"):
         definition = values[name].definition
-        assert isinstance(definition, Sum)
+        assert isinstance(definition, IntegerSum)
         assert all(term.shift >= 0 for term in definition.fine)
     assert fixed.error_bounds["next"] < Fraction(52, 100) * Fraction(1, 2**30)
 
@@ -223,7 +227,7 @@ def test_no_value_and_no_partial_sum_leaves_its_type(choice, word):
             bits = word * (1 + value.wide)
             assert -(2 ** (bits - 1)) <= value.low <= value.high < 2 ** (bits - 1), value.name
             assert value.peak < 2 ** (2 * word - 1), value.name
-            if isinstance(value.definition, Sum):
+            if isinstance(value.definition, IntegerSum):
                 terms = (*value.definition.fine, *value.definition.coarse)
                 shifts = [value.definition.shift, value.definition.drop, *(abs(t.shift) for t in terms)]
                 assert max(shifts) < 2 * word, value.name
@@ -249,6 +253,12 @@ def test_interfaces_survive_json():
     data = json.loads(json.dumps(fixed.interface.as_dict()))
     assert type(fixed.interface).from_dict(data) == fixed.interface
     assert len(fixed.interface.residuals) == 8
+
+
+def test_a_division_by_zero_is_refused():
+    body = {"y": op("divide", "x_1", op("subtract", number(1), number(1)))}
+    with pytest.raises(InputError, match="made has no fixed point: a program divides by zero"):
+        quantize(hand_made(body, "y"), Settings(16))
 
 
 def test_a_constant_output_and_a_repeated_one():

@@ -9,6 +9,7 @@ import mpmath
 import pytest
 import sympy as sp
 from derived import kernel, program
+from gathering import each
 
 from strapgen import catalogue, derive
 from strapgen.catalogue import STANDARD_METHODS, Choice
@@ -20,6 +21,7 @@ from strapgen.program import RESOLUTION, Assignment, Constant, Node, Operation, 
 
 STANDARD = catalogue.standard()
 EVERY = pytest.mark.parametrize("choice", STANDARD, ids=lambda choice: choice.kernel)
+TOGETHER = each("choice", STANDARD, ids=lambda choice: choice.kernel)
 
 
 def input_names(made: Kernel | Program) -> list[str]:
@@ -177,7 +179,7 @@ def test_the_cheapest_candidate_is_taken(choice):
     assert cost(program(choice)) == min(map(cost, map(optimize, made)))
 
 
-@EVERY
+@TOGETHER
 def test_nothing_unused_is_left(choice):
     made = program(choice)
     used = made.used()
@@ -206,7 +208,7 @@ def test_remove_unused_keeps_the_transition():
     assert not any(name.startswith("next_") for name in names)
 
 
-@EVERY
+@TOGETHER
 def test_operations_are_those_of_a_walk(choice):
     made = program(choice)
     kinds: Counter[str] = Counter()
@@ -227,7 +229,7 @@ def test_operations_are_those_of_a_walk(choice):
     }
 
 
-@EVERY
+@TOGETHER
 def test_results_are_names_or_constants(choice):
     # The count leaves results out, so nothing may be computed in them.
     made = program(choice)
@@ -236,7 +238,7 @@ def test_results_are_names_or_constants(choice):
     assert all(isinstance(node, Reference | Constant) for node in nodes)
 
 
-@pytest.mark.parametrize("choice", STANDARD, ids=lambda choice: choice.kernel)
+@each("choice", STANDARD, ids=lambda choice: choice.kernel)
 def test_equal_operations_are_computed_once(choice):
     # Conditions apart: they are no values that a program could hold.
     operations = Counter(

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from cffi import FFI
 from derived import programs
+from gathering import each
 from hypothesis import example, given
 from hypothesis import strategies as st
 from pycparser import c_ast, c_parser
@@ -119,8 +120,8 @@ def test_objects_have_no_state_of_their_own(objects):
     assert library <= {"sqrt", "sin", "cos", "atan2", "fmax", "memcpy", "memmove", "sincos"}
 
 
-@pytest.mark.parametrize("target", TARGETS)
-@pytest.mark.parametrize("kernel", KERNELS)
+@each("target", TARGETS)
+@each("kernel", KERNELS)
 def test_text_has_no_heap_and_no_static_data(kernel, target):
     for text in generated(kernel, target).files.values():
         code = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
@@ -301,7 +302,7 @@ def test_propagation_is_the_step_repeated_bit_for_bit(propagate):
         assert record.tobytes() == state.tobytes()
 
 
-@pytest.mark.parametrize("steps", [1, 15, 16, 17])
+@each("steps", [1, 15, 16, 17])
 def test_blocks_of_prepared_steps_join_without_a_seam(propagate, steps):
     _, whole = propagate(propagate.increments[0], 1, 7, function=propagate.normalize)
     status, part = propagate(propagate.increments[0], 1, 7, steps=steps, function=propagate.normalize)
@@ -384,7 +385,7 @@ def test_steps_after_the_last_record_are_run_and_not_recorded(propagate):
     assert history.shape[1] == 1
 
 
-@pytest.mark.parametrize(
+@each(
     "fault",
     [
         {"initial": None},
@@ -451,8 +452,8 @@ def function_body(source: str) -> str:
     return body
 
 
-@pytest.mark.parametrize("target", TARGETS)
-@pytest.mark.parametrize("kernel", KERNELS)
+@each("target", TARGETS)
+@each("kernel", KERNELS)
 def test_operation_counts(kernel, target):
     program, sources = programs()[kernel], generated(kernel, target)
     tree = c_parser.CParser().parse(function_body(text_of(sources, ".c")))
@@ -563,8 +564,8 @@ def test_compiler_reads_literals_as_meant(tmp_path):
 # Headers
 
 
-@pytest.mark.parametrize("target", TARGETS)
-@pytest.mark.parametrize("kernel", KERNELS)
+@each("target", TARGETS)
+@each("kernel", KERNELS)
 def test_header_is_a_contract(kernel, target):
     program, sources = programs()[kernel], generated(kernel, target)
     header = re.sub(r"\n \*\s+", " ", text_of(sources, ".h"))
@@ -597,8 +598,8 @@ def test_names_of_both_types_differ(target):
     assert sources.function.name == f"euler_rk4_2{suffix}"
 
 
-@pytest.mark.parametrize("target", TARGETS)
-@pytest.mark.parametrize("kernel", KERNELS)
+@each("target", TARGETS)
+@each("kernel", KERNELS)
 def test_text_is_clean(kernel, target):
     for text in generated(kernel, target).files.values():
         assert text.endswith("\n") and not text.endswith("\n\n")

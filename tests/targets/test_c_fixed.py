@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 from derived import program
 from evidence import corners_and_random
+from gathering import each
 
-from strapgen import build, generate, quantize
+from strapgen import build, compilation, generate, quantize
 from strapgen.backends.fixed import CFixedEvaluator, ModelEvaluator
 from strapgen.catalogue import Choice, standard
 from strapgen.exceptions import InputError
@@ -34,6 +35,13 @@ LOWERED = [
 ]
 STRICT = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror"]
 EULER = Choice("euler", "rk4", 2)
+#: Methods of all of them, and None for what has no method.
+ALL = (None, "rk1", "rk2", "rk3", "rk4")
+
+
+def choices_of(*methods) -> list[Choice]:
+    """Return the choices of these methods."""
+    return [choice for choice in CHOICES if choice.method in methods]
 
 
 @cache
@@ -52,20 +60,34 @@ def results(evaluator, inputs, residuals):
 
 
 @pytest.mark.parametrize(
-    ("word", "carry"),
+    ("word", "carry", "methods"),
     [
-        (32, "full"),
+        (32, "full", (None, "rk4")),
+        pytest.param(32, "full", ("rk1", "rk2", "rk3"), marks=pytest.mark.long),
         *(
-            pytest.param(word, carry, marks=pytest.mark.long)
+            pytest.param(word, carry, ALL, marks=pytest.mark.long)
             for word in (16, 32, 64)
             for carry in ("none", "full")
             if (word, carry) != (32, "full")
         ),
     ],
 )
-@pytest.mark.parametrize("choice", LOWERED)
-def test_c_and_model_agree_bit_for_bit(choice, word, carry, rng):
-    in_c, model = pair(choice, Settings(word, Fraction(1, 60), carry=carry))
+def test_c_and_model_agree_bit_for_bit(word, carry, methods, rng):
+    settings = Settings(word, Fraction(1, 60), carry=carry)
+    every = {choice: quantize(program(choice), settings) for choice in choices_of(*methods)}
+    compilation.compile_together(generate(fixed, "c-fixed") for fixed in every.values())
+
+    @each("choice", every)
+    def agree(choice, rng):
+        fixed = every[choice]
+        in_c = CFixedEvaluator(generate(fixed, "c-fixed"))
+        model = ModelEvaluator(generate(fixed, "fixed-model"))
+        c_agrees_with_the_model(in_c, model, word, rng)
+
+    agree(rng=rng)
+
+
+def c_agrees_with_the_model(in_c, model, word, rng):
     inputs = corners_and_random(model, 400, rng)
     residuals = rng.integers(0, 2**word - 1, size=(400, len(model.interface.residuals)), dtype=np.uint64)
     residuals = residuals.astype(object if word == 64 else np.int64)
@@ -202,18 +224,18 @@ def test_loops_refuse_bad_arguments():
 
 
 @pytest.mark.parametrize(
-    "word", [32, pytest.param(16, marks=pytest.mark.long), pytest.param(64, marks=pytest.mark.long)]
+    ("word", "methods"),
+    [(32, (None, "rk4")), *(pytest.param(w, ALL, marks=pytest.mark.long) for w in (16, 32, 64))],
 )
-@pytest.mark.parametrize("choice", LOWERED)
-def test_strict_compilers_are_silent(choice, word, tmp_path):
-    sources = generate(quantize(program(choice), Settings(word, carry="full")), "c-fixed")
-    for name, text in sources.files.items():
-        (tmp_path / name).write_text(text)
-    (code,) = (name for name in sources.files if name.endswith(".c"))
+def test_strict_compilers_are_silent(word, methods, tmp_path):
+    files = []
+    for choice in choices_of(*methods):
+        sources = generate(quantize(program(choice), Settings(word, carry="full")), "c-fixed")
+        for name, text in sources.files.items():
+            (tmp_path / name).write_text(text)
+            files += [name] * name.endswith(".c")
     for command in (["cc", *STRICT], ["c++", "-x", "c++", "-std=c++17", "-Wall", "-Wextra", "-Werror"]):
-        done = subprocess.run(
-            [*command, "-O2", "-c", code, "-o", "x.o"], cwd=tmp_path, capture_output=True, text=True
-        )
+        done = subprocess.run([*command, "-O2", "-c", *files], cwd=tmp_path, capture_output=True, text=True)
         assert not done.returncode, done.stderr
 
 
@@ -242,11 +264,7 @@ def test_the_header_states_format_unit_range_and_error():
 # Sanitizers and other semantics of overflow
 
 _HARNESS = """
-#include <stdio.h>
-#include <stdlib.h>
-#include "{name}.c"
-
-int main(void)
+static int run_{name}(void)
 {{
     {word} in[{inputs}], out[{outputs}];
     {residual} kept[{kept} + 1];
@@ -282,7 +300,8 @@ BUILDS = {
 }
 
 
-def built(folder: Path, sources, flags: list[str]) -> Path:
+def harness(sources) -> str:
+    """Return the C that runs a kernel on lines of integers."""
     interface, name = sources.fixed, sources.function.name
     word = interface.settings.word
     places, offset = [], 0
@@ -294,51 +313,69 @@ def built(folder: Path, sources, flags: list[str]) -> Path:
     for argument in interface.outputs:
         arguments.append(f"out + {size}")
         size += argument.signal.size
-    for file, text in sources.files.items():
-        (folder / file).write_text(text)
-    (folder / "main.c").write_text(
-        _HARNESS.format(
-            name=name,
-            word=f"int{word}_t",
-            residual=f"uint{word}_t",
-            inputs=offset,
-            outputs=size,
-            kept=len(interface.residuals),
-            arguments=", ".join(arguments),
-        )
+    return _HARNESS.format(
+        name=name,
+        word=f"int{word}_t",
+        residual=f"uint{word}_t",
+        inputs=offset,
+        outputs=size,
+        kept=len(interface.residuals),
+        arguments=", ".join(arguments),
     )
-    program_file = folder / "main"
-    done = subprocess.run(
-        ["cc", "-std=c99", *flags, "main.c", "-o", program_file], cwd=folder, capture_output=True, text=True
-    )
+
+
+def built(folder: Path, every, flags: list[str]) -> Path:
+    """Compile all kernels and one program that runs the one that it is told."""
+    folder.mkdir()
+    names = [sources.function.name for sources in every]
+    for sources in every:
+        for file, text in sources.files.items():
+            (folder / file).write_text(text)
+    main = [
+        *("#include <stdio.h>", "#include <string.h>", *(f'#include "{name}.h"' for name in names)),
+        *map(harness, every),
+        "int main(int count, char **words)",
+        "{",
+        *(
+            f'    if (count > 1 && !strcmp(words[1], "{name}"))\n        return run_{name}();'
+            for name in names
+        ),
+        "    return 2;",
+        "}",
+    ]
+    (folder / "main.c").write_text("\n".join(main) + "\n")
+    command = ["cc", "-std=c99", *flags, "main.c", *(f"{name}.c" for name in names), "-o", "main"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
     assert not done.returncode, done.stderr
-    return program_file
+    return folder / "main"
 
 
-@pytest.mark.parametrize("word", [32, pytest.param(16, marks=pytest.mark.long)])
 @pytest.mark.parametrize(
-    "choice",
-    [p for p in LOWERED if p.values[0].method in (None, "rk3", "rk4")],
+    ("word", "methods"),
+    [(32, (None, "rk4")), *(pytest.param(w, (None, "rk3", "rk4"), marks=pytest.mark.long) for w in (16, 32))],
 )
-def test_no_undefined_behaviour_under_any_semantics(choice, word, tmp_path, rng):
-    sources = generate(quantize(program(choice), Settings(word, Fraction(1, 60), carry="full")), "c-fixed")
-    model = ModelEvaluator(
-        generate(quantize(program(choice), Settings(word, Fraction(1, 60), carry="full")), "fixed-model")
-    )
-    inputs = np.hstack(corners_and_random(model, 300, rng))
-    # Some far outside: any integer of the word is a lawful argument.
-    inputs[::10] = rng.integers(-(2 ** (word - 1)), 2 ** (word - 1), size=inputs[::10].shape)
-    kept = rng.integers(0, 2**word, size=(300, len(model.interface.residuals)))
-    given = "\n".join(" ".join(map(str, row)) for row in np.hstack([inputs, kept]).tolist())
-    said = {}
-    for name, flags in BUILDS.items():
-        folder = tmp_path / name
-        folder.mkdir()
-        done = subprocess.run(
-            [built(folder, sources, flags)], input=given, capture_output=True, text=True, check=False
-        )
-        assert not done.returncode and not done.stderr, (name, done.stderr[:500])
-        said[name] = done.stdout
-    assert said["plain"].count("\n") == 300
-    assert "\n1 " in said["plain"] and "\n0 " in said["plain"]
-    assert set(said.values()) == {said["plain"]}
+def test_no_undefined_behaviour_under_any_semantics(word, methods, tmp_path, rng):
+    settings = Settings(word, Fraction(1, 60), carry="full")
+    every = {choice: quantize(program(choice), settings) for choice in choices_of(*methods)}
+    sources = {choice: generate(fixed, "c-fixed") for choice, fixed in every.items()}
+    programs = {name: built(tmp_path / name, sources.values(), flags) for name, flags in BUILDS.items()}
+
+    @each("choice", every)
+    def agree(choice, rng):
+        model = ModelEvaluator(generate(every[choice], "fixed-model"))
+        inputs = np.hstack(corners_and_random(model, 300, rng))
+        # Some far outside: any integer of the word is a lawful argument.
+        inputs[::10] = rng.integers(-(2 ** (word - 1)), 2 ** (word - 1), size=inputs[::10].shape)
+        kept = rng.integers(0, 2**word, size=(300, len(model.interface.residuals)))
+        given = "\n".join(" ".join(map(str, row)) for row in np.hstack([inputs, kept]).tolist())
+        said = {}
+        for name, file in programs.items():
+            command = [file, sources[choice].function.name]
+            done = subprocess.run(command, input=given, capture_output=True, text=True, check=False)
+            assert not done.returncode and not done.stderr, (name, done.stderr[:500])
+            said[name] = done.stdout
+        assert said["plain"].count("\n") == 300
+        assert "\n1 " in said["plain"] and "\n0 " in said["plain"]
+        assert set(said.values()) == {said["plain"]}
+
+    agree(rng=rng)

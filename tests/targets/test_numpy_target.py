@@ -10,6 +10,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 from derived import programs
+from gathering import each
 
 from strapgen import compilation
 from strapgen.catalogue import standard
@@ -55,7 +56,7 @@ def as_tuple(result) -> tuple[np.ndarray, ...]:
     return result if isinstance(result, tuple) else (result,)
 
 
-@pytest.mark.parametrize("kernel", KERNELS)
+@each("kernel", KERNELS)
 def test_leading_axes_are_samples(kernel, rng):
     program = programs()[kernel]
     inputs = samples(program, (2, 5), rng)
@@ -70,7 +71,7 @@ def test_leading_axes_are_samples(kernel, rng):
             np.testing.assert_allclose(one, all_[place], rtol=1e-14, atol=1e-15)
 
 
-@pytest.mark.parametrize("kernel", KERNELS)
+@each("kernel", KERNELS)
 def test_result_is_the_program_s(kernel, rng):
     program = programs()[kernel]
     inputs = samples(program, (), rng)
@@ -94,7 +95,7 @@ def test_inputs_broadcast(rng):
     assert result[2, 1].tobytes() == function("euler-rk4-2")(state[2, 0], increments[1]).tobytes()
 
 
-@pytest.mark.parametrize("kernel", KERNELS)
+@each("kernel", KERNELS)
 def test_out_may_be_an_input(kernel, rng):
     program = programs()[kernel]
     if len(program.outputs) > 1:
@@ -122,7 +123,7 @@ def test_out_may_be_an_input(kernel, rng):
         np.testing.assert_array_equal(turned, wanted)
 
 
-@pytest.mark.parametrize("kernel", KERNELS)
+@each("kernel", KERNELS)
 def test_inputs_are_left_alone(kernel, rng):
     inputs = samples(programs()[kernel], (3,), rng)
     before = {name: value.tobytes() for name, value in inputs.items()}
@@ -177,7 +178,7 @@ def counted(node: ast.AST) -> dict[str, int]:
     return counts
 
 
-@pytest.mark.parametrize("kernel", KERNELS)
+@each("kernel", KERNELS)
 def test_operation_counts(kernel):
     program = programs()[kernel]
     parts = {program.name: program}
@@ -203,7 +204,7 @@ def test_operation_counts(kernel):
 # Documentation
 
 
-@pytest.mark.parametrize("kernel", KERNELS)
+@each("kernel", KERNELS)
 def test_module_documents_itself(kernel):
     program = programs()[kernel]
     said = " ".join((module(kernel).__doc__ or "").split())
@@ -219,7 +220,7 @@ def test_module_documents_itself(kernel):
             assert f"at most {signal.bound} in magnitude" in contract
 
 
-@pytest.mark.parametrize("kernel", KERNELS)
+@each("kernel", KERNELS)
 def test_text_is_clean(kernel):
     assert text(kernel).endswith("\n") and not text(kernel).endswith("\n\n")
     assert all(line == line.rstrip() for line in text(kernel).splitlines())

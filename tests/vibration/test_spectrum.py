@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from itertools import pairwise
 
 import numpy as np
@@ -177,6 +178,15 @@ def test_a_file_is_a_spectrum(tmp_path):
     assert list(found.transfers) == ["angle_x", "angle_y"]
     assert found.transfers["angle_x"](f) == pytest.approx([0.02, 0.02, 0.02, 0.014, 0.002])
     assert np.angle(found.transfers["angle_y"](f)) == pytest.approx([-1.0, -1.25, -1.5, -2.0, -3.0])
+
+
+@pytest.mark.parametrize("cell", ["1_0", "٣", "", "x", "inf"])
+def test_a_cell_that_is_no_finite_number(cell, tmp_path):
+    path = written(tmp_path, f"frequency_hz,density,angle_x_rad\n5,1,1\n20,{cell},1\n")
+    with pytest.raises(
+        InputError, match=rf"line 3: density is {re.escape(repr(cell))}; a finite number is needed$"
+    ):
+        read_spectrum(path)
 
 
 def test_a_density_of_zero_is_reached_in_a_straight_line(tmp_path):

@@ -14,7 +14,7 @@ from typing import Any
 
 import mpmath
 
-from strapgen import catalogue, checks, exact
+from strapgen import checks, exact
 from strapgen.analysis.error_rate import error_rate
 from strapgen.analysis.prediction import Prediction, parts_of, predict
 from strapgen.catalogue import Choice
@@ -111,6 +111,7 @@ def agreement(
 
     Examples
     --------
+    >>> from strapgen import catalogue
     >>> from strapgen.motions import motion
     >>> turn = motion("constant", y_rad_s=1)
     >>> found = agreement(catalogue.choose("dcm", "rk2", 1), turn, ["1/8", "1/16"], 1, terms=1)
@@ -180,7 +181,5 @@ SETTINGS: dict[str, dict[str, str]] = {
 def default_steps(choice: Choice) -> tuple[str, ...]:
     """Return steps in s, halved from one to the next, on which the term after the predicted ones can be seen."""
     return (
-        ("1/4", "1/8", "1/16", "1/32")
-        if catalogue.increments(choice) > 4
-        else ("1/8", "1/16", "1/32", "1/64")
+        ("1/4", "1/8", "1/16", "1/32") if choice.increments_per_step > 4 else ("1/8", "1/16", "1/32", "1/64")
     )

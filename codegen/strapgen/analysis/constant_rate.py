@@ -196,7 +196,7 @@ def constant_rate(choice: Choice) -> ConstantRate:
     turned = {name: ANGLE / share if k % 3 == 2 else sp.S.Zero for k, name in enumerate(samples.elements)}
     attitude = None
     if step_kernels.attitude is not None:
-        attitude = catalogue.derive(catalogue.choose(step_kernels.attitude))
+        attitude = catalogue.companion(kernel, step_kernels.attitude)
     try:
         result = _rational(attitude_step.domain, kernel, {**identity, **turned}, attitude)
     except _NotRationalError:

@@ -21,7 +21,7 @@ from strapgen.analysis import motion_rates, one_step
 from strapgen.analysis.invariants import invariants
 from strapgen.analysis.motion_rates import TIME
 from strapgen.analysis.one_step import Step
-from strapgen.catalogue import Choice, user
+from strapgen.catalogue import Choice
 from strapgen.exceptions import InputError
 from strapgen.lowering.canonical.decomposition import NotCovariantError
 from strapgen.powers import Powers
@@ -94,7 +94,7 @@ def error_rate(choice: Choice, motion: str, terms: int = 2) -> ErrorRate:
     attitude_step = one_step.linear_step(choice)
     order = attitude_step.kernel.order
     try:
-        if choice.name in user.KERNELS:
+        if choice.user_kernel is not None:
             _require_covariance(attitude_step)
         top = 1 + (order.step if order else 1) + terms
         most = top + one_step.PATIENCE

@@ -120,7 +120,7 @@ def general_rate(attitude_step: Step, count: int) -> tuple[Frame, Any, list[list
 
     Parameters
     ----------
-    taken : Step
+    attitude_step : Step
     count : int
         Number of derivatives, counting the rate itself.
     """
@@ -134,7 +134,7 @@ def errors(attitude_step: Step, ring: Any, rate: Rate, top: int) -> dict[str, li
 
     Parameters
     ----------
-    taken : Step
+    attitude_step : Step
     ring : PolyRing
         Ring of the coefficients, over the step's own field.
     rate : sequence of sequence of ring element
@@ -258,7 +258,7 @@ def computed_matrix(attitude_step: Step, ring: Any, rate: Rate, top: int) -> lis
     step_kernels = attitude_step.kernel.companions
     if step_kernels is None or step_kernels.attitude is None:
         return elements
-    attitude = catalogue.derive(catalogue.choose(step_kernels.attitude))
+    attitude = catalogue.companion(attitude_step.kernel, step_kernels.attitude)
     values = dict(zip(attitude.inputs[0].elements, elements, strict=True))
     return _evaluated(attitude, values, ring, top)
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import sympy as sp
 
-from strapgen import catalogue, pipeline
+from strapgen import catalogue, library
 from strapgen.analysis.accumulation import accumulate
 from strapgen.analysis.constant_rate import constant_rate
 from strapgen.analysis.growth import as_intervals, contraction
@@ -180,10 +180,10 @@ def _row(choice: Choice) -> OverviewRow:
     coning_power, coning = next(iter(run.secular.items()), (None, None))
     a = parameters("coning")[0]
     drift = min(general.drift, default=None)
-    counts = pipeline.lower(kernel).operations
+    counts = library.program(choice).operations
     return OverviewRow(
         kernel.name,
-        catalogue.increments(choice),
+        choice.increments_per_step,
         general.order,
         sum(counts.values()),
         constant_power,

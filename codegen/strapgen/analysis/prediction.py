@@ -10,7 +10,7 @@ from typing import Any
 import mpmath
 import sympy as sp
 
-from strapgen import algebra, catalogue, checks, exact
+from strapgen import algebra, catalogue, checks, exact, library
 from strapgen.analysis.accumulation import antiderivative
 from strapgen.analysis.error_rate import ErrorRate, error_rate
 from strapgen.analysis.motion_rates import TIME, parameters
@@ -243,12 +243,13 @@ def _about_an_axis(rates: ErrorRate, settings: list[Any], h: Any) -> Transfer:
 
 def _orthonormalization(choice: Choice) -> Callable[[Matrix], Matrix]:
     """Return the function that orthonormalizes a computed matrix, by the scheme of the algorithm."""
-    step_kernels = catalogue.derive(choice).companions
+    kernel = catalogue.derive(choice)
+    step_kernels = kernel.companions
     assert step_kernels is not None, "checked by error_rate"
     if step_kernels.orthonormalize is None:
         return lambda computed: computed
     if step_kernels.attitude is not None:
         # If the length of the parameters is not 1, their matrix is a rotation times a factor.
         return lambda computed: computed / mpmath.cbrt(mpmath.det(computed))
-    scheme = interpreter(step_kernels.orthonormalize)
+    scheme = interpreter(step_kernels.orthonormalize, library.program(choice))
     return lambda computed: _matrix(scheme(list(computed)))

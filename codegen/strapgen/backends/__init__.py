@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
-from importlib import import_module
-from typing import NamedTuple
 
 from strapgen import catalogue, checks, library
 from strapgen.backends.protocol import Backend, Evaluator
+from strapgen.backends.registry import BACKENDS, Entry, classes, of_sources
+from strapgen.backends.step_sources import StepSources
 from strapgen.catalogue import Choice
 from strapgen.catalogue.tableaux import Tableau
 from strapgen.exceptions import InputError, InputTypeError
@@ -27,51 +26,6 @@ __all__ = [
     "of",
     "of_sources",
 ]
-
-
-class Entry(NamedTuple):
-    """A back end: what it is, the target that it runs, the module and classes of this package that run it.
-
-    `word` is the length of word in fixed point, None where it is the user's choice or there is none.
-    """
-
-    title: str
-    target: str
-    module: str
-    evaluator: str
-    backend: str
-    word: int | None = None
-
-
-#: Back ends by name.
-BACKENDS = {
-    "numpy": Entry("generated numpy code in double", "numpy", "numpy", "NumpyEvaluator", "NumpyBackend"),
-    "c": Entry("generated C in double, compiled", "c", "c", "CEvaluator", "CBackend"),
-    "c-float": Entry("generated C in float, compiled", "c-float", "c", "CEvaluator", "CBackend"),
-    "c-q31": Entry(
-        "generated C in 32-bit fixed point, compiled",
-        "c-fixed",
-        "fixed",
-        "CFixedEvaluator",
-        "CFixedBackend",
-        32,
-    ),
-    "c-q15": Entry(
-        "generated C in 16-bit fixed point, compiled",
-        "c-fixed",
-        "fixed",
-        "CFixedEvaluator",
-        "CFixedBackend",
-        16,
-    ),
-    "fixed-model": Entry(
-        "integer model of the fixed-point C in Python, any word",
-        "fixed-model",
-        "fixed",
-        "ModelEvaluator",
-        "ModelBackend",
-    ),
-}
 
 
 def fitted(backend: str, settings: Settings | None) -> Settings | None:
@@ -98,19 +52,14 @@ def fitted(backend: str, settings: Settings | None) -> Settings | None:
     return replace(settings, word=entry.word)
 
 
-def _loaded(target: str) -> tuple[type[Evaluator], type[Backend]]:
-    entry = next(entry for entry in BACKENDS.values() if entry.target == target)
-    module = import_module(f"{__name__}.{entry.module}")
-    return getattr(module, entry.evaluator), getattr(module, entry.backend)
-
-
 def evaluator(kernel: str | Choice, backend: str = "numpy", settings: Settings | None = None) -> Evaluator:
-    """Return a kernel of the catalogue as a callable.
+    """Return a kernel as a callable.
 
     Parameters
     ----------
     kernel : str or Choice
-        Name of a kernel that takes no method, for instance "dcm-from-euler"; or what `catalogue.choose` returned.
+        Name of a kernel that takes no method, for instance "dcm-from-euler"; or what `catalogue.choose` returned, a
+        user's algorithm too, and `Choice.companion` for the kernels that it brings.
     backend : str, optional
         A key of `BACKENDS`.
     settings : Settings, optional
@@ -136,8 +85,7 @@ def evaluator(kernel: str | Choice, backend: str = "numpy", settings: Settings |
     """
     checks.choice("backend", backend, BACKENDS)
     if not isinstance(kernel, Choice):
-        if kernel not in catalogue.user.KERNELS:
-            checks.choice("kernel", kernel, catalogue.KERNELS)
+        checks.choice("kernel", kernel, catalogue.KERNELS)
         kernel = catalogue.choose(kernel)
     chosen = fitted(backend, settings)
     return of_sources(library.sources(kernel, BACKENDS[backend].target, chosen))
@@ -203,9 +151,10 @@ def of(
     """Return a chosen attitude step as a back end; parameters and errors are those of `backend`."""
     checks.choice("backend", backend, BACKENDS)
     if orthonormalization is not None:
-        checks.choice("orthonormalization", orthonormalization, catalogue.orthonormalizations(choice.name))
+        checks.choice("orthonormalization", orthonormalization, choice.orthonormalizations)
     chosen = fitted(backend, settings)
-    return build(library.sources(choice, BACKENDS[backend].target, chosen), orthonormalization)
+    step = library.sources(choice, BACKENDS[backend].target, chosen)
+    return classes(step.target)[1](StepSources(step, choice, orthonormalization))
 
 
 def build(sources: Sources, orthonormalization: str | None = None) -> Backend:
@@ -228,18 +177,4 @@ def build(sources: Sources, orthonormalization: str | None = None) -> Backend:
     CompilerError
         If a C compiler is needed and there is none, or it fails.
     """
-
-    def evaluate(kernel: str) -> Evaluator:
-        if kernel == sources.kernel:
-            return of_sources(sources)
-        settings = sources.fixed.companion_settings if sources.fixed else None
-        return of_sources(library.sources(catalogue.choose(kernel), sources.target, settings))
-
-    make = _loaded(sources.target)[1]
-    return make(sources, evaluate, orthonormalization)
-
-
-def of_sources(sources: Sources) -> Evaluator:
-    """Return the generated function of any kernel as a callable."""
-    make: Callable[[Sources], Evaluator] = _loaded(sources.target)[0]
-    return make(sources)
+    return classes(sources.target)[1](StepSources(sources, None, orthonormalization))

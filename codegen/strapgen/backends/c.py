@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from strapgen import compilation
 from strapgen.backends.protocol import Array, Backend, Evaluator
+from strapgen.backends.step_sources import StepSources
 from strapgen.targets import Sources
 
 _TYPES = {"c": ("double", np.float64), "c-float": ("float", np.float32)}
@@ -19,7 +19,7 @@ class CEvaluator(Evaluator):
 
     def __init__(self, sources: Sources) -> None:
         self.real, dtype = _TYPES[sources.target]
-        super().__init__(sources.function, dtype)
+        super().__init__(sources, dtype)
         self.module = compilation.load(sources)
         self._array = getattr(self.module.lib, f"{sources.function.name}_array")
 
@@ -48,21 +48,16 @@ class CEvaluator(Evaluator):
 class CBackend(Backend):
     """Runs generated C."""
 
-    def __init__(
-        self,
-        sources: Sources,
-        evaluate: Callable[[str], Evaluator],
-        orthonormalization: str | None = None,
-    ) -> None:
-        super().__init__(sources, evaluate, orthonormalization)
+    def __init__(self, parts: StepSources) -> None:
+        super().__init__(parts)
         step = self._step
         assert isinstance(step, CEvaluator)
         self._module, self._pointer = step.module, step.pointer
-        name = sources.function.name
+        name = self.sources.function.name
         self._generated_propagate = getattr(self._module.lib, f"{name}_propagate")
         self._orthonormalizer = self._module.ffi.NULL
         if self._orthonormalization is not None:
-            orthonormalizer = evaluate(self._orthonormalization)
+            orthonormalizer = parts.evaluator(self._orthonormalization)
             assert isinstance(orthonormalizer, CEvaluator)
             self._orthonormalizer = self._module.ffi.cast(
                 f"{name}_orthonormalizer", orthonormalizer.address()

@@ -13,8 +13,9 @@ import numpy as np
 
 from strapgen import compilation
 from strapgen.backends.protocol import Array, Backend, Evaluator
+from strapgen.backends.step_sources import StepSources
 from strapgen.exceptions import InputError
-from strapgen.fixedpoint.code import Argument, Interface
+from strapgen.fixedpoint.interface import Argument, Interface
 from strapgen.targets import Sources
 
 
@@ -55,7 +56,7 @@ class FixedEvaluator(Evaluator):
 
     def __init__(self, sources: Sources) -> None:
         assert sources.fixed is not None, "fixed-point sources tell their formats"
-        super().__init__(sources.function, np.float64)
+        super().__init__(sources, np.float64)
         self.kernel = sources.kernel
         self.interface: Interface = sources.fixed
         self.integer_type: Any = object if self.interface.settings.word > 32 else np.int64
@@ -198,13 +199,8 @@ class ModelEvaluator(FixedEvaluator):
 class FixedBackend(Backend):
     """Runs a step in fixed point."""
 
-    def __init__(
-        self,
-        sources: Sources,
-        evaluate: Callable[[str], Evaluator],
-        orthonormalization: str | None = None,
-    ) -> None:
-        super().__init__(sources, evaluate, orthonormalization)
+    def __init__(self, parts: StepSources) -> None:
+        super().__init__(parts)
         assert isinstance(self._step, FixedEvaluator)
         self.evaluator: FixedEvaluator = self._step
         self.interface = self.evaluator.interface
@@ -263,18 +259,13 @@ class FixedBackend(Backend):
 class CFixedBackend(FixedBackend):
     """Runs generated fixed-point C."""
 
-    def __init__(
-        self,
-        sources: Sources,
-        evaluate: Callable[[str], Evaluator],
-        orthonormalization: str | None = None,
-    ) -> None:
-        super().__init__(sources, evaluate, orthonormalization)
+    def __init__(self, parts: StepSources) -> None:
+        super().__init__(parts)
         self.name = f"c-q{self.interface.settings.word - 1}"
         step = self.evaluator
         assert isinstance(step, CFixedEvaluator)
         self._c = step
-        self._function = sources.function.name
+        self._function = self.sources.function.name
         self._generated = getattr(step.module.lib, f"{self._function}_propagate")
 
     def propagate_integers(
@@ -288,7 +279,7 @@ class CFixedBackend(FixedBackend):
         history = np.empty((runs, 1 + steps // record_every, initial.shape[-1]), kind)
         orthonormalizer = ffi.NULL
         if orthonormalize_every:
-            made = self._evaluate(self._need_orthonormalization())
+            made = self.beside(self._need_orthonormalization())
             assert isinstance(made, CFixedEvaluator)
             orthonormalizer = ffi.cast(f"{self._function}_orthonormalizer", made.address())
         stopped = ffi.new("size_t[2]")
@@ -317,7 +308,7 @@ class ModelBackend(FixedBackend):
         """Propagate integers in Python."""
         step = self.evaluator
         assert isinstance(step, ModelEvaluator)
-        normalize = self._evaluate(self._need_orthonormalization()) if orthonormalize_every else None
+        normalize = self.beside(self._need_orthonormalization()) if orthonormalize_every else None
         runs, steps = increments.shape[:2]
         single = runs == 1
         fresh = self.evaluator.fresh(runs)

@@ -14,6 +14,7 @@ import numpy as np
 
 from strapgen import compilation
 from strapgen.backends.protocol import Array, Backend, Evaluator
+from strapgen.backends.step_sources import StepSources
 from strapgen.targets import Sources
 
 #: Steps times runs that are held at once: some megabytes, which stay in the cache.
@@ -28,7 +29,7 @@ class NumpyEvaluator(Evaluator):
     """A generated numpy function."""
 
     def __init__(self, sources: Sources) -> None:
-        super().__init__(sources.function, np.float64)
+        super().__init__(sources, np.float64)
         self._generated = getattr(compilation.load(sources), sources.function.name)
 
     def evaluate(self, arrays: list[Array], batch: tuple[int, ...]) -> tuple[Array, ...]:
@@ -40,21 +41,16 @@ class NumpyEvaluator(Evaluator):
 class NumpyBackend(Backend):
     """Runs generated numpy code; many runs and long runs alike without a loop over them."""
 
-    def __init__(
-        self,
-        sources: Sources,
-        evaluate: Callable[[str], Evaluator],
-        orthonormalization: str | None = None,
-    ) -> None:
-        super().__init__(sources, evaluate, orthonormalization)
+    def __init__(self, parts: StepSources) -> None:
+        super().__init__(parts)
         if self._product is not None:
-            name = f"{sources.function.name}_transition"
-            self._transition: Callable[..., Array] = getattr(compilation.load(sources), name)
-            product = evaluate(self._product)
+            name = f"{self.sources.function.name}_transition"
+            self._transition: Callable[..., Array] = getattr(compilation.load(self.sources), name)
+            product = parts.evaluator(self._product)
             assert isinstance(product, NumpyEvaluator)
             self._generated_product: Callable[..., Array] = product._generated
         if self._orthonormalization is not None:
-            orthonormalizer = evaluate(self._orthonormalization)
+            orthonormalizer = parts.evaluator(self._orthonormalization)
             assert isinstance(orthonormalizer, NumpyEvaluator)
             self._orthonormalize: Callable[..., Array] = orthonormalizer._generated
         self._elements = self.identity.size

@@ -10,26 +10,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapgen import checks
+from strapgen.backends.step_sources import StepSources
 from strapgen.exceptions import InputError
-from strapgen.targets import Function, Sources
+from strapgen.targets import Sources
 
 Array = NDArray[Any]
 
 
 class Evaluator(ABC):
-    """A generated function, called with arrays of samples.
+    """A generated function, called with arrays of samples. It can be pickled: the sources are, and built again.
 
     Parameters
     ----------
-    function : Function
-        Its interface.
+    sources : Sources
+        What it is made of.
     dtype : dtype
-        Type of the numbers that it computes with.
+        Type of the numbers that it computes with; a class of one target knows it.
     """
 
-    def __init__(self, function: Function, dtype: Any) -> None:
-        self.function = function
+    def __init__(self, sources: Sources, dtype: Any) -> None:
+        self.sources = sources
+        self.function = sources.function
         self.dtype = np.dtype(dtype)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return what makes it again in another process: its class and its sources."""
+        return type(self), (self.sources,)
 
     def __call__(self, *values: Any) -> Any:
         """Call the function.
@@ -76,14 +82,13 @@ class Evaluator(ABC):
 class Backend(ABC):
     """An attitude algorithm, compiled and ready to run.
 
+    It can be pickled, so that a pool of processes can run it: its sources are, with those of the kernels beside the
+    step, and built again, C from the cache.
+
     Parameters
     ----------
-    sources : Sources
-        Sources of an attitude step.
-    evaluate : callable
-        Gives the `Evaluator` of a kernel by name, on the same target.
-    orthonormalization : str, optional
-        Kernel that orthonormalizes; by default the one that goes with the algorithm.
+    parts : StepSources
+        Sources of an attitude step, and of what goes with it.
 
     Attributes
     ----------
@@ -113,12 +118,8 @@ class Backend(ABC):
         What it was made of.
     """
 
-    def __init__(
-        self,
-        sources: Sources,
-        evaluate: Callable[[str], Evaluator],
-        orthonormalization: str | None = None,
-    ) -> None:
+    def __init__(self, parts: StepSources) -> None:
+        sources = parts.step
         companions = sources.companions
         if companions is None:
             raise InputError(f"kernel {sources.kernel} is no attitude step; back ends are built from steps")
@@ -133,15 +134,47 @@ class Backend(ABC):
         self.state_shape = state.shape
         self.elements = state.elements
         self.attitude = companions.attitude
-        self._evaluate = evaluate
+        self._parts = parts
         self._product = companions.product
-        self._orthonormalization = orthonormalization or companions.orthonormalize
-        self._step = evaluate(sources.kernel)
+        self._orthonormalization = parts.orthonormalization or companions.orthonormalize
+        self._step: Evaluator = parts.evaluator(sources.kernel)
         self.dtype = self._step.dtype
         self.identity: Array = np.array([float(x) for x in companions.identity], self.dtype).reshape(
             state.shape
         )
         self.unit = float(np.finfo(self.dtype).eps)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return what makes it again in another process: its class, and sources that need nothing else."""
+        return type(self), (self._parts.complete(),)
+
+    def beside(self, kernel: str) -> Evaluator:
+        """Return a kernel that works on the same state, on the same target: an orthonormalization.
+
+        Parameters
+        ----------
+        kernel : str
+            One that the step brings, or of the catalogue.
+        """
+        return self._parts.evaluator(kernel)
+
+    def matrices(self, states: Any) -> Array:
+        """Return the attitude that states stand for.
+
+        Parameters
+        ----------
+        states : array_like, (..., state shape)
+
+        Returns
+        -------
+        array, (..., 3, 3)
+            Direction cosine matrices, body to reference, in double.
+        """
+        states = np.asarray(states, np.float64)
+        if self.attitude is None:
+            return np.array(states)
+        result: Array = self._parts.evaluator(self.attitude, "numpy")(states)
+        return result
 
     def rounding_bound(self, steps: int, rounded_inputs: bool = False) -> float | None:
         """Return a certified bound of what rounding does to a run without orthonormalization.
@@ -221,7 +254,7 @@ class Backend(ABC):
         -------
         array, (..., state shape)
         """
-        result: Array = self._evaluate(self._need_orthonormalization())(state)
+        result: Array = self.beside(self._need_orthonormalization())(state)
         return result
 
     def _need_orthonormalization(self) -> str:

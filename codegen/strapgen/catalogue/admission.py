@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
-import keyword
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import sympy as sp
 
 from strapgen import checks
 from strapgen.algebra import Direction, Wrapped
+from strapgen.catalogue.derivation import companion as derived_companion
+from strapgen.catalogue.names import RESERVED
 from strapgen.exceptions import InputError
 from strapgen.kernel import Kernel
 from strapgen.program import RESOLUTION
-from strapgen.signal import Signal
 
 _NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
-#: Words of C and of its library that a function may not be called.
-_WORDS = """
-auto break case char const continue default do double else enum extern float for goto if inline int long register
-restrict return short signed sizeof static struct switch typedef union unsigned void volatile while
-main printf puts exit abort malloc free signal time clock rand
-sin cos tan sqrt exp log pow floor ceil round fabs abs asin acos atan atan2 sinh cosh tanh gamma
-"""
-_OF_C = frozenset(_WORDS.split())
+#: What the names of a kernel's functions end with, in some target.
+_FUNCTION_OF = re.compile(
+    r"(-float|-q\d+)?(-array|-batch|-propagate|-orthonormalizer|-transition)$|(-float|-q\d+)$"
+)
 #: Functions that can be generated.
 _FUNCTIONS = (sp.sin, sp.cos, sp.sinc, sp.atan2, sp.asin, sp.acos, Direction, Wrapped, sp.Max, sp.Piecewise)
 _COMPARISONS = (sp.Gt, sp.Ge, sp.Lt, sp.Le)
@@ -33,59 +29,55 @@ ALLOWED = (
 )
 
 
-def require(kernel: Kernel, catalogue: frozenset[str], derived: Callable[[str], Kernel]) -> None:
-    """Check the kernel of an attitude step, and the kernels of its own.
+def require(kernel: Kernel) -> None:
+    """Check the kernel of an attitude step, and the kernels that it brings.
 
     Parameters
     ----------
     kernel : Kernel
-    catalogue : frozenset of str
-        Names that are taken.
-    derived : callable
-        Derives a kernel of the catalogue.
 
     Raises
     ------
     InputError
         If something is not as it must be.
     """
-    for made in (kernel, *kernel.own):
-        _require_names(made, catalogue)
-        _require_texts(made)
-        _require_formulas(made)
+    names = [each.name for each in (kernel, *kernel.own)]
+    for each in (kernel, *kernel.own):
+        _require_names(each)
+        _require_functions(each, {*RESERVED, *names})
+        _require_texts(each)
+        _require_formulas(each)
+    if repeated := next((name for name in names if names.count(name) > 1), None):
+        raise InputError(
+            f"kernel {kernel.name}: two of its kernels are called {repeated}; every one needs another name"
+        )
     _require_step(kernel)
-    own = {made.name: made for made in kernel.own}
-    for role, companion in _companions(kernel):
-        if companion in own:
-            _require_shapes(kernel, role, own[companion])
-        elif companion in catalogue:
-            _require_shapes(kernel, role, derived(companion))
-        else:
-            _refuse(kernel, f"its {role} {companion!r} is neither in the catalogue nor its own")
+    for role, name in _companions(kernel):
+        if name not in names[1:] and name not in RESERVED:
+            _refuse(kernel, f"its {role} {name!r} is neither in the catalogue nor its own")
+        _require_shapes(kernel, role, derived_companion(kernel, name))
 
 
 def _refuse(kernel: Kernel, reason: str) -> None:
     raise InputError(f"kernel {kernel.name}: {reason}")
 
 
-def _signals(kernel: Kernel) -> list[Signal]:
-    return [*kernel.inputs, *(stage.signal for stage in (*kernel.stages, *kernel.outputs))]
-
-
-def _require_names(kernel: Kernel, catalogue: frozenset[str]) -> None:
+def _require_names(kernel: Kernel) -> None:
     name = kernel.name
     if not isinstance(name, str) or not _NAME.fullmatch(name):
         raise InputError(
             f"kernel {name!r} has no name for generated code; a-z, 0-9 and hyphens between them are allowed"
         )
-    if keyword.iskeyword(kernel.identifier) or kernel.identifier in _OF_C:
-        raise InputError(f"kernel {name} has a name that C or Python use themselves; another one is needed")
-    if name in catalogue or re.match(r"(dcm|euler|cayley-klein)-.*-(\d+|rates)(-previous\d)?$", name):
+    if name in RESERVED or re.match(r"(dcm|euler|cayley-klein)-.*-(\d+|rates)(-previous\d)?$", name):
         raise InputError(
             f"kernel {name} is in the catalogue, or looks like one of its steps; another name is needed"
         )
+    arguments = [*kernel.inputs, *(stage.signal for stage in kernel.outputs)]
+    for number, signal in enumerate(arguments):
+        if signal.name in (other.name for other in arguments[:number]):
+            _refuse(kernel, f"two of its arguments are called {signal.name}; each needs a name of its own")
     seen: set[str] = set()
-    for signal in _signals(kernel):
+    for signal in kernel.signals:
         for part in (signal.name, *signal.elements):
             if not (part.isascii() and part.isidentifier()):
                 _refuse(kernel, f"{part!r} is no name for generated code")
@@ -100,10 +92,17 @@ def _require_names(kernel: Kernel, catalogue: frozenset[str]) -> None:
             seen.add(element)
 
 
+def _require_functions(kernel: Kernel, others: set[str]) -> None:
+    """Check that none of a kernel's functions is called as one of another kernel: they go into one program."""
+    other = _FUNCTION_OF.sub("", kernel.name)
+    if other != kernel.name and other in others:
+        _refuse(kernel, f"{other} has a function of this name; another name is needed")
+
+
 def _require_texts(kernel: Kernel) -> None:
     texts = {"title": kernel.title, "source": kernel.source}
     texts |= {f"note {number}": note for number, note in enumerate(kernel.notes, 1)}
-    for signal in _signals(kernel):
+    for signal in kernel.signals:
         texts |= {f"meaning of {signal.name}": signal.meaning, f"unit of {signal.name}": signal.unit}
     for what, text in texts.items():
         checks.text(f"kernel {kernel.name}: its {what}", text)
@@ -190,6 +189,8 @@ def _require_step(kernel: Kernel) -> None:
             kernel,
             f"its transition {kernel.transition!r} is none of its stages: {', '.join(stages) or 'none'}",
         )
+    if sum(stage.signal.name == kernel.transition for stage in kernel.stages) > 1:
+        _refuse(kernel, f"two of its stages are called {kernel.transition}, as its transition is")
     if companions.attitude is None and state.shape != (3, 3):
         _refuse(kernel, "attitude is None, but the state is no matrix (3, 3)")
 

@@ -85,6 +85,7 @@ DCM_MEANING = "direction cosine matrix, body to reference"
 EULER_MEANING = "Euler parameters, body to reference, scalar last"
 CAYLEY_KLEIN_MEANING = "Cayley-Klein parameters, body to reference, scalar first"
 
+#: The direction cosine matrix: signals of a step, its derivative, the kernels that go with it.
 DCM = Kinematics(
     name="dcm",
     title="Direction cosine matrix",
@@ -105,6 +106,7 @@ DCM = Kinematics(
     attitude=None,
 )
 
+#: Euler parameters, scalar last, likewise.
 EULER = Kinematics(
     name="euler",
     title="Euler parameters",
@@ -125,6 +127,7 @@ EULER = Kinematics(
     attitude="dcm-from-euler",
 )
 
+#: Cayley-Klein parameters, scalar first, likewise.
 CAYLEY_KLEIN = Kinematics(
     name="cayley-klein",
     title="Cayley-Klein parameters",

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from strapgen import algebra, catalogue
+from strapgen import algebra
 from strapgen.catalogue.kinematics import DCM_MEANING, THESIS
+from strapgen.catalogue.names import MOTIONS as MOTION_PARAMETERS
 from strapgen.kernel import Kernel, KernelBuilder
 from strapgen.signal import Signal
 
@@ -112,7 +113,7 @@ MOTIONS = {
 def _parameters(build: KernelBuilder, motion: MotionModel) -> list[sp.Symbol]:
     return [
         build.scalar(Signal.scalar(name, unit=unit, meaning=f"parameter of the rate, {motion.title}"))
-        for name, unit in catalogue.MOTIONS[motion.name].items()
+        for name, unit in MOTION_PARAMETERS[motion.name].items()
     ]
 
 

@@ -32,14 +32,42 @@ class Fit:
 
     basis: tuple[Coefficients, ...]
 
+    @property
+    def degree(self) -> int:
+        """Degree of the polynomial: one less than the number of samples."""
+        return len(self.basis) - 1
+
     def at(self, node: Fraction | sp.Expr) -> list[sp.Expr]:
         """Return the weights of the samples in the rate at a node."""
         t = exact(node)
         return [_reduced(sum((c * t**k for k, c in enumerate(row)), sp.Integer(0))) for row in self.basis]
 
-    def taylor(self, power: int) -> list[sp.Expr]:
-        """Return the weights of the samples in the coefficient of a power of time."""
-        return [row[power] if power < len(row) else sp.Integer(0) for row in self.basis]
+    def taylor(self, power: int, middle: sp.Rational = sp.S.Zero) -> list[sp.Expr]:
+        """Return the weights of the samples in the coefficient of a power of time.
+
+        Parameters
+        ----------
+        power : int
+        middle : Rational, optional
+            The moment from which the time counts.
+
+        Examples
+        --------
+        >>> from_increments(2).taylor(0), from_increments(2).taylor(0, sp.Rational(1, 2))
+        ([3, -1], [1, 1])
+        """
+        return [
+            _reduced(
+                sp.Add(
+                    *(
+                        c * sp.binomial(k, power) * middle ** (k - power)
+                        for k, c in enumerate(row)
+                        if k >= power
+                    )
+                )
+            )
+            for row in self.basis
+        ]
 
     def legendre(self, degree: int) -> list[sp.Expr]:
         """Return the weights of the samples in the coefficient of a Legendre polynomial, see `legendre`.

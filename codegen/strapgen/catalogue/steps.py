@@ -190,8 +190,9 @@ class Method:
     attitude_order : callable, optional
         ``attitude_order(degree)``: order on the kinematics of the attitude for a rate that is a polynomial of at
         most this degree, None for any; by default the classical order.
-    isometry : bool
-        Whether its transition is a rotation whatever the increments are.
+    isometry : callable, optional
+        ``isometry(count)``: whether its transition from so many samples, None for rates at the nodes, is a rotation
+        whatever they are; by default it is not.
     option : str
         How the command line names it.
     rotation_vector : callable, optional
@@ -209,7 +210,7 @@ class Method:
     transition: Callable[[KernelBuilder, Kinematics, Samples], sp.Matrix]
     nodes: tuple[Number, ...] = ()
     attitude_order: Callable[[int | None], int] | None = None
-    isometry: bool = False
+    isometry: Callable[[int | None], bool] = lambda count: False
     option: str = ""
     rotation_vector: Callable[[KernelBuilder, Samples], sp.Matrix] | None = None
     limit: Callable[[int, int], int] = rates.step_order
@@ -254,7 +255,7 @@ def exponential(
         source,
         order,
         transition,
-        isometry=True,
+        isometry=lambda count: True,
         rotation_vector=rotation_vector,
         **rest,
     )
@@ -302,7 +303,7 @@ def step(kinematics: Kinematics, method: Method, increments: int | None, previou
             kinematics.attitude,
             tuple(Fraction(int(x)) for x in kinematics.identity),
             previous,
-            method.isometry,
+            method.isometry(None if increments is None else increments + previous),
         ),
         order=order,
         arguments=f"{kinematics.name} {option}",

@@ -1,25 +1,25 @@
 """Algorithms that users bring: a Python file, or an entry point of an installed package.
 
 Both give a function called ``algorithm`` that returns the `Kernel` of an attitude step. Its parameters, if it has any,
-are chosen by name from `OPTIONS`.
+are chosen by name from `OPTIONS`. Each runs as if in a process of its own, see `isolation`, and its kernel is cached.
 """
 
 from __future__ import annotations
 
 import contextlib
-import importlib.util
 import inspect
+import os
 import shlex
 import sys
 import traceback
-from collections.abc import Callable
+from collections.abc import Iterator
 from dataclasses import replace
-from functools import partial
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from strapgen import checks
+from strapgen import cache, checks
+from strapgen.catalogue import isolation, user_cache
 from strapgen.exceptions import InputError, StrapgenError
 
 if TYPE_CHECKING:
@@ -32,26 +32,19 @@ FUNCTION = "algorithm"
 #: What the function may take: a `Tableau`, and how many increments.
 OPTIONS = ("method", "increments", "previous")
 
-#: Kernels that were loaded in this process, by name.
-KERNELS: dict[str, Kernel] = {}
-
 
 def installed() -> dict[str, EntryPoint]:
     """Return the entry points of installed packages by name."""
     return {point.name: point for point in entry_points(group=GROUP)}
 
 
-def load(name: str, catalogue: frozenset[str], derived: Callable[[str], Kernel], **options: Any) -> Kernel:
-    """Load an algorithm, check its kernel and remember it with the kernels of its own.
+def load(name: str, **options: Any) -> Kernel:
+    """Load an algorithm: its kernel, checked, from the cache if nothing has changed since it was derived.
 
     Parameters
     ----------
     name : str
         A Python file, or the name of an entry point.
-    catalogue : frozenset of str
-        Kernels that there are already.
-    derived : callable
-        Derives one of them.
     **options
         Of `OPTIONS`, those that the user chose.
 
@@ -64,21 +57,71 @@ def load(name: str, catalogue: frozenset[str], derived: Callable[[str], Kernel],
     InputError
         If there is no such algorithm, its code fails, or what it returns is no attitude step.
     """
-    function = _from_file(Path(name)) if name.endswith(".py") else _guarded(name, installed()[name].load)
+    arguments = _arguments(name, options)
+    texts = [f"{option} {value!r} {getattr(value, 'file', '')}" for option, value in options.items()]
+    isolation.depends_on(f"loads {name}, another algorithm")
+    find = _of_file if name.endswith(".py") else _of_entry_point
+    return replace(find(name, options, texts), arguments=arguments)
+
+
+def _of_file(name: str, options: dict[str, Any], texts: list[str]) -> Kernel:
+    path = Path(os.path.realpath(name))  # which a circle of links does not stop
+    if not path.is_file():
+        raise InputError(f"algorithm {name} is no file; a Python file with a function {FUNCTION} is needed")
+    try:
+        source = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"algorithm {name} cannot be read ({error.strerror})") from None
+
+    def derive() -> tuple[Kernel, isolation.Record]:
+        with _isolated(path.parent) as record, _guarded(name):
+            # Two files may have one name: each module gets a name of its own.
+            module = isolation.load_source(
+                path, f"strapgen_user_{path.stem}_{cache.digest([str(path)])}", record
+            )
+            if not hasattr(module, FUNCTION):
+                raise InputError(
+                    f"{name} defines no function {FUNCTION}; one that returns a Kernel is needed"
+                )
+            kernel = _called(name, getattr(module, FUNCTION), options)
+        return kernel, record
+
+    return user_cache.kernel(["file", str(path), cache.digest([source]), *texts], path.parent, derive)
+
+
+def _of_entry_point(name: str, options: dict[str, Any], texts: list[str]) -> Kernel:
+    point = installed()[name]
+
+    def derive() -> tuple[Kernel, isolation.Record]:
+        with _isolated(None, (point.module.partition(".")[0],)) as record, _guarded(name):
+            kernel = _called(name, point.load(), options)
+        return kernel, record
+
+    return user_cache.kernel(["entry point", name, point.value, *texts], None, derive)
+
+
+@contextlib.contextmanager
+def _isolated(folder: Path | None, anew: tuple[str, ...] = ()) -> Iterator[isolation.Record]:
+    """Begin a session with all imported that strapgen itself needs in it."""
+    from strapgen.catalogue import admission  # noqa: F401
+
+    with isolation.session(folder, anew) as record:
+        yield record
+
+
+def _called(name: str, function: Any, options: dict[str, Any]) -> Kernel:
+    """Return the kernel that a user's function returns, checked."""
     if not callable(function):
         raise InputError(f"{name}: {FUNCTION} is no function; one that returns a Kernel is needed")
-    parameters = _guarded(name, lambda: inspect.signature(function).parameters)
+    parameters = inspect.signature(function).parameters
     takes = [option for option in OPTIONS if option in parameters]
     for option in options:
         if option not in takes:
             raise InputError(
                 f"{name}: its {FUNCTION}({', '.join(takes)}) takes no {option}; {_allowed(takes)}"
             )
-    kernel = _guarded(name, lambda: function(**options))
-    _require(name, kernel, catalogue, derived)
-    kernel = replace(kernel, arguments=_arguments(name, options))
-    for made in (kernel, *kernel.own):
-        KERNELS[made.name] = made
+    kernel = function(**options)
+    _require(name, kernel)
     return kernel  # type: ignore[no-any-return]
 
 
@@ -93,7 +136,7 @@ def _arguments(name: str, options: dict[str, Any]) -> str:
     return " ".join(words)
 
 
-def _require(name: str, kernel: Any, catalogue: frozenset[str], derived: Callable[[str], Kernel]) -> None:
+def _require(name: str, kernel: Any) -> None:
     """Check what a user's function returned."""
     from strapgen.catalogue import admission
     from strapgen.kernel import Kernel
@@ -101,7 +144,7 @@ def _require(name: str, kernel: Any, catalogue: frozenset[str], derived: Callabl
     if not isinstance(kernel, Kernel):
         raise InputError(f"{name}: {FUNCTION}() returned {type(kernel).__name__}; a Kernel is needed")
     try:
-        admission.require(kernel, catalogue, derived)
+        admission.require(kernel)
     except InputError as error:
         raise InputError(f"{name}: {error}") from None
 
@@ -110,40 +153,20 @@ def _allowed(takes: list[str]) -> str:
     return f"it takes {', '.join(takes)}" if takes else "it takes no options"
 
 
-def _from_file(path: Path) -> Callable[..., Any]:
-    if not path.is_file():
-        raise InputError(f"algorithm {path} is no file; a Python file with a function {FUNCTION} is needed")
-    spec = importlib.util.spec_from_file_location(f"strapgen_user_{path.stem}", path)
-    assert spec is not None and spec.loader is not None, "a .py file has a loader"
-    module = importlib.util.module_from_spec(spec)
-    _guarded(str(path), partial(spec.loader.exec_module, module))
-    if not hasattr(module, FUNCTION):
-        raise InputError(f"{path} defines no function {FUNCTION}; one that returns a Kernel is needed")
-    function: Callable[..., Any] = getattr(module, FUNCTION)
-    return function
-
-
-def _guarded(name: str, run: Callable[[], Any]) -> Any:
-    """Run a user's code; where it fails, say where and why in one line.
-
-    What lies beside its file can be imported, and what it prints is no output of ours.
-    """
-    beside = [str(Path(name).resolve().parent)] if name.endswith(".py") else []
-    before = list(sys.path)
-    sys.path[:0] = beside
+@contextlib.contextmanager
+def _guarded(name: str) -> Iterator[None]:
+    """Run a user's code; where it fails, say where and why in one line. What it prints is no output of ours."""
     try:
         with contextlib.redirect_stdout(sys.stderr):
-            return run()
+            yield
     except SystemExit:
         raise InputError(f"{name} ends the program with sys.exit; it must return a Kernel") from None
     except StrapgenError:
         raise
     except Exception as error:
         frames = traceback.extract_tb(error.__traceback__)
-        own = [frame for frame in frames if Path(frame.filename).name == Path(name).name]
-        line = error.lineno if isinstance(error, SyntaxError) else own[-1].lineno if own else None
+        lines = [frame.lineno for frame in frames if Path(frame.filename).name == Path(name).name]
+        line = error.lineno if isinstance(error, SyntaxError) else lines[-1] if lines else None
         where = "" if line is None else f", line {line}"
         said = error.msg if isinstance(error, SyntaxError) else " ".join(str(error).split())
         raise InputError(f"{name}{where}: {type(error).__name__}: {said}") from error
-    finally:
-        sys.path[:] = before

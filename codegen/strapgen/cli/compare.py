@@ -90,12 +90,12 @@ def compare(
         --step 0.125 --duration 180
     """  # noqa: D301
     check_format(format, "csv")
-    from strapgen import catalogue, checks, output
+    from strapgen import checks, output
     from strapgen.backends import BACKENDS
     from strapgen.targets import FIXED
 
     choice = chosen(algorithm, method, tableau, increments, previous)
-    samples = catalogue.increments(choice)
+    samples = choice.increments_per_step
     names = list(dict.fromkeys(name.strip() for name in backends.split(",") if name.strip()))
     for name in names:
         checks.choice("backend", name, BACKENDS)
@@ -141,7 +141,7 @@ def compare(
             rate_unit,
             resample_hz,
             arcseconds(pulse_arcsec),
-            catalogue.previous(choice),
+            choice.previous,
         )
         length = None if max_rate_deg_s is None else repr(inputs.step)
         rows = comparison.compare_choice(

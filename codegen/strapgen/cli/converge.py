@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -76,7 +77,7 @@ def converge(
 
     \b
       strapgen converge euler --method rk1,rk2,rk4,butcher6 --increments enough \\
-        --plot orders.png
+        --plot out/orders.png
     """  # noqa: D301
     check_format(format, "csv")
     from strapgen import catalogue, checks
@@ -104,7 +105,7 @@ def converge(
         one = chosen(algorithm, name, tableau, None, previous)
         if one.method is None:
             raise InputError(f"--increments enough does not go with {algorithm}; a number does")
-        return one._replace(increments=catalogue.enough(one.method))
+        return replace(one, increments=catalogue.enough(one.method))
 
     choices = [choose(name) for name in names]
     import numpy as np

@@ -119,17 +119,17 @@ def generate(
         return
     if algorithm is None:
         raise InputError("an algorithm is needed, or --all; strapgen list shows them")
-    from strapgen import catalogue, checks, output, pipeline
+    from strapgen import checks, library, output, pipeline
     from strapgen.targets import FIXED, TARGETS
 
     choice = chosen(algorithm, method, tableau, increments, previous, rates, step=False)
-    settings = read_settings(catalogue.increments(choice), **stated)
+    settings = read_settings(choice.increments_per_step, **stated)
     target = checks.choice("target", "numpy" if target is None else target, TARGETS)
     if settings is not None and target not in FIXED:
         raise InputError(
             f"the options of fixed point go with --target {' or '.join(FIXED)}, not with {target}"
         )
-    program = pipeline.lower(catalogue.derive(choice))
+    program = library.program(choice)
     takes = {signal.name for signal in program.inputs}
     if not takes & {"increments", "turns"} and (max_rate_deg_s or step or max_angle_rad):
         raise InputError(
@@ -169,13 +169,15 @@ def generate(
 
 
 def _generate_all(out: Path | None, check: bool, format: str) -> None:
-    from strapgen import catalogue, resources, standard_tree
+    from strapgen import catalogue, output, resources, standard_tree
 
     if out is None:
         in_place = resources.checkout() is not None or check
         out = resources.folder("generated") if in_place else Path("generated")
     if check and not out.is_dir():
         raise InputError(f"{out} is no folder; --check needs the one to look at")
+    if not check:
+        output.check_folder(out)  # known before the derivation of all kernels
     total = len(catalogue.standard())
     files = standard_tree.tree(track(standard_tree.programs(), "deriving", total))
     if check:

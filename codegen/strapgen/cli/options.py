@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from strapgen import checks
+from strapgen.cli.progress import waiting
 from strapgen.exceptions import InputError
 
 if TYPE_CHECKING:
@@ -81,9 +82,9 @@ def chosen(
             raise InputError(f"--method {method} and --tableau {tableau} are both given; one is needed")
         chosen_method = tableaux.read(tableau)
     choose = catalogue.choose_step if step else catalogue.choose
-    return choose(
-        algorithm, chosen_method, whole("increments", increments), rates, whole("previous", previous) or 0
-    )
+    count, before = whole("increments", increments), whole("previous", previous) or 0
+    with waiting(f"deriving {algorithm}"):  # a user's code may take its time
+        return choose(algorithm, chosen_method, count, rates, before)
 
 
 def check_format(value: str, *more: str) -> str:
@@ -98,9 +99,4 @@ def print_json(data: Any) -> None:
 
 def whole(what: str, value: str | None) -> int | None:
     """Read an option that takes a whole number."""
-    if value is None:
-        return None
-    try:
-        return int(value)
-    except ValueError:
-        raise InputError(f"{what} is {value!r}; a whole number is needed") from None
+    return None if value is None else checks.whole(what, value)

@@ -3,10 +3,17 @@
 from __future__ import annotations
 
 import sys
+import threading
+import time
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from typing import TypeVar
 
 Item = TypeVar("Item")
+#: Seconds after which something is said to take time, and from one word to the next.
+_PATIENCE, _INTERVAL = 1.0, 1.0
+#: Takes a terminal back to the beginning of an empty line.
+_WIPE = "\r\x1b[2K"
 
 
 def track(items: Iterable[Item], title: str, total: int) -> Iterator[Item]:
@@ -18,3 +25,32 @@ def track(items: Iterable[Item], title: str, total: int) -> Iterator[Item]:
     from rich.progress import track as rich_track
 
     yield from rich_track(items, title, total, console=Console(stderr=True), transient=True)
+
+
+@contextmanager
+def waiting(title: str) -> Iterator[None]:
+    """Show on a terminal's stderr for how long one thing has taken, once it takes more than a moment."""
+    stream = sys.stderr
+    if not stream.isatty():
+        yield
+        return
+    done, begin = threading.Event(), time.monotonic()
+
+    def show() -> None:
+        if done.wait(_PATIENCE):
+            return
+        while True:
+            stream.write(f"{_WIPE}{title} {time.monotonic() - begin:.0f} s")
+            stream.flush()
+            if done.wait(_INTERVAL):
+                break
+        stream.write(_WIPE)
+        stream.flush()
+
+    shown = threading.Thread(target=show, daemon=True)
+    shown.start()
+    try:
+        yield
+    finally:
+        done.set()
+        shown.join()

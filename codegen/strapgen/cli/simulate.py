@@ -131,7 +131,7 @@ def simulate(
 
     \b
       strapgen simulate dcm --backend c --rates-csv gyro.csv \\
-        --rate-unit deg/s --resample-hz 100 --out attitude.csv
+        --rate-unit deg/s --resample-hz 100 --out out/attitude.csv
     """  # noqa: D301
     choice = chosen(algorithm, method, tableau, increments, previous)
     _check_names(backend, motion, format)
@@ -145,10 +145,10 @@ def simulate(
 
     import numpy as np
 
-    from strapgen import catalogue, output
+    from strapgen import output
     from strapgen.backends import of as make_backend
 
-    samples = catalogue.increments(choice), catalogue.previous(choice)
+    samples = choice.increments_per_step, choice.previous
 
     stated = {
         "word": word,

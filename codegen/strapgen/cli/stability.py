@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from strapgen.cli.options import Format, StepAlgorithm, check_format, print_json
+from strapgen.cli.options import Format, StepAlgorithm, check_format, chosen, print_json
 from strapgen.exceptions import InputError
 
 
@@ -32,7 +32,7 @@ def stability(
     The square of the factor by which a step of the angle x = |w| h stretches the state across the axis, exactly, and
     the angles at which it is at most 1.
 
-    Example: strapgen stability dcm --method rk3,rk4,butcher5 --plot stability.png
+    Example: strapgen stability dcm --method rk3,rk4,butcher5 --plot out/stability.png
     """
     check_format(format)
     from strapgen import catalogue, checks, output
@@ -44,10 +44,10 @@ def stability(
         if not given:
             raise InputError("--method names no method")
         names = [checks.choice("method", name, catalogue.METHODS) for name in given]
-    choices = [
-        catalogue.choose_step(algorithm, name, catalogue.enough(name) if ours and name else None)
-        for name in names
-    ]
+    choices = []
+    for name in names:
+        enough = str(catalogue.enough(name)) if ours and name else None
+        choices.append(chosen(algorithm, name, None, enough, None))
     from strapgen.analysis import growth
 
     found = [growth.stability(choice) for choice in choices]

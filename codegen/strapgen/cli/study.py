@@ -80,7 +80,7 @@ def word_length(
 
     \b
       strapgen study word-length --words 12,16,20,24,32 \\
-        --carries none,full --plot word-length.png
+        --carries none,full --plot out/word-length.png
     """  # noqa: D301
     check_format(format, "csv")
     from strapgen import catalogue, checks

@@ -136,6 +136,10 @@ def _print_table(table: Table, entries: list[TableEntry]) -> None:
         lines.append("  * not the thesis's figure in its printed digits")
     if any(entry.roundoff_dominates for entry in entries):
         lines.append("  r round-off dominates: over half of what the method itself loses")
-    for note in dict.fromkeys(entry.note for entry in entries if entry.note):
+    notes: dict[tuple[str, int], str] = {}
+    for entry in entries:
+        if entry.note:  # back ends differ in its figures alone; the first one's stand for all
+            notes.setdefault((entry.algorithm, entry.order), entry.note)
+    for note in notes.values():
         lines += [f"  {line}" for line in textwrap.wrap(note, 90)]
     typer.echo("\n".join(line.rstrip() for line in lines) + "\n")

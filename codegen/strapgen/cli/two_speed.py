@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from strapgen.cli.fixed import Fixes, Ranges, Rounding, Word, read_settings
+from strapgen.cli.fixed import Allowance, Carry, Fixes, Ranges, Rounding, Word, read_settings
 from strapgen.cli.options import Format, check_format, print_json, whole
 from strapgen.exceptions import InputError
 
@@ -26,6 +26,8 @@ def two_speed(
     ] = None,
     word: Word = None,
     rounding: Rounding = None,
+    carry: Carry = None,
+    drift_allowance: Allowance = None,
     ranges: Ranges = None,
     fix: Fixes = None,
     format: Format = "text",
@@ -40,7 +42,15 @@ def two_speed(
     from strapgen.fixedpoint import Settings
 
     form = whole("sculling", sculling) or 0
-    settings = read_settings(1, word=word, rounding=rounding, ranges=ranges, formats=fix)
+    settings = read_settings(
+        1,
+        word=word,
+        rounding=rounding,
+        carry=carry,
+        drift_allowance=drift_allowance,
+        ranges=ranges,
+        formats=fix,
+    )
     if target == "c-fixed":
         settings = settings or Settings()
     elif settings is not None:

@@ -277,11 +277,11 @@ def _assessed(
     random: bool,
 ) -> list[_Case]:
     """Return what can be assessed of an algorithm, of what is asked for."""
-    from strapgen import catalogue, checks
+    from strapgen import checks
     from strapgen.catalogue import user
     from strapgen.vibration import assessment, systems
 
-    _check_known(algorithm, (*systems.NAMES, _TWO_SPEED), (*user.KERNELS, *user.installed()))
+    _check_known(algorithm, (*systems.NAMES, _TWO_SPEED), tuple(user.installed()))
     method, tableau, count, previous, rates = options
     cycles = None
     whole_algorithm = algorithm == _TWO_SPEED
@@ -307,7 +307,7 @@ def _assessed(
     else:
         choice = chosen(algorithm, method, tableau, count, previous, rates, step=False)
         can = assessment.quantities(choice)
-        of, samples = partial(assessment.of, choice), cycles or catalogue.increments(choice)
+        of, samples = partial(assessment.of, choice), cycles or choice.increments_per_step
     if random:
         wanted = list(can)
     else:

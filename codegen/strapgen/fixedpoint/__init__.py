@@ -1,8 +1,9 @@
 """Fixed point: a program lowered to integers, with proved ranges and certified error bounds."""
 
 from strapgen.exceptions import InputError
-from strapgen.fixedpoint.code import FixedProgram, Interface
+from strapgen.fixedpoint.code import FixedProgram
 from strapgen.fixedpoint.formats import Format
+from strapgen.fixedpoint.interface import Interface
 from strapgen.fixedpoint.settings import Settings
 from strapgen.program import Operation, Program, walk
 

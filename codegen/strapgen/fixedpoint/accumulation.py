@@ -13,8 +13,9 @@ from fractions import Fraction
 from functools import lru_cache
 
 from strapgen.fixedpoint import quantities as exact
-from strapgen.fixedpoint.code import Accumulation, Argument, Sum, Value
+from strapgen.fixedpoint.code import IntegerSum, Value
 from strapgen.fixedpoint.formats import ROUNDINGS
+from strapgen.fixedpoint.interface import Argument, RoundingAccumulation
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.fixedpoint.series import Series, Truncated
 from strapgen.fixedpoint.settings import Settings
@@ -31,7 +32,7 @@ def accumulation(
     values: Mapping[str, Value],
     inputs: Sequence[Argument],
     outputs: Sequence[Argument],
-) -> Accumulation | None:
+) -> RoundingAccumulation | None:
     """Return how the errors of a step add up; None where it calls more than sums, roots, sines and cosines.
 
     Lengths are those of a state, or of a row of a matrix: the norm in which a transition stretches least.
@@ -53,7 +54,7 @@ def accumulation(
         value = values[name]
         rounding = half / Fraction(2) ** value.fraction
         rounded = value.definition
-        carried = isinstance(rounded, Sum) and rounded.residual is not None
+        carried = isinstance(rounded, IntegerSum) and rounded.residual is not None
         inner.append(value.error - (2 * rounding if carried else 0))
         kept.append(rounding if carried else Fraction(0))
         away.append(made.distance(name))
@@ -74,7 +75,7 @@ def accumulation(
         )
         own = value.error - through
         lowered = value.definition
-        if isinstance(lowered, Sum) and lowered.residual is not None:
+        if isinstance(lowered, IntegerSum) and lowered.residual is not None:
             own -= 2 * rounding
             left = rounding
         local.append(own)
@@ -93,7 +94,7 @@ def accumulation(
     if moved is None:
         return None
     input_rounding = length * _norm([moved[name] for name in held])
-    return Accumulation(once, per_step, input_rounding, _growth(program, made, width))
+    return RoundingAccumulation(once, per_step, input_rounding, _growth(program, made, width))
 
 
 def _moved(made: exact.Quantities, by: Mapping[str, Fraction]) -> dict[str, Fraction] | None:
@@ -101,7 +102,7 @@ def _moved(made: exact.Quantities, by: Mapping[str, Fraction]) -> dict[str, Frac
     moved: dict[str, Fraction] = {}
     for name, quantity in made.items.items():
         definition = quantity.definition
-        if isinstance(definition, exact.Given):
+        if isinstance(definition, exact.InputElement):
             moved[name] = by.get(definition.signal, Fraction(0))
         elif isinstance(definition, exact.Sum):
             total = Fraction(0)
@@ -114,9 +115,9 @@ def _moved(made: exact.Quantities, by: Mapping[str, Fraction]) -> dict[str, Frac
                     (a, b), (da, db) = sizes, moves
                     total += abs(coefficient) * (a * db + b * da + da * db)
             moved[name] = total + sum(abs(c) * moved[m[0]] for m, c in quantity.beside)
-        elif isinstance(definition, exact.Taken | exact.Nearest):
+        elif isinstance(definition, exact.Computed | exact.NearestInteger):
             moved[name] = Fraction(0)  # within a function, whose slope tells what becomes of it
-        elif isinstance(definition, exact.Root):
+        elif isinstance(definition, exact.SquareRoot):
             moved[name] = _root(moved[definition.argument])
         else:
             return None
@@ -125,7 +126,7 @@ def _moved(made: exact.Quantities, by: Mapping[str, Fraction]) -> dict[str, Frac
     return moved
 
 
-def _followed(follows: exact.Following, moved: Mapping[str, Fraction]) -> Fraction:
+def _followed(follows: exact.ErrorPropagation, moved: Mapping[str, Fraction]) -> Fraction:
     """Return how far a function can move."""
     total = Fraction(0)
     for name, slope in follows.slopes:

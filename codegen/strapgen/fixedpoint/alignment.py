@@ -6,7 +6,7 @@ import math
 from collections.abc import Container, Iterable, Iterator, Mapping
 from fractions import Fraction
 
-from strapgen.fixedpoint.code import Sum, Value, used_by
+from strapgen.fixedpoint.code import IntegerSum, Value, used_by
 
 #: Bits below the last place of a sum down to which its products are kept.
 _BELOW = 8
@@ -39,7 +39,7 @@ def aligning(body: Iterable[Value], values: Mapping[str, Value], kept: Container
     coarser: dict[str, int] = {}
     for name, want in wanted.items():
         definition = values[name].definition
-        rounded = isinstance(definition, Sum) and definition.shift and definition.residual is None
+        rounded = isinstance(definition, IntegerSum) and definition.shift and definition.residual is None
         bits = min(want, allowed[name])
         if bits > 0 and rounded and name not in kept:
             coarser[name] = values[name].fraction - bits
@@ -49,7 +49,7 @@ def aligning(body: Iterable[Value], values: Mapping[str, Value], kept: Container
 def _uses(value: Value, values: Mapping[str, Value]) -> Iterator[tuple[str, int, int]]:
     """Yield the values that another is computed from: by how many bits each should be coarser, and may be."""
     definition = value.definition
-    if not isinstance(definition, Sum) or value.wide or not definition.shift:
+    if not isinstance(definition, IntegerSum) or value.wide or not definition.shift:
         # Left as it is: every bit of what is compared, or added at full precision, counts.
         for name in used_by(value):
             yield name, 0, 0

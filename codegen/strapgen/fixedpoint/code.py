@@ -6,16 +6,14 @@ Nothing here knows C or Python text; targets print it.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
 from fractions import Fraction
 from typing import Any
 
 from strapgen.fixedpoint.formats import Format
-from strapgen.fixedpoint.settings import Settings
+from strapgen.fixedpoint.interface import ErrorFeedback, Interface
 from strapgen.program import Program
-from strapgen.signal import Signal
 
 
 @dataclass(frozen=True)
@@ -37,38 +35,12 @@ class Term:
 
 
 @dataclass(frozen=True)
-class Residual:
-    """What lies below the last place of a value, kept for the next call: a word without a sign.
-
-    It takes the place of what is added for rounding: the sum starts from it, and its low bits are the next one. A fresh
-    start is half a unit of the last place for rounding to the nearest, and nothing for truncation; every other word is
-    allowed too.
-
-    Parameters
-    ----------
-    name : str
-        Its name.
-    fraction : int
-        Its fraction bits.
-    shift : int
-        From its fraction to that of the sum, not above 0: added as ``residual * 2**shift``, which drops bits.
-    fresh : int
-        The word of a fresh start.
-    """
-
-    name: str
-    fraction: int
-    shift: int
-    fresh: int
-
-
-@dataclass(frozen=True)
-class Given:
+class IntegerInput:
     """An element of an input."""
 
 
 @dataclass(frozen=True)
-class Sum:
+class IntegerSum:
     """Terms, divided by 2**shift with rounding, and terms that are added after that.
 
     Parameters
@@ -79,7 +51,7 @@ class Sum:
         Places that the rounding drops, 0 for none.
     coarse : tuple of Term
         What is exact at the result's own fraction.
-    residual : Residual or None
+    residual : ErrorFeedback or None
         What the rounding of the last call left; it is added in place of half a unit.
     drop : int
         Places below the last one of the residual, which are dropped before it is added.
@@ -88,7 +60,7 @@ class Sum:
     fine: tuple[Term, ...]
     shift: int = 0
     coarse: tuple[Term, ...] = ()
-    residual: Residual | None = None
+    residual: ErrorFeedback | None = None
     drop: int = 0
 
 
@@ -101,7 +73,7 @@ class Scaled:
 
 
 @dataclass(frozen=True)
-class Quotient:
+class IntegerQuotient:
     """``numerator / denominator``, rounded; the denominator has one sign."""
 
     numerator: Scaled
@@ -109,21 +81,21 @@ class Quotient:
 
 
 @dataclass(frozen=True)
-class Root:
+class IntegerRoot:
     """The square root of an integer that is not negative, rounded."""
 
     argument: Scaled
 
 
 @dataclass(frozen=True)
-class Largest:
+class IntegerMaximum:
     """The largest of several."""
 
     arguments: tuple[Scaled, ...]
 
 
 @dataclass(frozen=True)
-class Choice:
+class IntegerSelection:
     """The value of the first case whose left side is at least its right side, or another one.
 
     The two sides of a case have one fraction, and so have all values.
@@ -133,7 +105,9 @@ class Choice:
     otherwise: Scaled
 
 
-Definition = Given | Sum | Quotient | Root | Largest | Choice
+IntegerDefinition = (
+    IntegerInput | IntegerSum | IntegerQuotient | IntegerRoot | IntegerMaximum | IntegerSelection
+)
 
 
 @dataclass(frozen=True)
@@ -143,7 +117,7 @@ class Value:
     Parameters
     ----------
     name : str
-    definition : Definition
+    definition : IntegerDefinition
     fraction : int
     wide : bool
         Whether it takes a wide number.
@@ -162,7 +136,7 @@ class Value:
     """
 
     name: str
-    definition: Definition
+    definition: IntegerDefinition
     fraction: int
     wide: bool
     low: int
@@ -181,169 +155,67 @@ class Value:
 
 def used_by(value: Value) -> list[str]:
     """Return the names that a value is computed from."""
-    definition = value.definition
-    if isinstance(definition, Sum):
-        return [name for term in (*definition.fine, *definition.coarse) for name in term.names]
-    if isinstance(definition, Quotient):
-        return [definition.denominator, *_named([definition.numerator])]
-    if isinstance(definition, Root):
-        return _named([definition.argument])
-    if isinstance(definition, Largest):
-        return _named(definition.arguments)
-    if not isinstance(definition, Choice):
-        return []
-    return _named([side for case in definition.cases for side in case] + [definition.otherwise])
+    match value.definition:
+        case IntegerSum() as total:
+            return [name for term in (*total.fine, *total.coarse) for name in term.names]
+        case IntegerQuotient(numerator, denominator):
+            return [denominator, *_names([numerator])]
+        case IntegerRoot(argument):
+            return _names([argument])
+        case IntegerMaximum(arguments):
+            return _names(arguments)
+        case IntegerSelection(cases, otherwise):
+            return _names([*(operand for case in cases for operand in case), otherwise])
+    return []
 
 
-def _named(operands: tuple[Scaled, ...] | list[Scaled]) -> list[str]:
+def _names(operands: Iterable[Scaled]) -> list[str]:
+    """Return the names of the operands that are no constants."""
     return [operand.value for operand in operands if isinstance(operand.value, str)]
 
 
-@dataclass(frozen=True)
-class Argument:
-    """An input or an output of a fixed-point function.
+def operation_counts(body: Iterable[Value], rounding: str) -> dict[str, int]:
+    """Return the number of integer operations of each kind.
 
     Parameters
     ----------
-    signal : Signal
-    format : Format
-    values : tuple of str
-        The value that holds each element.
-    low, high : int
-        Range of the integers: of an input, what is accepted; of an output, what is proved.
-    errors : tuple of Fraction
-        Error bound of each element of an output after one call; of an input, zeros.
+    body : iterable of Value
+    rounding : str
+        "nearest" or "truncation".
+
+    Returns
+    -------
+    dict of str to int
     """
-
-    signal: Signal
-    format: Format
-    values: tuple[str, ...]
-    low: int
-    high: int
-    errors: tuple[Fraction, ...]
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the argument as plain JSON data."""
-        return {
-            "signal": self.signal.as_dict(),
-            "word": self.format.word,
-            "fraction": self.format.fraction,
-            "values": list(self.values),
-            "low": self.low,
-            "high": self.high,
-            "errors": [str(error) for error in self.errors],
-        }
-
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> Argument:
-        """Rebuild an argument from `as_dict`."""
-        return cls(
-            Signal.from_dict(data["signal"]),
-            Format(data["word"], data["fraction"]),
-            tuple(data["values"]),
-            data["low"],
-            data["high"],
-            tuple(map(Fraction, data["errors"])),
-        )
+    counts = dict.fromkeys(("add", "multiply", "shift", "divide", "sqrt", "compare"), 0)
+    for value in body:
+        match value.definition:
+            case IntegerSum() as total:
+                for kind, count in _sum_counts(total, rounding).items():
+                    counts[kind] += count
+            case IntegerQuotient():
+                counts["divide"] += 1
+            case IntegerRoot():
+                counts["sqrt"] += 1
+            case IntegerMaximum(arguments):
+                counts["compare"] += len(arguments) - 1
+            case IntegerSelection(cases):
+                counts["compare"] += len(cases)
+    return counts
 
 
-@dataclass(frozen=True)
-class Accumulation:
-    """How rounding adds up over the steps of a run, in the length of a state (of a row, for a matrix).
-
-    Parameters
-    ----------
-    once : Fraction
-        What does not depend on the number of steps.
-    per_step : Fraction
-        What every step adds.
-    input_rounding : Fraction
-        What every step adds if increments are rounded to their format first.
-    growth : Fraction
-        Largest factor by which a step stretches what is there.
-    """
-
-    once: Fraction
-    per_step: Fraction
-    input_rounding: Fraction
-    growth: Fraction
-
-    def bound(self, steps: int, rounded_inputs: bool = False, stretch: float | None = None) -> float:
-        """Return a bound after a number of steps; inf where none of use is known.
-
-        Parameters
-        ----------
-        steps : int
-        rounded_inputs : bool, optional
-            Whether increments are rounded to their format first.
-        stretch : float, optional
-            Largest factor by which the transitions of the run stretch a difference, where more is known of it than
-            that no step exceeds `growth`.
-
-        Examples
-        --------
-        >>> Accumulation(Fraction(1), Fraction(2), Fraction(0), Fraction(1)).bound(10)
-        21.0
-        """
-        exponent = steps * float(self.growth - 1)
-        if exponent > 100 and stretch is None:
-            return math.inf
-        exponent = min(exponent, 100.0)
-        per_step = self.per_step + (self.input_rounding if rounded_inputs else 0)
-        # (g^n - 1)/(g - 1) <= n exp(n (g - 1)); a part in a million covers the rounding of this line.
-        stretched = math.exp(exponent) * (1 + 1e-6) if exponent else 1.0
-        if stretch is not None:
-            stretched = stretch
-        return stretched * (float(self.once) + steps * float(per_step))
-
-
-@dataclass(frozen=True)
-class Interface:
-    """All that a caller of fixed-point code must know.
-
-    Parameters
-    ----------
-    settings : Settings
-    inputs, outputs : tuple of Argument
-    residuals : tuple of Residual
-        What is kept from call to call.
-    accumulation : Accumulation or None
-        For a step, how its rounding adds up.
-    """
-
-    settings: Settings
-    inputs: tuple[Argument, ...]
-    outputs: tuple[Argument, ...]
-    residuals: tuple[Residual, ...]
-    accumulation: Accumulation | None
-
-    @property
-    def companion_settings(self) -> Settings:
-        """The settings of a kernel that works on the same state beside a step: an orthonormalization."""
-        return replace(self.settings, ranges={}, formats={"state": str(self.inputs[0].format)})
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the interface as plain JSON data."""
-        adds_up = self.accumulation
-        return {
-            "settings": self.settings.as_dict(),
-            "inputs": [argument.as_dict() for argument in self.inputs],
-            "outputs": [argument.as_dict() for argument in self.outputs],
-            "residuals": [asdict(residual) for residual in self.residuals],
-            "accumulation": adds_up and {name: str(value) for name, value in asdict(adds_up).items()},
-        }
-
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> Interface:
-        """Rebuild an interface from `as_dict`."""
-        adds_up = data["accumulation"]
-        return cls(
-            Settings.from_dict(data["settings"]),
-            tuple(map(Argument.from_dict, data["inputs"])),
-            tuple(map(Argument.from_dict, data["outputs"])),
-            tuple(Residual(**residual) for residual in data["residuals"]),
-            adds_up and Accumulation(**{name: Fraction(value) for name, value in adds_up.items()}),
-        )
+def _sum_counts(total: IntegerSum, rounding: str) -> dict[str, int]:
+    """Return the numbers of additions, multiplications and shifts of a sum."""
+    terms = [*total.fine, *total.coarse]
+    products = sum(len(t.names) == 2 or (abs(t.factor) != 1 and bool(t.names)) for t in terms)
+    additions = max(0, len(terms) - 1)
+    shifts = sum(bool(term.shift) for term in terms) + bool(total.shift)
+    if total.residual is not None:
+        additions += 1
+        shifts += 2 * bool(total.residual.shift) + bool(total.drop)
+    elif total.shift and rounding == "nearest":
+        additions += 1
+    return {"add": additions, "multiply": products, "shift": shifts}
 
 
 @dataclass(frozen=True)

@@ -44,7 +44,7 @@ class Format:
         InputError
             If the text is no format of the word.
         """
-        found = re.fullmatch(r"Q(-?\d{1,4})\.(-?\d{1,4})", text)
+        found = re.fullmatch(r"Q(-?[0-9]{1,4})\.(-?[0-9]{1,4})", text)
         if found is None:
             raise InputError(f"format {text!r} is not known; Qm.n is needed, as in Q1.{word - 2}")
         whole, fraction = map(int, found.groups())

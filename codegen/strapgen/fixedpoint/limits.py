@@ -43,16 +43,17 @@ def limits(program: Program, settings: Settings) -> list[Limit]:
     Raises
     ------
     InputError
-        If an input has no known range, or a format that is asked for does not hold it.
+        If an input has no known range, or the format that the user states does not hold it.
     """
     unknown = set(settings.ranges) - {signal.name for signal in program.inputs}
     if unknown:
         names = ", ".join(signal.name for signal in program.inputs)
         raise InputError(f"{program.kernel} has no input {sorted(unknown)[0]!r}; its inputs are: {names}")
-    word, made = settings.word, []
+    word = settings.word
+    stated: list[Limit] = []
     for signal in program.inputs:
         largest = _largest(program, signal, settings)
-        text = asked(settings, signal)
+        text = stated_format(settings, signal)
         if text is not None:
             fraction = Format.parse(text, word).fraction
             if largest * Fraction(2) ** fraction < 1:
@@ -67,12 +68,12 @@ def limits(program: Program, settings: Settings) -> list[Limit]:
             fraction = state_fraction(word, largest)
         else:
             fraction = finest(largest, word)
-        made.append(Limit(signal, largest, fraction, text is not None))
-    return made
+        stated.append(Limit(signal, largest, fraction, text is not None))
+    return stated
 
 
-def asked(settings: Settings, signal: Signal) -> str | None:
-    """Return the format that is asked for an argument; "state" stands for every attitude."""
+def stated_format(settings: Settings, signal: Signal) -> str | None:
+    """Return the format that the user states for an argument, if any; "state" stands for every attitude."""
     return settings.formats.get(signal.name, settings.formats.get("state") if signal.constraint else None)
 
 

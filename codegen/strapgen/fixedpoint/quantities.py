@@ -17,7 +17,7 @@ Terms = dict[Monomial, Fraction]
 
 
 @dataclass(frozen=True)
-class Given:
+class InputElement:
     """An element of an input."""
 
     signal: str
@@ -39,21 +39,21 @@ class Quotient:
 
 
 @dataclass(frozen=True)
-class Root:
+class SquareRoot:
     """A square root."""
 
     argument: str
 
 
 @dataclass(frozen=True)
-class Largest:
+class Maximum:
     """The largest of several quantities."""
 
     arguments: tuple[Operand, ...]
 
 
 @dataclass(frozen=True)
-class Choice:
+class Selection:
     """The value of the first case whose left side is at least its right side, or another one."""
 
     cases: tuple[tuple[Operand, Operand, Operand], ...]
@@ -61,25 +61,25 @@ class Choice:
 
 
 @dataclass(frozen=True)
-class Taken:
+class Computed:
     """What the code computes for another quantity, brought into that one's range: it has no error of its own."""
 
     argument: str
 
 
 @dataclass(frozen=True)
-class Nearest:
+class NearestInteger:
     """The integer that the code finds nearest to a multiple of a quantity; the factor is dyadic."""
 
     argument: str
     factor: Fraction
 
 
-Definition = Given | Sum | Quotient | Root | Largest | Choice | Taken | Nearest
+Definition = InputElement | Sum | Quotient | SquareRoot | Maximum | Selection | Computed | NearestInteger
 
 
 @dataclass(frozen=True)
-class Following:
+class ErrorPropagation:
     """The error of a function of quantities whose computed values were taken as exact.
 
     Parameters
@@ -117,7 +117,7 @@ class Quantity:
     inexact : Fraction
         Bound of how far the definition is from the quantity: what a series leaves out, or a rational number for an
         irrational one.
-    follows : Following or None
+    follows : ErrorPropagation or None
         How the errors of quantities go on whose computed values were taken as exact on the way.
     """
 
@@ -129,7 +129,7 @@ class Quantity:
     guarded: bool = False
     beside: tuple[tuple[Monomial, Fraction], ...] = ()
     inexact: Fraction = Fraction(0)
-    follows: Following | None = None
+    follows: ErrorPropagation | None = None
 
 
 @dataclass
@@ -166,7 +166,11 @@ class Quantities:
             for quantity in self.items.values()
             for name in (
                 *(m[0] for m, _ in quantity.beside),
-                *([quantity.definition.argument] if isinstance(quantity.definition, Taken | Nearest) else []),
+                *(
+                    [quantity.definition.argument]
+                    if isinstance(quantity.definition, Computed | NearestInteger)
+                    else []
+                ),
             )
         }
 
@@ -203,11 +207,11 @@ def used_by(quantity: Quantity) -> list[str]:
         used += [name for monomial, _ in definition.terms for name in monomial]
     elif isinstance(definition, Quotient):
         used += [definition.numerator, definition.denominator]
-    elif isinstance(definition, Root | Taken | Nearest):
+    elif isinstance(definition, SquareRoot | Computed | NearestInteger):
         used.append(definition.argument)
-    elif isinstance(definition, Largest):
+    elif isinstance(definition, Maximum):
         used += definition.arguments
-    elif isinstance(definition, Choice):
+    elif isinstance(definition, Selection):
         used += [operand for case in definition.cases for operand in case] + [definition.otherwise]
     return [name for name in used if isinstance(name, str)]
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from fractions import Fraction
 
 from strapgen.fixedpoint.intervals import Interval
-from strapgen.fixedpoint.quantities import Given, Quantity, Sum, Terms, combined
+from strapgen.fixedpoint.quantities import InputElement, Quantity, Sum, Terms, combined
 
 #: Degree up to which a quantity is expanded in the inputs for its range, and terms that this may take.
 _DEGREE, _MOST_TERMS = 2, 60
@@ -96,7 +96,7 @@ class Ranges:
         `seen` is the largest magnitude on samples: where a bit may be gained, and no proof.
         """
         bits, lost = math.frexp(seen * (1 + 1e-9))[1], math.frexp(float(enclosure.magnitude))[1]
-        if lost <= bits or any(not isinstance(q.definition, Given | Sum) for q in self.items.values()):
+        if lost <= bits or any(not isinstance(q.definition, InputElement | Sum) for q in self.items.values()):
             return enclosure
         goal = Fraction(2) ** bits
         needed = self._needed(definition)

@@ -29,6 +29,28 @@ class Placed:
     error: Fraction
 
 
+@dataclass(frozen=True)
+class Aligned:
+    """Terms at one place.
+
+    Parameters
+    ----------
+    terms : tuple of Term
+    peak : int
+        Bound of the magnitude of their partial sums.
+    error : Fraction
+        Bound of the error of their sum, with what shifts lose.
+    """
+
+    terms: tuple[Term, ...]
+    peak: int
+    error: Fraction
+
+    def fits(self, word: int, values: Mapping[str, Value], added: int = 0) -> bool:
+        """Tell whether every term, and every partial sum with so much added, fits into a wide number."""
+        return self.peak + added <= largest_wide(word) and terms_fit(self.terms, word, values)
+
+
 def largest_wide(word: int) -> int:
     """Return the largest integer that a wide number holds."""
     return (1 << (2 * word - 1)) - 1
@@ -44,22 +66,12 @@ def up(value: Fraction) -> Fraction:
     return Fraction(-((-value.numerator << GRID) // value.denominator), 1 << GRID)
 
 
-def bound(term: Term, values: Mapping[str, Value]) -> int:
-    """Return the largest magnitude of an integer term, before it is shifted down."""
-    size = abs(term.factor)
-    for name in term.names:
-        size *= values[name].magnitude
-    return size << term.shift if term.shift > 0 else size
-
-
-def aligned(
-    terms: Iterable[Placed], place: int, word: int, values: Mapping[str, Value]
-) -> tuple[tuple[Term, ...], int, Fraction]:
-    """Return terms at one place, the bound of their partial sums, and their error with what shifts lose.
+def aligned(terms: Iterable[Placed], place: int, word: int, values: Mapping[str, Value]) -> Aligned:
+    """Return terms at one place.
 
     A shift by all bits of a wide number but one leaves 0 or -1, as every longer one would.
     """
-    made: list[Term] = []
+    shifted: list[Term] = []
     peak, error = 0, Fraction(0)
     for item in terms:
         term, wrong = item.term, item.error
@@ -70,16 +82,24 @@ def aligned(
             error += wrong + abs(integer - exact) / Fraction(2) ** place
             if not integer:
                 continue
-            made.append(Term((), integer))
+            shifted.append(Term((), integer))
         else:
-            made.append(replace(term, shift=shift))
+            shifted.append(replace(term, shift=shift))
             error += wrong + (Fraction(2) ** -place if shift < 0 else 0)
-        size = bound(made[-1], values)
+        size = _bound(shifted[-1], values)
         peak += (size >> -shift) + 1 if shift < 0 and term.names else size
-    return tuple(made), peak, up(error)
+    return Aligned(tuple(shifted), peak, up(error))
 
 
-def fits(terms: Iterable[Term], peak: int, word: int, values: Mapping[str, Value]) -> bool:
-    """Tell whether every term, and every partial sum up to a bound, fits into a wide number."""
+def terms_fit(terms: Iterable[Term], word: int, values: Mapping[str, Value]) -> bool:
+    """Tell whether every term fits into a wide number."""
     room = largest_wide(word)
-    return peak <= room and all(bound(term, values) <= room for term in terms)
+    return all(_bound(term, values) <= room for term in terms)
+
+
+def _bound(term: Term, values: Mapping[str, Value]) -> int:
+    """Return the largest magnitude of an integer term, before it is shifted down."""
+    size = abs(term.factor)
+    for name in term.names:
+        size *= values[name].magnitude
+    return size << term.shift if term.shift > 0 else size

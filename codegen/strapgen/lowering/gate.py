@@ -7,6 +7,7 @@ they are multiplied by it, and negative terms are subtracted.
 from __future__ import annotations
 
 from fractions import Fraction
+from itertools import count
 
 import sympy as sp
 from sympy.core.relational import GreaterThan, LessThan, StrictGreaterThan, StrictLessThan
@@ -48,7 +49,8 @@ def gate(kernel: Kernel, shared: Shared) -> Program:
     NotImplementedError
         If an expression uses a function, a power or a condition for which programs have no operation.
     """
-    writer = _Writer()
+    reserved = {name for signal in kernel.signals for name in signal.elements}
+    writer = _Writer(reserved | {definition.symbol.name for definition in shared.definitions})
     for definition in shared.definitions:
         value = writer.node(definition.expression)
         writer.body.append(Assignment(definition.symbol.name, value, definition.meaning))
@@ -77,9 +79,9 @@ def gate(kernel: Kernel, shared: Shared) -> Program:
 class _Writer:
     """Turns expressions into nodes; it adds a temporary where a power or an inverse function needs a value twice."""
 
-    def __init__(self) -> None:
+    def __init__(self, reserved: set[str]) -> None:
         self.body: list[Assignment] = []
-        self._powers = 0
+        self._powers = (name for k in count(1) if (name := f"{FACTOR}{k}") not in reserved)
 
     def node(self, expression: sp.Expr) -> Node:
         if expression.is_Symbol:
@@ -168,8 +170,7 @@ class _Writer:
         for assignment in self.body:
             if assignment.value == node:
                 return Reference(assignment.name)
-        self._powers += 1
-        name = f"{FACTOR}{self._powers}"
+        name = next(self._powers)
         self.body.append(Assignment(name, node))
         return Reference(name)
 

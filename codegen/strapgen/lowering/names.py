@@ -20,5 +20,6 @@ def is_temporary(name: str) -> bool:
 
 def shared_names(program: Program) -> Iterator[str]:
     """Yield names for further common subexpressions, none of which the program uses yet."""
-    assigned = {assignment.name for assignment in program.body}
-    return (name for k in count(1) if (name := f"{SHARED}{k}") not in assigned)
+    names = {assignment.name for assignment in program.body}
+    names |= {element for signal in program.inputs for element in signal.elements}
+    return (name for k in count(1) if (name := f"{SHARED}{k}") not in names)

@@ -66,7 +66,9 @@ def share(kernel: Kernel, common: bool = True) -> Shared:
                 meaning = ""
     if not common:
         return Shared(definitions, values)
-    names = sp.numbered_symbols(SHARED, start=1, real=True)
+    elements = (name for signal in kernel.signals for name in signal.elements)
+    excluded = [sp.Symbol(name, real=True) for name in elements]
+    names = sp.numbered_symbols(SHARED, start=1, exclude=excluded, real=True)
     common_parts, reduced = sp.cse([d.expression for d in definitions], symbols=names, order="canonical")
     # A program cannot assign a condition to a name, so each condition goes back to where it is used.
     conditions = {symbol: expression for symbol, expression in common_parts if expression.is_Relational}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from importlib import import_module
 from typing import NamedTuple
 
@@ -56,11 +57,12 @@ def emit(program: Program | FixedProgram, target: str, settings: Settings | None
     """
     module = import_module(f"{__name__}.{TARGETS[checks.choice('target', target, TARGETS)].module}")
     if target in FIXED:
-        made: Sources = module.emit(program, target, settings)
-        return made
+        fixed: Sources = module.emit(program, target, settings)
+        lowered = program.program if isinstance(program, FixedProgram) else program
+        return replace(fixed, own=lowered.own)
     if isinstance(program, FixedProgram):
         raise InputError(f"target {target} does not take fixed-point programs; these do: {', '.join(FIXED)}")
     if settings is not None:
         raise InputError(f"target {target} takes no fixed-point settings; these do: {', '.join(FIXED)}")
     sources: Sources = module.emit(program, target)
-    return sources
+    return replace(sources, own=program.own)

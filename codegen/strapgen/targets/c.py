@@ -9,6 +9,7 @@ import numpy as np
 
 from strapgen.program import Operation, Program, walk
 from strapgen.signal import Signal
+from strapgen.targets.names import C, external, printed
 from strapgen.targets.printer import Printer, fill_expression
 from strapgen.targets.rendering import render
 from strapgen.targets.sources import Function, Sources
@@ -102,8 +103,26 @@ def emit(program: Program, target: str = "c") -> Sources:
         ``<name>_propagate`` too, the loop over runs and steps.
     """
     real = REALS[target]
+    name = external(f"{program.name}{real.infix}")
+    # A scalar that goes in is its own argument.
+    scalars = [signal.name for signal in program.inputs if not signal.shape]
+    _, files = printed(program, lambda named, _: _files(named, name, real), C, scalars)
+    function = Function(name, program.inputs, tuple(result.signal for result in program.outputs))
+    return Sources(
+        program.kernel,
+        real.target,
+        files,
+        function,
+        program.operations,
+        program.temporaries,
+        program.companions,
+        recursion=program.recursion,
+    )
+
+
+def _files(program: Program, name: str, real: Real) -> dict[str, str]:
+    """Return the header and the source of a program whose names are as they are printed."""
     printer = CPrinter(real)
-    name = f"{program.name}{real.infix}"
     nodes = [node for a in program.body for node in walk(a.value) if isinstance(node, Operation)]
     values = {
         "program": program,
@@ -113,6 +132,7 @@ def emit(program: Program, target: str = "c") -> Sources:
         "real": real,
         "state": program.inputs[0],
         "samples": program.inputs[-1],
+        "result": program.outputs[0].signal,
         "parameters": _parameters(program, real),
         "names": ", ".join(s.name for s in (*program.inputs, *(r.signal for r in program.outputs))),
         "arrays": _arrays(program, real),
@@ -126,21 +146,10 @@ def emit(program: Program, target: str = "c") -> Sources:
         "uses_sinc": any(node.kind == "sinc" for node in nodes),
         "turn": tuple(map(printer.constant, _HALF_TURNS)) if any(n.kind == "wrap" for n in nodes) else None,
     }
-    files = {
+    return {
         f"{name}.h": render("c/header.h.j2", **values),
         f"{name}.c": render("c/source.c.j2", **values),
     }
-    function = Function(name, program.inputs, tuple(result.signal for result in program.outputs))
-    return Sources(
-        program.kernel,
-        real.target,
-        files,
-        function,
-        program.operations,
-        program.temporaries,
-        program.companions,
-        recursion=program.recursion,
-    )
 
 
 def _code(

@@ -10,8 +10,19 @@ from dataclasses import dataclass
 
 from strapgen.exceptions import InputError
 from strapgen.fixedpoint import FixedProgram, Settings, quantize
-from strapgen.fixedpoint.code import Choice, Largest, Quotient, Root, Scaled, Sum, Term, Value, used_by
+from strapgen.fixedpoint.code import (
+    IntegerMaximum,
+    IntegerQuotient,
+    IntegerRoot,
+    IntegerSelection,
+    IntegerSum,
+    Scaled,
+    Term,
+    Value,
+    used_by,
+)
 from strapgen.program import Program
+from strapgen.targets.names import C, external, printed
 from strapgen.targets.printer import fill_expression
 from strapgen.targets.rendering import render
 from strapgen.targets.sources import Function, Sources
@@ -74,9 +85,30 @@ def emit(program: Program | FixedProgram, target: str, settings: Settings | None
         allowed = ", ".join(map(str, WORDS))
         raise InputError(f"word is {chosen.word}; in C it is {allowed} bits; the integer model takes any")
     fixed = program if isinstance(program, FixedProgram) else quantize(program, chosen)
-    interface, word = fixed.interface, WORDS[chosen.word]
+    interface, name = fixed.interface, external(fixed.name)
+    arguments = (*interface.inputs, *interface.outputs)
+    scalars = [argument.signal.name for argument in arguments if not argument.signal.shape]
+    _, files = printed(fixed, lambda named, _: _files(named, name), C, scalars)
+    function = Function(
+        name, *(tuple(a.signal for a in side) for side in (interface.inputs, interface.outputs))
+    )
+    return Sources(
+        fixed.program.kernel,
+        target,
+        files,
+        function,
+        fixed.operations,
+        fixed.temporaries,
+        fixed.program.companions,
+        interface,
+        fixed.program.recursion,
+    )
+
+
+def _files(fixed: FixedProgram, name: str) -> dict[str, str]:
+    """Return the header and the source of a program whose names are as they are printed."""
+    interface, word = fixed.interface, WORDS[fixed.word]
     printer = _Printer(fixed, word)
-    name = fixed.name
     signals = [(a.signal, "const ") for a in interface.inputs] + [(a.signal, "") for a in interface.outputs]
     residuals = len(interface.residuals)
     pieces = [f"{constant}{word.type} {s.name}[{s.size}]" for s, constant in signals]
@@ -109,31 +141,17 @@ def emit(program: Program | FixedProgram, target: str, settings: Settings | None
         "names": ", ".join(names),
         "code": printer.code(),
         "counts": ", ".join(f"{number} {kind}" for kind, number in fixed.operations.items() if number),
-        "nearest": chosen.rounding == "nearest",
-        "fresh": dict.fromkeys(f"UINT{chosen.word}_C({r.fresh})" for r in interface.residuals),
+        "nearest": interface.settings.rounding == "nearest",
+        "fresh": dict.fromkeys(f"UINT{fixed.word}_C({r.fresh})" for r in interface.residuals),
         "uses_shift": printer.uses_shift,
-        "uses_root": any(isinstance(d, Root) for d in definitions),
-        "uses_quotient": any(isinstance(d, Quotient) for d in definitions),
+        "uses_root": any(isinstance(d, IntegerRoot) for d in definitions),
+        "uses_quotient": any(isinstance(d, IntegerQuotient) for d in definitions),
         "guarded": tuple(value for value in fixed.body if value.guarded),
     }
-    files = {
+    return {
         f"{name}.h": render("c_fixed/header.h.j2", **values),
         f"{name}.c": render("c_fixed/source.c.j2", **values),
     }
-    function = Function(
-        name, *(tuple(a.signal for a in side) for side in (interface.inputs, interface.outputs))
-    )
-    return Sources(
-        fixed.program.kernel,
-        target,
-        files,
-        function,
-        fixed.operations,
-        fixed.temporaries,
-        fixed.program.companions,
-        interface,
-        fixed.program.recursion,
-    )
 
 
 class _Printer:
@@ -182,30 +200,30 @@ class _Printer:
         lines = [f"/* {value.meaning} */"] if value.meaning else []
         kind = self.word.wide if value.wide else self.word.fast
         definition, name = value.definition, value.name
-        if isinstance(definition, Sum):
+        if isinstance(definition, IntegerSum):
             lines += self._sum(value, definition, kind)
-        elif isinstance(definition, Quotient):
+        elif isinstance(definition, IntegerQuotient):
             lines += self._narrow(
                 value, kind, f"quotient_({self.scaled(definition.numerator)}, {definition.denominator})"
             )
-        elif isinstance(definition, Root):
+        elif isinstance(definition, IntegerRoot):
             lines.append(
                 f"const {kind} {name} = root_(({self.word.magnitude})({self.scaled(definition.argument)}));"
             )
-        elif isinstance(definition, Largest):
+        elif isinstance(definition, IntegerMaximum):
             lines.append(f"{kind} {name} = {self.cast(self.scaled(definition.arguments[0]), value)};")
             for argument in definition.arguments[1:]:
                 text = self.scaled(argument)
                 lines.append(f"if ({text} > {name})\n        {name} = {self.cast(text, value)};")
         else:
-            assert isinstance(definition, Choice)
+            assert isinstance(definition, IntegerSelection)
             text = self.scaled(definition.otherwise)
             for left, right, chosen in reversed(definition.cases):
                 text = (
                     f"{self.scaled(left)} >= {self.scaled(right)} ? {self.scaled(chosen)}\n        : {text}"
                 )
             lines.append(f"const {kind} {name} = {self.cast(f'({text})', value)};")
-        if value.guarded and not (isinstance(definition, Sum) and not value.wide):
+        if value.guarded and not (isinstance(definition, IntegerSum) and not value.wide):
             lines.append(self._guard(name, value))
         return lines
 
@@ -220,7 +238,7 @@ class _Printer:
         """Return an expression of a wide number as one of the value's type."""
         return text if value.wide else f"({self.word.fast})({text})"
 
-    def _sum(self, value: Value, definition: Sum, kind: str) -> list[str]:
+    def _sum(self, value: Value, definition: IntegerSum, kind: str) -> list[str]:
         name, wide = value.name, self.word.wide
         fine = self._joined([self.term(term) for term in definition.fine])
         coarse = [self.term(term) for term in definition.coarse]

@@ -2,9 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from strapgen.fixedpoint import FixedProgram, Settings, quantize
-from strapgen.fixedpoint.code import Choice, Largest, Quotient, Root, Scaled, Sum, Term, Value
+from strapgen.fixedpoint.code import (
+    IntegerMaximum,
+    IntegerQuotient,
+    IntegerRoot,
+    IntegerSelection,
+    IntegerSum,
+    Scaled,
+    Term,
+    Value,
+)
 from strapgen.program import Program
+from strapgen.targets.names import PYTHON, printed
 from strapgen.targets.rendering import render
 from strapgen.targets.sources import Function, Sources
 
@@ -27,24 +39,16 @@ def emit(program: Program | FixedProgram, target: str, settings: Settings | None
     """
     fixed = program if isinstance(program, FixedProgram) else quantize(program, settings or Settings())
     interface = fixed.interface
-    text = render(
-        "fixed_model/module.py.j2",
-        fixed=fixed,
-        program=fixed.program,
-        interface=interface,
-        statements=[statement for value in fixed.body for statement in _statements(value, fixed)],
-        nearest=interface.settings.rounding == "nearest",
-        fresh=[_fresh(residual.name) for residual in interface.residuals],
-    )
+    named, files = printed(fixed, _files, PYTHON)
     function = Function(
-        fixed.name,
+        named.name,
         tuple(argument.signal for argument in interface.inputs),
         tuple(argument.signal for argument in interface.outputs),
     )
     return Sources(
         fixed.program.kernel,
         target,
-        {f"{fixed.name}.py": text},
+        files,
         function,
         fixed.operations,
         fixed.temporaries,
@@ -54,56 +58,73 @@ def emit(program: Program | FixedProgram, target: str, settings: Settings | None
     )
 
 
+def _files(fixed: FixedProgram, other: Mapping[str, str]) -> dict[str, str]:
+    """Return the module of a program whose names are as they are printed; what it says has their other names."""
+    interface = fixed.interface
+    text = render(
+        "fixed_model/module.py.j2",
+        fixed=fixed,
+        program=fixed.program,
+        interface=interface,
+        other=other,
+        statements=[statement for value in fixed.body for statement in _statements(value, fixed, other)],
+        nearest=interface.settings.rounding == "nearest",
+        fresh=[_fresh(residual.name) for residual in interface.residuals],
+    )
+    return {f"{fixed.name}.py": text}
+
+
 def _fresh(name: str) -> str:
     return f"next_{name}"
 
 
-def _statements(value: Value, fixed: FixedProgram) -> list[str]:
+def _statements(value: Value, fixed: FixedProgram, other: Mapping[str, str]) -> list[str]:
     """Return the lines that compute a value and check it on the way."""
     name, definition = value.name, value.definition
+    said = other.get(name, name)
     lines = [f"# {value.meaning}"] if value.meaning else []
-    if isinstance(definition, Sum):
-        lines += _sum(value, definition, fixed)
+    if isinstance(definition, IntegerSum):
+        lines += _sum(value, definition, fixed, said)
     else:
-        if isinstance(definition, Quotient):
+        if isinstance(definition, IntegerQuotient):
             text = f"_quotient({_scaled(definition.numerator)}, {definition.denominator})"
-        elif isinstance(definition, Root):
+        elif isinstance(definition, IntegerRoot):
             text = f"_root({_scaled(definition.argument)})"
-        elif isinstance(definition, Largest):
+        elif isinstance(definition, IntegerMaximum):
             text = _scaled(definition.arguments[0])
             for argument in definition.arguments[1:]:
                 text = f"_larger({text}, {_scaled(argument)})"
         else:
-            assert isinstance(definition, Choice)
+            assert isinstance(definition, IntegerSelection)
             text = _scaled(definition.otherwise)
             for left, right, chosen in reversed(definition.cases):
                 text = f"_chosen({_scaled(left)} >= {_scaled(right)}, {_scaled(chosen)}, {text})"
         lines.append(f"{name} = {text}")
     check = "_require" if value.guarded else "_within"
-    lines.append(f'{check}("{name}", {name}, {value.low}, {value.high})')
+    lines.append(f'{check}("{said}", {name}, {value.low}, {value.high})')
     return lines
 
 
-def _sum(value: Value, definition: Sum, fixed: FixedProgram) -> list[str]:
+def _sum(value: Value, definition: IntegerSum, fixed: FixedProgram, said: str) -> list[str]:
     name = value.name
     fine = [_term(term) for term in definition.fine]
     coarse = [_term(term) for term in definition.coarse]
     if not definition.shift:
-        return [f'{name} = _total("{name}", {value.peak}, {", ".join([*coarse, *fine]) or 0})']
+        return [f'{name} = _total("{said}", {value.peak}, {", ".join([*coarse, *fine]) or 0})']
     residual, lines = definition.residual, []
     if residual is not None and definition.drop:
-        lines.append(f'{name}_kept = _total("{name}", {value.peak}, {", ".join(fine)}) >> {definition.drop}')
+        lines.append(f'{name}_kept = _total("{said}", {value.peak}, {", ".join(fine)}) >> {definition.drop}')
         fine = [f"{name}_kept"]
     if residual is not None:
         fine.append(_shifted(residual.name, residual.shift))
     elif fixed.interface.settings.rounding == "nearest":
         fine.append(str(1 << (definition.shift - 1)))
-    lines.append(f'{name}_sum = _total("{name}", {value.peak}, {", ".join(fine)})')
+    lines.append(f'{name}_sum = _total("{said}", {value.peak}, {", ".join(fine)})')
     if residual is not None:
         mask = (1 << fixed.word) - 1
         lines.append(f"{_fresh(residual.name)} = {_shifted(f'{name}_sum', -residual.shift)} & {mask}")
     rounded = _shifted(f"{name}_sum", -definition.shift)
-    lines.append(f'{name} = _total("{name}", {value.peak}, {", ".join([rounded, *coarse])})')
+    lines.append(f'{name} = _total("{said}", {value.peak}, {", ".join([rounded, *coarse])})')
     return lines
 
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 from fractions import Fraction
 
 from strapgen.fixedpoint import FixedProgram
-from strapgen.fixedpoint.code import Accumulation, Argument, Residual, Value
-from strapgen.fixedpoint.settings import DEFAULT_ALLOWANCE, DEFAULT_ANGLE
+from strapgen.fixedpoint.code import Value
+from strapgen.fixedpoint.interface import Argument, ErrorFeedback, RoundingAccumulation
+from strapgen.fixedpoint.settings import DEFAULT_ALLOWANCE, DEFAULT_ANGLE, Settings
 from strapgen.program import Program
 
 
@@ -27,8 +28,14 @@ def argument_text(argument: Argument) -> str:
 
 def command(fixed: FixedProgram, target: str) -> str:
     """Return the command that generates a fixed-point program."""
-    settings = fixed.interface.settings
-    words = [f"strapgen generate {fixed.program.arguments} --target {target} --word {settings.word}"]
+    return (
+        f"strapgen generate {fixed.program.arguments} --target {target} {options(fixed.interface.settings)}"
+    )
+
+
+def options(settings: Settings) -> str:
+    """Return settings as options of the command line."""
+    words = [f"--word {settings.word}"]
     if settings.stated:
         words.append(settings.stated)
     elif settings.largest_angle != DEFAULT_ANGLE:
@@ -52,7 +59,7 @@ def _number(value: Fraction) -> str:
     return f"{float(value):.6g}"
 
 
-def accumulation_text(accumulation: Accumulation, program: Program) -> str:
+def accumulation_text(accumulation: RoundingAccumulation, program: Program) -> str:
     """Return the bound of a run of N steps in words."""
     what = "in the length of a row" if len(program.inputs[0].shape) == 2 else "in the length of the state"
     growth = accumulation.growth - 1
@@ -61,7 +68,7 @@ def accumulation_text(accumulation: Accumulation, program: Program) -> str:
     return f"({once}{_number(accumulation.per_step)} N){stretched}, {what}"
 
 
-def residuals_text(residuals: tuple[Residual, ...]) -> str:
+def residuals_text(residuals: tuple[ErrorFeedback, ...]) -> str:
     """Return the residuals with their formats in words."""
     parts = []
     for fraction in dict.fromkeys(residual.fraction for residual in residuals):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 
 from strapgen.program import Operation, Program, Reference, walk
+from strapgen.targets.names import PYTHON, printed
 from strapgen.targets.printer import Printer, fill_expression
 from strapgen.targets.rendering import render
 from strapgen.targets.sources import Function, Sources
@@ -50,6 +51,23 @@ def emit(program: Program, target: str = "numpy") -> Sources:
         One file. Its function takes and returns arrays (..., shape); a step has a second function,
         ``<name>_transition``, from the increments to the transition.
     """
+    scalars = [signal.name for signal in program.inputs if not signal.shape]
+    named, files = printed(program, lambda part, _: _files(part, target), PYTHON, scalars)
+    function = Function(named.name, program.inputs, tuple(result.signal for result in program.outputs))
+    return Sources(
+        program.kernel,
+        target,
+        files,
+        function,
+        program.operations,
+        program.temporaries,
+        program.companions,
+        recursion=program.recursion,
+    )
+
+
+def _files(program: Program, target: str) -> dict[str, str]:
+    """Return the module of a program whose names are as they are printed."""
     functions = [program] if program.transition is None else [program, program.transition_program()]
     kinds = {
         node.kind
@@ -65,17 +83,7 @@ def emit(program: Program, target: str = "numpy") -> Sources:
         uses_sinc="sinc" in kinds,
         uses_wrap="wrap" in kinds,
     )
-    function = Function(program.name, program.inputs, tuple(result.signal for result in program.outputs))
-    return Sources(
-        program.kernel,
-        target,
-        {f"{program.name}.py": text},
-        function,
-        program.operations,
-        program.temporaries,
-        program.companions,
-        recursion=program.recursion,
-    )
+    return {f"{program.name}.py": text}
 
 
 def _function(program: Program, is_transition: bool) -> dict[str, object]:

@@ -8,6 +8,7 @@ from typing import Any
 
 from strapgen.companions import Companions
 from strapgen.fixedpoint import Interface
+from strapgen.program import Program
 from strapgen.recursion import Recursion
 from strapgen.signal import Signal
 
@@ -43,6 +44,8 @@ class Sources:
         Formats, ranges and error bounds of fixed-point code; None for every other target.
     recursion : Recursion or None
         Which outputs are inputs of the next call.
+    own : tuple of Program
+        Kernels that a user's step brings; empty where they are found through its choice.
     """
 
     kernel: str
@@ -54,6 +57,7 @@ class Sources:
     companions: Companions | None
     fixed: Interface | None = None
     recursion: Recursion | None = None
+    own: tuple[Program, ...] = ()
 
     def interface(self) -> dict[str, Any]:
         """Return everything but the text as plain JSON data."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from strapgen.fixedpoint.code import Argument
+from strapgen.fixedpoint.interface import Argument
 from strapgen.recursion import Recursion
 from strapgen.signal import Signal
 from strapgen.targets.c import REALS

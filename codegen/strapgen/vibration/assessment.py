@@ -227,7 +227,7 @@ def of(choice: Choice, quantity: str = "drift") -> Assessment:
     if not isinstance(choice, Choice):
         raise InputTypeError(f"choice is {choice!r}; what catalogue.choose returns is needed")
     checks.choice("quantity", quantity, ("drift", "sculling"))
-    if choice.name in catalogue.user.KERNELS:  # which another one of the same name may replace
+    if choice.user_kernel is not None:  # whose file may change: not to be held for good
         return _of(choice, quantity)
     return _of_catalogue(choice, quantity)
 
@@ -237,7 +237,7 @@ def _of(choice: Choice, quantity: str) -> Assessment:
     if quantity == "sculling" and kernel.companions is not None:
         return _dual(of(choice))
     assess = {"drift": drift, "sculling": sculling}[quantity]
-    return assess(kernel, nodes=catalogue.nodes(choice), previous=catalogue.previous(choice))
+    return assess(kernel, nodes=catalogue.nodes(choice), previous=choice.previous)
 
 
 _of_catalogue = lru_cache(maxsize=64)(_of)

@@ -356,10 +356,7 @@ def _numbers(path: Path, line: int, row: list[str], header: list[str]) -> list[f
         raise InputError(f"{path}, line {line}: {len(row)} cells; {len(header)} are needed")
     numbers = []
     for cell, name in zip(row, header, strict=True):
-        try:
-            number = float(cell)
-        except ValueError:
-            number = math.nan
+        number = checks.double(cell)
         if not math.isfinite(number):
             raise InputError(f"{path}, line {line}: {name} is {cell.strip()!r}; a finite number is needed")
         numbers.append(number)

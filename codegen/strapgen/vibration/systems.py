@@ -134,9 +134,8 @@ def checked(kernel: Any) -> Kernel:
 
 def _of_step(kernel: Kernel, sampled: Sequence[Signal], nodes: Sequence[Fraction | sp.Expr]) -> System:
     assert kernel.companions is not None
-    users_kernels = {each.name: each for each in kernel.own}
     name = kernel.companions.attitude
-    attitude = None if name is None else users_kernels.get(name) or catalogue.derive(Choice(name))
+    attitude = None if name is None else catalogue.companion(kernel, name)
     expander = Expander([kernel] if attitude is None else [kernel, attitude])
     state, output = kernel.inputs[0], kernel.outputs[-1].signal
     initial = {

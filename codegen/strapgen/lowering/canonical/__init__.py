@@ -14,7 +14,7 @@ from strapgen.lowering.canonical.core import Core, decompose, extract, verify
 from strapgen.lowering.canonical.decomposition import NotCovariantError
 from strapgen.lowering.canonical.search import plans
 from strapgen.lowering.canonical.vectors import independent
-from strapgen.lowering.canonical.writing import Writer
+from strapgen.lowering.canonical.writing import NameClashError, Writer
 from strapgen.program import Assignment
 
 __all__ = ["Core", "expansion", "extract_core", "forms", "verify"]
@@ -104,8 +104,11 @@ def forms(core: Core) -> list[list[Assignment]]:
     for plan in ranked[:_WRITTEN]:
         vectors = plan.pool.vectors.values()
         writer = Writer(plan, [v.name for v in vectors if len(independent([*base, v.form])) == len(base)])
-        if core.transition.shape == (3, 3):
-            written.append(writer.matrix(elements))
-        else:
-            written.append(writer.quaternion({element[-1]: element for element in elements}))
+        try:
+            if core.transition.shape == (3, 3):
+                written.append(writer.matrix(elements))
+            else:
+                written.append(writer.quaternion({element[-1]: element for element in elements}))
+        except NameClashError:  # another basis has other names, and the stages have their own
+            continue
     return written

@@ -118,16 +118,21 @@ def extract(kernel: Kernel) -> Core:
         form = _linear(stage, columns)
         if form is None:
             stages.append(stage)
+        elif stage.signal.name in vectors:
+            raise NotCovariantError(f"two vectors are called {stage.signal.name}")
         else:
             vectors[stage.signal.name] = stage.signal, form
         if stage.signal.name == kernel.transition:
             break
-    labels = {element.rsplit("_", 1)[-1] for element in stages[-1].signal.elements}
-    if stages[-1].signal.shape != (3, 3) and labels != set("xyzs"):
+    elements = stages[-1].signal.elements
+    prefix = elements[0].rpartition("_")[0]
+    if stages[-1].signal.shape != (3, 3) and {*elements} != {f"{prefix}_{label}" for label in "xyzs"}:
         raise NotCovariantError(f"the transition of {kernel.name} is neither a quaternion nor a matrix")
     used = set().union(*(e.free_symbols for stage in stages for e in stage.expressions))
     for k, (name, vector) in enumerate(inputs.items()):
         if used & {column[k] for column in columns}:
+            if name in vectors:
+                raise NotCovariantError(f"two vectors are called {name}")
             vectors[name] = vector, tuple(Fraction(int(j == k)) for j in range(len(inputs)))
     needed = {symbol.name for symbol in used}
     vectors = {name: (s, form) for name, (s, form) in vectors.items() if needed & set(s.elements)}

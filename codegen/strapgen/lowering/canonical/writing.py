@@ -26,6 +26,10 @@ from strapgen.program import Assignment, Constant, Node, Operation, Reference
 _Summand = tuple[Fraction, Reference | None, str]
 
 
+class NameClashError(ValueError):
+    """A vector of the kernel has the name of a quantity that canonical forms have."""
+
+
 class Writer:
     """Writes a plan as assignments.
 
@@ -39,7 +43,11 @@ class Writer:
     def __init__(self, plan: Plan, offered: Sequence[str]) -> None:
         self._plan = plan
         self._body: list[Assignment] = []
-        self._names: set[str] = set()
+        inputs = (v.name for v in plan.pool.vectors.values() if not v.parts)
+        self._names: dict[str, Node] = {
+            n: Reference(n) for v in inputs for n in (f"{v}_{axis}" for axis in "xyz")
+        }
+        self._scalar_products: set[str] = set()
         self._scalars: list[tuple[Polynomial, str]] = []
         vectors = plan.pool.vectors
         polynomials = plan.polynomials()
@@ -132,8 +140,7 @@ class Writer:
                 factor, weight = self._weight(polynomial, name, meaning)
                 if weight is not None and uses[unsigned(self._chosen[_key(polynomial)]), vector] > 1:
                     product = f"{vector}_times_{weight.name}"
-                    if f"{product}_x" not in self._names:
-                        self._vector(product, [(Fraction(1), weight, vector)], "")
+                    self._vector(product, [(Fraction(1), weight, vector)], "")
                     weight, vector = None, product
                 summands.append((factor, weight, vector))
             self._vector(definition.name, summands, definition.meaning)
@@ -183,7 +190,8 @@ class Writer:
 
     def _product_node(self, factor: tuple[str, ...]) -> Node:
         name = "_dot_".join(factor[:2]) + "".join(f"_cross_{n}" for n in factor[2:])
-        if name not in self._names:
+        if name not in self._scalar_products:
+            self._scalar_products.add(name)
             if len(factor) == 3:
                 crosses = [d for d in self._plan.definitions if isinstance(d, Cross)]
                 for k in range(3):
@@ -193,8 +201,7 @@ class Writer:
                 else:
                     one, left, right = factor
                 cross = Cross(f"{left}_cross_{right}", left, right)
-                if f"{cross.name}_x" not in self._names:
-                    self._cross(cross)
+                self._cross(cross)
                 pair = (one, cross.name)
             else:
                 pair = (factor[0], factor[1])
@@ -203,8 +210,10 @@ class Writer:
         return Reference(name)
 
     def _assign(self, name: str, node: Node, meaning: str = "") -> None:
-        if name not in self._names:
-            self._names.add(name)
+        known = self._names.setdefault(name, node)
+        if known != node:
+            raise NameClashError(f"{name} would stand for two quantities")
+        if known is node:
             self._body.append(Assignment(name, node, meaning))
 
 

@@ -1,0 +1,143 @@
+"""Choosing: names and options, checked and filled in."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+from strapgen import checks
+from strapgen.catalogue import user
+from strapgen.catalogue.choice import Choice
+from strapgen.catalogue.names import (
+    ALGORITHMS,
+    INTEGRATORS,
+    KERNELS,
+    METHODS,
+    MOST_INCREMENTS,
+    MOST_PREVIOUS,
+    RESERVED,
+    STANDARD_METHODS,
+    VECTORS,
+)
+from strapgen.catalogue.tableaux import TABLEAUX, Tableau
+from strapgen.exceptions import InputError, InputTypeError
+
+
+def choose(
+    name: str,
+    method: str | Tableau | None = None,
+    increments: int | None = None,
+    rates: bool = False,
+    previous: int = 0,
+) -> Choice:
+    """Check a choice of kernel and fill in the defaults: fourth order, two increments.
+
+    Parameters
+    ----------
+    name : str
+        A name of the catalogue, a user's Python file, or the entry point of one.
+    method : str or Tableau, optional
+    increments, previous : int, optional
+        Increments of a step, and increments before it that it takes too.
+    rates : bool, optional
+        Whether the step takes the rate at the nodes of its method instead.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown, a method is given for a kernel that takes none, or increments for a step that
+        takes rates.
+
+    Examples
+    --------
+    >>> choose("euler").kernel
+    'euler-rk4-2'
+    """
+    if isinstance(name, os.PathLike):
+        name = os.fspath(name)
+    if not isinstance(name, str):
+        raise InputTypeError(f"algorithm is {name!r}; a name or the path of a Python file is needed")
+    if name.endswith(".py") or (name not in RESERVED and name in user.installed()):
+        return _choose_users(name, method, increments, rates, previous)
+    if name not in RESERVED:
+        shown = [kernel for kernel, recipe in KERNELS.items() if recipe.standard]
+        raise InputError(
+            f"algorithm {name!r} is not known; "
+            f"allowed: {_allowed(*VECTORS, *shown, 'other kernels of strapgen list')}"
+        )
+    if name in KERNELS:
+        options = {
+            "method": method.name if isinstance(method, Tableau) else method,
+            "increments": increments,
+            "rates": rates or None,
+            "previous": previous or None,
+        }
+        for option, value in options.items():
+            if value is not None:
+                takers = ", ".join([*ALGORITHMS, *VECTORS])
+                raise InputError(f"kernel {name} takes no {option} (got {value}); these do: {takers}")
+        return Choice(name)
+    if name in VECTORS:
+        if isinstance(method, Tableau):
+            raise InputError(
+                f"{name} goes with no tableau; allowed methods: {', '.join(VECTORS[name].methods)}"
+            )
+        method = VECTORS[name].default if method is None else method
+        checks.choice(f"method of {name}", method, VECTORS[name].methods)
+    if not isinstance(method, Tableau):
+        method = checks.choice("method", "rk4" if method is None else method, METHODS)
+    previous = checks.count("previous", previous, smallest=0, largest=MOST_PREVIOUS)
+    if rates:
+        if increments is not None or previous:
+            what = f"{increments} increments" if increments is not None else f"{previous} previous ones"
+            raise InputError(f"a step takes increments or rates, not both (got {what} and rates)")
+        if method in INTEGRATORS and not INTEGRATORS[method].takes_rates:
+            raise InputError(f"method {method} takes increments; rates at nodes do not go with it")
+        return Choice(name, method)
+    increments = checks.count("increments", 2 if increments is None else increments, largest=MOST_INCREMENTS)
+    return Choice(name, method, increments, previous)
+
+
+def _choose_users(
+    name: str, method: str | Tableau | None, increments: int | None, rates: bool, previous: int
+) -> Choice:
+    """Load a user's algorithm with the options that are given."""
+    if rates:
+        raise InputError(f"{name}: an algorithm of a user takes increments, not rates")
+    options: dict[str, Any] = {}
+    if method is not None:
+        options["method"] = method if isinstance(method, Tableau) else TABLEAUX[_tableau_name(method)]
+    if increments is not None:
+        options["increments"] = checks.count("increments", increments, largest=MOST_INCREMENTS)
+    if previous:
+        options["previous"] = checks.count("previous", previous, smallest=0, largest=MOST_PREVIOUS)
+    return Choice.of_user(user.load(name, **options))
+
+
+def _allowed(*more: str) -> str:
+    return f"{', '.join(dict.fromkeys([*ALGORITHMS, *user.installed(), *more]))}, or a Python file"
+
+
+def _tableau_name(method: str) -> str:
+    if method in INTEGRATORS:
+        raise InputError(f"method {method!r} has no tableau; these have: {', '.join(TABLEAUX)}")
+    return checks.choice("method", method, TABLEAUX)
+
+
+def choose_step(
+    name: str,
+    method: str | Tableau | None = None,
+    increments: int | None = None,
+    rates: bool = False,
+    previous: int = 0,
+) -> Choice:
+    """Check a choice of attitude step; parameters and errors are those of `choose`."""
+    if name in KERNELS or name in VECTORS:
+        raise InputError(f"algorithm {name!r} is no attitude step; allowed: {_allowed()}")
+    return choose(name, method, increments, rates, previous)
+
+
+def standard() -> list[Choice]:
+    """Return the standard catalogue: every algorithm by the thesis's methods on two increments, and all else."""
+    steps = [Choice(algorithm, method, 2) for algorithm in ALGORITHMS for method in STANDARD_METHODS]
+    return steps + [Choice(name) for name, recipe in KERNELS.items() if recipe.standard]

@@ -1,0 +1,103 @@
+"""What a choice stands for: its kernel derived exactly, and its method."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from strapgen.catalogue.choice import Choice
+from strapgen.catalogue.names import INTEGRATORS, KERNELS, MOST_INCREMENTS, VECTORS
+from strapgen.catalogue.tableaux import TABLEAUX, Tableau
+
+if TYPE_CHECKING:
+    from strapgen.catalogue.coefficients import Number
+    from strapgen.catalogue.steps import Method
+    from strapgen.kernel import Kernel
+
+#: Where the modules lie that `names` tells of.
+_PACKAGE = __name__.rpartition(".")[0]
+
+
+def nodes(choice: Choice) -> tuple[Number, ...]:
+    """Return the nodes at which a step takes the rate; empty for one that takes increments."""
+    if choice.method is None or choice.increments is not None:
+        return ()
+    return _method(choice.method).nodes
+
+
+def rounding(choice: Choice) -> Fraction:
+    """Return by how much published coefficients of a chosen method may be off, which are rounded: mostly 0."""
+    method = choice.method
+    if isinstance(method, str):
+        method = TABLEAUX.get(method)
+    return Fraction(0) if method is None else method.tolerance
+
+
+def enough(method: str | Tableau) -> int:
+    """Return how many increments a step needs for the order of its method.
+
+    Examples
+    --------
+    >>> enough("rk4"), enough("butcher6")
+    (2, 4)
+    """
+    loaded = _method(method)
+    return next(
+        count for count in range(1, MOST_INCREMENTS + 1) if loaded.limit(count, 0) >= min(loaded.order, 10)
+    )
+
+
+def derive(choice: Choice) -> Kernel:
+    """Derive a kernel exactly.
+
+    Parameters
+    ----------
+    choice : Choice
+        What `choose` returned.
+    """
+    if choice.user_kernel is not None:
+        return choice.user_kernel
+    if choice.method is None:
+        recipe = KERNELS[choice.name]
+        function = getattr(import_module(f"{_PACKAGE}.{recipe.module}"), recipe.function)
+        kernel: Kernel = function(*recipe.arguments)
+        return kernel
+    if choice.name in VECTORS:
+        vector = VECTORS[choice.name]
+        derived: Kernel = getattr(import_module(f"{_PACKAGE}.{vector.module}"), vector.function)(
+            _method(choice.method), choice.increments, choice.previous
+        )
+        return derived
+    from strapgen.catalogue.kinematics import KINEMATICS
+    from strapgen.catalogue.steps import step
+
+    return step(KINEMATICS[choice.name], _method(choice.method), choice.increments, choice.previous)
+
+
+def companion(kernel: Kernel, name: str) -> Kernel:
+    """Return a kernel that goes with a step: one that it brings, or one of the catalogue.
+
+    Parameters
+    ----------
+    kernel : Kernel
+        An attitude step.
+    name : str
+        Product, orthonormalization or attitude, as its `companions` name them.
+    """
+    return next((brought for brought in kernel.own if brought.name == name), None) or derive(Choice(name))
+
+
+def _method(method: str | Tableau) -> Method:
+    """Load a method by its name, or make one of a tableau."""
+    from strapgen.catalogue import runge_kutta
+
+    if isinstance(method, Tableau):
+        return runge_kutta.method(method)
+    if method in TABLEAUX:
+        return runge_kutta.method(TABLEAUX[method])
+    family = INTEGRATORS[method]
+    integrator: Method = import_module(f"{_PACKAGE}.{family.module}").method(
+        *(family.arguments or (family.order,))
+    )
+    return integrator

@@ -1,0 +1,287 @@
+"""The names of the catalogue: plain data, so that listing and checking them imports no computer algebra."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from strapgen.catalogue.tableaux import TITLES
+
+#: Attitude algorithms, by the state they integrate.
+ALGORITHMS = {
+    "dcm": "direction cosine matrix",
+    "euler": "Euler parameters, scalar last",
+    "cayley-klein": "Cayley-Klein parameters, scalar first",
+}
+
+
+class Integrator(NamedTuple):
+    """A method without tableau: a module of the catalogue whose ``method`` makes it of its arguments, or its order."""
+
+    title: str
+    module: str
+    order: int
+    takes_rates: bool = True
+    arguments: tuple[str, ...] = ()
+
+
+#: Integration methods that have no tableau.
+INTEGRATORS = {
+    **{
+        f"taylor{order}": Integrator(
+            f"Taylor series of order {order} of the transition", "taylor", order, False
+        )
+        for order in range(1, 21)
+    },
+    **{
+        f"magnus{order}": Integrator(f"Magnus series of order {order}", "magnus", order)
+        for order in (2, 4, 6)
+    },
+    "munthe-kaas4": Integrator("Runge-Kutta-Munthe-Kaas method of order 4", "munthe_kaas", 4),
+    "coning-compressed": Integrator(
+        "compressed coning coefficients, made for coning", "coning_methods", 4, False, ("compressed",)
+    ),
+    "coning-uncompressed": Integrator(
+        "uncompressed coning coefficients, made for polynomial rates",
+        "coning_methods",
+        4,
+        False,
+        ("uncompressed",),
+    ),
+    "coning-combined": Integrator(
+        "coning coefficients for both, with the terms of third and fourth order",
+        "coning_methods",
+        6,
+        False,
+        ("combined",),
+    ),
+    "coning-polynomial": Integrator(
+        "uncompressed coning coefficients, with the terms of third and fourth order",
+        "coning_methods",
+        6,
+        False,
+        ("polynomial",),
+    ),
+}
+
+#: Integration methods.
+METHODS = {**TITLES, **{name: integrator.title for name, integrator in INTEGRATORS.items()}}
+
+#: Methods of the standard catalogue: the thesis's.
+STANDARD_METHODS = ("rk1", "rk2", "rk3", "rk4")
+
+#: Most angle increments that one step may take, and most that it may keep from the steps before.
+MOST_INCREMENTS = 8
+MOST_PREVIOUS = 3
+
+#: Motions with a closed-form attitude, and the unit of each of their parameters.
+MOTIONS = {
+    "constant": dict.fromkeys("xyz", "rad/s"),
+    "sinusoidal": dict.fromkeys("ab", "rad/s"),
+    "coning": dict.fromkeys("abg", "rad/s"),
+    "polynomial": {"a0": "rad/s", **{f"a{k}": f"rad/s^{k + 1}" for k in range(1, 5)}},
+}
+
+
+class Recipe(NamedTuple):
+    """Where a kernel that takes no method is derived: a module of the catalogue, a function, its arguments."""
+
+    title: str
+    module: str
+    function: str
+    arguments: tuple[Any, ...] = ()
+    standard: bool = True
+
+
+#: Orders of the updates that are cut off.
+UPDATE_ORDERS = range(1, 21)
+
+#: Kernels of algorithms in two speeds that are in the standard catalogue; their variants are not.
+_STANDARD_TWO_SPEED = (
+    *("dcm-update", "coning-fast", "sculling-fast-2", "dcm-velocity-2"),
+    *("euler-from-dcm-sheppard", "dcm-from-euler-angles", "euler-angles-from-dcm"),
+)
+
+#: Kernels of algorithms in two speeds: they take no method.
+_TWO_SPEED = {
+    **{
+        f"{algorithm}-update": Recipe(
+            f"{title}: update by a rotation vector", "updates", "update", (algorithm,)
+        )
+        for algorithm, title in ALGORITHMS.items()
+    },
+    **{
+        f"{algorithm}-update-{order}": Recipe(
+            f"{title}: update by a rotation vector, order {order}",
+            "updates",
+            "update",
+            (algorithm, order),
+        )
+        for algorithm, title in ALGORITHMS.items()
+        for order in UPDATE_ORDERS
+    },
+    **{
+        f"{algorithm}-navigation-update{suffix}": Recipe(
+            f"{title}: update by the rotation of the navigation frame{words}",
+            "updates",
+            "navigation_update",
+            (algorithm, order),
+        )
+        for algorithm, title in ALGORITHMS.items()
+        for order, suffix, words in ((1, "-1", ", order 1"), (2, "-2", ", order 2"), (None, "", ""))
+    },
+    "navigation-rotation": Recipe(
+        "rotation of the navigation frame, trapezoidal", "updates", "navigation_rotation"
+    ),
+    "coning-fast": Recipe("rotation vector by recursion: fast loop", "coning_sculling", "coning"),
+    "coning-slow": Recipe("rotation vector by recursion: slow loop", "coning_sculling", "rotation_vector"),
+    **{
+        f"sculling-fast-{form}": Recipe(
+            f"sculling integral S{form} by recursion: fast loop", "coning_sculling", "sculling", (form,)
+        )
+        for form in (1, 2)
+    },
+    **{
+        f"{name}-{what}": Recipe(title, "acceleration", function, (name, *more))
+        for name in ("dcm", "euler")
+        for what, title, function, *more in (
+            ("acceleration", "acceleration transformation", "transformation"),
+            ("velocity-1", "velocity increment in navigation axes with S1", "velocity", 1),
+            ("velocity-2", "velocity increment in navigation axes with S2", "velocity", 2),
+        )
+    },
+    "navigation-velocity": Recipe(
+        "velocity correction for the rotation of the navigation frame", "acceleration", "navigation_velocity"
+    ),
+    **{
+        f"two-speed-fast-{form}": Recipe(f"two speeds: fast loop with S{form}", "two_speed", "fast", (form,))
+        for form in (1, 2)
+    },
+    **{
+        f"{name}-two-speed-slow-{form}": Recipe(
+            f"two speeds: slow loop with S{form}", "two_speed", "slow", (name, form)
+        )
+        for name in ("dcm", "euler")
+        for form in (1, 2)
+    },
+    **{
+        f"{name}-two-speed-navigation": Recipe(
+            "two speeds: navigation loop", "two_speed", "navigation", (name,)
+        )
+        for name in ("dcm", "euler")
+    },
+    "dcm-rows-orthogonalize": Recipe(
+        "rows made orthogonal, to first order", "orthonormal", "rows_orthogonalized"
+    ),
+    "dcm-rows-normalize": Recipe("rows made of length 1, to first order", "orthonormal", "rows_normalized"),
+    "dcm-third-row": Recipe("third row from the first two", "orthonormal", "third_row"),
+    **{
+        f"{name}-normalize-first-order": Recipe(
+            "normalization to first order", "orthonormal", "normalized_first_order", (name,)
+        )
+        for name in ("euler", "cayley-klein")
+    },
+    "euler-from-dcm-sheppard": Recipe(
+        "conversion: the largest parameter keeps its sign",
+        "conversions",
+        "euler_from_dcm_followed",
+        ("element",),
+    ),
+    "euler-from-dcm-continuous": Recipe(
+        "conversion: the nearer sign to the call before",
+        "conversions",
+        "euler_from_dcm_followed",
+        ("product",),
+    ),
+    "dcm-from-euler-angles": Recipe(
+        "conversion: direction cosine matrix from Euler angles", "euler_angles", "dcm_from_euler_angles"
+    ),
+    "euler-angles-from-dcm": Recipe(
+        "conversion: Euler angles from direction cosine matrix", "euler_angles", "euler_angles_from_dcm"
+    ),
+}
+
+TWO_SPEED = {
+    name: recipe._replace(standard=name in _STANDARD_TWO_SPEED) for name, recipe in _TWO_SPEED.items()
+}
+
+#: Kernels that take no method.
+KERNELS = {
+    **{
+        f"{algorithm}-product": Recipe(f"{title}: state after a transition", "steps", "product", (algorithm,))
+        for algorithm, title in ALGORITHMS.items()
+    },
+    "dcm-orthonormalize": Recipe(
+        "orthonormalization by dual rows, the thesis's scheme", "orthonormal", "dcm"
+    ),
+    "dcm-orthonormalize-optimal": Recipe("the nearest rotation", "orthonormal", "dcm_optimal"),
+    "dcm-orthonormalize-first-order": Recipe(
+        "the nearest rotation to first order", "orthonormal", "dcm_first_order"
+    ),
+    "dcm-orthonormalize-second-order": Recipe(
+        "the nearest rotation to second order", "orthonormal", "dcm_second_order"
+    ),
+    "euler-normalize": Recipe("exact normalization", "orthonormal", "euler"),
+    "cayley-klein-normalize": Recipe("exact normalization", "orthonormal", "cayley_klein"),
+    **{
+        f"{to}-from-{source}": Recipe(
+            f"conversion: {ALGORITHMS[to]} from {ALGORITHMS[source]}",
+            "conversions",
+            f"{to}_from_{source}".replace("-", "_"),
+        )
+        for to in ALGORITHMS
+        for source in ALGORITHMS
+        if to != source
+    },
+    "error-matrix": Recipe("scale, skew and drift of a computed attitude", "error_matrix", "error_matrix"),
+    **{
+        f"{motion}-truth": Recipe(
+            f"rate and true attitude of the {motion} motion", "motions", "truth", (motion,)
+        )
+        for motion in MOTIONS
+    },
+    **{
+        f"{motion}-increments": Recipe(
+            f"exact increments of the {motion} motion", "motions", "increments", (motion,)
+        )
+        for motion in MOTIONS
+    },
+    **TWO_SPEED,
+}
+
+
+class StepVector(NamedTuple):
+    """A vector of one step, by a method: a module of the catalogue, a function, modules of methods that go with it."""
+
+    title: str
+    module: str
+    function: str
+    families: tuple[str, ...]
+    default: str
+
+    @property
+    def methods(self) -> list[str]:
+        """Names of the methods that go with it."""
+        return [name for name, integrator in INTEGRATORS.items() if integrator.module in self.families]
+
+
+#: Vectors of a step that are derived by a method.
+VECTORS = {
+    "rotation-vector": StepVector(
+        "rotation vector of a step",
+        "steps",
+        "rotation_vector",
+        ("magnus", "munthe_kaas", "coning_methods"),
+        "coning-combined",
+    ),
+    "sculling": StepVector(
+        "sculling term of a step, by duality with coning",
+        "coning_methods",
+        "sculling",
+        ("coning_methods",),
+        "coning-combined",
+    ),
+}
+
+
+#: Names that no algorithm of a user may have.
+RESERVED = (*ALGORITHMS, *VECTORS, *KERNELS)

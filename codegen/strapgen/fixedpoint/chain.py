@@ -1,0 +1,173 @@
+"""Chains of exact quantities: what a function is made of, every link with a proved range."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+
+from strapgen.fixedpoint.intervals import Interval, maximum
+from strapgen.fixedpoint.quantities import (
+    Computed,
+    Definition,
+    ErrorPropagation,
+    InputElement,
+    Maximum,
+    Monomial,
+    Operand,
+    Quantity,
+    Selection,
+    Sum,
+)
+
+_ONE = Fraction(1)
+
+
+@dataclass
+class Chain:
+    """The quantities of a function in order, each made from those before it.
+
+    Parameters
+    ----------
+    name : str
+        Name of the function's value, which is the last link.
+    known : mapping of str to Quantity
+        The quantities that there are already.
+    same : dict of Definition to str
+        What other functions were made from, by definition; what is made here is added.
+    free : callable
+        Returns a name that no known quantity has: its argument, or that with a number behind it.
+    word : int
+        Bits of a word.
+    links : list of Quantity
+    ranges : dict of str to Interval
+        Range of every link.
+    """
+
+    name: str
+    known: Mapping[str, Quantity]
+    same: dict[Definition, str]
+    free: Callable[[str], str]
+    word: int
+    links: list[Quantity] = field(default_factory=list)
+    ranges: dict[str, Interval] = field(default_factory=dict)
+
+    @property
+    def tolerance(self) -> Fraction:
+        """What a series may leave out: an eighth of the last place of a word that holds 1."""
+        return Fraction(1, 1 << (self.word + 1))
+
+    def range(self, operand: Operand) -> Interval:
+        """Return the proved range of a quantity or a constant."""
+        if isinstance(operand, Fraction):
+            return Interval.of(operand)
+        return self.ranges[operand] if operand in self.ranges else self.known[operand].range
+
+    def add(
+        self,
+        label: str,
+        definition: Definition,
+        enclosure: Interval,
+        inexact: Fraction = Fraction(0),
+        follows: ErrorPropagation | None = None,
+    ) -> str:
+        """Make a quantity unless there is an equal one; without a label it is the function's value."""
+        if label and definition in self.same:
+            return self.same[definition]
+        name = self.name
+        if label:
+            name = self.free(f"{self.name}_{label}")
+            count = 2
+            while name in self.ranges:
+                name, count = self.free(f"{self.name}_{label}_{count}"), count + 1
+            self.same[definition] = name
+        self.links.append(
+            Quantity(name, definition, Fraction(0), enclosure, inexact=inexact, follows=follows)
+        )
+        self.ranges[name] = enclosure
+        return name
+
+    def sum(
+        self,
+        label: str,
+        *terms: tuple[Monomial, Fraction],
+        within: Interval | None = None,
+        inexact: Fraction = Fraction(0),
+        follows: ErrorPropagation | None = None,
+    ) -> str:
+        """Make a sum of products; `within` is a range that is known otherwise."""
+        enclosure = Interval(0, 0)
+        for monomial, coefficient in terms:
+            ranges = [self.range(factor) for factor in monomial]
+            if not ranges:
+                enclosure += Interval.of(coefficient)
+            elif len(ranges) == 1:
+                enclosure += ranges[0].scale(coefficient)
+            else:
+                square = monomial[0] == monomial[1]
+                product = ranges[0].square() if square else ranges[0] * ranges[1]
+                enclosure += product.scale(coefficient)
+        enclosure = enclosure.widened(inexact)
+        return self.add(
+            label,
+            Sum(tuple((m, c) for m, c in terms if c)),
+            enclosure if within is None else enclosure.meet(within),
+            inexact,
+            follows,
+        )
+
+    def selection(self, label: str, *cases: tuple[Operand, Operand, Operand], otherwise: Operand) -> str:
+        """Make a selection by comparisons of exact quantities."""
+        enclosure = self.range(otherwise)
+        for _, _, value in cases:
+            enclosure = enclosure.join(self.range(value))
+        return self.add(label, Selection(cases, otherwise), enclosure)
+
+    def maximum(self, label: str, *arguments: Operand) -> str:
+        """Make the largest of several quantities and constants."""
+        return self.add(label, Maximum(arguments), maximum(map(self.range, arguments)))
+
+    def computed(self, argument: str) -> str:
+        """Return an argument as the code computes it, so that it has no error of its own."""
+        if argument in self.known and isinstance(self.known[argument].definition, InputElement):
+            return argument
+        return self.add("taken", Computed(argument), self.range(argument))
+
+    def magnitude(self, label: str, argument: str) -> str:
+        """Return the magnitude of a quantity."""
+        inside = self.range(argument)
+        if inside.low >= 0:
+            return argument
+        negative = self.sum("negative", ((argument,), -_ONE))
+        enclosure = Interval(0, Interval.of(inside.magnitude).high)
+        return self.add(label, Maximum((argument, negative)), enclosure)
+
+    def square(self, argument: str) -> str:
+        """Return the square of a quantity."""
+        return self.sum("square", ((argument, argument), _ONE))
+
+    def polynomial(self, label: str, coefficients: Sequence[Fraction], variable: str) -> str:
+        """Make a polynomial of two or more coefficients by Horner's scheme."""
+        *others, last_but_one, last = coefficients
+        total = self.sum(label, ((variable,), last), ((), last_but_one))
+        for coefficient in reversed(others):
+            total = self.sum(label, ((variable, total), _ONE), ((), coefficient))
+        return total
+
+    def finish(self, value: str, *slopes: tuple[str, Fraction | None]) -> None:
+        """Make the last quantity the function's value, whose error follows those of what was taken as exact.
+
+        Parameters
+        ----------
+        value : str
+        *slopes : tuple of (str, Fraction or None)
+            Quantities that were taken as exact, and bounds of the function's derivative by them.
+        """
+        inside = self.range(value)
+        follows = ErrorPropagation(slopes, inside.highest - inside.lowest)
+        last = self.links[-1] if self.links else None
+        if last is not None and last.name == value and isinstance(last.definition, Sum):
+            del self.same[last.definition]
+            self.links[-1] = replace(last, name=self.name, follows=follows)
+        else:  # one that is rounded to a word where a word is needed
+            self.sum("", ((value,), _ONE), follows=follows)

@@ -1,0 +1,186 @@
+"""The interface of fixed-point code: formats, ranges and error bounds of its arguments, and how rounding adds up."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from fractions import Fraction
+from typing import Any
+
+from strapgen.fixedpoint.formats import Format
+from strapgen.fixedpoint.settings import Settings
+from strapgen.signal import Signal
+
+
+@dataclass(frozen=True)
+class ErrorFeedback:
+    """What lies below the last place of a value, kept for the next call: a word without a sign.
+
+    It takes the place of what is added for rounding: the sum starts from it, and its low bits are the next one. A fresh
+    start is half a unit of the last place for rounding to the nearest, and nothing for truncation; every other word is
+    allowed too.
+
+    Parameters
+    ----------
+    name : str
+        Its name.
+    fraction : int
+        Its fraction bits.
+    shift : int
+        From its fraction to that of the sum, not above 0: added as ``residual * 2**shift``, which drops bits.
+    fresh : int
+        The word of a fresh start.
+    """
+
+    name: str
+    fraction: int
+    shift: int
+    fresh: int
+
+
+@dataclass(frozen=True)
+class Argument:
+    """An input or an output of a fixed-point function.
+
+    Parameters
+    ----------
+    signal : Signal
+    format : Format
+    values : tuple of str
+        The value that holds each element.
+    low, high : int
+        Range of the integers: of an input, what is accepted; of an output, what is proved.
+    errors : tuple of Fraction
+        Error bound of each element of an output after one call; of an input, zeros.
+    """
+
+    signal: Signal
+    format: Format
+    values: tuple[str, ...]
+    low: int
+    high: int
+    errors: tuple[Fraction, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the argument as plain JSON data."""
+        return {
+            "signal": self.signal.as_dict(),
+            "word": self.format.word,
+            "fraction": self.format.fraction,
+            "values": list(self.values),
+            "low": self.low,
+            "high": self.high,
+            "errors": [str(error) for error in self.errors],
+        }
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Argument:
+        """Rebuild an argument from `as_dict`."""
+        return cls(
+            Signal.from_dict(data["signal"]),
+            Format(data["word"], data["fraction"]),
+            tuple(data["values"]),
+            data["low"],
+            data["high"],
+            tuple(map(Fraction, data["errors"])),
+        )
+
+
+@dataclass(frozen=True)
+class RoundingAccumulation:
+    """How rounding adds up over the steps of a run, in the length of a state (of a row, for a matrix).
+
+    Parameters
+    ----------
+    once : Fraction
+        What does not depend on the number of steps.
+    per_step : Fraction
+        What every step adds.
+    input_rounding : Fraction
+        What every step adds if increments are rounded to their format first.
+    growth : Fraction
+        Largest factor by which a step stretches what is there.
+    """
+
+    once: Fraction
+    per_step: Fraction
+    input_rounding: Fraction
+    growth: Fraction
+
+    def bound(self, steps: int, rounded_inputs: bool = False, stretch: float | None = None) -> float:
+        """Return a bound after a number of steps; inf where none of use is known.
+
+        Parameters
+        ----------
+        steps : int
+        rounded_inputs : bool, optional
+            Whether increments are rounded to their format first.
+        stretch : float, optional
+            Largest factor by which the transitions of the run stretch a difference, where more is known of it than
+            that no step exceeds `growth`.
+
+        Examples
+        --------
+        >>> RoundingAccumulation(Fraction(1), Fraction(2), Fraction(0), Fraction(1)).bound(10)
+        21.0
+        """
+        exponent = steps * float(self.growth - 1)
+        if exponent > 100 and stretch is None:
+            return math.inf
+        exponent = min(exponent, 100.0)
+        per_step = self.per_step + (self.input_rounding if rounded_inputs else 0)
+        # (g^n - 1)/(g - 1) <= n exp(n (g - 1)); a part in a million covers the rounding of this line.
+        stretched = math.exp(exponent) * (1 + 1e-6) if exponent else 1.0
+        if stretch is not None:
+            stretched = stretch
+        return stretched * (float(self.once) + steps * float(per_step))
+
+
+@dataclass(frozen=True)
+class Interface:
+    """All that a caller of fixed-point code must know.
+
+    Parameters
+    ----------
+    settings : Settings
+    inputs, outputs : tuple of Argument
+    residuals : tuple of ErrorFeedback
+        What is kept from call to call.
+    accumulation : RoundingAccumulation or None
+        For a step, how its rounding adds up.
+    """
+
+    settings: Settings
+    inputs: tuple[Argument, ...]
+    outputs: tuple[Argument, ...]
+    residuals: tuple[ErrorFeedback, ...]
+    accumulation: RoundingAccumulation | None
+
+    @property
+    def companion_settings(self) -> Settings:
+        """The settings of a kernel that works on the same state beside a step: an orthonormalization."""
+        return replace(self.settings, ranges={}, formats={"state": str(self.inputs[0].format)})
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the interface as plain JSON data."""
+        adds_up = self.accumulation
+        return {
+            "settings": self.settings.as_dict(),
+            "inputs": [argument.as_dict() for argument in self.inputs],
+            "outputs": [argument.as_dict() for argument in self.outputs],
+            "residuals": [asdict(residual) for residual in self.residuals],
+            "accumulation": adds_up and {name: str(value) for name, value in asdict(adds_up).items()},
+        }
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Interface:
+        """Rebuild an interface from `as_dict`."""
+        adds_up = data["accumulation"]
+        return cls(
+            Settings.from_dict(data["settings"]),
+            tuple(map(Argument.from_dict, data["inputs"])),
+            tuple(map(Argument.from_dict, data["outputs"])),
+            tuple(ErrorFeedback(**residual) for residual in data["residuals"]),
+            adds_up and RoundingAccumulation(**{name: Fraction(value) for name, value in adds_up.items()}),
+        )

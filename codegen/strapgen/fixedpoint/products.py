@@ -1,0 +1,202 @@
+"""Trees of operations as sums of products: every term is a multiple of at most two stored quantities."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapgen.fixedpoint.derivation_context import (
+    DerivationContext,
+    Samples,
+    free_name,
+    note_samples,
+    stored_terms,
+)
+from strapgen.fixedpoint.quantities import (
+    InputElement,
+    Operand,
+    Quantity,
+    Sum,
+    Terms,
+    combined,
+    is_dyadic,
+    is_power_of_two,
+    scaled,
+)
+from strapgen.program import RESOLUTION, Constant, Node, Reference
+
+#: Operations that a sum of products is made of.
+SUM_OPERATIONS = ("add", "subtract", "negate", "multiply")
+#: An offset leaves at most this part of itself to be stored, so that one bit or more is gained.
+_SMALL = Fraction(1, 2)
+#: What is put behind the name of a value for an operation inside it.
+_SUFFIXES = {
+    "divide": "quotient",
+    "sqrt": "root",
+    "maximum": "largest",
+    "select": "choice",
+    "sin": "sine",
+    "cos": "cosine",
+    "sinc": "sinc",
+    "atan2": "angle",
+    "direction": "angle",
+    "wrap": "principal",
+}
+
+
+def terms_of(context: DerivationContext, node: Node, name: str) -> Terms:
+    """Return a node as a sum over products of at most two stored quantities."""
+    if isinstance(node, Constant):
+        return {(): node.value} if node.value else {}
+    if isinstance(node, Reference):
+        if node.name == RESOLUTION:  # that of a word which holds an attitude
+            return {(): Fraction(1, 1 << (context.word - 2))}
+        return stored_terms(context, node.name)
+    if node.kind not in SUM_OPERATIONS:
+        inner = free_name(context, f"{stem(name)}_{_SUFFIXES[node.kind]}")
+        context.derive_operation(context, inner, node, "")
+        return stored_terms(context, inner)
+    operands = [terms_of(context, argument, name) for argument in node.arguments]
+    if node.kind == "negate":
+        return scaled(operands[0], Fraction(-1))
+    left, right = operands
+    if node.kind == "multiply":
+        return _product(context, left, right, name)
+    return combined(left, right, Fraction(1 if node.kind == "add" else -1))
+
+
+def operand_of(context: DerivationContext, node: Node, name: str) -> Operand:
+    """Return a constant, or the name of a quantity that is stored whole."""
+    terms = terms_of(context, node, name)
+    if set(terms) <= {()}:
+        return terms.get((), Fraction(0))
+    if len(terms) == 1:
+        ((monomial, coefficient),) = terms.items()
+        if len(monomial) == 1 and coefficient == 1:
+            return monomial[0]
+    return store_temporary(context, name, terms)
+
+
+def store_temporary(context: DerivationContext, name: str, terms: Terms) -> str:
+    """Store a sum whole under a free name like this one, and return that name."""
+    free = free_name(context, name)
+    store(context, free, terms, whole=True)
+    return free
+
+
+def store(
+    context: DerivationContext, name: str, terms: Terms, meaning: str = "", whole: bool = False
+) -> None:
+    """Make the quantity of a sum; unless it is stored whole, only its distance from what it stays near."""
+    terms = _with_plain_products(context, name, terms)
+    constant = terms.get((), Fraction(0))
+    rest = {monomial: c for monomial, c in terms.items() if monomial}
+    offset = Fraction(0)
+    if constant and not whole and is_dyadic(constant):
+        spread = context.ranges.enclosure(rest).magnitude
+        if spread <= abs(constant) * _SMALL:
+            offset = constant
+    beside: Terms = {}
+    if context.split and not whole and not (constant and not offset):
+        beside, rest = _split(context, rest)
+    if constant and not offset:
+        rest[()] = constant
+    note_samples(context, name, lambda values: _evaluated(rest, values))
+    seen = float(np.nan_to_num(np.abs(context.anywhere[name]), posinf=0).max()) or 1e-300
+    enclosure = context.ranges.of_sum(name, rest, seen)
+    definition = Sum(tuple(rest.items()))
+    context.items[name] = Quantity(name, definition, offset, enclosure, meaning, beside=tuple(beside.items()))
+
+
+def stem(name: str) -> str:
+    """Return a name without the suffixes of operations: of a part of a part, the last suffix says enough."""
+    for suffix in (*_SUFFIXES.values(), "numerator", "denominator"):
+        name = name.removesuffix(f"_{suffix}")
+    return name
+
+
+def _with_plain_products(context: DerivationContext, name: str, terms: Terms) -> Terms:
+    """Store the products that are multiplied once more: they are rounded in between."""
+    total = dict(terms)
+    for monomial, coefficient in terms.items():
+        if len(monomial) == 2 and not is_power_of_two(coefficient):
+            inner = free_name(context, f"{name}_product")
+            store(context, inner, {monomial: Fraction(1)})
+            del total[monomial]
+            total = combined(total, stored_terms(context, inner), coefficient)
+    return total
+
+
+def _split(context: DerivationContext, terms: Terms) -> tuple[Terms, Terms]:
+    """Return the exact sum of inputs that a sum differs little from, and the difference; else nothing and the sum."""
+    exact: Terms = {
+        monomial: c
+        for monomial, c in terms.items()
+        if len(monomial) == 1 and is_power_of_two(c) and _is_exact(context, monomial[0])
+    }
+    others = {monomial: c for monomial, c in terms.items() if monomial not in exact}
+    if exact and others:
+        around = context.ranges.enclosure(exact).magnitude
+        if context.ranges.enclosure(others).magnitude <= around * _SMALL:
+            return exact, others
+    return {}, terms
+
+
+def _is_exact(context: DerivationContext, name: str) -> bool:
+    """Tell whether a quantity is a sum of inputs without rounding."""
+    quantity = context.items[name]
+    definition = quantity.definition
+    if isinstance(definition, InputElement):
+        return True
+    return (
+        isinstance(definition, Sum)
+        and not quantity.offset
+        and not quantity.beside
+        and all(
+            len(monomial) == 1
+            and is_power_of_two(c)
+            and isinstance(context.items[monomial[0]].definition, InputElement)
+            for monomial, c in definition.terms
+        )
+    )
+
+
+def _product(context: DerivationContext, left: Terms, right: Terms, name: str) -> Terms:
+    """Return the product of two sums, each stored first where it has too many terms."""
+    for constant, terms in ((left, right), (right, left)):
+        if set(constant) <= {()}:
+            return scaled(terms, constant.get((), Fraction(0)))
+    left, right = _factor(context, left, name), _factor(context, right, name)
+    total: Terms = {}
+    for one, a in left.items():
+        for other, b in right.items():
+            total = combined(total, {tuple(sorted(one + other)): a * b}, Fraction(1))
+    return total
+
+
+def _factor(context: DerivationContext, terms: Terms, name: str) -> Terms:
+    """Return a factor as a constant, one stored quantity times a power of two, and what stands beside it."""
+    linear = [monomial for monomial in terms if monomial]
+    if is_dyadic(terms.get((), Fraction(0))) and all(
+        len(m) == 1 and is_power_of_two(terms[m]) for m in linear
+    ):
+        stored = [context.items[m[0]] for m in linear]
+        beside = {m for quantity in stored for m, _ in quantity.beside}
+        if len(linear) == 1 or (beside and all(m in beside or context.items[m[0]].beside for m in linear)):
+            return terms
+    inner = free_name(context, f"{name}_factor")
+    store(context, inner, terms)
+    return stored_terms(context, inner)
+
+
+def _evaluated(terms: Terms, values: Samples) -> NDArray[np.float64]:
+    """Return the values of a sum on samples."""
+    total = np.zeros(len(values[""]))
+    for monomial, coefficient in terms.items():
+        product = np.full(1, float(coefficient))
+        for name in monomial:
+            product = product * values[name]
+        total = total + product
+    return total

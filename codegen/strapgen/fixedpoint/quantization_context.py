@@ -1,0 +1,171 @@
+"""What a walk over exact quantities has come to know: the integers so far, with their ranges and error bounds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+from strapgen.exceptions import InputError
+from strapgen.fixedpoint.code import IntegerDefinition, Value
+from strapgen.fixedpoint.format_plan import FormatPlan
+from strapgen.fixedpoint.formats import ROUNDINGS, Format
+from strapgen.fixedpoint.quantities import InputElement, Quantities, Quantity, Sum, used_by
+from strapgen.fixedpoint.settings import Settings
+from strapgen.fixedpoint.terms import up
+from strapgen.program import Program
+
+#: Part of the smaller end of a checked range that an error may take, so that proper input passes the check.
+_LARGEST_PART = Fraction(1, 2)
+
+
+@dataclass
+class Quantization:
+    """The state of a walk over the exact quantities of a program.
+
+    Parameters
+    ----------
+    program : Program
+    settings : Settings
+    quantities : Quantities
+    plan : FormatPlan
+    most : mapping of str to int
+        Most fraction bits of quantities that need not be finer.
+    feedback_names : mapping of str to str
+        The name of the error feedback of every quantity whose rounding error goes into the next call.
+    values : dict of str to Value
+        The integers so far, those of the inputs included.
+    body : list of Value
+        The integers so far, in the order of the code.
+    resets : set of str
+        Quantities whose computed value is taken as exact from there on.
+    """
+
+    program: Program
+    settings: Settings
+    quantities: Quantities
+    plan: FormatPlan
+    most: Mapping[str, int]
+    feedback_names: Mapping[str, str]
+    values: dict[str, Value] = field(init=False)
+    body: list[Value] = field(default_factory=list)
+    resets: set[str] = field(default_factory=set)
+
+    def __post_init__(self) -> None:
+        self.values = dict(self.plan.values)
+
+    @property
+    def word(self) -> int:
+        """Bits of a word."""
+        return self.settings.word
+
+    @property
+    def rounding_error(self) -> Fraction:
+        """Largest error of a rounding, in units of the last place."""
+        return ROUNDINGS[self.settings.rounding]
+
+    def largest(self, fraction: int) -> int:
+        """Return the largest integer that a word of so many fraction bits holds."""
+        return Format(self.word, fraction).largest
+
+    def too_short(self, name: str) -> InputError:
+        """Return the error that says that a word does not hold a quantity."""
+        return InputError(f"{self.program.kernel}: words of {self.word} bits are too short for {name}")
+
+    def add(self, value: Value) -> None:
+        """Add a value to the code."""
+        self.values[value.name] = value
+        self.body.append(value)
+
+
+def integer_value(
+    context: Quantization,
+    quantity: Quantity,
+    definition: IntegerDefinition,
+    fraction: int,
+    error: Fraction,
+    peak: int,
+    wide: bool = False,
+    followed: Fraction = Fraction(0),
+) -> Value:
+    """Return a value with the range of its integer: that of the quantity, and what rounding adds.
+
+    Parameters
+    ----------
+    context : Quantization
+    quantity : Quantity
+    definition : IntegerDefinition
+    fraction : int
+        Fraction bits of the integer.
+    error : Fraction
+        Bound of what rounding, and the errors of what it is computed from, do to the value.
+    peak : int
+        Bound of the magnitude of every partial sum.
+    wide : bool, optional
+        Whether it takes a wide number.
+    followed : Fraction, optional
+        Bound of what the errors do of quantities that were taken as exact on the way.
+
+    Raises
+    ------
+    InputError
+        If the range is checked, and the error may be as large as the value.
+    """
+    unit = Fraction(2) ** fraction
+    local = up(error + quantity.inexact)
+    total = local + followed
+    low, high = quantity.range.lowest, quantity.range.highest
+    if quantity.guarded and total > min(abs(low), abs(high)) * _LARGEST_PART:
+        _reset(context, quantity)
+        total, limits = Fraction(0), (math.ceil(low * unit), math.floor(high * unit))
+    elif quantity.guarded:
+        # What passes the check is so far inside that the exact value is in the range too.
+        limits = (math.ceil((low + total) * unit), math.floor((high - total) * unit))
+    else:
+        # What was taken as exact lies in its range too, so that its error does not lead out of this one.
+        limits = (math.floor((low - local) * unit), math.ceil((high + local) * unit))
+    return Value(
+        quantity.name,
+        definition,
+        fraction,
+        wide,
+        *limits,
+        quantity.offset,
+        total,
+        peak,
+        quantity.guarded,
+        quantity.meaning,
+    )
+
+
+def _reset(context: Quantization, quantity: Quantity) -> None:
+    """Take the computed value as exact from here on, because nothing is known of its distance from the exact one.
+
+    What comes after is bounded as a function of the computed value, so that it stays inside its formats; an output
+    that depends on it is certified by the range of its signal alone.
+    """
+    items = context.quantities.items
+    only_checked = all(quantity.name not in used_by(item) for item in items.values())
+    # Every output has a range by what it is: an attitude.
+    limited = all(r.signal.constraint and r.signal.bound is not None for r in context.program.outputs)
+    if only_checked or not limited or _is_polynomial(context.quantities, quantity.name):
+        raise InputError(
+            f"{context.program.kernel}: words of {context.word} bits are too short for {quantity.name}, its error may "
+            "be as large as itself"
+        )
+    context.resets.add(quantity.name)
+
+
+def _is_polynomial(quantities: Quantities, name: str) -> bool:
+    """Tell whether a quantity is a polynomial of the inputs: ranges of what comes after it may rest on that."""
+    pending, seen = [name], set[str]()
+    while pending:
+        definition = quantities.items[pending.pop()].definition
+        if isinstance(definition, Sum):
+            factors = {factor for monomial, _ in definition.terms for factor in monomial}
+            pending += factors - seen
+            seen |= factors
+        elif not isinstance(definition, InputElement):
+            return False
+    return True

@@ -1,0 +1,276 @@
+"""Sums of products as integers: exact products, aligned, added up and rounded once, with or without error feedback."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+from strapgen.exceptions import InputError
+from strapgen.fixedpoint.code import IntegerSum, Term, Value
+from strapgen.fixedpoint.format_plan import carried_input
+from strapgen.fixedpoint.formats import Format, finest
+from strapgen.fixedpoint.interface import ErrorFeedback
+from strapgen.fixedpoint.intervals import Interval
+from strapgen.fixedpoint.quantities import (
+    Monomial,
+    Quantity,
+    Sum,
+    exponent,
+    is_dyadic,
+    is_power_of_two,
+)
+from strapgen.fixedpoint.quantization_context import Quantization, integer_value
+from strapgen.fixedpoint.terms import Aligned, Placed, aligned, largest_wide, nearest, up
+
+
+def lower_sum(context: Quantization, quantity: Quantity, definition: Sum) -> None:
+    """Lower a sum of products to a word, or to a wide number where no word is needed.
+
+    Raises
+    ------
+    InputError
+        If a format that the user states does not hold it, or the word is too short.
+    """
+    terms = _integer_terms(context, definition)
+    followed = _followed_error(context, quantity)
+    if quantity.name not in context.plan.words:
+        context.add(_wide(context, quantity, terms, followed))
+        return
+    natural = finest(quantity.range.magnitude, context.word)
+    places = [item.place for item in terms]
+    fraction = min(natural, max(places, default=natural), context.most.get(quantity.name, natural))
+    fraction = context.plan.forced.get(quantity.name, fraction)
+    value = _rounded(context, quantity, terms, fraction, followed)
+    while value.magnitude > context.largest(value.fraction):
+        if quantity.name in context.plan.forced:
+            value = _limited(context, quantity, value)
+            break
+        value = _rounded(context, quantity, terms, value.fraction - 1, followed)
+    context.add(value)
+
+
+def word_of(context: Quantization, name: str) -> str:
+    """Return the name of a value as a word, which is rounded from the wide one if it is needed."""
+    wide = context.values[name]
+    if not wide.wide:
+        return name
+    rounded = f"{name}_word"
+    if rounded not in context.values:
+        exact = context.quantities.items[name]
+        quantity = replace(exact, name=rounded, meaning="", guarded=False, inexact=Fraction(0), follows=None)
+        terms = [Placed(Term((name,), 1), wide.fraction, wide.error)]
+        fraction = min(finest(exact.range.magnitude, context.word), wide.fraction)
+        value = _rounded(context, quantity, terms, fraction)
+        while value.magnitude > context.largest(value.fraction):
+            value = _rounded(context, quantity, terms, value.fraction - 1)
+        context.add(value)
+    return rounded
+
+
+# Terms
+
+
+def _integer_terms(context: Quantization, definition: Sum) -> list[Placed]:
+    """Return the terms of a sum as integers, each with its fraction bits and its error."""
+    terms = [
+        _product_term(context, monomial, coefficient)
+        for monomial, coefficient in definition.terms
+        if monomial
+    ]
+    constant = next((coefficient for monomial, coefficient in definition.terms if not monomial), Fraction(0))
+    if constant:
+        terms.append(_constant_term(constant, [item.place for item in terms], context.word))
+    return terms
+
+
+def _product_term(context: Quantization, monomial: Monomial, coefficient: Fraction) -> Placed:
+    """Return a multiple of one or two values as an integer term."""
+    shifts = is_power_of_two(coefficient)
+    names = tuple(word_of(context, n) if len(monomial) == 2 or not shifts else n for n in monomial)
+    values = [context.values[name] for name in names]
+    error = _product_error(context, values, monomial) * abs(coefficient)
+    places = sum(value.fraction for value in values)
+    if shifts:
+        sign = 1 if coefficient > 0 else -1
+        return Placed(Term(names, sign), places - exponent(coefficient), up(error))
+    factor, bits = _nearest_word(coefficient, context.word)
+    wrong = abs(Fraction(factor, 1) / Fraction(2) ** bits - coefficient)
+    stored = values[0].magnitude / Fraction(2) ** values[0].fraction
+    return Placed(Term(names, factor), places + bits, up(error + wrong * stored))
+
+
+def _product_error(context: Quantization, values: Sequence[Value], monomial: Monomial) -> Fraction:
+    """Return the error of an exact product of inexact values."""
+    if len(values) == 1:
+        return values[0].error
+    a, b = values
+    size_a, size_b = (context.quantities.items[name].range.magnitude for name in monomial)
+    return size_a * b.error + size_b * a.error + a.error * b.error
+
+
+def _nearest_word(value: Fraction, word: int) -> tuple[int, int]:
+    """Return the nearest word to a number that is no power of two, and its fraction bits."""
+    bits = finest(abs(value) * (1 + Fraction(1, 1 << word)), word)
+    integer = nearest(value * Fraction(2) ** bits)
+    while integer and integer % 2 == 0:
+        integer, bits = integer // 2, bits - 1
+    return integer, bits
+
+
+def _constant_term(constant: Fraction, places: Sequence[int], word: int) -> Placed:
+    """Return a constant as an integer term: exact if it is dyadic, else as fine as the other terms or finer."""
+    longest = 2 * word - 3
+    if is_dyadic(constant):
+        place = constant.denominator.bit_length() - 1
+    else:
+        place = max([*places, finest(abs(constant), longest)])
+    place = min(place, longest - math.ceil(abs(constant)).bit_length())
+    integer = nearest(constant * Fraction(2) ** place)
+    wrong = abs(integer / Fraction(2) ** place - constant)
+    return Placed(Term((), integer), place, up(wrong))
+
+
+# Rounding
+
+
+@dataclass(frozen=True)
+class _FineTerms:
+    """The terms of a sum that are rounded, as they are added up.
+
+    Parameters
+    ----------
+    aligned : Aligned
+    shift : int
+        Places that the rounding drops.
+    added : int
+        Bound of what is added before: half a unit, or the error feedback.
+    feedback : ErrorFeedback or None
+    error : Fraction
+        Bound of the error before rounding.
+    """
+
+    aligned: Aligned
+    shift: int
+    added: int
+    feedback: ErrorFeedback | None
+    error: Fraction
+
+    @property
+    def peak(self) -> int:
+        """Bound of the magnitude of every partial sum."""
+        return self.aligned.peak + self.added
+
+
+def _wide(context: Quantization, quantity: Quantity, terms: Sequence[Placed], followed: Fraction) -> Value:
+    """Return a sum at full precision: it is only added, compared or drawn a root from."""
+    fraction = max((item.place for item in terms), default=context.word - 1)
+    while True:
+        total = aligned(terms, fraction, context.word, context.values)
+        if total.fits(context.word, context.values):
+            break
+        fraction -= 1
+    definition = IntegerSum(total.terms)
+    return integer_value(context, quantity, definition, fraction, total.error, total.peak, True, followed)
+
+
+def _rounded(
+    context: Quantization,
+    quantity: Quantity,
+    terms: Sequence[Placed],
+    fraction: int,
+    followed: Fraction = Fraction(0),
+) -> Value:
+    """Return a sum as a word of so many fraction bits."""
+    word, values = context.word, context.values
+    fine_terms = [item for item in terms if item.place > fraction]
+    coarse = aligned([item for item in terms if item.place <= fraction], fraction, word, values)
+    if not coarse.fits(word, values):
+        raise context.too_short(quantity.name)
+    if not fine_terms:
+        definition = IntegerSum(coarse.terms)
+        return integer_value(
+            context, quantity, definition, fraction, coarse.error, coarse.peak, followed=followed
+        )
+    fine = _fine(context, quantity.name, fine_terms, fraction)
+    rounded_peak = (fine.peak >> fine.shift) + 1
+    if not coarse.fits(word, values, rounded_peak) or fine.peak > largest_wide(word):
+        raise context.too_short(quantity.name)
+    feedback = fine.feedback
+    drop = max(0, fraction + fine.shift - feedback.fraction) if feedback is not None else 0
+    # With error feedback, the result is off by what was left before and what is left now.
+    roundings = 2 if feedback is not None else 1
+    error = fine.error + coarse.error + roundings * context.rounding_error / Fraction(2) ** fraction
+    value = integer_value(
+        context,
+        quantity,
+        IntegerSum(fine.aligned.terms, fine.shift - drop, coarse.terms, feedback, drop),
+        fraction,
+        error,
+        max(fine.peak, coarse.peak + rounded_peak),
+        followed=followed,
+    )
+    if feedback is not None:  # whatever integer a caller hands over as a residual
+        value = replace(value, low=value.low - 1, high=value.high + 1)
+    return value
+
+
+def _fine(context: Quantization, name: str, terms: Sequence[Placed], fraction: int) -> _FineTerms:
+    """Return the terms that are rounded at the finest place at which they have room."""
+    word, values = context.word, context.values
+    rounds_to_nearest = context.settings.rounding == "nearest"
+    feedback_name = context.feedback_names.get(name)
+    for place in range(max(item.place for item in terms), fraction, -1):
+        shift = place - fraction
+        total = aligned(terms, place, word, values)
+        error, feedback = total.error, None
+        added = 1 << (shift - 1) if rounds_to_nearest else 0
+        if feedback_name is not None:
+            below = fraction + word  # fraction bits of the feedback
+            fresh = 1 << (word - 1) if rounds_to_nearest else 0
+            feedback = ErrorFeedback(feedback_name, below, min(0, place - below), fresh)
+            added = 1 << shift
+            error += Fraction(2) ** -min(below, place)
+        if shift < 2 * word - 1 and total.fits(word, values, added):
+            return _FineTerms(total, shift, added, feedback, error)
+    raise context.too_short(name)
+
+
+def _limited(context: Quantization, quantity: Quantity, value: Value) -> Value:
+    """Return a value in a fixed format that does not hold its range: it is checked if its range is otherwise known."""
+    limit = _known_limit(context, quantity.name, value.fraction)
+    if limit is None:
+        raise InputError(
+            f"format {Format(context.word, value.fraction)} of {quantity.name} does not hold its range "
+            f"{(quantity.range + Interval.of(quantity.offset)).text()}"
+            f"{', less ' + str(quantity.offset) if quantity.offset else ''}"
+        )
+    return replace(value, low=max(value.low, -limit), high=min(value.high, limit), guarded=True)
+
+
+def _known_limit(context: Quantization, name: str, fraction: int) -> int | None:
+    """Return the largest integer of an output whose range is known but not proved."""
+    program, inputs = context.program, context.plan.inputs
+    for result in program.outputs:
+        if name in context.quantities.results[result.signal.name]:
+            if result.signal.constraint:
+                return math.floor((Fraction(1) + context.settings.allowance) * Fraction(2) ** fraction)
+            carried = carried_input(program, inputs, result.signal)
+            if carried is not None:
+                return carried.high
+            if program.companions is not None:  # the state of the next step
+                return inputs[0].high
+    return None
+
+
+def _followed_error(context: Quantization, quantity: Quantity) -> Fraction:
+    """Return what the errors of quantities add that were taken as exact on the way to this one."""
+    follows, total = quantity.follows, Fraction(0)
+    if follows is None:
+        return total
+    for name, slope in follows.slopes:
+        error = context.values[word_of(context, name)].error
+        if error:
+            total += follows.most if slope is None else slope * error
+    return up(min(total, follows.most))

@@ -1,0 +1,192 @@
+"""Names in generated code: those of a kernel, made legal where a language or the code around them has them already.
+
+What a template owns is read off the text that it prints. A program is printed once with marks in place of its names;
+every identifier without a mark is then one of the code around it, and stands in the scopes where the marks show which
+names it can meet. So no list of a template's variables has to be kept, and a name that meets none stays as it is.
+"""
+
+from __future__ import annotations
+
+import keyword
+import re
+import symtable
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from itertools import count
+from typing import TypeVar
+
+from strapgen.fixedpoint import FixedProgram
+from strapgen.program import Program
+from strapgen.targets.c_library import LIBRARY
+from strapgen.targets.renaming import Key, keys, renamed
+
+#: Keywords of C99 to C23 and of C++, which reads the headers too, and macros without arguments in lower case.
+_C_TEXT = """
+I alignas alignof and and_eq asm auto bitand bitor bool break case catch char char16_t char32_t char8_t class
+co_await co_return co_yield compl complex concept const const_cast consteval constexpr constinit continue
+decltype default delete do double dynamic_cast else enum errno explicit export extern false float for fortran
+friend goto i386 if imaginary inline int linux long math_errhandling mutable namespace new noexcept noreturn
+not not_eq nullptr operator or or_eq private protected public register reinterpret_cast requires restrict
+return short signed sizeof static static_assert static_cast stderr stdin stdout struct switch template this
+thread_local throw true try typedef typeid typename typeof typeof_unqual union unix unsigned using virtual
+void volatile wchar_t while xor xor_eq
+"""
+_C_WORDS = frozenset(_C_TEXT.split())
+#: Macros without arguments of the standard headers.
+_C_MACROS = re.compile(
+    r"NULL|EOF|WEOF|NAN|INFINITY|HUGE(_VAL[FL]?)?|MAXFLOAT|DECIMAL_DIG|BUFSIZ|L_tmpnam|RAND_MAX|TMP_MAX|TIME_UTC"
+    r"|CLOCKS_PER_SEC|MB_(CUR|LEN)_MAX|F(ILENAME|OPEN)_MAX|DOMAIN|SING|OVERFLOW|UNDERFLOW|[PT]LOSS|X_TLOSS"
+    r"|M_(E|PI(_[24])?|[12]_PI|2_SQRTPI|LN2|LN10|LOG2E|LOG10E|SQRT2|SQRT1_2)[fl]?"
+    r"|E(2BIG|[A-Z][A-Z0-9]{2,})|SIG[A-Z0-9_]{2,}"
+    r"|(U?INT(MAX|PTR|(_LEAST|_FAST)?\d+)?|FLT|L?DBL|[SU]?CHAR|U?SHRT|U?L?LONG|WCHAR|WINT|S?SIZE|PTRDIFF|SIG_ATOMIC|FP|FE|LC"
+    r"|EXIT|SEEK|MATH|SA)_[A-Z0-9_]+|(PRI|SCN)[diouxX](LEAST|FAST)?(\d+|MAX|PTR)"
+)
+_P = TypeVar("_P", Program, FixedProgram)
+
+#: A letter that no name has: admission lets letters of ASCII alone in.
+_MARK = "ж"
+_IDENTIFIER = re.compile(rf"(?<![\w.])[A-Za-z_{_MARK}]\w*")
+
+
+@dataclass(frozen=True)
+class Language:
+    """What a language says about names.
+
+    Parameters
+    ----------
+    allows : callable
+        Tells whether an identifier may stand for a quantity.
+    scopes : callable
+        Returns the identifiers of each scope of some files.
+    """
+
+    allows: Callable[[str], bool]
+    scopes: Callable[[Iterable[str]], list[set[str]]]
+
+
+def _c_allows(name: str) -> bool:
+    reserved = re.match(r"_[A-Z_]", name)
+    macro = _C_MACROS.fullmatch(name) and not name.endswith("_")
+    return not (reserved or macro or name in _C_WORDS)
+
+
+def _c_scopes(texts: Iterable[str]) -> list[set[str]]:
+    """Return the identifiers of each declaration and function; macros of the code count in all of them."""
+    macros: set[str] = set()
+    scopes: list[set[str]] = [set()]
+    for text in texts:
+        macros.update(re.findall(r"^#define (\w+)", text, flags=re.MULTILINE))
+        plain = re.sub(r"/\*.*?\*/|^ *#.*?$|^extern \"C\" \{$", " ", text, flags=re.DOTALL | re.MULTILINE)
+        depth = 0
+        for token in re.findall(rf"[{{}};]|{_IDENTIFIER.pattern}", plain):
+            if token in "{}":
+                depth = max(0, depth + (1 if token == "{" else -1))
+            if token in "};" and not depth:
+                scopes.append(set())
+            elif token not in "{};":
+                scopes[-1].add(token)
+    return [scope | macros for scope in scopes if scope]
+
+
+def _python_allows(name: str) -> bool:
+    return not (keyword.iskeyword(name) or (name.startswith("__") and name.endswith("__")))
+
+
+def _python_scopes(texts: Iterable[str]) -> list[set[str]]:
+    """Return the names that each function uses, and first those that the modules do."""
+    module: set[str] = set()
+    scopes: list[set[str]] = [module]
+
+    def read(table: symtable.SymbolTable) -> set[str]:
+        used = set(table.get_identifiers())
+        module.update(symbol.get_name() for symbol in table.get_symbols() if symbol.is_global())
+        return used.union(*(read(child) for child in table.get_children()))
+
+    for text in texts:
+        table = symtable.symtable(text, "generated", "exec")
+        module.update(table.get_identifiers())
+        module.update(re.findall(r"^(?:import|from) (\w+)", text, flags=re.MULTILINE))
+        scopes += [read(child) for child in table.get_children()]
+    return scopes
+
+
+C = Language(_c_allows, _c_scopes)
+PYTHON = Language(_python_allows, _python_scopes)
+
+
+def external(name: str) -> str:
+    """Return the name of a kernel's function in C, which no library, header or keyword has.
+
+    Examples
+    --------
+    >>> external("euler_rk4_2"), external("hypot")
+    ('euler_rk4_2', 'hypot_Kernel')
+    """
+    free = _c_allows(name) and name not in LIBRARY and not name.endswith("_t")
+    return name if free else f"{name}_Kernel"  # a capital letter stands in no other kernel's name
+
+
+def printed(
+    program: _P,
+    text: Callable[[_P, Mapping[str, str]], dict[str, str]],
+    language: Language,
+    joined: Iterable[str] = (),
+) -> tuple[_P, dict[str, str]]:
+    """Print a program with names that the language and the code around them leave free.
+
+    Parameters
+    ----------
+    program : Program or FixedProgram
+    text : callable
+        Prints a program into files; takes the kernel's name of every name that stands for another one too.
+    language : Language
+    joined : iterable of str
+        Signals that have one name with their only element.
+
+    Returns
+    -------
+    program : Program or FixedProgram
+        With the names that are printed.
+    files : dict of str to str
+    """
+    names = keys(program, frozenset(joined))
+    marks = {key: f"{_MARK}{number}{_MARK}" for number, key in enumerate(names)}
+    marked = text(renamed(program, marks, joined), {})
+    chosen = _chosen(marks, language, language.scopes(marked.values()))
+    result = renamed(program, chosen, joined)
+    return result, text(result, {new: key.name for key, new in chosen.items() if new != key.name})
+
+
+def _chosen(marks: Mapping[Key, str], language: Language, scopes: list[set[str]]) -> dict[Key, str]:
+    """Return the name of everything that is marked: its own where that is free, and else one like it."""
+    taken = [{name for name in scope if _MARK not in name} for scope in scopes]
+    places: dict[str, list[tuple[str, set[str]]]] = {mark: [] for mark in marks.values()}
+    for scope, names in zip(scopes, taken, strict=True):
+        for token in sorted(name for name in scope if _MARK in name):
+            (mark,) = re.findall(rf"{_MARK}\d+{_MARK}", token)
+            places[mark].append((token, names))
+    chosen: dict[Key, str] = {}
+
+    def settle(key: Key, name: str) -> bool:
+        mark = marks[key]
+        finals = [(token.replace(mark, name), names) for token, names in places[mark]]
+        if any(final in names or not language.allows(final) for final, names in finals):
+            return False
+        for final, names in finals:
+            names.add(final)
+        chosen[key] = name
+        return True
+
+    waiting = [key for key in marks if not settle(key, key.name)]
+    for key in waiting:
+        next(name for name in _alike(key) if settle(key, name))
+    return chosen
+
+
+def _alike(key: Key) -> Iterator[str]:
+    """Yield names like one that is not free."""
+    if key.kind == "function":
+        yield f"{key.name}_Kernel"
+    base = key.name.lstrip("_") or "value"
+    yield f"{base}_"
+    yield from (f"{base}_v{number}" for number in count(2))  # no macro has small letters there

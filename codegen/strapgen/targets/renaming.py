@@ -1,0 +1,170 @@
+"""A program under other names: the same code, to be printed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from typing import NamedTuple, TypeVar
+
+from strapgen.fixedpoint import FixedProgram
+from strapgen.fixedpoint.code import (
+    IntegerDefinition,
+    IntegerInput,
+    IntegerMaximum,
+    IntegerQuotient,
+    IntegerRoot,
+    IntegerSelection,
+    IntegerSum,
+    Scaled,
+    Term,
+    Value,
+)
+from strapgen.fixedpoint.interface import Argument, ErrorFeedback, Interface
+from strapgen.program import Assignment, Node, Operation, Program, Reference, Result
+from strapgen.signal import Signal
+
+_P = TypeVar("_P", Program, FixedProgram)
+
+
+class Key(NamedTuple):
+    """Something that has a name: of kind "function", "signal", "value" or "residual"."""
+
+    kind: str
+    name: str
+
+
+def keys(program: Program | FixedProgram, joined: Iterable[str] = ()) -> list[Key]:
+    """Return everything that a program names, each once, signals first.
+
+    Parameters
+    ----------
+    program : Program or FixedProgram
+    joined : iterable of str
+        Signals that have one name with their only element.
+    """
+    plain = program if isinstance(program, Program) else program.program
+    signals = [*plain.inputs, *(result.signal for result in plain.results)]
+    names = [Key("function", plain.name)]
+    names += [Key("signal", signal.name) for signal in signals if signal.name not in joined]
+    names += [Key("value", name) for signal in signals for name in signal.elements]
+    if isinstance(program, Program):
+        names += [Key("value", assignment.name) for assignment in program.body]
+    else:
+        names += [Key("value", value.name) for value in program.body]
+        names += [Key("residual", residual.name) for residual in program.interface.residuals]
+    return list(dict.fromkeys(names))
+
+
+def renamed(program: _P, names: Mapping[Key, str], joined: Iterable[str] = ()) -> _P:
+    """Return a program with other names.
+
+    Parameters
+    ----------
+    program : Program or FixedProgram
+    names : mapping of Key to str
+        Names by what they stand for; what is missing keeps its own.
+    joined : iterable of str
+        As for `keys`.
+    """
+    work = _Renaming(names, frozenset(joined))
+    return work.program(program) if isinstance(program, Program) else work.fixed(program)
+
+
+class _Renaming:
+    """Names, and how each part of a program takes them."""
+
+    def __init__(self, names: Mapping[Key, str], joined: frozenset[str]) -> None:
+        self.names, self.joined = names, joined
+
+    def value(self, name: str) -> str:
+        return self.names.get(Key("value", name), name)
+
+    def signal(self, signal: Signal) -> Signal:
+        if signal.name in self.joined:
+            name = self.value(*signal.elements)
+        else:
+            name = self.names.get(Key("signal", signal.name), signal.name)
+        return replace(signal, name=name, elements=tuple(map(self.value, signal.elements)))
+
+    # Programs
+
+    def node(self, node: Node) -> Node:
+        if isinstance(node, Reference):
+            return Reference(self.value(node.name))
+        if isinstance(node, Operation):
+            return Operation(node.kind, tuple(map(self.node, node.arguments)))
+        return node
+
+    def result(self, result: Result) -> Result:
+        return Result(self.signal(result.signal), tuple(map(self.node, result.nodes)))
+
+    def program(self, program: Program) -> Program:
+        return replace(
+            program,
+            name=self.names.get(Key("function", program.name), program.name),
+            inputs=tuple(map(self.signal, program.inputs)),
+            body=tuple(Assignment(self.value(a.name), self.node(a.value), a.meaning) for a in program.body),
+            outputs=tuple(map(self.result, program.outputs)),
+            transition=program.transition and self.result(program.transition),
+        )
+
+    # Programs on integers: their interface and body say all that is printed
+
+    def fixed(self, fixed: FixedProgram) -> FixedProgram:
+        interface = fixed.interface
+        return replace(
+            fixed,
+            program=replace(
+                fixed.program,
+                name=self.names.get(Key("function", fixed.program.name), fixed.program.name),
+            ),
+            interface=self.interface(interface),
+            body=tuple(map(self.fixed_value, fixed.body)),
+        )
+
+    def interface(self, interface: Interface) -> Interface:
+        return replace(
+            interface,
+            inputs=tuple(map(self.argument, interface.inputs)),
+            outputs=tuple(map(self.argument, interface.outputs)),
+            residuals=tuple(map(self.residual, interface.residuals)),
+        )
+
+    def argument(self, argument: Argument) -> Argument:
+        values = tuple(map(self.value, argument.values))
+        return replace(argument, signal=self.signal(argument.signal), values=values)
+
+    def residual(self, residual: ErrorFeedback) -> ErrorFeedback:
+        return replace(residual, name=self.names.get(Key("residual", residual.name), residual.name))
+
+    def fixed_value(self, value: Value) -> Value:
+        return replace(value, name=self.value(value.name), definition=self.definition(value.definition))
+
+    def definition(self, definition: IntegerDefinition) -> IntegerDefinition:
+        if isinstance(definition, IntegerSum):
+            return replace(
+                definition,
+                fine=tuple(map(self.term, definition.fine)),
+                coarse=tuple(map(self.term, definition.coarse)),
+                residual=definition.residual and self.residual(definition.residual),
+            )
+        if isinstance(definition, IntegerQuotient):
+            return IntegerQuotient(self.scaled(definition.numerator), self.value(definition.denominator))
+        if isinstance(definition, IntegerRoot):
+            return IntegerRoot(self.scaled(definition.argument))
+        if isinstance(definition, IntegerMaximum):
+            return IntegerMaximum(tuple(map(self.scaled, definition.arguments)))
+        if isinstance(definition, IntegerInput):
+            return definition
+        assert isinstance(definition, IntegerSelection)
+        cases = tuple(
+            (self.scaled(left), self.scaled(right), self.scaled(value))
+            for left, right, value in definition.cases
+        )
+        return IntegerSelection(cases, self.scaled(definition.otherwise))
+
+    def term(self, term: Term) -> Term:
+        return replace(term, names=tuple(map(self.value, term.names)))
+
+    def scaled(self, scaled: Scaled) -> Scaled:
+        return replace(scaled, value=self.value(scaled.value)) if isinstance(scaled.value, str) else scaled

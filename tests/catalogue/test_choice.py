@@ -1,0 +1,164 @@
+"""A choice carries what was chosen: two kernels of one name are two kernels, wherever they are used."""
+
+from __future__ import annotations
+
+import json
+import pickle
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import strapgen
+from strapgen import behaviour, catalogue, vibration
+from strapgen.analysis.constant_rate import constant_rate
+from strapgen.analysis.prediction import predict
+from strapgen.analysis.series import series
+from strapgen.backends import of
+from strapgen.cli import main
+from strapgen.comparison import compare_choice
+from strapgen.convergence import GENERAL, converge
+from strapgen.exceptions import InputError
+
+#: A file whose kernel has one name, whatever its options are: Euler parameters by a tableau.
+FILE = str(Path(__file__).resolve().parents[1] / "data" / "algorithms" / "one_name.py")
+METHODS = ("rk1", "rk3")
+
+
+@pytest.fixture
+def chosen() -> dict[str, catalogue.Choice]:
+    """Return choices of one file by two methods, both made before either is used."""
+    choices = {method: catalogue.choose(FILE, method) for method in METHODS}
+    assert {choice.kernel for choice in choices.values()} == {"mine"}
+    return choices
+
+
+@pytest.fixture
+def says(capsys: pytest.CaptureFixture[str]):
+    """Run a command line and return what it prints as data."""
+
+    def run(command: str):
+        with pytest.raises(SystemExit) as stop:
+            main(shlex.split(command))
+        said = capsys.readouterr()
+        assert (stop.value.code, said.err) == (0, "")
+        return json.loads(said.out)
+
+    return run
+
+
+def test_choices_of_two_kernels_of_one_name_differ(chosen):
+    first, second = chosen.values()
+    assert first != second and first.identity != second.identity
+    assert first == catalogue.choose(FILE, "rk1") and hash(first) == hash(catalogue.choose(FILE, "rk1"))
+    assert len({first, second, catalogue.choose(FILE, "rk3")}) == 2
+    assert pickle.loads(pickle.dumps(first)) == first
+    assert catalogue.derive(first) != catalogue.derive(second)
+    assert (first.increments_per_step, first.previous) == (2, 0)
+
+
+def test_each_runs_as_its_own_method(chosen, rng):
+    d = rng.normal(scale=0.05, size=(30, 2, 3))
+    for name in ("numpy", "c"):
+        for method, choice in chosen.items():
+            wanted = strapgen.backend("euler", method, backend=name).propagate(d)
+            np.testing.assert_array_equal(of(choice, name).propagate(d), wanted)
+
+
+def test_each_has_the_companions_that_it_brings(chosen, rng):
+    state = np.array([0.1, 0.2, 0.3, 1.0])
+    d = rng.normal(scale=0.02, size=(30, 2, 3))
+    for method, scheme in (("rk1", "euler-normalize-first-order"), ("rk3", "euler-normalize")):
+        mend = strapgen.evaluator(chosen[method].companion("mend"))
+        np.testing.assert_array_equal(mend(state), strapgen.evaluator(scheme)(state))
+        for name in ("numpy", "c", "c-q31"):
+            wanted = strapgen.backend("euler", method, backend=name, orthonormalization=scheme)
+            backend = of(chosen[method], name, orthonormalization="mend")
+            np.testing.assert_array_equal(backend.propagate(d, 1, 5), wanted.propagate(d, 1, 5))
+    with pytest.raises(
+        InputError, match=r"orthonormalization 'euler-normalize' is not known; allowed: mend$"
+    ):
+        of(chosen["rk1"], orthonormalization="euler-normalize")
+
+
+def test_an_evaluator_takes_a_choice_of_a_user_s_kernel(chosen, rng):
+    state, d = np.array([0.0, 0.6, 0.0, 0.8]), rng.normal(scale=0.1, size=(2, 3))
+    for method, choice in chosen.items():
+        wanted = strapgen.evaluator(catalogue.choose("euler", method))(state, d)
+        np.testing.assert_array_equal(strapgen.evaluator(choice)(state, d), wanted)
+    with pytest.raises(InputError, match="kernel 'mend' is not known"):
+        strapgen.evaluator("mend")
+
+
+def test_the_stages_by_hand_find_what_a_kernel_brings():
+    for target in ("numpy", "c"):
+        sources = strapgen.generate(strapgen.lower(strapgen.derive(FILE, "rk3")), target)
+        run = strapgen.simulate(
+            strapgen.build(sources), strapgen.motion("coning", **GENERAL), "1/16", 1, orthonormalize="1/4"
+        )
+        wanted = strapgen.simulate(
+            strapgen.backend("euler", "rk3", backend=target),
+            strapgen.motion("coning", **GENERAL),
+            "1/16",
+            1,
+            orthonormalize="1/4",
+        )
+        np.testing.assert_array_equal(run.computed, wanted.computed)
+
+
+def test_each_has_its_own_errors_in_many_digits(chosen):
+    profile = strapgen.motion("coning", **GENERAL)
+    for method, choice in chosen.items():
+        measured = converge(choice, profile, ["1/8", "1/16"], 1)
+        wanted = converge(catalogue.choose("euler", method), profile, ["1/8", "1/16"], 1)
+        assert measured.rungs == wanted.rungs
+
+
+def test_each_has_its_own_analysis(chosen):
+    turn = strapgen.motion("constant", y_deg_s=10)
+    for method, choice in chosen.items():
+        ours = catalogue.choose("euler", method)
+        assert constant_rate(choice).angle_lost == constant_rate(ours).angle_lost
+        assert series(choice, "coning", 1).drift == series(ours, "coning", 1).drift
+        assert vibration.of(choice).computed == vibration.of(ours).computed
+        found, wanted = (predict(one, turn, "1/8", 18, 5) for one in (choice, ours))
+        assert list(found.drift[-1]) == list(wanted.drift[-1])
+
+
+def test_each_is_compared_and_checked_for_itself(chosen, rng):
+    d = rng.normal(scale=0.02, size=(20, 2, 3))
+    for method, choice in chosen.items():
+        (row,) = compare_choice(choice, ["numpy"], d, reference="exact")
+        (wanted,) = compare_choice(catalogue.choose("euler", method), ["numpy"], d, reference="exact")
+        assert (row.max_abs_rad, row.drift_deg) == (wanted.max_abs_rad, wanted.drift_deg)
+    findings = {finding.name: finding for finding in behaviour.check(chosen["rk3"])}
+    assert findings["order"].measured == pytest.approx(3, abs=0.15)
+
+
+@pytest.mark.parametrize(
+    ("command", "columns"),
+    [
+        ("converge {} --method rk1,rk3 --steps 1/8,1/16 --duration 1 --format json", "rungs"),
+        ("stability {} --method rk1,rk3 --format json", "contractive"),
+    ],
+)
+def test_a_command_that_takes_methods_shows_each_in_its_own_column(says, command, columns):
+    ours = says(command.format("euler") + (" --increments 2" if command.startswith("converge") else ""))
+    assert [one[columns] for one in says(command.format(shlex.quote(FILE)))] == [one[columns] for one in ours]
+    assert ours[0][columns] != ours[1][columns]
+
+
+def test_an_algorithm_is_held_against_itself_by_another_method(says):
+    command = "series {0} --method rk1 --motion constant --versus {0} --versus-method rk3 --format json"
+    users, ours = (says(command.format(name)) for name in (shlex.quote(FILE), "euler"))
+    for part in ("first_terms", "second_terms", "ratio"):
+        assert users[part] == ours[part]
+    assert users["first_terms"] != users["second_terms"]
+
+
+def test_two_kernels_of_one_step_need_two_names(tmp_path):
+    text = Path(FILE).read_text()
+    (tmp_path / "twice.py").write_text(text.replace('name="matrix-from-mine"),', 'name="mend"),'))
+    with pytest.raises(InputError, match="kernel mine: two of its kernels are called mend; every one needs"):
+        catalogue.choose(str(tmp_path / "twice.py"))

@@ -1,0 +1,102 @@
+"""Taylor series on three samples and more: a rotation, whatever the samples are, and the best of the series."""
+
+from __future__ import annotations
+
+from random import Random
+
+import mpmath
+import numpy as np
+import pytest
+from derived import precisely
+
+from strapgen import backend, derive, motion, simulate
+from strapgen.catalogue import ALGORITHMS
+from strapgen.kernel import Kernel
+from strapgen.motions import Motion
+
+
+def cone(frequency_hz: float) -> Motion:
+    """Return a cone of half-angle 5 degrees."""
+    half_angle, omega = np.radians(5), 2 * np.pi * frequency_hz
+    return motion(
+        "coning",
+        a_rad_s=omega * np.sin(half_angle),
+        b_rad_s=omega,
+        g_rad_s=-omega * (1 - np.cos(half_angle)),
+    )
+
+
+def transition(kernel: Kernel, samples: list[mpmath.mpf]) -> mpmath.matrix:
+    """Return the elements of the transition, in many digits."""
+    state = dict.fromkeys(kernel.inputs[0].elements, mpmath.mpf(0))
+    signal = next(stage.signal for stage in kernel.stages if stage.signal.name == "transition")
+    known = precisely(kernel, state | dict(zip(kernel.inputs[1].elements, samples, strict=True)))
+    flat = [known[name] for name in signal.elements]
+    return mpmath.matrix([flat[k : k + 3] for k in (0, 3, 6)] if signal.shape == (3, 3) else flat)
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "order", "count", "previous"),
+    [
+        *((algorithm, 4, 4, 0) for algorithm in ALGORITHMS),
+        *(("euler", 8, 4, 0), ("euler", 4, 3, 0), ("dcm", 2, 8, 0), ("euler", 4, 1, 3)),
+        *(
+            pytest.param(algorithm, order, count, 0, marks=pytest.mark.long)
+            for algorithm in ALGORITHMS
+            for order in (1, 5, 8)
+            for count in (3, 5, 8)
+        ),
+    ],
+)
+def test_three_minutes_on_a_fast_cone_end_on_a_rotation(algorithm, order, count, previous):
+    # Five samples a turn of the cone.
+    runner = backend(algorithm, f"taylor{order}", count, previous=previous)
+    step = f"{count}/100"
+    run = simulate(runner, cone(20), step, 180, record=step)
+    gram = np.einsum("nik,njk->nij", run.computed, run.computed)
+    assert np.abs(gram - np.eye(3)).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("order", "count", "frequency_hz", "most_deg"),
+    [(4, 3, 5, 0.005), (4, 4, 5, 0.012), (6, 4, 5, 0.0004), (8, 4, 20, 1.3), (8, 5, 10, 0.025)],
+)
+def test_the_series_from_the_middle_converges_where_that_from_the_beginning_does_not(
+    order, count, frequency_hz, most_deg
+):
+    run = simulate(
+        backend("euler", f"taylor{order}", count), cone(frequency_hz), f"{count}/100", "1.2", record="1.2"
+    )
+    assert np.degrees(run.mean_drift) < most_deg
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+@pytest.mark.parametrize(
+    ("order", "count", "previous"),
+    [(1, 3, 0), (4, 4, 0), (3, 2, 2), pytest.param(20, 8, 3, marks=pytest.mark.long)],
+)
+def test_a_transition_is_a_rotation_whatever_the_increments_are(algorithm, order, count, previous):
+    kernel, random = derive(algorithm, f"taylor{order}", count, previous=previous), Random(1969)
+    assert kernel.companions.isometry
+    with mpmath.workdps(60):
+        for size in (10**-4, 1, 5):
+            samples = [mpmath.mpf(random.randint(-999, 999)) * size / 1000 for _ in kernel.inputs[1].elements]
+            turn = transition(kernel, samples)
+            product = turn.T * turn
+            assert mpmath.mnorm(product - mpmath.eye(product.rows)) < mpmath.mpf(10) ** -50
+
+
+@pytest.mark.parametrize(("algorithm", "order", "count"), [("dcm", 4, 3), ("dcm", 5, 4)])
+def test_time_reversed_takes_the_step_back(algorithm, order, count):
+    # Hence the order is even.
+    kernel, random = derive(algorithm, f"taylor{order}", count), Random(1969)
+    with mpmath.workdps(60):
+        samples = [mpmath.mpf(random.randint(-999, 999)) / 1000 for _ in range(3 * count)]
+        back = [-samples[3 * (count - 1 - k) + axis] for k in range(count) for axis in range(3)]
+        product = transition(kernel, samples) * transition(kernel, back)
+        assert mpmath.mnorm(product - mpmath.eye(3)) < mpmath.mpf(10) ** -50
+
+
+def test_a_series_on_two_samples_is_no_rotation():
+    assert not derive("euler", "taylor4", 2).companions.isometry
+    assert not derive("euler", "taylor4", 1, previous=1).companions.isometry

@@ -1,0 +1,182 @@
+"""The names of the package: complete, documented, loaded when used, and typed for a user's scripts."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import re
+import subprocess
+import sys
+import textwrap
+import types
+import venv
+from pathlib import Path
+
+import pytest
+
+import strapgen
+
+ROOT = Path(__file__).resolve().parents[1]
+PACKAGE = Path(strapgen.__file__).parent
+
+
+def in_a_new_process(code: str) -> str:
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_dir_shows_the_public_names_and_nothing_else():
+    shown = in_a_new_process(
+        "import strapgen.cli, strapgen; strapgen.derive('euler'); print(*dir(strapgen))"
+    ).split()
+    assert shown == sorted(strapgen.__all__)
+    assert [name for name in shown if name.startswith("_")] == ["__version__"]
+    hidden = {"annotations", "TYPE_CHECKING", "Any", "import_module", "pipeline", "checks", "cli"}
+    assert hidden & {*shown} == set()
+
+
+def test_neither_numpy_nor_sympy_is_loaded_with_the_package():
+    loaded = in_a_new_process("import sys, strapgen; dir(strapgen); print(*sys.modules)").split()
+    assert {"strapgen"} <= {*loaded}
+    assert {"numpy", "sympy", "mpmath", "jinja2", "cffi"} & {*loaded} == set()
+
+
+def test_every_name_is_there_whatever_was_imported_before():
+    for name in strapgen.__all__:
+        assert getattr(strapgen, name) is not None
+    after = "import strapgen.cli, strapgen.two_speed, strapgen.behaviour, strapgen.vibration.spectrum, strapgen as s"
+    kinds = in_a_new_process(f"{after}; print(*(n + ':' + type(getattr(s, n)).__name__ for n in s.__all__))")
+    assert kinds.split() == [f"{name}:{type(getattr(strapgen, name)).__name__}" for name in strapgen.__all__]
+
+
+def test_a_name_that_is_not_there():
+    with pytest.raises(AttributeError, match=r"^module 'strapgen' has no attribute 'derve'$"):
+        strapgen.derve  # noqa: B018
+
+
+def test_what_type_checkers_see_is_what_python_loads():
+    tree = ast.parse((PACKAGE / "__init__.py").read_text())
+    (block,) = (
+        node
+        for node in tree.body
+        if isinstance(node, ast.If)
+        and isinstance(node.test, ast.Attribute)
+        and node.test.attr == "TYPE_CHECKING"
+    )
+    seen = {}
+    for statement in block.body:
+        assert isinstance(statement, ast.ImportFrom) and statement.level == 0
+        for alias in statement.names:
+            assert alias.asname == alias.name, "without it, a strict checker does not see the name"
+            seen[alias.name] = statement.module.removeprefix("strapgen").lstrip(".")
+    loaded = dict(strapgen._EXPORTS)
+    for name, module in strapgen._NAMESPACES.items():
+        folder, _, last = module.rpartition(".")
+        assert last == name
+        loaded[name] = folder
+    assert seen == loaded
+    assert ["__version__", *loaded] == strapgen.__all__
+    assert len(loaded) == len(strapgen._EXPORTS) + len(strapgen._NAMESPACES)
+
+
+def test_every_public_name_has_a_docstring():
+    undocumented = []
+    for name in strapgen.__all__:
+        value = getattr(strapgen, name)
+        if isinstance(value, types.FunctionType | type | types.ModuleType):
+            text = value.__doc__ or ""
+            if not inspect.cleandoc(text) or text.startswith(
+                f"{name}("
+            ):  # dataclasses write one of their own
+                undocumented.append(name)
+        elif name != "__version__":
+            source = (PACKAGE / f"{strapgen._EXPORTS[name].replace('.', '/')}.py",)
+            source += (PACKAGE / strapgen._EXPORTS[name].replace(".", "/") / "__init__.py",)
+            text = next(path for path in source if path.is_file()).read_text()
+            if not re.search(rf"^#: .*\n(?:#.*\n)*{name}\b", text, flags=re.MULTILINE):
+                undocumented.append(name)
+    assert undocumented == []
+
+
+def test_every_public_name_is_on_the_page_of_the_api():
+    page = (ROOT / "docs" / "python-api.md").read_text()
+    assert [name for name in strapgen.__all__ if not re.search(rf"\b{name}\b", page)] == []
+
+
+@pytest.mark.parametrize("page", ["docs/python-api.md", "docs/own-algorithms.md", "README.md", "examples"])
+def test_pages_and_examples_need_no_module_but_the_package(page):
+    paths = sorted((ROOT / page).glob("*.py")) if page == "examples" else [ROOT / page]
+    for path in paths:
+        text = path.read_text()
+        assert re.findall(r"(?:from|import) strapgen\.[\w.]+", text) == []
+        for names in re.findall(r"from strapgen import (\([^)]*\)|.*)", text):
+            assert {*re.findall(r"\w+", names)} <= {*strapgen.__all__}
+        used = set(re.findall(r"(?<![\w/.-])strapgen\.(\w+)", text)) - {"exceptions", "algorithms"}
+        assert used <= {*strapgen.__all__}
+
+
+SCRIPT = """
+    import numpy as np
+    import strapgen
+    from strapgen import KernelBuilder, Signal, gyro, tableaux
+
+    kernel = strapgen.derive("euler", strapgen.TABLEAUX["rk4"], 2)
+    backend = strapgen.build(strapgen.generate(strapgen.lower(kernel), "c"))
+    run = strapgen.simulate(backend, strapgen.motion("constant", x_deg_s=1), "0.1", 1)
+    reveal_type(kernel)  # strapgen.kernel.Kernel
+    reveal_type(backend)  # strapgen.backends.protocol.Backend
+    reveal_type(run)  # strapgen.simulation.Run
+    reveal_type(strapgen.compare)  # def (
+    reveal_type(gyro.pulses)  # def (
+    reveal_type(tableaux.read("heun.toml"))  # strapgen.catalogue.tableaux.Tableau
+    reveal_type(KernelBuilder().input(Signal.vector("rate", "w")))  # Any
+"""
+
+WRONG = """
+    import strapgen
+
+    strapgen.derve("euler")  # [attr-defined]
+    strapgen.lower("euler")  # [arg-type]
+    strapgen.build(strapgen.derive("euler"))  # [arg-type]
+"""
+
+
+@pytest.mark.long
+def test_a_user_s_script_is_typed(tmp_path):
+    """In an environment that finds the package as an installed one, where `py.typed` counts; strict rules."""
+    venv.create(tmp_path / "venv", with_pip=False)
+    (packages,) = (tmp_path / "venv").glob("lib/python*/site-packages")
+    import numpy as np
+
+    (packages / "places.pth").write_text(f"{PACKAGE.parent}\n{Path(np.__file__).parents[1]}\n")
+    for name, script in (("right.py", SCRIPT), ("wrong.py", WRONG)):
+        (tmp_path / name).write_text(textwrap.dedent(script))
+    python = tmp_path / "venv" / "bin" / "python"
+    command = [
+        sys.executable,
+        "-m",
+        "mypy",
+        "--strict",
+        "--python-executable",
+        str(python),
+        "right.py",
+        "wrong.py",
+    ]
+    said = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True).stdout
+    expected = {
+        (name, number): line.split("  # ")[1]
+        for name, script in (("right.py", SCRIPT), ("wrong.py", WRONG))
+        for number, line in enumerate(textwrap.dedent(script).splitlines(), 1)
+        if "  # " in line
+    }
+    found = {}
+    for name, line, text in re.findall(r"^(\w+\.py):(\d+): (?:note|error): (.*)$", said, flags=re.MULTILINE):
+        found.setdefault((name, int(line)), text)
+    assert found.keys() == expected.keys(), said
+    for place, words in expected.items():
+        assert words in found[place], said
+
+
+def test_the_package_says_that_it_is_typed():
+    assert (PACKAGE / "py.typed").is_file()
