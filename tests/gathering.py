@@ -45,6 +45,7 @@ def each(
                 pytest.fail(f"{len(failures)} of {len(every)} cases\n" + "\n".join(failures), pytrace=False)
 
         assert every, "a test without cases"
+        assert not any(hasattr(case, "marks") for case in every), "cases with marks are tests of their own"
         del gathered.__wrapped__
         rest = [p for p in signature.parameters.values() if p.name not in parameters]
         gathered.__signature__ = signature.replace(parameters=rest)

@@ -71,6 +71,16 @@ class Series:
             result = self * result
         return result
 
+    def near_one(self, exponent: Fraction) -> Series:
+        """Return a power of a series whose constant term is 1, of any rational exponent, by the binomial series."""
+        rest = self + -1
+        assert 0 not in rest.coefficients
+        term = result = Series({0: Fraction(1)}, self.top)
+        for k in range(1, self.top + 1):
+            term = term * rest * ((exponent - k + 1) / k)
+            result = result + term
+        return result
+
     @property
     def lowest(self) -> int | None:
         """The lowest power; None if all that is known is 0."""
@@ -109,6 +119,9 @@ def _value(expression: sp.Expr, known: Mapping[str, Any], field: Any) -> Any:
         for value in values[1:]:
             result = result + value if expression.is_Add else result * value
         return result
+    if expression.is_Pow and expression.exp.is_negative:
+        exponent = Fraction(int(expression.exp.p), int(expression.exp.q))
+        return _value(expression.base, known, field).near_one(exponent)
     if expression.is_Pow:
         return _Root(values[0]) if expression.exp == sp.Rational(1, 2) else values[0] ** int(expression.exp)
     return values[0].even({sp.cos: 0, sp.sinc: 1}[expression.func])

@@ -42,3 +42,20 @@ def test_a_change_of_the_generator_makes_new_sources(monkeypatch, tmp_path):
     monkeypatch.setattr(cache, "generator_digest", lambda: "another generator")
     library.sources(choice, "numpy")
     assert len(list((tmp_path / "sources").iterdir())) == 2
+
+
+def test_another_target_and_other_settings_derive_nothing_again(monkeypatch, tmp_path):
+    monkeypatch.setenv("STRAPGEN_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(library, "_programs", {})
+    choice = catalogue.choose("euler-product")
+    wanted = strapgen.lower(catalogue.derive(choice))
+    library.sources(choice, "numpy")
+    monkeypatch.setattr(library, "_programs", {})  # as another process
+
+    def never(_choice):
+        raise AssertionError("derived again")
+
+    monkeypatch.setattr(library, "derive", never)
+    settings = strapgen.Settings(16)
+    assert library.sources(choice, "c-fixed", settings) == strapgen.generate(wanted, "c-fixed", settings)
+    assert library.program(choice) == wanted

@@ -95,13 +95,13 @@ def compile_together(many: Iterable[Sources]) -> None:
         together = _key(group.values())
         name = f"strapgen_{together}"
         folder = _build(list(group.values()), name, together)
+        pointer = json.dumps({"name": name, "build": folder.name})
         for key in group:
-            cache.entry(_SHARED, key, partial(_note_module, {"name": name, "build": folder.name}))
+            cache.entry(_SHARED, key, partial(_point, pointer))
 
 
-def _note_module(module: dict[str, str], draft: Path) -> None:
-    """Write down in which module a source was compiled."""
-    (draft / "module.json").write_text(json.dumps(module))
+def _point(pointer: str, draft: Path) -> None:
+    (draft / "module.json").write_text(pointer)
 
 
 def _groups(missing: dict[str, Sources]) -> list[dict[str, Sources]]:

@@ -158,6 +158,7 @@ def test_a_user_fixes_formats():
         ({"q_x": "Q0.31"}, "has no value 'q_x'; its values are: state, increments"),
         ({"d1_x": "Q0.31"}, "give the format of the whole input"),
         ({"state": "Q0.31"}, "format Q0.31 of state does not hold its range of \\+-1.0625"),
+        ({"next": "Q0.31"}, "format Q0.31 of next_s does not hold its range \\[-1.0625, 1.0625\\]"),
         (
             {"next_x": "Q2.29"},
             "elements of next share one format; fix the format of next, not of one element",
@@ -167,6 +168,15 @@ def test_a_user_fixes_formats():
 def test_formats_that_do_not_hold_their_values(formats, said):
     with pytest.raises(InputError, match=said):
         quantize(program(EULER), Settings(32, formats=formats))
+
+
+def test_what_the_next_call_takes_is_checked_in_the_format_of_the_output():
+    # The sum of angles is accepted up to 0.4, and its successor is not proved to be below.
+    formats = {"angle_sum": "Q3.28", "next_angle_sum": "Q-1.32"}
+    ranges = {"angle_sum": Fraction(2, 5), "coning": Fraction(1, 10)}
+    ranges |= dict.fromkeys(("previous_increment", "increment"), Fraction(1, 8))
+    fixed = quantize(program(Choice("coning-fast")), Settings(ranges=ranges, formats=formats))
+    assert fixed.ranges["next_angle_sum"][1] == pytest.approx(0.4)
 
 
 def test_ranges_of_inputs_must_be_known():

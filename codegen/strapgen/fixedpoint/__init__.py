@@ -1,4 +1,4 @@
-"""Fixed point: a program lowered to integers, with proved ranges and certified error bounds."""
+"""Fixed point: programs become integer code with proved ranges and certified error bounds."""
 
 from strapgen.exceptions import InputError
 from strapgen.fixedpoint.code import FixedProgram
@@ -25,7 +25,7 @@ def quantize(program: Program, settings: Settings) -> FixedProgram:
     Raises
     ------
     InputError
-        If an input has no known range, a format that is asked for does not hold its values, or the word is too short.
+        If an input has no known range, a stated format does not hold its values, or the word is too short.
     """
     from strapgen.fixedpoint.integers import lowered  # numpy and the proofs are loaded when they are needed
 
@@ -33,7 +33,7 @@ def quantize(program: Program, settings: Settings) -> FixedProgram:
         return lowered(program, settings)
     except InputError:
         raise
-    except (ValueError, ArithmeticError) as error:  # of the proofs: a division by what may be zero
+    except (ValueError, ArithmeticError) as error:  # a proof fails, as where a divisor may be zero
         raise InputError(f"{program.kernel} has no fixed point: {error}") from error
 
 
@@ -47,7 +47,7 @@ OPERATIONS = frozenset(
 
 
 def can_lower(program: Program) -> bool:
-    """Tell whether a program needs no word of a user: its operations are known here, and the ranges of all inputs."""
+    """Tell whether a program can be lowered as it is: its operations exist here, and its inputs have known ranges."""
     known = ("increments", "turns")
     nodes = (node for assignment in program.body for node in walk(assignment.value))
     return all(signal.bound is not None or signal.name in known for signal in program.inputs) and all(

@@ -1,8 +1,8 @@
 """How the rounding of one step adds up over a run.
 
 The computed state obeys x' = x T + x d + r: T the exact transition, d the error of the computed one, r the rounding of
-the state. A step stretches an error by at most the norm of T. With residuals, what is rounded off in one step is added
-in the next: then r is paid once, beside the residual times T - 1 in every step; and of the rounding of T, summed by
+the state. A step stretches an error by at most the norm of T. With error feedback, what is rounded off in one step is
+added in the next: then r counts once, and in every step what fed it back times T - 1; of the rounding of T, summed by
 parts, only its product with T - 1 is left.
 """
 
@@ -12,126 +12,138 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from functools import lru_cache
 
-from strapgen.fixedpoint import quantities as exact
 from strapgen.fixedpoint.code import IntegerSum, Value
-from strapgen.fixedpoint.formats import ROUNDINGS
 from strapgen.fixedpoint.interface import Argument, RoundingAccumulation
 from strapgen.fixedpoint.intervals import Interval
+from strapgen.fixedpoint.quantities import (
+    Computed,
+    ErrorPropagation,
+    InputElement,
+    NearestInteger,
+    Quantities,
+    SquareRoot,
+    Sum,
+)
+from strapgen.fixedpoint.quantization_context import Quantization
 from strapgen.fixedpoint.series import Series, Truncated
-from strapgen.fixedpoint.settings import Settings
-from strapgen.program import Constant, Node, Operation, Program, Reference
+from strapgen.program import Constant, Node, Program, Reference, Result
 
 #: Terms of the longest series that the norm of the transition is expanded in.
 _MOST_TERMS = 1000
 
 
-def accumulation(
-    program: Program,
-    settings: Settings,
-    made: exact.Quantities,
-    values: Mapping[str, Value],
-    inputs: Sequence[Argument],
-    outputs: Sequence[Argument],
-) -> RoundingAccumulation | None:
+def accumulation(context: Quantization, transition: Result, result: Argument) -> RoundingAccumulation | None:
     """Return how the errors of a step add up; None where it calls more than sums, roots, sines and cosines.
 
     Lengths are those of a state, or of a row of a matrix: the norm in which a transition stretches least.
+
+    Parameters
+    ----------
+    context : Quantization
+        The step, with all its values.
+    transition : Result
+    result : Argument
+        The state after the step.
     """
-    (result,) = outputs
-    state = program.inputs[0]
-    rows = state.shape[0] if len(state.shape) == 2 else 1
-    width = state.size // rows
-    limit = made.items[state.elements[0]].range.magnitude
-    length = limit * _root(Fraction(width))
-    carry, half = settings.carry, ROUNDINGS[settings.rounding]
+    quantities, state = context.quantities, context.program.inputs[0]
+    width = state.size // (state.shape[0] if len(state.shape) == 2 else 1)
+    length = quantities.items[state.elements[0]].range.magnitude * _root(Fraction(width))
+    elements = [name for name in quantities.results[transition.signal.name] if isinstance(name, str)]
+    rounded = [context.values[name] for name in elements if name in context.values]
+    feedbacks = [_feedback_rounding(context, value) for value in rounded]
+    errors = [value.error - 2 * fed_back for value, fed_back in zip(rounded, feedbacks, strict=True)]
+    transition_feedback = _norm(feedbacks)
+    away = _norm([quantities.distance(value.name) for value in rounded])
+    local, fed_back = _local_errors(context, elements, result)
+    state_feedback = fed_back * _root(Fraction(width))
 
-    assert program.transition is not None, "a step has a transition"
-    held = [name for name in made.results[program.transition.signal.name] if isinstance(name, str)]
-    inner, kept, away = [], [], []
-    for name in held:
-        if name not in values:
-            continue
-        value = values[name]
-        rounding = half / Fraction(2) ** value.fraction
-        rounded = value.definition
-        carried = isinstance(rounded, IntegerSum) and rounded.residual is not None
-        inner.append(value.error - (2 * rounding if carried else 0))
-        kept.append(rounding if carried else Fraction(0))
-        away.append(made.distance(name))
-    away_norm = _norm(away)
+    per_step = max(_norm(local[k : k + width]) for k in range(0, len(local), width))
+    per_step += length * _norm(errors)
+    once = Fraction(0)
+    if context.settings.carry != "none":
+        per_step += state_feedback * away
+        once += 2 * state_feedback
+    if any(feedbacks):
+        per_step += 2 * transition_feedback * (length * away + state_feedback)
+        once += 2 * length * transition_feedback
+    half_units = {argument.signal.name: argument.format.unit / 2 for argument in context.plan.inputs[1:]}
+    moves = _moves(quantities, half_units)
+    if moves is None:
+        return None
+    input_rounding = length * _norm([moves[name] for name in elements])
+    growth = _growth(context.program, transition, quantities, width)
+    return RoundingAccumulation(once, per_step, input_rounding, growth)
 
-    rounding = half * result.format.unit
-    local, left = [], Fraction(0)
+
+def _feedback_rounding(context: Quantization, value: Value) -> Fraction:
+    """Return the rounding error of a value that is fed back in the next call; 0 of any other value."""
+    definition = value.definition
+    if not isinstance(definition, IntegerSum) or definition.residual is None:
+        return Fraction(0)
+    return context.rounding_error / Fraction(2) ** value.fraction
+
+
+def _local_errors(
+    context: Quantization, transition: Sequence[str], result: Argument
+) -> tuple[list[Fraction], Fraction]:
+    """Return what the elements of the state lose beside the errors of the transition, and what is fed back of it."""
+    items, values = context.quantities.items, context.values
+    local, fed_back = [], Fraction(0)
     for name in result.values:
-        value = values[name]
-        definition = made.items[name].definition
-        assert isinstance(definition, exact.Sum)
+        value, definition = values[name], items[name].definition
         through = sum(
-            abs(coefficient) * made.items[factor].range.magnitude * values[other].error
-            for monomial, coefficient in definition.terms
+            abs(coefficient) * items[factor].range.magnitude * values[other].error
+            for monomial, coefficient in (definition.terms if isinstance(definition, Sum) else ())
             if len(monomial) == 2
             for factor, other in (monomial, monomial[::-1])
-            if other in held and factor not in held
+            if other in transition and factor not in transition
         )
-        own = value.error - through
-        lowered = value.definition
-        if isinstance(lowered, IntegerSum) and lowered.residual is not None:
-            own -= 2 * rounding
-            left = rounding
-        local.append(own)
-    own_norm = max(_norm(local[k : k + width]) for k in range(0, len(local), width))
-    left_norm = left * _root(Fraction(width))
-    kept_norm = _norm(kept)
-    per_step = own_norm + length * _norm(inner)
-    once = Fraction(0)
-    if carry != "none":
-        per_step += left_norm * away_norm
-        once += 2 * left_norm
-    if any(kept):
-        per_step += 2 * kept_norm * (length * away_norm + left_norm)
-        once += 2 * length * kept_norm
-    moved = _moved(made, {a.signal.name: a.format.unit / 2 for a in inputs[1:]})
-    if moved is None:
-        return None
-    input_rounding = length * _norm([moved[name] for name in held])
-    return RoundingAccumulation(once, per_step, input_rounding, _growth(program, made, width))
+        rounding = _feedback_rounding(context, value)
+        fed_back = max(fed_back, rounding)
+        local.append(value.error - through - 2 * rounding)
+    return local, fed_back
 
 
-def _moved(made: exact.Quantities, by: Mapping[str, Fraction]) -> dict[str, Fraction] | None:
+def _moves(quantities: Quantities, by: Mapping[str, Fraction]) -> dict[str, Fraction] | None:
     """Return how far every quantity can move when the elements of inputs, by name, move by so much; None if unknown."""
-    moved: dict[str, Fraction] = {}
-    for name, quantity in made.items.items():
-        definition = quantity.definition
-        if isinstance(definition, exact.InputElement):
-            moved[name] = by.get(definition.signal, Fraction(0))
-        elif isinstance(definition, exact.Sum):
-            total = Fraction(0)
-            for monomial, coefficient in definition.terms:
-                sizes = [made.items[factor].range.magnitude for factor in monomial]
-                moves = [moved[factor] for factor in monomial]
-                if len(monomial) == 1:
-                    total += abs(coefficient) * moves[0]
-                elif monomial:
-                    (a, b), (da, db) = sizes, moves
-                    total += abs(coefficient) * (a * db + b * da + da * db)
-            moved[name] = total + sum(abs(c) * moved[m[0]] for m, c in quantity.beside)
-        elif isinstance(definition, exact.Computed | exact.NearestInteger):
-            moved[name] = Fraction(0)  # within a function, whose slope tells what becomes of it
-        elif isinstance(definition, exact.SquareRoot):
-            moved[name] = _root(moved[definition.argument])
-        else:
-            return None
+    moves: dict[str, Fraction] = {}
+    for name, quantity in quantities.items.items():
+        match quantity.definition:
+            case InputElement(signal):
+                moves[name] = by.get(signal, Fraction(0))
+            case Sum() as total:
+                moves[name] = _sum_move(total, quantities, moves)
+                moves[name] += sum(abs(c) * moves[m[0]] for m, c in quantity.beside)
+            case Computed() | NearestInteger():
+                moves[name] = Fraction(0)  # within a function, whose slope tells what becomes of it
+            case SquareRoot(argument):
+                moves[name] = _root(moves[argument])
+            case _:
+                return None
         if quantity.follows is not None:
-            moved[name] += _followed(quantity.follows, moved)
-    return moved
+            moves[name] += _function_move(quantity.follows, moves)
+    return moves
 
 
-def _followed(follows: exact.ErrorPropagation, moved: Mapping[str, Fraction]) -> Fraction:
+def _sum_move(total: Sum, quantities: Quantities, moves: Mapping[str, Fraction]) -> Fraction:
+    """Return how far a sum of products can move."""
+    move = Fraction(0)
+    for monomial, coefficient in total.terms:
+        if len(monomial) == 1:
+            move += abs(coefficient) * moves[monomial[0]]
+        elif monomial:
+            a, b = (quantities.items[factor].range.magnitude for factor in monomial)
+            da, db = (moves[factor] for factor in monomial)
+            move += abs(coefficient) * (a * db + b * da + da * db)
+    return move
+
+
+def _function_move(follows: ErrorPropagation, moves: Mapping[str, Fraction]) -> Fraction:
     """Return how far a function can move."""
     total = Fraction(0)
     for name, slope in follows.slopes:
-        if moved[name]:
-            total += follows.most if slope is None else slope * moved[name]
+        if moves[name]:
+            total += follows.most if slope is None else slope * moves[name]
     return min(total, follows.most)
 
 
@@ -141,28 +153,31 @@ def _norm(values: Sequence[Fraction]) -> Fraction:
 
 
 def _root(value: Fraction) -> Fraction:
+    """Return a number that is not below a square root."""
     return Interval.of(value).sqrt().highest
 
 
-def _growth(program: Program, made: exact.Quantities, width: int) -> Fraction:
+def _growth(program: Program, transition: Result, quantities: Quantities, width: int) -> Fraction:
     """Return a number that is not below the norm of any transition.
 
     The transition is expanded in its inputs to a degree at which it stays short, the rest bounded; in T T' - 1 the
     terms then cancel that a rotation does not have.
     """
-    assert program.transition is not None
     if program.companions is not None and program.companions.isometry:
         return Fraction(1)
     inputs = [name for signal in program.inputs[1:] for name in signal.elements]
+    sizes = tuple(quantities.items[name].range.magnitude for name in inputs)
     try:
-        return _expanded_growth(program, tuple(made.items[name].range.magnitude for name in inputs), width)
+        return _expanded_growth(program, transition, sizes, width)
     except NotImplementedError:  # it calls functions: the identity, and the length of what is added to it
-        held = made.results[program.transition.signal.name]
-        return 1 + _norm([made.distance(name) for name in held if isinstance(name, str)])
+        elements = quantities.results[transition.signal.name]
+        return 1 + _norm([quantities.distance(name) for name in elements if isinstance(name, str)])
 
 
 @lru_cache(maxsize=64)
-def _expanded_growth(program: Program, sizes: tuple[Fraction, ...], width: int) -> Fraction:
+def _expanded_growth(
+    program: Program, transition: Result, sizes: tuple[Fraction, ...], width: int
+) -> Fraction:
     """Return what `_growth` does, which no word and no rounding changes.
 
     Raises
@@ -171,7 +186,7 @@ def _expanded_growth(program: Program, sizes: tuple[Fraction, ...], width: int) 
         If the transition calls functions.
     """
     series = Truncated(sizes, _MOST_TERMS)
-    elements = _expanded(program, series)
+    elements = _expanded(program, transition, series)
     rows = [elements[k : k + width] for k in range(0, len(elements), width)]
     one = series.constant(Fraction(1))
     largest = Fraction(0)
@@ -184,29 +199,27 @@ def _expanded_growth(program: Program, sizes: tuple[Fraction, ...], width: int) 
     return _root(1 + largest)
 
 
-def _expanded(program: Program, series: Truncated) -> list[Series]:
+def _expanded(program: Program, transition: Result, series: Truncated) -> list[Series]:
     """Return the elements of the transition as truncated series in the inputs."""
-    assert program.transition is not None
     inputs = [name for signal in program.inputs[1:] for name in signal.elements]
     known = {name: series.variable(place) for place, name in enumerate(inputs)}
-    needed = program.used([program.transition])
+    needed = program.used([transition])
 
     def value(node: Node) -> Series:
         if isinstance(node, Constant):
             return series.constant(node.value)
         if isinstance(node, Reference):
             return known[node.name]
-        assert isinstance(node, Operation)
         if node.kind not in ("negate", "add", "subtract", "multiply"):
             raise NotImplementedError(node.kind)
-        arguments = [value(argument) for argument in node.arguments]
+        operands = [value(argument) for argument in node.arguments]
         if node.kind == "negate":
-            return series.less(series.constant(Fraction(0)), arguments[0])
+            return series.less(series.constant(Fraction(0)), operands[0])
         if node.kind == "subtract":
-            return series.less(*arguments)
-        return series.sum(*arguments) if node.kind == "add" else series.product(*arguments)
+            return series.less(*operands)
+        return series.sum(*operands) if node.kind == "add" else series.product(*operands)
 
     for assignment in program.body:
         if assignment.name in needed:
             known[assignment.name] = value(assignment.value)
-    return [value(node) for node in program.transition.nodes]
+    return [value(node) for node in transition.nodes]

@@ -6,15 +6,15 @@ import math
 from collections.abc import Container, Iterable, Iterator, Mapping
 from fractions import Fraction
 
-from strapgen.fixedpoint.code import IntegerSum, Value, used_by
+from strapgen.fixedpoint.code import IntegerSum, Term, Value, used_by
 
-#: Bits below the last place of a sum down to which its products are kept.
+#: Bits below the last place of a sum down to which its products are computed.
 _BELOW = 8
-#: A coarser format may add this part of the rounding of a value that it is multiplied into.
+#: A coarser format may add this part of the rounding error of a value that it is multiplied into.
 _PART = Fraction(1, 16)
 
 
-def aligning(body: Iterable[Value], values: Mapping[str, Value], kept: Container[str]) -> dict[str, int]:
+def aligning(body: Iterable[Value], values: Mapping[str, Value], fixed: Container[str]) -> dict[str, int]:
     """Return, by name, the most fraction bits of values that are finer than the sums that use them can tell.
 
     Parameters
@@ -23,25 +23,25 @@ def aligning(body: Iterable[Value], values: Mapping[str, Value], kept: Container
         The code, with every value in its finest format.
     values : mapping of str to Value
         The same by name, and the elements of the inputs.
-    kept : container of str
+    fixed : container of str
         Values whose format must stay.
 
     Returns
     -------
     dict of str to int
     """
-    wanted: dict[str, int] = {}
+    useful: dict[str, int] = {}
     allowed: dict[str, int] = {}
     for value in body:
-        for name, want, most in _uses(value, values):
-            wanted[name] = max(want, wanted.get(name, 0))
+        for name, bits, most in _uses(value, values):
+            useful[name] = max(bits, useful.get(name, 0))
             allowed[name] = min(most, allowed.get(name, most))
     coarser: dict[str, int] = {}
-    for name, want in wanted.items():
+    for name in useful:
         definition = values[name].definition
         rounded = isinstance(definition, IntegerSum) and definition.shift and definition.residual is None
-        bits = min(want, allowed[name])
-        if bits > 0 and rounded and name not in kept:
+        bits = min(useful[name], allowed[name])
+        if bits > 0 and rounded and name not in fixed:
             coarser[name] = values[name].fraction - bits
     return coarser
 
@@ -50,7 +50,7 @@ def _uses(value: Value, values: Mapping[str, Value]) -> Iterator[tuple[str, int,
     """Yield the values that another is computed from: by how many bits each should be coarser, and may be."""
     definition = value.definition
     if not isinstance(definition, IntegerSum) or value.wide or not definition.shift:
-        # Left as it is: every bit of what is compared, or added at full precision, counts.
+        # Every bit counts of what is compared, or added at full precision.
         for name in used_by(value):
             yield name, 0, 0
         return
@@ -61,20 +61,22 @@ def _uses(value: Value, values: Mapping[str, Value]) -> Iterator[tuple[str, int,
     lowest = value.fraction + _BELOW
     goal = max(min((place - term.shift for term in definition.fine if term.names), default=place), lowest)
     for term in definition.fine:
-        own = place - term.shift
+        term_place = place - term.shift
         for name in term.names:
-            # What an error of the value is multiplied with.
             others = [other for other in term.names if other != name]
-            if len(others) == len(term.names) - 1:
-                size = Fraction(1)
-                for other in others:
-                    made = values[other]
-                    size = Fraction(made.magnitude) / Fraction(2) ** made.fraction
-                if not others:
-                    size = abs(term.factor) / Fraction(2) ** (own - values[name].fraction)
-                room = _PART / Fraction(2) ** value.fraction / size * Fraction(2) ** values[name].fraction
-                most = min(max(0, own - lowest), max(0, math.floor(room).bit_length() - 1))
-            else:
-                most = 0  # a square
+            is_square = len(others) < len(term.names) - 1
+            room = (
+                0 if is_square else _room(term, term_place, value, values[name], [values[o] for o in others])
+            )
             finer = len(others) == 1 and values[others[0]].fraction > values[name].fraction
-            yield name, 0 if finer else max(0, own - goal), most
+            yield name, 0 if finer else max(0, term_place - goal), min(max(0, term_place - lowest), room)
+
+
+def _room(term: Term, place: int, value: Value, factor: Value, others: list[Value]) -> int:
+    """Return by how many bits a factor of a term may be coarser, so that the error of the sum hardly grows."""
+    # What an error of the factor is multiplied with.
+    size = abs(term.factor) / Fraction(2) ** (place - factor.fraction)
+    for other in others:
+        size = Fraction(other.magnitude) / Fraction(2) ** other.fraction
+    units = _PART / Fraction(2) ** value.fraction / size * Fraction(2) ** factor.fraction
+    return max(0, math.floor(units).bit_length() - 1)

@@ -41,20 +41,20 @@ class IntegerInput:
 
 @dataclass(frozen=True)
 class IntegerSum:
-    """Terms, divided by 2**shift with rounding, and terms that are added after that.
+    """A sum of fine terms that is divided by 2**shift and rounded, plus coarse terms that are exact after that.
 
     Parameters
     ----------
     fine : tuple of Term
-        What is rounded, or all of it where nothing is.
+        The terms that are rounded; all terms if nothing is rounded.
     shift : int
         Places that the rounding drops, 0 for none.
     coarse : tuple of Term
-        What is exact at the result's own fraction.
+        The terms that are integers at the fraction of the result.
     residual : ErrorFeedback or None
-        What the rounding of the last call left; it is added in place of half a unit.
+        The rounding error of the last call; it is added in place of half a unit.
     drop : int
-        Places below the last one of the residual, which are dropped before it is added.
+        Places below the last one of the error feedback; they are dropped before it is added.
     """
 
     fine: tuple[Term, ...]
@@ -89,14 +89,14 @@ class IntegerRoot:
 
 @dataclass(frozen=True)
 class IntegerMaximum:
-    """The largest of several."""
+    """The largest of several integers of one fraction."""
 
     arguments: tuple[Scaled, ...]
 
 
 @dataclass(frozen=True)
 class IntegerSelection:
-    """The value of the first case whose left side is at least its right side, or another one.
+    """The value of the first case whose left side is at least its right side; `otherwise` if there is none.
 
     The two sides of a case have one fraction, and so have all values.
     """
@@ -120,7 +120,7 @@ class Value:
     definition : IntegerDefinition
     fraction : int
     wide : bool
-        Whether it takes a wide number.
+        Whether the integer may exceed a word, so that a wide number holds it.
     low, high : int
         Proved range of the integer.
     offset : Fraction
@@ -130,9 +130,9 @@ class Value:
     peak : int
         Bound of the magnitude of every partial sum on the way to it.
     guarded : bool
-        Whether the range is checked when the code runs; what lies outside is refused.
+        Whether the range is checked when the code runs: the call returns an error for integers outside.
     meaning : str
-        Said where a named stage of the algorithm begins.
+        The comment where a named stage of the algorithm begins; "" elsewhere.
     """
 
     name: str
@@ -170,7 +170,7 @@ def used_by(value: Value) -> list[str]:
 
 
 def _names(operands: Iterable[Scaled]) -> list[str]:
-    """Return the names of the operands that are no constants."""
+    """Return the names of the operands that are not constants."""
     return [operand.value for operand in operands if isinstance(operand.value, str)]
 
 
@@ -225,7 +225,7 @@ class FixedProgram:
     Parameters
     ----------
     program : Program
-        What it was lowered from.
+        The program in real numbers that it computes.
     interface : Interface
     body : tuple of Value
         The code.
@@ -256,13 +256,13 @@ class FixedProgram:
 
     @property
     def formats(self) -> dict[str, Format]:
-        """Format of every argument and word, by name; of a wide number with its length."""
+        """Format of every argument and value, by name; wide numbers are twice as long as words."""
         known = {a.signal.name: a.format for a in (*self.interface.inputs, *self.interface.outputs)}
         return known | {v.name: Format(self.word * (1 + v.wide), v.fraction) for v in self.body}
 
     @property
     def ranges(self) -> dict[str, tuple[Fraction, Fraction]]:
-        """Proved range of every argument and value, by name; the offset of a value is in it."""
+        """Proved range of every argument and value, by name; it includes the offset of the value."""
         known = {
             a.signal.name: (a.low * a.format.unit, a.high * a.format.unit)
             for a in (*self.interface.inputs, *self.interface.outputs)

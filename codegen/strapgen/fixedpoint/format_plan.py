@@ -26,7 +26,7 @@ from strapgen.signal import Signal
 
 @dataclass(frozen=True)
 class FormatPlan:
-    """What is known of formats.
+    """The formats that are fixed before anything is lowered.
 
     Parameters
     ----------
@@ -53,6 +53,20 @@ def format_plan(
     guard_bits: int,
 ) -> FormatPlan:
     """Return what is known of formats when inputs are stored so many bits below their finest format.
+
+    Parameters
+    ----------
+    program : Program
+    settings : Settings
+    limits : sequence of Limit
+        Ranges and formats of the inputs.
+    quantities : Quantities
+    guard_bits : int
+        Bits below the finest format of an input.
+
+    Returns
+    -------
+    FormatPlan
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Fixed-point formats: words, fractions, and how a format is written."""
+"""Fixed-point formats: their words and fraction bits, and the notation Qm.n."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from fractions import Fraction
 from strapgen import checks
 from strapgen.exceptions import InputError
 
-#: Rounding of a value to its format, and its largest error in units of the last place.
+#: The roundings of a value to its format, with the largest error in units of the last place.
 ROUNDINGS = {"nearest": Fraction(1, 2), "truncation": Fraction(1)}
 
 SHORTEST_WORD, LONGEST_WORD = 8, 64
@@ -44,10 +44,10 @@ class Format:
         InputError
             If the text is no format of the word.
         """
-        found = re.fullmatch(r"Q(-?[0-9]{1,4})\.(-?[0-9]{1,4})", text)
-        if found is None:
+        match = re.fullmatch(r"Q(-?[0-9]{1,4})\.(-?[0-9]{1,4})", text)
+        if match is None:
             raise InputError(f"format {text!r} is not known; Qm.n is needed, as in Q1.{word - 2}")
-        whole, fraction = map(int, found.groups())
+        whole, fraction = map(int, match.groups())
         if whole + fraction + 1 != word:
             raise InputError(
                 f"format {text} has {whole + fraction + 1} bits with its sign; {word} are needed, as in "
@@ -82,12 +82,12 @@ def finest(largest: Fraction, word: int) -> int:
 
 
 def check_word(word: int) -> int:
-    """Return a length of word that the integer model knows.
+    """Return a length of word if the integer model has it.
 
     Raises
     ------
     InputError
-        If it is none.
+        If it has not.
     """
     if isinstance(word, bool) or not isinstance(word, int) or not SHORTEST_WORD <= word <= LONGEST_WORD:
         raise InputError(
@@ -97,7 +97,7 @@ def check_word(word: int) -> int:
 
 
 def check_rounding(rounding: str) -> str:
-    """Return the name of a rounding.
+    """Return the name of a rounding if there is one of that name.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Series of sine, cosine and arctangent with bounds of what they leave out, and pi with a bound of what it lacks."""
+"""Series of sine, cosine and arctangent, and a rational pi, with bounds of their errors."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from fractions import Fraction
 from functools import cache
 
-#: Bits of `pi`, and a bound of what it lacks.
+#: Bits of `pi`, and a bound of its error.
 _PI_BITS = 256
 PI_ERROR = Fraction(1, 1 << (_PI_BITS - 8))
 #: Parameter p of the arctangent's series, which holds up to 2p/(1 - p^2) = 0.4394.
@@ -45,7 +45,7 @@ def sine_series(first: int, reach: Fraction, tolerance: Fraction) -> tuple[tuple
     reach : Fraction
         Largest magnitude of the argument, at most 2.
     tolerance : Fraction
-        What may be left out.
+        Largest error that the terms left out may cause.
 
     Returns
     -------
@@ -76,7 +76,7 @@ def arctangent_series(tolerance: Fraction) -> tuple[tuple[Fraction, ...], Fracti
     Parameters
     ----------
     tolerance : Fraction
-        What may be left out.
+        Largest error that the terms left out may cause.
 
     Returns
     -------

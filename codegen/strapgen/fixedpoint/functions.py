@@ -27,7 +27,7 @@ _FUNCTIONS: dict[str, Callable[..., None]] = {
 def derive_function(
     kind: str, chain: Chain, arguments: Sequence[str], distance: Fraction = Fraction(0)
 ) -> None:
-    """Add to a chain the quantities that make a function of others, in order; the last is the function.
+    """Add to a chain the quantities that a function is computed by, in order; the last is its value.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def derive_function(
         "sin", "cos", "sinc", "atan2", "direction" or "wrap".
     chain : Chain
     arguments : sequence of str
-        What it is a function of, stored whole.
+        Quantities that are stored whole.
     distance : Fraction, optional
         The inverse of a bound of how fast atan2 changes with its arguments, where more is known than their ranges tell.
 

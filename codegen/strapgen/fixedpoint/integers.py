@@ -71,7 +71,7 @@ def lowered(program: Program, settings: Settings) -> FixedProgram:
     Raises
     ------
     InputError
-        If an input has no known range, a format that is asked for does not hold its values, or the word is too short.
+        If an input has no known range, a stated format does not hold its values, or the word is too short.
     """
     quantities, plan = _planned(program, settings)
     finest = _walked(program, settings, quantities, plan, {})
@@ -83,9 +83,9 @@ def lowered(program: Program, settings: Settings) -> FixedProgram:
         context, fixed = shorter, aligned
     if program.companions is None or program.transition is None:
         return fixed
-    interface = fixed.interface
-    adds_up = accumulation(program, settings, quantities, context.values, interface.inputs, interface.outputs)
-    return replace(fixed, interface=replace(interface, accumulation=adds_up))
+    (result,) = fixed.interface.outputs
+    adds_up = accumulation(context, program.transition, result)
+    return replace(fixed, interface=replace(fixed.interface, accumulation=adds_up))
 
 
 def _planned(program: Program, settings: Settings) -> tuple[Quantities, FormatPlan]:

@@ -15,22 +15,21 @@ from strapgen.signal import Signal
 
 @dataclass(frozen=True)
 class ErrorFeedback:
-    """What lies below the last place of a value, kept for the next call: a word without a sign.
+    """The bits below the last place of a value, which are fed back into the next call: a word without a sign.
 
-    It takes the place of what is added for rounding: the sum starts from it, and its low bits are the next one. A fresh
-    start is half a unit of the last place for rounding to the nearest, and nothing for truncation; every other word is
-    allowed too.
+    The sum starts from it in place of a constant for rounding, and the low bits of the sum are the next error feedback.
+    A run starts from half a unit of the last place for rounding to the nearest, and from zero for truncation; every
+    other word is allowed too.
 
     Parameters
     ----------
     name : str
-        Its name.
     fraction : int
-        Its fraction bits.
+        Fraction bits.
     shift : int
-        From its fraction to that of the sum, not above 0: added as ``residual * 2**shift``, which drops bits.
+        Places from its fraction to that of the sum, at most 0: ``word * 2**shift`` is added, which drops bits.
     fresh : int
-        The word of a fresh start.
+        The word that a run starts from.
     """
 
     name: str
@@ -50,7 +49,7 @@ class Argument:
     values : tuple of str
         The value that holds each element.
     low, high : int
-        Range of the integers: of an input, what is accepted; of an output, what is proved.
+        Range of the integers: an input outside is refused, an output is proved to lie inside.
     errors : tuple of Fraction
         Error bound of each element of an output after one call; of an input, zeros.
     """
@@ -94,13 +93,13 @@ class RoundingAccumulation:
     Parameters
     ----------
     once : Fraction
-        What does not depend on the number of steps.
+        The part of the bound that does not depend on the number of steps.
     per_step : Fraction
-        What every step adds.
+        The part that every step adds.
     input_rounding : Fraction
         What every step adds if increments are rounded to their format first.
     growth : Fraction
-        Largest factor by which a step stretches what is there.
+        Largest factor by which a step stretches the error before it.
     """
 
     once: Fraction
@@ -109,7 +108,7 @@ class RoundingAccumulation:
     growth: Fraction
 
     def bound(self, steps: int, rounded_inputs: bool = False, stretch: float | None = None) -> float:
-        """Return a bound after a number of steps; inf where none of use is known.
+        """Return a bound of the error after a number of steps; inf where no useful bound is known.
 
         Parameters
         ----------
@@ -117,8 +116,8 @@ class RoundingAccumulation:
         rounded_inputs : bool, optional
             Whether increments are rounded to their format first.
         stretch : float, optional
-            Largest factor by which the transitions of the run stretch a difference, where more is known of it than
-            that no step exceeds `growth`.
+            Largest factor by which all transitions of the run together stretch a difference, if a smaller one is known
+            than `growth` tells.
 
         Examples
         --------
@@ -139,16 +138,16 @@ class RoundingAccumulation:
 
 @dataclass(frozen=True)
 class Interface:
-    """All that a caller of fixed-point code must know.
+    """The facts that a caller of fixed-point code must know.
 
     Parameters
     ----------
     settings : Settings
     inputs, outputs : tuple of Argument
     residuals : tuple of ErrorFeedback
-        What is kept from call to call.
+        Error feedback, from call to call.
     accumulation : RoundingAccumulation or None
-        For a step, how its rounding adds up.
+        How the rounding of a step adds up; None for other kernels.
     """
 
     settings: Settings
@@ -169,7 +168,7 @@ class Interface:
             "settings": self.settings.as_dict(),
             "inputs": [argument.as_dict() for argument in self.inputs],
             "outputs": [argument.as_dict() for argument in self.outputs],
-            "residuals": [asdict(residual) for residual in self.residuals],
+            "residuals": [asdict(feedback) for feedback in self.residuals],
             "accumulation": adds_up and {name: str(value) for name, value in asdict(adds_up).items()},
         }
 
@@ -181,6 +180,6 @@ class Interface:
             Settings.from_dict(data["settings"]),
             tuple(map(Argument.from_dict, data["inputs"])),
             tuple(map(Argument.from_dict, data["outputs"])),
-            tuple(ErrorFeedback(**residual) for residual in data["residuals"]),
+            tuple(ErrorFeedback(**feedback) for feedback in data["residuals"]),
             adds_up and RoundingAccumulation(**{name: Fraction(value) for name, value in adds_up.items()}),
         )

@@ -16,7 +16,18 @@ from strapgen.signal import Signal
 
 @dataclass(frozen=True)
 class Limit:
-    """Range of one input as the user states it, and its finest format."""
+    """Range of one input as the user states it, and its finest format.
+
+    Parameters
+    ----------
+    signal : Signal
+    largest : Fraction
+        Largest magnitude of an element.
+    fraction : int
+        Fraction bits of the finest format, or of the one that the user states.
+    fixed : bool
+        Whether the user states it.
+    """
 
     signal: Signal
     largest: Fraction
@@ -24,21 +35,30 @@ class Limit:
     fixed: bool
 
     def places(self, guard_bits: int) -> int:
-        """Return the fraction bits of the input when sums of inputs are given so many bits more."""
+        """Return the fraction bits of the input when so many bits are left for sums of inputs."""
         return self.fraction if self.fixed or self.signal.constraint else self.fraction - guard_bits
 
     def largest_integer(self, guard_bits: int) -> int:
-        """Return the largest integer that is accepted: that of an attitude rounded down, of any other input up."""
+        """Return the largest integer that is accepted: the limit of an attitude is rounded down, any other limit up."""
         scaled = self.largest * Fraction(2) ** self.places(guard_bits)
         return math.floor(scaled) if self.signal.constraint else math.ceil(scaled)
 
     def range(self, guard_bits: int) -> Interval:
-        """Return the range of what is accepted."""
+        """Return the range of the accepted values."""
         return Interval.symmetric(self.largest_integer(guard_bits) / Fraction(2) ** self.places(guard_bits))
 
 
 def limits(program: Program, settings: Settings) -> list[Limit]:
-    """Return range and finest format of every input of a program.
+    """Return the range and the finest format of every input of a program.
+
+    Parameters
+    ----------
+    program : Program
+    settings : Settings
+
+    Returns
+    -------
+    list of Limit
 
     Raises
     ------
@@ -83,6 +103,7 @@ def state_fraction(word: int, largest: Fraction) -> int:
 
 
 def _largest(program: Program, signal: Signal, settings: Settings) -> Fraction:
+    """Return the largest magnitude of the elements of an input."""
     if signal.name in settings.ranges:
         if signal.constraint or signal.name in ("increments", "turns"):
             raise InputError(

@@ -1,7 +1,8 @@
 """Exact quantities: what a fixed-point program stores, before anything is rounded.
 
 Every quantity is an exact sum of products of quantities before it, or one operation on them. A quantity that stays near
-a constant is kept as its distance from it, which is small and so gets a finer scale: 1 - x as -x, the 1 remembered.
+a constant is stored as its distance from that constant, which is small and so has a finer scale: 1 - x is stored as
+-x, with the offset 1.
 """
 
 from __future__ import annotations
@@ -25,14 +26,14 @@ class InputElement:
 
 @dataclass(frozen=True)
 class Sum:
-    """A sum of exact multiples of products of at most two stored quantities; without a constant, unless alone."""
+    """A sum of exact multiples of products of at most two stored quantities."""
 
     terms: tuple[tuple[Monomial, Fraction], ...]
 
 
 @dataclass(frozen=True)
 class Quotient:
-    """A quotient of whole quantities."""
+    """A quotient of quantities that are stored whole, without offset."""
 
     numerator: Operand
     denominator: str
@@ -54,7 +55,7 @@ class Maximum:
 
 @dataclass(frozen=True)
 class Selection:
-    """The value of the first case whose left side is at least its right side, or another one."""
+    """The value of the first case whose left side is at least its right side; `otherwise` if there is none."""
 
     cases: tuple[tuple[Operand, Operand, Operand], ...]
     otherwise: Operand
@@ -62,14 +63,14 @@ class Selection:
 
 @dataclass(frozen=True)
 class Computed:
-    """What the code computes for another quantity, brought into that one's range: it has no error of its own."""
+    """The computed value of another quantity, brought into the range of that one: as a number, it has no error."""
 
     argument: str
 
 
 @dataclass(frozen=True)
 class NearestInteger:
-    """The integer that the code finds nearest to a multiple of a quantity; the factor is dyadic."""
+    """The integer that the code computes as the nearest to a multiple of a quantity; the factor is dyadic."""
 
     argument: str
     factor: Fraction
@@ -102,23 +103,22 @@ class Quantity:
     ----------
     name : str
     definition : Definition
-        What is stored: the quantity less its offset.
+        The stored part: the quantity less its offset and what stands beside it.
     offset : Fraction
         Constant that is not stored.
     range : Interval
-        Proved range of what is stored.
+        Proved range of the stored part.
     meaning : str
-        Said where a named stage of the algorithm begins.
+        The comment where a named stage of the algorithm begins; "" elsewhere.
     guarded : bool
         Whether the range holds because it is checked when the code runs.
     beside : tuple
-        Exact words that are not stored in it either, each with a power of two: the quantity is what is stored, the
-        offset and these.
+        Exact words, each with a power of two: the quantity is the sum of its stored part, its offset and these.
     inexact : Fraction
         Bound of how far the definition is from the quantity: what a series leaves out, or a rational number for an
         irrational one.
     follows : ErrorPropagation or None
-        How the errors of quantities go on whose computed values were taken as exact on the way.
+        What becomes of the errors of quantities whose computed values were taken as exact on the way.
     """
 
     name: str
@@ -153,26 +153,18 @@ class Quantities:
         return quantity.range.magnitude + sum(beside, Fraction(0))
 
     def factors(self) -> set[str]:
-        """Return the quantities that are multiplied by something that is no power of two."""
-        return {
-            name
-            for quantity in self.items.values()
-            if isinstance(quantity.definition, Sum)
-            for monomial, coefficient in quantity.definition.terms
-            if len(monomial) == 2 or not is_power_of_two(coefficient)
-            for name in monomial
-        } | {
-            name
-            for quantity in self.items.values()
-            for name in (
-                *(m[0] for m, _ in quantity.beside),
-                *(
-                    [quantity.definition.argument]
-                    if isinstance(quantity.definition, Computed | NearestInteger)
-                    else []
-                ),
-            )
-        }
+        """Return the quantities that must be words: factors of products, exact parts beside others, and arguments."""
+        names: set[str] = set()
+        for quantity in self.items.values():
+            names.update(monomial[0] for monomial, _ in quantity.beside)
+            match quantity.definition:
+                case Sum(terms):
+                    for monomial, coefficient in terms:
+                        if len(monomial) == 2 or not is_power_of_two(coefficient):
+                            names.update(monomial)
+                case Computed(argument) | NearestInteger(argument):
+                    names.add(argument)
+        return names
 
 
 def is_power_of_two(value: Fraction) -> bool:
@@ -198,21 +190,21 @@ def is_dyadic(value: Fraction) -> bool:
 
 
 def used_by(quantity: Quantity) -> list[str]:
-    """Return the quantities that another rests on."""
-    definition = quantity.definition
-    used: list[Operand] = [m[0] for m, _ in quantity.beside]
+    """Return the names that a quantity is made from."""
+    used: list[Operand] = [monomial[0] for monomial, _ in quantity.beside]
     if quantity.follows is not None:
         used += [name for name, _ in quantity.follows.slopes]
-    if isinstance(definition, Sum):
-        used += [name for monomial, _ in definition.terms for name in monomial]
-    elif isinstance(definition, Quotient):
-        used += [definition.numerator, definition.denominator]
-    elif isinstance(definition, SquareRoot | Computed | NearestInteger):
-        used.append(definition.argument)
-    elif isinstance(definition, Maximum):
-        used += definition.arguments
-    elif isinstance(definition, Selection):
-        used += [operand for case in definition.cases for operand in case] + [definition.otherwise]
+    match quantity.definition:
+        case Sum(terms):
+            used += [name for monomial, _ in terms for name in monomial]
+        case Quotient(numerator, denominator):
+            used += [numerator, denominator]
+        case SquareRoot(argument) | Computed(argument) | NearestInteger(argument):
+            used.append(argument)
+        case Maximum(arguments):
+            used += arguments
+        case Selection(cases, otherwise):
+            used += [operand for case in cases for operand in case] + [otherwise]
     return [name for name in used if isinstance(name, str)]
 
 

@@ -18,6 +18,12 @@ from strapgen.fixedpoint.terms import largest_wide
 def lower_quotient(context: Quantization, quantity: Quantity, definition: Quotient) -> None:
     """Lower a quotient to a word of the finest format for which the numerator has room.
 
+    Parameters
+    ----------
+    context : Quantization
+    quantity : Quantity
+    definition : Quotient
+
     Raises
     ------
     InputError
@@ -57,6 +63,12 @@ def lower_quotient(context: Quantization, quantity: Quantity, definition: Quotie
 
 def lower_root(context: Quantization, quantity: Quantity, definition: SquareRoot) -> None:
     """Lower a square root: as many places below the argument as a wide number has room for, an even number in all.
+
+    Parameters
+    ----------
+    context : Quantization
+    quantity : Quantity
+    definition : SquareRoot
 
     Raises
     ------

@@ -16,12 +16,12 @@ _MOST_BOXES = 128
 
 
 class Ranges:
-    """Proves ranges of quantities while they are made.
+    """Proves the ranges of quantities one after another, as they are derived.
 
     Parameters
     ----------
     items : mapping of str to Quantity
-        The quantities made so far.
+        The quantities so far; the caller adds each after its range is proved.
     box : mapping of str to Interval
         Range of every element of an input.
     """
@@ -31,7 +31,7 @@ class Ranges:
         self.expanded: dict[str, Terms | None] = {name: {(name,): Fraction(1)} for name in box}
 
     def of_sum(self, name: str, terms: Terms, seen: float) -> Interval:
-        """Return the range of a sum, which gets a name; `seen` is its largest magnitude on samples."""
+        """Return the range of a sum and note its expansion by name; `seen` is its largest magnitude on samples."""
         self.expanded[name] = expansion = self.expansion(terms)
         enclosure = self.enclosure(terms)
         if expansion is not None:
@@ -39,7 +39,7 @@ class Ranges:
         return self.cut(Sum(tuple(terms.items())), enclosure, seen)
 
     def expansion(self, terms: Terms) -> Terms | None:
-        """Return a sum as a polynomial of the inputs, None if it is none of low degree."""
+        """Return a sum as a polynomial of the inputs; None if that has too high a degree or too many terms."""
         total: Terms = {}
         for monomial, coefficient in terms.items():
             product: Terms = {(): coefficient}
@@ -61,7 +61,7 @@ class Ranges:
         return total
 
     def enclosure(self, terms: Terms, box: Mapping[str, Interval] | None = None) -> Interval:
-        """Return the interval of a sum: of the quantities, or of intervals by name."""
+        """Return the interval of a sum from the ranges of the quantities, or from intervals by name."""
         total = Interval(0, 0)
         for monomial, coefficient in terms.items():
             ranges = [self.items[name].range if box is None else box[name] for name in monomial]
@@ -80,7 +80,7 @@ class Ranges:
         return total
 
     def _with_square(self, one: str, other: str) -> Interval | None:
-        """Return the interval of a product whose first factor is a multiple of the second: of that one's square."""
+        """Return the interval of a product whose first factor is a multiple of the second, by a square."""
         definition = self.items[one].definition
         if not isinstance(definition, Sum) or len(definition.terms) != 1 or self.items[one].inexact:
             return None
@@ -91,16 +91,16 @@ class Ranges:
         return (self.items[other].range.square() * self.items[rest].range).scale(coefficient)
 
     def cut(self, definition: Sum, enclosure: Interval, seen: float) -> Interval:
-        """Cut the box of the inputs until the range of a sum of products loses no bit, or it becomes too much.
+        """Return the range of a sum after the box of the inputs is cut until no bit is lost, or the boxes are too many.
 
-        `seen` is the largest magnitude on samples: where a bit may be gained, and no proof.
+        `seen` is the largest magnitude on samples: it tells whether a bit may be gained, and proves nothing.
         """
         bits, lost = math.frexp(seen * (1 + 1e-9))[1], math.frexp(float(enclosure.magnitude))[1]
         if lost <= bits or any(not isinstance(q.definition, InputElement | Sum) for q in self.items.values()):
             return enclosure
         goal = Fraction(2) ** bits
         needed = self._needed(definition)
-        pending, kept, spent = [self.box], Interval(0, 0), 0
+        pending, proved, spent = [self.box], Interval(0, 0), 0
         names = [n for n in self.box if n in needed]
         if not names or 2 ** len(names) > _MOST_BOXES:  # not even a cut of every side in two
             return enclosure
@@ -108,7 +108,7 @@ class Ranges:
             box = pending.pop()
             inside = self._on(box, definition, needed)
             if inside.magnitude <= goal:
-                kept = kept.join(inside)
+                proved = proved.join(inside)
                 continue
             spent += 2
             if spent > _MOST_BOXES:
@@ -119,9 +119,10 @@ class Ranges:
                 key=lambda n: Fraction(box[n].high - box[n].low, max(1, self.box[n].high - self.box[n].low)),
             )
             pending += [box | {widest: half} for half in box[widest].halves()]
-        return enclosure.meet(kept)
+        return enclosure.meet(proved)
 
     def _needed(self, definition: Sum) -> set[str]:
+        """Return the names that a sum is made from, directly or not."""
         needed = {name for monomial, _ in definition.terms for name in monomial}
         for quantity in reversed(list(self.items.values())):
             if quantity.name in needed and isinstance(quantity.definition, Sum):

@@ -1,4 +1,4 @@
-"""Sample inputs of a program: hints where a range may be narrower than what is proved. No proof rests on them."""
+"""Sample inputs of a program: they hint where a range may be narrower than proved, and no proof rests on them."""
 
 from __future__ import annotations
 

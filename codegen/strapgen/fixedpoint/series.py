@@ -1,6 +1,6 @@
-"""Truncated series: polynomials of bounded variables up to a degree, with a bound of all that is left out.
+"""Truncated series: polynomials of bounded variables up to a degree, with a bound of all terms that are left out.
 
-Coefficients are integers in units of 2^-192: what they round away is counted with what is left out.
+Coefficients are integers in units of 2^-192; the bound includes what their rounding loses.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-#: Binary places of a coefficient: rounding it is nothing beside what is left out.
+#: Binary places of a coefficient, so many that its rounding does not count beside the terms left out.
 _PLACES = 192
 _UNIT = Fraction(1, 1 << _PLACES)
 
@@ -20,7 +20,7 @@ Monomial = tuple[int, ...]
 
 @dataclass(frozen=True)
 class Series:
-    """A polynomial and a bound of its distance from what it stands for.
+    """A polynomial, and a bound of its distance from the function that it approximates.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class Truncated:
     sizes : sequence of Fraction
         Largest magnitude of every variable.
     most : int
-        Most terms of a series; the degree follows.
+        Largest number of terms of a series, from which the degree follows.
     """
 
     def __init__(self, sizes: Sequence[Fraction], most: int) -> None:
@@ -63,7 +63,7 @@ class Truncated:
         return Series({1: {(place,): 1 << _PLACES}}, Fraction(0))
 
     def size(self, series: Series) -> Fraction:
-        """Return a bound of the magnitude of what a series stands for."""
+        """Return a bound of the magnitude of the function that a series approximates."""
         return series.rest + sum((self._size(part) for part in series.terms.values()), Fraction(0))
 
     def sum(self, one: Series, other: Series) -> Series:
@@ -77,8 +77,8 @@ class Truncated:
     def product(self, one: Series, other: Series) -> Series:
         """Return a product."""
         terms: dict[int, dict[Monomial, int]] = {}
-        own, others = self.size(one), self.size(other)
-        rest = one.rest * others + (own - one.rest) * other.rest
+        size, others = self.size(one), self.size(other)
+        rest = one.rest * others + (size - one.rest) * other.rest
         rounded = 0
         for a, first in one.terms.items():
             for b, second in other.terms.items():
@@ -104,6 +104,7 @@ class Truncated:
         return total
 
     def _combined(self, one: Series, other: Series, sign: int) -> Series:
+        """Return a series plus or minus another."""
         terms = {degree: dict(part) for degree, part in one.terms.items()}
         for degree, part in other.terms.items():
             into = terms.setdefault(degree, {})
@@ -112,18 +113,15 @@ class Truncated:
         return Series(_without_zeros(terms), one.rest + other.rest)
 
     def _size(self, part: dict[Monomial, int]) -> Fraction:
-        return (
-            sum(
-                (
-                    abs(c) * math.prod((self.sizes[place] for place in key), start=Fraction(1))
-                    for key, c in part.items()
-                ),
-                Fraction(0),
-            )
-            * _UNIT
+        """Return a bound of the magnitude of terms."""
+        products = (
+            abs(c) * math.prod((self.sizes[place] for place in key), start=Fraction(1))
+            for key, c in part.items()
         )
+        return sum(products, Fraction(0)) * _UNIT
 
 
 def _without_zeros(terms: dict[int, dict[Monomial, int]]) -> dict[int, dict[Monomial, int]]:
-    kept = {degree: {key: c for key, c in part.items() if c} for degree, part in terms.items()}
-    return {degree: part for degree, part in kept.items() if part}
+    """Drop the terms that have cancelled."""
+    nonzero = {degree: {key: c for key, c in part.items() if c} for degree, part in terms.items()}
+    return {degree: part for degree, part in nonzero.items() if part}

@@ -1,4 +1,4 @@
-"""Settings of a fixed-point program: what the user states, from which everything else is derived."""
+"""Settings of a fixed-point program: the user states them, and everything else is derived from them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from strapgen import checks
 from strapgen.exceptions import InputError
 from strapgen.fixedpoint.formats import Format, check_rounding, check_word
 
-#: What is kept of rounding from step to step.
+#: Rounding errors that are fed back from step to step.
 CARRIES = {
     "none": "nothing",
     "state": "the rounding of the state",
@@ -33,7 +33,7 @@ _LIMIT_UNIT = 1 << 60
 
 @dataclass(frozen=True)
 class Settings:
-    """What a fixed-point program is made for.
+    """The conditions that fixed-point code must meet: word, ranges, rounding.
 
     Parameters
     ----------
@@ -44,15 +44,15 @@ class Settings:
     rounding : str
         "nearest" (halves up) or "truncation" (down).
     carry : str
-        Rounding residuals kept from call to call: "none", "state", or "full": of state and transition.
+        Rounding errors that are fed back from call to call: "none", "state", or "full", those of state and transition.
     allowance : Fraction
         By how much an element of a state may exceed 1 in magnitude.
     ranges : mapping of str to Fraction
         Largest magnitude of the elements of other inputs, by the signal's name.
     formats : mapping of str to str
-        Formats that are not to be chosen, as Qm.n, by the name of a value or of an input or output.
+        Formats that the user fixes, as Qm.n, by the name of a value or of an input or output.
     stated : str
-        How the user said what the largest angle is, in the words of the command line; "" where it is said itself.
+        The options of the command line that the largest angle follows from; "" where it is stated itself.
 
     Raises
     ------
@@ -132,7 +132,7 @@ class Settings:
         return cls(word, Fraction(math.ceil(angle * _LIMIT_UNIT), _LIMIT_UNIT), **rest, stated=stated)
 
     def fitted(self, largest: float) -> Settings:
-        """Return the settings with a largest angle that holds what is known to come, and up to an eighth more.
+        """Return the settings with a largest angle of this magnitude, and up to an eighth more.
 
         Examples
         --------
@@ -140,14 +140,14 @@ class Settings:
         0.013671875
         """
         if not SMALLEST_ANGLE * 2 < largest <= LARGEST_ANGLE:
-            # Nothing turns, or too much for any format: what then comes is refused where it is read.
+            # Nothing turns, or no format holds the increments: those are refused where they are read.
             return self
         exponent = math.frexp(largest)[1] - 4
         angle = Fraction(2) ** exponent * math.ceil(math.ldexp(largest, -exponent))
         return replace(self, largest_angle=angle, stated="")
 
     def for_increments(self, largest: float) -> Settings:
-        """Return the settings for a run whose largest increment is known: themselves if a largest angle is stated."""
+        """Return the settings for a run whose largest increment is known; a largest angle that is stated stays."""
         return self if self.largest_angle != DEFAULT_ANGLE else self.fitted(largest)
 
     def as_dict(self) -> dict[str, Any]:

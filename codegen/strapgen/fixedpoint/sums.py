@@ -28,6 +28,12 @@ from strapgen.fixedpoint.terms import Aligned, Placed, aligned, largest_wide, ne
 def lower_sum(context: Quantization, quantity: Quantity, definition: Sum) -> None:
     """Lower a sum of products to a word, or to a wide number where no word is needed.
 
+    Parameters
+    ----------
+    context : Quantization
+    quantity : Quantity
+    definition : Sum
+
     Raises
     ------
     InputError
@@ -239,28 +245,29 @@ def _fine(context: Quantization, name: str, terms: Sequence[Placed], fraction: i
 
 def _limited(context: Quantization, quantity: Quantity, value: Value) -> Value:
     """Return a value in a fixed format that does not hold its range: it is checked if its range is otherwise known."""
-    limit = _known_limit(context, quantity.name, value.fraction)
-    if limit is None:
+    known = _known_limit(context, quantity.name)
+    inside = quantity.range + Interval.of(quantity.offset) if known is None else Interval.symmetric(known)
+    limit = None if known is None else math.floor(known * Fraction(2) ** value.fraction)
+    if limit is None or limit > context.largest(value.fraction):
         raise InputError(
             f"format {Format(context.word, value.fraction)} of {quantity.name} does not hold its range "
-            f"{(quantity.range + Interval.of(quantity.offset)).text()}"
-            f"{', less ' + str(quantity.offset) if quantity.offset else ''}"
+            f"{inside.text()}{', less ' + str(quantity.offset) if quantity.offset else ''}"
         )
     return replace(value, low=max(value.low, -limit), high=min(value.high, limit), guarded=True)
 
 
-def _known_limit(context: Quantization, name: str, fraction: int) -> int | None:
-    """Return the largest integer of an output whose range is known but not proved."""
+def _known_limit(context: Quantization, name: str) -> Fraction | None:
+    """Return the largest magnitude of an output whose range is known but not proved."""
     program, inputs = context.program, context.plan.inputs
     for result in program.outputs:
         if name in context.quantities.results[result.signal.name]:
             if result.signal.constraint:
-                return math.floor((Fraction(1) + context.settings.allowance) * Fraction(2) ** fraction)
-            carried = carried_input(program, inputs, result.signal)
-            if carried is not None:
-                return carried.high
-            if program.companions is not None:  # the state of the next step
-                return inputs[0].high
+                return Fraction(1) + context.settings.allowance
+            following = carried_input(program, inputs, result.signal)
+            if following is None and program.companions is not None:  # the state of the next step
+                following = inputs[0]
+            if following is not None:
+                return following.high * following.format.unit
     return None
 
 

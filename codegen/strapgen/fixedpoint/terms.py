@@ -1,4 +1,4 @@
-"""Terms of sums as integers: brought to one place, with the bound of their partial sums and what shifts lose."""
+"""Terms of sums as integers at one place, with bounds of their partial sums and of what shifts lose."""
 
 from __future__ import annotations
 
@@ -69,12 +69,24 @@ def up(value: Fraction) -> Fraction:
 def aligned(terms: Iterable[Placed], place: int, word: int, values: Mapping[str, Value]) -> Aligned:
     """Return terms at one place.
 
-    A shift by all bits of a wide number but one leaves 0 or -1, as every longer one would.
+    Parameters
+    ----------
+    terms : iterable of Placed
+    place : int
+        Fraction bits of the sum.
+    word : int
+    values : mapping of str to Value
+        The values in the terms.
+
+    Returns
+    -------
+    Aligned
     """
     shifted: list[Term] = []
     peak, error = 0, Fraction(0)
     for item in terms:
         term, wrong = item.term, item.error
+        # A shift by all bits of a wide number but one leaves 0 or -1, as every longer one would.
         shift = max(place - item.place, 1 - 2 * word)
         if not term.names and shift < 0:  # a constant: rounded here
             exact = term.factor * Fraction(2) ** (place - item.place)

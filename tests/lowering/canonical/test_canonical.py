@@ -5,7 +5,6 @@ from time import process_time
 import pytest
 import sympy as sp
 from derived import kernel, program
-from gathering import each
 
 from strapgen import catalogue
 from strapgen.catalogue import ALGORITHMS, STANDARD_METHODS, Choice
@@ -17,13 +16,6 @@ from strapgen.program import Program
 STEPS = [Choice(a, m, n) for a in ALGORITHMS for m in STANDARD_METHODS for n in (1, 2, 3, 4, 5, None)]
 #: Three increments and more have the vectors of rates at three nodes, and more inputs: with the long tests.
 EVERY = pytest.mark.parametrize(
-    "choice",
-    [
-        pytest.param(choice, marks=pytest.mark.long if (choice.increments or 0) > 2 else (), id=choice.kernel)
-        for choice in STEPS
-    ],
-)
-TOGETHER = each(
     "choice",
     [
         pytest.param(choice, marks=pytest.mark.long if (choice.increments or 0) > 2 else (), id=choice.kernel)
@@ -117,7 +109,7 @@ def test_a_transition_depends_on_nothing_but_the_increments():
         )
 
 
-@TOGETHER
+@EVERY
 def test_values_are_named_after_what_they_are(choice):
     # Only partial sums and factors that a pass shares have no meaning: few in a matrix, none in a quaternion.
     temporaries = [a.name for a in program(choice).body if is_temporary(a.name)]
