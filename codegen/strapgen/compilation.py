@@ -35,11 +35,11 @@ from strapgen.targets import Sources
 #: Without notes for debuggers, which Python's flags switch on, compiling takes a tenth less time.
 C_FLAGS = ("-std=c99", "-O3", "-ffp-contract=off", "-g0")
 
-#: The functions of a module are found in it, whatever the process has by their names.
+#: A module calls its own functions, whatever other functions of the same names the process has.
 _VISIBILITY = "-fvisibility=hidden"
-#: What is in effect: tests that are not about optimization compile with less of it.
+#: The flags in effect; tests that are not about optimization compile with less of it.
 _flags: tuple[str, ...] = C_FLAGS
-#: Behind the headers: what cffi wraps the functions with only passes arguments on, and is not worth optimizing.
+#: Text after the headers. The wrappers of cffi only pass arguments on and are not worth optimizing.
 _UNOPTIMIZED = '#if defined(__GNUC__) && !defined(__clang__)\n#pragma GCC optimize ("O0")\n#endif\n'
 
 #: Kind of cache entry that says in which module of many a source was compiled.

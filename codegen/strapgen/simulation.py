@@ -93,7 +93,7 @@ def require_finite(backend: Backend, states: Any, time: Array) -> None:
     Parameters
     ----------
     backend : Backend
-        What ran.
+        The back end of the run.
     states : array, (N, state shape)
     time : array, (N,)
         Time of each state in s.

@@ -120,7 +120,7 @@ def general_rate(attitude_step: Step, count: int) -> tuple[Frame, Any, list[list
 
     Parameters
     ----------
-    taken : Step
+    attitude_step : Step
     count : int
         Number of derivatives, counting the rate itself.
     """
@@ -134,7 +134,7 @@ def errors(attitude_step: Step, ring: Any, rate: Rate, top: int) -> dict[str, li
 
     Parameters
     ----------
-    taken : Step
+    attitude_step : Step
     ring : PolyRing
         Ring of the coefficients, over the step's own field.
     rate : sequence of sequence of ring element

@@ -49,8 +49,8 @@ def gate(kernel: Kernel, shared: Shared) -> Program:
     NotImplementedError
         If an expression uses a function, a power or a condition for which programs have no operation.
     """
-    taken = {name for signal in kernel.signals for name in signal.elements}
-    writer = _Writer(taken | {definition.symbol.name for definition in shared.definitions})
+    reserved = {name for signal in kernel.signals for name in signal.elements}
+    writer = _Writer(reserved | {definition.symbol.name for definition in shared.definitions})
     for definition in shared.definitions:
         value = writer.node(definition.expression)
         writer.body.append(Assignment(definition.symbol.name, value, definition.meaning))
@@ -79,9 +79,9 @@ def gate(kernel: Kernel, shared: Shared) -> Program:
 class _Writer:
     """Turns expressions into nodes; it adds a temporary where a power or an inverse function needs a value twice."""
 
-    def __init__(self, taken: set[str]) -> None:
+    def __init__(self, reserved: set[str]) -> None:
         self.body: list[Assignment] = []
-        self._powers = (name for k in count(1) if (name := f"{FACTOR}{k}") not in taken)
+        self._powers = (name for k in count(1) if (name := f"{FACTOR}{k}") not in reserved)
 
     def node(self, expression: sp.Expr) -> Node:
         if expression.is_Symbol:
