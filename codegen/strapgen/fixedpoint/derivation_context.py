@@ -43,6 +43,10 @@ class DerivationContext:
         Assignments that hold elements of results.
     same : dict of Definition to str
         Quantities of which functions were made, by definition: equal ones are stored once.
+    items : dict of str to Quantity
+        The quantities so far, by name.
+    assigned : frozenset of str
+        Names of all assignments of the program.
     """
 
     program: Program
@@ -55,11 +59,12 @@ class DerivationContext:
     anywhere: Samples
     outputs: frozenset[str]
     same: dict[Definition, str] = field(default_factory=dict)
+    items: dict[str, Quantity] = field(init=False)
+    assigned: frozenset[str] = field(init=False)
 
-    @property
-    def items(self) -> dict[str, Quantity]:
-        """The quantities so far, by name."""
-        return self.quantities.items
+    def __post_init__(self) -> None:
+        self.items = self.quantities.items
+        self.assigned = frozenset(assignment.name for assignment in self.program.body)
 
 
 def note_samples(context: DerivationContext, name: str, evaluate: Callable[[Samples], Any]) -> None:
@@ -80,10 +85,11 @@ def range_of(context: DerivationContext, operand: Operand) -> Interval:
 
 def free_name(context: DerivationContext, name: str) -> str:
     """Return the name, or with a number behind it one that is free."""
-    assigned = {assignment.name for assignment in context.program.body}
     candidates = (name if number == 1 else f"{name}_{number}" for number in count(1))
     return next(
-        candidate for candidate in candidates if candidate not in context.items and candidate not in assigned
+        candidate
+        for candidate in candidates
+        if candidate not in context.items and candidate not in context.assigned
     )
 
 

@@ -34,6 +34,10 @@ class Quantization:
         Most fraction bits of quantities that need not be finer.
     feedback_names : mapping of str to str
         The name of the error feedback of every quantity whose rounding error goes into the next call.
+    word : int
+        Bits of a word.
+    rounding_error : Fraction
+        Largest error of a rounding, in units of the last place.
     values : dict of str to Value
         The integers so far, those of the inputs included.
     body : list of Value
@@ -48,22 +52,15 @@ class Quantization:
     plan: FormatPlan
     most: Mapping[str, int]
     feedback_names: Mapping[str, str]
+    word: int = field(init=False)
+    rounding_error: Fraction = field(init=False)
     values: dict[str, Value] = field(init=False)
     body: list[Value] = field(default_factory=list)
     resets: set[str] = field(default_factory=set)
 
     def __post_init__(self) -> None:
+        self.word, self.rounding_error = self.settings.word, ROUNDINGS[self.settings.rounding]
         self.values = dict(self.plan.values)
-
-    @property
-    def word(self) -> int:
-        """Bits of a word."""
-        return self.settings.word
-
-    @property
-    def rounding_error(self) -> Fraction:
-        """Largest error of a rounding, in units of the last place."""
-        return ROUNDINGS[self.settings.rounding]
 
     def largest(self, fraction: int) -> int:
         """Return the largest integer that a word of so many fraction bits holds."""
