@@ -9,7 +9,7 @@ import pytest
 
 from strapgen import behaviour, catalogue
 from strapgen.catalogue import choose
-from strapgen.exceptions import InputError
+from strapgen.support.exceptions import InputError
 
 EXAMPLE = Path(__file__).resolve().parents[1] / "examples" / "modified_rodrigues.py"
 

@@ -16,8 +16,8 @@ import pytest
 from tolerances import certified, roundoff
 
 import strapgen
-from strapgen.exceptions import InputError
 from strapgen.simulation import simulate
+from strapgen.support.exceptions import InputError
 
 ORDERS = (1, 2, 3, 4)
 

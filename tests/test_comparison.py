@@ -13,8 +13,8 @@ import pytest
 import strapgen
 from strapgen import comparison
 from strapgen.backends import BACKENDS
-from strapgen.exceptions import InputError
 from strapgen.fixedpoint import Settings
+from strapgen.support.exceptions import InputError
 
 FIXED_NAMES = ("c-q31", "c-q15", "fixed-model")
 

@@ -13,7 +13,7 @@ import pytest
 import strapgen
 from strapgen import backends, compilation, pipeline
 from strapgen.cli import main
-from strapgen.exceptions import CompilerError
+from strapgen.support.exceptions import CompilerError
 from strapgen.targets import Sources
 
 SIMULATE = ["simulate", "euler", "--method", "rk1", "--increments", "1", "--step", "1", "--duration", "2"]

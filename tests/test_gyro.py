@@ -12,8 +12,8 @@ from hypothesis.extra.numpy import arrays
 from tolerances import certified
 
 import strapgen
-from strapgen.exceptions import InputError
 from strapgen.gyro import pulses, windows
+from strapgen.support.exceptions import InputError
 
 
 @given(

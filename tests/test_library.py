@@ -6,7 +6,8 @@ import subprocess
 import sys
 
 import strapgen
-from strapgen import cache, catalogue, library
+from strapgen import catalogue, library
+from strapgen.support import cache
 
 RUN = """
 import sys

@@ -10,7 +10,7 @@ from scipy.integrate import quad
 from tolerances import roundoff
 
 import strapgen
-from strapgen.exceptions import InputError
+from strapgen.support.exceptions import InputError
 
 MOTIONS = {
     "constant": {"x_deg_s": 3, "y_deg_s": -5, "z_deg_s": 7},

@@ -10,10 +10,10 @@ import pytest
 import strapgen
 from strapgen import plots
 from strapgen.convergence import Convergence, Rung
-from strapgen.exceptions import InputError, MissingExtraError
 from strapgen.order import Order
 from strapgen.recording import History
 from strapgen.simulation import Run, simulate
+from strapgen.support.exceptions import InputError, MissingExtraError
 from strapgen.vibration.curves import Curve
 
 pyplot = pytest.importorskip("matplotlib.pyplot")

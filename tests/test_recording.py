@@ -19,8 +19,8 @@ from tolerances import certified
 
 import strapgen
 from strapgen import recording
-from strapgen.exceptions import InputError
 from strapgen.recording import Recording, propagate, read_increments, read_rates
+from strapgen.support.exceptions import InputError
 
 DATA = Path(__file__).parent / "data"
 MAKER = runpy.run_path(str(DATA / "make_recordings.py"))

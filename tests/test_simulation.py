@@ -9,8 +9,8 @@ import pytest
 from tolerances import certified
 
 import strapgen
-from strapgen.exceptions import InputError
 from strapgen.simulation import simulate
+from strapgen.support.exceptions import InputError
 
 CONING = {"a_deg_s": 10, "b_deg_s": 10, "g_deg_s": 10}
 

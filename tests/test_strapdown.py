@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 from strapgen import evaluator, reports
-from strapgen.exceptions import InputError
 from strapgen.fixedpoint import Settings
 from strapgen.motions import motion
 from strapgen.recording import InertialRecording, read_inertial
 from strapgen.simulation import drift_between
 from strapgen.strapdown import NavigationFrame, course
+from strapgen.support.exceptions import InputError
 from strapgen.two_speed import ALGORITHMS
 
 LOG = Path(__file__).resolve().parents[1] / "examples" / "inertial_log.csv"

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from strapgen.exceptions import InputError
 from strapgen.fixedpoint import Settings
 from strapgen.stress import MOTIONS, angles, as_text, stress
+from strapgen.support.exceptions import InputError
 
 
 def test_both_motions_pass_the_vertical():

@@ -8,7 +8,7 @@ import io
 import pytest
 
 from strapgen import plots, study
-from strapgen.exceptions import InputError
+from strapgen.support.exceptions import InputError
 
 SMALL = {"duration": "5", "words": (12, 16, 24), "carries": ("none", "full")}
 

@@ -14,8 +14,8 @@ from scipy.spatial.transform import Rotation
 
 from strapgen import compilation
 from strapgen.backends import BACKENDS
-from strapgen.exceptions import InputError, InputTypeError
 from strapgen.fixedpoint import Settings
+from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.targets import FIXED
 from strapgen.two_speed import ALGORITHMS, SCULLING, TwoSpeed, loops, sources
 

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from strapgen import resources
 from strapgen.catalogue.tableaux import TABLEAUX
+from strapgen.support import resources
 
 pytestmark = pytest.mark.long
 

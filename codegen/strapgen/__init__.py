@@ -42,11 +42,6 @@ if _typing.TYPE_CHECKING:
     from strapgen.comparison import compare as compare
     from strapgen.convergence import Convergence as Convergence
     from strapgen.convergence import converge as converge
-    from strapgen.exceptions import CompilerError as CompilerError
-    from strapgen.exceptions import InputError as InputError
-    from strapgen.exceptions import InputTypeError as InputTypeError
-    from strapgen.exceptions import MissingExtraError as MissingExtraError
-    from strapgen.exceptions import StrapgenError as StrapgenError
     from strapgen.fixedpoint import FixedProgram as FixedProgram
     from strapgen.fixedpoint import Format as Format
     from strapgen.fixedpoint import Settings as Settings
@@ -76,37 +71,110 @@ if _typing.TYPE_CHECKING:
     from strapgen.simulation import simulate as simulate
     from strapgen.strapdown import Course as Course
     from strapgen.strapdown import course as course
+    from strapgen.support.exceptions import CompilerError as CompilerError
+    from strapgen.support.exceptions import InputError as InputError
+    from strapgen.support.exceptions import InputTypeError as InputTypeError
+    from strapgen.support.exceptions import MissingExtraError as MissingExtraError
+    from strapgen.support.exceptions import StrapgenError as StrapgenError
     from strapgen.targets import TARGETS as TARGETS
     from strapgen.targets import Sources as Sources
     from strapgen.two_speed import TwoSpeed as TwoSpeed
 
 #: Public names by the modules that define them.
 _NAMES = {
-    "backends": ("BACKENDS", "Backend", "Evaluator", "backend", "evaluator"),
-    "behaviour": ("Finding", "check"),
-    "catalogue": ("Choice", "choose", "choose_step"),
-    "catalogue.kinematics": ("CAYLEY_KLEIN", "DCM", "EULER", "Kinematics"),
-    "catalogue.steps": ("Samples", "increments_signal"),
-    "catalogue.tableaux": ("TABLEAUX", "Tableau"),
+    "backends": (
+        "BACKENDS",
+        "Backend",
+        "Evaluator",
+        "backend",
+        "evaluator",
+    ),
+    "behaviour": (
+        "Finding",
+        "check",
+    ),
+    "catalogue": (
+        "Choice",
+        "choose",
+        "choose_step",
+    ),
+    "catalogue.kinematics": (
+        "CAYLEY_KLEIN",
+        "DCM",
+        "EULER",
+        "Kinematics",
+    ),
+    "catalogue.steps": (
+        "Samples",
+        "increments_signal",
+    ),
+    "catalogue.tableaux": (
+        "TABLEAUX",
+        "Tableau",
+    ),
     "companions": ("Companions",),
-    "comparison": ("Comparison", "compare"),
-    "convergence": ("Convergence", "converge"),
-    "exceptions": ("CompilerError", "InputError", "InputTypeError", "MissingExtraError", "StrapgenError"),
-    "fixedpoint": ("FixedProgram", "Format", "Settings"),
-    "kernel": ("Kernel", "KernelBuilder", "Stage", "resolution"),
-    "motions": ("Motion", "motion"),
+    "comparison": (
+        "Comparison",
+        "compare",
+    ),
+    "convergence": (
+        "Convergence",
+        "converge",
+    ),
+    "fixedpoint": (
+        "FixedProgram",
+        "Format",
+        "Settings",
+    ),
+    "kernel": (
+        "Kernel",
+        "KernelBuilder",
+        "Stage",
+        "resolution",
+    ),
+    "motions": (
+        "Motion",
+        "motion",
+    ),
     "order": ("Order",),
-    "pipeline": ("build", "derive", "generate", "lower", "quantize"),
+    "pipeline": (
+        "build",
+        "derive",
+        "generate",
+        "lower",
+        "quantize",
+    ),
     "program": ("Program",),
     "recording": (
-        *("History", "InertialRecording", "Recording"),
-        *("propagate", "read_increments", "read_inertial", "read_rates"),
+        "History",
+        "InertialRecording",
+        "Recording",
+        "propagate",
+        "read_increments",
+        "read_inertial",
+        "read_rates",
     ),
     "recursion": ("Recursion",),
     "signal": ("Signal",),
-    "simulation": ("Run", "simulate"),
-    "strapdown": ("Course", "course"),
-    "targets": ("TARGETS", "Sources"),
+    "simulation": (
+        "Run",
+        "simulate",
+    ),
+    "strapdown": (
+        "Course",
+        "course",
+    ),
+    "support.exceptions": (
+        "CompilerError",
+        "InputError",
+        "InputTypeError",
+        "MissingExtraError",
+        "StrapgenError",
+    ),
+    "targets": (
+        "TARGETS",
+        "Sources",
+    ),
     "two_speed": ("TwoSpeed",),
 }
 #: Modules whose functions belong together, by the names that they have here.

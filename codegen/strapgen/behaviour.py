@@ -16,13 +16,13 @@ from strapgen.backends import Backend, of
 from strapgen.catalogue import Choice
 from strapgen.comparison import certified_angle
 from strapgen.convergence import GENERAL, converge, interpreter, step_of_increments
-from strapgen.exceptions import CompilerError, InputError
 from strapgen.fixedpoint import Settings
 from strapgen.gyro import windows
 from strapgen.kernel import Kernel
 from strapgen.motions import motion
 from strapgen.program import Program
 from strapgen.simulation import attitude, drift_between, simulate
+from strapgen.support.exceptions import CompilerError, InputError
 
 #: How far an observed order may be from the one of theory.
 ORDER_WITHIN = 0.15

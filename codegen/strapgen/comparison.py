@@ -14,13 +14,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen import catalogue, checks, compilation, exact, library
+from strapgen import catalogue, compilation, exact, library
 from strapgen.backends import BACKENDS, Backend, of
 from strapgen.catalogue import Choice
 from strapgen.catalogue.tableaux import Tableau
-from strapgen.exceptions import InputError
 from strapgen.fixedpoint import Settings
 from strapgen.simulation import attitude, drift_between, require_finite
+from strapgen.support import checks
+from strapgen.support.exceptions import InputError
 from strapgen.targets import FIXED
 
 Array = NDArray[np.float64]

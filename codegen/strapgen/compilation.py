@@ -27,8 +27,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from strapgen import cache
-from strapgen.exceptions import CompilerError
+from strapgen.support import cache
+from strapgen.support.exceptions import CompilerError
 from strapgen.targets import Sources
 
 #: Flags in addition to those of Python. Without contraction to fused multiply-add every machine computes the same bits.

@@ -15,15 +15,16 @@ from typing import TYPE_CHECKING, Any
 import mpmath
 import numpy as np
 
-from strapgen import catalogue, checks, exact, library
+from strapgen import catalogue, exact, library
 from strapgen.backends import BACKENDS, of
 from strapgen.catalogue import Choice
-from strapgen.exceptions import InputError, InputTypeError
 from strapgen.fixedpoint import Settings
 from strapgen.motions import Motion
 from strapgen.order import Order
 from strapgen.program import Program
 from strapgen.simulation import largest_increment, simulate
+from strapgen.support import checks
+from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.targets import FIXED
 
 if TYPE_CHECKING:

@@ -10,8 +10,8 @@ import mpmath
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen import stages
 from strapgen.program import OPERATIONS, Program
+from strapgen.support import stages
 
 #: Decimal digits: a million steps lose six of them.
 DIGITS = 40

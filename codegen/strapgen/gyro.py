@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen import checks
-from strapgen.exceptions import InputError
+from strapgen.support import checks
+from strapgen.support.exceptions import InputError
 
 #: Most pulses that can be counted, since a double represents every whole number up to here.
 _MOST_PULSES = 2**53

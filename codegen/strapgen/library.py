@@ -11,10 +11,10 @@ import json
 import pickle
 from pathlib import Path
 
-from strapgen import cache
 from strapgen.catalogue import Choice, derive
 from strapgen.fixedpoint import Settings
 from strapgen.program import Program
+from strapgen.support import cache
 from strapgen.targets import Sources, emit
 
 _programs: dict[str, Program] = {}

@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen import catalogue, checks
+from strapgen import catalogue
 from strapgen.backends import evaluator
-from strapgen.exceptions import InputError
 from strapgen.gyro import windows
+from strapgen.support import checks
+from strapgen.support.exceptions import InputError
 
 Array = NDArray[np.float64]
 

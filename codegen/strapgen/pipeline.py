@@ -21,10 +21,11 @@ import os
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from strapgen import catalogue, fixedpoint, stages, targets
-from strapgen.exceptions import InputTypeError
+from strapgen import catalogue, fixedpoint, targets
 from strapgen.fixedpoint import FixedProgram, Settings
 from strapgen.program import Program
+from strapgen.support import stages
+from strapgen.support.exceptions import InputTypeError
 from strapgen.targets import Sources
 
 if TYPE_CHECKING:

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from strapgen import output
-from strapgen.exceptions import InputError, MissingExtraError
 from strapgen.recording import History
 from strapgen.reports import AXES, SKEW_PLANES
 from strapgen.simulation import Run
 from strapgen.study import Outcome
+from strapgen.support.exceptions import InputError, MissingExtraError
+from strapgen.support.files import write_file
 
 if TYPE_CHECKING:
     from strapgen.analysis.agreement import Agreement
@@ -75,12 +75,12 @@ def _style(axes: Any) -> None:
 
 def plot_run(run: Run, title: str, path: str | Path) -> Path:
     """Plot the nine errors of a run to a file; see `run_image`."""
-    return output.write_file(path, run_image(run, title, path))
+    return write_file(path, run_image(run, title, path))
 
 
 def plot_history(history: History, elements: Sequence[str], title: str, path: str | Path) -> Path:
     """Plot an attitude history to a file; see `history_image`."""
-    return output.write_file(path, history_image(history, elements, title, path))
+    return write_file(path, history_image(history, elements, title, path))
 
 
 def run_image(run: Run, title: str, path: str | Path) -> bytes:

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen import checks, stages
 from strapgen.backends import Backend
-from strapgen.exceptions import InputError
 from strapgen.gyro import pulses, windows
 from strapgen.simulation import require_finite
+from strapgen.support import checks, stages
+from strapgen.support.exceptions import InputError
 
 Array = NDArray[np.float64]
 

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen import checks, stages
 from strapgen.backends import Backend, evaluator
-from strapgen.exceptions import InputError
 from strapgen.gyro import pulses
 from strapgen.motions import Motion
+from strapgen.support import checks, stages
+from strapgen.support.exceptions import InputError
 
 Array = NDArray[np.float64]
 

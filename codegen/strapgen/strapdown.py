@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen import backends, checks, two_speed
+from strapgen import backends, two_speed
 from strapgen.backends import BACKENDS
-from strapgen.exceptions import InputError
 from strapgen.fixedpoint import Settings
 from strapgen.recording import InertialRecording
+from strapgen.support import checks
+from strapgen.support.exceptions import InputError
 from strapgen.targets import FIXED
 
 Array = NDArray[np.float64]

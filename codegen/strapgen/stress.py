@@ -11,14 +11,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen import catalogue, checks, two_speed
+from strapgen import catalogue, two_speed
 from strapgen.backends import BACKENDS, evaluator, of
 from strapgen.backends.fixed import FixedBackend
 from strapgen.catalogue import Choice
-from strapgen.exceptions import InputError
 from strapgen.fixedpoint import Settings
 from strapgen.gyro import pulses, windows
 from strapgen.simulation import attitude, drift_between
+from strapgen.support import checks
+from strapgen.support.exceptions import InputError
 from strapgen.targets import FIXED
 
 Array = NDArray[np.float64]

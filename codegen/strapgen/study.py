@@ -18,14 +18,14 @@ from typing import Any
 
 import numpy as np
 
-from strapgen import cache, checks
 from strapgen.backends import backend
 from strapgen.comparison import certified_angle
-from strapgen.exceptions import InputError
 from strapgen.fixedpoint import Settings
 from strapgen.gyro import pulses
 from strapgen.motions import Motion, motion
 from strapgen.simulation import attitude, drift_between
+from strapgen.support import cache, checks
+from strapgen.support.exceptions import InputError
 
 #: Most cases of one study.
 _MOST_CASES = 5000

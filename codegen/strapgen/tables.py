@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from strapgen.backends import BACKENDS, Backend, backend
-from strapgen.exceptions import InputError
 from strapgen.fixedpoint import Settings
 from strapgen.motions import motion
 from strapgen.simulation import Run, largest_increment, simulate
+from strapgen.support.exceptions import InputError
 from strapgen.targets import FIXED
 
 STEP = Fraction(1, 8)

@@ -15,15 +15,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen import backends, checks, compilation, library
+from strapgen import backends, compilation, library
 from strapgen.backends import BACKENDS, Evaluator
 from strapgen.backends.fixed import FixedEvaluator, integers, numbers
 from strapgen.catalogue import Choice
-from strapgen.exceptions import InputError
 from strapgen.fixedpoint import Settings
 from strapgen.fixedpoint.interface import Argument
 from strapgen.fixedpoint.settings import DEFAULT_ANGLE
 from strapgen.gyro import pulses
+from strapgen.support import checks
+from strapgen.support.exceptions import InputError
 from strapgen.targets import FIXED, Sources
 from strapgen.targets.fixed_text import options
 from strapgen.targets.whole import LOOPS, recursion, whole, wiring

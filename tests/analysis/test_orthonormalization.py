@@ -10,7 +10,7 @@ from strapgen import exact
 from strapgen.analysis.orthonormalization import ERROR, effect
 from strapgen.catalogue import orthonormalizations
 from strapgen.convergence import interpreter
-from strapgen.exceptions import InputError
+from strapgen.support.exceptions import InputError
 
 P = ERROR
 K, Y = (P - P.T) / 2, (P + P.T) / 2

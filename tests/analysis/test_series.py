@@ -11,7 +11,7 @@ from strapgen.analysis.invariants import LATEX, as_text
 from strapgen.analysis.report import as_latex, as_report, report
 from strapgen.analysis.series import MOTIONS, STEP, series
 from strapgen.catalogue import ALGORITHMS, METHODS, choose, choose_step, derive, enough, nodes
-from strapgen.exceptions import InputError
+from strapgen.support.exceptions import InputError
 
 W = sp.symbols("w_x w_y w_z")
 RANK = {"rk1": 1, "rk2": 2, "rk3": 3, "rk4": 4}

@@ -12,8 +12,8 @@ from tolerances import one_call, roundoff
 
 import strapgen
 from strapgen.backends import numpy as numpy_module
-from strapgen.exceptions import InputError, InputTypeError
 from strapgen.gyro import windows
+from strapgen.support.exceptions import InputError, InputTypeError
 
 STEPS = 1440
 

@@ -15,7 +15,7 @@ import pytest
 import strapgen
 from strapgen import catalogue
 from strapgen.backends import BACKENDS, of
-from strapgen.exceptions import InputError
+from strapgen.support.exceptions import InputError
 
 ALGORITHMS = Path(__file__).resolve().parents[1] / "data" / "algorithms"
 #: An algorithm of a user that brings its orthonormalization and its attitude.

@@ -9,8 +9,8 @@ from gathering import each
 
 from strapgen import catalogue
 from strapgen.catalogue import ALGORITHMS, KERNELS, METHODS, MOST_INCREMENTS, STANDARD_METHODS, Choice, choose
-from strapgen.exceptions import InputError
 from strapgen.program import RESOLUTION
+from strapgen.support.exceptions import InputError
 
 STANDARD = catalogue.standard()
 EVERY = each("choice", STANDARD, ids=lambda choice: choice.kernel)

@@ -19,7 +19,7 @@ from strapgen.backends import of
 from strapgen.cli import main
 from strapgen.comparison import compare_choice
 from strapgen.convergence import GENERAL, converge
-from strapgen.exceptions import InputError
+from strapgen.support.exceptions import InputError
 
 #: A file whose kernel has one name, whatever its options are: Euler parameters by a tableau.
 FILE = str(Path(__file__).resolve().parents[1] / "data" / "algorithms" / "one_name.py")

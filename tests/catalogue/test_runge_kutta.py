@@ -16,7 +16,7 @@ from strapgen.catalogue.kinematics import KINEMATICS
 from strapgen.catalogue.runge_kutta import method
 from strapgen.catalogue.steps import increments_signal, step
 from strapgen.catalogue.tableaux import TABLEAUX
-from strapgen.exceptions import InputError
+from strapgen.support.exceptions import InputError
 
 ALGORITHM = pytest.mark.parametrize("algorithm", ALGORITHMS)
 METHOD = pytest.mark.parametrize("method", STANDARD_METHODS)

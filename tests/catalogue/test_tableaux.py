@@ -12,10 +12,10 @@ import pytest
 import sympy as sp
 from gathering import each
 
-from strapgen import resources
 from strapgen.catalogue import METHODS, STANDARD_METHODS, tableaux
 from strapgen.catalogue.tableaux import TABLEAUX, Tableau, read, verify
-from strapgen.exceptions import InputError
+from strapgen.support import resources
+from strapgen.support.exceptions import InputError
 
 FOLDER = Path(tableaux.__file__).parent / "methods"
 BUILT_IN = pytest.mark.parametrize("name", TABLEAUX)

@@ -7,7 +7,7 @@ import pytest
 from evidence import corners_and_random
 
 import strapgen
-import strapgen.exceptions
+import strapgen.support.exceptions
 from strapgen import derive, generate, lower
 from strapgen.catalogue import TWO_SPEED
 from strapgen.fixedpoint import Settings
@@ -34,8 +34,8 @@ def test_every_target_computes_the_kernel(name, rng):
         sample = [array[k : k + 1] for array in integers]
         try:
             computed, _ = in_c.run(sample, in_c.fresh(1))
-        except strapgen.exceptions.InputError:
-            with pytest.raises(strapgen.exceptions.InputError):
+        except strapgen.support.exceptions.InputError:
+            with pytest.raises(strapgen.support.exceptions.InputError):
                 model.run(sample, model.fresh(1))
             continue
         wanted, _ = model.run(sample, model.fresh(1))

@@ -20,7 +20,7 @@ from strapgen import catalogue
 from strapgen.catalogue import user
 from strapgen.catalogue.tableaux import TABLEAUX
 from strapgen.cli import main
-from strapgen.exceptions import InputError, InputTypeError
+from strapgen.support.exceptions import InputError, InputTypeError
 
 FOLDER = Path(__file__).resolve().parents[1] / "data" / "algorithms"
 CONING = "--motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 --step 0.125 --duration 5"

@@ -9,9 +9,9 @@ import pytest
 from users_files import STEP, beside, written
 
 import strapgen
-from strapgen import cache
 from strapgen.catalogue import user
-from strapgen.exceptions import InputError
+from strapgen.support import cache
+from strapgen.support.exceptions import InputError
 
 #: Says on stderr that the file runs.
 SAYS = "print('derived')\n"

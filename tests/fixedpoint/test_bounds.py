@@ -18,9 +18,9 @@ from strapgen.backends import backend as make_backend
 from strapgen.backends import evaluator as make_evaluator
 from strapgen.backends.fixed import ModelEvaluator
 from strapgen.catalogue import Choice, standard
-from strapgen.exceptions import InputError
 from strapgen.fixedpoint import Settings, can_lower, function_series
 from strapgen.fixedpoint.code import IntegerSum
+from strapgen.support.exceptions import InputError
 
 STEPS = [choice for choice in standard() if choice.method]
 OTHERS = [choice for choice in standard() if not choice.method and can_lower(program(choice))]

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from strapgen.exceptions import InputError
 from strapgen.fixedpoint import Format, Settings
 from strapgen.fixedpoint.formats import finest
+from strapgen.support.exceptions import InputError
 
 
 @given(st.integers(8, 64), st.integers(-20, 200))

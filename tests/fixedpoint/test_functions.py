@@ -17,10 +17,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from strapgen.backends.fixed import CFixedEvaluator, FixedEvaluator, ModelEvaluator
-from strapgen.exceptions import InputError
 from strapgen.fixedpoint import FixedProgram, Settings, can_lower, function_series, quantize
 from strapgen.program import Assignment, Constant, Operation, Program, Reference, Result
 from strapgen.signal import Signal
+from strapgen.support.exceptions import InputError
 from strapgen.targets import emit
 
 PRECISE = mpmath.mp.clone()

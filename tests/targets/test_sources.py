@@ -15,8 +15,8 @@ from gathering import each
 from strapgen import pipeline
 from strapgen.catalogue import standard
 from strapgen.cli import main
-from strapgen.exceptions import InputError
 from strapgen.fixedpoint import Settings, can_lower
+from strapgen.support.exceptions import InputError
 from strapgen.targets import FIXED, TARGETS, Sources, emit
 
 KERNELS = [choice.kernel for choice in standard()]

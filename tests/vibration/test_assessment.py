@@ -16,11 +16,11 @@ from hypothesis import strategies as st
 import strapgen
 from strapgen import backends, catalogue, derive, exact, gyro, lower, vibration
 from strapgen.catalogue import coning
-from strapgen.exceptions import InputError, InputTypeError
 from strapgen.kernel import KernelBuilder
 from strapgen.recursion import Recursion
 from strapgen.signal import Signal, after
 from strapgen.simulation import attitude
+from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.two_speed import TwoSpeed
 from strapgen.vibration import systems
 from strapgen.vibration.mean_rates import D_Y, PARTS, PHI, THETA_X, THETA_Y

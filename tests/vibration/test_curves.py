@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from strapgen import catalogue, vibration
-from strapgen.exceptions import InputError
+from strapgen.support.exceptions import InputError
 from strapgen.vibration import curves
 
 

@@ -6,9 +6,9 @@ import pytest
 import sympy as sp
 
 from strapgen import derive
-from strapgen.exceptions import InputError
 from strapgen.kernel import KernelBuilder
 from strapgen.signal import Signal
+from strapgen.support.exceptions import InputError
 from strapgen.vibration.expansion import Expander
 
 X, Y = sp.symbols("x y", real=True)

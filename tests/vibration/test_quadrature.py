@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from strapgen.exceptions import InputError
+from strapgen.support.exceptions import InputError
 from strapgen.vibration.quadrature import integrate
 
 

@@ -11,8 +11,8 @@ import pytest
 
 import strapgen
 from strapgen import catalogue, gyro, vibration
-from strapgen.exceptions import InputError, InputTypeError
 from strapgen.simulation import attitude
+from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.vibration import Spectrum, random_rates, read_spectrum
 
 choose = catalogue.choose

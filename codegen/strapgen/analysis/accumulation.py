@@ -13,13 +13,14 @@ from typing import Any
 
 import sympy as sp
 
-from strapgen import algebra, catalogue, checks
+from strapgen import algebra, catalogue
 from strapgen.analysis import one_step
 from strapgen.analysis.error_rate import ErrorRate, error_rate
 from strapgen.analysis.motion_rates import TIME, is_plain
 from strapgen.analysis.series import MOST_TERMS, STEP
 from strapgen.catalogue import Choice
 from strapgen.powers import Powers
+from strapgen.support import checks
 
 
 @dataclass(frozen=True)

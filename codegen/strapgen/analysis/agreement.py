@@ -14,13 +14,14 @@ from typing import Any
 
 import mpmath
 
-from strapgen import checks, exact
+from strapgen import exact
 from strapgen.analysis.error_rate import error_rate
 from strapgen.analysis.prediction import Prediction, parts_of, predict
 from strapgen.catalogue import Choice
 from strapgen.convergence import GENERAL, exact_attitudes, step_of_increments
-from strapgen.exceptions import InputError
 from strapgen.motions import Motion
+from strapgen.support import checks
+from strapgen.support.exceptions import InputError
 
 
 @dataclass(frozen=True)

@@ -22,9 +22,9 @@ from strapgen.analysis.invariants import invariants
 from strapgen.analysis.motion_rates import TIME
 from strapgen.analysis.one_step import Step
 from strapgen.catalogue import Choice
-from strapgen.exceptions import InputError
 from strapgen.lowering.canonical.decomposition import NotCovariantError
 from strapgen.powers import Powers
+from strapgen.support.exceptions import InputError
 
 _Matrix = list[list[Powers]]
 

@@ -15,10 +15,10 @@ import sympy as sp
 from strapgen import algebra, catalogue
 from strapgen.catalogue import Choice
 from strapgen.catalogue.coefficients import Number
-from strapgen.exceptions import InputError, InputTypeError
 from strapgen.kernel import Kernel
 from strapgen.lowering.canonical.decomposition import Frame
 from strapgen.powers import Powers, constant, field, outputs
+from strapgen.support.exceptions import InputError, InputTypeError
 
 #: For methods whose coefficients are published with about 17 digits: digits of an error, and the largest that may be 0.
 _DIGITS = 12

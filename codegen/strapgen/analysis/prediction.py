@@ -10,13 +10,14 @@ from typing import Any
 import mpmath
 import sympy as sp
 
-from strapgen import algebra, catalogue, checks, exact, library
+from strapgen import algebra, catalogue, exact, library
 from strapgen.analysis.accumulation import antiderivative
 from strapgen.analysis.error_rate import ErrorRate, error_rate
 from strapgen.analysis.motion_rates import TIME, parameters
 from strapgen.catalogue import Choice
 from strapgen.convergence import interpreter
 from strapgen.motions import Motion
+from strapgen.support import checks
 
 #: A 3 x 3 matrix of mpmath, and the function that returns its growth factor from one time to another.
 Matrix = Any

@@ -8,12 +8,13 @@ from typing import Any
 
 import sympy as sp
 
-from strapgen import catalogue, checks
+from strapgen import catalogue
 from strapgen.analysis.accumulation import accumulate
 from strapgen.analysis.constant_rate import constant_rate
 from strapgen.analysis.motion_rates import TIME
 from strapgen.analysis.series import MOTIONS, STEP, series
 from strapgen.catalogue import Choice
+from strapgen.support import checks
 
 #: The angle of a step at a constant rate, |w| h.
 _ANGLE = sp.Symbol("x")

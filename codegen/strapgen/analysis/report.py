@@ -15,7 +15,7 @@ from strapgen.analysis.invariants import LATEX, as_text, scalar_as_text
 from strapgen.analysis.motion_rates import is_plain
 from strapgen.analysis.series import PARTS, STEP, ErrorSeries, series
 from strapgen.catalogue import Choice
-from strapgen.exceptions import InputError
+from strapgen.support.exceptions import InputError
 
 
 @dataclass(frozen=True)

@@ -12,13 +12,14 @@ from typing import Any
 
 import sympy as sp
 
-from strapgen import catalogue, checks
+from strapgen import catalogue
 from strapgen.analysis import motion_rates, one_step
 from strapgen.analysis.invariants import Invariants, as_text, invariants, matrix
 from strapgen.analysis.one_step import Step, errors
 from strapgen.catalogue import Choice
-from strapgen.exceptions import InputError
 from strapgen.powers import Powers
+from strapgen.support import checks
+from strapgen.support.exceptions import InputError
 
 #: Motions for which a series can be derived.
 MOTIONS = ("general", *catalogue.MOTIONS)

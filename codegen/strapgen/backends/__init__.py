@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from strapgen import catalogue, checks, library
+from strapgen import catalogue, library
 from strapgen.backends.protocol import Backend, Evaluator
 from strapgen.backends.registry import BACKENDS, Entry, classes, of_sources
 from strapgen.backends.step_sources import StepSources
 from strapgen.catalogue import Choice
 from strapgen.catalogue.tableaux import Tableau
-from strapgen.exceptions import InputError, InputTypeError
 from strapgen.fixedpoint import Settings
+from strapgen.support import checks
+from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.targets import FIXED, Sources
 
 __all__ = [

@@ -14,8 +14,8 @@ import numpy as np
 from strapgen import compilation
 from strapgen.backends.protocol import Array, Backend, Evaluator
 from strapgen.backends.step_sources import StepSources
-from strapgen.exceptions import InputError
 from strapgen.fixedpoint.interface import Argument, Interface
+from strapgen.support.exceptions import InputError
 from strapgen.targets import Sources
 
 

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen import checks
 from strapgen.backends.step_sources import StepSources
-from strapgen.exceptions import InputError
+from strapgen.support import checks
+from strapgen.support.exceptions import InputError
 from strapgen.targets import Sources
 
 Array = NDArray[Any]

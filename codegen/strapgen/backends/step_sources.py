@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from strapgen import library
 from strapgen.backends.registry import of_sources
 from strapgen.catalogue import Choice
-from strapgen.exceptions import InputError
+from strapgen.support.exceptions import InputError
 from strapgen.targets import Sources, emit
 
 if TYPE_CHECKING:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from typing import Any
 
-from strapgen import checks
 from strapgen.catalogue import user
 from strapgen.catalogue.choice import Choice
 from strapgen.catalogue.names import (
@@ -20,7 +19,8 @@ from strapgen.catalogue.names import (
     VECTORS,
 )
 from strapgen.catalogue.tableaux import TABLEAUX, Tableau
-from strapgen.exceptions import InputError, InputTypeError
+from strapgen.support import checks
+from strapgen.support.exceptions import InputError, InputTypeError
 
 
 def choose(

@@ -25,10 +25,10 @@ from itertools import count, pairwise
 import sympy as sp
 from sympy.polys.matrices import DomainMatrix
 
-from strapgen import checks
 from strapgen.catalogue import rotation_series
 from strapgen.catalogue.rotation_series import Scalars, fraction
-from strapgen.exceptions import InputError
+from strapgen.support import checks
+from strapgen.support.exceptions import InputError
 
 SOURCES = {
     "compressed": "M. B. Ignagni, J. Guid. Control Dyn. 13 (1990) 363-369",

@@ -21,8 +21,8 @@ from pathlib import Path
 from types import CodeType, ModuleType
 from typing import Any
 
-from strapgen.cache import digest
-from strapgen.resources import PACKAGE
+from strapgen.support.cache import digest
+from strapgen.support.resources import PACKAGE
 
 #: What a file does beyond reading files: a kernel that depends on it cannot be known from files alone.
 _OUTSIDE = {

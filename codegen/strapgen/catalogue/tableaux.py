@@ -12,9 +12,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from strapgen import checks
 from strapgen.catalogue import coefficients, order_conditions
-from strapgen.exceptions import InputError
+from strapgen.support import checks
+from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
     from strapgen.catalogue.coefficients import Number

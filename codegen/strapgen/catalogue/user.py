@@ -18,9 +18,9 @@ from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from strapgen import cache, checks
 from strapgen.catalogue import isolation, user_cache
-from strapgen.exceptions import InputError, StrapgenError
+from strapgen.support import cache, checks
+from strapgen.support.exceptions import InputError, StrapgenError
 
 if TYPE_CHECKING:
     from strapgen.kernel import Kernel

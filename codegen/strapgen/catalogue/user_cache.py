@@ -11,9 +11,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from strapgen import cache
 from strapgen.catalogue.isolation import Record, installed_folders
-from strapgen.exceptions import InputError
+from strapgen.support import cache
+from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
     from strapgen.kernel import Kernel

@@ -28,7 +28,7 @@ from strapgen.cli import (
     version,
     vibration,
 )
-from strapgen.exceptions import StrapgenError
+from strapgen.support.exceptions import StrapgenError
 
 app = typer.Typer(
     name="strapgen",

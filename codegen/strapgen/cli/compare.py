@@ -31,7 +31,7 @@ from strapgen.cli.options import (
     check_format,
     chosen,
 )
-from strapgen.exceptions import InputError
+from strapgen.support.exceptions import InputError
 
 
 def compare(
@@ -90,8 +90,9 @@ def compare(
         --step 0.125 --duration 180
     """  # noqa: D301
     check_format(format, "csv")
-    from strapgen import checks, output
     from strapgen.backends import BACKENDS
+    from strapgen.support import checks
+    from strapgen.support.files import write_files
     from strapgen.targets import FIXED
 
     choice = chosen(algorithm, method, tableau, increments, previous)
@@ -163,7 +164,7 @@ def compare(
     if out is None:
         typer.echo(text)
     else:
-        output.write_files(Path(), {str(out): f"{text}\n"})
+        write_files(Path(), {str(out): f"{text}\n"})
     beyond = [row for row in rows if limit is not None and not row.max_abs_rad <= limit]
     if beyond:
         said = ", ".join(f"{row.backend} {row.max_abs_rad:.3g} rad" for row in beyond)

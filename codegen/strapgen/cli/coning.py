@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from strapgen import checks
 from strapgen.cli.options import Format, check_format, print_json, whole
-from strapgen.exceptions import InputError
+from strapgen.support import checks
+from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
     from strapgen.catalogue.coning import Design

@@ -13,7 +13,7 @@ from strapgen.catalogue import MOTIONS
 from strapgen.cli.inputs import MotionSettings, pairs
 from strapgen.cli.options import Previous, StepAlgorithm, TableauFile, check_format, chosen
 from strapgen.cli.progress import track
-from strapgen.exceptions import InputError
+from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
     from strapgen.convergence import Convergence
@@ -80,8 +80,9 @@ def converge(
         --plot out/orders.png
     """  # noqa: D301
     check_format(format, "csv")
-    from strapgen import catalogue, checks
+    from strapgen import catalogue
     from strapgen.backends import BACKENDS
+    from strapgen.support import checks
 
     checks.choice("backend", backend, [*BACKENDS, "exact"])
     limit = None if fail_beyond is None else float(checks.number("fail-beyond", fail_beyond))
@@ -110,8 +111,9 @@ def converge(
     choices = [choose(name) for name in names]
     import numpy as np
 
-    from strapgen import convergence, output
+    from strapgen import convergence
     from strapgen.motions import motion as make_motion
+    from strapgen.support.files import write_files
 
     if motion is None and not settings:
         given = convergence.GENERAL
@@ -134,7 +136,7 @@ def converge(
         from strapgen import plots
 
         files[str(plot)] = plots.convergence_image(found, title, plot)
-    output.write_files(Path(), files)
+    write_files(Path(), files)
     if out is None:
         typer.echo(text)
     far = [one for one in found if limit is not None and not _within(one, limit)]

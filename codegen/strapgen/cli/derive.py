@@ -6,7 +6,6 @@ from typing import Annotated
 
 import typer
 
-from strapgen import checks
 from strapgen.cli.options import (
     Algorithm,
     Format,
@@ -19,6 +18,7 @@ from strapgen.cli.options import (
     chosen,
     print_json,
 )
+from strapgen.support import checks
 
 
 def derive(

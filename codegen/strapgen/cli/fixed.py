@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from strapgen.cli.options import whole
-from strapgen.exceptions import InputError
+from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -100,8 +100,8 @@ def read_settings(
     given = (word, max_rate_deg_s, step, max_angle_rad, rounding, carry, drift_allowance, ranges, formats)
     if not any(given):
         return None
-    from strapgen import checks
     from strapgen.fixedpoint import Settings
+    from strapgen.support import checks
 
     bits = whole("word", word)
     return Settings.of(
@@ -124,8 +124,8 @@ def read_settings(
 
 def check_fixed(backend: str, stated: Mapping[str, Any]) -> None:
     """Refuse options of fixed point for a back end in floating point."""
-    from strapgen import checks
     from strapgen.backends import BACKENDS
+    from strapgen.support import checks
     from strapgen.targets import FIXED
 
     checks.choice("backend", backend, BACKENDS)
@@ -178,7 +178,7 @@ def settings_for_run(
 
 
 def _numbers(texts: Iterable[str]) -> dict[str, Fraction]:
-    from strapgen import checks
+    from strapgen.support import checks
 
     pairs = (_pair("--range", text) for text in texts)
     return {name: checks.number(f"range of {name}", value, positive=True) for name, value in pairs}

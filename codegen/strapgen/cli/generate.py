@@ -31,7 +31,7 @@ from strapgen.cli.options import (
     print_json,
 )
 from strapgen.cli.progress import track
-from strapgen.exceptions import InputError
+from strapgen.support.exceptions import InputError
 
 
 def generate(
@@ -119,7 +119,9 @@ def generate(
         return
     if algorithm is None:
         raise InputError("an algorithm is needed, or --all; strapgen list shows them")
-    from strapgen import checks, library, output, pipeline
+    from strapgen import library, pipeline
+    from strapgen.support import checks
+    from strapgen.support.files import write_files
     from strapgen.targets import FIXED, TARGETS
 
     choice = chosen(algorithm, method, tableau, increments, previous, rates, step=False)
@@ -141,7 +143,7 @@ def generate(
             f"kernel {program.kernel} rounds no state that goes on to the next step; --carry keeps nothing"
         )
     sources = pipeline.generate(fixed or program, target)
-    written = output.write_files(out or Path(), sources.files)
+    written = write_files(out or Path(), sources.files)
     operations = sources.operations
     if format == "json":
         data = {
@@ -169,7 +171,9 @@ def generate(
 
 
 def _generate_all(out: Path | None, check: bool, format: str) -> None:
-    from strapgen import catalogue, output, resources, standard_tree
+    from strapgen import catalogue, standard_tree
+    from strapgen.support import resources
+    from strapgen.support.files import check_folder
 
     if out is None:
         in_place = resources.checkout() is not None or check
@@ -177,7 +181,7 @@ def _generate_all(out: Path | None, check: bool, format: str) -> None:
     if check and not out.is_dir():
         raise InputError(f"{out} is no folder; --check needs the one to look at")
     if not check:
-        output.check_folder(out)  # known before the derivation of all kernels
+        check_folder(out)  # known before the derivation of all kernels
     total = len(catalogue.standard())
     files = standard_tree.tree(track(standard_tree.programs(), "deriving", total))
     if check:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from strapgen.exceptions import InputError
+from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -128,7 +128,7 @@ def pairs(settings: list[str]) -> dict[str, str]:
 
 def arcseconds(text: str | None) -> float | None:
     """Return the angle of a pulse, given in arc seconds, in rad."""
-    from strapgen import checks
+    from strapgen.support import checks
 
     if text is None:
         return None
@@ -151,8 +151,9 @@ def read_inputs(
     """Return the increments that the options of a command stand for, `samples` of them a step and those before it."""
     import numpy as np
 
-    from strapgen import checks, gyro, recording
+    from strapgen import gyro, recording
     from strapgen.motions import motion as make_motion
+    from strapgen.support import checks
 
     truth = None
     if motion is not None:

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from strapgen import checks
 from strapgen.cli.progress import waiting
-from strapgen.exceptions import InputError
+from strapgen.support import checks
+from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
     from strapgen.catalogue import Choice

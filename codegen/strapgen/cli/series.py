@@ -22,7 +22,7 @@ from strapgen.cli.options import (
     whole,
 )
 from strapgen.cli.progress import track
-from strapgen.exceptions import InputError
+from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
     from strapgen.catalogue import Choice
@@ -167,11 +167,11 @@ def series(
 
 def _emit(text: str, data: Any, format: str, out: Path | None, files: dict[str, str | bytes]) -> None:
     """Write files, and print or write the output."""
-    from strapgen import output
+    from strapgen.support.files import write_files
 
     if out is not None:
         files[str(out)] = f"{json.dumps(data, indent=1) if format == 'json' else text}\n"
-    output.write_files(Path(), files)
+    write_files(Path(), files)
     if out is None:
         if format == "json":
             print_json(data)
@@ -180,8 +180,9 @@ def _emit(text: str, data: Any, format: str, out: Path | None, files: dict[str, 
 
 
 def _overview(algorithm: _Text, method: _Text, format: str) -> tuple[str, Any]:
-    from strapgen import catalogue, checks
+    from strapgen import catalogue
     from strapgen.analysis import overview
+    from strapgen.support import checks
 
     if format == "latex":
         raise InputError("--all is printed as text or json, not as latex")
@@ -216,9 +217,10 @@ def _plotted(
     count: int | None,
     plot: Path,
 ) -> dict[str, str | bytes]:
-    from strapgen import checks, plots
+    from strapgen import plots
     from strapgen.analysis import agreement
     from strapgen.motions import motion as make_motion
+    from strapgen.support import checks
 
     checks.choice("motion", motion, MOTIONS)
     given = pairs(settings) if settings else agreement.SETTINGS[motion]

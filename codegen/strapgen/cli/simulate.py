@@ -42,7 +42,7 @@ from strapgen.cli.options import (
     check_format,
     chosen,
 )
-from strapgen.exceptions import InputError
+from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
     from strapgen.backends import Backend
@@ -145,8 +145,8 @@ def simulate(
 
     import numpy as np
 
-    from strapgen import output
     from strapgen.backends import of as make_backend
+    from strapgen.support.files import write_files
 
     samples = choice.increments_per_step, choice.previous
 
@@ -187,14 +187,14 @@ def simulate(
         files[str(out)] = f"{text}\n"
     if plot is not None and image is not None:
         files[str(plot)] = image
-    output.write_files(Path(), files)
+    write_files(Path(), files)
     if out is None:
         typer.echo(text)
 
 
 def _check_names(backend: str, motion: str | None, format: str | None) -> None:
-    from strapgen import checks
     from strapgen.backends import BACKENDS
+    from strapgen.support import checks
 
     checks.choice("backend", backend, BACKENDS)
     if motion is not None:
@@ -222,10 +222,11 @@ def _on_motion(
     samples: tuple[int, int],
 ) -> tuple[str, bytes | None]:
     """Simulate; return the output and, if one is wanted, the image."""
-    from strapgen import checks, plots, reports
+    from strapgen import plots, reports
     from strapgen.motions import motion as make_motion
     from strapgen.simulation import largest_increment
     from strapgen.simulation import simulate as run_simulation
+    from strapgen.support import checks
 
     profile = make_motion(motion, **settings)
     step, duration, _, _, pulse = times

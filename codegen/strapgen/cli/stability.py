@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from strapgen.cli.options import Format, StepAlgorithm, check_format, chosen, print_json
-from strapgen.exceptions import InputError
+from strapgen.support.exceptions import InputError
 
 
 def stability(
@@ -35,7 +35,9 @@ def stability(
     Example: strapgen stability dcm --method rk3,rk4,butcher5 --plot out/stability.png
     """
     check_format(format)
-    from strapgen import catalogue, checks, output
+    from strapgen import catalogue
+    from strapgen.support import checks
+    from strapgen.support.files import write_files
 
     ours = algorithm in catalogue.ALGORITHMS
     names: list[str | None] = [*catalogue.STANDARD_METHODS] if ours else [None]
@@ -55,7 +57,7 @@ def stability(
         from strapgen import plots
 
         title = "constant rate: growth of the state in a step, and where it contracts"
-        output.write_files(Path(), {str(plot): plots.stability_image(found, title, plot)})
+        write_files(Path(), {str(plot): plots.stability_image(found, title, plot)})
     if format == "json":
         print_json([one.as_dict() for one in found])
         return

@@ -10,7 +10,7 @@ import typer
 
 from strapgen.cli.fixed import Carry, Fixes, Ranges, Rounding, Word, check_fixed, settings_for_run
 from strapgen.cli.options import check_format, whole
-from strapgen.exceptions import InputError
+from strapgen.support.exceptions import InputError
 
 _Text = str | None
 
@@ -83,8 +83,9 @@ def strapdown(
     check_format(chosen, "csv")
     import numpy as np
 
-    from strapgen import output, recording, reports
+    from strapgen import recording, reports
     from strapgen.strapdown import NavigationFrame, course
+    from strapgen.support.files import write_files
 
     words = {"word": word, "rounding": rounding, "carry": carry}
     check_fixed(backend, words | {"range": ranges, "fix": fix})
@@ -121,11 +122,11 @@ def strapdown(
     if out is None:
         typer.echo(text)
     else:
-        output.write_files(Path(), {str(out): f"{text}\n"})
+        write_files(Path(), {str(out): f"{text}\n"})
 
 
 def _three(name: str, text: str) -> list[float]:
-    from strapgen import checks
+    from strapgen.support import checks
 
     parts = text.split(",")
     if len(parts) != 3:

@@ -9,7 +9,7 @@ import typer
 from strapgen.cli.fixed import Carry, Rounding, read_settings
 from strapgen.cli.options import Format, check_format, print_json
 from strapgen.cli.progress import track
-from strapgen.exceptions import InputError
+from strapgen.support.exceptions import InputError
 
 
 def stress(

@@ -11,7 +11,7 @@ import typer
 from strapgen.cli.inputs import pairs
 from strapgen.cli.options import Increments, check_format, whole
 from strapgen.cli.progress import track
-from strapgen.exceptions import InputError
+from strapgen.support.exceptions import InputError
 
 app = typer.Typer(help="Sweep settings and see what they do to the drift.", rich_markup_mode=None)
 
@@ -83,7 +83,8 @@ def word_length(
         --carries none,full --plot out/word-length.png
     """  # noqa: D301
     check_format(format, "csv")
-    from strapgen import catalogue, checks
+    from strapgen import catalogue
+    from strapgen.support import checks
 
     checks.choice("algorithm", algorithm, catalogue.ALGORITHMS)
     checks.choice("motion", motion, catalogue.MOTIONS)
@@ -97,7 +98,8 @@ def word_length(
 
     import numpy as np
 
-    from strapgen import output, study
+    from strapgen import study
+    from strapgen.support.files import write_files
 
     planned = study.cases(
         algorithm=algorithm,
@@ -132,7 +134,7 @@ def word_length(
         files[str(out)] = f"{text}\n"
     if plot is not None and image is not None:
         files[str(plot)] = image
-    output.write_files(Path(), files)
+    write_files(Path(), files)
     if out is None:
         typer.echo(text)
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from strapgen import checks
 from strapgen.cli.options import Format, check_format, print_json
+from strapgen.support import checks
 
 if TYPE_CHECKING:
     from strapgen.catalogue.tableaux import Tableau

@@ -10,7 +10,7 @@ import typer
 from strapgen.cli.fixed import Carry, Rounding, read_settings
 from strapgen.cli.options import Format, check_format, print_json
 from strapgen.cli.progress import track
-from strapgen.exceptions import InputError
+from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
     from strapgen.tables import Table, TableEntry
@@ -47,8 +47,8 @@ def tables(
                 raise InputError(f"--predict and {option} do not go together")
         _predict(format)
         return
-    from strapgen import checks
     from strapgen.backends import BACKENDS
+    from strapgen.support import checks
     from strapgen.tables import ALGORITHMS, ORDERS, TABLES, build_all, run_tables
     from strapgen.targets import FIXED
 
@@ -90,7 +90,7 @@ def _predict(format: str) -> None:
 def _runnable() -> tuple[str, ...]:
     """Return all back ends, or, with a word on stderr, those that need no compiler if there is none."""
     from strapgen import compilation
-    from strapgen.exceptions import CompilerError
+    from strapgen.support.exceptions import CompilerError
     from strapgen.tables import DEFAULT_BACKENDS
 
     try:

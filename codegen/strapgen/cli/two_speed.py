@@ -9,7 +9,7 @@ import typer
 
 from strapgen.cli.fixed import Allowance, Carry, Fixes, Ranges, Rounding, Word, read_settings
 from strapgen.cli.options import Format, check_format, print_json, whole
-from strapgen.exceptions import InputError
+from strapgen.support.exceptions import InputError
 
 
 def two_speed(
@@ -37,9 +37,9 @@ def two_speed(
     Example: strapgen two-speed dcm --target c --out firmware
     """
     check_format(format)
-    from strapgen import output
     from strapgen import two_speed as made
     from strapgen.fixedpoint import Settings
+    from strapgen.support.files import write_files
 
     form = whole("sculling", sculling) or 0
     settings = read_settings(
@@ -56,7 +56,7 @@ def two_speed(
     elif settings is not None:
         raise InputError(f"the options of fixed point go with --target c-fixed, not with {target}")
     sources = made.sources(algorithm, form, target, settings)
-    written = output.write_files(out or Path(), sources.files)
+    written = write_files(out or Path(), sources.files)
     if format == "json":
         print_json(
             {

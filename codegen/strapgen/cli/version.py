@@ -31,7 +31,7 @@ def _compiler() -> str:
     import subprocess
 
     from strapgen import compilation
-    from strapgen.exceptions import CompilerError
+    from strapgen.support.exceptions import CompilerError
 
     try:
         path = compilation.compiler()

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import typer
 
 from strapgen.cli.options import Previous, Rates, TableauFile, check_format, chosen, print_json, whole
-from strapgen.exceptions import InputError
+from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
     from strapgen.vibration import Assessment
@@ -143,8 +143,8 @@ def vibration(
         span,
         format,
     )
-    from strapgen import output
     from strapgen import vibration as assessing
+    from strapgen.support.files import write_files
 
     cases = [
         case
@@ -188,7 +188,7 @@ def vibration(
                 f"an acceleration across it, are needed for {cases[0].assessment.kernel}"
             )
     if plot is not None:
-        output.write_files(Path(), {str(plot): _image(cases, given, step, frequency, span, words, plot)})
+        write_files(Path(), {str(plot): _image(cases, given, step, frequency, span, words, plot)})
     title = f"{words}; step {step} s"
     if format == "json":
         data = _merged(found)
@@ -277,8 +277,8 @@ def _assessed(
     random: bool,
 ) -> list[_Case]:
     """Return what can be assessed of an algorithm, of what is asked for."""
-    from strapgen import checks
     from strapgen.catalogue import user
+    from strapgen.support import checks
     from strapgen.vibration import assessment, systems
 
     _check_known(algorithm, (*systems.NAMES, _TWO_SPEED), tuple(user.installed()))
@@ -422,7 +422,8 @@ def _image(
     words: str,
     path: Path,
 ) -> bytes:
-    from strapgen import checks, plots
+    from strapgen import plots
+    from strapgen.support import checks
     from strapgen.vibration import curves
 
     length = float(checks.number("step", step or "", positive=True))

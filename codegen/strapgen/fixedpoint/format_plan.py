@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from strapgen.exceptions import InputError
 from strapgen.fixedpoint.code import IntegerInput, Value
 from strapgen.fixedpoint.formats import Format, finest
 from strapgen.fixedpoint.interface import Argument
@@ -22,6 +21,7 @@ from strapgen.fixedpoint.quantities import (
 from strapgen.fixedpoint.settings import Settings
 from strapgen.program import Program, Result
 from strapgen.signal import Signal
+from strapgen.support.exceptions import InputError
 
 
 @dataclass(frozen=True)

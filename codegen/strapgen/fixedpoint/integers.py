@@ -7,7 +7,6 @@ from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
-from strapgen.exceptions import InputError
 from strapgen.fixedpoint import derivation
 from strapgen.fixedpoint.accumulation import accumulation
 from strapgen.fixedpoint.alignment import aligning
@@ -39,6 +38,7 @@ from strapgen.fixedpoint.settings import Settings
 from strapgen.fixedpoint.sums import lower_sum
 from strapgen.program import Program
 from strapgen.signal import Signal
+from strapgen.support.exceptions import InputError
 
 #: Bits that inputs may be stored below their finest format, so that sums of them are exact.
 _MOST_GUARD_BITS = 3

@@ -6,12 +6,12 @@ import math
 from dataclasses import dataclass
 from fractions import Fraction
 
-from strapgen.exceptions import InputError
 from strapgen.fixedpoint.formats import Format, finest
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.fixedpoint.settings import Settings
 from strapgen.program import Program
 from strapgen.signal import Signal
+from strapgen.support.exceptions import InputError
 
 
 @dataclass(frozen=True)

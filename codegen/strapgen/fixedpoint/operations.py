@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen.exceptions import InputError
 from strapgen.fixedpoint import functions
 from strapgen.fixedpoint.chain import Chain
 from strapgen.fixedpoint.derivation_context import (
@@ -41,6 +40,7 @@ from strapgen.fixedpoint.quantities import (
     scaled,
 )
 from strapgen.program import Node, Operation, Reference
+from strapgen.support.exceptions import InputError
 
 #: Functions on samples.
 _FUNCTIONS: dict[str, Callable[..., Any]] = {

@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from strapgen.exceptions import InputError
 from strapgen.fixedpoint.code import IntegerDefinition, Value
 from strapgen.fixedpoint.format_plan import FormatPlan
 from strapgen.fixedpoint.formats import ROUNDINGS, Format
@@ -15,6 +14,7 @@ from strapgen.fixedpoint.quantities import InputElement, Quantities, Quantity, S
 from strapgen.fixedpoint.settings import Settings
 from strapgen.fixedpoint.terms import up
 from strapgen.program import Program
+from strapgen.support.exceptions import InputError
 
 #: Part of the smaller end of a checked range that an error may take, so that proper input passes the check.
 _LARGEST_PART = Fraction(1, 2)

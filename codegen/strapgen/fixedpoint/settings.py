@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any
 
-from strapgen import checks
-from strapgen.exceptions import InputError
 from strapgen.fixedpoint.formats import Format, check_rounding, check_word
+from strapgen.support import checks
+from strapgen.support.exceptions import InputError
 
 #: Rounding errors that are fed back from step to step.
 CARRIES = {

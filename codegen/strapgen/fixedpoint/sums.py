@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
-from strapgen.exceptions import InputError
 from strapgen.fixedpoint.code import IntegerSum, Term, Value
 from strapgen.fixedpoint.format_plan import carried_input
 from strapgen.fixedpoint.formats import Format, finest
@@ -23,6 +22,7 @@ from strapgen.fixedpoint.quantities import (
 )
 from strapgen.fixedpoint.quantization_context import Quantization, integer_value
 from strapgen.fixedpoint.terms import Aligned, Placed, aligned, largest_wide, nearest, up
+from strapgen.support.exceptions import InputError
 
 
 def lower_sum(context: Quantization, quantity: Quantity, definition: Sum) -> None:

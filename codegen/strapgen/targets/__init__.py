@@ -6,10 +6,10 @@ from dataclasses import replace
 from importlib import import_module
 from typing import NamedTuple
 
-from strapgen import checks
-from strapgen.exceptions import InputError
 from strapgen.fixedpoint import FixedProgram, Settings
 from strapgen.program import Program
+from strapgen.support import checks
+from strapgen.support.exceptions import InputError
 from strapgen.targets.sources import Function, Sources
 
 __all__ = ["FIXED", "TARGETS", "Function", "Sources", "Target", "emit"]

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from strapgen.exceptions import InputError
 from strapgen.fixedpoint import FixedProgram, Settings, quantize
 from strapgen.fixedpoint.code import (
     IntegerMaximum,
@@ -22,6 +21,7 @@ from strapgen.fixedpoint.code import (
     used_by,
 )
 from strapgen.program import Program
+from strapgen.support.exceptions import InputError
 from strapgen.targets.names import C, external, printed
 from strapgen.targets.printer import fill_expression
 from strapgen.targets.rendering import render

@@ -7,7 +7,7 @@ from typing import Any
 
 import jinja2
 
-from strapgen import resources
+from strapgen.support import resources
 from strapgen.targets import fixed_text
 from strapgen.targets.printer import elements_text, fill, fill_arguments, operations_text, range_text
 

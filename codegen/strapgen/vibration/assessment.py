@@ -12,10 +12,11 @@ from functools import lru_cache
 
 import sympy as sp
 
-from strapgen import catalogue, checks
+from strapgen import catalogue
 from strapgen.catalogue import Choice
-from strapgen.exceptions import InputError, InputTypeError
 from strapgen.kernel import Kernel
+from strapgen.support import checks
+from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.vibration import response, systems
 from strapgen.vibration.mean_rates import Assessment
 from strapgen.vibration.response import Form

@@ -8,8 +8,8 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen import checks
-from strapgen.exceptions import InputError
+from strapgen.support import checks
+from strapgen.support.exceptions import InputError
 from strapgen.vibration.mean_rates import Assessment
 
 Array = NDArray[np.float64]

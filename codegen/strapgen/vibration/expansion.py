@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 import sympy as sp
 
 from strapgen import powers
-from strapgen.exceptions import InputError
 from strapgen.kernel import Kernel
 from strapgen.lowering.irrational import rationalized
 from strapgen.powers import Powers
+from strapgen.support.exceptions import InputError
 
 #: An exact number: an element of a field of SymPy.
 Number = Any

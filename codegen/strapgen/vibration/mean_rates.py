@@ -17,8 +17,8 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from strapgen import checks
-from strapgen.exceptions import InputError
+from strapgen.support import checks
+from strapgen.support.exceptions import InputError
 from strapgen.vibration.response import Form, Pair
 from strapgen.vibration.systems import T_L, T_M, F, T
 

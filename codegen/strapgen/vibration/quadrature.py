@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen.exceptions import InputError
+from strapgen.support.exceptions import InputError
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import sympy as sp
 
-from strapgen.exceptions import InputError
+from strapgen.support.exceptions import InputError
 from strapgen.vibration.expansion import Number
 from strapgen.vibration.systems import CHANNELS, T_L, T_M, F, System, T
 from strapgen.vibration.waves import Shift, Wave, combined, resolvent

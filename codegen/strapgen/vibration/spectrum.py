@@ -17,8 +17,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen import checks
-from strapgen.exceptions import InputError, InputTypeError
+from strapgen.support import checks
+from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.vibration.mean_rates import Assessment, Rates
 from strapgen.vibration.quadrature import integrate
 

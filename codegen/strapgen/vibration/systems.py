@@ -10,13 +10,14 @@ from typing import Any
 
 import sympy as sp
 
-from strapgen import catalogue, checks
+from strapgen import catalogue
 from strapgen.algebra import exact
 from strapgen.catalogue import Choice
-from strapgen.exceptions import InputError, InputTypeError
 from strapgen.kernel import Kernel
 from strapgen.powers import Powers
 from strapgen.signal import Signal
+from strapgen.support import checks
+from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.vibration.expansion import Expander, Expansion, Number
 from strapgen.vibration.waves import Shift, Wave
 

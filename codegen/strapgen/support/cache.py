@@ -19,8 +19,8 @@ from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
-from strapgen import resources
-from strapgen.exceptions import InputError
+from strapgen.support import resources
+from strapgen.support.exceptions import InputError
 
 _UNUSED_DAYS = 60
 _MANIFEST = "manifest.json"

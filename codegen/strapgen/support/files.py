@@ -10,7 +10,7 @@ import stat
 from collections.abc import Mapping
 from pathlib import Path
 
-from strapgen.exceptions import InputError
+from strapgen.support.exceptions import InputError
 
 #: Flags of a file that must not be there yet.
 _NEW = os.O_CREAT | os.O_EXCL | os.O_WRONLY | getattr(os, "O_BINARY", 0)

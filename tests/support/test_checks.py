@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from strapgen import checks
-from strapgen.exceptions import InputError, InputTypeError, StrapgenError
+from strapgen.support import checks
+from strapgen.support.exceptions import InputError, InputTypeError, StrapgenError
 
 
 def test_choice():

@@ -8,7 +8,7 @@ from fractions import Fraction
 from numbers import Integral
 from typing import TYPE_CHECKING, Any
 
-from strapgen.exceptions import InputError, InputTypeError
+from strapgen.support.exceptions import InputError, InputTypeError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -5,7 +5,7 @@ from __future__ import annotations
 import reprlib
 from typing import Any
 
-from strapgen.exceptions import InputTypeError
+from strapgen.support.exceptions import InputTypeError
 
 #: The call that makes the next stage's argument, by the class of this one's, and the class of what it makes.
 _NEXT = {
@@ -63,7 +63,7 @@ def require(function: str, value: Any, *classes: type) -> None:
     >>> require("derive", 3, str)
     Traceback (most recent call last):
         ...
-    strapgen.exceptions.InputTypeError: derive takes a name, not 3; strapgen list shows the names
+    strapgen.support.exceptions.InputTypeError: derive takes a name, not 3; strapgen list shows the names
     """
     if isinstance(value, classes):
         return

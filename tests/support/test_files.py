@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from strapgen import output
-from strapgen.exceptions import InputError
+from strapgen.support.exceptions import InputError
+from strapgen.support.files import write_file, write_files
 
 FILES = {"a.txt": "alpha\n", "deep/er/b.txt": "beta\n", "c.bin": b"\x00\xff"}
 
@@ -20,25 +20,25 @@ def tree(folder: Path) -> dict[str, bytes]:
 
 
 def test_files_are_written_in_order(tmp_path):
-    written = output.write_files(tmp_path / "new", FILES)
+    written = write_files(tmp_path / "new", FILES)
     assert written == [tmp_path / "new" / name for name in FILES]
     assert tree(tmp_path / "new") == {"a.txt": b"alpha\n", "deep/er/b.txt": b"beta\n", "c.bin": b"\x00\xff"}
 
 
 def test_text_is_utf8_with_line_feeds(tmp_path):
-    assert output.write_file(tmp_path / "x", "σ\nτ\n").read_bytes() == "σ\nτ\n".encode()
+    assert write_file(tmp_path / "x", "σ\nτ\n").read_bytes() == "σ\nτ\n".encode()
 
 
 def test_name_without_a_folder_goes_here(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert output.write_file("x.txt", "x") == Path("x.txt")
+    assert write_file("x.txt", "x") == Path("x.txt")
     assert tree(tmp_path) == {"x.txt": b"x"}
 
 
 def test_old_files_are_replaced_and_others_left(tmp_path):
     (tmp_path / "a.txt").write_text("old, and longer than the new")
     (tmp_path / "mine.txt").write_text("mine")
-    output.write_files(tmp_path, FILES)
+    write_files(tmp_path, FILES)
     assert tree(tmp_path)["a.txt"] == b"alpha\n"
     assert tree(tmp_path)["mine.txt"] == b"mine"
 
@@ -65,11 +65,11 @@ class FullDisk:
 
 @pytest.mark.parametrize("fitting", [0, 1, 2])
 def test_full_disk_changes_nothing(fitting, tmp_path, monkeypatch):
-    output.write_files(tmp_path, FILES)
+    write_files(tmp_path, FILES)
     before = tree(tmp_path)
-    monkeypatch.setattr(output.os, "fdopen", FullDisk(fitting))
+    monkeypatch.setattr(os, "fdopen", FullDisk(fitting))
     with pytest.raises(InputError, match=r"cannot be written .*No space left on device"):
-        output.write_files(tmp_path, {name: "changed" for name in FILES})
+        write_files(tmp_path, {name: "changed" for name in FILES})
     assert tree(tmp_path) == before
 
 
@@ -88,7 +88,7 @@ def test_failure_while_renaming_changes_nothing(good, tmp_path, monkeypatch):
 
     monkeypatch.setattr(Path, "replace", replace)
     with pytest.raises(InputError, match=r"cannot be written .*Operation not permitted"):
-        output.write_files(tmp_path, FILES)
+        write_files(tmp_path, FILES)
     assert tree(tmp_path) == before
 
 
@@ -98,7 +98,7 @@ def test_interruption_leaves_no_draft(tmp_path, monkeypatch):
 
     monkeypatch.setattr(Path, "replace", interrupt)
     with pytest.raises(KeyboardInterrupt):
-        output.write_files(tmp_path, FILES)
+        write_files(tmp_path, FILES)
     assert tree(tmp_path) == {}
 
 
@@ -106,7 +106,7 @@ def test_interruption_leaves_no_draft(tmp_path, monkeypatch):
 def test_permissions_are_those_of_an_ordinary_file(umask, tmp_path):
     before = os.umask(umask)
     try:
-        (path,) = output.write_files(tmp_path, {"a": "x"})
+        (path,) = write_files(tmp_path, {"a": "x"})
     finally:
         os.umask(before)
     assert stat.S_IMODE(path.stat().st_mode) == 0o666 & ~umask
@@ -114,22 +114,22 @@ def test_permissions_are_those_of_an_ordinary_file(umask, tmp_path):
 
 @pytest.mark.parametrize("mode", [0o600, 0o640, 0o666, 0o755])
 def test_a_file_that_exists_keeps_its_permissions(mode, tmp_path):
-    path = output.write_file(tmp_path / "a", "x")
+    path = write_file(tmp_path / "a", "x")
     path.chmod(mode)
-    output.write_file(path, "y")
+    write_file(path, "y")
     assert (path.read_text(), stat.S_IMODE(path.stat().st_mode)) == ("y", mode)
 
 
 def test_a_link_s_target_keeps_its_permissions(tmp_path):
-    target = output.write_file(tmp_path / "target", "x")
+    target = write_file(tmp_path / "target", "x")
     target.chmod(0o600)
     (tmp_path / "link").symlink_to(target)
-    output.write_file(tmp_path / "link", "y")
+    write_file(tmp_path / "link", "y")
     assert (target.read_text(), stat.S_IMODE(target.stat().st_mode)) == ("y", 0o600)
 
 
 def test_what_replaces_a_private_file_is_private_before_it_is_whole(tmp_path, monkeypatch):
-    path = output.write_file(tmp_path / "a", "x")
+    path = write_file(tmp_path / "a", "x")
     path.chmod(0o600)
     modes = []
 
@@ -137,8 +137,8 @@ def test_what_replaces_a_private_file_is_private_before_it_is_whole(tmp_path, mo
         modes.append(stat.S_IMODE(os.fstat(handle).st_mode))
         return fdopen(handle, mode)
 
-    monkeypatch.setattr(output.os, "fdopen", watched)
-    output.write_file(path, "y")
+    monkeypatch.setattr(os, "fdopen", watched)
+    write_file(path, "y")
     assert modes == [0o600]
 
 
@@ -147,32 +147,32 @@ def test_the_umask_of_the_process_stays_alone(tmp_path, monkeypatch):
         raise AssertionError("another thread would create its files without a umask")
 
     monkeypatch.setattr(os, "umask", forbidden)
-    output.write_files(tmp_path, FILES)
-    output.write_files(tmp_path, FILES)
+    write_files(tmp_path, FILES)
+    write_files(tmp_path, FILES)
 
 
 def test_folder_under_a_file(tmp_path):
     (tmp_path / "file").write_text("x")
     with pytest.raises(InputError, match=r"file/folder cannot be written \(Not a directory\)"):
-        output.write_files(tmp_path / "file" / "folder", FILES)
+        write_files(tmp_path / "file" / "folder", FILES)
     assert tree(tmp_path) == {"file": b"x"}
 
 
 def test_folder_that_nothing_can_be_made_in():
     with pytest.raises(InputError, match=r"/proc/strapgen cannot be written"):
-        output.write_files("/proc/strapgen", FILES)
+        write_files("/proc/strapgen", FILES)
 
 
 def test_folder_where_a_file_belongs(tmp_path):
     (tmp_path / "c.bin").mkdir()
     with pytest.raises(InputError, match=r"c.bin is a folder; a file is to be written there"):
-        output.write_files(tmp_path, FILES)
+        write_files(tmp_path, FILES)
     assert tree(tmp_path) == {}
 
 
 def test_name_that_is_too_long(tmp_path):
     with pytest.raises(InputError, match=r"cannot be written"):
-        output.write_file(tmp_path / ("x" * 300), "x")
+        write_file(tmp_path / ("x" * 300), "x")
 
 
 def test_link_is_written_through(tmp_path):
@@ -181,7 +181,7 @@ def test_link_is_written_through(tmp_path):
     target.write_text("old")
     link = tmp_path / "link.txt"
     link.symlink_to(target)
-    assert output.write_file(link, "new") == link
+    assert write_file(link, "new") == link
     assert link.is_symlink()
     assert target.read_text() == "new"
 
@@ -189,5 +189,5 @@ def test_link_is_written_through(tmp_path):
 def test_pipe_is_not_replaced_by_a_file(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(InputError, match=r"pipe is no ordinary file"):
-        output.write_file(tmp_path / "pipe", "x")
+        write_file(tmp_path / "pipe", "x")
     assert stat.S_ISFIFO((tmp_path / "pipe").stat().st_mode)

@@ -9,7 +9,7 @@ import pytest
 
 import strapgen
 from strapgen import exact, recording
-from strapgen.exceptions import InputTypeError
+from strapgen.support.exceptions import InputTypeError
 
 
 @cache

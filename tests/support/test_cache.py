@@ -11,9 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from strapgen import cache, library
+from strapgen import library
 from strapgen.catalogue import choose
-from strapgen.exceptions import CompilerError, InputError
+from strapgen.support import cache
+from strapgen.support.exceptions import CompilerError, InputError
 
 
 @pytest.fixture(autouse=True)
@@ -208,7 +209,7 @@ def test_sources_change_with_the_generator(monkeypatch, root):
 
 
 def test_generator_digest_sees_every_template(monkeypatch, tmp_path):
-    from strapgen import resources
+    from strapgen.support import resources
 
     files = resources.package_files()
     assert {path.name for path in files} >= {"printer.py", "runge_kutta.py", "source.c.j2", "module.py.j2"}

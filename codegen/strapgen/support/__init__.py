@@ -1,0 +1,1 @@
+"""The ground: checks, errors, files. It knows nothing of algorithms."""
