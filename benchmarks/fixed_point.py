@@ -20,7 +20,7 @@ import numpy as np
 
 import strapgen
 from compare import FLAGS, machine, run
-from strapgen.fixedpoint import Settings
+from strapgen.ir.fixed_settings import Settings
 
 HERE = Path(__file__).resolve().parent
 STEPS, TIMED = 500, 20_000

@@ -12,7 +12,7 @@ import strapgen
 from strapgen import compilation
 from strapgen.backends import BACKENDS, Backend
 from strapgen.catalogue import ALGORITHMS
-from strapgen.fixedpoint import Settings
+from strapgen.ir.fixed_settings import Settings
 from strapgen.targets import FIXED
 
 #: The back ends. Short words have the code of long ones, C in float that of double, and the integer model gives the

@@ -11,9 +11,9 @@ import sympy as sp
 from strapgen import catalogue, generate, library
 from strapgen.backends import BACKENDS, fitted
 from strapgen.catalogue import Choice
+from strapgen.ir.program import Program
+from strapgen.ir.sources import Sources
 from strapgen.kernel import Kernel
-from strapgen.program import Program
-from strapgen.targets import Sources
 
 
 @cache

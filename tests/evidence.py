@@ -10,8 +10,8 @@ import numpy as np
 
 from strapgen.backends.fixed import FixedEvaluator
 from strapgen.exact import FUNCTIONS
-from strapgen.fixedpoint import FixedProgram
-from strapgen.program import OPERATIONS, RESOLUTION, Constant, Program, Reference
+from strapgen.ir.integer_program import FixedProgram
+from strapgen.ir.program import OPERATIONS, RESOLUTION, Constant, Program, Reference
 
 
 def corners_and_random(evaluator: FixedEvaluator, count: int, rng: np.random.Generator) -> list[np.ndarray]:

@@ -59,9 +59,9 @@ import sympy as sp
 from strapgen import algebra
 from strapgen.catalogue.kinematics import EULER
 from strapgen.catalogue.steps import increments_signal
-from strapgen.companions import Companions
+from strapgen.ir.attitude_step import Companions
 from strapgen.kernel import KernelBuilder
-from strapgen.order import Order
+from strapgen.ir.order import Order
 
 def algorithm():
     build = KernelBuilder()

@@ -13,7 +13,7 @@ import pytest
 import strapgen
 from strapgen import comparison
 from strapgen.backends import BACKENDS
-from strapgen.fixedpoint import Settings
+from strapgen.ir.fixed_settings import Settings
 from strapgen.support.exceptions import InputError
 
 FIXED_NAMES = ("c-q31", "c-q15", "fixed-model")
@@ -50,7 +50,7 @@ def test_every_back_end_against_every_kind_of_reference(algorithm, reference, in
 
 @pytest.mark.parametrize("carry", ["none", "state", "full"])
 def test_the_bound_counts_the_rounding_of_increments_only_where_there_is_one(increments, carry):
-    settings = Settings(largest_angle=strapgen.fixedpoint.settings.Fraction(1, 60), carry=carry)
+    settings = Settings(largest_angle=strapgen.ir.fixed_settings.Fraction(1, 60), carry=carry)
     made = strapgen.backend("euler", backend="c-q31", settings=settings)
 
     def bound(given):
@@ -63,7 +63,7 @@ def test_the_bound_counts_the_rounding_of_increments_only_where_there_is_one(inc
 
 def test_drift_is_that_from_the_truth_where_it_is_known():
     motion = strapgen.motion("constant", y_deg_s=10)
-    given = motion.increments(strapgen.fixedpoint.settings.Fraction(1, 8), 80, 2)
+    given = motion.increments(strapgen.ir.fixed_settings.Fraction(1, 8), 80, 2)
     truth = motion.attitude(np.arange(81) / 8)
     (row,) = comparison.compare("dcm", "rk2", 2, ["numpy"], given, truth=truth)
     run = strapgen.simulate(strapgen.backend("dcm", "rk2"), motion, "0.125", 10)

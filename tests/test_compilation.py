@@ -13,8 +13,8 @@ import pytest
 import strapgen
 from strapgen import backends, compilation, pipeline
 from strapgen.cli import main
+from strapgen.ir.sources import Sources
 from strapgen.support.exceptions import CompilerError
-from strapgen.targets import Sources
 
 SIMULATE = ["simulate", "euler", "--method", "rk1", "--increments", "1", "--step", "1", "--duration", "2"]
 SIMULATE += ["--motion", "constant", "--set", "x_deg_s=1"]

@@ -14,7 +14,7 @@ from strapgen import catalogue, convergence, motion
 from strapgen.catalogue import INTEGRATORS, choose
 from strapgen.catalogue.tableaux import TABLEAUX
 from strapgen.convergence import Convergence, Rung, converge
-from strapgen.order import Order
+from strapgen.ir.order import Order
 from strapgen.support.exceptions import InputError
 
 #: How far an observed order may be from the one of theory: the next term of the series is still there at these steps.

@@ -70,7 +70,7 @@ def test_the_simulator_feeds_pulses_to_every_back_end(make):
 def test_pulses_of_the_format_s_unit_reach_fixed_point_exactly(make):
     motion = strapgen.motion("coning", a_deg_s=10, b_deg_s=10, g_deg_s=10)
     backend = make("euler", largest=0.012)
-    given_ = pulses(motion.increments(strapgen.fixedpoint.settings.Fraction(1, 8), 80, 2), 2.0**-20)
+    given_ = pulses(motion.increments(strapgen.ir.fixed_settings.Fraction(1, 8), 80, 2), 2.0**-20)
     np.testing.assert_array_equal(backend.representable(given_).astype(float), given_)
 
 

@@ -5,8 +5,8 @@ from fractions import Fraction
 import pytest
 import sympy as sp
 
+from strapgen.ir.signals import Signal
 from strapgen.kernel import Kernel, KernelBuilder, Stage, symbols
-from strapgen.signal import Signal
 
 
 def two_stages() -> Kernel:

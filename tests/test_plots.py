@@ -10,7 +10,7 @@ import pytest
 import strapgen
 from strapgen import plots
 from strapgen.convergence import Convergence, Rung
-from strapgen.order import Order
+from strapgen.ir.order import Order
 from strapgen.recording import History
 from strapgen.simulation import Run, simulate
 from strapgen.support.exceptions import InputError, MissingExtraError

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from strapgen import evaluator, reports
-from strapgen.fixedpoint import Settings
+from strapgen.ir.fixed_settings import Settings
 from strapgen.motions import motion
 from strapgen.recording import InertialRecording, read_inertial
 from strapgen.simulation import drift_between

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from strapgen.fixedpoint import Settings
+from strapgen.ir.fixed_settings import Settings
 from strapgen.stress import MOTIONS, angles, as_text, stress
 from strapgen.support.exceptions import InputError
 

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from strapgen import compilation
 from strapgen.backends import BACKENDS
-from strapgen.fixedpoint import Settings
+from strapgen.ir.fixed_settings import Settings
 from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.targets import FIXED
 from strapgen.two_speed import ALGORITHMS, SCULLING, TwoSpeed, loops, sources

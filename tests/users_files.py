@@ -7,9 +7,9 @@ from pathlib import Path
 #: A step whose title tells what was imported for it; the first lines are the test's.
 STEP = """{beginning}
 from fractions import Fraction
-from strapgen.companions import Companions
+from strapgen.ir.attitude_step import Companions
 from strapgen.kernel import KernelBuilder
-from strapgen.signal import Signal
+from strapgen.ir.signals import Signal
 
 def algorithm():
     {inside}

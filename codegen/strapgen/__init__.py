@@ -37,27 +37,30 @@ if _typing.TYPE_CHECKING:
     from strapgen.catalogue.steps import increments_signal as increments_signal
     from strapgen.catalogue.tableaux import TABLEAUX as TABLEAUX
     from strapgen.catalogue.tableaux import Tableau as Tableau
-    from strapgen.companions import Companions as Companions
     from strapgen.comparison import Comparison as Comparison
     from strapgen.comparison import compare as compare
     from strapgen.convergence import Convergence as Convergence
     from strapgen.convergence import converge as converge
-    from strapgen.fixedpoint import FixedProgram as FixedProgram
-    from strapgen.fixedpoint import Format as Format
-    from strapgen.fixedpoint import Settings as Settings
+    from strapgen.ir.attitude_step import Companions as Companions
+    from strapgen.ir.fixed_settings import Settings as Settings
+    from strapgen.ir.formats import Format as Format
+    from strapgen.ir.integer_program import FixedProgram as FixedProgram
+    from strapgen.ir.order import Order as Order
+    from strapgen.ir.program import Program as Program
+    from strapgen.ir.recursion import Recursion as Recursion
+    from strapgen.ir.signals import Signal as Signal
+    from strapgen.ir.sources import Sources as Sources
     from strapgen.kernel import Kernel as Kernel
     from strapgen.kernel import KernelBuilder as KernelBuilder
     from strapgen.kernel import Stage as Stage
     from strapgen.kernel import resolution as resolution
     from strapgen.motions import Motion as Motion
     from strapgen.motions import motion as motion
-    from strapgen.order import Order as Order
     from strapgen.pipeline import build as build
     from strapgen.pipeline import derive as derive
     from strapgen.pipeline import generate as generate
     from strapgen.pipeline import lower as lower
     from strapgen.pipeline import quantize as quantize
-    from strapgen.program import Program as Program
     from strapgen.recording import History as History
     from strapgen.recording import InertialRecording as InertialRecording
     from strapgen.recording import Recording as Recording
@@ -65,8 +68,6 @@ if _typing.TYPE_CHECKING:
     from strapgen.recording import read_increments as read_increments
     from strapgen.recording import read_inertial as read_inertial
     from strapgen.recording import read_rates as read_rates
-    from strapgen.recursion import Recursion as Recursion
-    from strapgen.signal import Signal as Signal
     from strapgen.simulation import Run as Run
     from strapgen.simulation import simulate as simulate
     from strapgen.strapdown import Course as Course
@@ -77,7 +78,6 @@ if _typing.TYPE_CHECKING:
     from strapgen.support.exceptions import MissingExtraError as MissingExtraError
     from strapgen.support.exceptions import StrapgenError as StrapgenError
     from strapgen.targets import TARGETS as TARGETS
-    from strapgen.targets import Sources as Sources
     from strapgen.two_speed import TwoSpeed as TwoSpeed
 
 #: Public names by the modules that define them.
@@ -112,7 +112,6 @@ _NAMES = {
         "TABLEAUX",
         "Tableau",
     ),
-    "companions": ("Companions",),
     "comparison": (
         "Comparison",
         "compare",
@@ -121,11 +120,15 @@ _NAMES = {
         "Convergence",
         "converge",
     ),
-    "fixedpoint": (
-        "FixedProgram",
-        "Format",
-        "Settings",
-    ),
+    "ir.attitude_step": ("Companions",),
+    "ir.fixed_settings": ("Settings",),
+    "ir.formats": ("Format",),
+    "ir.integer_program": ("FixedProgram",),
+    "ir.order": ("Order",),
+    "ir.program": ("Program",),
+    "ir.recursion": ("Recursion",),
+    "ir.signals": ("Signal",),
+    "ir.sources": ("Sources",),
     "kernel": (
         "Kernel",
         "KernelBuilder",
@@ -136,7 +139,6 @@ _NAMES = {
         "Motion",
         "motion",
     ),
-    "order": ("Order",),
     "pipeline": (
         "build",
         "derive",
@@ -144,7 +146,6 @@ _NAMES = {
         "lower",
         "quantize",
     ),
-    "program": ("Program",),
     "recording": (
         "History",
         "InertialRecording",
@@ -154,8 +155,6 @@ _NAMES = {
         "read_inertial",
         "read_rates",
     ),
-    "recursion": ("Recursion",),
-    "signal": ("Signal",),
     "simulation": (
         "Run",
         "simulate",
@@ -171,10 +170,7 @@ _NAMES = {
         "MissingExtraError",
         "StrapgenError",
     ),
-    "targets": (
-        "TARGETS",
-        "Sources",
-    ),
+    "targets": ("TARGETS",),
     "two_speed": ("TwoSpeed",),
 }
 #: Modules whose functions belong together, by the names that they have here.

@@ -16,11 +16,11 @@ from strapgen.backends import Backend, of
 from strapgen.catalogue import Choice
 from strapgen.comparison import certified_angle
 from strapgen.convergence import GENERAL, converge, interpreter, step_of_increments
-from strapgen.fixedpoint import Settings
 from strapgen.gyro import windows
+from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.program import Program
 from strapgen.kernel import Kernel
 from strapgen.motions import motion
-from strapgen.program import Program
 from strapgen.simulation import attitude, drift_between, simulate
 from strapgen.support.exceptions import CompilerError, InputError
 

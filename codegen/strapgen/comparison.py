@@ -18,7 +18,7 @@ from strapgen import catalogue, compilation, exact, library
 from strapgen.backends import BACKENDS, Backend, of
 from strapgen.catalogue import Choice
 from strapgen.catalogue.tableaux import Tableau
-from strapgen.fixedpoint import Settings
+from strapgen.ir.fixed_settings import Settings
 from strapgen.simulation import attitude, drift_between, require_finite
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError

@@ -27,9 +27,9 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from strapgen.ir.sources import Sources
 from strapgen.support import cache
 from strapgen.support.exceptions import CompilerError
-from strapgen.targets import Sources
 
 #: Flags in addition to those of Python. Without contraction to fused multiply-add every machine computes the same bits.
 #: Without notes for debuggers, which Python's flags switch on, compiling takes a tenth less time.

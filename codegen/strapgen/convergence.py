@@ -18,10 +18,10 @@ import numpy as np
 from strapgen import catalogue, exact, library
 from strapgen.backends import BACKENDS, of
 from strapgen.catalogue import Choice
-from strapgen.fixedpoint import Settings
+from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.order import Order
+from strapgen.ir.program import Program
 from strapgen.motions import Motion
-from strapgen.order import Order
-from strapgen.program import Program
 from strapgen.simulation import largest_increment, simulate
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError, InputTypeError

@@ -10,7 +10,7 @@ import mpmath
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen.program import OPERATIONS, Program
+from strapgen.ir.program import OPERATIONS, Program
 from strapgen.support import stages
 
 #: Decimal digits: a million steps lose six of them.

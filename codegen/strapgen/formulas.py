@@ -9,8 +9,8 @@ from typing import Any
 
 import sympy as sp
 
+from strapgen.ir.program import Program
 from strapgen.kernel import Kernel, Stage
-from strapgen.program import Program
 from strapgen.targets.printer import Printer, operations_text
 
 

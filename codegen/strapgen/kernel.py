@@ -9,11 +9,11 @@ from typing import Any
 import sympy as sp
 
 from strapgen.algebra import evaluate
-from strapgen.companions import Companions
-from strapgen.order import Order
-from strapgen.program import RESOLUTION
-from strapgen.recursion import Recursion
-from strapgen.signal import Signal
+from strapgen.ir.attitude_step import Companions
+from strapgen.ir.order import Order
+from strapgen.ir.program import RESOLUTION
+from strapgen.ir.recursion import Recursion
+from strapgen.ir.signals import Signal
 
 #: The distance from 1 to the next number of the target that a kernel is lowered for; 0 in exact arithmetic.
 resolution = sp.Symbol(RESOLUTION, real=True)

@@ -12,10 +12,11 @@ import pickle
 from pathlib import Path
 
 from strapgen.catalogue import Choice, derive
-from strapgen.fixedpoint import Settings
-from strapgen.program import Program
+from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.program import Program
+from strapgen.ir.sources import Sources
 from strapgen.support import cache
-from strapgen.targets import Sources, emit
+from strapgen.targets import emit
 
 _programs: dict[str, Program] = {}
 

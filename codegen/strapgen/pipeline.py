@@ -22,11 +22,12 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from strapgen import catalogue, fixedpoint, targets
-from strapgen.fixedpoint import FixedProgram, Settings
-from strapgen.program import Program
+from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.integer_program import FixedProgram
+from strapgen.ir.program import Program
+from strapgen.ir.sources import Sources
 from strapgen.support import stages
 from strapgen.support.exceptions import InputTypeError
-from strapgen.targets import Sources
 
 if TYPE_CHECKING:
     from strapgen.backends import Backend

@@ -13,8 +13,8 @@ import sympy as sp
 from sympy.polys.polyerrors import CoercionFailed
 
 from strapgen.algebra import Direction, Wrapped
+from strapgen.ir.program import RESOLUTION
 from strapgen.kernel import Kernel, evaluate_stages
-from strapgen.program import RESOLUTION
 
 _NO_SERIES = "the square root of a series that begins with 0 is no series"
 

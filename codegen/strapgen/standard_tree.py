@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from strapgen import catalogue, fixedpoint, pipeline
-from strapgen.program import Program
+from strapgen.ir.program import Program
 from strapgen.support.exceptions import InputError
 from strapgen.support.files import write_files
 from strapgen.targets import FIXED, TARGETS

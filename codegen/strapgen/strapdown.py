@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from strapgen import backends, two_speed
 from strapgen.backends import BACKENDS
-from strapgen.fixedpoint import Settings
+from strapgen.ir.fixed_settings import Settings
 from strapgen.recording import InertialRecording
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError

@@ -15,8 +15,8 @@ from strapgen import catalogue, two_speed
 from strapgen.backends import BACKENDS, evaluator, of
 from strapgen.backends.fixed import FixedBackend
 from strapgen.catalogue import Choice
-from strapgen.fixedpoint import Settings
 from strapgen.gyro import pulses, windows
+from strapgen.ir.fixed_settings import Settings
 from strapgen.simulation import attitude, drift_between
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError

@@ -20,8 +20,8 @@ import numpy as np
 
 from strapgen.backends import backend
 from strapgen.comparison import certified_angle
-from strapgen.fixedpoint import Settings
 from strapgen.gyro import pulses
+from strapgen.ir.fixed_settings import Settings
 from strapgen.motions import Motion, motion
 from strapgen.simulation import attitude, drift_between
 from strapgen.support import cache, checks

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from strapgen.backends import BACKENDS, Backend, backend
-from strapgen.fixedpoint import Settings
+from strapgen.ir.fixed_settings import Settings
 from strapgen.motions import motion
 from strapgen.simulation import Run, largest_increment, simulate
 from strapgen.support.exceptions import InputError

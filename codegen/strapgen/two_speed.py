@@ -19,13 +19,13 @@ from strapgen import backends, compilation, library
 from strapgen.backends import BACKENDS, Evaluator
 from strapgen.backends.fixed import FixedEvaluator, integers, numbers
 from strapgen.catalogue import Choice
-from strapgen.fixedpoint import Settings
-from strapgen.fixedpoint.interface import Argument
-from strapgen.fixedpoint.settings import DEFAULT_ANGLE
 from strapgen.gyro import pulses
+from strapgen.ir.fixed_interface import Argument
+from strapgen.ir.fixed_settings import DEFAULT_ANGLE, Settings
+from strapgen.ir.sources import Sources
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
-from strapgen.targets import FIXED, Sources
+from strapgen.targets import FIXED
 from strapgen.targets.fixed_text import options
 from strapgen.targets.whole import LOOPS, recursion, whole, wiring
 

@@ -13,8 +13,8 @@ from derived import generated
 import strapgen
 from strapgen.algebra import Wrapped
 from strapgen.backends import BACKENDS, of_sources
+from strapgen.ir.signals import Signal
 from strapgen.kernel import KernelBuilder, resolution
-from strapgen.signal import Signal
 from strapgen.targets import FIXED
 
 

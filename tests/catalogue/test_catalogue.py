@@ -9,7 +9,7 @@ from gathering import each
 
 from strapgen import catalogue
 from strapgen.catalogue import ALGORITHMS, KERNELS, METHODS, MOST_INCREMENTS, STANDARD_METHODS, Choice, choose
-from strapgen.program import RESOLUTION
+from strapgen.ir.program import RESOLUTION
 from strapgen.support.exceptions import InputError
 
 STANDARD = catalogue.standard()

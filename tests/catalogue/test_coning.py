@@ -24,7 +24,7 @@ from strapgen.backends import BACKENDS, evaluator
 from strapgen.catalogue import MOST_INCREMENTS, MOST_PREVIOUS, Choice, choose, coning, coning_methods
 from strapgen.catalogue import rotation_series as series
 from strapgen.catalogue.coning import FORMS, design
-from strapgen.fixedpoint import Settings
+from strapgen.ir.fixed_settings import Settings
 from strapgen.targets import FIXED
 
 #: Every number of samples, and of those kept.

@@ -16,8 +16,8 @@ from strapgen.catalogue import ALGORITHMS, INTEGRATORS, MOST_INCREMENTS, MOST_PR
 from strapgen.catalogue.rates import step_order
 from strapgen.catalogue.steps import increments_signal, label, labels, turns_signal
 from strapgen.catalogue.tableaux import TABLEAUX, Tableau, read
+from strapgen.ir.order import Order
 from strapgen.kernel import Kernel
-from strapgen.order import Order
 
 ALGORITHM = pytest.mark.parametrize("algorithm", ALGORITHMS)
 

@@ -10,7 +10,7 @@ import strapgen
 import strapgen.support.exceptions
 from strapgen import derive, generate, lower
 from strapgen.catalogue import TWO_SPEED
-from strapgen.fixedpoint import Settings
+from strapgen.ir.fixed_settings import Settings
 
 NAMES = [
     *("dcm-update-5", "euler-update", "euler-update-4", "dcm-navigation-update-2", "euler-navigation-update"),

@@ -13,7 +13,7 @@ import strapgen
 from strapgen import algebra, derive
 from strapgen.backends import BACKENDS
 from strapgen.catalogue.kinematics import KINEMATICS
-from strapgen.fixedpoint import Settings
+from strapgen.ir.fixed_settings import Settings
 from strapgen.targets import FIXED
 
 ORDERS = [1, 2, 3, 4, 5, 7, pytest.param(12, marks=pytest.mark.long)]

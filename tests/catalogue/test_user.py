@@ -138,9 +138,9 @@ def test_what_a_file_says_now_counts(folder):
 STEP = """
 from fractions import Fraction
 import sympy as sp
-from strapgen.companions import Companions
+from strapgen.ir.attitude_step import Companions
 from strapgen.kernel import Kernel, KernelBuilder, Stage
-from strapgen.signal import Signal
+from strapgen.ir.signals import Signal
 
 def algorithm():
     build = KernelBuilder()

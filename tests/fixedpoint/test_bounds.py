@@ -18,8 +18,9 @@ from strapgen.backends import backend as make_backend
 from strapgen.backends import evaluator as make_evaluator
 from strapgen.backends.fixed import ModelEvaluator
 from strapgen.catalogue import Choice, standard
-from strapgen.fixedpoint import Settings, can_lower, function_series
-from strapgen.fixedpoint.code import IntegerSum
+from strapgen.fixedpoint import can_lower, function_series
+from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.integer_program import IntegerSum
 from strapgen.support.exceptions import InputError
 
 STEPS = [choice for choice in standard() if choice.method]

@@ -17,9 +17,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from strapgen.backends.fixed import CFixedEvaluator, FixedEvaluator, ModelEvaluator
-from strapgen.fixedpoint import FixedProgram, Settings, can_lower, function_series, quantize
-from strapgen.program import Assignment, Constant, Operation, Program, Reference, Result
-from strapgen.signal import Signal
+from strapgen.fixedpoint import can_lower, function_series, quantize
+from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.integer_program import FixedProgram
+from strapgen.ir.program import Assignment, Constant, Operation, Program, Reference, Result
+from strapgen.ir.signals import Signal
 from strapgen.support.exceptions import InputError
 from strapgen.targets import emit
 

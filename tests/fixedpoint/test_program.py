@@ -15,12 +15,13 @@ from hypothesis import strategies as st
 from strapgen import generate, quantize
 from strapgen.backends.fixed import ModelEvaluator
 from strapgen.catalogue import Choice, standard
-from strapgen.fixedpoint import Settings, can_lower
-from strapgen.fixedpoint.code import IntegerSum
+from strapgen.fixedpoint import can_lower
 from strapgen.fixedpoint.derivation import quantities
 from strapgen.fixedpoint.intervals import Interval
-from strapgen.program import Assignment, Constant, Operation, Program, Reference, Result
-from strapgen.signal import Signal
+from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.integer_program import IntegerSum
+from strapgen.ir.program import Assignment, Constant, Operation, Program, Reference, Result
+from strapgen.ir.signals import Signal
 from strapgen.support.exceptions import InputError
 
 EULER = Choice("euler", "rk4", 2)

@@ -11,8 +11,8 @@ from derived import precisely
 
 import strapgen
 from strapgen.exact import propagate
-from strapgen.fixedpoint import Settings
 from strapgen.gyro import windows
+from strapgen.ir.fixed_settings import Settings
 
 EXPONENTIALS = ("magnus2", "magnus4", "magnus6", "munthe-kaas4")
 

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from strapgen.ir.program import OPERATIONS, Constant, Node, Operation, Reference, walk
 from strapgen.lowering.arithmetic import (
     chain,
     expanded,
@@ -19,7 +20,6 @@ from strapgen.lowering.arithmetic import (
     with_constant,
 )
 from strapgen.lowering.polynomials import Polynomial
-from strapgen.program import OPERATIONS, Constant, Node, Operation, Reference, walk
 
 SETTINGS = settings(max_examples=80, derandomize=True, database=None, deadline=None)
 NAMES = "xyz"

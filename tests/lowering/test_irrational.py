@@ -11,10 +11,10 @@ import sympy as sp
 from derived import precisely
 
 from strapgen import derive, lower
+from strapgen.ir.program import Constant, walk
+from strapgen.ir.signals import Signal
 from strapgen.kernel import Kernel, KernelBuilder
 from strapgen.lowering.irrational import DIGITS, rationalized
-from strapgen.program import Constant, walk
-from strapgen.signal import Signal
 
 #: Exact series of many methods: with the long tests.
 pytestmark = pytest.mark.long

@@ -22,8 +22,9 @@ from pycparser import c_ast, c_parser
 
 from strapgen.catalogue import standard
 from strapgen.compilation import C_FLAGS
-from strapgen.program import Program
-from strapgen.targets import Sources, c, emit
+from strapgen.ir.program import Program
+from strapgen.ir.sources import Sources
+from strapgen.targets import c, emit
 
 STRICT = ["-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-Werror", "-pedantic"]
 COMPILERS = {

@@ -17,7 +17,8 @@ from gathering import each
 from strapgen import build, compilation, generate, quantize
 from strapgen.backends.fixed import CFixedEvaluator, ModelEvaluator
 from strapgen.catalogue import Choice, standard
-from strapgen.fixedpoint import Settings, can_lower
+from strapgen.fixedpoint import can_lower
+from strapgen.ir.fixed_settings import Settings
 from strapgen.support.exceptions import InputError
 
 #: Steps of Cayley-Klein parameters are those of Euler parameters under other names, which tests/lowering proves.

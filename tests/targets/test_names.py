@@ -20,10 +20,12 @@ from hypothesis import strategies as st
 import strapgen
 from strapgen import compilation, targets
 from strapgen.catalogue import admission
-from strapgen.companions import Companions
-from strapgen.fixedpoint import Settings, quantize
+from strapgen.fixedpoint import quantize
+from strapgen.ir import sources
+from strapgen.ir.attitude_step import Companions
+from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.signals import Signal
 from strapgen.kernel import Kernel, KernelBuilder
-from strapgen.signal import Signal
 from strapgen.targets import c_library, names
 
 STRICT = ("-pedantic", "-Wall", "-Wextra", "-Werror")
@@ -157,7 +159,7 @@ def reference() -> np.ndarray:
 EXPECTED = reference()
 
 
-def module(sources: targets.Sources) -> ModuleType:
+def module(sources: sources.Sources) -> ModuleType:
     """Return the module of Python sources."""
     ((name, text),) = sources.files.items()
     result = ModuleType(name)
@@ -170,7 +172,7 @@ def declarations(header: str) -> str:
     return compilation._declarations(header)
 
 
-def library(folder: Path, several: list[targets.Sources]) -> tuple[cffi.FFI, object]:
+def library(folder: Path, several: list[sources.Sources]) -> tuple[cffi.FFI, object]:
     """Compile C sources in one call of the compiler, and return them loaded."""
     ffi = cffi.FFI()
     for sources in several:

@@ -14,8 +14,9 @@ from gathering import each
 
 from strapgen import compilation
 from strapgen.catalogue import standard
-from strapgen.program import Program
-from strapgen.targets import Sources, emit
+from strapgen.ir.program import Program
+from strapgen.ir.sources import Sources
+from strapgen.targets import emit
 
 KERNELS = [choice.kernel for choice in standard()]
 STEPS = [kernel for kernel in KERNELS if "-rk" in kernel]

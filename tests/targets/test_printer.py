@@ -17,8 +17,8 @@ from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from strapgen.compilation import C_FLAGS
-from strapgen.program import Assignment, Constant, Node, Operation, Program, Reference, Result
-from strapgen.signal import Signal
+from strapgen.ir.program import Assignment, Constant, Node, Operation, Program, Reference, Result
+from strapgen.ir.signals import Signal
 from strapgen.targets import c
 from strapgen.targets.numpy import NumpyPrinter
 from strapgen.targets.numpy import emit as emit_numpy

@@ -16,9 +16,9 @@ from hypothesis import strategies as st
 import strapgen
 from strapgen import backends, catalogue, derive, exact, gyro, lower, vibration
 from strapgen.catalogue import coning
+from strapgen.ir.recursion import Recursion
+from strapgen.ir.signals import Signal, after
 from strapgen.kernel import KernelBuilder
-from strapgen.recursion import Recursion
-from strapgen.signal import Signal, after
 from strapgen.simulation import attitude
 from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.two_speed import TwoSpeed

@@ -6,8 +6,8 @@ import pytest
 import sympy as sp
 
 from strapgen import derive
+from strapgen.ir.signals import Signal
 from strapgen.kernel import KernelBuilder
-from strapgen.signal import Signal
 from strapgen.support.exceptions import InputError
 from strapgen.vibration.expansion import Expander
 

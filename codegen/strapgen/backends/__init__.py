@@ -10,10 +10,11 @@ from strapgen.backends.registry import BACKENDS, Entry, classes, of_sources
 from strapgen.backends.step_sources import StepSources
 from strapgen.catalogue import Choice
 from strapgen.catalogue.tableaux import Tableau
-from strapgen.fixedpoint import Settings
+from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.sources import Sources
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError, InputTypeError
-from strapgen.targets import FIXED, Sources
+from strapgen.targets import FIXED
 
 __all__ = [
     "BACKENDS",

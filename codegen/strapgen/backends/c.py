@@ -9,7 +9,7 @@ import numpy as np
 from strapgen import compilation
 from strapgen.backends.protocol import Array, Backend, Evaluator
 from strapgen.backends.step_sources import StepSources
-from strapgen.targets import Sources
+from strapgen.ir.sources import Sources
 
 _TYPES = {"c": ("double", np.float64), "c-float": ("float", np.float32)}
 

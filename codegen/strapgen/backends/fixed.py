@@ -14,9 +14,9 @@ import numpy as np
 from strapgen import compilation
 from strapgen.backends.protocol import Array, Backend, Evaluator
 from strapgen.backends.step_sources import StepSources
-from strapgen.fixedpoint.interface import Argument, Interface
+from strapgen.ir.fixed_interface import Argument, Interface
+from strapgen.ir.sources import Sources
 from strapgen.support.exceptions import InputError
-from strapgen.targets import Sources
 
 
 def integers(argument: Argument, values: Any, kernel: str) -> Array:

@@ -15,7 +15,7 @@ import numpy as np
 from strapgen import compilation
 from strapgen.backends.protocol import Array, Backend, Evaluator
 from strapgen.backends.step_sources import StepSources
-from strapgen.targets import Sources
+from strapgen.ir.sources import Sources
 
 #: Steps times runs that are held at once: some megabytes, which stay in the cache.
 _SPAN = 1 << 18

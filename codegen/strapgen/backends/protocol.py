@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapgen.backends.step_sources import StepSources
+from strapgen.ir.sources import Sources
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
-from strapgen.targets import Sources
 
 Array = NDArray[Any]
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     from strapgen.backends.protocol import Backend, Evaluator
-    from strapgen.targets import Sources
+    from strapgen.ir.sources import Sources
 
 _PACKAGE = __name__.rpartition(".")[0]
 

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 from strapgen import library
 from strapgen.backends.registry import of_sources
 from strapgen.catalogue import Choice
+from strapgen.ir.sources import Sources
 from strapgen.support.exceptions import InputError
-from strapgen.targets import Sources, emit
+from strapgen.targets import emit
 
 if TYPE_CHECKING:
     from strapgen.backends.protocol import Evaluator

@@ -11,8 +11,8 @@ from strapgen.algebra import cross
 from strapgen.catalogue.coning_sculling import ANGLE_SUM, SCULLING, VELOCITY_SUM
 from strapgen.catalogue.kinematics import DCM_MEANING, KINEMATICS, SAVAGE, UNIT
 from strapgen.catalogue.updates import NAVIGATION_ROTATION
+from strapgen.ir.signals import Signal
 from strapgen.kernel import Kernel, KernelBuilder
-from strapgen.signal import Signal
 
 TRANSFORMED = Signal.vector(
     "transformed", "v", unit="m/s", meaning="velocity increment of the slow cycle, navigation axes"

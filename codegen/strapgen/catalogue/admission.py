@@ -10,8 +10,8 @@ import sympy as sp
 from strapgen.algebra import Direction, Wrapped
 from strapgen.catalogue.derivation import companion as derived_companion
 from strapgen.catalogue.names import RESERVED
+from strapgen.ir.program import RESOLUTION
 from strapgen.kernel import Kernel
-from strapgen.program import RESOLUTION
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 

@@ -19,8 +19,8 @@ from strapgen.catalogue.steps import (
     kept,
     sample_names,
 )
+from strapgen.ir.signals import Signal
 from strapgen.kernel import Kernel, KernelBuilder
-from strapgen.signal import Signal
 
 #: Most Legendre coefficients of the rate in the terms of third and fourth order.
 MOST_COEFFICIENTS = 6

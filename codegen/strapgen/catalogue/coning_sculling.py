@@ -9,9 +9,9 @@ import sympy as sp
 from strapgen.algebra import cross
 from strapgen.catalogue.kinematics import SAVAGE
 from strapgen.catalogue.updates import ROTATION_VECTOR
+from strapgen.ir.recursion import Recursion
+from strapgen.ir.signals import Signal, after
 from strapgen.kernel import Kernel, KernelBuilder
-from strapgen.recursion import Recursion
-from strapgen.signal import Signal, after
 
 INCREMENT = Signal.vector(
     "increment",

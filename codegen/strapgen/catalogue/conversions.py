@@ -10,9 +10,9 @@ import sympy as sp
 
 from strapgen import algebra
 from strapgen.catalogue.kinematics import CAYLEY_KLEIN, DCM, EULER, SAVAGE, THESIS, Kinematics
+from strapgen.ir.recursion import Recursion
+from strapgen.ir.signals import Signal
 from strapgen.kernel import Kernel, KernelBuilder
-from strapgen.recursion import Recursion
-from strapgen.signal import Signal
 
 _CONVERTED = Signal.matrix(
     "attitude", "C", meaning=DCM.state.meaning, bound=DCM.state.bound, constraint="rotation"

@@ -5,8 +5,8 @@ from __future__ import annotations
 import sympy as sp
 
 from strapgen.catalogue.kinematics import DCM_MEANING, THESIS, UNIT
+from strapgen.ir.signals import Signal
 from strapgen.kernel import Kernel, KernelBuilder
-from strapgen.signal import Signal
 
 
 def error_matrix() -> Kernel:

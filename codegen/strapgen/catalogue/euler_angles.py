@@ -9,9 +9,9 @@ import sympy as sp
 
 from strapgen.algebra import Direction, Wrapped
 from strapgen.catalogue.kinematics import DCM, SAVAGE
+from strapgen.ir.recursion import Recursion
+from strapgen.ir.signals import Signal
 from strapgen.kernel import Kernel, KernelBuilder, resolution
-from strapgen.recursion import Recursion
-from strapgen.signal import Signal
 
 ANGLES = Signal(
     "angles",

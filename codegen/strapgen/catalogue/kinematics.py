@@ -14,7 +14,7 @@ from fractions import Fraction
 import sympy as sp
 
 from strapgen import algebra
-from strapgen.signal import Signal
+from strapgen.ir.signals import Signal
 
 THESIS = "MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969)"
 SAVAGE = "P. G. Savage, Strapdown System Algorithms, AGARD Lecture Series 133 (1984), paper 3"

@@ -11,8 +11,8 @@ import sympy as sp
 
 from strapgen import algebra
 from strapgen.catalogue.steps import PHI, Method, Samples, exponential
+from strapgen.ir.signals import Signal
 from strapgen.kernel import KernelBuilder
-from strapgen.signal import Signal
 
 SOURCE = "S. Blanes, F. Casas, J. A. Oteo, J. Ros, Phys. Rep. 470 (2009) 151-238, section 5.3"
 

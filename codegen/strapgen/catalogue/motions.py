@@ -13,8 +13,8 @@ import sympy as sp
 from strapgen import algebra
 from strapgen.catalogue.kinematics import DCM_MEANING, THESIS
 from strapgen.catalogue.names import MOTIONS as MOTION_PARAMETERS
+from strapgen.ir.signals import Signal
 from strapgen.kernel import Kernel, KernelBuilder
-from strapgen.signal import Signal
 
 Formula = Callable[..., sp.Matrix]
 

@@ -8,8 +8,8 @@ from strapgen.algebra import cross
 from strapgen.catalogue.runge_kutta import advance
 from strapgen.catalogue.steps import PHI, Method, Samples, exponential
 from strapgen.catalogue.tableaux import TABLEAUX
+from strapgen.ir.signals import Signal
 from strapgen.kernel import KernelBuilder
-from strapgen.signal import Signal
 
 
 def method(order: int) -> Method:

@@ -6,8 +6,8 @@ import sympy as sp
 
 from strapgen import algebra
 from strapgen.catalogue.kinematics import CAYLEY_KLEIN, DCM_MEANING, EULER, SAVAGE, THESIS, UNIT, Kinematics
+from strapgen.ir.signals import Signal
 from strapgen.kernel import Kernel, KernelBuilder
-from strapgen.signal import Signal
 
 _COMPUTED = Signal.matrix(
     "computed", "C", meaning=f"{DCM_MEANING}, as computed", bound=UNIT, constraint="rotation"

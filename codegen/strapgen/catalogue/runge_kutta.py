@@ -11,8 +11,8 @@ from strapgen.catalogue.kinematics import Kinematics
 from strapgen.catalogue.order_conditions import attitude_order
 from strapgen.catalogue.steps import Method, Samples, combination
 from strapgen.catalogue.tableaux import Tableau
+from strapgen.ir.signals import Signal
 from strapgen.kernel import Kernel, KernelBuilder
-from strapgen.signal import Signal
 
 
 def method(tableau: Tableau) -> Method:

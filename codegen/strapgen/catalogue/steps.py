@@ -13,10 +13,10 @@ from strapgen.algebra import exact
 from strapgen.catalogue import rates
 from strapgen.catalogue.coefficients import Number
 from strapgen.catalogue.kinematics import KINEMATICS, Kinematics
-from strapgen.companions import Companions
+from strapgen.ir.attitude_step import Companions
+from strapgen.ir.order import Order
+from strapgen.ir.signals import Signal
 from strapgen.kernel import Kernel, KernelBuilder
-from strapgen.order import Order
-from strapgen.signal import Signal
 
 #: Signal of the rotation vector of a step.
 PHI = Signal.vector("phi", "phi", unit="rad", meaning="rotation vector of the step")

@@ -18,8 +18,8 @@ import sympy as sp
 from strapgen import algebra
 from strapgen.catalogue.kinematics import DCM, EULER, Kinematics
 from strapgen.catalogue.steps import Method, Samples
+from strapgen.ir.signals import Signal
 from strapgen.kernel import KernelBuilder
-from strapgen.signal import Signal
 
 #: Lowest degree of the polynomial for which the series is taken from the middle of the step.
 _CENTRED = 2

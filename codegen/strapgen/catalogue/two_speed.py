@@ -28,9 +28,9 @@ from strapgen.catalogue.updates import (
     transition,
     turned_frame,
 )
+from strapgen.ir.recursion import Recursion
+from strapgen.ir.signals import Signal, after
 from strapgen.kernel import Kernel, KernelBuilder
-from strapgen.recursion import Recursion
-from strapgen.signal import Signal, after
 
 
 def fast(form: int) -> Kernel:

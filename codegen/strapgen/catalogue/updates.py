@@ -8,9 +8,9 @@ import sympy as sp
 
 from strapgen import algebra
 from strapgen.catalogue.kinematics import KINEMATICS, SAVAGE, Kinematics
+from strapgen.ir.recursion import Recursion
+from strapgen.ir.signals import Signal, after
 from strapgen.kernel import Kernel, KernelBuilder
-from strapgen.recursion import Recursion
-from strapgen.signal import Signal, after
 
 ROTATION_VECTOR = Signal.vector(
     "rotation_vector", "phi", unit="rad", meaning="rotation vector of the cycle, body axes", bound=Fraction(1)

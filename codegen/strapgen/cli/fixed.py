@@ -13,7 +13,7 @@ from strapgen.support.exceptions import InputError
 if TYPE_CHECKING:
     from fractions import Fraction
 
-    from strapgen.fixedpoint import Settings
+    from strapgen.ir.fixed_settings import Settings
 
 Word = Annotated[
     str | None,
@@ -100,7 +100,7 @@ def read_settings(
     given = (word, max_rate_deg_s, step, max_angle_rad, rounding, carry, drift_allowance, ranges, formats)
     if not any(given):
         return None
-    from strapgen.fixedpoint import Settings
+    from strapgen.ir.fixed_settings import Settings
     from strapgen.support import checks
 
     bits = whole("word", word)
@@ -161,7 +161,7 @@ def settings_for_run(
         None for a back end in floating point.
     """
     from strapgen.backends import BACKENDS
-    from strapgen.fixedpoint import Settings
+    from strapgen.ir.fixed_settings import Settings
     from strapgen.targets import FIXED
 
     if BACKENDS[backend].target not in FIXED:

@@ -38,7 +38,7 @@ def two_speed(
     """
     check_format(format)
     from strapgen import two_speed as made
-    from strapgen.fixedpoint import Settings
+    from strapgen.ir.fixed_settings import Settings
     from strapgen.support.files import write_files
 
     form = whole("sculling", sculling) or 0

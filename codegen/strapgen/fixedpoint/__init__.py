@@ -1,10 +1,10 @@
 """Fixed point: programs become integer code with proved ranges and certified error bounds."""
 
-from strapgen.fixedpoint.code import FixedProgram
-from strapgen.fixedpoint.formats import Format
-from strapgen.fixedpoint.interface import Interface
-from strapgen.fixedpoint.settings import Settings
-from strapgen.program import Operation, Program, walk
+from strapgen.ir.fixed_interface import Interface
+from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.formats import Format
+from strapgen.ir.integer_program import FixedProgram
+from strapgen.ir.program import Operation, Program, walk
 from strapgen.support.exceptions import InputError
 
 __all__ = ["OPERATIONS", "FixedProgram", "Format", "Interface", "Settings", "can_lower", "quantize"]

@@ -12,8 +12,6 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from functools import lru_cache
 
-from strapgen.fixedpoint.code import IntegerSum, Value
-from strapgen.fixedpoint.interface import Argument, RoundingAccumulation
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.fixedpoint.quantities import (
     Computed,
@@ -26,7 +24,9 @@ from strapgen.fixedpoint.quantities import (
 )
 from strapgen.fixedpoint.quantization_context import Quantization
 from strapgen.fixedpoint.series import Series, Truncated
-from strapgen.program import Constant, Node, Program, Reference, Result
+from strapgen.ir.fixed_interface import Argument, RoundingAccumulation
+from strapgen.ir.integer_program import IntegerSum, Value
+from strapgen.ir.program import Constant, Node, Program, Reference, Result
 
 #: Terms of the longest series that the norm of the transition is expanded in.
 _MOST_TERMS = 1000

@@ -6,7 +6,7 @@ import math
 from collections.abc import Container, Iterable, Iterator, Mapping
 from fractions import Fraction
 
-from strapgen.fixedpoint.code import IntegerSum, Term, Value, used_by
+from strapgen.ir.integer_program import IntegerSum, Term, Value, used_by
 
 #: Bits below the last place of a sum down to which its products are computed.
 _BELOW = 8

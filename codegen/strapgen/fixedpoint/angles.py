@@ -6,10 +6,10 @@ import math
 from fractions import Fraction
 
 from strapgen.fixedpoint.chain import Chain
-from strapgen.fixedpoint.formats import finest
 from strapgen.fixedpoint.function_series import PI_ERROR, arctangent_series, pi
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.fixedpoint.quantities import Operand, Quotient, Selection
+from strapgen.ir.formats import finest
 
 #: Quotients below 1/2 - 1/16 have the polynomial of the arctangent; those above are measured from the diagonal.
 _OCTANT = (Fraction(1, 2), Fraction(-1, 16))

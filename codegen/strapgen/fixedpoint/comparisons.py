@@ -6,7 +6,11 @@ import math
 from dataclasses import replace
 from fractions import Fraction
 
-from strapgen.fixedpoint.code import (
+from strapgen.fixedpoint.operands import at_one_fraction
+from strapgen.fixedpoint.quantities import Computed, Maximum, NearestInteger, Quantity, Selection
+from strapgen.fixedpoint.quantization_context import Quantization, integer_value
+from strapgen.fixedpoint.sums import word_of
+from strapgen.ir.integer_program import (
     IntegerDefinition,
     IntegerMaximum,
     IntegerSelection,
@@ -14,10 +18,6 @@ from strapgen.fixedpoint.code import (
     Scaled,
     Term,
 )
-from strapgen.fixedpoint.operands import at_one_fraction
-from strapgen.fixedpoint.quantities import Computed, Maximum, NearestInteger, Quantity, Selection
-from strapgen.fixedpoint.quantization_context import Quantization, integer_value
-from strapgen.fixedpoint.sums import word_of
 
 _EXACT = Fraction(0)
 _Case = tuple[Scaled, Scaled, Scaled]

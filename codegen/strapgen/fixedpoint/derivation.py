@@ -24,7 +24,7 @@ from strapgen.fixedpoint.quantities import (
 )
 from strapgen.fixedpoint.ranges import Ranges
 from strapgen.fixedpoint.samples import samples
-from strapgen.program import Assignment, Constant, Operation, Program, Reference, Result
+from strapgen.ir.program import Assignment, Constant, Operation, Program, Reference, Result
 
 
 def quantities(

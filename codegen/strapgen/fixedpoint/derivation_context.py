@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.fixedpoint.quantities import Definition, Operand, Quantities, Quantity, Sum, Terms
 from strapgen.fixedpoint.ranges import Ranges
-from strapgen.program import Operation, Program
+from strapgen.ir.program import Operation, Program
 
 #: Values of quantities on sample inputs, by name; the key "" holds the numbers of the samples.
 Samples = dict[str, NDArray[np.float64]]

@@ -6,9 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from strapgen.fixedpoint.code import IntegerInput, Value
-from strapgen.fixedpoint.formats import Format, finest
-from strapgen.fixedpoint.interface import Argument
 from strapgen.fixedpoint.limits import Limit, state_fraction, stated_format
 from strapgen.fixedpoint.quantities import (
     InputElement,
@@ -18,9 +15,12 @@ from strapgen.fixedpoint.quantities import (
     exponent,
     is_power_of_two,
 )
-from strapgen.fixedpoint.settings import Settings
-from strapgen.program import Program, Result
-from strapgen.signal import Signal
+from strapgen.ir.fixed_interface import Argument
+from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.formats import Format, finest
+from strapgen.ir.integer_program import IntegerInput, Value
+from strapgen.ir.program import Program, Result
+from strapgen.ir.signals import Signal
 from strapgen.support.exceptions import InputError
 
 

@@ -10,7 +10,6 @@ from typing import Any
 from strapgen.fixedpoint import derivation
 from strapgen.fixedpoint.accumulation import accumulation
 from strapgen.fixedpoint.alignment import aligning
-from strapgen.fixedpoint.code import FixedProgram, IntegerSum, Value, operation_counts, used_by
 from strapgen.fixedpoint.comparisons import (
     lower_computed,
     lower_maximum,
@@ -18,8 +17,6 @@ from strapgen.fixedpoint.comparisons import (
     lower_selection,
 )
 from strapgen.fixedpoint.format_plan import FormatPlan, format_plan, sums_of_inputs_are_exact
-from strapgen.fixedpoint.formats import Format
-from strapgen.fixedpoint.interface import Argument, ErrorFeedback, Interface
 from strapgen.fixedpoint.limits import Limit, limits
 from strapgen.fixedpoint.quantities import (
     Computed,
@@ -34,10 +31,13 @@ from strapgen.fixedpoint.quantities import (
 )
 from strapgen.fixedpoint.quantization_context import Quantization
 from strapgen.fixedpoint.quotients_and_roots import lower_quotient, lower_root
-from strapgen.fixedpoint.settings import Settings
 from strapgen.fixedpoint.sums import lower_sum
-from strapgen.program import Program
-from strapgen.signal import Signal
+from strapgen.ir.fixed_interface import Argument, ErrorFeedback, Interface
+from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.formats import Format
+from strapgen.ir.integer_program import FixedProgram, IntegerSum, Value, operation_counts, used_by
+from strapgen.ir.program import Program
+from strapgen.ir.signals import Signal
 from strapgen.support.exceptions import InputError
 
 #: Bits that inputs may be stored below their finest format, so that sums of them are exact.

@@ -6,11 +6,11 @@ import math
 from dataclasses import dataclass
 from fractions import Fraction
 
-from strapgen.fixedpoint.formats import Format, finest
 from strapgen.fixedpoint.intervals import Interval
-from strapgen.fixedpoint.settings import Settings
-from strapgen.program import Program
-from strapgen.signal import Signal
+from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.formats import Format, finest
+from strapgen.ir.program import Program
+from strapgen.ir.signals import Signal
 from strapgen.support.exceptions import InputError
 
 

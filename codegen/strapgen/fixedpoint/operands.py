@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from strapgen.fixedpoint.code import Scaled
 from strapgen.fixedpoint.quantities import Operand, is_dyadic
 from strapgen.fixedpoint.quantization_context import Quantization
 from strapgen.fixedpoint.terms import largest_wide, nearest
+from strapgen.ir.integer_program import Scaled
 from strapgen.support.exceptions import InputError
 
 

@@ -39,7 +39,7 @@ from strapgen.fixedpoint.quantities import (
     combined,
     scaled,
 )
-from strapgen.program import Node, Operation, Reference
+from strapgen.ir.program import Node, Operation, Reference
 from strapgen.support.exceptions import InputError
 
 #: Functions on samples.

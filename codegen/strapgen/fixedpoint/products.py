@@ -25,7 +25,7 @@ from strapgen.fixedpoint.quantities import (
     is_power_of_two,
     scaled,
 )
-from strapgen.program import RESOLUTION, Constant, Node, Reference
+from strapgen.ir.program import RESOLUTION, Constant, Node, Reference
 
 #: Operations that a sum of products is made of.
 SUM_OPERATIONS = ("add", "subtract", "negate", "multiply")

@@ -7,13 +7,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from strapgen.fixedpoint.code import IntegerDefinition, Value
 from strapgen.fixedpoint.format_plan import FormatPlan
-from strapgen.fixedpoint.formats import ROUNDINGS, Format
 from strapgen.fixedpoint.quantities import InputElement, Quantities, Quantity, Sum, used_by
-from strapgen.fixedpoint.settings import Settings
 from strapgen.fixedpoint.terms import up
-from strapgen.program import Program
+from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.formats import ROUNDINGS, Format
+from strapgen.ir.integer_program import IntegerDefinition, Value
+from strapgen.ir.program import Program
 from strapgen.support.exceptions import InputError
 
 #: Part of the smaller end of a checked range that an error may take, so that proper input passes the check.

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from fractions import Fraction
 
-from strapgen.fixedpoint.code import IntegerQuotient, IntegerRoot, Scaled
-from strapgen.fixedpoint.formats import finest
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.fixedpoint.operands import at_one_fraction
 from strapgen.fixedpoint.quantities import Quantity, Quotient, SquareRoot
 from strapgen.fixedpoint.quantization_context import Quantization, integer_value
 from strapgen.fixedpoint.sums import word_of
 from strapgen.fixedpoint.terms import largest_wide
+from strapgen.ir.formats import finest
+from strapgen.ir.integer_program import IntegerQuotient, IntegerRoot, Scaled
 
 
 def lower_quotient(context: Quantization, quantity: Quantity, definition: Quotient) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapgen.fixedpoint.intervals import Interval
-from strapgen.signal import Signal
+from strapgen.ir.signals import Signal
 
 _COUNT = 500
 

@@ -7,10 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
-from strapgen.fixedpoint.code import IntegerSum, Term, Value
 from strapgen.fixedpoint.format_plan import carried_input
-from strapgen.fixedpoint.formats import Format, finest
-from strapgen.fixedpoint.interface import ErrorFeedback
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.fixedpoint.quantities import (
     Monomial,
@@ -22,6 +19,9 @@ from strapgen.fixedpoint.quantities import (
 )
 from strapgen.fixedpoint.quantization_context import Quantization, integer_value
 from strapgen.fixedpoint.terms import Aligned, Placed, aligned, largest_wide, nearest, up
+from strapgen.ir.fixed_interface import ErrorFeedback
+from strapgen.ir.formats import Format, finest
+from strapgen.ir.integer_program import IntegerSum, Term, Value
 from strapgen.support.exceptions import InputError
 
 

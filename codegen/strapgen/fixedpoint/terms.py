@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
-from strapgen.fixedpoint.code import Term, Value
 from strapgen.fixedpoint.intervals import GRID
+from strapgen.ir.integer_program import Term, Value
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import count
 
+from strapgen.ir.program import Assignment, Node, Program, Reference, Result
 from strapgen.kernel import Kernel, Stage
 from strapgen.lowering import canonical
 from strapgen.lowering.gate import gate
@@ -19,7 +20,6 @@ from strapgen.lowering.irrational import rationalized
 from strapgen.lowering.passes import PASSES, cost, optimize
 from strapgen.lowering.passes.rewriting import rewritten
 from strapgen.lowering.share import share
-from strapgen.program import Assignment, Node, Program, Reference, Result
 
 __all__ = ["PASSES", "candidates", "lower"]
 

@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterable
 from fractions import Fraction
 from typing import Any
 
+from strapgen.ir.program import Constant, Node, Operation
 from strapgen.lowering.polynomials import Polynomial
-from strapgen.program import Constant, Node, Operation
 
 #: A sign, True for plus, and the node that is added or subtracted.
 Term = tuple[bool, Node]
@@ -103,7 +103,7 @@ def horner(polynomial: Polynomial, node: Callable[[Any], Node]) -> Term:
 
     Examples
     --------
-    >>> from strapgen.program import Reference
+    >>> from strapgen.ir.program import Reference
     >>> p = {("x", "x"): Fraction(1, 2), ("x", "y"): Fraction(1), (): Fraction(1)}
     >>> positive, tree = horner(p, Reference)
     >>> operation_count(tree)

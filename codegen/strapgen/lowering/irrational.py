@@ -27,7 +27,7 @@ def rationalized(kernel: Kernel) -> Kernel:
     Examples
     --------
     >>> from strapgen.kernel import KernelBuilder
-    >>> from strapgen.signal import Signal
+    >>> from strapgen.ir.signals import Signal
     >>> build = KernelBuilder()
     >>> x = build.scalar(Signal.scalar("x"))
     >>> _ = build.output(Signal.scalar("y"), [sp.sqrt(2) * x + 1])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import count
 
-from strapgen.program import Program
+from strapgen.ir.program import Program
 
 #: Prefix of the temporaries that hold common subexpressions.
 SHARED = "shared_"

@@ -6,11 +6,12 @@ from dataclasses import replace
 from importlib import import_module
 from typing import NamedTuple
 
-from strapgen.fixedpoint import FixedProgram, Settings
-from strapgen.program import Program
+from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.integer_program import FixedProgram
+from strapgen.ir.program import Program
+from strapgen.ir.sources import Function, Sources
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
-from strapgen.targets.sources import Function, Sources
 
 __all__ = ["FIXED", "TARGETS", "Function", "Sources", "Target", "emit"]
 

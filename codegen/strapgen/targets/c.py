@@ -7,12 +7,12 @@ from fractions import Fraction
 
 import numpy as np
 
-from strapgen.program import Operation, Program, walk
-from strapgen.signal import Signal
+from strapgen.ir.program import Operation, Program, walk
+from strapgen.ir.signals import Signal
+from strapgen.ir.sources import Function, Sources
 from strapgen.targets.names import C, external, printed
 from strapgen.targets.printer import Printer, fill_expression
 from strapgen.targets.rendering import render
-from strapgen.targets.sources import Function, Sources
 
 
 @dataclass(frozen=True)

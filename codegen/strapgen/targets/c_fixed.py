@@ -8,8 +8,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from strapgen.fixedpoint import FixedProgram, Settings, quantize
-from strapgen.fixedpoint.code import (
+from strapgen.fixedpoint import quantize
+from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.integer_program import (
+    FixedProgram,
     IntegerMaximum,
     IntegerQuotient,
     IntegerRoot,
@@ -20,12 +22,12 @@ from strapgen.fixedpoint.code import (
     Value,
     used_by,
 )
-from strapgen.program import Program
+from strapgen.ir.program import Program
+from strapgen.ir.sources import Function, Sources
 from strapgen.support.exceptions import InputError
 from strapgen.targets.names import C, external, printed
 from strapgen.targets.printer import fill_expression
 from strapgen.targets.rendering import render
-from strapgen.targets.sources import Function, Sources
 
 
 @dataclass(frozen=True)

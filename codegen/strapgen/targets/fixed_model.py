@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from strapgen.fixedpoint import FixedProgram, Settings, quantize
-from strapgen.fixedpoint.code import (
+from strapgen.fixedpoint import quantize
+from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.integer_program import (
+    FixedProgram,
     IntegerMaximum,
     IntegerQuotient,
     IntegerRoot,
@@ -15,10 +17,10 @@ from strapgen.fixedpoint.code import (
     Term,
     Value,
 )
-from strapgen.program import Program
+from strapgen.ir.program import Program
+from strapgen.ir.sources import Function, Sources
 from strapgen.targets.names import PYTHON, printed
 from strapgen.targets.rendering import render
-from strapgen.targets.sources import Function, Sources
 
 
 def emit(program: Program | FixedProgram, target: str, settings: Settings | None = None) -> Sources:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from strapgen.fixedpoint import FixedProgram
-from strapgen.fixedpoint.code import Value
-from strapgen.fixedpoint.interface import Argument, ErrorFeedback, RoundingAccumulation
-from strapgen.fixedpoint.settings import DEFAULT_ALLOWANCE, DEFAULT_ANGLE, Settings
-from strapgen.program import Program
+from strapgen.ir.fixed_interface import Argument, ErrorFeedback, RoundingAccumulation
+from strapgen.ir.fixed_settings import DEFAULT_ALLOWANCE, DEFAULT_ANGLE, Settings
+from strapgen.ir.integer_program import FixedProgram, Value
+from strapgen.ir.program import Program
 
 
 def argument_text(argument: Argument) -> str:

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from itertools import count
 from typing import TypeVar
 
-from strapgen.fixedpoint import FixedProgram
-from strapgen.program import Program
+from strapgen.ir.integer_program import FixedProgram
+from strapgen.ir.program import Program
 from strapgen.targets.c_library import LIBRARY
 from strapgen.targets.renaming import Key, keys, renamed
 

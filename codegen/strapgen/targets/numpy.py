@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from strapgen.program import Operation, Program, Reference, walk
+from strapgen.ir.program import Operation, Program, Reference, walk
+from strapgen.ir.sources import Function, Sources
 from strapgen.targets.names import PYTHON, printed
 from strapgen.targets.printer import Printer, fill_expression
 from strapgen.targets.rendering import render
-from strapgen.targets.sources import Function, Sources
 
 _FUNCTIONS = {
     "sqrt": "np.sqrt({})",

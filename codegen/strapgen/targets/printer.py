@@ -6,8 +6,8 @@ import re
 import textwrap
 from fractions import Fraction
 
-from strapgen.program import DOUBLE_RESOLUTION, RESOLUTION, Constant, Node, Program, Reference
-from strapgen.signal import Signal
+from strapgen.ir.program import DOUBLE_RESOLUTION, RESOLUTION, Constant, Node, Program, Reference
+from strapgen.ir.signals import Signal
 
 _SUM, _PRODUCT, _UNARY, _ATOM = range(4)
 

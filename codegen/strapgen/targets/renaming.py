@@ -6,8 +6,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import NamedTuple, TypeVar
 
-from strapgen.fixedpoint import FixedProgram
-from strapgen.fixedpoint.code import (
+from strapgen.ir.fixed_interface import Argument, ErrorFeedback, Interface
+from strapgen.ir.integer_program import (
+    FixedProgram,
     IntegerDefinition,
     IntegerInput,
     IntegerMaximum,
@@ -19,9 +20,8 @@ from strapgen.fixedpoint.code import (
     Term,
     Value,
 )
-from strapgen.fixedpoint.interface import Argument, ErrorFeedback, Interface
-from strapgen.program import Assignment, Node, Operation, Program, Reference, Result
-from strapgen.signal import Signal
+from strapgen.ir.program import Assignment, Node, Operation, Program, Reference, Result
+from strapgen.ir.signals import Signal
 
 _P = TypeVar("_P", Program, FixedProgram)
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from strapgen.fixedpoint.interface import Argument
-from strapgen.recursion import Recursion
-from strapgen.signal import Signal
+from strapgen.ir.fixed_interface import Argument
+from strapgen.ir.recursion import Recursion
+from strapgen.ir.signals import Signal
+from strapgen.ir.sources import Function, Sources
 from strapgen.targets.c import REALS
 from strapgen.targets.c_fixed import WORDS
 from strapgen.targets.rendering import render
-from strapgen.targets.sources import Function, Sources
 
 #: What the loops are called, from the fastest.
 LOOPS = ("fast", "slow", "navigation")

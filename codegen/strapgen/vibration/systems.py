@@ -13,9 +13,9 @@ import sympy as sp
 from strapgen import catalogue
 from strapgen.algebra import exact
 from strapgen.catalogue import Choice
+from strapgen.ir.signals import Signal
 from strapgen.kernel import Kernel
 from strapgen.powers import Powers
-from strapgen.signal import Signal
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.vibration.expansion import Expander, Expansion, Number

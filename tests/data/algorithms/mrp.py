@@ -8,9 +8,9 @@ from strapgen import algebra
 from strapgen.catalogue.runge_kutta import advance
 from strapgen.catalogue.steps import Samples
 from strapgen.catalogue.tableaux import TABLEAUX
-from strapgen.companions import Companions
+from strapgen.ir.attitude_step import Companions
+from strapgen.ir.signals import Signal
 from strapgen.kernel import KernelBuilder
-from strapgen.signal import Signal
 
 SOURCE = "M. D. Shuster, J. Astronaut. Sci. 41 (1993) 439-517"
 STATE = Signal.vector(

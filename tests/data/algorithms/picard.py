@@ -5,9 +5,9 @@ from fractions import Fraction
 from strapgen.algebra import cross
 from strapgen.catalogue.kinematics import EULER
 from strapgen.catalogue.steps import increments_signal
-from strapgen.companions import Companions
+from strapgen.ir.attitude_step import Companions
+from strapgen.ir.signals import Signal
 from strapgen.kernel import KernelBuilder
-from strapgen.signal import Signal
 
 
 def algorithm():

@@ -8,10 +8,10 @@ from derived import kernel, program
 
 from strapgen import catalogue
 from strapgen.catalogue import ALGORITHMS, STANDARD_METHODS, Choice
+from strapgen.ir.program import Program
 from strapgen.lowering import candidates, canonical, lower
 from strapgen.lowering.names import is_temporary
 from strapgen.lowering.passes import optimize
-from strapgen.program import Program
 
 STEPS = [Choice(a, m, n) for a in ALGORITHMS for m in STANDARD_METHODS for n in (1, 2, 3, 4, 5, None)]
 #: Three increments and more have the vectors of rates at three nodes, and more inputs: with the long tests.

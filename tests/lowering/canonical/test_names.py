@@ -10,10 +10,10 @@ import sympy as sp
 from strapgen import algebra
 from strapgen.catalogue.kinematics import EULER
 from strapgen.catalogue.steps import increments_signal
-from strapgen.companions import Companions
+from strapgen.ir.attitude_step import Companions
+from strapgen.ir.signals import Signal
 from strapgen.kernel import Kernel, KernelBuilder
 from strapgen.lowering import lower
-from strapgen.signal import Signal
 
 
 def two_sample(stage: str, prefix: str, transition: tuple[str, ...], increments: tuple[str, str]) -> Kernel:

@@ -7,11 +7,11 @@ import pytest
 import sympy as sp
 
 from strapgen.algebra import cross, dot, quaternion_product, skew
+from strapgen.ir.program import Program
+from strapgen.ir.signals import Signal
 from strapgen.kernel import Kernel, KernelBuilder
 from strapgen.lowering import candidates, canonical, lower
 from strapgen.lowering.passes import cost, optimize
-from strapgen.program import Program
-from strapgen.signal import Signal
 
 #: Elements of state and increment of a step from one.
 NAMES = ("e_x", "e_y", "e_z", "e_s", "d1_x", "d1_y", "d1_z")

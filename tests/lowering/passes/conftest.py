@@ -8,7 +8,7 @@ from fractions import Fraction
 
 import pytest
 
-from strapgen.program import (
+from strapgen.ir.program import (
     OPERATIONS,
     Assignment,
     Constant,
@@ -19,7 +19,7 @@ from strapgen.program import (
     Result,
     references,
 )
-from strapgen.signal import Signal
+from strapgen.ir.signals import Signal
 
 INFIX = {"add": ast.Add(), "subtract": ast.Sub(), "multiply": ast.Mult(), "divide": ast.Div()}
 KINDS = {type(operator): kind for kind, operator in INFIX.items()}

@@ -2,8 +2,8 @@
 
 import pytest
 
+from strapgen.ir.program import Constant, Reference
 from strapgen.lowering.passes import drop_copies
-from strapgen.program import Constant, Reference
 
 
 def test_a_copy_is_replaced_by_what_it_was_copied_from(parse, show):

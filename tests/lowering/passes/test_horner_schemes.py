@@ -2,8 +2,8 @@
 
 import pytest
 
+from strapgen.ir.program import Program
 from strapgen.lowering.passes import horner_schemes
-from strapgen.program import Program
 
 
 def operations(program: Program) -> tuple[int, int]:

@@ -7,9 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from strapgen.lowering.names import FACTOR, SHARED, is_temporary
-from strapgen.lowering.passes import PASSES, cost, optimize, remove_unused
-from strapgen.program import (
+from strapgen.ir.program import (
     Assignment,
     Constant,
     Node,
@@ -20,7 +18,9 @@ from strapgen.program import (
     references,
     walk,
 )
-from strapgen.signal import Signal
+from strapgen.ir.signals import Signal
+from strapgen.lowering.names import FACTOR, SHARED, is_temporary
+from strapgen.lowering.passes import PASSES, cost, optimize, remove_unused
 
 INPUTS = ("x", "y", "z")
 EVERY = pytest.mark.parametrize("run", PASSES, ids=lambda run: run.__name__)

@@ -8,11 +8,11 @@ from typing import Any
 
 import sympy as sp
 
+from strapgen.ir.program import Program
+from strapgen.ir.signals import Signal
 from strapgen.kernel import Kernel, Stage, evaluate_stages
 from strapgen.lowering.canonical.decomposition import Decomposition, Frame, NotCovariantError
 from strapgen.lowering.canonical.vectors import Form, components, independent
-from strapgen.program import Program
-from strapgen.signal import Signal
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 from strapgen.algebra import CROSS
+from strapgen.ir.program import Assignment, Constant, Node, Operation, Reference
 from strapgen.lowering.arithmetic import (
     Term,
     chain,
@@ -20,7 +21,6 @@ from strapgen.lowering.arithmetic import (
 from strapgen.lowering.canonical.plan import Cross, Plan, Sides, Weighted
 from strapgen.lowering.canonical.products import choose_products
 from strapgen.lowering.polynomials import Polynomial, ratio
-from strapgen.program import Assignment, Constant, Node, Operation, Reference
 
 #: A summand of a vector: its coefficient, its weight unless that is a number, and the name of the vector.
 _Summand = tuple[Fraction, Reference | None, str]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from strapgen.ir.program import Program
 from strapgen.lowering.passes.absorb_negations import absorb_negations
 from strapgen.lowering.passes.drop_copies import drop_copies
 from strapgen.lowering.passes.fold_constants import fold_constants
@@ -11,7 +12,6 @@ from strapgen.lowering.passes.horner_schemes import horner_schemes
 from strapgen.lowering.passes.remove_unused import remove_unused
 from strapgen.lowering.passes.reuse_values import reuse_values
 from strapgen.lowering.passes.share_pairs import share_pairs
-from strapgen.program import Program
 
 Pass = Callable[[Program], Program]
 

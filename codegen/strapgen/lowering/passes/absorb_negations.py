@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from strapgen.ir.program import Constant, Node, Operation, Program, Reference
 from strapgen.lowering.names import is_temporary
 from strapgen.lowering.passes.rewriting import rewritten, with_values
-from strapgen.program import Constant, Node, Operation, Program, Reference
 
 _EVEN = ("cos", "sinc")
 
@@ -16,8 +16,8 @@ def absorb_negations(program: Program) -> Program:
 
     Examples
     --------
-    >>> from strapgen.program import Assignment, Result
-    >>> from strapgen.signal import Signal
+    >>> from strapgen.ir.program import Assignment, Result
+    >>> from strapgen.ir.signals import Signal
     >>> minus = Operation("negate", (Reference("a"),))
     >>> body = (Assignment("c", Operation("add", (minus, Reference("b")))),)
     >>> result = Result(Signal.scalar("c"), (Reference("c"),))

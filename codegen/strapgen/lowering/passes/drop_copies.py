@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from strapgen.ir.program import Constant, Node, Program, Reference, Result
 from strapgen.lowering.names import is_temporary
 from strapgen.lowering.passes.rewriting import rewritten
-from strapgen.program import Constant, Node, Program, Reference, Result
 
 
 def drop_copies(program: Program) -> Program:

@@ -11,9 +11,9 @@ from collections import defaultdict
 from dataclasses import replace
 from fractions import Fraction
 
+from strapgen.ir.program import OPERATIONS, Constant, Node, Operation, Program, Reference, references, walk
 from strapgen.lowering.names import is_temporary
 from strapgen.lowering.passes.rewriting import rewritten, uses, with_values
-from strapgen.program import OPERATIONS, Constant, Node, Operation, Program, Reference, references, walk
 
 _EXACT = ("add", "subtract", "multiply", "divide", "negate")
 
@@ -23,8 +23,8 @@ def fold_constants(program: Program) -> Program:
 
     Examples
     --------
-    >>> from strapgen.program import Assignment, Result
-    >>> from strapgen.signal import Signal
+    >>> from strapgen.ir.program import Assignment, Result
+    >>> from strapgen.ir.signals import Signal
     >>> third = Operation("divide", (Reference("x"), Constant(Fraction(3))))
     >>> body = (Assignment("y", Operation("multiply", (Constant(Fraction(6)), third))),)
     >>> x, y = Signal.scalar("x"), Result(Signal.scalar("y"), (Reference("y"),))

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from fractions import Fraction
 
+from strapgen.ir.program import Constant, Node, Operation, Program
 from strapgen.lowering.arithmetic import horner, operation_count, plain
 from strapgen.lowering.passes.rewriting import with_values
 from strapgen.lowering.polynomials import ONE, Polynomial, add, atom, multiply, scale
-from strapgen.program import Constant, Node, Operation, Program
 
 #: Most terms of a polynomial that is rewritten: expanding a longer one takes long and saves no operations.
 _MOST_TERMS = 60
@@ -20,8 +20,8 @@ def horner_schemes(program: Program) -> Program:
 
     Examples
     --------
-    >>> from strapgen.program import Assignment, Reference, Result
-    >>> from strapgen.signal import Signal
+    >>> from strapgen.ir.program import Assignment, Reference, Result
+    >>> from strapgen.ir.signals import Signal
     >>> x, y, z = map(Reference, "xyz")
     >>> value = Operation("add", (Operation("multiply", (x, y)), Operation("multiply", (x, z))))
     >>> signals = tuple(map(Signal.scalar, "xyz"))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from strapgen.program import Program
+from strapgen.ir.program import Program
 
 
 def remove_unused(program: Program) -> Program:

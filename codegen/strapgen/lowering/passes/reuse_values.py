@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import replace
 
+from strapgen.ir.program import Assignment, Node, Operation, Program, Reference
 from strapgen.lowering.names import shared_names
-from strapgen.program import Assignment, Node, Operation, Program, Reference
 
 
 def reuse_values(program: Program) -> Program:

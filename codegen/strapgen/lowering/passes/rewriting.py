@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 
-from strapgen.program import Node, Operation, Program, references
+from strapgen.ir.program import Node, Operation, Program, references
 
 
 def rewritten(node: Node, rule: Callable[[Node], Node]) -> Node:

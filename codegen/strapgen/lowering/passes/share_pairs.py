@@ -11,10 +11,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import combinations
 
+from strapgen.ir.program import Assignment, Node, Operation, Program, Reference, references
 from strapgen.lowering.arithmetic import Term, chain, plain, signed_sum
 from strapgen.lowering.names import is_temporary, shared_names
 from strapgen.lowering.passes.rewriting import rewritten, uses
-from strapgen.program import Assignment, Node, Operation, Program, Reference, references
 
 #: The kind of the sum or product, two members, and whether their signs are equal; those of factors always are.
 _Pair = tuple[str, Node, Node, bool]
@@ -33,8 +33,8 @@ def share_pairs(program: Program) -> Program:
 
     Examples
     --------
-    >>> from strapgen.program import Result
-    >>> from strapgen.signal import Signal
+    >>> from strapgen.ir.program import Result
+    >>> from strapgen.ir.signals import Signal
     >>> a, b, c, d = map(Reference, "abcd")
     >>> sums = [chain("add", [a, b, c]), chain("add", [a, d, b])]
     >>> body = tuple(Assignment(name, value) for name, value in zip("rs", sums))

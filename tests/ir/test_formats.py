@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from strapgen.fixedpoint import Format, Settings
-from strapgen.fixedpoint.formats import finest
+from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.formats import Format, finest
 from strapgen.support.exceptions import InputError
 
 

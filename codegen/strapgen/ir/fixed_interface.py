@@ -8,9 +8,9 @@ from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from typing import Any
 
-from strapgen.fixedpoint.formats import Format
-from strapgen.fixedpoint.settings import Settings
-from strapgen.signal import Signal
+from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.formats import Format
+from strapgen.ir.signals import Signal
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any
 
-from strapgen.fixedpoint.formats import Format, check_rounding, check_word
+from strapgen.ir.formats import Format, check_rounding, check_word
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 

@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import pytest
 
-from strapgen.signal import Signal
+from strapgen.ir.signals import Signal
 
 
 def test_a_matrix_names_its_elements_row_by_row():

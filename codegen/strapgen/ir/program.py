@@ -14,9 +14,9 @@ from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
-from strapgen.companions import Companions
-from strapgen.recursion import Recursion
-from strapgen.signal import Signal
+from strapgen.ir.attitude_step import Companions
+from strapgen.ir.recursion import Recursion
+from strapgen.ir.signals import Signal
 
 
 @dataclass(frozen=True)

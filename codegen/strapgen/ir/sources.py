@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from strapgen.companions import Companions
-from strapgen.fixedpoint import Interface
-from strapgen.program import Program
-from strapgen.recursion import Recursion
-from strapgen.signal import Signal
+from strapgen.ir.attitude_step import Companions
+from strapgen.ir.fixed_interface import Interface
+from strapgen.ir.program import Program
+from strapgen.ir.recursion import Recursion
+from strapgen.ir.signals import Signal
 
 
 @dataclass(frozen=True)

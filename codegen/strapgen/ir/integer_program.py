@@ -11,9 +11,9 @@ from dataclasses import asdict, dataclass
 from fractions import Fraction
 from typing import Any
 
-from strapgen.fixedpoint.formats import Format
-from strapgen.fixedpoint.interface import ErrorFeedback, Interface
-from strapgen.program import Program
+from strapgen.ir.fixed_interface import ErrorFeedback, Interface
+from strapgen.ir.formats import Format
+from strapgen.ir.program import Program
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import pytest
 
-from strapgen.program import (
+from strapgen.ir.program import (
     COUNTED_AS,
     OPERATIONS,
     Assignment,
@@ -18,7 +18,7 @@ from strapgen.program import (
     references,
     walk,
 )
-from strapgen.signal import Signal
+from strapgen.ir.signals import Signal
 
 X, Y = Reference("x"), Reference("y")
 SUM = Operation("add", (X, Y))

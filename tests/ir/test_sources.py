@@ -15,9 +15,11 @@ from gathering import each
 from strapgen import pipeline
 from strapgen.catalogue import standard
 from strapgen.cli import main
-from strapgen.fixedpoint import Settings, can_lower
+from strapgen.fixedpoint import can_lower
+from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.sources import Sources
 from strapgen.support.exceptions import InputError
-from strapgen.targets import FIXED, TARGETS, Sources, emit
+from strapgen.targets import FIXED, TARGETS, emit
 
 KERNELS = [choice.kernel for choice in standard()]
 

@@ -1,0 +1,1 @@
+"""What the stages exchange: signals, programs, integer programs, sources. No SymPy."""
