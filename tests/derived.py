@@ -13,7 +13,7 @@ from strapgen.backends import BACKENDS, fitted
 from strapgen.catalogue import Choice
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
-from strapgen.kernel import Kernel
+from strapgen.symbolic.kernel import Kernel
 
 
 @cache

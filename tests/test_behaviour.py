@@ -60,7 +60,7 @@ from strapgen import algebra
 from strapgen.catalogue.kinematics import EULER
 from strapgen.catalogue.steps import increments_signal
 from strapgen.ir.attitude_step import Companions
-from strapgen.kernel import KernelBuilder
+from strapgen.symbolic.kernel import KernelBuilder
 from strapgen.ir.order import Order
 
 def algorithm():

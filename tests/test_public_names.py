@@ -124,7 +124,7 @@ SCRIPT = """
     kernel = strapgen.derive("euler", strapgen.TABLEAUX["rk4"], 2)
     backend = strapgen.build(strapgen.generate(strapgen.lower(kernel), "c"))
     run = strapgen.simulate(backend, strapgen.motion("constant", x_deg_s=1), "0.1", 1)
-    reveal_type(kernel)  # strapgen.kernel.Kernel
+    reveal_type(kernel)  # strapgen.symbolic.kernel.Kernel
     reveal_type(backend)  # strapgen.backends.protocol.Backend
     reveal_type(run)  # strapgen.simulation.Run
     reveal_type(strapgen.compare)  # def (

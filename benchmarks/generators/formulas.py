@@ -10,7 +10,7 @@ from strapgen.catalogue.kinematics import KINEMATICS
 from strapgen.catalogue.runge_kutta import method, staged_step
 from strapgen.catalogue.steps import step
 from strapgen.catalogue.tableaux import TABLEAUX
-from strapgen.kernel import Kernel
+from strapgen.symbolic.kernel import Kernel
 
 
 def kernel(case: Case) -> Kernel:

@@ -11,7 +11,6 @@ __version__ = "0.1.0"
 
 # For type checkers; a test holds it against the table below, from which Python loads a name when it is first used.
 if _typing.TYPE_CHECKING:
-    from strapgen import algebra as algebra
     from strapgen import exact as exact
     from strapgen import formulas as formulas
     from strapgen import gyro as gyro
@@ -50,10 +49,6 @@ if _typing.TYPE_CHECKING:
     from strapgen.ir.recursion import Recursion as Recursion
     from strapgen.ir.signals import Signal as Signal
     from strapgen.ir.sources import Sources as Sources
-    from strapgen.kernel import Kernel as Kernel
-    from strapgen.kernel import KernelBuilder as KernelBuilder
-    from strapgen.kernel import Stage as Stage
-    from strapgen.kernel import resolution as resolution
     from strapgen.motions import Motion as Motion
     from strapgen.motions import motion as motion
     from strapgen.pipeline import build as build
@@ -77,6 +72,11 @@ if _typing.TYPE_CHECKING:
     from strapgen.support.exceptions import InputTypeError as InputTypeError
     from strapgen.support.exceptions import MissingExtraError as MissingExtraError
     from strapgen.support.exceptions import StrapgenError as StrapgenError
+    from strapgen.symbolic import rotations as algebra
+    from strapgen.symbolic.kernel import Kernel as Kernel
+    from strapgen.symbolic.kernel import KernelBuilder as KernelBuilder
+    from strapgen.symbolic.kernel import Stage as Stage
+    from strapgen.symbolic.kernel import resolution as resolution
     from strapgen.targets import TARGETS as TARGETS
     from strapgen.two_speed import TwoSpeed as TwoSpeed
 
@@ -129,12 +129,6 @@ _NAMES = {
     "ir.recursion": ("Recursion",),
     "ir.signals": ("Signal",),
     "ir.sources": ("Sources",),
-    "kernel": (
-        "Kernel",
-        "KernelBuilder",
-        "Stage",
-        "resolution",
-    ),
     "motions": (
         "Motion",
         "motion",
@@ -170,12 +164,18 @@ _NAMES = {
         "MissingExtraError",
         "StrapgenError",
     ),
+    "symbolic.kernel": (
+        "Kernel",
+        "KernelBuilder",
+        "Stage",
+        "resolution",
+    ),
     "targets": ("TARGETS",),
     "two_speed": ("TwoSpeed",),
 }
 #: Modules whose functions belong together, by the names that they have here.
 _NAMESPACES = {
-    "algebra": "algebra",
+    "algebra": "symbolic.rotations",
     "exact": "exact",
     "formulas": "formulas",
     "gyro": "gyro",

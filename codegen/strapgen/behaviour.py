@@ -19,10 +19,10 @@ from strapgen.convergence import GENERAL, converge, interpreter, step_of_increme
 from strapgen.gyro import windows
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.program import Program
-from strapgen.kernel import Kernel
 from strapgen.motions import motion
 from strapgen.simulation import attitude, drift_between, simulate
 from strapgen.support.exceptions import CompilerError, InputError
+from strapgen.symbolic.kernel import Kernel
 
 #: How far an observed order may be from the one of theory.
 ORDER_WITHIN = 0.15

@@ -28,7 +28,7 @@ from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.targets import FIXED
 
 if TYPE_CHECKING:
-    from strapgen.kernel import Kernel
+    from strapgen.symbolic.kernel import Kernel
 
 #: Arithmetic of many digits, where a back end is named.
 EXACT = "exact"

@@ -10,7 +10,7 @@ from typing import Any
 import sympy as sp
 
 from strapgen.ir.program import Program
-from strapgen.kernel import Kernel, Stage
+from strapgen.symbolic.kernel import Kernel, Stage
 from strapgen.targets.printer import Printer, operations_text
 
 

@@ -32,7 +32,7 @@ from strapgen.support.exceptions import InputTypeError
 if TYPE_CHECKING:
     from strapgen.backends import Backend
     from strapgen.catalogue.tableaux import Tableau
-    from strapgen.kernel import Kernel
+    from strapgen.symbolic.kernel import Kernel
 
 
 def derive(
@@ -103,8 +103,8 @@ def lower(kernel: Kernel) -> Program:
     >>> lower(derive("euler")).operations["divide"]
     0
     """
-    from strapgen.kernel import Kernel
     from strapgen.lowering import lower as lower_kernel
+    from strapgen.symbolic.kernel import Kernel
 
     stages.require("lower", kernel, Kernel)
     return replace(lower_kernel(kernel), own=tuple(map(lower_kernel, kernel.own)))

@@ -13,7 +13,7 @@ from strapgen import exact, lower
 from strapgen.analysis import invariants
 from strapgen.analysis.one_step import errors, step
 from strapgen.catalogue import ALGORITHMS, Choice, choose, derive
-from strapgen.lowering.canonical.decomposition import Frame
+from strapgen.symbolic.covariants import Frame
 
 CASES = [
     ("rk1", 2, 0),

@@ -11,10 +11,10 @@ import sympy as sp
 from derived import generated
 
 import strapgen
-from strapgen.algebra import Wrapped
 from strapgen.backends import BACKENDS, of_sources
 from strapgen.ir.signals import Signal
-from strapgen.kernel import KernelBuilder, resolution
+from strapgen.symbolic.kernel import KernelBuilder, resolution
+from strapgen.symbolic.rotations import Wrapped
 from strapgen.targets import FIXED
 
 

@@ -19,12 +19,12 @@ from tolerances import one_call
 
 import strapgen
 from strapgen import derive, exact
-from strapgen.algebra import cross_elements
 from strapgen.backends import BACKENDS, evaluator
 from strapgen.catalogue import MOST_INCREMENTS, MOST_PREVIOUS, Choice, choose, coning, coning_methods
 from strapgen.catalogue import rotation_series as series
 from strapgen.catalogue.coning import FORMS, design
 from strapgen.ir.fixed_settings import Settings
+from strapgen.symbolic.rotations import cross_elements
 from strapgen.targets import FIXED
 
 #: Every number of samples, and of those kept.

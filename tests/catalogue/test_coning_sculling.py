@@ -8,8 +8,8 @@ import sympy as sp
 
 import strapgen
 from strapgen import derive
-from strapgen.algebra import cross_elements
 from strapgen.backends import BACKENDS
+from strapgen.symbolic.rotations import cross_elements
 from strapgen.targets import FIXED
 
 RING, T, *SYMBOLS = sp.ring(

@@ -9,7 +9,7 @@ from peano_baker import evaluated, generic_rate, local_error, lowest_difference,
 from strapgen import derive
 from strapgen.catalogue import ALGORITHMS, munthe_kaas
 from strapgen.catalogue.munthe_kaas import bortz
-from strapgen.kernel import evaluate_stages
+from strapgen.symbolic.kernel import evaluate_stages
 
 #: Exact series of many methods: with the long tests.
 pytestmark = pytest.mark.long

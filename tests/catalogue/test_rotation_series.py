@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from peano_baker import Series, generic_rate, lowest_difference, matrix, rotation
 
-from strapgen.algebra import cross_elements, dot
 from strapgen.catalogue import rotation_series
 from strapgen.catalogue.rotation_series import legendre_terms, terms
+from strapgen.symbolic.rotations import cross_elements, dot
 
 
 def vectors(count: int) -> list[list[Fraction]]:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import pytest
 import sympy as sp
 
-from strapgen import algebra, derive
-from strapgen.algebra import cross_elements
+from strapgen import derive
 from strapgen.catalogue.kinematics import EULER
 from strapgen.catalogue.munthe_kaas import bortz
+from strapgen.symbolic import rotations
+from strapgen.symbolic.rotations import cross_elements
 
 A = sp.Symbol("alpha", positive=True)
 #: alpha . w, and the coefficients of the derivative of alpha along w, alpha x w and alpha.
@@ -19,7 +20,7 @@ BRACKET = (1 - A * sp.sin(A) / (2 * (1 - sp.cos(A)))) / A**2
 
 def test_the_quaternion_is_that_of_the_derivation():
     # h = f3 alpha + f4 with f3 = sin(alpha/2)/alpha, f4 = cos(alpha/2): algebra.quaternion along one axis.
-    h = algebra.quaternion(sp.Matrix([A, 0, 0]))
+    h = rotations.quaternion(sp.Matrix([A, 0, 0]))
     assert sp.simplify(h[0].rewrite(sp.sin) - sp.sin(A / 2)) == 0
     assert (h[1], h[2], h[3]) == (0, 0, sp.cos(A / 2))
 
@@ -49,16 +50,16 @@ def test_bortz_equation_is_that_of_the_codes_quaternions():
     # Component by component: the derivative of the quaternion of alpha, where alpha obeys (20), is the product h w / 2
     # of the kinematics, its order and signs included.
     alpha, w = (sp.Matrix(sp.symbols(f"{name}x {name}y {name}z")) for name in "aw")
-    first = algebra.cross(alpha, w)
-    rate = w + first / 2 + BRACKET * algebra.cross(alpha, first)
+    first = rotations.cross(alpha, w)
+    rate = w + first / 2 + BRACKET * rotations.cross(alpha, first)
     f3, f4 = sp.sin(A / 2) / A, sp.cos(A / 2)
-    angle_rate = algebra.dot(alpha, rate) / A
+    angle_rate = rotations.dot(alpha, rate) / A
     derivative = sp.Matrix([*(sp.diff(f3, A) * angle_rate * alpha + f3 * rate), sp.diff(f4, A) * angle_rate])
     wanted = EULER.derivative(sp.Matrix([*(f3 * alpha), f4]), EULER.scale * w)
     for x, y in zip(derivative, wanted, strict=True):
         polynomial = sp.Poly(sp.expand(x - y), *alpha, *w)
         # The square of the last component is what the others leave of the square of the angle.
-        square = sp.Poly(algebra.dot(alpha, alpha) - A**2, *alpha, *w)
+        square = sp.Poly(rotations.dot(alpha, alpha) - A**2, *alpha, *w)
         rest = sp.rem(polynomial, square, alpha[2])
         assert all(sp.simplify(c) == 0 for c in sp.Poly(rest, *alpha, *w).coeffs())
 

@@ -17,7 +17,7 @@ from strapgen.catalogue.rates import step_order
 from strapgen.catalogue.steps import increments_signal, label, labels, turns_signal
 from strapgen.catalogue.tableaux import TABLEAUX, Tableau, read
 from strapgen.ir.order import Order
-from strapgen.kernel import Kernel
+from strapgen.symbolic.kernel import Kernel
 
 ALGORITHM = pytest.mark.parametrize("algorithm", ALGORITHMS)
 

@@ -11,8 +11,8 @@ from derived import precisely
 
 from strapgen import backend, derive, motion, simulate
 from strapgen.catalogue import ALGORITHMS
-from strapgen.kernel import Kernel
 from strapgen.motions import Motion
+from strapgen.symbolic.kernel import Kernel
 
 
 def cone(frequency_hz: float) -> Motion:

@@ -139,7 +139,7 @@ STEP = """
 from fractions import Fraction
 import sympy as sp
 from strapgen.ir.attitude_step import Companions
-from strapgen.kernel import Kernel, KernelBuilder, Stage
+from strapgen.symbolic.kernel import Kernel, KernelBuilder, Stage
 from strapgen.ir.signals import Signal
 
 def algorithm():

@@ -24,7 +24,9 @@ def unit_state(algorithm: str, rng: np.random.Generator) -> np.ndarray:
     return state / np.linalg.norm(state)
 
 
-def exact_step(kernel: strapgen.kernel.Kernel, state: np.ndarray, samples: np.ndarray) -> list[mpmath.mpf]:
+def exact_step(
+    kernel: strapgen.symbolic.kernel.Kernel, state: np.ndarray, samples: np.ndarray
+) -> list[mpmath.mpf]:
     names = [name for signal in kernel.inputs for name in signal.elements]
     numbers = map(mpmath.mpf, [*state.ravel().tolist(), *samples.ravel().tolist()])
     known = precisely(kernel, dict(zip(names, numbers, strict=True)))

@@ -19,7 +19,7 @@ from strapgen.lowering.arithmetic import (
     signed_sum,
     with_constant,
 )
-from strapgen.lowering.polynomials import Polynomial
+from strapgen.symbolic.polynomials import Polynomial
 
 SETTINGS = settings(max_examples=80, derandomize=True, database=None, deadline=None)
 NAMES = "xyz"

@@ -25,7 +25,7 @@ from strapgen.ir import sources
 from strapgen.ir.attitude_step import Companions
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.signals import Signal
-from strapgen.kernel import Kernel, KernelBuilder
+from strapgen.symbolic.kernel import Kernel, KernelBuilder
 from strapgen.targets import c_library, names
 
 STRICT = ("-pedantic", "-Wall", "-Wextra", "-Werror")

@@ -18,9 +18,9 @@ from strapgen import backends, catalogue, derive, exact, gyro, lower, vibration
 from strapgen.catalogue import coning
 from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import Signal, after
-from strapgen.kernel import KernelBuilder
 from strapgen.simulation import attitude
 from strapgen.support.exceptions import InputError, InputTypeError
+from strapgen.symbolic.kernel import KernelBuilder
 from strapgen.two_speed import TwoSpeed
 from strapgen.vibration import systems
 from strapgen.vibration.mean_rates import D_Y, PARTS, PHI, THETA_X, THETA_Y

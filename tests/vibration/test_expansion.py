@@ -7,8 +7,8 @@ import sympy as sp
 
 from strapgen import derive
 from strapgen.ir.signals import Signal
-from strapgen.kernel import KernelBuilder
 from strapgen.support.exceptions import InputError
+from strapgen.symbolic.kernel import KernelBuilder
 from strapgen.vibration.expansion import Expander
 
 X, Y = sp.symbols("x y", real=True)

@@ -13,14 +13,15 @@ from typing import Any
 
 import sympy as sp
 
-from strapgen import algebra, catalogue
+from strapgen import catalogue
 from strapgen.analysis import one_step
 from strapgen.analysis.error_rate import ErrorRate, error_rate
 from strapgen.analysis.motion_rates import TIME, is_plain
 from strapgen.analysis.series import MOST_TERMS, STEP
 from strapgen.catalogue import Choice
-from strapgen.powers import Powers
 from strapgen.support import checks
+from strapgen.symbolic import rotations
+from strapgen.symbolic.power_series import Powers
 
 
 @dataclass(frozen=True)
@@ -156,9 +157,9 @@ def _drift(matrix: sp.Matrix) -> sp.Matrix:
 
 def _swing(drift: sp.Matrix, axis: sp.Matrix) -> sp.Matrix:
     """Return the integral of a drift rate that turns with a frame, without its component along the axis."""
-    square = algebra.dot(axis, axis)
-    across = drift - algebra.dot(drift, axis) / square * axis
-    turned = algebra.cross(axis, drift)
+    square = rotations.dot(axis, axis)
+    across = drift - rotations.dot(drift, axis) / square * axis
+    turned = rotations.cross(axis, drift)
     length = sp.sqrt(sp.expand(square))
     return across.applyfunc(_short) * sp.sin(length * TIME) / length + turned.applyfunc(_short) * (
         1 - sp.cos(length * TIME)
@@ -197,9 +198,9 @@ def _eigenvalue(error: ErrorRate, top: int) -> dict[int, tuple[sp.Expr, sp.Expr]
         (m[i][i] * m[j][j] - m[i][j] * m[j][i] for i, j in ((0, 1), (0, 2), (1, 2))),
         Powers(extended, {}, top),
     )
-    determinant = algebra.dot(m[0], algebra.cross_elements(m[1], m[2]))
+    determinant = rotations.dot(m[0], rotations.cross_elements(m[1], m[2]))
     axis = [extended.from_expr(sp.expand(x)) for x in error.axis]
-    square = algebra.dot(axis, axis)
+    square = rotations.dot(axis, axis)
     value = Powers(extended, {0: y}, top)
     known = 1 / (2 * square.as_expr())
     shifts: dict[int, tuple[sp.Expr, sp.Expr]] = {}

@@ -14,15 +14,16 @@ from typing import Any
 import mpmath
 import sympy as sp
 
-from strapgen import algebra, catalogue, exact
+from strapgen import catalogue, exact
 from strapgen.analysis import one_step
 from strapgen.analysis.motion_rates import CONSTANT
 from strapgen.analysis.prediction import Matrix, Prediction, Transfer, follow
 from strapgen.analysis.series import PARTS, STEP
 from strapgen.catalogue import Choice
-from strapgen.kernel import Kernel, evaluate_stages
 from strapgen.motions import Motion
-from strapgen.powers import Powers, constant, field, function
+from strapgen.symbolic import rotations
+from strapgen.symbolic.kernel import Kernel, evaluate_stages
+from strapgen.symbolic.power_series import Powers, constant, field, function
 
 #: The angle of a step, |w| h.
 ANGLE = sp.Symbol("x", positive=True)
@@ -100,7 +101,7 @@ class ConstantRate:
                 return constant(ring, value, top)
 
             cosine, sine = (
-                algebra.evaluate(part, angle, number, function)
+                rotations.evaluate(part, angle, number, function)
                 for part in (_plain(self.cosine), _plain(self.sine))
             )
             # d atan2(s, c) = (c ds - s dc) / (c^2 + s^2)
@@ -130,7 +131,7 @@ class ConstantRate:
 
     def _errors(self, stretch: sp.Expr, along: sp.Expr) -> dict[str, list[sp.Expr]]:
         rate = sp.Matrix(CONSTANT)
-        length = sp.sqrt(algebra.dot(rate, rate))
+        length = sp.sqrt(rotations.dot(rate, rate))
         here = {ANGLE: length * STEP}
         gained = _product(
             stretch.subs(here), along.subs(here), self.angle_lost.subs(here), STEPS, *(rate / length)
@@ -147,7 +148,7 @@ def _product(stretch: sp.Expr, along: sp.Expr, lost: sp.Expr, steps: sp.Expr, *a
     """Return the computed matrix times the transposed true one, after a number of steps about a unit vector."""
     u = sp.Matrix(axis)
     projection = u * u.T
-    turned = sp.cos(steps * lost) * (sp.eye(3) - projection) - sp.sin(steps * lost) * algebra.skew(u)
+    turned = sp.cos(steps * lost) * (sp.eye(3) - projection) - sp.sin(steps * lost) * rotations.skew(u)
     return along**steps * projection + stretch**steps * turned
 
 

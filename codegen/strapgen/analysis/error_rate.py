@@ -16,15 +16,15 @@ from typing import Any
 
 import sympy as sp
 
-from strapgen import algebra
 from strapgen.analysis import motion_rates, one_step
 from strapgen.analysis.invariants import invariants
 from strapgen.analysis.motion_rates import TIME
 from strapgen.analysis.one_step import Step
 from strapgen.catalogue import Choice
-from strapgen.lowering.canonical.decomposition import NotCovariantError
-from strapgen.powers import Powers
 from strapgen.support.exceptions import InputError
+from strapgen.symbolic import rotations
+from strapgen.symbolic.covariants import NotCovariantError
+from strapgen.symbolic.power_series import Powers
 
 _Matrix = list[list[Powers]]
 
@@ -145,7 +145,7 @@ def _steady(attitude_step: Step, motion: str, top: int) -> ErrorRate:
     back = one_step.true_matrix(ring, [[ring.from_expr(sp.expand(x)) for x in turning]], top)
     raw = _logarithm(_product(step, _product(_square(true), _square(back))))
     axis = model.rate(sp.S.Zero, *symbols) + turning
-    skew = algebra.skew(axis)
+    skew = rotations.skew(axis)
     matrices = {}
     for power in range(1, top):
         parts = [[element.parts.get(power + 1, ring.zero) for element in row] for row in raw]

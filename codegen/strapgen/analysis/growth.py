@@ -13,16 +13,16 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from strapgen.algebra import cross_elements, dot
 from strapgen.analysis import motion_rates, one_step
 from strapgen.analysis.constant_rate import ANGLE, ConstantRate, constant_rate
 from strapgen.analysis.invariants import scalar, scalar_as_text, scalar_value
 from strapgen.analysis.one_step import Step
 from strapgen.analysis.series import MOST_TERMS, MOTIONS, STEP
 from strapgen.catalogue import Choice
-from strapgen.lowering.polynomials import Polynomial
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
+from strapgen.symbolic.polynomials import Polynomial
+from strapgen.symbolic.rotations import cross_elements, dot
 
 #: Decimal digits of an irrational coefficient.
 _DIGITS = 60

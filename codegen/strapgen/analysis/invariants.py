@@ -14,9 +14,9 @@ from typing import Any
 
 import sympy as sp
 
-from strapgen.algebra import exact
-from strapgen.lowering.canonical.decomposition import Coefficients, Decomposition, Frame
-from strapgen.lowering.polynomials import Polynomial
+from strapgen.symbolic.covariants import Coefficients, Decomposition, Frame
+from strapgen.symbolic.polynomials import Polynomial
+from strapgen.symbolic.rotations import exact
 
 #: Denominators from here on are those of rounded decimals.
 _DECIMAL = 10**16

@@ -12,13 +12,14 @@ from typing import Any
 
 import sympy as sp
 
-from strapgen import algebra, catalogue
+from strapgen import catalogue
 from strapgen.catalogue import Choice
 from strapgen.catalogue.coefficients import Number
-from strapgen.kernel import Kernel
-from strapgen.lowering.canonical.decomposition import Frame
-from strapgen.powers import Powers, constant, field, outputs
 from strapgen.support.exceptions import InputError, InputTypeError
+from strapgen.symbolic import rotations
+from strapgen.symbolic.covariants import Frame
+from strapgen.symbolic.kernel import Kernel
+from strapgen.symbolic.power_series import Powers, constant, field, outputs
 
 #: For methods whose coefficients are published with about 17 digits: digits of an error, and the largest that may be 0.
 _DIGITS = 12
@@ -58,7 +59,7 @@ class Step:
     @property
     def domain(self) -> Any:
         """The smallest field that holds the numbers of the step."""
-        expressions = [algebra.exact(node) for node in self.nodes or ()]
+        expressions = [rotations.exact(node) for node in self.nodes or ()]
         for stage in (*self.kernel.stages, *self.kernel.outputs):
             expressions += stage.expressions
         return field(expressions)
@@ -316,7 +317,7 @@ def turns(ring: Any, rate: Rate, nodes: Sequence[Number], top: int) -> list[Powe
     """
     elements = []
     for node in nodes:
-        shares = [algebra.exact(node) ** j / sp.factorial(j) for j in range(len(rate))]
+        shares = [rotations.exact(node) ** j / sp.factorial(j) for j in range(len(rate))]
         elements += _moments(ring, rate, shares, top)
     return elements
 
@@ -370,5 +371,5 @@ def true_matrix(ring: Any, rate: Rate, top: int) -> list[Powers]:
 
 
 def _skew(vector: Sequence[Any]) -> list[list[Any]]:
-    columns = [algebra.cross_elements(vector, [int(axis == k) for k in range(3)]) for axis in range(3)]
+    columns = [rotations.cross_elements(vector, [int(axis == k) for k in range(3)]) for axis in range(3)]
     return [list(row) for row in zip(*columns, strict=True)]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import sympy as sp
 
 from strapgen import catalogue
-from strapgen.powers import Powers, outputs
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
+from strapgen.symbolic.power_series import Powers, outputs
 
 #: The error P of the computed matrix (I + s P) C, where C is the true matrix and s the size of the error.
 ERROR = sp.Matrix(3, 3, sp.symbols("p11 p12 p13 p21 p22 p23 p31 p32 p33"))

@@ -10,7 +10,7 @@ from typing import Any
 import mpmath
 import sympy as sp
 
-from strapgen import algebra, catalogue, exact, library
+from strapgen import catalogue, exact, library
 from strapgen.analysis.accumulation import antiderivative
 from strapgen.analysis.error_rate import ErrorRate, error_rate
 from strapgen.analysis.motion_rates import TIME, parameters
@@ -18,6 +18,7 @@ from strapgen.catalogue import Choice
 from strapgen.convergence import interpreter
 from strapgen.motions import Motion
 from strapgen.support import checks
+from strapgen.symbolic import rotations
 
 #: A 3 x 3 matrix of mpmath, and the function that returns its growth factor from one time to another.
 Matrix = Any
@@ -217,7 +218,7 @@ def _sum(rates: ErrorRate, matrices: dict[int, sp.Matrix], h: Any) -> Callable[.
 
 def _turning(rates: ErrorRate, settings: list[Any], h: Any) -> Transfer:
     """Return the growth of the product between two times for a frame that turns at a constant rate."""
-    axis = sp.lambdify(parameters(rates.motion), algebra.skew(rates.axis), "mpmath")(*settings)
+    axis = sp.lambdify(parameters(rates.motion), rotations.skew(rates.axis), "mpmath")(*settings)
     whole = axis + _sum(rates, rates.matrices, h)(*settings, mpmath.mpf(0))
     spans: dict[Fraction, Matrix] = {}
 

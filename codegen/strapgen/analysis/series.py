@@ -17,9 +17,9 @@ from strapgen.analysis import motion_rates, one_step
 from strapgen.analysis.invariants import Invariants, as_text, invariants, matrix
 from strapgen.analysis.one_step import Step, errors
 from strapgen.catalogue import Choice
-from strapgen.powers import Powers
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
+from strapgen.symbolic.power_series import Powers
 
 #: Motions for which a series can be derived.
 MOTIONS = ("general", *catalogue.MOTIONS)

@@ -6,13 +6,13 @@ from fractions import Fraction
 
 import sympy as sp
 
-from strapgen import algebra
-from strapgen.algebra import cross
 from strapgen.catalogue.coning_sculling import ANGLE_SUM, SCULLING, VELOCITY_SUM
 from strapgen.catalogue.kinematics import DCM_MEANING, KINEMATICS, SAVAGE, UNIT
 from strapgen.catalogue.updates import NAVIGATION_ROTATION
 from strapgen.ir.signals import Signal
-from strapgen.kernel import Kernel, KernelBuilder
+from strapgen.symbolic import rotations
+from strapgen.symbolic.kernel import Kernel, KernelBuilder
+from strapgen.symbolic.rotations import cross
 
 TRANSFORMED = Signal.vector(
     "transformed", "v", unit="m/s", meaning="velocity increment of the slow cycle, navigation axes"
@@ -46,7 +46,7 @@ def rotated(build: KernelBuilder, name: str, state: sp.Matrix, u: sp.Matrix) -> 
     if name == "dcm":
         return state * u
     matrix = Signal.matrix("attitude", "C", meaning=DCM_MEANING, bound=UNIT, constraint="rotation")
-    return build.stage(matrix, algebra.quaternion_matrix(state).applyfunc(sp.expand)) * u
+    return build.stage(matrix, rotations.quaternion_matrix(state).applyfunc(sp.expand)) * u
 
 
 def compensated(

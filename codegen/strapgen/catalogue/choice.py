@@ -9,7 +9,7 @@ from strapgen.catalogue.names import KERNELS
 from strapgen.catalogue.tableaux import Tableau
 
 if TYPE_CHECKING:
-    from strapgen.kernel import Kernel
+    from strapgen.symbolic.kernel import Kernel
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,6 @@ from fractions import Fraction
 
 import sympy as sp
 
-from strapgen.algebra import cross, dot, exact
 from strapgen.catalogue import coning, rates, rotation_series
 from strapgen.catalogue.rotation_series import Scalars, Words, fraction
 from strapgen.catalogue.steps import (
@@ -20,7 +19,8 @@ from strapgen.catalogue.steps import (
     sample_names,
 )
 from strapgen.ir.signals import Signal
-from strapgen.kernel import Kernel, KernelBuilder
+from strapgen.symbolic.kernel import Kernel, KernelBuilder
+from strapgen.symbolic.rotations import cross, dot, exact
 
 #: Most Legendre coefficients of the rate in the terms of third and fourth order.
 MOST_COEFFICIENTS = 6

@@ -6,12 +6,12 @@ from fractions import Fraction
 
 import sympy as sp
 
-from strapgen.algebra import cross
 from strapgen.catalogue.kinematics import SAVAGE
 from strapgen.catalogue.updates import ROTATION_VECTOR
 from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import Signal, after
-from strapgen.kernel import Kernel, KernelBuilder
+from strapgen.symbolic.kernel import Kernel, KernelBuilder
+from strapgen.symbolic.rotations import cross
 
 INCREMENT = Signal.vector(
     "increment",

@@ -13,7 +13,7 @@ from strapgen.catalogue.tableaux import TABLEAUX, Tableau
 if TYPE_CHECKING:
     from strapgen.catalogue.coefficients import Number
     from strapgen.catalogue.steps import Method
-    from strapgen.kernel import Kernel
+    from strapgen.symbolic.kernel import Kernel
 
 #: Where the modules lie that `names` tells of.
 _PACKAGE = __name__.rpartition(".")[0]

@@ -7,11 +7,11 @@ from fractions import Fraction
 
 import sympy as sp
 
-from strapgen.algebra import Direction, Wrapped
 from strapgen.catalogue.kinematics import DCM, SAVAGE
 from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import Signal
-from strapgen.kernel import Kernel, KernelBuilder, resolution
+from strapgen.symbolic.kernel import Kernel, KernelBuilder, resolution
+from strapgen.symbolic.rotations import Direction, Wrapped
 
 ANGLES = Signal(
     "angles",

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import sympy as sp
 
-from strapgen import algebra
 from strapgen.catalogue.steps import PHI, Method, Samples, exponential
 from strapgen.ir.signals import Signal
-from strapgen.kernel import KernelBuilder
+from strapgen.symbolic import rotations
+from strapgen.symbolic.kernel import KernelBuilder
 
 SOURCE = "S. Blanes, F. Casas, J. A. Oteo, J. Ros, Phys. Rep. 470 (2009) 151-238, section 5.3"
 
@@ -99,7 +99,7 @@ def _second_order(samples: Samples, first: int) -> sp.Matrix:
 
 def _commutator(a: sp.Matrix, b: sp.Matrix) -> sp.Matrix:
     """Return [a, b] for dC/dt = C skew(w): the source has dY/dt = A Y, whose transpose reverses every commutator."""
-    return algebra.cross(b, a)
+    return rotations.cross(b, a)
 
 
 def _fourth(build: KernelBuilder, samples: Samples) -> sp.Matrix:

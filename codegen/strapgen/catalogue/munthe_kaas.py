@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import sympy as sp
 
-from strapgen.algebra import cross
 from strapgen.catalogue.runge_kutta import advance
 from strapgen.catalogue.steps import PHI, Method, Samples, exponential
 from strapgen.catalogue.tableaux import TABLEAUX
 from strapgen.ir.signals import Signal
-from strapgen.kernel import KernelBuilder
+from strapgen.symbolic.kernel import KernelBuilder
+from strapgen.symbolic.rotations import cross
 
 
 def method(order: int) -> Method:

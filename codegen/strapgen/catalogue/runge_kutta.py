@@ -12,7 +12,7 @@ from strapgen.catalogue.order_conditions import attitude_order
 from strapgen.catalogue.steps import Method, Samples, combination
 from strapgen.catalogue.tableaux import Tableau
 from strapgen.ir.signals import Signal
-from strapgen.kernel import Kernel, KernelBuilder
+from strapgen.symbolic.kernel import Kernel, KernelBuilder
 
 
 def method(tableau: Tableau) -> Method:

@@ -9,14 +9,14 @@ from typing import Any
 
 import sympy as sp
 
-from strapgen.algebra import exact
 from strapgen.catalogue import rates
 from strapgen.catalogue.coefficients import Number
 from strapgen.catalogue.kinematics import KINEMATICS, Kinematics
 from strapgen.ir.attitude_step import Companions
 from strapgen.ir.order import Order
 from strapgen.ir.signals import Signal
-from strapgen.kernel import Kernel, KernelBuilder
+from strapgen.symbolic.kernel import Kernel, KernelBuilder
+from strapgen.symbolic.rotations import exact
 
 #: Signal of the rotation vector of a step.
 PHI = Signal.vector("phi", "phi", unit="rad", meaning="rotation vector of the step")

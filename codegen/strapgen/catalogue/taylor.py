@@ -15,11 +15,11 @@ from collections.abc import Sequence
 
 import sympy as sp
 
-from strapgen import algebra
 from strapgen.catalogue.kinematics import DCM, EULER, Kinematics
 from strapgen.catalogue.steps import Method, Samples
 from strapgen.ir.signals import Signal
-from strapgen.kernel import KernelBuilder
+from strapgen.symbolic import rotations
+from strapgen.symbolic.kernel import KernelBuilder
 
 #: Lowest degree of the polynomial for which the series is taken from the middle of the step.
 _CENTRED = 2
@@ -74,10 +74,10 @@ def _centred(build: KernelBuilder, kinematics: Kinematics, samples: Samples, ord
             parameters.identity.multiply_elementwise(even - odd) * 2 - (even - odd), even + odd
         ),
     )
-    square = algebra.dot(series, series)
+    square = rotations.dot(series, series)
     if kinematics is DCM:
         factor = build.value("inverse_square", 1 / square, "1/(series . series)")
-        return factor * algebra.quaternion_matrix(series)
+        return factor * rotations.quaternion_matrix(series)
     return build.value("inverse_length", 1 / sp.sqrt(square), "1/|series|") * series
 
 

@@ -30,7 +30,7 @@ from strapgen.catalogue.updates import (
 )
 from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import Signal, after
-from strapgen.kernel import Kernel, KernelBuilder
+from strapgen.symbolic.kernel import Kernel, KernelBuilder
 
 
 def fast(form: int) -> Kernel:

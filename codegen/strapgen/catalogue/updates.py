@@ -6,11 +6,11 @@ from fractions import Fraction
 
 import sympy as sp
 
-from strapgen import algebra
 from strapgen.catalogue.kinematics import KINEMATICS, SAVAGE, Kinematics
 from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import Signal, after
-from strapgen.kernel import Kernel, KernelBuilder
+from strapgen.symbolic import rotations
+from strapgen.symbolic.kernel import Kernel, KernelBuilder
 
 ROTATION_VECTOR = Signal.vector(
     "rotation_vector", "phi", unit="rad", meaning="rotation vector of the cycle, body axes", bound=Fraction(1)
@@ -50,7 +50,7 @@ def transition(
     order : int, optional
         Highest degree of products of its elements in the transition; exact by default.
     """
-    square = build.value("angle_squared", algebra.dot(phi, phi), "square of the angle")
+    square = build.value("angle_squared", rotations.dot(phi, phi), "square of the angle")
     return build.stage(kinematics.transition, kinematics.exponential(phi, order, square))
 
 

@@ -23,7 +23,7 @@ from strapgen.support import cache, checks
 from strapgen.support.exceptions import InputError, StrapgenError
 
 if TYPE_CHECKING:
-    from strapgen.kernel import Kernel
+    from strapgen.symbolic.kernel import Kernel
 
 #: Entry points of installed packages.
 GROUP = "strapgen.algorithms"
@@ -139,7 +139,7 @@ def _arguments(name: str, options: dict[str, Any]) -> str:
 def _require(name: str, kernel: Any) -> None:
     """Check what a user's function returned."""
     from strapgen.catalogue import admission
-    from strapgen.kernel import Kernel
+    from strapgen.symbolic.kernel import Kernel
 
     if not isinstance(kernel, Kernel):
         raise InputError(f"{name}: {FUNCTION}() returned {type(kernel).__name__}; a Kernel is needed")

@@ -16,7 +16,7 @@ from strapgen.support import cache
 from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
-    from strapgen.kernel import Kernel
+    from strapgen.symbolic.kernel import Kernel
 
 _KIND = "kernels"
 _KERNEL, _RECORD = "kernel.pickle", "record.json"

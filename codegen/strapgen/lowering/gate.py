@@ -12,13 +12,13 @@ from itertools import count
 import sympy as sp
 from sympy.core.relational import GreaterThan, LessThan, StrictGreaterThan, StrictLessThan
 
-from strapgen.algebra import Direction, Wrapped
 from strapgen.ir.program import Assignment, Constant, Node, Operation, Program, Reference, Result
 from strapgen.ir.signals import Signal
-from strapgen.kernel import Kernel
 from strapgen.lowering.arithmetic import chain, gathered, plain, with_constant
 from strapgen.lowering.names import FACTOR
 from strapgen.lowering.share import Shared
+from strapgen.symbolic.kernel import Kernel
+from strapgen.symbolic.rotations import Direction, Wrapped
 
 _FUNCTIONS = {
     sp.sin: "sin",

@@ -14,9 +14,9 @@ import sympy as sp
 
 from strapgen import catalogue
 from strapgen.catalogue import Choice
-from strapgen.kernel import Kernel
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError, InputTypeError
+from strapgen.symbolic.kernel import Kernel
 from strapgen.vibration import response, systems
 from strapgen.vibration.mean_rates import Assessment
 from strapgen.vibration.response import Form

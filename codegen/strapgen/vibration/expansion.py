@@ -8,11 +8,11 @@ from typing import Any, NamedTuple
 
 import sympy as sp
 
-from strapgen import powers
-from strapgen.kernel import Kernel
-from strapgen.lowering.irrational import rationalized
-from strapgen.powers import Powers
 from strapgen.support.exceptions import InputError
+from strapgen.symbolic import power_series
+from strapgen.symbolic.kernel import Kernel
+from strapgen.symbolic.power_series import Powers
+from strapgen.symbolic.rational_constants import rationalized
 
 #: An exact number: an element of a field of SymPy.
 Number = Any
@@ -66,7 +66,7 @@ class Expander:
         if any(_is_transcendental(expression) for expression in self._expressions()):
             # They are rounded to so many digits that the results do not differ.
             self._kernels = {name: rationalized(kernel) for name, kernel in self._kernels.items()}
-        self.domain = powers.field(self._expressions())
+        self.domain = power_series.field(self._expressions())
         signals = chain.from_iterable(kernel.inputs for kernel in self._kernels.values())
         self._names = sorted({name for signal in signals for name in signal.elements})
         self._ring = sp.ring(self._names, self.domain)[0]
@@ -82,7 +82,7 @@ class Expander:
 
     def constant(self, value: Any) -> Powers:
         """Return a number as a series."""
-        return powers.constant(self._ring, value, _ORDER)
+        return power_series.constant(self._ring, value, _ORDER)
 
     def variable(self, name: str, at: Any = 0) -> Powers:
         """Return an input of a kernel as a series: a number plus a small variable."""
@@ -120,7 +120,7 @@ class Expander:
         names = chain.from_iterable(signal.elements for signal in exact.inputs)
         values = {name: inputs.get(name) or self.constant(0) for name in names}
         try:
-            return powers.outputs(exact, values, self._ring, _ORDER)
+            return power_series.outputs(exact, values, self._ring, _ORDER)
         except ArithmeticError as error:
             raise InputError(f"kernel {kernel.name} has no expansion to second order: {error}") from None
 

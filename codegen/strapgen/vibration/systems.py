@@ -11,13 +11,13 @@ from typing import Any
 import sympy as sp
 
 from strapgen import catalogue
-from strapgen.algebra import exact
 from strapgen.catalogue import Choice
 from strapgen.ir.signals import Signal
-from strapgen.kernel import Kernel
-from strapgen.powers import Powers
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError, InputTypeError
+from strapgen.symbolic.kernel import Kernel
+from strapgen.symbolic.power_series import Powers
+from strapgen.symbolic.rotations import exact
 from strapgen.vibration.expansion import Expander, Expansion, Number
 from strapgen.vibration.waves import Shift, Wave
 

@@ -2,12 +2,12 @@
 
 from fractions import Fraction
 
-from strapgen.algebra import cross
 from strapgen.catalogue.kinematics import EULER
 from strapgen.catalogue.steps import increments_signal
 from strapgen.ir.attitude_step import Companions
 from strapgen.ir.signals import Signal
-from strapgen.kernel import KernelBuilder
+from strapgen.symbolic.kernel import KernelBuilder
+from strapgen.symbolic.rotations import cross
 
 
 def algorithm():

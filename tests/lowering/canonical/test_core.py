@@ -7,14 +7,14 @@ import pytest
 import sympy as sp
 
 from strapgen import catalogue, derive
-from strapgen.algebra import dot, quaternion_product, skew
 from strapgen.ir.program import Assignment, Constant, Node, Operation, Program, walk
 from strapgen.ir.signals import Signal
-from strapgen.kernel import Kernel, KernelBuilder
 from strapgen.lowering import lower
 from strapgen.lowering.canonical import extract_core
 from strapgen.lowering.canonical.core import Core, decompose, extract, verify
-from strapgen.lowering.canonical.decomposition import NotCovariantError
+from strapgen.symbolic.covariants import NotCovariantError
+from strapgen.symbolic.kernel import Kernel, KernelBuilder
+from strapgen.symbolic.rotations import dot, quaternion_product, skew
 
 #: Two vectors in one signal.
 PAIR = Signal("increments", (2, 3), tuple(f"d{k}_{axis}" for k in (1, 2) for axis in "xyz"))

@@ -6,12 +6,12 @@ from fractions import Fraction
 import pytest
 import sympy as sp
 
-from strapgen.algebra import cross, dot, quaternion_product, skew
 from strapgen.ir.program import Program
 from strapgen.ir.signals import Signal
-from strapgen.kernel import Kernel, KernelBuilder
 from strapgen.lowering import candidates, canonical, lower
 from strapgen.lowering.passes import cost, optimize
+from strapgen.symbolic.kernel import Kernel, KernelBuilder
+from strapgen.symbolic.rotations import cross, dot, quaternion_product, skew
 
 #: Elements of state and increment of a step from one.
 NAMES = ("e_x", "e_y", "e_z", "e_s", "d1_x", "d1_y", "d1_z")

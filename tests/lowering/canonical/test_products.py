@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from strapgen.lowering.canonical.products import choose_products
 from strapgen.lowering.canonical.vectors import Form
-from strapgen.lowering.polynomials import Polynomial, atoms
+from strapgen.symbolic.polynomials import Polynomial, atoms
 
 SETTINGS = settings(max_examples=40, derandomize=True, database=None, deadline=None)
 

@@ -10,9 +10,9 @@ import sympy as sp
 
 from strapgen.ir.program import Program
 from strapgen.ir.signals import Signal
-from strapgen.kernel import Kernel, Stage, evaluate_stages
-from strapgen.lowering.canonical.decomposition import Decomposition, Frame, NotCovariantError
 from strapgen.lowering.canonical.vectors import Form, components, independent
+from strapgen.symbolic.covariants import Decomposition, Frame, NotCovariantError
+from strapgen.symbolic.kernel import Kernel, Stage, evaluate_stages
 
 
 @dataclass(frozen=True)

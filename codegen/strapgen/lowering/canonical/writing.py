@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Sequence
 from fractions import Fraction
 
-from strapgen.algebra import CROSS
 from strapgen.ir.program import Assignment, Constant, Node, Operation, Reference
 from strapgen.lowering.arithmetic import (
     Term,
@@ -20,7 +19,8 @@ from strapgen.lowering.arithmetic import (
 )
 from strapgen.lowering.canonical.plan import Cross, Plan, Sides, Weighted
 from strapgen.lowering.canonical.products import choose_products
-from strapgen.lowering.polynomials import Polynomial, ratio
+from strapgen.symbolic.polynomials import Polynomial, ratio
+from strapgen.symbolic.rotations import CROSS
 
 #: A summand of a vector: its coefficient, its weight unless that is a number, and the name of the vector.
 _Summand = tuple[Fraction, Reference | None, str]

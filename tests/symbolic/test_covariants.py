@@ -12,16 +12,10 @@ from hypothesis import strategies as st
 
 from strapgen import derive
 from strapgen.lowering.canonical.core import Core, decompose, extract
-from strapgen.lowering.canonical.decomposition import (
-    Decomposition,
-    Frame,
-    NotCovariantError,
-    invariants,
-    transform,
-)
 from strapgen.lowering.canonical.plan import without_triples
 from strapgen.lowering.canonical.vectors import components
-from strapgen.lowering.polynomials import ONE, Polynomial, add, multiply, scale
+from strapgen.symbolic.covariants import Decomposition, Frame, NotCovariantError, invariants, transform
+from strapgen.symbolic.polynomials import ONE, Polynomial, add, multiply, scale
 
 SETTINGS = settings(max_examples=60, derandomize=True, database=None, deadline=None)
 Vector = tuple[Fraction, ...]

@@ -13,8 +13,8 @@ from derived import precisely
 from strapgen import derive, lower
 from strapgen.ir.program import Constant, walk
 from strapgen.ir.signals import Signal
-from strapgen.kernel import Kernel, KernelBuilder
-from strapgen.lowering.irrational import DIGITS, rationalized
+from strapgen.symbolic.kernel import Kernel, KernelBuilder
+from strapgen.symbolic.rational_constants import DIGITS, rationalized
 
 #: Exact series of many methods: with the long tests.
 pytestmark = pytest.mark.long

@@ -6,7 +6,7 @@ import pytest
 import sympy as sp
 
 from strapgen.ir.signals import Signal
-from strapgen.kernel import Kernel, KernelBuilder, Stage, symbols
+from strapgen.symbolic.kernel import Kernel, KernelBuilder, Stage, symbols
 
 
 def two_stages() -> Kernel:

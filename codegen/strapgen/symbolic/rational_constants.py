@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import sympy as sp
 
-from strapgen.kernel import Kernel, Stage
+from strapgen.symbolic.kernel import Kernel, Stage
 
 #: Decimal digits of a rounded constant: twice those of the arithmetic that programs are compared with.
 DIGITS = 80
@@ -26,7 +26,7 @@ def rationalized(kernel: Kernel) -> Kernel:
 
     Examples
     --------
-    >>> from strapgen.kernel import KernelBuilder
+    >>> from strapgen.symbolic.kernel import KernelBuilder
     >>> from strapgen.ir.signals import Signal
     >>> build = KernelBuilder()
     >>> x = build.scalar(Signal.scalar("x"))

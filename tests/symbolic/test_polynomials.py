@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from strapgen.lowering.polynomials import (
+from strapgen.symbolic.polynomials import (
     ONE,
     Polynomial,
     add,

@@ -1,0 +1,1 @@
+"""Mathematics on exact expressions: kernels, rotations, series, polynomials. No optimisation."""
