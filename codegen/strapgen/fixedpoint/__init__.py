@@ -27,7 +27,9 @@ def quantize(program: Program, settings: Settings) -> FixedProgram:
     InputError
         If an input has no known range, a stated format does not hold its values, or the word is too short.
     """
-    from strapgen.fixedpoint.integers import lowered  # numpy and the proofs are loaded when they are needed
+    from strapgen.fixedpoint.quantization import (
+        lowered,  # numpy and the proofs are loaded when they are needed
+    )
 
     try:
         return lowered(program, settings)

@@ -13,6 +13,7 @@ import numpy as np
 from strapgen.fixedpoint.derivation_context import DerivationContext, free_name
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.fixedpoint.operations import derive_operation
+from strapgen.fixedpoint.probes import samples
 from strapgen.fixedpoint.products import SUM_OPERATIONS, store, terms_of
 from strapgen.fixedpoint.quantities import (
     InputElement,
@@ -23,7 +24,6 @@ from strapgen.fixedpoint.quantities import (
     used_by,
 )
 from strapgen.fixedpoint.ranges import Ranges
-from strapgen.fixedpoint.samples import samples
 from strapgen.ir.program import Assignment, Constant, Operation, Program, Reference, Result
 
 
