@@ -9,7 +9,7 @@ import sympy as sp
 
 from strapgen import derive
 from strapgen.catalogue import MOST_INCREMENTS, STANDARD_METHODS
-from strapgen.catalogue.tableaux import TABLEAUX
+from strapgen.catalogue.methods.tableaux import TABLEAUX
 
 X = sp.Symbol("x", positive=True)
 STEP_NAMES = ("dcm", "euler")

@@ -12,7 +12,7 @@ import pytest
 
 from strapgen import catalogue, convergence, motion
 from strapgen.catalogue import INTEGRATORS, choose
-from strapgen.catalogue.tableaux import TABLEAUX
+from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.convergence import Convergence, Rung, converge
 from strapgen.ir.order import Order
 from strapgen.support.exceptions import InputError

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from strapgen.catalogue.tableaux import TABLEAUX
+from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.support import resources
 
 pytestmark = pytest.mark.long
@@ -48,7 +48,7 @@ def test_templates_and_generated_sources_are_in_the_wheel(wheel):
         assert shipped
         assert shipped <= names
     assert {"strapgen/cli/generate.py", "strapgen/py.typed"} <= names
-    assert {f"strapgen/catalogue/methods/{method}.toml" for method in TABLEAUX} <= names
+    assert {f"strapgen/catalogue/methods/butcher_tableaux/{method}.toml" for method in TABLEAUX} <= names
     assert not any("__pycache__" in name or name.startswith(("tests/", "codegen/")) for name in names)
 
 

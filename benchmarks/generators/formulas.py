@@ -7,9 +7,9 @@ from typing import Any
 
 from generators import Case
 from strapgen.catalogue.kinematics import KINEMATICS
-from strapgen.catalogue.runge_kutta import method, staged_step
-from strapgen.catalogue.steps import step
-from strapgen.catalogue.tableaux import TABLEAUX
+from strapgen.catalogue.methods.runge_kutta import method, staged_step
+from strapgen.catalogue.methods.steps import step
+from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.symbolic.kernel import Kernel
 
 

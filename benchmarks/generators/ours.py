@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import strapgen
-import strapgen.catalogue.runge_kutta
+import strapgen.catalogue.methods.runge_kutta
 import strapgen.lowering
 import strapgen.targets.rendering
 from generators import Case

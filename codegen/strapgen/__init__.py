@@ -26,16 +26,16 @@ if _typing.TYPE_CHECKING:
     from strapgen.catalogue import Choice as Choice
     from strapgen.catalogue import choose as choose
     from strapgen.catalogue import choose_step as choose_step
-    from strapgen.catalogue import runge_kutta as runge_kutta
-    from strapgen.catalogue import tableaux as tableaux
     from strapgen.catalogue.kinematics import CAYLEY_KLEIN as CAYLEY_KLEIN
     from strapgen.catalogue.kinematics import DCM as DCM
     from strapgen.catalogue.kinematics import EULER as EULER
     from strapgen.catalogue.kinematics import Kinematics as Kinematics
-    from strapgen.catalogue.steps import Samples as Samples
-    from strapgen.catalogue.steps import increments_signal as increments_signal
-    from strapgen.catalogue.tableaux import TABLEAUX as TABLEAUX
-    from strapgen.catalogue.tableaux import Tableau as Tableau
+    from strapgen.catalogue.methods import runge_kutta as runge_kutta
+    from strapgen.catalogue.methods import tableaux as tableaux
+    from strapgen.catalogue.methods.steps import Samples as Samples
+    from strapgen.catalogue.methods.steps import increments_signal as increments_signal
+    from strapgen.catalogue.methods.tableaux import TABLEAUX as TABLEAUX
+    from strapgen.catalogue.methods.tableaux import Tableau as Tableau
     from strapgen.comparison import Comparison as Comparison
     from strapgen.comparison import compare as compare
     from strapgen.convergence import Convergence as Convergence
@@ -104,11 +104,11 @@ _NAMES = {
         "EULER",
         "Kinematics",
     ),
-    "catalogue.steps": (
+    "catalogue.methods.steps": (
         "Samples",
         "increments_signal",
     ),
-    "catalogue.tableaux": (
+    "catalogue.methods.tableaux": (
         "TABLEAUX",
         "Tableau",
     ),
@@ -179,9 +179,9 @@ _NAMESPACES = {
     "exact": "exact",
     "formulas": "formulas",
     "gyro": "gyro",
-    "runge_kutta": "catalogue.runge_kutta",
+    "runge_kutta": "catalogue.methods.runge_kutta",
     "study": "study",
-    "tableaux": "catalogue.tableaux",
+    "tableaux": "catalogue.methods.tableaux",
     "vibration": "vibration",
 }
 _EXPORTS = {name: module for module, names in _NAMES.items() for name in names}

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from strapgen import catalogue, compilation, exact, library
 from strapgen.backends import BACKENDS, Backend, of
 from strapgen.catalogue import Choice
-from strapgen.catalogue.tableaux import Tableau
+from strapgen.catalogue.methods.tableaux import Tableau
 from strapgen.ir.fixed_settings import Settings
 from strapgen.simulation import attitude, drift_between, require_finite
 from strapgen.support import checks

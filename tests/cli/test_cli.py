@@ -23,8 +23,8 @@ from tolerances import certified
 import strapgen
 from strapgen import catalogue, formulas, pipeline
 from strapgen.backends import BACKENDS, fitted
-from strapgen.catalogue import coefficients, coning
-from strapgen.catalogue.tableaux import TABLEAUX
+from strapgen.catalogue.methods import coefficients, coning_coefficients
+from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.cli import main
 from strapgen.motions import motion as make_motion
 from strapgen.recording import read_inertial
@@ -202,7 +202,7 @@ def test_tableau_too_wide_for_a_table(strapgen_says):
 
 
 def test_tableau_of_a_file(strapgen_says, tmp_path):
-    text = (Path(catalogue.__file__).parent / "methods" / "ralston3.toml").read_text()
+    text = (Path(catalogue.__file__).parent / "methods" / "butcher_tableaux" / "ralston3.toml").read_text()
     (tmp_path / "folder").mkdir()
     for name in ("mine.toml", "folder/mine"):
         (tmp_path / name).write_text(text)
@@ -377,9 +377,9 @@ def test_fixed_point_of_a_vector_of_a_step(strapgen_says, tmp_path):
 
 
 @pytest.mark.parametrize("previous", [0, 3])
-@pytest.mark.parametrize("form", coning.FORMS)
+@pytest.mark.parametrize("form", coning_coefficients.FORMS)
 def test_coefficients_of_eight_samples_are_quick(form, previous, strapgen_says):
-    coning._designed.cache_clear()
+    coning_coefficients._designed.cache_clear()
     begin = time.process_time()
     data = json.loads(strapgen_says(f"coning --samples 8 --previous {previous} --form {form} --format json"))
     total = 8 + previous

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 
 import strapgen
 from strapgen import compilation, targets
-from strapgen.catalogue import admission
+from strapgen.catalogue.user import admission
 from strapgen.fixedpoint import quantize
 from strapgen.ir import sources
 from strapgen.ir.attitude_step import Companions

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 import strapgen
 from strapgen import backends, catalogue, derive, exact, gyro, lower, vibration
-from strapgen.catalogue import coning
+from strapgen.catalogue.methods import coning_coefficients
 from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import Signal, after
 from strapgen.simulation import attitude
@@ -94,14 +94,14 @@ def test_both_loops_have_equations_75_and_79_and_the_term_in_the_slow_cycle():
 # Other derivations of the same
 
 
-@pytest.mark.parametrize("form", coning.FORMS)
+@pytest.mark.parametrize("form", coning_coefficients.FORMS)
 @pytest.mark.parametrize(("samples", "previous"), [(1, 0), (1, 2), (2, 0), (3, 1), (5, 0)])
 def test_coning_coefficients_leave_their_residual(form, samples, previous):
     """On a cone, both amplitudes alike and a quarter turn apart, the error is the closed form of the design."""
     found = vibration.of(choose("euler", f"coning-{form}", samples, previous=previous))
     alpha, omega, interval = sp.symbols("alpha omega T", positive=True)
     cone = {THETA_X: alpha, THETA_Y: alpha, PHI: -sp.pi / 2, F: omega / 2 / sp.pi, T: samples * interval}
-    residual = sp.sympify(coning.design(samples, previous, form).residual().expression)
+    residual = sp.sympify(coning_coefficients.design(samples, previous, form).residual().expression)
     residual = residual.subs(dict(zip(sp.symbols("alpha omega T"), (alpha, omega, interval), strict=True)))
     assert sp.expand(found.expression("error").subs(cone, simultaneous=True) - residual) == 0
 

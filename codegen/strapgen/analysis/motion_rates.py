@@ -9,7 +9,7 @@ from typing import Any
 import sympy as sp
 
 from strapgen import catalogue
-from strapgen.catalogue.motions import MOTIONS, MotionModel
+from strapgen.catalogue.kernels.motion_models import MOTIONS, MotionModel
 
 #: Time at the beginning of a step.
 TIME = sp.Symbol("t")

@@ -14,7 +14,7 @@ import sympy as sp
 
 from strapgen import catalogue
 from strapgen.catalogue import Choice
-from strapgen.catalogue.coefficients import Number
+from strapgen.catalogue.methods.coefficients import Number
 from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.symbolic import rotations
 from strapgen.symbolic.covariants import Frame

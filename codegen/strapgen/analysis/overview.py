@@ -17,7 +17,7 @@ from strapgen.analysis.invariants import as_text
 from strapgen.analysis.motion_rates import is_plain, parameters
 from strapgen.analysis.series import series
 from strapgen.catalogue import Choice
-from strapgen.catalogue.tableaux import TABLEAUX
+from strapgen.catalogue.methods.tableaux import TABLEAUX
 
 #: Highest order of a Taylor method in the overview; with higher orders the error is far below that of any gyro.
 _HIGHEST_TAYLOR = 8

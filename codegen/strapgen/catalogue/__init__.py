@@ -6,7 +6,6 @@ loaded when it is derived.
 
 from __future__ import annotations
 
-from strapgen.catalogue import user as user
 from strapgen.catalogue.choice import Choice, increments, orthonormalizations, previous
 from strapgen.catalogue.choosing import choose, choose_step, standard
 from strapgen.catalogue.derivation import companion, derive, enough, nodes, rounding
@@ -27,6 +26,7 @@ from strapgen.catalogue.names import (
     Recipe,
     StepVector,
 )
+from strapgen.catalogue.user import loading as user
 
 __all__ = [
     "ALGORITHMS",

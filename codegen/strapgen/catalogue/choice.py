@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from strapgen.catalogue.methods.tableaux import Tableau
 from strapgen.catalogue.names import KERNELS
-from strapgen.catalogue.tableaux import Tableau
 
 if TYPE_CHECKING:
     from strapgen.symbolic.kernel import Kernel

@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from typing import Any
 
-from strapgen.catalogue import user
 from strapgen.catalogue.choice import Choice
+from strapgen.catalogue.methods.tableaux import TABLEAUX, Tableau
 from strapgen.catalogue.names import (
     ALGORITHMS,
     INTEGRATORS,
@@ -18,7 +18,7 @@ from strapgen.catalogue.names import (
     STANDARD_METHODS,
     VECTORS,
 )
-from strapgen.catalogue.tableaux import TABLEAUX, Tableau
+from strapgen.catalogue.user import loading
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError, InputTypeError
 
@@ -57,7 +57,7 @@ def choose(
         name = os.fspath(name)
     if not isinstance(name, str):
         raise InputTypeError(f"algorithm is {name!r}; a name or the path of a Python file is needed")
-    if name.endswith(".py") or (name not in RESERVED and name in user.installed()):
+    if name.endswith(".py") or (name not in RESERVED and name in loading.installed()):
         return _choose_users(name, method, increments, rates, previous)
     if name not in RESERVED:
         shown = [kernel for kernel, recipe in KERNELS.items() if recipe.standard]
@@ -111,11 +111,11 @@ def _choose_users(
         options["increments"] = checks.count("increments", increments, largest=MOST_INCREMENTS)
     if previous:
         options["previous"] = checks.count("previous", previous, smallest=0, largest=MOST_PREVIOUS)
-    return Choice.of_user(user.load(name, **options))
+    return Choice.of_user(loading.load(name, **options))
 
 
 def _allowed(*more: str) -> str:
-    return f"{', '.join(dict.fromkeys([*ALGORITHMS, *user.installed(), *more]))}, or a Python file"
+    return f"{', '.join(dict.fromkeys([*ALGORITHMS, *loading.installed(), *more]))}, or a Python file"
 
 
 def _tableau_name(method: str) -> str:

@@ -7,12 +7,12 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from strapgen.catalogue.choice import Choice
+from strapgen.catalogue.methods.tableaux import TABLEAUX, Tableau
 from strapgen.catalogue.names import INTEGRATORS, KERNELS, MOST_INCREMENTS, VECTORS
-from strapgen.catalogue.tableaux import TABLEAUX, Tableau
 
 if TYPE_CHECKING:
-    from strapgen.catalogue.coefficients import Number
-    from strapgen.catalogue.steps import Method
+    from strapgen.catalogue.methods.coefficients import Number
+    from strapgen.catalogue.methods.steps import Method
     from strapgen.symbolic.kernel import Kernel
 
 #: Where the modules lie that `names` tells of.
@@ -60,17 +60,17 @@ def derive(choice: Choice) -> Kernel:
         return choice.user_kernel
     if choice.method is None:
         recipe = KERNELS[choice.name]
-        function = getattr(import_module(f"{_PACKAGE}.{recipe.module}"), recipe.function)
+        function = getattr(import_module(f"{_PACKAGE}.kernels.{recipe.module}"), recipe.function)
         kernel: Kernel = function(*recipe.arguments)
         return kernel
     if choice.name in VECTORS:
         vector = VECTORS[choice.name]
-        derived: Kernel = getattr(import_module(f"{_PACKAGE}.{vector.module}"), vector.function)(
+        derived: Kernel = getattr(import_module(f"{_PACKAGE}.kernels.{vector.module}"), vector.function)(
             _method(choice.method), choice.increments, choice.previous
         )
         return derived
     from strapgen.catalogue.kinematics import KINEMATICS
-    from strapgen.catalogue.steps import step
+    from strapgen.catalogue.methods.steps import step
 
     return step(KINEMATICS[choice.name], _method(choice.method), choice.increments, choice.previous)
 
@@ -90,14 +90,14 @@ def companion(kernel: Kernel, name: str) -> Kernel:
 
 def _method(method: str | Tableau) -> Method:
     """Load a method by its name, or make one of a tableau."""
-    from strapgen.catalogue import runge_kutta
+    from strapgen.catalogue.methods import runge_kutta
 
     if isinstance(method, Tableau):
         return runge_kutta.method(method)
     if method in TABLEAUX:
         return runge_kutta.method(TABLEAUX[method])
     family = INTEGRATORS[method]
-    integrator: Method = import_module(f"{_PACKAGE}.{family.module}").method(
+    integrator: Method = import_module(f"{_PACKAGE}.methods.{family.module}").method(
         *(family.arguments or (family.order,))
     )
     return integrator

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from strapgen.catalogue.tableaux import TITLES
+from strapgen.catalogue.methods.tableaux import TITLES
 
 #: Attitude algorithms, by the state they integrate.
 ALGORITHMS = {
@@ -38,25 +38,25 @@ INTEGRATORS = {
     },
     "munthe-kaas4": Integrator("Runge-Kutta-Munthe-Kaas method of order 4", "munthe_kaas", 4),
     "coning-compressed": Integrator(
-        "compressed coning coefficients, made for coning", "coning_methods", 4, False, ("compressed",)
+        "compressed coning coefficients, made for coning", "coning", 4, False, ("compressed",)
     ),
     "coning-uncompressed": Integrator(
         "uncompressed coning coefficients, made for polynomial rates",
-        "coning_methods",
+        "coning",
         4,
         False,
         ("uncompressed",),
     ),
     "coning-combined": Integrator(
         "coning coefficients for both, with the terms of third and fourth order",
-        "coning_methods",
+        "coning",
         6,
         False,
         ("combined",),
     ),
     "coning-polynomial": Integrator(
         "uncompressed coning coefficients, with the terms of third and fourth order",
-        "coning_methods",
+        "coning",
         6,
         False,
         ("polynomial",),
@@ -153,19 +153,21 @@ _TWO_SPEED = {
         "velocity correction for the rotation of the navigation frame", "acceleration", "navigation_velocity"
     ),
     **{
-        f"two-speed-fast-{form}": Recipe(f"two speeds: fast loop with S{form}", "two_speed", "fast", (form,))
+        f"two-speed-fast-{form}": Recipe(
+            f"two speeds: fast loop with S{form}", "two_speed_loops", "fast", (form,)
+        )
         for form in (1, 2)
     },
     **{
         f"{name}-two-speed-slow-{form}": Recipe(
-            f"two speeds: slow loop with S{form}", "two_speed", "slow", (name, form)
+            f"two speeds: slow loop with S{form}", "two_speed_loops", "slow", (name, form)
         )
         for name in ("dcm", "euler")
         for form in (1, 2)
     },
     **{
         f"{name}-two-speed-navigation": Recipe(
-            "two speeds: navigation loop", "two_speed", "navigation", (name,)
+            "two speeds: navigation loop", "two_speed_loops", "navigation", (name,)
         )
         for name in ("dcm", "euler")
     },
@@ -207,7 +209,9 @@ TWO_SPEED = {
 #: Kernels that take no method.
 KERNELS = {
     **{
-        f"{algorithm}-product": Recipe(f"{title}: state after a transition", "steps", "product", (algorithm,))
+        f"{algorithm}-product": Recipe(
+            f"{title}: state after a transition", "attitude_step", "product", (algorithm,)
+        )
         for algorithm, title in ALGORITHMS.items()
     },
     "dcm-orthonormalize": Recipe(
@@ -235,13 +239,13 @@ KERNELS = {
     "error-matrix": Recipe("scale, skew and drift of a computed attitude", "error_matrix", "error_matrix"),
     **{
         f"{motion}-truth": Recipe(
-            f"rate and true attitude of the {motion} motion", "motions", "truth", (motion,)
+            f"rate and true attitude of the {motion} motion", "motion_models", "truth", (motion,)
         )
         for motion in MOTIONS
     },
     **{
         f"{motion}-increments": Recipe(
-            f"exact increments of the {motion} motion", "motions", "increments", (motion,)
+            f"exact increments of the {motion} motion", "motion_models", "increments", (motion,)
         )
         for motion in MOTIONS
     },
@@ -268,16 +272,16 @@ class StepVector(NamedTuple):
 VECTORS = {
     "rotation-vector": StepVector(
         "rotation vector of a step",
-        "steps",
+        "attitude_step",
         "rotation_vector",
-        ("magnus", "munthe_kaas", "coning_methods"),
+        ("magnus", "munthe_kaas", "coning"),
         "coning-combined",
     ),
     "sculling": StepVector(
         "sculling term of a step, by duality with coning",
-        "coning_methods",
+        "sculling_term",
         "sculling",
-        ("coning_methods",),
+        ("coning",),
         "coning-combined",
     ),
 }

@@ -11,8 +11,8 @@ from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
-    from strapgen.catalogue.coning import Design
-    from strapgen.catalogue.rotation_series import Scalars
+    from strapgen.catalogue.methods.coning_coefficients import Design
+    from strapgen.catalogue.methods.rotation_series import Scalars
 
 
 def coning(
@@ -50,7 +50,7 @@ def coning(
     """
     check_format(format)
     from strapgen import catalogue
-    from strapgen.catalogue import coning as derivation
+    from strapgen.catalogue.methods import coning_coefficients as derivation
 
     count = checks.count("samples", whole("samples", samples), largest=catalogue.MOST_INCREMENTS)
     kept = checks.count("previous", whole("previous", previous), smallest=0, largest=catalogue.MOST_PREVIOUS)
@@ -72,12 +72,12 @@ _MOST_SAMPLES = 6
 
 
 def _data(design: Design, terms: bool) -> dict[str, Any]:
-    from strapgen.catalogue import coning_methods
-    from strapgen.catalogue.steps import sample_names
+    from strapgen.catalogue.methods.coning import method, sample_terms
+    from strapgen.catalogue.methods.steps import sample_names
 
     names = sample_names(design.samples, design.previous)
     residual = design.residual()
-    order = coning_methods.method(design.form).step_order(design.samples, design.previous)
+    order = method(design.form).step_order(design.samples, design.previous)
     data: dict[str, Any] = {
         "coefficients": [str(c) for c in design.pairs.values()],
         "residual": residual.expression,
@@ -86,7 +86,7 @@ def _data(design: Design, terms: bool) -> dict[str, Any]:
         "order": order.step,
     }
     if terms:
-        third, fourth = coning_methods.sample_terms(design.samples, design.previous)
+        third, fourth = sample_terms(design.samples, design.previous)
         data["third_order"] = {names[k]: _products(row, names) for k, row in third.items()}
         data["fourth_order"] = {
             f"{names[k]} x {names[m]}": _products(row, names) for (k, m), row in fourth.items()
@@ -99,7 +99,7 @@ def _products(row: Scalars, names: list[str]) -> dict[str, str]:
 
 
 def _text(design: Design, data: dict[str, Any]) -> str:
-    from strapgen.catalogue import coning as derivation
+    from strapgen.catalogue.methods import coning_coefficients as derivation
 
     before = (
         f" and {design.previous} before {'it' if design.samples == 1 else 'them'}" if design.previous else ""

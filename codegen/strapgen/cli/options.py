@@ -15,7 +15,7 @@ from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
     from strapgen.catalogue import Choice
-    from strapgen.catalogue.tableaux import Tableau
+    from strapgen.catalogue.methods.tableaux import Tableau
 
 Algorithm = Annotated[
     str,
@@ -74,7 +74,7 @@ def chosen(
 ) -> Choice:
     """Return the kernel that options choose; with `step` it must be an attitude step."""
     from strapgen import catalogue
-    from strapgen.catalogue import tableaux
+    from strapgen.catalogue.methods import tableaux
 
     chosen_method: str | Tableau | None = method
     if tableau is not None:

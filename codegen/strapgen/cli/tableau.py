@@ -11,7 +11,7 @@ from strapgen.cli.options import Format, check_format, print_json
 from strapgen.support import checks
 
 if TYPE_CHECKING:
-    from strapgen.catalogue.tableaux import Tableau
+    from strapgen.catalogue.methods.tableaux import Tableau
 
 #: Widest table; what is wider is listed coefficient by coefficient.
 _WIDEST = 120
@@ -32,7 +32,7 @@ def tableau(
     Example: strapgen tableau dormand-prince5
     """
     check_format(format)
-    from strapgen.catalogue import tableaux
+    from strapgen.catalogue.methods import tableaux
 
     if method.endswith(".toml") or any(separator in method for separator in (os.sep, os.altsep) if separator):
         chosen = tableaux.read(method)
@@ -47,8 +47,8 @@ def tableau(
 
 
 def _data(chosen: Tableau) -> dict[str, Any]:
-    from strapgen.catalogue import order_conditions
-    from strapgen.catalogue.coefficients import text
+    from strapgen.catalogue.methods import order_conditions
+    from strapgen.catalogue.methods.coefficients import text
 
     embedded = chosen.embedded_weights
     return {

@@ -277,11 +277,11 @@ def _assessed(
     random: bool,
 ) -> list[_Case]:
     """Return what can be assessed of an algorithm, of what is asked for."""
-    from strapgen.catalogue import user
+    from strapgen.catalogue.user import loading
     from strapgen.support import checks
     from strapgen.vibration import assessment, systems
 
-    _check_known(algorithm, (*systems.NAMES, _TWO_SPEED), tuple(user.installed()))
+    _check_known(algorithm, (*systems.NAMES, _TWO_SPEED), tuple(loading.installed()))
     method, tableau, count, previous, rates = options
     cycles = None
     whole_algorithm = algorithm == _TWO_SPEED

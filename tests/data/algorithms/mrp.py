@@ -4,9 +4,9 @@ from fractions import Fraction
 
 import sympy as sp
 
-from strapgen.catalogue.runge_kutta import advance
-from strapgen.catalogue.steps import Samples
-from strapgen.catalogue.tableaux import TABLEAUX
+from strapgen.catalogue.methods.runge_kutta import advance
+from strapgen.catalogue.methods.steps import Samples
+from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.ir.attitude_step import Companions
 from strapgen.ir.signals import Signal
 from strapgen.symbolic import rotations

@@ -2,10 +2,11 @@
 
 from dataclasses import replace
 
-from strapgen.catalogue import Choice, derive, runge_kutta
+from strapgen.catalogue import Choice, derive
 from strapgen.catalogue.kinematics import KINEMATICS
-from strapgen.catalogue.steps import step
-from strapgen.catalogue.tableaux import TABLEAUX
+from strapgen.catalogue.methods import runge_kutta
+from strapgen.catalogue.methods.steps import step
+from strapgen.catalogue.methods.tableaux import TABLEAUX
 
 
 def algorithm(method=TABLEAUX["rk4"], increments=2, previous=0):

@@ -1,0 +1,203 @@
+"""Coning and sculling by recursion: the sums of a fast loop, and the rotation vector that follows from them."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import sympy as sp
+
+from strapgen.catalogue.kernels.updates import ROTATION_VECTOR
+from strapgen.catalogue.kinematics import SAVAGE
+from strapgen.ir.recursion import Recursion
+from strapgen.ir.signals import Signal, after
+from strapgen.symbolic.kernel import Kernel, KernelBuilder
+from strapgen.symbolic.rotations import cross
+
+INCREMENT = Signal.vector(
+    "increment",
+    "d",
+    unit="rad",
+    meaning="angle increment of the fast cycle, body axes: exact integral of the body rate",
+    bound=Fraction(1, 8),
+)
+PREVIOUS = Signal.vector(
+    "previous_increment",
+    "past",
+    unit="rad",
+    meaning="angle increment of the fast cycle before; zero at the start",
+    bound=Fraction(1, 8),
+)
+ANGLE_SUM = Signal.vector(
+    "angle_sum",
+    "beta",
+    unit="rad",
+    meaning="sum of the angle increments since the slow cycle began",
+    bound=Fraction(1),
+)
+CONING = Signal.vector(
+    "coning",
+    "coning",
+    unit="rad",
+    meaning="coning correction since the slow cycle began",
+    bound=Fraction(1, 8),
+)
+VELOCITY_INCREMENT = Signal.vector(
+    "velocity_increment",
+    "dv",
+    unit="m/s",
+    meaning="velocity increment of the fast cycle, body axes: exact integral of the specific force",
+    bound=Fraction(1),
+)
+VELOCITY_SUM = Signal.vector(
+    "velocity_sum",
+    "u",
+    unit="m/s",
+    meaning="sum of the velocity increments since the slow cycle began",
+    bound=Fraction(8),
+)
+SCULLING = Signal.vector(
+    "sculling",
+    "eta",
+    unit="m/s",
+    meaning="sculling integral since the slow cycle began",
+    bound=Fraction(4),
+)
+
+
+class FastLoop:
+    """A fast loop under construction: its inputs, and the outputs that take their place in the next cycle.
+
+    Attributes
+    ----------
+    build : KernelBuilder
+    states : list of (str, str)
+        Feedback pairs: an input and the output that takes its place.
+    """
+
+    def __init__(self) -> None:
+        self.build = KernelBuilder()
+        self.states: list[tuple[str, str]] = []
+
+    def hand_on(self, signal: Signal, value: sp.Matrix) -> None:
+        """Add a feedback pair: the value becomes this input in the next cycle."""
+        self.states.append((signal.name, after(signal).name))
+        self.build.output(after(signal), value)
+
+    def kernel(self, name: str, title: str, source: str) -> Kernel:
+        """Return the kernel; at the end of a slow cycle all states but the previous increment are reset."""
+        continued = tuple(state for state, _ in self.states if state == PREVIOUS.name)
+        return self.build.kernel(
+            name, title, f"{SAVAGE}, {source}", recursion=Recursion(tuple(self.states), continued)
+        )
+
+
+def coned(
+    build: KernelBuilder, coning: sp.Matrix, beta: sp.Matrix, past: sp.Matrix, d: sp.Matrix
+) -> sp.Matrix:
+    """Return the coning correction after a fast cycle, equation (26).
+
+    Parameters
+    ----------
+    build : KernelBuilder
+    coning, beta : Matrix, 3 x 1
+        Coning correction and sum of the increments before the cycle, in rad.
+    past, d : Matrix, 3 x 1
+        Increments of the previous cycle and of this one, in rad.
+    """
+    arm = Signal.vector("arm", "arm", unit="rad", meaning="angle at the middle of the cycle, for coning")
+    return coning + cross(build.stage(arm, beta + past / 6), d) / 2
+
+
+def sculled(
+    build: KernelBuilder,
+    form: int,
+    eta: sp.Matrix,
+    beta: sp.Matrix,
+    u: sp.Matrix | None,
+    d: sp.Matrix,
+    dv: sp.Matrix,
+) -> sp.Matrix:
+    """Return the sculling integral after a fast cycle: S1 by equation (55), S2 by (56).
+
+    Parameters
+    ----------
+    build : KernelBuilder
+    form : int
+        1 or 2.
+    eta, beta, u : Matrix, 3 x 1
+        Sculling integral in m/s, and the sums of the angle increments in rad and of the velocity increments in m/s
+        before the cycle; S1 does not use u.
+    d, dv : Matrix, 3 x 1
+        Angle and velocity increment of the cycle.
+    """
+    if form == 1:
+        middle = Signal.vector("middle", "middle", unit="rad", meaning="angle at the middle of the cycle")
+        return eta + cross(build.stage(middle, beta + d / 2), dv)
+    return eta + (cross(beta, dv) + cross(u, d)) / 2
+
+
+def coning() -> Kernel:
+    """Return the fast loop of the rotation vector, equation (26).
+
+    Returns
+    -------
+    Kernel
+        Inputs ``angle_sum``, ``coning``, ``previous_increment`` and ``increment``, all (3,) in rad; outputs
+        ``next_angle_sum``, ``next_coning``, ``next_previous_increment``.
+    """
+    loop = FastLoop()
+    beta, correction, past, d = map(loop.build.input, (ANGLE_SUM, CONING, PREVIOUS, INCREMENT))
+    loop.hand_on(ANGLE_SUM, beta + d)
+    loop.hand_on(CONING, coned(loop.build, correction, beta, past, d))
+    loop.hand_on(PREVIOUS, d)
+    return loop.kernel("coning-fast", "Rotation vector by recursion: fast loop", "equation (26)")
+
+
+def rotation_vector_of(beta: sp.Matrix, correction: sp.Matrix) -> sp.Matrix:
+    """Return the rotation vector of a slow cycle, the sum of increments plus coning correction, equation (22)."""
+    return beta + correction
+
+
+def rotation_vector() -> Kernel:
+    """Return the slow loop of the rotation vector, which adds increments and coning correction, equation (26).
+
+    Returns
+    -------
+    Kernel
+        Inputs ``angle_sum`` and ``coning`` (3,) in rad; output ``rotation_vector`` (3,) in rad.
+    """
+    build = KernelBuilder()
+    beta, correction = build.input(ANGLE_SUM), build.input(CONING)
+    build.output(ROTATION_VECTOR, rotation_vector_of(beta, correction))
+    return build.kernel(
+        "coning-slow", "Rotation vector by recursion: slow loop", f"{SAVAGE}, equations (22) and (26)"
+    )
+
+
+def sculling(form: int) -> Kernel:
+    """Return the fast loop of the velocity: S1 by equation (55) for form 1, S2 by (56) for form 2.
+
+    Parameters
+    ----------
+    form : int
+        1 or 2.
+
+    Returns
+    -------
+    Kernel
+        Inputs ``angle_sum``, ``velocity_sum``, ``sculling``, ``increment``, ``velocity_increment``; outputs
+        ``next_angle_sum``, ``next_velocity_sum``, ``next_sculling``. Angles in rad, velocities in m/s, all (3,).
+    """
+    loop = FastLoop()
+    beta, u, eta, d, dv = map(
+        loop.build.input, (ANGLE_SUM, VELOCITY_SUM, SCULLING, INCREMENT, VELOCITY_INCREMENT)
+    )
+    loop.hand_on(ANGLE_SUM, beta + d)
+    loop.hand_on(VELOCITY_SUM, u + dv)
+    loop.hand_on(SCULLING, sculled(loop.build, form, eta, beta, u, d, dv))
+    title = "Sculling with rotation compensation apart" if form == 2 else "Sculling and rotation compensation"
+    return loop.kernel(
+        f"sculling-fast-{form}",
+        f"{title} by recursion: fast loop",
+        f"equation {'(56)' if form == 2 else '(55)'}",
+    )

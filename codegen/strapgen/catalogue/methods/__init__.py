@@ -1,0 +1,1 @@
+"""How to integrate: Butcher tableaux, Taylor, Magnus, Munthe-Kaas and coning methods."""

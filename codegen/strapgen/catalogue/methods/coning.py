@@ -1,0 +1,262 @@
+"""Attitude steps by coning coefficients, from increments and their cross products, and the dual for sculling."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import sympy as sp
+
+from strapgen.catalogue.methods import coning_coefficients, rate_fit, rotation_series
+from strapgen.catalogue.methods.rotation_series import Scalars, Words, fraction
+from strapgen.catalogue.methods.steps import (
+    PHI,
+    Method,
+    Samples,
+    chosen,
+    exponential,
+    increments_signal,
+    kept,
+    sample_names,
+)
+from strapgen.ir.signals import Signal
+from strapgen.symbolic.kernel import Kernel, KernelBuilder
+from strapgen.symbolic.rotations import cross, dot, exact
+
+#: Most Legendre coefficients of the rate in the terms of third and fourth order.
+MOST_COEFFICIENTS = 6
+
+#: Order of a step with terms up to second order in the rate, and of one with terms up to fourth order.
+_SECOND, _FOURTH = 4, 6
+
+#: Methods by the suffix of their name: the form of the coefficients, and whether the step has the terms of third and
+#: fourth order of the polynomial through the samples.
+_METHODS = {
+    "compressed": ("compressed", False),
+    "uncompressed": ("uncompressed", False),
+    "combined": ("combined", True),
+    "polynomial": ("uncompressed", True),
+}
+
+
+def method(name: str) -> Method:
+    """Return a step by coning coefficients.
+
+    Parameters
+    ----------
+    name : str
+        "compressed" and "uncompressed" have terms up to second order. "combined" and "polynomial", the latter with
+        uncompressed coefficients, also have the terms of third and fourth order.
+    """
+    form, terms = _METHODS[name]
+    order = _FOURTH if terms else _SECOND
+
+    def limit(increments: int, previous: int) -> int:
+        # The first product with an error has a total degree one higher; its local order is that degree plus two.
+        return min(order, coning_coefficients.design(increments, previous, form).degree + 2)
+
+    return exponential(
+        f"coning-{name}",
+        f"{form} coning coefficients{', terms to fourth order' if terms else ''}",
+        f"{coning_coefficients.SOURCES[form]}; {rotation_series.SOURCE}"
+        if terms
+        else coning_coefficients.SOURCES[form],
+        order,
+        lambda build, samples: (_with_terms if terms else _of_pairs)(build, samples, form),
+        limit=limit,
+    )
+
+
+def sculling(method: Method, increments: int, previous: int = 0) -> Kernel:
+    """Derive the sculling term of a step, by duality with the coning coefficients of a method.
+
+    The term is half the integral of (integral of w) x a + (integral of a) x w, in body axes.
+
+    Parameters
+    ----------
+    method : Method
+        A result of the function `method`.
+    increments, previous : int
+        Samples of the step, and samples from before it.
+
+    Returns
+    -------
+    Kernel
+        Inputs ``increments`` in rad and ``velocity_increments`` in m/s, both (previous + increments, 3); output
+        ``sculling`` (3,) in m/s.
+    """
+    form = _METHODS[method.name.removeprefix("coning-")][0]
+    build = KernelBuilder()
+    angles = increments_signal(increments, previous)
+    names = [sample_names(increments, previous, letter) for letter in "dv"]
+    velocities = Signal(
+        "velocity_increments",
+        angles.shape,
+        tuple(f"{name}_{axis}" for name in names[1] for axis in "xyz"),
+        unit="m/s",
+        meaning="velocity increments of the step, body axes, oldest first: exact integrals of the specific force"
+        + kept(previous),
+    )
+    d, v = build.input(angles), build.input(velocities)
+    rows = [d[k, :].T for k in range(d.rows)], [v[k, :].T for k in range(v.rows)]
+    pairs = coning_coefficients.design(increments, previous, form).pairs
+    total = sp.zeros(3, 1)
+    for newer in range(1, d.rows):
+        for levered, crossed, what in ((0, 1, "angle"), (1, 0, "velocity")):
+            weights = {older: c for (older, other), c in pairs.items() if other == newer and c}
+            if not weights:
+                continue
+            name = f"{what}_lever_{names[crossed][newer]}"
+            signal = Signal.vector(
+                name,
+                name,
+                unit=(angles, velocities)[levered].unit,
+                meaning=f"sum of older {what} increments that is crossed with {names[crossed][newer]}",
+            )
+            lever = build.stage(signal, _combined(weights, rows[levered]))
+            total += cross(lever, rows[crossed][newer])
+    build.output(
+        Signal.vector(
+            "sculling", "sculling", unit="m/s", meaning="sculling term of the velocity change, body axes"
+        ),
+        total,
+    )
+    suffix, option, samples_text = chosen(method, increments, previous)
+    samples_text = samples_text.replace("angle ", "angle and velocity ")
+    return build.kernel(
+        f"sculling-{suffix}",
+        f"Sculling term of a step by {form} coning coefficients from {samples_text}",
+        f"{coning_coefficients.SOURCES[form]}; by duality: K. M. Roscoe, J. Guid. Control Dyn. 24 (2001) 201-205",
+        arguments=f"sculling {option}",
+    )
+
+
+def _of_pairs(build: KernelBuilder, samples: Samples, form: str) -> sp.Matrix:
+    """Return the rotation vector as the sum of the increments and of weighted cross products of them."""
+    increments = samples.increments
+    assert increments is not None, "rates are refused before"
+    pairs = coning_coefficients.design(increments, samples.previous, form).pairs
+    names = sample_names(increments, samples.previous)
+    total = samples.combination("increment_sum", samples.fit.moment(0), "integral of the rate over the step")
+    if not any(pairs.values()):
+        return total
+    second = sp.zeros(3, 1)
+    for newer in range(1, len(names)):
+        weights = [exact(pairs.get((older, newer), Fraction(0))) for older in range(len(names))]
+        if any(weights):
+            lever = samples.combination(
+                f"lever_{names[newer]}",
+                weights,
+                f"sum of older increments that is crossed with {names[newer]}",
+            )
+            unit = [sp.Integer(int(k == newer)) for k in range(len(names))]
+            second += cross(lever, samples.combination(names[newer], unit, ""))
+    return build.stage(PHI, total + second)
+
+
+def _with_terms(build: KernelBuilder, samples: Samples, form: str) -> sp.Matrix:
+    """Return the rotation vector in the Legendre coefficients of the rate, where half of the weights vanish."""
+    assert samples.increments is not None, "rates are refused before"
+    pairs = coning_coefficients.design(samples.increments, samples.previous, form).pairs
+    count = len(samples.fit.basis)
+    vectors = [
+        samples.combination(
+            f"legendre_{m}",
+            samples.fit.legendre(m),
+            f"Legendre coefficient {m} of the rate times the step",
+        )
+        for m in range(count)
+    ]
+    second = in_legendre(pairs, samples.increments, samples.previous)
+    series = rotation_series.legendre_terms(min(count, MOST_COEFFICIENTS), 4)
+    third, fourth = rotation_series.third(series[2]), rotation_series.fourth(series[3])
+    products: dict[tuple[int, int], sp.Symbol] = {}
+
+    def weight(constant: Fraction, row: Scalars) -> sp.Expr:
+        total = exact(constant)
+        for (i, j), c in row.items():
+            if (i, j) not in products:
+                products[i, j] = build.value(
+                    f"product_{i}_{j}",
+                    dot(vectors[i], vectors[j]),
+                    f"scalar product of Legendre coefficients {i} and {j}",
+                )
+            total += exact(c) * products[i, j]
+        return total
+
+    phi = sp.zeros(3, 1)
+    for k in range(count):
+        value = weight(Fraction(int(k == 0)), third.get(k, {}))
+        if value.is_Rational:
+            phi += value * vectors[k]
+        else:
+            phi += build.value(f"weight_{k}", value, f"weight of Legendre coefficient {k}") * vectors[k]
+    for k, m in sorted({*second, *fourth}):
+        product = build.stage(
+            Signal.vector(
+                f"cross_{k}_{m}",
+                f"cross_{k}_{m}",
+                meaning=f"cross product of Legendre coefficients {k} and {m}",
+            ),
+            cross(vectors[k], vectors[m]),
+        )
+        value = weight(second.get((k, m), Fraction(0)), fourth.get((k, m), {}))
+        if value.is_Rational:
+            phi += value * product
+        else:
+            phi += build.value(f"weight_{k}_{m}", value, "weight of that cross product") * product
+    return build.stage(PHI, phi)
+
+
+def sample_terms(
+    increments: int, previous: int = 0
+) -> tuple[dict[int, Scalars], dict[tuple[int, int], Scalars]]:
+    """Return the terms of third and fourth order of the polynomial through samples, in terms of the samples.
+
+    Parameters
+    ----------
+    increments, previous : int
+        Samples of the step, and samples from before it.
+
+    Returns
+    -------
+    third, fourth : dict
+        As from `rotation_series.third` and `rotation_series.fourth`; the oldest sample is number 0.
+    """
+    terms = rotation_series.terms(increments + previous, 4)
+    third, fourth = (rotation_series.in_samples(words, increments, previous) for words in terms[2:])
+    return rotation_series.third(third), rotation_series.fourth(fourth)
+
+
+def in_legendre(pairs: Scalars, increments: int, previous: int) -> Scalars:
+    """Convert coefficients of cross products of samples to those of the rate's Legendre coefficients.
+
+    Parameters
+    ----------
+    pairs : dict
+        By the numbers of two samples.
+    increments, previous : int
+        Samples of the step, and samples from before it.
+
+    Returns
+    -------
+    dict
+        By the numbers of two Legendre coefficients, without zeros.
+    """
+    count = increments + previous
+    powers = [coning_coefficients.powers(increments, previous, j) for j in range(count)]
+    table = [
+        {
+            m: sum((fraction(c) * powers[j][sample] for j, c in enumerate(rate_fit.legendre(m))), Fraction(0))
+            for m in range(count)
+        }
+        for sample in range(count)
+    ]  # every sample in the coefficients
+    words: Words = {pair: c for pair, c in pairs.items()}
+    return rotation_series.pairs(rotation_series.substituted(words, table))
+
+
+def _combined(weights: dict[int, Fraction], vectors: list[sp.Matrix]) -> sp.Matrix:
+    total = sp.zeros(3, 1)
+    for k, c in weights.items():
+        total += exact(c) * vectors[k]
+    return total

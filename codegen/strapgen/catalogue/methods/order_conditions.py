@@ -1,0 +1,375 @@
+"""Order conditions of Runge-Kutta methods, decided exactly.
+
+For general equations the conditions of order p belong to the rooted trees with p nodes: b' Phi(t) = 1/gamma(t), after
+Butcher.
+
+For linear equations x' = A(t) x most of them coincide or are not needed. A word (k_1, ..., k_m) stands for the product
+A^(k_1) A^(k_2) ... A^(k_m) of derivatives of A. Its order is p = sum (k_i + 1), and there are 2^(p - 1) words of this
+order. In the exact solution, a series of iterated integrals (Peano and Baker), its coefficient is
+
+    int_0^1 s_1^k_1 int_0^s_1 s_2^k_2 ... int_0^s_(m-1) s_m^k_m ds_m ... ds_1 = prod_i 1 / sum_(j >= i) (k_j + 1)
+
+and in the method it is b' C^k_1 A C^k_2 A ... C^k_m 1 with the diagonal matrix C of the nodes; a factor
+1/(k_1! ... k_m!) is common to both. Attitude kinematics is linear. In the form x' = x A all products are reversed on
+both sides, and the conditions are the same.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from functools import cache, lru_cache
+from itertools import combinations_with_replacement, groupby, product
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+if TYPE_CHECKING:
+    from strapgen.catalogue.methods.coefficients import Number
+    from strapgen.catalogue.methods.tableaux import Tableau
+
+#: A rooted tree as the tuple of the subtrees of its root, in a fixed order.
+Tree: TypeAlias = "tuple[Tree, ...]"
+
+#: A product of derivatives of A(t), as the tuple of the orders of the derivatives, the last in time first.
+Word: TypeAlias = tuple[int, ...]
+
+
+# Trees
+
+
+@cache
+def trees(order: int) -> tuple[Tree, ...]:
+    """Return the rooted trees with as many nodes as the order, the tree with all leaves on the root first.
+
+    Examples
+    --------
+    >>> trees(3)
+    (((), ()), (((),),))
+    >>> [len(trees(order)) for order in range(1, 9)]
+    [1, 1, 2, 4, 9, 20, 48, 115]
+    """
+    return tuple(
+        tuple(subtree for choice in chosen for subtree in choice)
+        for sizes in _partitions(order - 1, order - 1)
+        for chosen in product(
+            *(combinations_with_replacement(trees(nodes), len([*same])) for nodes, same in groupby(sizes))
+        )
+    )
+
+
+def _partitions(total: int, largest: int) -> Iterator[tuple[int, ...]]:
+    """Yield the partitions of a number, with the parts of each in ascending order."""
+    if total == 0:
+        yield ()
+    for last in range(1, min(total, largest) + 1):
+        for rest in _partitions(total - last, last):
+            yield (*rest, last)
+
+
+@cache
+def size(tree: Tree) -> int:
+    """Return the number of nodes of a tree, which is the order of its condition."""
+    return 1 + sum(map(size, tree))
+
+
+@cache
+def density(tree: Tree) -> int:
+    """Return gamma, the product of the sizes of a tree and of all its subtrees.
+
+    Examples
+    --------
+    >>> density((((),),))
+    6
+    """
+    return size(tree) * math.prod(map(density, tree))
+
+
+@cache
+def symmetry(tree: Tree) -> int:
+    """Return sigma, the number of exchanges of branches that leave a tree unchanged.
+
+    Examples
+    --------
+    >>> symmetry(((), (), ()))
+    6
+    """
+    return math.prod(
+        math.factorial(number) * symmetry(subtree) ** number
+        for subtree in dict.fromkeys(tree)
+        for number in [tree.count(subtree)]
+    )
+
+
+def weight_text(tree: Tree) -> str:
+    """Return the elementary weight of a tree in the usual notation.
+
+    Examples
+    --------
+    >>> [weight_text(tree) for tree in trees(3)]
+    ['sum b_i c_i^2', 'sum b_i a_ij c_j']
+    """
+    letters = iter("ijklmnopqrstuvwxyz")
+
+    def factors(tree: Tree, at: str) -> list[str]:
+        leaves = tree.count(())
+        parts = [f"c_{at}" + (f"^{leaves}" if leaves > 1 else "")] if leaves else []
+        for subtree in tree:
+            if subtree:
+                below = next(letters)
+                parts += [f"a_{at}{below}", *factors(subtree, below)]
+        return parts
+
+    root = next(letters)
+    return " ".join(["sum", f"b_{root}", *factors(tree, root)])
+
+
+# Words
+
+
+def words(order: int, derivatives: int | None = None) -> list[Word]:
+    """Return the products of derivatives of A(t) of an order, without derivatives above `derivatives` if it is set.
+
+    Parameters
+    ----------
+    order : int
+    derivatives : int, optional
+        Highest derivative.
+
+    Returns
+    -------
+    list of Word
+        The shortest first.
+
+    Examples
+    --------
+    >>> words(3)
+    [(2,), (1, 0), (0, 1), (0, 0, 0)]
+    >>> words(3, derivatives=0)
+    [(0, 0, 0)]
+    """
+    if order == 0:
+        return [()]
+    highest = order - 1 if derivatives is None else min(derivatives, order - 1)
+    products = [(k, *rest) for k in range(highest, -1, -1) for rest in words(order - 1 - k, derivatives)]
+    return sorted(products, key=len)
+
+
+def word_coefficient(word: Word) -> Fraction:
+    """Return the coefficient of a word in the exact solution, times the factorials of its derivatives.
+
+    Examples
+    --------
+    >>> word_coefficient((0, 1))  # int_0^1 int_0^s t dt ds
+    Fraction(1, 6)
+    """
+    return Fraction(1, math.prod(sum(k + 1 for k in word[place:]) for place in range(len(word))))
+
+
+# Tableaux
+
+
+class _Stages:
+    """The coefficients of a tableau in the smallest field that holds them, and vectors with one element per stage.
+
+    Arithmetic is exact in fractions or in an algebraic field, so that a zero is recognized.
+    """
+
+    def __init__(self, tableau: Tableau) -> None:
+        rows = [tableau.nodes, tableau.weights, *tableau.matrix]
+        if tableau.rational:
+            self.rational: Callable[[Fraction], Any] = Fraction
+            self.number: Callable[[Any], Number] = Fraction
+            converted: Sequence[Sequence[Any]] = rows
+        else:
+            import sympy as sp
+            from sympy.polys.constructor import construct_domain
+
+            values = [sp.sympify(value) for row in rows for value in row]
+            domain, elements = construct_domain(values, extension=True, field=True)
+            rest_of_elements = iter(elements)
+            converted = [[next(rest_of_elements) for _ in row] for row in rows]
+            self.rational = lambda value: domain.from_sympy(sp.Rational(value.numerator, value.denominator))
+            self.number = domain.to_sympy
+        self.nodes, self.weights, *self.matrix = converted
+        self.zero, one = self.rational(Fraction(0)), self.rational(Fraction(1))
+        self.ones = [one] * len(self.nodes)
+        self.trees: dict[Tree, list[Any]] = {}
+        self.words: dict[Word, list[Any]] = {(): self.ones}
+
+    def applied(self, vector: list[Any]) -> list[Any]:
+        """Return the matrix of the tableau times a vector."""
+        return [self.sum(row, vector[: len(row)]) for row in self.matrix]
+
+    def sum(self, left: Sequence[Any], right: Sequence[Any]) -> Any:
+        return sum((x * y for x, y in zip(left, right, strict=True) if x and y), self.zero)
+
+    def tree(self, tree: Tree) -> list[Any]:
+        """Return the product over the subtrees of the matrix times their vectors, or the nodes for a leaf."""
+        if tree not in self.trees:
+            vector = self.ones
+            for subtree in tree:
+                factor = self.applied(self.tree(subtree)) if subtree else self.nodes
+                vector = [x * y for x, y in zip(vector, factor, strict=True)]
+            self.trees[tree] = vector
+        return self.trees[tree]
+
+    def word(self, word: Word) -> list[Any]:
+        """Return C^k_1 A C^k_2 A ... C^k_m 1."""
+        if word not in self.words:
+            first, *rest = word
+            if first:
+                shorter = self.word((first - 1, *rest))
+                self.words[word] = [c * x for c, x in zip(self.nodes, shorter, strict=True)]
+            else:
+                self.words[word] = self.applied(self.word(tuple(rest))) if rest else self.ones
+        return self.words[word]
+
+    def residual(self, vector: list[Any], exact: Fraction) -> Any:
+        """Return b' times a vector, minus the exact value."""
+        return self.sum(self.weights, vector) - self.rational(exact)
+
+    def tree_residual(self, tree: Tree) -> Any:
+        return self.residual(self.tree(tree), Fraction(1, density(tree)))
+
+    def word_residual(self, word: Word) -> Any:
+        return self.residual(self.word(word), word_coefficient(word))
+
+
+@lru_cache(maxsize=32)
+def _stages(tableau: Tableau) -> _Stages:
+    return _Stages(tableau)
+
+
+def _holds(tableau: Tableau, defect: Any) -> bool:
+    """Return whether a residual is zero, or within the tableau's tolerance for rounded coefficients."""
+    if not defect:
+        return True
+    return bool(tableau.tolerance) and abs(_stages(tableau).number(defect)) <= tableau.tolerance
+
+
+def row_residuals(tableau: Tableau) -> list[Number]:
+    """Return for every stage the sum of its row minus its node."""
+    stages = _stages(tableau)
+    sums = stages.applied(stages.ones)
+    return [stages.number(total - node) for total, node in zip(sums, stages.nodes, strict=True)]
+
+
+def residuals(tableau: Tableau, order: int) -> list[tuple[Tree, Number]]:
+    """Return for every tree of an order its elementary weight minus 1/gamma, which is zero if the condition holds.
+
+    Parameters
+    ----------
+    tableau : Tableau
+    order : int
+
+    Returns
+    -------
+    list of (Tree, number)
+
+    Examples
+    --------
+    >>> from strapgen.catalogue.methods.tableaux import TABLEAUX
+    >>> residuals(TABLEAUX["rk2"], 3)
+    [(((), ()), Fraction(1, 6)), ((((),),), Fraction(-1, 6))]
+    """
+    stages = _stages(tableau)
+    return [(tree, stages.number(stages.tree_residual(tree))) for tree in trees(order)]
+
+
+def first_failure(tableau: Tableau, order: int) -> tuple[Tree, Number] | None:
+    """Return the tree and the residual of the first condition of an order that fails; None if all hold."""
+    stages = _stages(tableau)
+    for tree in trees(order):
+        defect = stages.tree_residual(tree)
+        if not _holds(tableau, defect):
+            return tree, stages.number(defect)
+    return None
+
+
+def order(tableau: Tableau, most: int = 20) -> int:
+    """Return the classical order of a method, at most `most`.
+
+    Parameters
+    ----------
+    tableau : Tableau
+    most : int, optional
+
+    Returns
+    -------
+    int
+
+    Examples
+    --------
+    >>> from strapgen.catalogue.methods.tableaux import TABLEAUX
+    >>> order(TABLEAUX["rk4"])
+    4
+    """
+    return next((p - 1 for p in range(1, most + 1) if first_failure(tableau, p)), most)
+
+
+def embedded_order(tableau: Tableau) -> int:
+    """Return the classical order of the embedded weights."""
+    assert tableau.embedded_weights is not None
+    return order(replace(tableau, weights=tableau.embedded_weights, embedded_weights=None))
+
+
+def attitude_order(tableau: Tableau, derivatives: int | None = None) -> int:
+    """Return the order of a method on attitude kinematics, or on any x' = A(t) x.
+
+    It is at least the classical order and can exceed it, since fewer products have to agree. Relations among the
+    matrices of one representation are not used, for instance that the square of a rate is a scalar for quaternions.
+
+    Parameters
+    ----------
+    tableau : Tableau
+    derivatives : int, optional
+        Degree of a polynomial rate, for which only words without higher derivatives count. For a constant rate, 0, the
+        result is the order to which the step agrees with the exponential.
+
+    Examples
+    --------
+    >>> from strapgen.catalogue.methods.tableaux import TABLEAUX
+    >>> attitude_order(TABLEAUX["rk4"]), attitude_order(TABLEAUX["butcher5"], derivatives=0)
+    (4, 5)
+    """
+    stages = _stages(tableau)
+    # With s stages the weight of the word (0, ..., 0) of order s + 1 is zero, so the order is at most s.
+    most = len(tableau.nodes)
+    return next(
+        (
+            p - 1
+            for p in range(1, most + 1)
+            for word in words(p, derivatives)
+            if not _holds(tableau, stages.word_residual(word))
+        ),
+        most,
+    )
+
+
+def principal_error_norm(tableau: Tableau) -> float:
+    """Return the 2-norm of the error coefficients (Phi - 1/gamma)/sigma of the first order that fails.
+
+    Examples
+    --------
+    >>> from strapgen.catalogue.methods.tableaux import TABLEAUX
+    >>> round(principal_error_norm(TABLEAUX["rk4"]), 6)
+    0.014505
+    """
+    stages = _stages(tableau)
+    leading = trees(order(tableau) + 1)
+    return math.hypot(
+        *(float(stages.number(stages.tree_residual(tree))) / symmetry(tree) for tree in leading)
+    )
+
+
+def conditions(tableau: Tableau) -> int:
+    """Return the number of conditions for a tableau's order: its row sums, and the trees up to the order."""
+    return len(tableau.nodes) + sum(len(trees(p)) for p in range(1, tableau.order + 1))
+
+
+def largest_residual(tableau: Tableau) -> Number:
+    """Return the largest residual of the row sums and the conditions up to the order, in absolute value."""
+    defects = [abs(defect) for defect in row_residuals(tableau)]
+    defects += [abs(defect) for p in range(1, tableau.order + 1) for _, defect in residuals(tableau, p)]
+    return max(defects)

@@ -1,0 +1,328 @@
+"""Butcher tableaux of explicit Runge-Kutta methods, read from the files of `methods/` or of a user."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from strapgen.catalogue.methods import coefficients, order_conditions
+from strapgen.support import checks
+from strapgen.support.exceptions import InputError
+
+if TYPE_CHECKING:
+    from strapgen.catalogue.methods.coefficients import Number
+
+#: Keys of a file, and those of them that are optional.
+KEYS = ("name", "source", "order", "nodes", "matrix", "weights", "embedded_weights", "tolerance")
+OPTIONAL = ("embedded_weights", "tolerance")
+
+#: Highest order and most stages. The number of trees grows nearly threefold from order to order.
+MOST_ORDER = 10
+MOST_STAGES = 20
+
+#: Largest tolerance of a user's file; rounding to double precision stays below it, a wrong coefficient does not.
+MOST_TOLERANCE = Fraction(1, 10**12)
+
+#: Most bytes of a file; twenty stages of long expressions take far less.
+MOST_BYTES = 200_000
+
+
+@dataclass(frozen=True)
+class Tableau:
+    """An explicit Runge-Kutta method in exact numbers.
+
+    Parameters
+    ----------
+    name, title, source : str
+        Name on the command line, name in the literature, citation.
+    order : int
+        Classical order of the method.
+    nodes : tuple of Fraction or sympy.Expr
+        c_i, as fractions of the step. Only an irrational number is an expression.
+    matrix : tuple of tuple of Fraction or sympy.Expr
+        a_ij below the diagonal, the first row empty.
+    weights : tuple of Fraction or sympy.Expr
+        b_i.
+    embedded_weights : tuple of Fraction or sympy.Expr, optional
+        Weights of a second method on the same stages.
+    tolerance : Fraction
+        Largest residual of a condition that the rounding of published coefficients explains; 0 if they are exact.
+    file : str
+        Path of the file; empty for a tableau of the catalogue.
+
+    Examples
+    --------
+    >>> TABLEAUX["rk2"].weights
+    (Fraction(1, 2), Fraction(1, 2))
+    """
+
+    name: str
+    title: str
+    source: str
+    order: int
+    nodes: tuple[Number, ...]
+    matrix: tuple[tuple[Number, ...], ...]
+    weights: tuple[Number, ...]
+    embedded_weights: tuple[Number, ...] | None = None
+    tolerance: Fraction = Fraction(0)
+    file: str = field(default="", compare=False, repr=False)
+
+    @property
+    def option(self) -> str:
+        """The option that chooses it on the command line."""
+        return f"--tableau {shlex.quote(self.file)}" if self.file else f"--method {self.name}"
+
+    @property
+    def rational(self) -> bool:
+        """Whether every coefficient is a fraction."""
+        rows = (self.nodes, self.weights, self.embedded_weights or (), *self.matrix)
+        return all(isinstance(value, Fraction) for row in rows for value in row)
+
+    @cached_property
+    def largest_residual(self) -> Number:
+        """The largest residual of row sums and order conditions; not 0 only for rounded coefficients."""
+        return order_conditions.largest_residual(self)
+
+
+class _BuiltIn(Mapping[str, Tableau]):
+    """The tableaux of a folder by name; each file is read when its tableau is first used.
+
+    They are sorted by order, with those of the thesis first within an order. Tests verify the files.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._tableaux: dict[str, Tableau] = {}
+
+    @cached_property
+    def titles(self) -> dict[str, str]:
+        """Names in the literature, by name; no coefficient is read for them."""
+        files = {path.stem: tomllib.loads(path.read_text("utf-8")) for path in self._folder.glob("*.toml")}
+
+        def place(name: str) -> tuple[int, bool, int, str]:
+            return files[name]["order"], not name.startswith("rk"), len(files[name]["nodes"]), name
+
+        return {name: files[name]["name"] for name in sorted(files, key=place)}
+
+    def __getitem__(self, name: str) -> Tableau:
+        if name not in self._tableaux:
+            if name not in self.titles:
+                raise KeyError(name)
+            path = self._folder / f"{name}.toml"
+            self._tableaux[name] = _tableau(tomllib.loads(path.read_text("utf-8")), name)
+        return self._tableaux[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.titles)
+
+    def __len__(self) -> int:
+        return len(self.titles)
+
+
+_BUILT_IN = _BuiltIn(Path(__file__).resolve().parent / "butcher_tableaux")
+
+#: The tableaux that come with the package, by name.
+TABLEAUX: Mapping[str, Tableau] = _BUILT_IN
+
+#: Their names in the literature.
+TITLES: Mapping[str, str] = _BUILT_IN.titles
+
+
+def read(path: str | Path) -> Tableau:
+    """Read a tableau from a file and check that it is explicit, its rows sum to its nodes, and it has the stated order.
+
+    Parameters
+    ----------
+    path : path
+        A TOML file with the keys of `KEYS`; every number is a whole number or a string, see `coefficients.number`.
+
+    Returns
+    -------
+    Tableau
+        Named after its key `name`, in lower case with hyphens.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, a key or number is wrong, or a condition does not hold; the message names it.
+    """
+    try:
+        try:
+            with Path(path).open("rb") as file:
+                content = file.read(MOST_BYTES + 1)
+        except OSError as error:
+            raise InputError(f"cannot be read ({error.strerror})") from None
+        if len(content) > MOST_BYTES:
+            raise InputError(f"is over {MOST_BYTES} bytes long; a tableau is shorter")
+        try:
+            data = tomllib.loads(content.decode("utf-8-sig").replace("\r\n", "\n"))
+        except UnicodeDecodeError as error:
+            raise InputError(f"is not UTF-8 (byte {error.start})") from None
+        except (ValueError, RecursionError) as error:
+            raise InputError(f"is not TOML ({error})") from None
+    except InputError as error:
+        raise InputError(f"{path} {error}") from None
+    try:
+        _check_keys(data)
+        name = _slug(data["name"])
+        if name in TABLEAUX:
+            raise InputError(f"name {data['name']!r} is that of the method {name}; another one is needed")
+        tableau = replace(_tableau(data, name), file=checks.text("the name of the file", str(path)))
+        verify(tableau)
+        # A file may state less than the actual order.
+        tableau = replace(tableau, order=order_conditions.order(tableau, MOST_ORDER))
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    return tableau
+
+
+def _check_keys(data: Mapping[str, Any]) -> None:
+    for key in data:
+        if key not in KEYS:
+            raise InputError(f"key {key!r} is not known; allowed: {', '.join(KEYS)}")
+    for key in KEYS:
+        if key not in data and key not in OPTIONAL:
+            raise InputError(
+                f"key {key} is missing; needed: {', '.join(k for k in KEYS if k not in OPTIONAL)}"
+            )
+    for key in ("name", "source"):
+        if not checks.text(key, data[key]).strip():
+            raise InputError(f"{key} is empty; a text is needed")
+    order = data["order"]
+    if not isinstance(order, int) or isinstance(order, bool) or not 1 <= order <= MOST_ORDER:
+        raise InputError(
+            f"order is {str(order)[:40]}; a whole number from 1 to {MOST_ORDER} is needed, "
+            "beyond it there are too many conditions to check"
+        )
+
+
+def _slug(title: str) -> str:
+    """Return a title as a name on the command line.
+
+    Examples
+    --------
+    >>> _slug("Bogacki & Shampine 3(2)")
+    'bogacki-shampine-3-2'
+    """
+    name = re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-")
+    if not name[:1].isalpha():
+        raise InputError(f"name {title!r} must begin with a letter from a to z, for its name in code")
+    return name
+
+
+def _tableau(data: Mapping[str, Any], name: str) -> Tableau:
+    """Return a tableau from the content of a file with all keys, after a check of its numbers and its shape."""
+    nodes = _numbers("nodes", _list("nodes", data["nodes"]))
+    stages = len(nodes)
+    if not 1 <= stages <= MOST_STAGES:
+        raise InputError(f"nodes has {stages} entries; from 1 to {MOST_STAGES} are allowed")
+    rows = _list("matrix", data["matrix"])
+    if len(rows) != stages:
+        raise InputError(f"matrix has {len(rows)} rows; as many as nodes are needed: {stages}")
+    for number, row in enumerate(rows, 1):
+        entries = len(_list(f"matrix row {number}", row))
+        if entries != number - 1:
+            why = "not explicit, " if entries >= number else ""
+            raise InputError(
+                f"matrix row {number} has {entries} entries: {why}{number - 1} are needed, left of the diagonal"
+            )
+    embedded = data.get("embedded_weights")
+    tableau = Tableau(
+        name,
+        data["name"],
+        data["source"],
+        data["order"],
+        nodes,
+        tuple(_numbers(f"matrix row {number}", row) for number, row in enumerate(rows, 1)),
+        _weights("weights", data["weights"], stages),
+        None if embedded is None else _weights("embedded_weights", embedded, stages),
+        _tolerance(data.get("tolerance", 0)),
+    )
+    if not tableau.rational:
+        _check_roots(tableau)
+    return tableau
+
+
+def _list(what: str, value: Any) -> list[Any]:
+    if not isinstance(value, list):
+        raise InputError(f"{what} is of type {type(value).__name__}; a list is needed")
+    return value
+
+
+def _numbers(what: str, values: list[Any]) -> tuple[Number, ...]:
+    return tuple(coefficients.number(f"{what}, entry {k}", value) for k, value in enumerate(values, 1))
+
+
+def _weights(what: str, value: Any, stages: int) -> tuple[Number, ...]:
+    weights = _numbers(what, _list(what, value))
+    if len(weights) != stages:
+        raise InputError(f"{what} has {len(weights)} entries; as many as nodes are needed: {stages}")
+    return weights
+
+
+def _tolerance(value: Any) -> Fraction:
+    tolerance = coefficients.number("tolerance", value)
+    if not isinstance(tolerance, Fraction) or not 0 <= tolerance <= MOST_TOLERANCE:
+        raise InputError(
+            f"tolerance is {value}; from 0 to {float(MOST_TOLERANCE):g} is needed: "
+            "it explains the rounding of published coefficients, no more"
+        )
+    return tolerance
+
+
+def _check_roots(tableau: Tableau) -> None:
+    if tableau.tolerance:
+        raise InputError("tolerance is for rounded fractions; a tableau with square roots is exact")
+    rows = (tableau.nodes, tableau.weights, tableau.embedded_weights or (), *tableau.matrix)
+    irrational = [value for row in rows for value in row if not isinstance(value, Fraction)]
+    if coefficients.degree_bound(irrational) > coefficients.MOST_DEGREE:
+        raise InputError("its numbers hold too many different square roots; at most three are allowed")
+
+
+def verify(tableau: Tableau) -> None:
+    """Check row sums and order conditions exactly.
+
+    Parameters
+    ----------
+    tableau : Tableau
+
+    Raises
+    ------
+    InputError
+        If one does not hold; the message names the first.
+    """
+    for number, defect in enumerate(order_conditions.row_residuals(tableau), 1):
+        if defect != 0 and not (tableau.tolerance and abs(defect) <= tableau.tolerance):
+            node = tableau.nodes[number - 1]
+            raise InputError(
+                f"matrix row {number} sums to {_shown(node + defect)}; its node is {_shown(node)}"
+            )
+    for order in range(1, tableau.order + 1):
+        failure = order_conditions.first_failure(tableau, order)
+        if failure:
+            tree, defect = failure
+            needed = Fraction(1, order_conditions.density(tree))
+            raise InputError(
+                f"order {order}: {order_conditions.weight_text(tree)} = {_shown(needed + defect)}, "
+                f"{needed} is needed (off by {_shown(defect)})"
+            )
+    if tableau.embedded_weights is not None and order_conditions.embedded_order(tableau) < 1:
+        total = sum(tableau.embedded_weights)
+        raise InputError(f"embedded_weights sum to {_shown(total)}; 1 is needed, that they have an order")
+
+
+def _shown(value: Number) -> str:
+    """Return a number as text, exact if that is short, otherwise rounded."""
+    if not isinstance(value, Fraction):
+        import sympy as sp
+
+        value = sp.expand(value)
+    exact = coefficients.text(value)
+    return exact if len(exact) <= 40 else f"about {float(value):.9g}"

@@ -1,0 +1,1 @@
+"""What users bring: their files are loaded, and their kernels checked."""

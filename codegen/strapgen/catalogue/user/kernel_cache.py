@@ -1,0 +1,95 @@
+"""Kernels of users in the cache: derived once for a file, what it reads, and its options."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import pickle
+import sys
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from strapgen.catalogue.user.isolation import Record, installed_folders
+from strapgen.support import cache
+from strapgen.support.exceptions import InputError
+
+if TYPE_CHECKING:
+    from strapgen.symbolic.kernel import Kernel
+
+_KIND = "kernels"
+_KERNEL, _RECORD = "kernel.pickle", "record.json"
+
+
+def kernel(what: list[str], folder: Path | None, derive: Callable[[], tuple[Kernel, Record]]) -> Kernel:
+    """Return a user's kernel from the cache, or derive it and put it there.
+
+    Parameters
+    ----------
+    what : list of str
+        What tells it from others: the file with its content, or the entry point, and the options.
+    folder : Path or None
+        The folder of the file.
+    derive : callable
+        Returns the kernel, checked, and what was read for it.
+
+    Raises
+    ------
+    InputError
+        As `derive` does.
+    """
+    key = cache.digest([cache.generator_digest(), sys.version, *_installed(), *what])
+    with contextlib.suppress(InputError):  # no cache folder: derived every time
+        if (stored := _stored(key, folder)) is not None:
+            return stored
+    derived, record = derive()
+    data = None if record.outside or not record.holds(folder) else _pickled(derived)
+    if data is not None:
+        with contextlib.suppress(InputError):
+            _store(key, data, record)
+    return derived
+
+
+def _installed() -> list[str]:
+    """Return what is installed, with versions: the names of its folders of metadata."""
+    return sorted(
+        path.name
+        for folder in map(Path, installed_folders())
+        if folder.is_dir()
+        for path in folder.iterdir()
+        if path.suffix in (".dist-info", ".egg-info")
+    )
+
+
+def _stored(key: str, folder: Path | None) -> Kernel | None:
+    place = cache.lookup(_KIND, key)
+    if place is None:
+        return None
+    try:
+        record = Record(**json.loads((place / _RECORD).read_text()))
+        if record.holds(folder):
+            stored: Kernel = pickle.loads((place / _KERNEL).read_bytes())
+            return stored
+    except Exception:  # of another Python, or removed meanwhile: derived again
+        return None
+    return None
+
+
+def _store(key: str, data: bytes, record: Record) -> None:
+    def fill(draft: Path) -> None:
+        (draft / _KERNEL).write_bytes(data)
+        (draft / _RECORD).write_text(json.dumps(asdict(record)))
+
+    cache.discard(_KIND, key)
+    cache.entry(_KIND, key, fill)
+
+
+def _pickled(derived: Kernel) -> bytes | None:
+    """Return a kernel as bytes; None if it cannot be had back from them, for instance if it holds a user's class."""
+    try:
+        data = pickle.dumps(derived)
+        restored: Any = pickle.loads(data)
+    except Exception:  # pickle raises what the objects in a kernel raise
+        return None
+    return data if restored == derived and repr(restored) == repr(derived) else None

@@ -1,0 +1,172 @@
+"""Algorithms that users bring: a Python file, or an entry point of an installed package.
+
+Both give a function called ``algorithm`` that returns the `Kernel` of an attitude step. Its parameters, if it has any,
+are chosen by name from `OPTIONS`. Each runs as if in a process of its own, see `isolation`, and its kernel is cached.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import inspect
+import os
+import shlex
+import sys
+import traceback
+from collections.abc import Iterator
+from dataclasses import replace
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from strapgen.catalogue.user import isolation, kernel_cache
+from strapgen.support import cache, checks
+from strapgen.support.exceptions import InputError, StrapgenError
+
+if TYPE_CHECKING:
+    from strapgen.symbolic.kernel import Kernel
+
+#: Entry points of installed packages.
+GROUP = "strapgen.algorithms"
+#: Name of the function in a file.
+FUNCTION = "algorithm"
+#: What the function may take: a `Tableau`, and how many increments.
+OPTIONS = ("method", "increments", "previous")
+
+
+def installed() -> dict[str, EntryPoint]:
+    """Return the entry points of installed packages by name."""
+    return {point.name: point for point in entry_points(group=GROUP)}
+
+
+def load(name: str, **options: Any) -> Kernel:
+    """Load an algorithm: its kernel, checked, from the cache if nothing has changed since it was derived.
+
+    Parameters
+    ----------
+    name : str
+        A Python file, or the name of an entry point.
+    **options
+        Of `OPTIONS`, those that the user chose.
+
+    Returns
+    -------
+    Kernel
+
+    Raises
+    ------
+    InputError
+        If there is no such algorithm, its code fails, or what it returns is no attitude step.
+    """
+    arguments = _arguments(name, options)
+    texts = [f"{option} {value!r} {getattr(value, 'file', '')}" for option, value in options.items()]
+    isolation.depends_on(f"loads {name}, another algorithm")
+    find = _of_file if name.endswith(".py") else _of_entry_point
+    return replace(find(name, options, texts), arguments=arguments)
+
+
+def _of_file(name: str, options: dict[str, Any], texts: list[str]) -> Kernel:
+    path = Path(os.path.realpath(name))  # which a circle of links does not stop
+    if not path.is_file():
+        raise InputError(f"algorithm {name} is no file; a Python file with a function {FUNCTION} is needed")
+    try:
+        source = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"algorithm {name} cannot be read ({error.strerror})") from None
+
+    def derive() -> tuple[Kernel, isolation.Record]:
+        with _isolated(path.parent) as record, _guarded(name):
+            # Two files may have one name: each module gets a name of its own.
+            module = isolation.load_source(
+                path, f"strapgen_user_{path.stem}_{cache.digest([str(path)])}", record
+            )
+            if not hasattr(module, FUNCTION):
+                raise InputError(
+                    f"{name} defines no function {FUNCTION}; one that returns a Kernel is needed"
+                )
+            kernel = _called(name, getattr(module, FUNCTION), options)
+        return kernel, record
+
+    return kernel_cache.kernel(["file", str(path), cache.digest([source]), *texts], path.parent, derive)
+
+
+def _of_entry_point(name: str, options: dict[str, Any], texts: list[str]) -> Kernel:
+    point = installed()[name]
+
+    def derive() -> tuple[Kernel, isolation.Record]:
+        with _isolated(None, (point.module.partition(".")[0],)) as record, _guarded(name):
+            kernel = _called(name, point.load(), options)
+        return kernel, record
+
+    return kernel_cache.kernel(["entry point", name, point.value, *texts], None, derive)
+
+
+@contextlib.contextmanager
+def _isolated(folder: Path | None, anew: tuple[str, ...] = ()) -> Iterator[isolation.Record]:
+    """Begin a session with all imported that strapgen itself needs in it."""
+    from strapgen.catalogue.user import admission  # noqa: F401
+
+    with isolation.session(folder, anew) as record:
+        yield record
+
+
+def _called(name: str, function: Any, options: dict[str, Any]) -> Kernel:
+    """Return the kernel that a user's function returns, checked."""
+    if not callable(function):
+        raise InputError(f"{name}: {FUNCTION} is no function; one that returns a Kernel is needed")
+    parameters = inspect.signature(function).parameters
+    takes = [option for option in OPTIONS if option in parameters]
+    for option in options:
+        if option not in takes:
+            raise InputError(
+                f"{name}: its {FUNCTION}({', '.join(takes)}) takes no {option}; {_allowed(takes)}"
+            )
+    kernel = function(**options)
+    _require(name, kernel)
+    return kernel  # type: ignore[no-any-return]
+
+
+def _arguments(name: str, options: dict[str, Any]) -> str:
+    """Return what makes a kernel again on the command line: file or entry point as they were given, and the options."""
+    words = [shlex.quote(checks.text("the name of the file", name))]
+    for option, value in options.items():
+        if option == "method":
+            words.append(value.option)
+        else:
+            words += [f"--{option}", str(value)]
+    return " ".join(words)
+
+
+def _require(name: str, kernel: Any) -> None:
+    """Check what a user's function returned."""
+    from strapgen.catalogue.user import admission
+    from strapgen.symbolic.kernel import Kernel
+
+    if not isinstance(kernel, Kernel):
+        raise InputError(f"{name}: {FUNCTION}() returned {type(kernel).__name__}; a Kernel is needed")
+    try:
+        admission.require(kernel)
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from None
+
+
+def _allowed(takes: list[str]) -> str:
+    return f"it takes {', '.join(takes)}" if takes else "it takes no options"
+
+
+@contextlib.contextmanager
+def _guarded(name: str) -> Iterator[None]:
+    """Run a user's code; where it fails, say where and why in one line. What it prints is no output of ours."""
+    try:
+        with contextlib.redirect_stdout(sys.stderr):
+            yield
+    except SystemExit:
+        raise InputError(f"{name} ends the program with sys.exit; it must return a Kernel") from None
+    except StrapgenError:
+        raise
+    except Exception as error:
+        frames = traceback.extract_tb(error.__traceback__)
+        lines = [frame.lineno for frame in frames if Path(frame.filename).name == Path(name).name]
+        line = error.lineno if isinstance(error, SyntaxError) else lines[-1] if lines else None
+        where = "" if line is None else f", line {line}"
+        said = error.msg if isinstance(error, SyntaxError) else " ".join(str(error).split())
+        raise InputError(f"{name}{where}: {type(error).__name__}: {said}") from error

@@ -1,0 +1,234 @@
+"""Bortz's equation derived from the quaternion's, its truncations, and what they cost."""
+
+from __future__ import annotations
+
+import pytest
+import sympy as sp
+
+from strapgen import derive
+from strapgen.catalogue.kinematics import EULER
+from strapgen.catalogue.methods.munthe_kaas import bortz
+from strapgen.symbolic import rotations
+from strapgen.symbolic.rotations import cross_elements
+
+A = sp.Symbol("alpha", positive=True)
+#: alpha . w, and the coefficients of the derivative of alpha along w, alpha x w and alpha.
+P, X, Y, Z = sp.symbols("P X Y Z")
+#: Equation (20): the bracket over the square of the angle.
+BRACKET = (1 - A * sp.sin(A) / (2 * (1 - sp.cos(A)))) / A**2
+
+
+def test_the_quaternion_is_that_of_the_derivation():
+    # h = f3 alpha + f4 with f3 = sin(alpha/2)/alpha, f4 = cos(alpha/2): algebra.quaternion along one axis.
+    h = rotations.quaternion(sp.Matrix([A, 0, 0]))
+    assert sp.simplify(h[0].rewrite(sp.sin) - sp.sin(A / 2)) == 0
+    assert (h[1], h[2], h[3]) == (0, 0, sp.cos(A / 2))
+
+
+def test_bortz_equation_follows_from_the_quaternions():
+    # h' = h w / 2, appendix A. Vectors by their coefficients along w, alpha x w, alpha; alpha x (alpha x w) is
+    # alpha (alpha . w) - alpha^2 w. With the derivative D = X w + Y alpha x w + Z alpha, alpha . D = X P + Z alpha^2.
+    f3, f4 = sp.sin(A / 2) / A, sp.cos(A / 2)
+    along = X * P + Z * A**2
+    angle_rate = along / A
+    vector = {  # f3' alpha + f3 D - (f4 w + f3 alpha x w)/2
+        "w": f3 * X - f4 / 2,
+        "alpha x w": f3 * Y - f3 / 2,
+        "alpha": sp.diff(f3, A) * angle_rate + f3 * Z,
+    }
+    (solution,) = sp.solve(list(vector.values()), [X, Y, Z], dict=True)
+    # The scalar part then holds too: f4' = -alpha . w f3 / 2.
+    scalar = (sp.diff(f4, A) * angle_rate + f3 * P / 2).subs(solution)
+    assert sp.simplify(scalar) == 0
+    # (20): w + alpha x w / 2 + bracket alpha x (alpha x w).
+    assert solution[Y] == sp.Rational(1, 2)
+    assert sp.simplify(solution[X] - (1 - BRACKET * A**2)) == 0
+    assert sp.simplify(solution[Z] - BRACKET * P) == 0
+
+
+def test_bortz_equation_is_that_of_the_codes_quaternions():
+    # Component by component: the derivative of the quaternion of alpha, where alpha obeys (20), is the product h w / 2
+    # of the kinematics, its order and signs included.
+    alpha, w = (sp.Matrix(sp.symbols(f"{name}x {name}y {name}z")) for name in "aw")
+    first = rotations.cross(alpha, w)
+    rate = w + first / 2 + BRACKET * rotations.cross(alpha, first)
+    f3, f4 = sp.sin(A / 2) / A, sp.cos(A / 2)
+    angle_rate = rotations.dot(alpha, rate) / A
+    derivative = sp.Matrix([*(sp.diff(f3, A) * angle_rate * alpha + f3 * rate), sp.diff(f4, A) * angle_rate])
+    wanted = EULER.derivative(sp.Matrix([*(f3 * alpha), f4]), EULER.scale * w)
+    for x, y in zip(derivative, wanted, strict=True):
+        polynomial = sp.Poly(sp.expand(x - y), *alpha, *w)
+        # The square of the last component is what the others leave of the square of the angle.
+        square = sp.Poly(rotations.dot(alpha, alpha) - A**2, *alpha, *w)
+        rest = sp.rem(polynomial, square, alpha[2])
+        assert all(sp.simplify(c) == 0 for c in sp.Poly(rest, *alpha, *w).coeffs())
+
+
+def test_the_slip_of_the_appendix_vanishes_in_the_limit():
+    # (A5) prints cos(alpha/2) = 1 - alpha^2/2 for small angles; it is alpha^2/8. Either goes to 1.
+    half = sp.series(sp.cos(A / 2), A, 0, 4).removeO()
+    printed = 1 - A**2 / 2
+    assert sp.expand(half - (1 - A**2 / 8)) == 0
+    assert sp.limit(half, A, 0) == sp.limit(printed, A, 0) == 1
+    assert sp.limit((half - printed) / A**2, A, 0) == sp.Rational(3, 8)
+    assert sp.limit(BRACKET, A, 0) == sp.Rational(1, 12)
+
+
+def test_the_series_of_the_bracket_is_that_of_the_kernels():
+    # 1/12 + alpha^2/720 + alpha^4/30240: what `bortz` has, whose coefficients are Bernoulli's numbers.
+    wanted = sp.series(BRACKET, A, 0, 5).removeO()
+    assert sp.expand(wanted - (sp.Rational(1, 12) + A**2 / 720 + A**4 / 30240)) == 0
+    # alpha along x, w along y: alpha x (alpha x w) = -alpha^2 w, and so on.
+    rate = bortz(sp.Matrix([A, 0, 0]), sp.Matrix([0, 1, 0]), 6)
+    assert sp.expand(rate[1] - 1 + A**2 * wanted) == 0
+    assert sp.expand(rate[2] - A / 2) == 0
+
+
+# Truncations, on a rate that is any power series of the time
+
+ORDER = 5
+RING, *SYMBOLS = sp.ring(" ".join(f"w{k}{axis}" for k in range(ORDER) for axis in "xyz"), sp.QQ)
+#: The rate and its derivatives at the start.
+W = [SYMBOLS[3 * k : 3 * k + 3] for k in range(ORDER)]
+ZERO = [RING(0)] * 3
+Series = list[list]
+
+
+def product(left: Series, right: Series) -> Series:
+    """Return the cross product of two vectors by powers of the time, to the order."""
+    total = [list(ZERO) for _ in range(ORDER + 1)]
+    for j, a in enumerate(left):
+        for k, b in enumerate(right[: ORDER + 1 - j]):
+            total[j + k] = [x + y for x, y in zip(total[j + k], cross_elements(a, b), strict=True)]
+    return total
+
+
+def add(*terms: tuple[sp.Rational | int, Series]) -> Series:
+    return [
+        [sum((x * factor for factor, series in terms for x in [series[n][k]]), RING(0)) for k in range(3)]
+        for n in range(ORDER + 1)
+    ]
+
+
+def integral(series: Series) -> Series:
+    return [list(ZERO)] + [[x / (n + 1) for x in series[n]] for n in range(ORDER)]
+
+
+#: w_k t^k / k!
+RATE: Series = [[x / sp.factorial(k) for x in vector] for k, vector in enumerate(W)] + [list(ZERO)]
+
+
+def solved(coefficients: list[sp.Rational]) -> Series:
+    """Return alpha of D alpha = sum of coefficients times nested products alpha x (alpha x ... w), by Picard."""
+    alpha = [list(ZERO) for _ in range(ORDER + 1)]
+    for _ in range(ORDER):
+        terms, nested = [], RATE
+        for coefficient in coefficients:
+            terms.append((coefficient, nested))
+            nested = product(alpha, nested)
+        alpha = integral(add(*terms))
+    return alpha
+
+
+HALF, TWELFTH = sp.Rational(1, 2), sp.Rational(1, 12)
+#: (20) to fifth order in alpha: every other coefficient beyond the first is zero.
+WHOLE = [sp.S.One, HALF, TWELFTH, sp.S.Zero, -sp.Rational(1, 720)]
+
+
+def second() -> Series:
+    """Return phi of (22): beta, and the integral of beta x w / 2."""
+    beta = integral(RATE)
+    return add((1, beta), (HALF, integral(product(beta, RATE))))
+
+
+def difference(approximate: Series, power: int) -> list:
+    exact = solved(WHOLE)
+    return [a - b for a, b in zip(approximate[power], exact[power], strict=True)]
+
+
+def combination(*terms) -> list:
+    return [sum((vector[k] * factor for factor, vector in terms), RING(0)) for k in range(3)]
+
+
+def test_the_coefficients_are_those_of_the_bracket():
+    # alpha x (alpha x (alpha x (alpha x w))) is -alpha^2 alpha x (alpha x w): the sign of 1/720 turns over.
+    series = sp.series(BRACKET, A, 0, 3).removeO()
+    assert [series.coeff(A, 0), -series.coeff(A, 2)] == [WHOLE[2], WHOLE[4]]
+
+
+def test_third_order_is_exact_to_the_fifth_power_of_time():
+    # (21), the bracket cut off after 1/12, errs by the sixth power.
+    made = solved(WHOLE[:3])
+    assert all(difference(made, power) == ZERO for power in range(ORDER + 1))
+
+
+def test_two_integrals_are_as_good_as_third_order():
+    # (22) against (20): nothing up to the fourth power, and in the fifth
+    # -w0 x (w0 x w2)/720 + w1 x (w0 x w1)/240 + w0 x (w0 x (w0 x w1))/720.
+    made = second()
+    assert all(difference(made, power) == ZERO for power in range(ORDER))
+    w0, w1, w2 = W[:3]
+    inner = cross_elements(w0, w1)
+    wanted = combination(
+        (-sp.Rational(1, 720), cross_elements(w0, cross_elements(w0, w2))),
+        (sp.Rational(1, 240), cross_elements(w1, inner)),
+        (sp.Rational(1, 720), cross_elements(w0, cross_elements(w0, inner))),
+    )
+    assert difference(made, 5) == wanted != ZERO
+
+
+def test_without_its_third_term_the_equation_is_worse_than_two_integrals():
+    # (21) without 1/12 misses -w0 x (w0 x w1)/96 in the fourth power, which (22) has: beta x w takes no alpha.
+    made = solved(WHOLE[:2])
+    assert all(difference(made, power) == ZERO for power in range(4))
+    w0, w1 = W[:2]
+    assert difference(made, 4) == combination(
+        (-sp.Rational(1, 96), cross_elements(w0, cross_elements(w0, w1)))
+    )
+
+
+TIMED, TIME = sp.ring("T", RING.to_domain())
+
+
+def recursion(cycles: int) -> Series:
+    """Return phi of (26) after so many fast cycles, the increment before the first one known."""
+    turned = integral(RATE)
+
+    def angle(k: int) -> list:
+        end = sp.Rational(k, cycles)
+        return [
+            sum((TIME**n * (x[axis] * end**n) for n, x in enumerate(turned)), TIMED(0)) for axis in range(3)
+        ]
+
+    def given(kernel, state) -> dict:
+        values = {name: x for s in kernel.inputs for name, x in zip(s.elements, state[s.name], strict=True)}
+        return {name: list(map(TIMED, x)) for name, x in kernel.expand(values).items()}
+
+    fast, zero = derive("coning-fast"), [TIMED(0)] * 3
+    increments = [[b - a for a, b in zip(angle(k - 1), angle(k), strict=True)] for k in range(cycles + 1)]
+    state = {"angle_sum": zero, "coning": zero, "previous_increment": increments[0]}
+    for increment in increments[1:]:
+        made = given(fast, state | {"increment": increment})
+        state = {name: made[output] for output, name in fast.recursion.inputs.items()}
+    phi = given(derive("coning-slow"), state)["rotation_vector"]
+    return [[x.coeff(TIME**n) for x in phi] for n in range(ORDER + 1)]
+
+
+@pytest.mark.parametrize("cycles", [1, 2, 3])
+def test_the_recursion_compares_with_third_order(cycles):
+    # (26) against (20), on any rate: nothing up to the third power, as of a method of third order. The fourth has what
+    # a ramp leaves of a curved rate, -w0 x w2 / 24, by the cube of the number of cycles. (21) begins with the sixth
+    # power, (22) with the fifth: more cycles bring the recursion to (22).
+    made = recursion(cycles)
+    assert all(difference(made, power) == ZERO for power in range(4))
+    w0, _, w2 = W[:3]
+    wanted = combination((-sp.Rational(1, 24 * cycles**3), cross_elements(w0, w2)))
+    assert difference(made, 4) == wanted != ZERO
+
+
+def test_the_recursion_leaves_the_fifth_power_of_two_integrals():
+    # What stands in the fifth power for any number N of cycles is that of (22), and terms in 1/N^2 and less of two
+    # vectors only: (26) has the products of three and four that (22) has.
+    for cycles in (1, 2):
+        found, wanted = difference(recursion(cycles), 5), difference(second(), 5)
+        assert [sum((RING({m: c}) for m, c in x.terms() if sum(m) > 2), RING(0)) for x in found] == wanted
