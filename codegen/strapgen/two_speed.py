@@ -26,8 +26,8 @@ from strapgen.ir.sources import Sources
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 from strapgen.targets import FIXED
-from strapgen.targets.fixed_text import options
-from strapgen.targets.whole import LOOPS, recursion, whole, wiring
+from strapgen.targets.contract import options
+from strapgen.targets.two_speed_c.emit import LOOPS, recursion, whole, wiring
 
 Array = NDArray[Any]
 

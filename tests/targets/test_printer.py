@@ -19,9 +19,9 @@ from hypothesis import strategies as st
 from strapgen.compilation import C_FLAGS
 from strapgen.ir.program import Assignment, Constant, Node, Operation, Program, Reference, Result
 from strapgen.ir.signals import Signal
-from strapgen.targets import c
-from strapgen.targets.numpy import NumpyPrinter
-from strapgen.targets.numpy import emit as emit_numpy
+from strapgen.targets.c import emit
+from strapgen.targets.numpy_code.emit import NumpyPrinter
+from strapgen.targets.numpy_code.emit import emit as emit_numpy
 from strapgen.targets.printer import fill_expression
 
 NAMES = ("x_1", "x_2", "x_3", "x_4")
@@ -134,7 +134,7 @@ def test_python_text_has_the_value_of_the_tree(tree):
 )
 def test_no_more_parentheses_than_needed(tree, text):
     assert NumpyPrinter().text(tree) == text
-    assert c.CPrinter(c.DOUBLE).text(tree) == text
+    assert emit.CPrinter(emit.DOUBLE).text(tree) == text
 
 
 def random_tree(draw: random.Random, depth: int) -> Node:
@@ -163,13 +163,13 @@ def finite_trees(number: Any, wanted: int) -> list[Node]:
 
 
 @pytest.mark.parametrize(
-    ("real", "number"), [(c.DOUBLE, np.float64), (c.FLOAT, np.float32)], ids=["c", "c-float"]
+    ("real", "number"), [(emit.DOUBLE, np.float64), (emit.FLOAT, np.float32)], ids=["c", "c-float"]
 )
 def test_compiled_text_has_the_value_of_the_tree(real, number, tmp_path):
     if shutil.which("gcc") is None:
         pytest.skip("gcc is not on this machine")
     chosen = finite_trees(number, 200)
-    sources = c.emit(program(*chosen), real.target)
+    sources = emit.emit(program(*chosen), real.target)
     for name, text in sources.files.items():
         (tmp_path / name).write_text(text)
     source = next(tmp_path.glob("*.c"))

@@ -25,11 +25,11 @@ class Target(NamedTuple):
 
 #: Targets by name.
 TARGETS = {
-    "numpy": Target("numpy, vectorised over leading axes", "numpy"),
+    "numpy": Target("numpy, vectorised over leading axes", "numpy_code"),
     "c": Target("C99 in double", "c"),
     "c-float": Target("C99 in float", "c"),
     "c-fixed": Target("C99 in fixed point: integers alone, error bounds certified", "c_fixed"),
-    "fixed-model": Target("Python on integers, bit for bit what the fixed-point C computes", "fixed_model"),
+    "fixed-model": Target("Python on integers, bit for bit what the fixed-point C computes", "integer_model"),
 }
 
 #: Targets that are made for settings: word, ranges, rounding.
@@ -56,7 +56,7 @@ def emit(program: Program | FixedProgram, target: str, settings: Settings | None
     InputError
         If the target is unknown or takes no settings, or the program cannot be lowered to integers.
     """
-    module = import_module(f"{__name__}.{TARGETS[checks.choice('target', target, TARGETS)].module}")
+    module = import_module(f"{__name__}.{TARGETS[checks.choice('target', target, TARGETS)].module}.emit")
     if target in FIXED:
         fixed: Sources = module.emit(program, target, settings)
         lowered = program.program if isinstance(program, FixedProgram) else program

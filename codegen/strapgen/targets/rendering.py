@@ -8,7 +8,7 @@ from typing import Any
 import jinja2
 
 from strapgen.support import resources
-from strapgen.targets import fixed_text
+from strapgen.targets import contract
 from strapgen.targets.printer import elements_text, fill, fill_arguments, operations_text, range_text
 
 
@@ -27,11 +27,11 @@ def _environment() -> jinja2.Environment:
         range=range_text,
         elements=elements_text,
         operations=operations_text,
-        argument_text=fixed_text.argument_text,
-        fixed_command=fixed_text.command,
-        accumulation_text=fixed_text.accumulation_text,
-        residuals_text=fixed_text.residuals_text,
-        guards_text=fixed_text.guards_text,
+        argument_text=contract.argument_text,
+        fixed_command=contract.command,
+        accumulation_text=contract.accumulation_text,
+        residuals_text=contract.residuals_text,
+        guards_text=contract.guards_text,
     )
     return environment
 

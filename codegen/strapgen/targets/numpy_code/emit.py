@@ -76,7 +76,7 @@ def _files(program: Program, target: str) -> dict[str, str]:
         if isinstance(node, Operation)
     }
     text = render(
-        "numpy/module.py.j2",
+        "numpy_code/module.py.j2",
         program=program,
         command=f"strapgen generate {program.arguments} --target {target}",
         functions=[_function(part, part is not program) for part in functions],

@@ -64,7 +64,7 @@ def _files(fixed: FixedProgram, other: Mapping[str, str]) -> dict[str, str]:
     """Return the module of a program whose names are as they are printed; what it says has their other names."""
     interface = fixed.interface
     text = render(
-        "fixed_model/module.py.j2",
+        "integer_model/module.py.j2",
         fixed=fixed,
         program=fixed.program,
         interface=interface,

@@ -9,8 +9,8 @@ from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Function, Sources
-from strapgen.targets.c import REALS
-from strapgen.targets.c_fixed import WORDS
+from strapgen.targets.c.emit import REALS
+from strapgen.targets.c_fixed.emit import WORDS
 from strapgen.targets.rendering import render
 
 #: What the loops are called, from the fastest.
@@ -148,8 +148,8 @@ def whole(name: str, title: str, command: str, loops: Sequence[Sources]) -> Sour
         ],
     }
     files = {
-        f"{identifier}.h": render("two_speed/header.h.j2", **values),
-        f"{identifier}.c": render("two_speed/source.c.j2", **values),
+        f"{identifier}.h": render("two_speed_c/header.h.j2", **values),
+        f"{identifier}.c": render("two_speed_c/source.c.j2", **values),
     }
     for loop in loops:
         files |= loop.files

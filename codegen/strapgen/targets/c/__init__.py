@@ -1,0 +1,1 @@
+"""C99 in double and in float."""

@@ -1,0 +1,1 @@
+"""The integer model of the fixed-point C, in Python."""

@@ -1,0 +1,1 @@
+"""numpy code, vectorised over leading axes."""

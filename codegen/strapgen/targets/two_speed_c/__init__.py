@@ -1,0 +1,1 @@
+"""The C of all loops of an algorithm in two speeds."""
