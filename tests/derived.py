@@ -8,11 +8,12 @@ from functools import cache
 import mpmath
 import sympy as sp
 
-from strapgen import catalogue, generate, library
+from strapgen import catalogue, generate
 from strapgen.backends import BACKENDS, fitted
 from strapgen.catalogue import Choice
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
+from strapgen.library import generated_sources
 from strapgen.symbolic.kernel import Kernel
 
 
@@ -22,7 +23,7 @@ def kernel(choice: Choice) -> Kernel:
 
 
 def program(choice: Choice) -> Program:
-    return library.program(choice)
+    return generated_sources.program(choice)
 
 
 @cache

@@ -14,11 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen import catalogue, compilation, exact, library
+from strapgen import catalogue, compilation, exact
 from strapgen.backends import BACKENDS, Backend, of
 from strapgen.catalogue import Choice
 from strapgen.catalogue.methods.tableaux import Tableau
 from strapgen.ir.fixed_settings import Settings
+from strapgen.library import generated_sources
 from strapgen.simulation import attitude, drift_between, require_finite
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
@@ -152,7 +153,7 @@ def compare_choice(
 def _reference(make: Any, choice: Choice, reference: str, increments: Array) -> Array:
     """Return the states of the reference, in double."""
     if reference == EXACT:
-        return exact.propagate(library.program(choice), increments)
+        return exact.propagate(generated_sources.program(choice), increments)
     backend = make(reference)
     states: Array = backend.propagate(increments).astype(np.float64)
     require_finite(backend, states, np.arange(len(states), dtype=np.float64))

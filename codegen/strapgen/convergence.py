@@ -15,12 +15,13 @@ from typing import TYPE_CHECKING, Any
 import mpmath
 import numpy as np
 
-from strapgen import catalogue, exact, library
+from strapgen import catalogue, exact
 from strapgen.backends import BACKENDS, of
 from strapgen.catalogue import Choice
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.order import Order
 from strapgen.ir.program import Program
+from strapgen.library import generated_sources
 from strapgen.motions import Motion
 from strapgen.simulation import largest_increment, simulate
 from strapgen.support import checks
@@ -251,7 +252,7 @@ def interpreter(name: str, step: Program | None = None) -> exact.Interpreter:
 
 @cache
 def _program(name: str) -> Program:
-    return library.program(Choice(name))
+    return generated_sources.program(Choice(name))
 
 
 def _exactly(choice: Choice, motion: Motion, rounding: float) -> _Measure:
@@ -287,7 +288,7 @@ def exact_attitudes(
     callable
         ``run(step, count)``: the computed and the true matrix, row by row, at time 0 and after every step.
     """
-    program = library.program(choice)
+    program = generated_sources.program(choice)
     assert program.companions is not None, "checked by the caller"
     samples, previous = choice.increments_per_step, choice.previous
 

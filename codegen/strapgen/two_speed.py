@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen import backends, compilation, library
+from strapgen import backends, compilation
 from strapgen.backends import BACKENDS, Evaluator
 from strapgen.backends.fixed import FixedEvaluator, integers, numbers
 from strapgen.catalogue import Choice
@@ -23,6 +23,7 @@ from strapgen.gyro import pulses
 from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.fixed_settings import DEFAULT_ANGLE, Settings
 from strapgen.ir.sources import Sources
+from strapgen.library import generated_sources
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 from strapgen.targets import FIXED
@@ -161,10 +162,12 @@ def loops(
     if target not in FIXED:
         if settings is not None:
             raise InputError(f"target {target} takes no fixed-point settings; these do: {', '.join(FIXED)}")
-        fast, slow, navigation = (library.sources(Choice(name), target) for name in names)
+        fast, slow, navigation = (generated_sources.sources(Choice(name), target) for name in names)
         return fast, slow, navigation
     asked = _without_largest_angle(settings or Settings())
-    inputs = [{s.name for s in library.sources(Choice(name), "numpy").function.inputs} for name in names]
+    inputs = [
+        {s.name for s in generated_sources.sources(Choice(name), "numpy").function.inputs} for name in names
+    ]
     for what, given in (("range", asked.ranges), ("format", asked.formats)):
         unknown = set(given) - set().union(*inputs)
         if unknown:
@@ -183,11 +186,11 @@ def loops(
             ranges={name: value for name, value in stated.items() if name in own},
             formats={name: text for name, text in formats.items() if name in own},
         )
-        loop = library.sources(Choice(names[number]), target, chosen)
+        loop = generated_sources.sources(Choice(names[number]), target, chosen)
         if chosen.carry == "none" or loop.fixed is None or loop.fixed.residuals:
             return loop
         # A loop that rounds nothing to carry on is the one that `strapgen generate` makes without the option.
-        return library.sources(Choice(names[number]), target, replace(chosen, carry="none"))
+        return generated_sources.sources(Choice(names[number]), target, replace(chosen, carry="none"))
 
     formats = dict(asked.formats)
     natural = _formats(made(0, formats))

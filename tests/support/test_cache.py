@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from strapgen import library
 from strapgen.catalogue import choose
+from strapgen.library import generated_sources
 from strapgen.support import cache
 from strapgen.support.exceptions import CompilerError, InputError
 
@@ -196,15 +196,15 @@ def test_folder_that_cannot_be_written(place, tmp_path, monkeypatch):
 def test_sources_are_derived_once(monkeypatch):
     from strapgen import pipeline
 
-    first = library.sources(choose("euler", "rk1", 1), "c")
+    first = generated_sources.sources(choose("euler", "rk1", 1), "c")
     monkeypatch.setattr(pipeline, "derive", never)
-    assert library.sources(choose("euler", "rk1", 1), "c") == first
+    assert generated_sources.sources(choose("euler", "rk1", 1), "c") == first
 
 
 def test_sources_change_with_the_generator(monkeypatch, root):
-    library.sources(choose("euler-product"), "c")
+    generated_sources.sources(choose("euler-product"), "c")
     monkeypatch.setattr(cache, "generator_digest", lambda: "another version")
-    library.sources(choose("euler-product"), "c")
+    generated_sources.sources(choose("euler-product"), "c")
     assert len(names(root / "sources")) == 2
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import sympy as sp
 
-from strapgen import catalogue, library
+from strapgen import catalogue
 from strapgen.analysis.accumulation import accumulate
 from strapgen.analysis.constant_rate import constant_rate
 from strapgen.analysis.growth import as_intervals, contraction
@@ -18,6 +18,7 @@ from strapgen.analysis.motion_rates import is_plain, parameters
 from strapgen.analysis.series import series
 from strapgen.catalogue import Choice
 from strapgen.catalogue.methods.tableaux import TABLEAUX
+from strapgen.library import generated_sources
 
 #: Highest order of a Taylor method in the overview; with higher orders the error is far below that of any gyro.
 _HIGHEST_TAYLOR = 8
@@ -180,7 +181,7 @@ def _row(choice: Choice) -> OverviewRow:
     coning_power, coning = next(iter(run.secular.items()), (None, None))
     a = parameters("coning")[0]
     drift = min(general.drift, default=None)
-    counts = library.program(choice).operations
+    counts = generated_sources.program(choice).operations
     return OverviewRow(
         kernel.name,
         choice.increments_per_step,

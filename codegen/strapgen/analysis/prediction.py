@@ -10,12 +10,13 @@ from typing import Any
 import mpmath
 import sympy as sp
 
-from strapgen import catalogue, exact, library
+from strapgen import catalogue, exact
 from strapgen.analysis.accumulation import antiderivative
 from strapgen.analysis.error_rate import ErrorRate, error_rate
 from strapgen.analysis.motion_rates import TIME, parameters
 from strapgen.catalogue import Choice
 from strapgen.convergence import interpreter
+from strapgen.library import generated_sources
 from strapgen.motions import Motion
 from strapgen.support import checks
 from strapgen.symbolic import rotations
@@ -253,5 +254,5 @@ def _orthonormalization(choice: Choice) -> Callable[[Matrix], Matrix]:
     if step_kernels.attitude is not None:
         # If the length of the parameters is not 1, their matrix is a rotation times a factor.
         return lambda computed: computed / mpmath.cbrt(mpmath.det(computed))
-    scheme = interpreter(step_kernels.orthonormalize, library.program(choice))
+    scheme = interpreter(step_kernels.orthonormalize, generated_sources.program(choice))
     return lambda computed: _matrix(scheme(list(computed)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from strapgen import catalogue, library
+from strapgen import catalogue
 from strapgen.backends.protocol import Backend, Evaluator
 from strapgen.backends.registry import BACKENDS, Entry, classes, of_sources
 from strapgen.backends.step_sources import StepSources
@@ -12,6 +12,7 @@ from strapgen.catalogue import Choice
 from strapgen.catalogue.methods.tableaux import Tableau
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
+from strapgen.library import generated_sources
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.targets import FIXED
@@ -90,7 +91,7 @@ def evaluator(kernel: str | Choice, backend: str = "numpy", settings: Settings |
         checks.choice("kernel", kernel, catalogue.KERNELS)
         kernel = catalogue.choose(kernel)
     chosen = fitted(backend, settings)
-    return of_sources(library.sources(kernel, BACKENDS[backend].target, chosen))
+    return of_sources(generated_sources.sources(kernel, BACKENDS[backend].target, chosen))
 
 
 def backend(
@@ -155,7 +156,7 @@ def of(
     if orthonormalization is not None:
         checks.choice("orthonormalization", orthonormalization, choice.orthonormalizations)
     chosen = fitted(backend, settings)
-    step = library.sources(choice, BACKENDS[backend].target, chosen)
+    step = generated_sources.sources(choice, BACKENDS[backend].target, chosen)
     return classes(step.target)[1](StepSources(step, choice, orthonormalization))
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from strapgen import library
 from strapgen.backends.registry import of_sources
 from strapgen.catalogue import Choice
 from strapgen.ir.sources import Sources
+from strapgen.library import generated_sources
 from strapgen.support.exceptions import InputError
 from strapgen.targets import emit
 
@@ -70,7 +70,7 @@ class StepSources:
             if program.kernel == kernel:
                 return emit(program, target, settings)
         choice = Choice(kernel) if self.choice is None else self.choice.companion(kernel)
-        return library.sources(choice, target, settings)
+        return generated_sources.sources(choice, target, settings)
 
     def complete(self) -> StepSources:
         """Return the same with all that the step may need, so that no kernel has to be derived where it is taken."""

@@ -119,7 +119,8 @@ def generate(
         return
     if algorithm is None:
         raise InputError("an algorithm is needed, or --all; strapgen list shows them")
-    from strapgen import library, pipeline
+    from strapgen import pipeline
+    from strapgen.library import generated_sources
     from strapgen.support import checks
     from strapgen.support.files import write_files
     from strapgen.targets import FIXED, TARGETS
@@ -131,7 +132,7 @@ def generate(
         raise InputError(
             f"the options of fixed point go with --target {' or '.join(FIXED)}, not with {target}"
         )
-    program = library.program(choice)
+    program = generated_sources.program(choice)
     takes = {signal.name for signal in program.inputs}
     if not takes & {"increments", "turns"} and (max_rate_deg_s or step or max_angle_rad):
         raise InputError(
@@ -171,7 +172,8 @@ def generate(
 
 
 def _generate_all(out: Path | None, check: bool, format: str) -> None:
-    from strapgen import catalogue, standard_tree
+    from strapgen import catalogue
+    from strapgen.library import standard_tree
     from strapgen.support import resources
     from strapgen.support.files import check_folder
 

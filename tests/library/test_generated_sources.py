@@ -6,7 +6,8 @@ import subprocess
 import sys
 
 import strapgen
-from strapgen import catalogue, library
+from strapgen import catalogue
+from strapgen.library import generated_sources
 from strapgen.support import cache
 
 RUN = """
@@ -31,32 +32,34 @@ def test_sources_are_those_of_the_pipeline():
     choice = catalogue.choose("dcm", "rk2", 3)
     for target in strapgen.targets.TARGETS:
         made = strapgen.generate(strapgen.lower(catalogue.derive(choice)), target)
-        assert library.sources(choice, target) == made
+        assert generated_sources.sources(choice, target) == made
 
 
 def test_a_change_of_the_generator_makes_new_sources(monkeypatch, tmp_path):
     monkeypatch.setenv("STRAPGEN_CACHE_DIR", str(tmp_path))
     choice = catalogue.choose("euler-normalize")
-    library.sources(choice, "numpy")
-    library.sources(choice, "numpy")
+    generated_sources.sources(choice, "numpy")
+    generated_sources.sources(choice, "numpy")
     assert len(list((tmp_path / "sources").iterdir())) == 1
     monkeypatch.setattr(cache, "generator_digest", lambda: "another generator")
-    library.sources(choice, "numpy")
+    generated_sources.sources(choice, "numpy")
     assert len(list((tmp_path / "sources").iterdir())) == 2
 
 
 def test_another_target_and_other_settings_derive_nothing_again(monkeypatch, tmp_path):
     monkeypatch.setenv("STRAPGEN_CACHE_DIR", str(tmp_path))
-    monkeypatch.setattr(library, "_programs", {})
+    monkeypatch.setattr(generated_sources, "_programs", {})
     choice = catalogue.choose("euler-product")
     wanted = strapgen.lower(catalogue.derive(choice))
-    library.sources(choice, "numpy")
-    monkeypatch.setattr(library, "_programs", {})  # as another process
+    generated_sources.sources(choice, "numpy")
+    monkeypatch.setattr(generated_sources, "_programs", {})  # as another process
 
     def never(_choice):
         raise AssertionError("derived again")
 
-    monkeypatch.setattr(library, "derive", never)
+    monkeypatch.setattr(generated_sources, "derive", never)
     settings = strapgen.Settings(16)
-    assert library.sources(choice, "c-fixed", settings) == strapgen.generate(wanted, "c-fixed", settings)
-    assert library.program(choice) == wanted
+    assert generated_sources.sources(choice, "c-fixed", settings) == strapgen.generate(
+        wanted, "c-fixed", settings
+    )
+    assert generated_sources.program(choice) == wanted

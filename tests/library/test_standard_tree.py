@@ -13,9 +13,10 @@ from pathlib import Path
 import pytest
 from derived import programs
 
-from strapgen import catalogue, standard_tree
+from strapgen import catalogue
 from strapgen.cli import main
 from strapgen.fixedpoint import can_lower
+from strapgen.library import standard_tree
 from strapgen.support import resources
 
 CHECK = ["generate", "--all", "--check", "--out"]
