@@ -9,11 +9,11 @@ import pytest
 from gathering import SEED
 
 import strapgen
-from strapgen import compilation
 from strapgen.backends import BACKENDS, Backend
 from strapgen.catalogue import ALGORITHMS
 from strapgen.ir.fixed_settings import Settings
 from strapgen.targets import FIXED
+from strapgen.toolchain import compiler
 
 #: The back ends. Short words have the code of long ones, C in float that of double, and the integer model gives the
 #: bits of the C: they run with the long tests.
@@ -48,9 +48,9 @@ def optimization(pytestconfig: pytest.Config) -> Iterator[None]:
     """
     with pytest.MonkeyPatch.context() as patch:
         if pytestconfig.getoption("markexpr") == "not long":
-            flags = tuple("-O1" if flag == "-O3" else flag for flag in compilation.C_FLAGS)
-            assert flags != compilation.C_FLAGS
-            patch.setattr(compilation, "_flags", flags)
+            flags = tuple("-O1" if flag == "-O3" else flag for flag in compiler.C_FLAGS)
+            assert flags != compiler.C_FLAGS
+            patch.setattr(compiler, "_flags", flags)
         yield
 
 

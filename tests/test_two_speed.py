@@ -12,11 +12,11 @@ import pytest
 from scipy.integrate import quad_vec
 from scipy.spatial.transform import Rotation
 
-from strapgen import compilation
 from strapgen.backends import BACKENDS
 from strapgen.ir.fixed_settings import Settings
 from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.targets import FIXED
+from strapgen.toolchain import compiler
 from strapgen.two_speed import ALGORITHMS, SCULLING, TwoSpeed, loops, sources
 
 FORMS = [(a, s) for a in ALGORITHMS for s in SCULLING]
@@ -339,7 +339,7 @@ def test_one_cycle_at_a_time_is_a_run():
         turns=np.full((5, 3), 1e-4),
         previous=angles[0],
     )
-    module = compilation.load(sources("dcm", 2, "c"))
+    module = compiler.load(sources("dcm", 2, "c"))
     lib, ffi = module.lib, module.ffi
 
     def pointer(row):
@@ -365,7 +365,7 @@ def test_one_cycle_at_a_time_is_a_run():
 
 
 def test_null_pointers_are_refused():
-    lib, ffi = compilation.load(sources("dcm", 2, "c")).lib, compilation.load(sources("dcm", 2, "c")).ffi
+    lib, ffi = compiler.load(sources("dcm", 2, "c")).lib, compiler.load(sources("dcm", 2, "c")).ffi
     memory = ffi.new("dcm_two_speed_2_memory *")
     assert lib.dcm_two_speed_2_fast(memory, ffi.NULL, ffi.NULL) == 4
     assert lib.dcm_two_speed_2_slow(ffi.NULL, ffi.NULL) == 4

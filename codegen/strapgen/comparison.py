@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen import catalogue, compilation, exact
+from strapgen import catalogue, exact
 from strapgen.backends import BACKENDS, Backend, of
 from strapgen.catalogue import Choice
 from strapgen.catalogue.methods.tableaux import Tableau
@@ -24,6 +24,7 @@ from strapgen.simulation import attitude, drift_between, require_finite
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 from strapgen.targets import FIXED
+from strapgen.toolchain import compiler
 
 Array = NDArray[np.float64]
 
@@ -182,7 +183,7 @@ def _compared(
         certified_angle(candidate, increments, wanted),
         math.degrees(float(np.linalg.norm(np.abs(drifts).max(axis=0)))),
         seconds / max(1, steps) * 1e9,
-        compilation.code_size(candidate.sources),
+        compiler.code_size(candidate.sources),
         candidate.sources.operations,
     )
 

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen import backends, compilation
+from strapgen import backends
 from strapgen.backends import BACKENDS, Evaluator
 from strapgen.backends.fixed import FixedEvaluator, integers, numbers
 from strapgen.catalogue import Choice
@@ -29,6 +29,7 @@ from strapgen.support.exceptions import InputError
 from strapgen.targets import FIXED
 from strapgen.targets.contract import options
 from strapgen.targets.two_speed_c.emit import LOOPS, recursion, whole, wiring
+from strapgen.toolchain import compiler
 
 Array = NDArray[Any]
 
@@ -327,7 +328,7 @@ class TwoSpeed:
         fitted = backends.fitted(backend, settings)
         self.loops = loops(algorithm, sculling, entry.target, fitted)
         self._whole = (
-            compilation.load(sources(algorithm, sculling, entry.target, fitted))
+            compiler.load(sources(algorithm, sculling, entry.target, fitted))
             if entry.target.startswith("c")
             else None
         )

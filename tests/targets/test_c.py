@@ -21,11 +21,11 @@ from hypothesis import strategies as st
 from pycparser import c_ast, c_parser
 
 from strapgen.catalogue import standard
-from strapgen.compilation import C_FLAGS
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
 from strapgen.targets import emit
 from strapgen.targets.c import emit
+from strapgen.toolchain.compiler import C_FLAGS
 
 STRICT = ["-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-Werror", "-pedantic"]
 COMPILERS = {

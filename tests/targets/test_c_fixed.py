@@ -14,12 +14,13 @@ from derived import program
 from evidence import corners_and_random
 from gathering import each
 
-from strapgen import build, compilation, generate, quantize
+from strapgen import build, generate, quantize
 from strapgen.backends.fixed import CFixedEvaluator, ModelEvaluator
 from strapgen.catalogue import Choice, standard
 from strapgen.fixedpoint import can_lower
 from strapgen.ir.fixed_settings import Settings
 from strapgen.support.exceptions import InputError
+from strapgen.toolchain import compiler
 
 #: Steps of Cayley-Klein parameters are those of Euler parameters under other names, which tests/lowering proves.
 CHOICES = [
@@ -76,7 +77,7 @@ def results(evaluator, inputs, residuals):
 def test_c_and_model_agree_bit_for_bit(word, carry, methods, rng):
     settings = Settings(word, Fraction(1, 60), carry=carry)
     every = {choice: quantize(program(choice), settings) for choice in choices_of(*methods)}
-    compilation.compile_together(generate(fixed, "c-fixed") for fixed in every.values())
+    compiler.compile_together(generate(fixed, "c-fixed") for fixed in every.values())
 
     @each("choice", every)
     def agree(choice, rng):

@@ -18,7 +18,7 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 import strapgen
-from strapgen import compilation, targets
+from strapgen import targets
 from strapgen.catalogue.user import admission
 from strapgen.fixedpoint import quantize
 from strapgen.ir import sources
@@ -27,6 +27,7 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.signals import Signal
 from strapgen.symbolic.kernel import Kernel, KernelBuilder
 from strapgen.targets import c_library, names
+from strapgen.toolchain import compiler
 
 STRICT = ("-pedantic", "-Wall", "-Wextra", "-Werror")
 STEPS = 19  # more than the loop in C takes together
@@ -169,7 +170,7 @@ def module(sources: sources.Sources) -> ModuleType:
 
 def declarations(header: str) -> str:
     """Return a header as cffi reads it."""
-    return compilation._declarations(header)
+    return compiler._declarations(header)
 
 
 def library(folder: Path, several: list[sources.Sources]) -> tuple[cffi.FFI, object]:
@@ -412,7 +413,7 @@ def test_a_function_is_found_in_its_module_whatever_the_process_has():
     # No standard knows this function; the library of this process may.
     kernel = step(HARMLESS._replace(kernel="gnu-get-libc-version"))
     sources = targets.emit(strapgen.lower(kernel), "c")
-    module = compilation.load(sources)
+    module = compiler.load(sources)
     result = module.ffi.new("double[3]")
     getattr(module.lib, sources.function.name)(list(START), list(INCREMENTS[0]), result)
     np.testing.assert_allclose(list(result), EXPECTED[1], rtol=0, atol=1e-14)

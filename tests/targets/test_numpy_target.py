@@ -12,11 +12,11 @@ import pytest
 from derived import programs
 from gathering import each
 
-from strapgen import compilation
 from strapgen.catalogue import standard
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
 from strapgen.targets import emit
+from strapgen.toolchain import compiler
 
 KERNELS = [choice.kernel for choice in standard()]
 STEPS = [kernel for kernel in KERNELS if "-rk" in kernel]
@@ -33,7 +33,7 @@ def text(kernel: str) -> str:
 
 
 def module(kernel: str) -> ModuleType:
-    return compilation.load(generated(kernel))
+    return compiler.load(generated(kernel))
 
 
 def function(kernel: str):

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from strapgen import compilation
 from strapgen.backends.protocol import Array, Backend, Evaluator
 from strapgen.backends.step_sources import StepSources
 from strapgen.ir.sources import Sources
+from strapgen.toolchain import compiler
 
 _TYPES = {"c": ("double", np.float64), "c-float": ("float", np.float32)}
 
@@ -20,7 +20,7 @@ class CEvaluator(Evaluator):
     def __init__(self, sources: Sources) -> None:
         self.real, dtype = _TYPES[sources.target]
         super().__init__(sources, dtype)
-        self.module = compilation.load(sources)
+        self.module = compiler.load(sources)
         self._array = getattr(self.module.lib, f"{sources.function.name}_array")
 
     def evaluate(self, arrays: list[Array], batch: tuple[int, ...]) -> tuple[Array, ...]:

@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from strapgen import compilation
 from strapgen.backends.protocol import Array, Backend, Evaluator
 from strapgen.backends.step_sources import StepSources
 from strapgen.ir.fixed_interface import Argument, Interface
 from strapgen.ir.sources import Sources
 from strapgen.support.exceptions import InputError
+from strapgen.toolchain import compiler
 
 
 def integers(argument: Argument, values: Any, kernel: str) -> Array:
@@ -134,7 +134,7 @@ class CFixedEvaluator(FixedEvaluator):
         super().__init__(sources)
         word = self.interface.settings.word
         self.word_type, self.residual_type = np.dtype(f"int{word}"), np.dtype(f"uint{word}")
-        self.module = compilation.load(sources)
+        self.module = compiler.load(sources)
         self._array = getattr(self.module.lib, f"{sources.function.name}_array")
 
     def run(self, inputs: Sequence[Array], residuals: Array) -> tuple[tuple[Array, ...], Array]:
@@ -165,7 +165,7 @@ class ModelEvaluator(FixedEvaluator):
 
     def __init__(self, sources: Sources) -> None:
         super().__init__(sources)
-        module = compilation.load(sources)
+        module = compiler.load(sources)
         self.generated: Callable[..., Any] = getattr(module, sources.function.name)
         self.out_of_range: type[Exception] = module.OutOfRange
 

@@ -12,10 +12,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from strapgen import compilation
 from strapgen.backends.protocol import Array, Backend, Evaluator
 from strapgen.backends.step_sources import StepSources
 from strapgen.ir.sources import Sources
+from strapgen.toolchain import compiler
 
 #: Steps times runs that are held at once: some megabytes, which stay in the cache.
 _SPAN = 1 << 18
@@ -30,7 +30,7 @@ class NumpyEvaluator(Evaluator):
 
     def __init__(self, sources: Sources) -> None:
         super().__init__(sources, np.float64)
-        self._generated = getattr(compilation.load(sources), sources.function.name)
+        self._generated = getattr(compiler.load(sources), sources.function.name)
 
     def evaluate(self, arrays: list[Array], batch: tuple[int, ...]) -> tuple[Array, ...]:
         """Evaluate on checked arrays."""
@@ -45,7 +45,7 @@ class NumpyBackend(Backend):
         super().__init__(parts)
         if self._product is not None:
             name = f"{self.sources.function.name}_transition"
-            self._transition: Callable[..., Array] = getattr(compilation.load(self.sources), name)
+            self._transition: Callable[..., Array] = getattr(compiler.load(self.sources), name)
             product = parts.evaluator(self._product)
             assert isinstance(product, NumpyEvaluator)
             self._generated_product: Callable[..., Array] = product._generated

@@ -89,12 +89,12 @@ def _predict(format: str) -> None:
 
 def _runnable() -> tuple[str, ...]:
     """Return all back ends, or, with a word on stderr, those that need no compiler if there is none."""
-    from strapgen import compilation
     from strapgen.support.exceptions import CompilerError
     from strapgen.tables import DEFAULT_BACKENDS
+    from strapgen.toolchain import compiler
 
     try:
-        compilation.compiler()
+        compiler.compiler()
     except CompilerError as error:
         typer.echo(f"strapgen: only numpy is shown: {error}", err=True)
         return ("numpy",)

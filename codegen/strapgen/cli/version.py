@@ -30,11 +30,11 @@ def _show(wanted: bool) -> None:
 def _compiler() -> str:
     import subprocess
 
-    from strapgen import compilation
     from strapgen.support.exceptions import CompilerError
+    from strapgen.toolchain import compiler
 
     try:
-        path = compilation.compiler()
+        path = compiler.compiler()
     except CompilerError:
         return "is not installed"
     said = subprocess.run([path, "--version"], capture_output=True, text=True, check=False).stdout

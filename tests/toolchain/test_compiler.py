@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 import strapgen
-from strapgen import backends, compilation, pipeline
+from strapgen import backends, pipeline
 from strapgen.cli import main
 from strapgen.ir.sources import Sources
 from strapgen.support.exceptions import CompilerError
+from strapgen.toolchain import compiler
 
 SIMULATE = ["simulate", "euler", "--method", "rk1", "--increments", "1", "--step", "1", "--duration", "2"]
 SIMULATE += ["--motion", "constant", "--set", "x_deg_s=1"]
@@ -24,8 +25,8 @@ SIMULATE += ["--motion", "constant", "--set", "x_deg_s=1"]
 def root(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Start with an empty cache, on disk and in memory, and the machine's own compiler."""
     monkeypatch.setenv("STRAPGEN_CACHE_DIR", str(tmp_path / "cache"))
-    monkeypatch.setattr(compilation, "_loaded", {})
-    monkeypatch.setattr(compilation, "_modules", {})
+    monkeypatch.setattr(compiler, "_loaded", {})
+    monkeypatch.setattr(compiler, "_modules", {})
     monkeypatch.delenv("CC", raising=False)
     return tmp_path / "cache"
 
@@ -54,19 +55,19 @@ def without_compiler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_compiled_function_is_called(sources):
-    module = compilation.load(sources)
+    module = compiler.load(sources)
     result = module.ffi.new("double[4]")
     module.lib.euler_normalize([0.0, 0.0, 3.0, 4.0], result)
     np.testing.assert_allclose(list(result), [0, 0, 0.6, 0.8])
 
 
 def test_second_call_compiles_nothing(sources, counting, root, monkeypatch):
-    first = compilation.load(sources)
+    first = compiler.load(sources)
     calls = counting()
     assert calls > 0
-    assert compilation.load(sources) is first
-    monkeypatch.setattr(compilation, "_loaded", {})  # as another process
-    again = compilation.load(sources)
+    assert compiler.load(sources) is first
+    monkeypatch.setattr(compiler, "_loaded", {})  # as another process
+    again = compiler.load(sources)
     assert again.__file__ == first.__file__
     assert counting() == calls
     (place,) = (root / "builds").iterdir()
@@ -77,47 +78,47 @@ def test_second_call_compiles_nothing(sources, counting, root, monkeypatch):
 def test_back_end_compiles_nothing_the_second_time(counting, monkeypatch):
     strapgen.backend("euler", "rk1", 1, "c")
     calls = counting()
-    monkeypatch.setattr(compilation, "_loaded", {})
+    monkeypatch.setattr(compiler, "_loaded", {})
     strapgen.backend("euler", "rk1", 1, "c")
     assert counting() == calls
 
 
 def test_other_text_compiles_again(sources, counting):
-    compilation.load(sources)
+    compiler.load(sources)
     calls = counting()
     files = {name: text.replace("Euler", "Euler's") for name, text in sources.files.items()}
-    compilation.load(Sources.restore(sources.interface(), files))
+    compiler.load(Sources.restore(sources.interface(), files))
     assert counting() == 2 * calls
 
 
 def test_other_compiler_compiles_again(sources, counting, root, monkeypatch):
-    compilation.load(sources)
+    compiler.load(sources)
     monkeypatch.delenv("CC")
-    monkeypatch.setattr(compilation, "_loaded", {})
-    compilation.load(sources)
+    monkeypatch.setattr(compiler, "_loaded", {})
+    compiler.load(sources)
     assert len(list((root / "builds").iterdir())) == 2
 
 
 def test_environment_is_put_back(sources, monkeypatch):
-    compilation.load(sources)
+    compiler.load(sources)
     assert "CC" not in os.environ
     monkeypatch.setenv("CC", "cc -Wall")
-    monkeypatch.setattr(compilation, "_loaded", {})
-    compilation.load(sources)
+    monkeypatch.setattr(compiler, "_loaded", {})
+    compiler.load(sources)
     assert os.environ["CC"] == "cc -Wall"
 
 
 @pytest.mark.parametrize("blank", ["", "  "])
 def test_blank_choice_of_compiler_is_none(blank, sources, monkeypatch):
     monkeypatch.setenv("CC", blank)
-    assert compilation.compiler() == shutil.which("cc")
-    assert compilation.load(sources).lib.euler_normalize
+    assert compiler.compiler() == shutil.which("cc")
+    assert compiler.load(sources).lib.euler_normalize
 
 
 def test_cache_folder_may_be_relative(sources, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("STRAPGEN_CACHE_DIR", "relative")
-    assert compilation.load(sources).lib.euler_normalize
+    assert compiler.load(sources).lib.euler_normalize
     assert len(list((tmp_path / "relative" / "builds").iterdir())) == 1
 
 
@@ -126,7 +127,7 @@ def test_cache_folder_may_be_relative(sources, tmp_path, monkeypatch):
 
 def test_no_compiler(sources, without_compiler, root):
     with pytest.raises(CompilerError, match=r"^no C compiler: 'cc' is not on the PATH; install gcc .*numpy"):
-        compilation.load(sources)
+        compiler.load(sources)
     assert not (root / "builds").exists()
 
 
@@ -136,7 +137,7 @@ def test_chosen_compiler_is_not_there(chosen, sources, monkeypatch):
     with pytest.raises(
         CompilerError, match=r"^no C compiler: .* is not on the PATH; install gcc \(or set CC\)"
     ):
-        compilation.load(sources)
+        compiler.load(sources)
 
 
 def test_numpy_works_without_a_compiler(without_compiler):
@@ -175,7 +176,7 @@ def test_version_without_a_compiler(without_compiler, capsys):
 def test_compiler_that_fails(sources, root, monkeypatch, capfd):
     monkeypatch.setenv("CC", "false")
     with pytest.raises(CompilerError, match=r"false failed on strapgen_euler_normalize") as failure:
-        compilation.load(sources)
+        compiler.load(sources)
     assert "\n" not in str(failure.value)
     assert list((root / "builds").iterdir()) == []
     assert capfd.readouterr() == ("", "")
@@ -184,7 +185,7 @@ def test_compiler_that_fails(sources, root, monkeypatch, capfd):
 def test_source_that_does_not_compile(sources, root, capfd):
     files = {name: text.replace("#include", "#error no") for name, text in sources.files.items()}
     with pytest.raises(CompilerError, match=r"failed on strapgen_euler_normalize: .*error.* no") as failure:
-        compilation.load(Sources.restore(sources.interface(), files))
+        compiler.load(Sources.restore(sources.interface(), files))
     assert "\n" not in str(failure.value)
     assert list((root / "builds").iterdir()) == []
     assert capfd.readouterr() == ("", "")
@@ -193,13 +194,13 @@ def test_source_that_does_not_compile(sources, root, capfd):
 def test_flags_of_the_environment_do_not_reach_the_compiler(sources, root, monkeypatch):
     for name in ("CFLAGS", "CPPFLAGS", "LDFLAGS"):
         monkeypatch.setenv(name, "-no-such-flag-at-all")
-    assert compilation.load(sources).lib.euler_normalize
+    assert compiler.load(sources).lib.euler_normalize
 
 
 def test_a_compiler_that_fails_is_told_in_one_line(sources, root, monkeypatch, capfd):
     monkeypatch.setenv("CC", "cc -no-such-flag-at-all")
     with pytest.raises(CompilerError, match=r"cc failed on strapgen_\w+: .*error.*no-such-flag-at-all"):
-        compilation.load(sources)
+        compiler.load(sources)
     assert capfd.readouterr() == ("", "")
     assert not list((root / "builds").iterdir())
 
@@ -207,7 +208,7 @@ def test_a_compiler_that_fails_is_told_in_one_line(sources, root, monkeypatch, c
 def test_a_compiler_that_makes_nothing(sources, root, monkeypatch):
     monkeypatch.setenv("CC", "true")
     with pytest.raises(CompilerError, match="failed on"):
-        compilation.load(sources)
+        compiler.load(sources)
     assert not list((root / "builds").iterdir())
 
 
@@ -223,19 +224,19 @@ def many() -> list[Sources]:
 
 def test_many_sources_become_one_module_of_two_commands_for_each_and_two_for_all(many, counting, root):
     """One to compile each kernel, one for the wrapper and one to link."""
-    compilation.compile_together(many)
+    compiler.compile_together(many)
     assert counting() == 6 + 2
     (place,) = (root / "builds").iterdir()
-    modules = {compilation.load(sources) for sources in many if sources.target != "numpy"}
+    modules = {compiler.load(sources) for sources in many if sources.target != "numpy"}
     assert {Path(module.__file__).parent for module in modules} == {place}
     assert len(modules) == 1
     assert counting() == 6 + 2
 
 
 def test_each_function_of_a_module_is_the_one_that_it_is_alone(many, counting, monkeypatch, tmp_path):
-    together = compilation.compile_together(many) or [backends.of_sources(sources) for sources in many]
+    together = compiler.compile_together(many) or [backends.of_sources(sources) for sources in many]
     monkeypatch.setenv("STRAPGEN_CACHE_DIR", str(tmp_path / "other"))
-    monkeypatch.setattr(compilation, "_loaded", {})
+    monkeypatch.setattr(compiler, "_loaded", {})
     rng = np.random.default_rng(7)
     for sources, function in zip(many, together, strict=True):
         alone = backends.of_sources(sources)
@@ -249,39 +250,39 @@ def test_each_function_of_a_module_is_the_one_that_it_is_alone(many, counting, m
 
 def test_what_is_there_is_not_compiled_again(many, counting):
     first, *rest = many
-    compilation.load(first)
+    compiler.load(first)
     calls = counting()
-    compilation.compile_together([first])
+    compiler.compile_together([first])
     assert counting() == calls
-    compilation.compile_together(many)
+    compiler.compile_together(many)
     assert counting() == calls + len([s for s in rest if s.target != "numpy"]) + 2
     calls = counting()
-    compilation.compile_together(many)
+    compiler.compile_together(many)
     assert counting() == calls
 
 
 def test_functions_of_one_name_go_into_two_modules(sources, counting, root):
     pair = [sources, other(sources, 1)]
-    compilation.compile_together(pair)
+    compiler.compile_together(pair)
     assert len(list((root / "builds").iterdir())) == 2
-    assert len({compilation.load(one).__file__ for one in pair}) == 2
+    assert len({compiler.load(one).__file__ for one in pair}) == 2
 
 
 @pytest.mark.parametrize("kind", ["builds", "shared"])
 def test_a_module_of_many_that_is_gone_is_compiled_alone(kind, many, root, monkeypatch):
-    compilation.compile_together(many)
+    compiler.compile_together(many)
     for place in (root / kind).iterdir():
         shutil.rmtree(place)
-    module = compilation.load(many[0])
+    module = compiler.load(many[0])
     assert module.lib.euler_normalize
     assert Path(module.__file__).name.startswith("strapgen_euler_normalize")
 
 
 def test_many_without_a_compiler(many, without_compiler, root):
     with pytest.raises(CompilerError, match=r"^no C compiler: 'cc' is not on the PATH"):
-        compilation.compile_together(many)
+        compiler.compile_together(many)
     assert not (root / "builds").exists()
-    compilation.compile_together([sources for sources in many if sources.target == "numpy"])
+    compiler.compile_together([sources for sources in many if sources.target == "numpy"])
 
 
 def test_one_of_many_that_does_not_compile(many, root):
@@ -289,7 +290,7 @@ def test_one_of_many_that_does_not_compile(many, root):
     files = {name: text.replace("#include", "#error no") for name, text in first.files.items()}
     broken = Sources.restore(first.interface(), files)
     with pytest.raises(CompilerError, match=r"error.* no"):
-        compilation.compile_together([broken, *many[1:]])
+        compiler.compile_together([broken, *many[1:]])
     assert not list((root / "builds").iterdir())
     assert not (root / "shared").exists()
 
@@ -307,18 +308,18 @@ def other(sources: Sources, number: int) -> Sources:
 
 
 def test_one_process_compiles_one_source_after_the_other(sources):
-    compilation.load(sources)
-    service = compilation._service()
-    compilation.load(other(sources, 1))
-    assert compilation._service() is service
+    compiler.load(sources)
+    service = compiler._service()
+    compiler.load(other(sources, 1))
+    assert compiler._service() is service
 
 
 def test_a_compiling_process_that_has_ended_is_replaced(sources, root):
-    compilation.load(sources)
-    service = compilation._service()
+    compiler.load(sources)
+    service = compiler._service()
     service.stop()
-    assert compilation.load(other(sources, 1)).lib.euler_normalize
-    assert compilation._service() is not service
+    assert compiler.load(other(sources, 1)).lib.euler_normalize
+    assert compiler._service() is not service
 
 
 def test_a_compiling_process_that_ends_at_work_says_so(sources, root, tmp_path, monkeypatch):
@@ -328,22 +329,22 @@ def test_a_compiling_process_that_ends_at_work_says_so(sources, root, tmp_path, 
     script.chmod(0o755)
     with monkeypatch.context() as patched, pytest.raises(CompilerError, match="has ended before"):
         patched.setenv("CC", str(script))
-        compilation.load(sources)
+        compiler.load(sources)
     assert list((root / "builds").iterdir()) == []
-    assert compilation.load(sources).lib.euler_normalize
+    assert compiler.load(sources).lib.euler_normalize
 
 
 def _compile_in_a_fork(text_number: int, sources: Sources, made) -> None:
-    made.put((compilation.load(other(sources, text_number)) is not None, compilation._service()._owner))
+    made.put((compiler.load(other(sources, text_number)) is not None, compiler._service()._owner))
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
 def test_a_fork_compiles_in_a_process_of_its_own(sources):
-    compilation.load(sources)
+    compiler.load(sources)
     context = multiprocessing.get_context("fork")
     made = context.SimpleQueue()
     child = context.Process(target=_compile_in_a_fork, args=(2, sources, made))
     child.start()
     child.join(60)
     assert made.get() == (True, child.pid)
-    assert compilation.load(other(sources, 3)).lib.euler_normalize
+    assert compiler.load(other(sources, 3)).lib.euler_normalize
