@@ -8,8 +8,8 @@ from fractions import Fraction
 import mpmath
 import numpy as np
 
+from strapgen.backends.exact import FUNCTIONS
 from strapgen.backends.fixed import FixedEvaluator
-from strapgen.exact import FUNCTIONS
 from strapgen.ir.integer_program import FixedProgram
 from strapgen.ir.program import OPERATIONS, RESOLUTION, Constant, Program, Reference
 

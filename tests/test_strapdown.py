@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 
 from strapgen import evaluator, reports
+from strapgen.backends.two_speed import ALGORITHMS
 from strapgen.ir.fixed_settings import Settings
 from strapgen.motions import motion
 from strapgen.recording import InertialRecording, read_inertial
 from strapgen.simulation import drift_between
 from strapgen.strapdown import NavigationFrame, course
 from strapgen.support.exceptions import InputError
-from strapgen.two_speed import ALGORITHMS
 
 LOG = Path(__file__).resolve().parents[1] / "examples" / "inertial_log.csv"
 GRAVITY = 9.80665

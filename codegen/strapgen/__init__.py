@@ -11,9 +11,7 @@ __version__ = "0.1.0"
 
 # For type checkers; a test holds it against the table below, from which Python loads a name when it is first used.
 if _typing.TYPE_CHECKING:
-    from strapgen import exact as exact
     from strapgen import formulas as formulas
-    from strapgen import gyro as gyro
     from strapgen import study as study
     from strapgen import vibration as vibration
     from strapgen.backends import BACKENDS as BACKENDS
@@ -21,6 +19,9 @@ if _typing.TYPE_CHECKING:
     from strapgen.backends import Evaluator as Evaluator
     from strapgen.backends import backend as backend
     from strapgen.backends import evaluator as evaluator
+    from strapgen.backends import exact as exact
+    from strapgen.backends import increments as gyro
+    from strapgen.backends.two_speed import TwoSpeed as TwoSpeed
     from strapgen.behaviour import Finding as Finding
     from strapgen.behaviour import check as check
     from strapgen.catalogue import Choice as Choice
@@ -78,7 +79,6 @@ if _typing.TYPE_CHECKING:
     from strapgen.symbolic.kernel import Stage as Stage
     from strapgen.symbolic.kernel import resolution as resolution
     from strapgen.targets import TARGETS as TARGETS
-    from strapgen.two_speed import TwoSpeed as TwoSpeed
 
 #: Public names by the modules that define them.
 _NAMES = {
@@ -89,6 +89,7 @@ _NAMES = {
         "backend",
         "evaluator",
     ),
+    "backends.two_speed": ("TwoSpeed",),
     "behaviour": (
         "Finding",
         "check",
@@ -171,14 +172,13 @@ _NAMES = {
         "resolution",
     ),
     "targets": ("TARGETS",),
-    "two_speed": ("TwoSpeed",),
 }
 #: Modules whose functions belong together, by the names that they have here.
 _NAMESPACES = {
     "algebra": "symbolic.rotations",
-    "exact": "exact",
+    "exact": "backends.exact",
     "formulas": "formulas",
-    "gyro": "gyro",
+    "gyro": "backends.increments",
     "runge_kutta": "catalogue.methods.runge_kutta",
     "study": "study",
     "tableaux": "catalogue.methods.tableaux",

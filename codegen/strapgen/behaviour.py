@@ -11,12 +11,12 @@ import mpmath
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen import exact, fixedpoint, pipeline
-from strapgen.backends import Backend, of
+from strapgen import fixedpoint, pipeline
+from strapgen.backends import Backend, exact, of
+from strapgen.backends.increments import windows
 from strapgen.catalogue import Choice
 from strapgen.comparison import certified_angle
 from strapgen.convergence import GENERAL, converge, interpreter, step_of_increments
-from strapgen.gyro import windows
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.program import Program
 from strapgen.motions import motion

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen import catalogue, exact
-from strapgen.backends import BACKENDS, Backend, of
+from strapgen import catalogue
+from strapgen.backends import BACKENDS, Backend, exact, of
 from strapgen.catalogue import Choice
 from strapgen.catalogue.methods.tableaux import Tableau
 from strapgen.ir.fixed_settings import Settings

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 import mpmath
 import numpy as np
 
-from strapgen import catalogue, exact
-from strapgen.backends import BACKENDS, of
+from strapgen import catalogue
+from strapgen.backends import BACKENDS, exact, of
 from strapgen.catalogue import Choice
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.order import Order

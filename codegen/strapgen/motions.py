@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from strapgen import catalogue
 from strapgen.backends import evaluator
-from strapgen.gyro import windows
+from strapgen.backends.increments import windows
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 

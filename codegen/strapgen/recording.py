@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapgen.backends import Backend
-from strapgen.gyro import pulses, windows
+from strapgen.backends.increments import pulses, windows
 from strapgen.simulation import require_finite
 from strapgen.support import checks, stages
 from strapgen.support.exceptions import InputError

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapgen.backends import Backend, evaluator
-from strapgen.gyro import pulses
+from strapgen.backends.increments import pulses
 from strapgen.motions import Motion
 from strapgen.support import checks, stages
 from strapgen.support.exceptions import InputError

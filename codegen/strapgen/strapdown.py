@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen import backends, two_speed
-from strapgen.backends import BACKENDS
+from strapgen import backends
+from strapgen.backends import BACKENDS, two_speed
 from strapgen.ir.fixed_settings import Settings
 from strapgen.recording import InertialRecording
 from strapgen.support import checks

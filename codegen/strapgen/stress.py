@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen import catalogue, two_speed
-from strapgen.backends import BACKENDS, evaluator, of
+from strapgen import catalogue
+from strapgen.backends import BACKENDS, evaluator, of, two_speed
 from strapgen.backends.fixed import FixedBackend
+from strapgen.backends.increments import pulses, windows
 from strapgen.catalogue import Choice
-from strapgen.gyro import pulses, windows
 from strapgen.ir.fixed_settings import Settings
 from strapgen.simulation import attitude, drift_between
 from strapgen.support import checks

@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 
 from strapgen.backends import backend
+from strapgen.backends.increments import pulses
 from strapgen.comparison import certified_angle
-from strapgen.gyro import pulses
 from strapgen.ir.fixed_settings import Settings
 from strapgen.motions import Motion, motion
 from strapgen.simulation import attitude, drift_between

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from strapgen import exact
 from strapgen.analysis.constant_rate import ANGLE, STEPS, constant_rate, errors_after
 from strapgen.analysis.prediction import parts_of
+from strapgen.backends import exact
 from strapgen.catalogue import ALGORITHMS, choose
 from strapgen.convergence import exact_attitudes
 from strapgen.motions import motion

@@ -9,9 +9,10 @@ import mpmath
 import pytest
 import sympy as sp
 
-from strapgen import exact, lower
+from strapgen import lower
 from strapgen.analysis import invariants
 from strapgen.analysis.one_step import errors, step
+from strapgen.backends import exact
 from strapgen.catalogue import ALGORITHMS, Choice, choose, derive
 from strapgen.symbolic.covariants import Frame
 

@@ -6,8 +6,8 @@ import mpmath
 import pytest
 import sympy as sp
 
-from strapgen import exact
 from strapgen.analysis.orthonormalization import ERROR, effect
+from strapgen.backends import exact
 from strapgen.catalogue import orthonormalizations
 from strapgen.convergence import interpreter
 from strapgen.support.exceptions import InputError

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from tolerances import one_call, roundoff
 
 import strapgen
-from strapgen.backends import numpy as numpy_module
-from strapgen.gyro import windows
+from strapgen.backends import numpy_backend as numpy_module
+from strapgen.backends.increments import windows
 from strapgen.support.exceptions import InputError, InputTypeError
 
 STEPS = 1440

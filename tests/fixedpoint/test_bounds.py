@@ -13,9 +13,10 @@ from evidence import corners_and_random, exactly, in_double
 from scipy.spatial.transform import Rotation
 
 import strapgen
-from strapgen import build, exact, generate, quantize
+from strapgen import build, generate, quantize
 from strapgen.backends import backend as make_backend
 from strapgen.backends import evaluator as make_evaluator
+from strapgen.backends import exact
 from strapgen.backends.fixed import ModelEvaluator
 from strapgen.catalogue import Choice, standard
 from strapgen.fixedpoint import can_lower, function_series

@@ -10,8 +10,8 @@ import pytest
 from derived import precisely
 
 import strapgen
-from strapgen.exact import propagate
-from strapgen.gyro import windows
+from strapgen.backends.exact import propagate
+from strapgen.backends.increments import windows
 from strapgen.ir.fixed_settings import Settings
 
 EXPONENTIALS = ("magnus2", "magnus4", "magnus6", "munthe-kaas4")

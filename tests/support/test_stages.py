@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import strapgen
-from strapgen import exact, recording
+from strapgen import recording
+from strapgen.backends import exact
 from strapgen.support.exceptions import InputTypeError
 
 

@@ -14,14 +14,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import strapgen
-from strapgen import backends, catalogue, derive, exact, gyro, lower, vibration
+from strapgen import backends, catalogue, derive, lower, vibration
+from strapgen.backends import exact
+from strapgen.backends.increments import windows
+from strapgen.backends.two_speed import TwoSpeed
 from strapgen.catalogue.methods import coning_coefficients
 from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import Signal, after
 from strapgen.simulation import attitude
 from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.symbolic.kernel import KernelBuilder
-from strapgen.two_speed import TwoSpeed
 from strapgen.vibration import systems
 from strapgen.vibration.mean_rates import D_Y, PARTS, PHI, THETA_X, THETA_Y
 from strapgen.vibration.systems import T_L, T_M, F, T
@@ -154,7 +156,7 @@ def simulated(choice, periods, steps, step, theta, phase):
         samples = np.stack(rates, axis=-1) * turn * step
     else:
         rows, count, previous = oscillation(choice, frequency, step, steps, theta, phase)
-        samples = gyro.windows(np.array(rows), count, previous)
+        samples = windows(np.array(rows), count, previous)
     ready = backends.of(choice, "numpy")
     end = attitude(ready, ready.propagate(samples)[-1:])[0]
     return math.atan2(end[1, 0] - end[0, 1], end[0, 0] + end[1, 1]) / (steps * step)

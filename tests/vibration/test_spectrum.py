@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import strapgen
-from strapgen import catalogue, gyro, vibration
+from strapgen import catalogue, vibration
+from strapgen.backends.increments import windows
 from strapgen.simulation import attitude
 from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.vibration import Spectrum, random_rates, read_spectrum
@@ -136,7 +137,7 @@ def test_a_kernel_runs_on_noise():
         spectral[lines] = amplitudes
         angles[:-1, axis] = (np.fft.ifft(spectral) * 2 * steps).real
     angles[-1] = angles[0]
-    increments = gyro.windows(np.diff(angles, axis=0), 2)
+    increments = windows(np.diff(angles, axis=0), 2)
     ready = strapgen.backend("dcm", "rk4", 2)
     end = attitude(ready, ready.propagate(increments)[-1:])[0]
     measured = math.atan2(end[1, 0] - end[0, 1], end[0, 0] + end[1, 1]) / period

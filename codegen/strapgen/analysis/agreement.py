@@ -14,9 +14,9 @@ from typing import Any
 
 import mpmath
 
-from strapgen import exact
 from strapgen.analysis.error_rate import error_rate
 from strapgen.analysis.prediction import Prediction, parts_of, predict
+from strapgen.backends import exact
 from strapgen.catalogue import Choice
 from strapgen.convergence import GENERAL, exact_attitudes, step_of_increments
 from strapgen.motions import Motion

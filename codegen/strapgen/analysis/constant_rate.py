@@ -14,11 +14,12 @@ from typing import Any
 import mpmath
 import sympy as sp
 
-from strapgen import catalogue, exact
+from strapgen import catalogue
 from strapgen.analysis import one_step
 from strapgen.analysis.motion_rates import CONSTANT
 from strapgen.analysis.prediction import Matrix, Prediction, Transfer, follow
 from strapgen.analysis.series import PARTS, STEP
+from strapgen.backends import exact
 from strapgen.catalogue import Choice
 from strapgen.motions import Motion
 from strapgen.symbolic import rotations

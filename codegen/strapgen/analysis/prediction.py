@@ -10,10 +10,11 @@ from typing import Any
 import mpmath
 import sympy as sp
 
-from strapgen import catalogue, exact
+from strapgen import catalogue
 from strapgen.analysis.accumulation import antiderivative
 from strapgen.analysis.error_rate import ErrorRate, error_rate
 from strapgen.analysis.motion_rates import TIME, parameters
+from strapgen.backends import exact
 from strapgen.catalogue import Choice
 from strapgen.convergence import interpreter
 from strapgen.library import generated_sources

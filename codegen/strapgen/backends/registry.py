@@ -29,7 +29,9 @@ class Entry(NamedTuple):
 
 #: Back ends by name.
 BACKENDS = {
-    "numpy": Entry("generated numpy code in double", "numpy", "numpy", "NumpyEvaluator", "NumpyBackend"),
+    "numpy": Entry(
+        "generated numpy code in double", "numpy", "numpy_backend", "NumpyEvaluator", "NumpyBackend"
+    ),
     "c": Entry("generated C in double, compiled", "c", "c", "CEvaluator", "CBackend"),
     "c-float": Entry("generated C in float, compiled", "c-float", "c", "CEvaluator", "CBackend"),
     "c-q31": Entry(

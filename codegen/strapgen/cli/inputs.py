@@ -151,7 +151,8 @@ def read_inputs(
     """Return the increments that the options of a command stand for, `samples` of them a step and those before it."""
     import numpy as np
 
-    from strapgen import gyro, recording
+    from strapgen import recording
+    from strapgen.backends.increments import pulses, windows
     from strapgen.motions import motion as make_motion
     from strapgen.support import checks
 
@@ -175,9 +176,9 @@ def read_inputs(
             raise InputError(
                 f"the recording holds {len(data.increments)} increments; a step needs {samples + previous}"
             )
-        increments = gyro.windows(data.increments[: previous + steps * samples], samples, previous)
+        increments = windows(data.increments[: previous + steps * samples], samples, previous)
         length = data.interval * samples
         title = f"{(increments_csv or rates_csv or Path()).name}, {steps} steps of {length:.6g} s"
     if pulse is not None:
-        increments = gyro.pulses(increments, pulse, previous)
+        increments = pulses(increments, pulse, previous)
     return Inputs(increments, truth, length, title)

@@ -37,7 +37,7 @@ def two_speed(
     Example: strapgen two-speed dcm --target c --out firmware
     """
     check_format(format)
-    from strapgen import two_speed as made
+    from strapgen.backends import two_speed as made
     from strapgen.ir.fixed_settings import Settings
     from strapgen.support.files import write_files
 

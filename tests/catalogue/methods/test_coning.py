@@ -18,8 +18,8 @@ from peano_baker import generic_rate, local_error
 from tolerances import one_call
 
 import strapgen
-from strapgen import derive, exact
-from strapgen.backends import BACKENDS, evaluator
+from strapgen import derive
+from strapgen.backends import BACKENDS, evaluator, exact
 from strapgen.catalogue import MOST_INCREMENTS, MOST_PREVIOUS, Choice, choose
 from strapgen.catalogue.methods import coning_coefficients
 from strapgen.catalogue.methods import rotation_series as series

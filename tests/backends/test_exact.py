@@ -9,7 +9,7 @@ import pytest
 from derived import program
 
 import strapgen
-from strapgen import exact
+from strapgen.backends import exact
 from strapgen.catalogue import Choice
 
 

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from strapgen import backends
 from strapgen.backends import BACKENDS, Evaluator
 from strapgen.backends.fixed import FixedEvaluator, integers, numbers
+from strapgen.backends.increments import pulses
 from strapgen.catalogue import Choice
-from strapgen.gyro import pulses
 from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.fixed_settings import DEFAULT_ANGLE, Settings
 from strapgen.ir.sources import Sources

@@ -12,7 +12,7 @@ from hypothesis.extra.numpy import arrays
 from tolerances import certified
 
 import strapgen
-from strapgen.gyro import pulses, windows
+from strapgen.backends.increments import pulses, windows
 from strapgen.support.exceptions import InputError
 
 

@@ -13,11 +13,11 @@ from scipy.integrate import quad_vec
 from scipy.spatial.transform import Rotation
 
 from strapgen.backends import BACKENDS
+from strapgen.backends.two_speed import ALGORITHMS, SCULLING, TwoSpeed, loops, sources
 from strapgen.ir.fixed_settings import Settings
 from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.targets import FIXED
 from strapgen.toolchain import compiler
-from strapgen.two_speed import ALGORITHMS, SCULLING, TwoSpeed, loops, sources
 
 FORMS = [(a, s) for a in ALGORITHMS for s in SCULLING]
 STRICT = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Werror", "-O2"]
