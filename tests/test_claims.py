@@ -16,7 +16,7 @@ import pytest
 from tolerances import certified, roundoff
 
 import strapgen
-from strapgen.simulation import simulate
+from strapgen.simulation.runs import simulate
 from strapgen.support.exceptions import InputError
 
 ORDERS = (1, 2, 3, 4)

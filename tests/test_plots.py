@@ -11,8 +11,8 @@ import strapgen
 from strapgen import plots
 from strapgen.convergence import Convergence, Rung
 from strapgen.ir.order import Order
-from strapgen.recording import History
-from strapgen.simulation import Run, simulate
+from strapgen.simulation.recording import History
+from strapgen.simulation.runs import Run, simulate
 from strapgen.support.exceptions import InputError, MissingExtraError
 from strapgen.vibration.curves import Curve
 

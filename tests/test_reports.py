@@ -12,8 +12,8 @@ import pytest
 
 import strapgen
 from strapgen import reports
-from strapgen.recording import History
-from strapgen.simulation import Run, simulate
+from strapgen.simulation.recording import History
+from strapgen.simulation.runs import Run, simulate
 
 SETTINGS = {"algorithm": "dcm", "method": "rk1", "increments": 2, "backend": "numpy", "motion": "coning"}
 SETTINGS |= {"step_s": 0.125, "duration_s": 60.0}

@@ -50,24 +50,24 @@ if _typing.TYPE_CHECKING:
     from strapgen.ir.recursion import Recursion as Recursion
     from strapgen.ir.signals import Signal as Signal
     from strapgen.ir.sources import Sources as Sources
-    from strapgen.motions import Motion as Motion
-    from strapgen.motions import motion as motion
     from strapgen.pipeline import build as build
     from strapgen.pipeline import derive as derive
     from strapgen.pipeline import generate as generate
     from strapgen.pipeline import lower as lower
     from strapgen.pipeline import quantize as quantize
-    from strapgen.recording import History as History
-    from strapgen.recording import InertialRecording as InertialRecording
-    from strapgen.recording import Recording as Recording
-    from strapgen.recording import propagate as propagate
-    from strapgen.recording import read_increments as read_increments
-    from strapgen.recording import read_inertial as read_inertial
-    from strapgen.recording import read_rates as read_rates
-    from strapgen.simulation import Run as Run
-    from strapgen.simulation import simulate as simulate
-    from strapgen.strapdown import Course as Course
-    from strapgen.strapdown import course as course
+    from strapgen.simulation.courses import Course as Course
+    from strapgen.simulation.courses import course as course
+    from strapgen.simulation.motions import Motion as Motion
+    from strapgen.simulation.motions import motion as motion
+    from strapgen.simulation.recording import History as History
+    from strapgen.simulation.recording import InertialRecording as InertialRecording
+    from strapgen.simulation.recording import Recording as Recording
+    from strapgen.simulation.recording import propagate as propagate
+    from strapgen.simulation.recording import read_increments as read_increments
+    from strapgen.simulation.recording import read_inertial as read_inertial
+    from strapgen.simulation.recording import read_rates as read_rates
+    from strapgen.simulation.runs import Run as Run
+    from strapgen.simulation.runs import simulate as simulate
     from strapgen.support.exceptions import CompilerError as CompilerError
     from strapgen.support.exceptions import InputError as InputError
     from strapgen.support.exceptions import InputTypeError as InputTypeError
@@ -130,10 +130,6 @@ _NAMES = {
     "ir.recursion": ("Recursion",),
     "ir.signals": ("Signal",),
     "ir.sources": ("Sources",),
-    "motions": (
-        "Motion",
-        "motion",
-    ),
     "pipeline": (
         "build",
         "derive",
@@ -141,7 +137,15 @@ _NAMES = {
         "lower",
         "quantize",
     ),
-    "recording": (
+    "simulation.courses": (
+        "Course",
+        "course",
+    ),
+    "simulation.motions": (
+        "Motion",
+        "motion",
+    ),
+    "simulation.recording": (
         "History",
         "InertialRecording",
         "Recording",
@@ -150,13 +154,9 @@ _NAMES = {
         "read_inertial",
         "read_rates",
     ),
-    "simulation": (
+    "simulation.runs": (
         "Run",
         "simulate",
-    ),
-    "strapdown": (
-        "Course",
-        "course",
     ),
     "support.exceptions": (
         "CompilerError",

@@ -19,8 +19,8 @@ from strapgen.comparison import certified_angle
 from strapgen.convergence import GENERAL, converge, interpreter, step_of_increments
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.program import Program
-from strapgen.motions import motion
-from strapgen.simulation import attitude, drift_between, simulate
+from strapgen.simulation.motions import motion
+from strapgen.simulation.runs import attitude, drift_between, simulate
 from strapgen.support.exceptions import CompilerError, InputError
 from strapgen.symbolic.kernel import Kernel
 

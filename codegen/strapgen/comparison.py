@@ -20,7 +20,7 @@ from strapgen.catalogue import Choice
 from strapgen.catalogue.methods.tableaux import Tableau
 from strapgen.ir.fixed_settings import Settings
 from strapgen.library import generated_sources
-from strapgen.simulation import attitude, drift_between, require_finite
+from strapgen.simulation.runs import attitude, drift_between, require_finite
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 from strapgen.targets import FIXED

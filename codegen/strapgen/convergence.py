@@ -22,8 +22,8 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.order import Order
 from strapgen.ir.program import Program
 from strapgen.library import generated_sources
-from strapgen.motions import Motion
-from strapgen.simulation import largest_increment, simulate
+from strapgen.simulation.motions import Motion
+from strapgen.simulation.runs import largest_increment, simulate
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.targets import FIXED

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from strapgen.recording import History
 from strapgen.reports import AXES, SKEW_PLANES
-from strapgen.simulation import Run
+from strapgen.simulation.recording import History
+from strapgen.simulation.runs import Run
 from strapgen.study import Outcome
 from strapgen.support.exceptions import InputError, MissingExtraError
 from strapgen.support.files import write_file

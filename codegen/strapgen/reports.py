@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from strapgen.recording import History
-from strapgen.simulation import Run
+from strapgen.simulation.recording import History
+from strapgen.simulation.runs import Run
 
 if TYPE_CHECKING:
-    from strapgen.strapdown import Course
+    from strapgen.simulation.courses import Course
 
 AXES = ("x", "y", "z")
 ANGLES = ("roll", "pitch", "heading")

@@ -17,7 +17,7 @@ from strapgen.backends.fixed import FixedBackend
 from strapgen.backends.increments import pulses, windows
 from strapgen.catalogue import Choice
 from strapgen.ir.fixed_settings import Settings
-from strapgen.simulation import attitude, drift_between
+from strapgen.simulation.runs import attitude, drift_between
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 from strapgen.targets import FIXED

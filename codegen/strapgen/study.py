@@ -22,8 +22,8 @@ from strapgen.backends import backend
 from strapgen.backends.increments import pulses
 from strapgen.comparison import certified_angle
 from strapgen.ir.fixed_settings import Settings
-from strapgen.motions import Motion, motion
-from strapgen.simulation import attitude, drift_between
+from strapgen.simulation.motions import Motion, motion
+from strapgen.simulation.runs import attitude, drift_between
 from strapgen.support import cache, checks
 from strapgen.support.exceptions import InputError
 

@@ -13,8 +13,8 @@ import numpy as np
 
 from strapgen.backends import BACKENDS, Backend, backend
 from strapgen.ir.fixed_settings import Settings
-from strapgen.motions import motion
-from strapgen.simulation import Run, largest_increment, simulate
+from strapgen.simulation.motions import motion
+from strapgen.simulation.runs import Run, largest_increment, simulate
 from strapgen.support.exceptions import InputError
 from strapgen.targets import FIXED
 

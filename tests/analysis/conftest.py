@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from strapgen.backends import backend
-from strapgen.simulation import simulate
+from strapgen.simulation.runs import simulate
 
 DATA = Path(__file__).resolve().parents[1] / "data" / "algorithms"
 

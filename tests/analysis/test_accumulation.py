@@ -12,7 +12,7 @@ from strapgen.analysis.error_rate import error_rate
 from strapgen.analysis.motion_rates import TIME
 from strapgen.analysis.series import STEP
 from strapgen.catalogue import ALGORITHMS, MOTIONS, choose, choose_step
-from strapgen.motions import motion
+from strapgen.simulation.motions import motion
 from strapgen.support.exceptions import InputError
 
 a, b, g = sp.symbols("a b g")

@@ -15,7 +15,7 @@ from strapgen.analysis.prediction import parts_of
 from strapgen.backends import exact
 from strapgen.catalogue import ALGORITHMS, choose
 from strapgen.convergence import exact_attitudes
-from strapgen.motions import motion
+from strapgen.simulation.motions import motion
 
 RATES = {
     "one axis": {"y_deg_s": 10},

@@ -15,7 +15,7 @@ from strapgen.analysis.growth import as_text, contraction, growth, stability
 from strapgen.analysis.motion_rates import TIME, model, parameters
 from strapgen.backends import backend
 from strapgen.catalogue import ALGORITHMS, choose, choose_step
-from strapgen.motions import motion
+from strapgen.simulation.motions import motion
 from strapgen.support.exceptions import InputError
 
 SQUARE = sum(w**2 for w in sp.symbols("w_x w_y w_z"))

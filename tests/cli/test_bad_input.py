@@ -530,12 +530,12 @@ def test_cache_folder_that_cannot_be_written(place, folder, capsys, monkeypatch)
 
 
 def test_run_that_the_memory_does_not_hold(folder, capsys, monkeypatch):
-    from strapgen import simulation
+    from strapgen.simulation import runs
 
     def exhausted(*_: object) -> None:
         raise MemoryError
 
-    monkeypatch.setattr(simulation, "simulate", exhausted)
+    monkeypatch.setattr(runs, "simulate", exhausted)
     with pytest.raises(SystemExit) as stop:
         main(shlex.split(f"simulate euler {CONSTANT}"))
     said = capsys.readouterr()

@@ -26,10 +26,10 @@ from strapgen.backends import BACKENDS, fitted
 from strapgen.catalogue.methods import coefficients, coning_coefficients
 from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.cli import main
-from strapgen.motions import motion as make_motion
-from strapgen.recording import read_inertial
-from strapgen.simulation import largest_increment
-from strapgen.strapdown import NavigationFrame, course
+from strapgen.simulation.courses import NavigationFrame, course
+from strapgen.simulation.motions import motion as make_motion
+from strapgen.simulation.recording import read_inertial
+from strapgen.simulation.runs import largest_increment
 from strapgen.tables import TABLES
 from strapgen.targets import FIXED, TARGETS
 

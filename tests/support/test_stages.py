@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import strapgen
-from strapgen import recording
 from strapgen.backends import exact
+from strapgen.simulation import recording
 from strapgen.support.exceptions import InputTypeError
 
 

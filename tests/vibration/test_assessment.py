@@ -21,7 +21,7 @@ from strapgen.backends.two_speed import TwoSpeed
 from strapgen.catalogue.methods import coning_coefficients
 from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import Signal, after
-from strapgen.simulation import attitude
+from strapgen.simulation.runs import attitude
 from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.symbolic.kernel import KernelBuilder
 from strapgen.vibration import systems

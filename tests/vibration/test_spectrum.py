@@ -12,7 +12,7 @@ import pytest
 import strapgen
 from strapgen import catalogue, vibration
 from strapgen.backends.increments import windows
-from strapgen.simulation import attitude
+from strapgen.simulation.runs import attitude
 from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.vibration import Spectrum, random_rates, read_spectrum
 

@@ -19,7 +19,7 @@ from strapgen.analysis.prediction import Prediction, parts_of, predict
 from strapgen.backends import exact
 from strapgen.catalogue import Choice
 from strapgen.convergence import GENERAL, exact_attitudes, step_of_increments
-from strapgen.motions import Motion
+from strapgen.simulation.motions import Motion
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 
@@ -113,7 +113,7 @@ def agreement(
     Examples
     --------
     >>> from strapgen import catalogue
-    >>> from strapgen.motions import motion
+    >>> from strapgen.simulation.motions import motion
     >>> turn = motion("constant", y_rad_s=1)
     >>> found = agreement(catalogue.choose("dcm", "rk2", 1), turn, ["1/8", "1/16"], 1, terms=1)
     >>> found.order, round(found.slopes[0], 1)

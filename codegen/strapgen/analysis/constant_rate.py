@@ -21,7 +21,7 @@ from strapgen.analysis.prediction import Matrix, Prediction, Transfer, follow
 from strapgen.analysis.series import PARTS, STEP
 from strapgen.backends import exact
 from strapgen.catalogue import Choice
-from strapgen.motions import Motion
+from strapgen.simulation.motions import Motion
 from strapgen.symbolic import rotations
 from strapgen.symbolic.kernel import Kernel, evaluate_stages
 from strapgen.symbolic.power_series import Powers, constant, field, function
@@ -318,7 +318,7 @@ def errors_after(
 
     Examples
     --------
-    >>> from strapgen.motions import motion
+    >>> from strapgen.simulation.motions import motion
     >>> found = errors_after(catalogue.choose("dcm", "rk1"), motion("constant", y_deg_s=10), "1/8", 180)
     >>> round(float(found.scale[-1][0]), 4), round(float(found.drift[-1][1]), 6)
     (0.4086, 0.007019)

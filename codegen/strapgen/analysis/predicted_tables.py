@@ -11,8 +11,8 @@ from typing import Any
 from strapgen import catalogue
 from strapgen.analysis.prediction import Prediction, predict
 from strapgen.backends import backend
-from strapgen.motions import motion
-from strapgen.simulation import simulate
+from strapgen.simulation.motions import motion
+from strapgen.simulation.runs import simulate
 from strapgen.tables import ALGORITHMS, DURATION, INTERVAL, ORDERS, STEP, TABLES, Table, agrees, drift_deg
 
 

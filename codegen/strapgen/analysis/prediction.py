@@ -18,7 +18,7 @@ from strapgen.backends import exact
 from strapgen.catalogue import Choice
 from strapgen.convergence import interpreter
 from strapgen.library import generated_sources
-from strapgen.motions import Motion
+from strapgen.simulation.motions import Motion
 from strapgen.support import checks
 from strapgen.symbolic import rotations
 
@@ -93,7 +93,7 @@ def predict(
 
     Examples
     --------
-    >>> from strapgen.motions import motion
+    >>> from strapgen.simulation.motions import motion
     >>> found = predict(catalogue.choose("dcm", "rk1"), motion("constant", y_deg_s=10), "1/8", 180, 5)
     >>> round(float(mpmath.degrees(found.drift[-1][1])), 3)
     0.286

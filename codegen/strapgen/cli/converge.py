@@ -112,7 +112,7 @@ def converge(
     import numpy as np
 
     from strapgen import convergence
-    from strapgen.motions import motion as make_motion
+    from strapgen.simulation.motions import motion as make_motion
     from strapgen.support.files import write_files
 
     if motion is None and not settings:

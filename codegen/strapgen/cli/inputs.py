@@ -151,9 +151,9 @@ def read_inputs(
     """Return the increments that the options of a command stand for, `samples` of them a step and those before it."""
     import numpy as np
 
-    from strapgen import recording
     from strapgen.backends.increments import pulses, windows
-    from strapgen.motions import motion as make_motion
+    from strapgen.simulation import recording
+    from strapgen.simulation.motions import motion as make_motion
     from strapgen.support import checks
 
     truth = None

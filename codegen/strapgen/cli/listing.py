@@ -15,7 +15,7 @@ def list_names(format: Format = "text") -> None:
     check_format(format)
     from strapgen import catalogue
     from strapgen.backends import BACKENDS
-    from strapgen.motions import keys
+    from strapgen.simulation.motions import keys
     from strapgen.targets import TARGETS
 
     installed = {

@@ -219,7 +219,7 @@ def _plotted(
 ) -> dict[str, str | bytes]:
     from strapgen import plots
     from strapgen.analysis import agreement
-    from strapgen.motions import motion as make_motion
+    from strapgen.simulation.motions import motion as make_motion
     from strapgen.support import checks
 
     checks.choice("motion", motion, MOTIONS)

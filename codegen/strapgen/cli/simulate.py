@@ -223,9 +223,9 @@ def _on_motion(
 ) -> tuple[str, bytes | None]:
     """Simulate; return the output and, if one is wanted, the image."""
     from strapgen import plots, reports
-    from strapgen.motions import motion as make_motion
-    from strapgen.simulation import largest_increment
-    from strapgen.simulation import simulate as run_simulation
+    from strapgen.simulation.motions import motion as make_motion
+    from strapgen.simulation.runs import largest_increment
+    from strapgen.simulation.runs import simulate as run_simulation
     from strapgen.support import checks
 
     profile = make_motion(motion, **settings)
@@ -259,7 +259,8 @@ def _on_recording(
     samples: int,
 ) -> tuple[str, bytes | None]:
     """Propagate recorded data; return the output and, if one is wanted, the image."""
-    from strapgen import plots, recording, reports
+    from strapgen import plots, reports
+    from strapgen.simulation import recording
 
     rates_csv, unit, resample_hz = rates
     if increments_csv is not None:

@@ -83,8 +83,9 @@ def strapdown(
     check_format(chosen, "csv")
     import numpy as np
 
-    from strapgen import recording, reports
-    from strapgen.strapdown import NavigationFrame, course
+    from strapgen import reports
+    from strapgen.simulation import recording
+    from strapgen.simulation.courses import NavigationFrame, course
     from strapgen.support.files import write_files
 
     words = {"word": word, "rounding": rounding, "carry": carry}

@@ -11,7 +11,7 @@ from derived import precisely
 
 from strapgen import backend, derive, motion, simulate
 from strapgen.catalogue import ALGORITHMS
-from strapgen.motions import Motion
+from strapgen.simulation.motions import Motion
 from strapgen.symbolic.kernel import Kernel
 
 

@@ -14,13 +14,13 @@ import pytest
 from strapgen import evaluator, reports
 from strapgen.backends.two_speed import ALGORITHMS
 from strapgen.ir.fixed_settings import Settings
-from strapgen.motions import motion
-from strapgen.recording import InertialRecording, read_inertial
-from strapgen.simulation import drift_between
-from strapgen.strapdown import NavigationFrame, course
+from strapgen.simulation.courses import NavigationFrame, course
+from strapgen.simulation.motions import motion
+from strapgen.simulation.recording import InertialRecording, read_inertial
+from strapgen.simulation.runs import drift_between
 from strapgen.support.exceptions import InputError
 
-LOG = Path(__file__).resolve().parents[1] / "examples" / "inertial_log.csv"
+LOG = Path(__file__).resolve().parents[2] / "examples" / "inertial_log.csv"
 GRAVITY = 9.80665
 #: What rounding may make of ten seconds of the wobble, in rad: 250 slow cycles of some last places of what is summed.
 ROUNDING = {"c-float": 2e-5, "c-q31": 1e-7, "c-q15": 2e-3, "fixed-model": 1e-7}

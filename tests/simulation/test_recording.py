@@ -18,11 +18,11 @@ from scipy.spatial.transform import Rotation
 from tolerances import certified
 
 import strapgen
-from strapgen import recording
-from strapgen.recording import Recording, propagate, read_increments, read_rates
+from strapgen.simulation import recording
+from strapgen.simulation.recording import Recording, propagate, read_increments, read_rates
 from strapgen.support.exceptions import InputError
 
-DATA = Path(__file__).parent / "data"
+DATA = Path(__file__).parents[1] / "data"
 MAKER = runpy.run_path(str(DATA / "make_recordings.py"))
 
 EVEN = [["0.01", "1e-3", "2e-3", "3e-3"], ["0.02", "4e-3", "5e-3", "6e-3"], ["0.03", "7e-3", "8e-3", "9e-3"]]

@@ -9,7 +9,7 @@ import pytest
 from tolerances import certified
 
 import strapgen
-from strapgen.simulation import simulate
+from strapgen.simulation.runs import simulate
 from strapgen.support.exceptions import InputError
 
 CONING = {"a_deg_s": 10, "b_deg_s": 10, "g_deg_s": 10}

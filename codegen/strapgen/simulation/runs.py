@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from strapgen.backends import Backend, evaluator
 from strapgen.backends.increments import pulses
-from strapgen.motions import Motion
+from strapgen.simulation.motions import Motion
 from strapgen.support import checks, stages
 from strapgen.support.exceptions import InputError
 

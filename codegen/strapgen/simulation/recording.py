@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from strapgen.backends import Backend
 from strapgen.backends.increments import pulses, windows
-from strapgen.simulation import require_finite
+from strapgen.simulation.runs import require_finite
 from strapgen.support import checks, stages
 from strapgen.support.exceptions import InputError
 

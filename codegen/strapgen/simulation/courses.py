@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from strapgen import backends
 from strapgen.backends import BACKENDS, two_speed
 from strapgen.ir.fixed_settings import Settings
-from strapgen.recording import InertialRecording
+from strapgen.simulation.recording import InertialRecording
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 from strapgen.targets import FIXED
