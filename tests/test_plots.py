@@ -9,7 +9,7 @@ import pytest
 
 import strapgen
 from strapgen import plots
-from strapgen.convergence import Convergence, Rung
+from strapgen.experiments.convergence import Convergence, Rung
 from strapgen.ir.order import Order
 from strapgen.simulation.recording import History
 from strapgen.simulation.runs import Run, simulate

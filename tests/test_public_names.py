@@ -45,7 +45,7 @@ def test_neither_numpy_nor_sympy_is_loaded_with_the_package():
 def test_every_name_is_there_whatever_was_imported_before():
     for name in strapgen.__all__:
         assert getattr(strapgen, name) is not None
-    after = "import strapgen.cli, strapgen.backends.two_speed, strapgen.behaviour, strapgen.vibration.spectrum, strapgen as s"
+    after = "import strapgen.cli, strapgen.backends.two_speed, strapgen.experiments.conformance, strapgen.vibration.spectrum, strapgen as s"
     kinds = in_a_new_process(f"{after}; print(*(n + ':' + type(getattr(s, n)).__name__ for n in s.__all__))")
     assert kinds.split() == [f"{name}:{type(getattr(strapgen, name)).__name__}" for name in strapgen.__all__]
 

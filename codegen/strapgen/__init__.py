@@ -12,7 +12,6 @@ __version__ = "0.1.0"
 # For type checkers; a test holds it against the table below, from which Python loads a name when it is first used.
 if _typing.TYPE_CHECKING:
     from strapgen import formulas as formulas
-    from strapgen import study as study
     from strapgen import vibration as vibration
     from strapgen.backends import BACKENDS as BACKENDS
     from strapgen.backends import Backend as Backend
@@ -22,8 +21,6 @@ if _typing.TYPE_CHECKING:
     from strapgen.backends import exact as exact
     from strapgen.backends import increments as gyro
     from strapgen.backends.two_speed import TwoSpeed as TwoSpeed
-    from strapgen.behaviour import Finding as Finding
-    from strapgen.behaviour import check as check
     from strapgen.catalogue import Choice as Choice
     from strapgen.catalogue import choose as choose
     from strapgen.catalogue import choose_step as choose_step
@@ -37,10 +34,13 @@ if _typing.TYPE_CHECKING:
     from strapgen.catalogue.methods.steps import increments_signal as increments_signal
     from strapgen.catalogue.methods.tableaux import TABLEAUX as TABLEAUX
     from strapgen.catalogue.methods.tableaux import Tableau as Tableau
-    from strapgen.comparison import Comparison as Comparison
-    from strapgen.comparison import compare as compare
-    from strapgen.convergence import Convergence as Convergence
-    from strapgen.convergence import converge as converge
+    from strapgen.experiments import word_length as study
+    from strapgen.experiments.comparison import Comparison as Comparison
+    from strapgen.experiments.comparison import compare as compare
+    from strapgen.experiments.conformance import Finding as Finding
+    from strapgen.experiments.conformance import check as check
+    from strapgen.experiments.convergence import Convergence as Convergence
+    from strapgen.experiments.convergence import converge as converge
     from strapgen.ir.attitude_step import Companions as Companions
     from strapgen.ir.fixed_settings import Settings as Settings
     from strapgen.ir.formats import Format as Format
@@ -90,10 +90,6 @@ _NAMES = {
         "evaluator",
     ),
     "backends.two_speed": ("TwoSpeed",),
-    "behaviour": (
-        "Finding",
-        "check",
-    ),
     "catalogue": (
         "Choice",
         "choose",
@@ -113,11 +109,15 @@ _NAMES = {
         "TABLEAUX",
         "Tableau",
     ),
-    "comparison": (
+    "experiments.comparison": (
         "Comparison",
         "compare",
     ),
-    "convergence": (
+    "experiments.conformance": (
+        "Finding",
+        "check",
+    ),
+    "experiments.convergence": (
         "Convergence",
         "converge",
     ),
@@ -180,7 +180,7 @@ _NAMESPACES = {
     "formulas": "formulas",
     "gyro": "backends.increments",
     "runge_kutta": "catalogue.methods.runge_kutta",
-    "study": "study",
+    "study": "experiments.word_length",
     "tableaux": "catalogue.methods.tableaux",
     "vibration": "vibration",
 }

@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from strapgen.experiments.word_length import Outcome
 from strapgen.reports import AXES, SKEW_PLANES
 from strapgen.simulation.recording import History
 from strapgen.simulation.runs import Run
-from strapgen.study import Outcome
 from strapgen.support.exceptions import InputError, MissingExtraError
 from strapgen.support.files import write_file
 
 if TYPE_CHECKING:
     from strapgen.analysis.agreement import Agreement
     from strapgen.analysis.growth import Stability
-    from strapgen.convergence import Convergence
+    from strapgen.experiments.convergence import Convergence
     from strapgen.vibration.curves import Curve
 
 _COLOURS = ("#1f5f8b", "#b5562b", "#3d7a4f")

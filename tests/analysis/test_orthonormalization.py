@@ -9,7 +9,7 @@ import sympy as sp
 from strapgen.analysis.orthonormalization import ERROR, effect
 from strapgen.backends import exact
 from strapgen.catalogue import orthonormalizations
-from strapgen.convergence import interpreter
+from strapgen.experiments.convergence import interpreter
 from strapgen.support.exceptions import InputError
 
 P = ERROR

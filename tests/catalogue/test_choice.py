@@ -11,14 +11,15 @@ import numpy as np
 import pytest
 
 import strapgen
-from strapgen import behaviour, catalogue, vibration
+from strapgen import catalogue, vibration
 from strapgen.analysis.constant_rate import constant_rate
 from strapgen.analysis.prediction import predict
 from strapgen.analysis.series import series
 from strapgen.backends import of
 from strapgen.cli import main
-from strapgen.comparison import compare_choice
-from strapgen.convergence import GENERAL, converge
+from strapgen.experiments import conformance
+from strapgen.experiments.comparison import compare_choice
+from strapgen.experiments.convergence import GENERAL, converge
 from strapgen.support.exceptions import InputError
 
 #: A file whose kernel has one name, whatever its options are: Euler parameters by a tableau.
@@ -132,7 +133,7 @@ def test_each_is_compared_and_checked_for_itself(chosen, rng):
         (row,) = compare_choice(choice, ["numpy"], d, reference="exact")
         (wanted,) = compare_choice(catalogue.choose("euler", method), ["numpy"], d, reference="exact")
         assert (row.max_abs_rad, row.drift_deg) == (wanted.max_abs_rad, wanted.drift_deg)
-    findings = {finding.name: finding for finding in behaviour.check(chosen["rk3"])}
+    findings = {finding.name: finding for finding in conformance.check(chosen["rk3"])}
     assert findings["order"].measured == pytest.approx(3, abs=0.15)
 
 

@@ -26,11 +26,11 @@ from strapgen.backends import BACKENDS, fitted
 from strapgen.catalogue.methods import coefficients, coning_coefficients
 from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.cli import main
+from strapgen.experiments.thesis_tables import TABLES
 from strapgen.simulation.courses import NavigationFrame, course
 from strapgen.simulation.motions import motion as make_motion
 from strapgen.simulation.recording import read_inertial
 from strapgen.simulation.runs import largest_increment
-from strapgen.tables import TABLES
 from strapgen.targets import FIXED, TARGETS
 
 pytestmark = pytest.mark.filterwarnings("error")
@@ -909,7 +909,7 @@ def test_tables_text(strapgen_says):
 
 
 def test_a_footnote_is_printed_once_for_all_back_ends(monkeypatch, strapgen_says):
-    monkeypatch.setattr("strapgen.tables.DEFAULT_BACKENDS", ("numpy", "c", "c-q31"))
+    monkeypatch.setattr("strapgen.experiments.thesis_tables.DEFAULT_BACKENDS", ("numpy", "c", "c-q31"))
     said = strapgen_says("tables")
     assert len(re.findall(r"^    c-q31 ", said, flags=re.MULTILINE)) == 10
     assert said.count("The thesis prints 2.391 deg") == 1

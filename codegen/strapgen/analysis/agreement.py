@@ -18,7 +18,7 @@ from strapgen.analysis.error_rate import error_rate
 from strapgen.analysis.prediction import Prediction, parts_of, predict
 from strapgen.backends import exact
 from strapgen.catalogue import Choice
-from strapgen.convergence import GENERAL, exact_attitudes, step_of_increments
+from strapgen.experiments.convergence import GENERAL, exact_attitudes, step_of_increments
 from strapgen.simulation.motions import Motion
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError

@@ -16,7 +16,7 @@ from strapgen.analysis.error_rate import ErrorRate, error_rate
 from strapgen.analysis.motion_rates import TIME, parameters
 from strapgen.backends import exact
 from strapgen.catalogue import Choice
-from strapgen.convergence import interpreter
+from strapgen.experiments.convergence import interpreter
 from strapgen.library import generated_sources
 from strapgen.simulation.motions import Motion
 from strapgen.support import checks

@@ -37,16 +37,17 @@ def check(
     """
     check_format(format)
     choice = chosen(algorithm, method, tableau, increments, previous)
-    from strapgen import behaviour, catalogue
+    from strapgen import catalogue
+    from strapgen.experiments import conformance
 
     kernel = catalogue.derive(choice)
     if format == "text":
         typer.echo(f"{kernel.name}: {kernel.title}\n")
     findings = []
-    for finding in behaviour.check(choice):
+    for finding in conformance.check(choice):
         findings.append(finding)
         if format == "text":
-            typer.echo(behaviour.as_text(finding))
+            typer.echo(conformance.as_text(finding))
     failed = [finding.name for finding in findings if finding.holds is False]
     if format == "json":
         print_json(

@@ -128,7 +128,7 @@ def compare(
 
     import numpy as np
 
-    from strapgen import comparison
+    from strapgen.experiments import comparison
 
     with np.errstate(all="ignore"):  # numbers that overflow are refused, in one line
         inputs = read_inputs(

@@ -16,7 +16,7 @@ from strapgen.cli.progress import track
 from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
-    from strapgen.convergence import Convergence
+    from strapgen.experiments.convergence import Convergence
 
 _Text = str | None
 
@@ -111,7 +111,7 @@ def converge(
     choices = [choose(name) for name in names]
     import numpy as np
 
-    from strapgen import convergence
+    from strapgen.experiments import convergence
     from strapgen.simulation.motions import motion as make_motion
     from strapgen.support.files import write_files
 

@@ -47,7 +47,7 @@ def stress(
     Example: strapgen stress --duration 20 --algorithms euler,two-speed --backends numpy,c
     """
     check_format(format)
-    from strapgen import stress as test
+    from strapgen.experiments import rate_table as test
 
     def names(option: str, value: str | None, default: tuple[str, ...]) -> tuple[str, ...]:
         if value is None:

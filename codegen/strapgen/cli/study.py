@@ -98,10 +98,10 @@ def word_length(
 
     import numpy as np
 
-    from strapgen import study
+    from strapgen.experiments.word_length import as_csv, as_text, cases, run
     from strapgen.support.files import write_files
 
-    planned = study.cases(
+    planned = cases(
         algorithm=algorithm,
         methods=_split("methods", methods),
         increments=whole("increments", increments) or 2,
@@ -116,7 +116,7 @@ def word_length(
     )
     _ = planned[0].profile  # a motion that lacks a parameter is told before anything runs
     with np.errstate(all="ignore"):
-        found = {done.case: done for done in track(study.run(planned, count), "running", len(planned))}
+        found = {done.case: done for done in track(run(planned, count), "running", len(planned))}
     outcomes = [found[case] for case in planned]
     image = None
     if plot is not None:
@@ -126,9 +126,9 @@ def word_length(
     if format == "json":
         text = json.dumps([outcome.as_dict() for outcome in outcomes])
     elif format == "csv":
-        text = study.as_csv(outcomes).rstrip("\n")
+        text = as_csv(outcomes).rstrip("\n")
     else:
-        text = study.as_text(outcomes)
+        text = as_text(outcomes)
     files: dict[str, str | bytes] = {}
     if out is not None:
         files[str(out)] = f"{text}\n"

@@ -13,7 +13,7 @@ from strapgen.cli.progress import track
 from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
-    from strapgen.tables import Table, TableEntry
+    from strapgen.experiments.thesis_tables import Table, TableEntry
 
 
 def tables(
@@ -48,8 +48,8 @@ def tables(
         _predict(format)
         return
     from strapgen.backends import BACKENDS
+    from strapgen.experiments.thesis_tables import ALGORITHMS, ORDERS, TABLES, build_all, run_tables
     from strapgen.support import checks
-    from strapgen.tables import ALGORITHMS, ORDERS, TABLES, build_all, run_tables
     from strapgen.targets import FIXED
 
     names = _runnable() if backend is None else (checks.choice("backend", backend, BACKENDS),)
@@ -69,8 +69,9 @@ def tables(
 
 def _predict(format: str) -> None:
     """Print the tables as the series predict them, and the ratios that the thesis reads from its tables."""
-    from strapgen.analysis import predicted_tables, ratios
-    from strapgen.tables import ALGORITHMS, ORDERS, TABLES
+    from strapgen.analysis import ratios
+    from strapgen.experiments import predicted_tables
+    from strapgen.experiments.thesis_tables import ALGORITHMS, ORDERS, TABLES
 
     cases = len(TABLES) * len(ALGORITHMS) * len(ORDERS)
     found = list(track(predicted_tables.predicted(), "predicting", cases))
@@ -89,8 +90,8 @@ def _predict(format: str) -> None:
 
 def _runnable() -> tuple[str, ...]:
     """Return all back ends, or, with a word on stderr, those that need no compiler if there is none."""
+    from strapgen.experiments.thesis_tables import DEFAULT_BACKENDS
     from strapgen.support.exceptions import CompilerError
-    from strapgen.tables import DEFAULT_BACKENDS
     from strapgen.toolchain import compiler
 
     try:
@@ -111,7 +112,7 @@ _NAMES = {"dcm": "direction cosines", "euler": "Euler parameters"}
 
 def _print_table(table: Table, entries: list[TableEntry]) -> None:
     """Print one table: for each algorithm the thesis's line, then one for each back end."""
-    from strapgen.tables import ALGORITHMS, ORDERS
+    from strapgen.experiments.thesis_tables import ALGORITHMS, ORDERS
 
     ratio = "of the same order" if table.by_order else "of first order"
     lines = [f"Table {table.number}: {table.title}"]

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
+from strapgen.experiments.rate_table import MOTIONS, angles, as_text, stress
 from strapgen.ir.fixed_settings import Settings
-from strapgen.stress import MOTIONS, angles, as_text, stress
 from strapgen.support.exceptions import InputError
 
 

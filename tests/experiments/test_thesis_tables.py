@@ -10,7 +10,7 @@ from tolerances import roundoff
 
 import strapgen
 from strapgen.backends import BACKENDS
-from strapgen.tables import TABLES, agrees, entries, table_settings
+from strapgen.experiments.thesis_tables import TABLES, agrees, entries, table_settings
 from strapgen.targets import FIXED
 
 # What an independent program computed from the thesis's equations, in double precision: orders 1, 2, 4.

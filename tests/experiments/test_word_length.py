@@ -7,7 +7,9 @@ import io
 
 import pytest
 
-from strapgen import plots, study
+from strapgen import plots
+from strapgen.experiments import word_length
+from strapgen.experiments.word_length import as_csv, as_text, cases, run, run_case
 from strapgen.support.exceptions import InputError
 
 SMALL = {"duration": "5", "words": (12, 16, 24), "carries": ("none", "full")}
@@ -15,8 +17,8 @@ SMALL = {"duration": "5", "words": (12, 16, 24), "carries": ("none", "full")}
 
 @pytest.fixture(scope="module")
 def outcomes():
-    planned = study.cases(**SMALL, pulses_arcsec=("0", "30"))
-    found = {outcome.case: outcome for outcome in study.run(planned)}
+    planned = cases(**SMALL, pulses_arcsec=("0", "30"))
+    found = {outcome.case: outcome for outcome in run(planned)}
     return [found[case] for case in planned]
 
 
@@ -43,30 +45,28 @@ def test_parts_of_the_drift(outcomes):
 
 
 def test_a_finished_case_is_not_run_again(outcomes, monkeypatch):
-    monkeypatch.setattr(study, "_run", lambda case: pytest.fail("it was run before"))
+    monkeypatch.setattr(word_length, "_run", lambda case: pytest.fail("it was run before"))
     for outcome in outcomes:
-        assert study.run_case(outcome.case) == outcome
+        assert run_case(outcome.case) == outcome
 
 
 def test_one_process_finds_the_same(outcomes):
-    assert {o.case: o for o in study.run([o.case for o in outcomes], jobs=1)} == {o.case: o for o in outcomes}
+    assert {o.case: o for o in run([o.case for o in outcomes], jobs=1)} == {o.case: o for o in outcomes}
 
 
 def test_a_run_that_leaves_its_range_is_told():
-    (outcome,) = study.run(
-        study.cases(methods=("rk1",), words=(16,), carries=("none",), steps=("0.5",), duration="180")
-    )
+    (outcome,) = run(cases(methods=("rk1",), words=(16,), carries=("none",), steps=("0.5",), duration="180"))
     assert outcome.drift_deg is None and outcome.rounding_deg is None
     assert outcome.dominates == "range"
-    assert " - " in study.as_text([outcome])
+    assert " - " in as_text([outcome])
 
 
 def test_forms(outcomes):
-    rows = list(csv.DictReader(io.StringIO(study.as_csv(outcomes))))
+    rows = list(csv.DictReader(io.StringIO(as_csv(outcomes))))
     assert len(rows) == len(outcomes)
     assert float(rows[0]["rounding_deg"]) == outcomes[0].rounding_deg
     assert rows[0]["settings"] == "a_deg_s=10 b_deg_s=10 g_deg_s=10"
-    text = study.as_text(outcomes)
+    text = as_text(outcomes)
     assert text.count("the method itself drifts by") == 2
     assert "pulses of 30 arcsec" in text
 
@@ -94,4 +94,4 @@ def test_image(outcomes):
 )
 def test_studies_that_cannot_be_run(values, said):
     with pytest.raises(InputError, match=said):
-        study.cases(**values)
+        cases(**values)

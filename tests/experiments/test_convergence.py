@@ -10,10 +10,11 @@ from fractions import Fraction
 
 import pytest
 
-from strapgen import catalogue, convergence, motion
+from strapgen import catalogue, motion
 from strapgen.catalogue import INTEGRATORS, choose
 from strapgen.catalogue.methods.tableaux import TABLEAUX
-from strapgen.convergence import Convergence, Rung, converge
+from strapgen.experiments import convergence
+from strapgen.experiments.convergence import Convergence, Rung, converge
 from strapgen.ir.order import Order
 from strapgen.support.exceptions import InputError
 

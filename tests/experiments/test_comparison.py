@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import strapgen
-from strapgen import comparison
 from strapgen.backends import BACKENDS
+from strapgen.experiments import comparison
 from strapgen.ir.fixed_settings import Settings
 from strapgen.support.exceptions import InputError
 

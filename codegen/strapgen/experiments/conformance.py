@@ -15,8 +15,8 @@ from strapgen import fixedpoint, pipeline
 from strapgen.backends import Backend, exact, of
 from strapgen.backends.increments import windows
 from strapgen.catalogue import Choice
-from strapgen.comparison import certified_angle
-from strapgen.convergence import GENERAL, converge, interpreter, step_of_increments
+from strapgen.experiments.comparison import certified_angle
+from strapgen.experiments.convergence import GENERAL, converge, interpreter, step_of_increments
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.program import Program
 from strapgen.simulation.motions import motion

@@ -20,7 +20,7 @@ import numpy as np
 
 from strapgen.backends import backend
 from strapgen.backends.increments import pulses
-from strapgen.comparison import certified_angle
+from strapgen.experiments.comparison import certified_angle
 from strapgen.ir.fixed_settings import Settings
 from strapgen.simulation.motions import Motion, motion
 from strapgen.simulation.runs import attitude, drift_between

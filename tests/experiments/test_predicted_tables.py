@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from strapgen.analysis.predicted_tables import as_text, predicted
-from strapgen.tables import TABLES
+from strapgen.experiments.predicted_tables import as_text, predicted
+from strapgen.experiments.thesis_tables import TABLES
 
 
 @pytest.mark.long

@@ -11,9 +11,19 @@ from typing import Any
 from strapgen import catalogue
 from strapgen.analysis.prediction import Prediction, predict
 from strapgen.backends import backend
+from strapgen.experiments.thesis_tables import (
+    ALGORITHMS,
+    DURATION,
+    INTERVAL,
+    ORDERS,
+    STEP,
+    TABLES,
+    Table,
+    agrees,
+    drift_deg,
+)
 from strapgen.simulation.motions import motion
 from strapgen.simulation.runs import simulate
-from strapgen.tables import ALGORITHMS, DURATION, INTERVAL, ORDERS, STEP, TABLES, Table, agrees, drift_deg
 
 
 @dataclass(frozen=True)

@@ -7,15 +7,16 @@ from pathlib import Path
 
 import pytest
 
-from strapgen import behaviour, catalogue
+from strapgen import catalogue
 from strapgen.catalogue import choose
+from strapgen.experiments import conformance
 from strapgen.support.exceptions import InputError
 
-EXAMPLE = Path(__file__).resolve().parents[1] / "examples" / "modified_rodrigues.py"
+EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "modified_rodrigues.py"
 
 
-def findings(choice: catalogue.Choice) -> dict[str, behaviour.Finding]:
-    return {finding.name: finding for finding in behaviour.check(choice)}
+def findings(choice: catalogue.Choice) -> dict[str, conformance.Finding]:
+    return {finding.name: finding for finding in conformance.check(choice)}
 
 
 @pytest.mark.parametrize(
@@ -129,9 +130,9 @@ def test_a_fault_is_found(fault, fails, says, tmp_path):
     if not fails:
         assert failed == []
     assert any(says in finding.text for finding in failed) or not says
-    assert any("FAILS" in behaviour.as_text(finding) for finding in found.values()) == bool(fails)
+    assert any("FAILS" in conformance.as_text(finding) for finding in found.values()) == bool(fails)
 
 
 def test_a_step_from_rates_is_refused():
     with pytest.raises(InputError, match="takes no increments"):
-        list(behaviour.check(choose("euler", rates=True)))
+        list(conformance.check(choose("euler", rates=True)))

@@ -1,0 +1,1 @@
+"""What is measured with back ends: orders, tables, word lengths, agreement. Computed here, printed elsewhere."""
