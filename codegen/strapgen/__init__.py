@@ -11,7 +11,6 @@ __version__ = "0.1.0"
 
 # For type checkers; a test holds it against the table below, from which Python loads a name when it is first used.
 if _typing.TYPE_CHECKING:
-    from strapgen import formulas as formulas
     from strapgen import vibration as vibration
     from strapgen.backends import BACKENDS as BACKENDS
     from strapgen.backends import Backend as Backend
@@ -55,6 +54,7 @@ if _typing.TYPE_CHECKING:
     from strapgen.pipeline import generate as generate
     from strapgen.pipeline import lower as lower
     from strapgen.pipeline import quantize as quantize
+    from strapgen.reports import formulas as formulas
     from strapgen.simulation.courses import Course as Course
     from strapgen.simulation.courses import course as course
     from strapgen.simulation.motions import Motion as Motion
@@ -177,7 +177,7 @@ _NAMES = {
 _NAMESPACES = {
     "algebra": "symbolic.rotations",
     "exact": "backends.exact",
-    "formulas": "formulas",
+    "formulas": "reports.formulas",
     "gyro": "backends.increments",
     "runge_kutta": "catalogue.methods.runge_kutta",
     "study": "experiments.word_length",

@@ -8,9 +8,9 @@ import pytest
 import sympy as sp
 
 from strapgen.analysis.invariants import LATEX, as_text
-from strapgen.analysis.report import as_latex, as_report, report
 from strapgen.analysis.series import MOTIONS, STEP, series
 from strapgen.catalogue import ALGORITHMS, METHODS, choose, choose_step, derive, enough, nodes
+from strapgen.reports.series import as_latex, as_report, report
 from strapgen.support.exceptions import InputError
 
 W = sp.symbols("w_x w_y w_z")

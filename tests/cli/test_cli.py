@@ -21,12 +21,13 @@ import sympy as sp
 from tolerances import certified
 
 import strapgen
-from strapgen import catalogue, formulas, pipeline
+from strapgen import catalogue, pipeline
 from strapgen.backends import BACKENDS, fitted
 from strapgen.catalogue.methods import coefficients, coning_coefficients
 from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.cli import main
 from strapgen.experiments.thesis_tables import TABLES
+from strapgen.reports import formulas
 from strapgen.simulation.courses import NavigationFrame, course
 from strapgen.simulation.motions import motion as make_motion
 from strapgen.simulation.recording import read_inertial

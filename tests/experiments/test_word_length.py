@@ -7,9 +7,9 @@ import io
 
 import pytest
 
-from strapgen import plots
 from strapgen.experiments import word_length
 from strapgen.experiments.word_length import as_csv, as_text, cases, run, run_case
+from strapgen.reports import plots
 from strapgen.support.exceptions import InputError
 
 SMALL = {"duration": "5", "words": (12, 16, 24), "carries": ("none", "full")}

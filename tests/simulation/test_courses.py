@@ -11,9 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from strapgen import evaluator, reports
+from strapgen import evaluator
 from strapgen.backends.two_speed import ALGORITHMS
 from strapgen.ir.fixed_settings import Settings
+from strapgen.reports import runs
 from strapgen.simulation.courses import NavigationFrame, course
 from strapgen.simulation.motions import motion
 from strapgen.simulation.recording import InertialRecording, read_inertial
@@ -73,7 +74,7 @@ def test_initial_angles():
 def test_increments_that_make_no_whole_cycle_are_told(wobble):
     made = course("dcm", wobble, fast_cycles=3, slow_cycles=7)
     assert (len(made.time), made.unused) == (47, 13)
-    said = reports.course_text(made, {"backend": "numpy"})
+    said = runs.course_text(made, {"backend": "numpy"})
     assert "13 increments at the end make no whole navigation cycle" in said
     assert "of 47 cycles; --format csv prints all" in said
 
@@ -105,10 +106,10 @@ def test_what_is_refused(options, says, wobble):
 
 def test_reports_hold_every_number(wobble):
     made = course("euler", wobble, fast_cycles=4, slow_cycles=25)
-    data = json.loads(json.dumps(reports.course_data(made, {"backend": "numpy"}), allow_nan=False))
+    data = json.loads(json.dumps(runs.course_data(made, {"backend": "numpy"}), allow_nan=False))
     assert data["attitude"] == made.states.tolist()
     assert data["velocity_changes_m_s"] == made.velocity_changes.tolist()
-    rows = list(csv.DictReader(io.StringIO(reports.course_csv(made))))
+    rows = list(csv.DictReader(io.StringIO(runs.course_csv(made))))
     assert [float(row["time_s"]) for row in rows] == data["time_s"]
     for name in ("roll_deg", "pitch_deg", "heading_deg"):
         assert [float(row[name]) for row in rows] == data[name]

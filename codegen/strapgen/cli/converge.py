@@ -133,7 +133,7 @@ def converge(
     if out is not None:
         files[str(out)] = f"{text}\n"
     if plot is not None:
-        from strapgen import plots
+        from strapgen.reports import plots
 
         files[str(plot)] = plots.convergence_image(found, title, plot)
     write_files(Path(), files)

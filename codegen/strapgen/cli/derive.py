@@ -38,7 +38,8 @@ def derive(
     check_format(format)
     checks.choice("show", show, ("text", "latex", "program", "operations"))
     choice = chosen(algorithm, method, tableau, increments, previous, rates, step=False)
-    from strapgen import catalogue, formulas, pipeline
+    from strapgen import catalogue, pipeline
+    from strapgen.reports import formulas
 
     kernel = catalogue.derive(choice)
     program = pipeline.lower(kernel)

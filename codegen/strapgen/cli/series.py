@@ -157,7 +157,7 @@ def series(
         )
         _emit(*_versus(choice, other, motion, count, format), format, out, {})
         return
-    from strapgen.analysis import report as reports
+    from strapgen.reports import series as reports
 
     files = {} if plot is None else _plotted(choice, motion, settings, steps, duration, count, plot)
     found = reports.report(choice, motion, 2 if count is None else count)
@@ -217,8 +217,8 @@ def _plotted(
     count: int | None,
     plot: Path,
 ) -> dict[str, str | bytes]:
-    from strapgen import plots
     from strapgen.analysis import agreement
+    from strapgen.reports import plots
     from strapgen.simulation.motions import motion as make_motion
     from strapgen.support import checks
 

@@ -222,7 +222,7 @@ def _on_motion(
     samples: tuple[int, int],
 ) -> tuple[str, bytes | None]:
     """Simulate; return the output and, if one is wanted, the image."""
-    from strapgen import plots, reports
+    from strapgen.reports import plots, runs
     from strapgen.simulation.motions import motion as make_motion
     from strapgen.simulation.runs import largest_increment
     from strapgen.simulation.runs import simulate as run_simulation
@@ -236,16 +236,16 @@ def _on_motion(
     title = f"{ready.kernel}, {ready.name}: {profile.name} motion, step {step} s"
     image = None if plot is None else plots.run_image(run, title, plot)
     if format == "csv":
-        return reports.run_csv(run), image
+        return runs.run_csv(run), image
     named = _named(ready, choice) | {
         "motion": profile.name,
         "step_s": float(checks.number("step", step)),
         "duration_s": float(checks.number("duration", duration)),
     }
     if format == "text":
-        return reports.run_text(run, named), image
-    data = reports.run_data(run, named)
-    return json.dumps(data | reports.matrices_data(run) if matrices else data), image
+        return runs.run_text(run, named), image
+    data = runs.run_data(run, named)
+    return json.dumps(data | runs.matrices_data(run) if matrices else data), image
 
 
 def _on_recording(
@@ -259,7 +259,7 @@ def _on_recording(
     samples: int,
 ) -> tuple[str, bytes | None]:
     """Propagate recorded data; return the output and, if one is wanted, the image."""
-    from strapgen import plots, reports
+    from strapgen.reports import plots, runs
     from strapgen.simulation import recording
 
     rates_csv, unit, resample_hz = rates
@@ -274,7 +274,7 @@ def _on_recording(
     image = None if plot is None else plots.history_image(history, ready.elements, title, plot)
     named = _named(ready, choice) | {"source": str(source)}
     if format == "csv":
-        return reports.history_csv(history, ready.elements), image
+        return runs.history_csv(history, ready.elements), image
     if format == "text":
-        return reports.history_text(history, ready.elements, named), image
-    return json.dumps(reports.history_data(history, ready.elements, named)), image
+        return runs.history_text(history, ready.elements, named), image
+    return json.dumps(runs.history_data(history, ready.elements, named)), image

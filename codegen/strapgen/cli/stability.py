@@ -54,7 +54,7 @@ def stability(
 
     found = [growth.stability(choice) for choice in choices]
     if plot is not None:
-        from strapgen import plots
+        from strapgen.reports import plots
 
         title = "constant rate: growth of the state in a step, and where it contracts"
         write_files(Path(), {str(plot): plots.stability_image(found, title, plot)})

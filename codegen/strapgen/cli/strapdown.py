@@ -83,7 +83,7 @@ def strapdown(
     check_format(chosen, "csv")
     import numpy as np
 
-    from strapgen import reports
+    from strapgen.reports import runs
     from strapgen.simulation import recording
     from strapgen.simulation.courses import NavigationFrame, course
     from strapgen.support.files import write_files
@@ -114,11 +114,11 @@ def strapdown(
         "source": str(increments),
     }
     if chosen == "csv":
-        text = reports.course_csv(made)
+        text = runs.course_csv(made)
     elif chosen == "json":
-        text = json.dumps(reports.course_data(made, named))
+        text = json.dumps(runs.course_data(made, named))
     else:
-        text = reports.course_text(made, named)
+        text = runs.course_text(made, named)
     text = text.rstrip("\n")
     if out is None:
         typer.echo(text)

@@ -120,7 +120,7 @@ def word_length(
     outcomes = [found[case] for case in planned]
     image = None
     if plot is not None:
-        from strapgen import plots
+        from strapgen.reports import plots
 
         image = plots.study_image(outcomes, plot)
     if format == "json":

@@ -422,7 +422,7 @@ def _image(
     words: str,
     path: Path,
 ) -> bytes:
-    from strapgen import plots
+    from strapgen.reports import plots
     from strapgen.support import checks
     from strapgen.vibration import curves
 

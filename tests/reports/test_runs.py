@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import strapgen
-from strapgen import reports
+from strapgen.reports import runs
 from strapgen.simulation.recording import History
 from strapgen.simulation.runs import Run, simulate
 
@@ -36,7 +36,7 @@ def floats(table: list[dict[str, str]], *names: str) -> np.ndarray:
 
 
 def test_json_has_the_keys_in_their_order(run):
-    data = json.loads(json.dumps(reports.run_data(run, dict(SETTINGS)), allow_nan=False))
+    data = json.loads(json.dumps(runs.run_data(run, dict(SETTINGS)), allow_nan=False))
     wanted = [*SETTINGS, "time_s", "scale", "skew_deg", "drift_deg", "mean_drift_deg"]
     assert list(data) == wanted
     assert data["time_s"] == run.time.tolist()
@@ -49,12 +49,12 @@ def test_json_has_the_keys_in_their_order(run):
 
 def test_settings_are_not_changed(run):
     settings = dict(SETTINGS)
-    reports.run_data(run, settings)
+    runs.run_data(run, settings)
     assert settings == SETTINGS
 
 
 def test_matrices_as_data(run):
-    data = json.loads(json.dumps(reports.matrices_data(run)))
+    data = json.loads(json.dumps(runs.matrices_data(run)))
     assert list(data) == ["computed", "true", "difference", "error"]
     np.testing.assert_array_equal(data["computed"], run.computed)
     np.testing.assert_array_equal(data["true"], run.true)
@@ -63,7 +63,7 @@ def test_matrices_as_data(run):
 
 
 def test_csv_columns(run):
-    header = reports.run_csv(run).splitlines()[0].split(",")
+    header = runs.run_csv(run).splitlines()[0].split(",")
     wanted = ["time_s", *(f"scale_{axis}" for axis in "xyz")]
     wanted += [f"{kind}_{axis}_deg" for kind in ("skew", "drift") for axis in "xyz"]
     wanted += [f"{kind}_{place}" for kind in ("computed", "true", "difference", "error") for place in PLACES]
@@ -71,7 +71,7 @@ def test_csv_columns(run):
 
 
 def test_csv_comes_back_bit_for_bit(run):
-    table = rows(reports.run_csv(run))
+    table = rows(runs.run_csv(run))
     assert len(table) == len(run.time) == 121
     np.testing.assert_array_equal(floats(table, "time_s")[:, 0], run.time)
     np.testing.assert_array_equal(floats(table, *(f"scale_{axis}" for axis in "xyz")), run.scale)
@@ -83,13 +83,13 @@ def test_csv_comes_back_bit_for_bit(run):
 
 
 def lines_of(run: Run) -> list[str]:
-    return reports.run_text(run, dict(SETTINGS)).splitlines()
+    return runs.run_text(run, dict(SETTINGS)).splitlines()
 
 
 def test_text_begins_with_the_settings(run):
     first = lines_of(run)[0]
     assert first == ", ".join(f"{key} {value}" for key, value in SETTINGS.items())
-    assert "scheme" not in reports.run_text(run, SETTINGS | {"scheme": None})
+    assert "scheme" not in runs.run_text(run, SETTINGS | {"scheme": None})
 
 
 def test_text_shows_the_matrices_at_the_end(run):
@@ -147,7 +147,7 @@ def history(rng) -> History:
 
 
 def test_history_csv_comes_back(history):
-    table = rows(reports.history_csv(history, NAMES))
+    table = rows(runs.history_csv(history, NAMES))
     assert list(table[0]) == ["time_s", *NAMES]
     np.testing.assert_array_equal(floats(table, "time_s")[:, 0], history.time)
     np.testing.assert_array_equal(floats(table, *NAMES).astype(np.float32), history.states)
@@ -155,7 +155,7 @@ def test_history_csv_comes_back(history):
 
 def test_history_data(history):
     settings = {"algorithm": "euler", "source": "gyro.csv"}
-    data = json.loads(json.dumps(reports.history_data(history, NAMES, settings), allow_nan=False))
+    data = json.loads(json.dumps(runs.history_data(history, NAMES, settings), allow_nan=False))
     wanted = ["step_s", "duration_s", "unused_increments", "elements", "time_s", "attitude"]
     assert list(data) == [*settings, *wanted]
     assert (data["step_s"], data["duration_s"], data["unused_increments"]) == (0.125, 12.5, 3)
@@ -166,16 +166,16 @@ def test_history_data(history):
 def test_history_of_matrices_is_flat():
     history = History(np.arange(2.0), np.tile(np.eye(3), (2, 1, 1)), 1.0, 0)
     elements = [f"C_{place}" for place in PLACES]
-    assert reports.history_data(history, elements, {})["attitude"][1] == [1, 0, 0, 0, 1, 0, 0, 0, 1]
-    assert len(rows(reports.history_csv(history, elements))[0]) == 10
+    assert runs.history_data(history, elements, {})["attitude"][1] == [1, 0, 0, 0, 1, 0, 0, 0, 1]
+    assert len(rows(runs.history_csv(history, elements))[0]) == 10
 
 
 def test_history_text(history):
-    lines = reports.history_text(history, NAMES, {"algorithm": "euler"}).splitlines()
+    lines = runs.history_text(history, NAMES, {"algorithm": "euler"}).splitlines()
     assert lines[0] == "algorithm euler"
     assert lines[2].split() == ["time,", "s", *NAMES]
     assert len(lines[3].split()) == 5
     assert lines[-2] == "(37 of 51 records; --format csv prints all)"
     assert lines[-1] == "3 increments at the end make no whole step and were not used"
     whole = History(history.time, history.states, history.step, 0)
-    assert "no whole step" not in reports.history_text(whole, NAMES, {})
+    assert "no whole step" not in runs.history_text(whole, NAMES, {})

@@ -9,8 +9,9 @@ from fractions import Fraction
 import pytest
 import sympy as sp
 
-from strapgen import catalogue, formulas, pipeline
+from strapgen import catalogue, pipeline
 from strapgen.catalogue import standard
+from strapgen.reports import formulas
 
 SOME = [
     choice for choice in standard() if choice.kernel in ("euler-rk4-2", "dcm-rk2-2", "cayley-klein-rk1-2")

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import strapgen
-from strapgen import plots
 from strapgen.experiments.convergence import Convergence, Rung
 from strapgen.ir.order import Order
+from strapgen.reports import plots
 from strapgen.simulation.recording import History
 from strapgen.simulation.runs import Run, simulate
 from strapgen.support.exceptions import InputError, MissingExtraError

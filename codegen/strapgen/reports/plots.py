@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from strapgen.experiments.word_length import Outcome
-from strapgen.reports import AXES, SKEW_PLANES
+from strapgen.reports.runs import AXES, SKEW_PLANES
 from strapgen.simulation.recording import History
 from strapgen.simulation.runs import Run
 from strapgen.support.exceptions import InputError, MissingExtraError
