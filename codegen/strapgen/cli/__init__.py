@@ -8,7 +8,8 @@ from collections.abc import Sequence
 
 import typer
 
-from strapgen.cli import (
+from strapgen.cli import version_option
+from strapgen.cli.commands import (
     check,
     compare,
     coning,
@@ -25,7 +26,6 @@ from strapgen.cli import (
     tableau,
     tables,
     two_speed,
-    version,
     vibration,
 )
 from strapgen.support.exceptions import StrapgenError
@@ -37,7 +37,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.callback()(version.options)
+app.callback()(version_option.options)
 app.command("list")(listing.list_names)
 app.command("tableau")(tableau.tableau)
 app.command("coning")(coning.coning)

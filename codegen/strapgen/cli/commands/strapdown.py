@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from strapgen.cli.fixed import Carry, Fixes, Ranges, Rounding, Word, check_fixed, settings_for_run
+from strapgen.cli.fixed_options import Carry, Fixes, Ranges, Rounding, Word, check_fixed, settings_for_run
 from strapgen.cli.options import check_format, whole
 from strapgen.support.exceptions import InputError
 

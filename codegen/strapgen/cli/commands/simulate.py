@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from strapgen.catalogue import MOTIONS
-from strapgen.cli.fixed import (
+from strapgen.cli.fixed_options import (
     Allowance,
     Carry,
     MaxRate,

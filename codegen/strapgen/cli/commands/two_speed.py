@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from strapgen.cli.fixed import Allowance, Carry, Fixes, Ranges, Rounding, Word, read_settings
+from strapgen.cli.fixed_options import Allowance, Carry, Fixes, Ranges, Rounding, Word, read_settings
 from strapgen.cli.options import Format, check_format, print_json, whole
 from strapgen.support.exceptions import InputError
 

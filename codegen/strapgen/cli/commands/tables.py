@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from strapgen.cli.fixed import Carry, Rounding, read_settings
+from strapgen.cli.fixed_options import Carry, Rounding, read_settings
 from strapgen.cli.options import Format, check_format, print_json
 from strapgen.cli.progress import track
 from strapgen.support.exceptions import InputError

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from strapgen.cli.fixed import Allowance, Carry, MaxRate, Rounding, Word, read_settings
+from strapgen.cli.fixed_options import Allowance, Carry, MaxRate, Rounding, Word, read_settings
 from strapgen.cli.inputs import (
     Duration,
     IncrementsFile,

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from strapgen.cli.fixed import (
+from strapgen.cli.fixed_options import (
     Allowance,
     Carry,
     Fixes,
