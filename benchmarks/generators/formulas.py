@@ -6,9 +6,9 @@ from collections.abc import Callable
 from typing import Any
 
 from generators import Case
+from strapgen.catalogue.kernels.attitude_step import step
 from strapgen.catalogue.kinematics import KINEMATICS
 from strapgen.catalogue.methods.runge_kutta import method, staged_step
-from strapgen.catalogue.methods.steps import step
 from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.symbolic.kernel import Kernel
 

@@ -29,10 +29,10 @@ if _typing.TYPE_CHECKING:
     from strapgen.catalogue.kinematics import Kinematics as Kinematics
     from strapgen.catalogue.methods import runge_kutta as runge_kutta
     from strapgen.catalogue.methods import tableaux as tableaux
-    from strapgen.catalogue.methods.steps import Samples as Samples
-    from strapgen.catalogue.methods.steps import increments_signal as increments_signal
+    from strapgen.catalogue.methods.samples import Samples as Samples
+    from strapgen.catalogue.methods.samples import increments_signal as increments_signal
+    from strapgen.catalogue.methods.tableau import Tableau as Tableau
     from strapgen.catalogue.methods.tableaux import TABLEAUX as TABLEAUX
-    from strapgen.catalogue.methods.tableaux import Tableau as Tableau
     from strapgen.experiments import word_length as study
     from strapgen.experiments.comparison import Comparison as Comparison
     from strapgen.experiments.comparison import compare as compare
@@ -41,10 +41,10 @@ if _typing.TYPE_CHECKING:
     from strapgen.experiments.convergence import Convergence as Convergence
     from strapgen.experiments.convergence import converge as converge
     from strapgen.ir.attitude_step import Companions as Companions
+    from strapgen.ir.attitude_step import Order as Order
     from strapgen.ir.fixed_settings import Settings as Settings
     from strapgen.ir.formats import Format as Format
     from strapgen.ir.integer_program import FixedProgram as FixedProgram
-    from strapgen.ir.order import Order as Order
     from strapgen.ir.program import Program as Program
     from strapgen.ir.recursion import Recursion as Recursion
     from strapgen.ir.signals import Signal as Signal
@@ -101,14 +101,12 @@ _NAMES = {
         "EULER",
         "Kinematics",
     ),
-    "catalogue.methods.steps": (
+    "catalogue.methods.samples": (
         "Samples",
         "increments_signal",
     ),
-    "catalogue.methods.tableaux": (
-        "TABLEAUX",
-        "Tableau",
-    ),
+    "catalogue.methods.tableau": ("Tableau",),
+    "catalogue.methods.tableaux": ("TABLEAUX",),
     "experiments.comparison": (
         "Comparison",
         "compare",
@@ -121,11 +119,13 @@ _NAMES = {
         "Convergence",
         "converge",
     ),
-    "ir.attitude_step": ("Companions",),
+    "ir.attitude_step": (
+        "Companions",
+        "Order",
+    ),
     "ir.fixed_settings": ("Settings",),
     "ir.formats": ("Format",),
     "ir.integer_program": ("FixedProgram",),
-    "ir.order": ("Order",),
     "ir.program": ("Program",),
     "ir.recursion": ("Recursion",),
     "ir.signals": ("Signal",),

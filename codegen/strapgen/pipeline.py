@@ -31,7 +31,7 @@ from strapgen.support.exceptions import InputTypeError
 
 if TYPE_CHECKING:
     from strapgen.backends import Backend
-    from strapgen.catalogue.methods.tableaux import Tableau
+    from strapgen.catalogue.methods.tableau import Tableau
     from strapgen.symbolic.kernel import Kernel
 
 

@@ -14,7 +14,7 @@ from strapgen.analysis.constant_rate import ANGLE, STEPS, constant_rate, errors_
 from strapgen.analysis.prediction import parts_of
 from strapgen.backends import exact
 from strapgen.catalogue import ALGORITHMS, choose
-from strapgen.experiments.convergence import exact_attitudes
+from strapgen.simulation.exact_attitudes import exact_attitudes
 from strapgen.simulation.motions import motion
 
 RATES = {

@@ -8,8 +8,8 @@ import sympy as sp
 
 from strapgen.analysis.orthonormalization import ERROR, effect
 from strapgen.backends import exact
+from strapgen.backends.exact import interpreter
 from strapgen.catalogue import orthonormalizations
-from strapgen.experiments.convergence import interpreter
 from strapgen.support.exceptions import InputError
 
 P = ERROR

@@ -13,8 +13,8 @@ from derived import generated
 import strapgen
 from strapgen.backends import BACKENDS, of_sources
 from strapgen.ir.signals import Signal
+from strapgen.symbolic.evaluation import Wrapped
 from strapgen.symbolic.kernel import KernelBuilder, resolution
-from strapgen.symbolic.rotations import Wrapped
 from strapgen.targets import FIXED
 
 

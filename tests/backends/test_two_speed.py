@@ -13,8 +13,9 @@ from scipy.integrate import quad_vec
 from scipy.spatial.transform import Rotation
 
 from strapgen.backends import BACKENDS
-from strapgen.backends.two_speed import ALGORITHMS, SCULLING, TwoSpeed, loops, sources
+from strapgen.backends.two_speed import TwoSpeed
 from strapgen.ir.fixed_settings import Settings
+from strapgen.library.two_speed_sources import ALGORITHMS, SCULLING, loops, sources
 from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.targets import FIXED
 from strapgen.toolchain import compiler

@@ -19,7 +19,8 @@ from strapgen.backends import of
 from strapgen.cli import main
 from strapgen.experiments import conformance
 from strapgen.experiments.comparison import compare_choice
-from strapgen.experiments.convergence import GENERAL, converge
+from strapgen.experiments.convergence import converge
+from strapgen.simulation.motions import GENERAL
 from strapgen.support.exceptions import InputError
 
 #: A file whose kernel has one name, whatever its options are: Euler parameters by a tableau.

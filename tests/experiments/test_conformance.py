@@ -59,10 +59,10 @@ STEP = """
 import sympy as sp
 from strapgen import algebra
 from strapgen.catalogue.kinematics import EULER
-from strapgen.catalogue.methods.steps import increments_signal
+from strapgen.catalogue.methods.samples import increments_signal
 from strapgen.ir.attitude_step import Companions
 from strapgen.symbolic.kernel import KernelBuilder
-from strapgen.ir.order import Order
+from strapgen.ir.attitude_step import Order
 
 def algorithm():
     build = KernelBuilder()

@@ -15,7 +15,7 @@ from strapgen.catalogue import INTEGRATORS, choose
 from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.experiments import convergence
 from strapgen.experiments.convergence import Convergence, Rung, converge
-from strapgen.ir.order import Order
+from strapgen.ir.attitude_step import Order
 from strapgen.support.exceptions import InputError
 
 #: How far an observed order may be from the one of theory: the next term of the series is still there at these steps.

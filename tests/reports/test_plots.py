@@ -9,7 +9,7 @@ import pytest
 
 import strapgen
 from strapgen.experiments.convergence import Convergence, Rung
-from strapgen.ir.order import Order
+from strapgen.ir.attitude_step import Order
 from strapgen.reports import plots
 from strapgen.simulation.recording import History
 from strapgen.simulation.runs import Run, simulate

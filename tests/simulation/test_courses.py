@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from strapgen import evaluator
-from strapgen.backends.two_speed import ALGORITHMS
 from strapgen.ir.fixed_settings import Settings
+from strapgen.library.two_speed_sources import ALGORITHMS
 from strapgen.reports import runs
 from strapgen.simulation.courses import NavigationFrame, course
 from strapgen.simulation.motions import motion

@@ -6,7 +6,7 @@ import pytest
 import sympy as sp
 
 from strapgen.symbolic import rotations
-from strapgen.symbolic.rotations import evaluate
+from strapgen.symbolic.evaluation import evaluate
 
 U = sp.Matrix(sp.symbols("u1:4", real=True))
 V = sp.Matrix(sp.symbols("v1:4", real=True))

@@ -18,8 +18,8 @@ from strapgen.analysis.error_rate import error_rate
 from strapgen.analysis.prediction import Prediction, parts_of, predict
 from strapgen.backends import exact
 from strapgen.catalogue import Choice
-from strapgen.experiments.convergence import GENERAL, exact_attitudes, step_of_increments
-from strapgen.simulation.motions import Motion
+from strapgen.simulation.exact_attitudes import exact_attitudes, step_of_increments
+from strapgen.simulation.motions import GENERAL, Motion
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 

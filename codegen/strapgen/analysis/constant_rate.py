@@ -22,7 +22,7 @@ from strapgen.analysis.series import PARTS, STEP
 from strapgen.backends import exact
 from strapgen.catalogue import Choice
 from strapgen.simulation.motions import Motion
-from strapgen.symbolic import rotations
+from strapgen.symbolic import evaluation, rotations
 from strapgen.symbolic.kernel import Kernel, evaluate_stages
 from strapgen.symbolic.power_series import Powers, constant, field, function
 
@@ -102,7 +102,7 @@ class ConstantRate:
                 return constant(ring, value, top)
 
             cosine, sine = (
-                rotations.evaluate(part, angle, number, function)
+                evaluation.evaluate(part, angle, number, function)
                 for part in (_plain(self.cosine), _plain(self.sine))
             )
             # d atan2(s, c) = (c ds - s dc) / (c^2 + s^2)

@@ -15,8 +15,8 @@ from typing import Any
 import sympy as sp
 
 from strapgen.symbolic.covariants import Coefficients, Decomposition, Frame
+from strapgen.symbolic.evaluation import exact
 from strapgen.symbolic.polynomials import Polynomial
-from strapgen.symbolic.rotations import exact
 
 #: Denominators from here on are those of rounded decimals.
 _DECIMAL = 10**16

@@ -16,7 +16,7 @@ from strapgen import catalogue
 from strapgen.catalogue import Choice
 from strapgen.catalogue.methods.coefficients import Number
 from strapgen.support.exceptions import InputError, InputTypeError
-from strapgen.symbolic import rotations
+from strapgen.symbolic import evaluation, rotations
 from strapgen.symbolic.covariants import Frame
 from strapgen.symbolic.kernel import Kernel
 from strapgen.symbolic.power_series import Powers, constant, field, outputs
@@ -59,7 +59,7 @@ class Step:
     @property
     def domain(self) -> Any:
         """The smallest field that holds the numbers of the step."""
-        expressions = [rotations.exact(node) for node in self.nodes or ()]
+        expressions = [evaluation.exact(node) for node in self.nodes or ()]
         for stage in (*self.kernel.stages, *self.kernel.outputs):
             expressions += stage.expressions
         return field(expressions)
@@ -317,7 +317,7 @@ def turns(ring: Any, rate: Rate, nodes: Sequence[Number], top: int) -> list[Powe
     """
     elements = []
     for node in nodes:
-        shares = [rotations.exact(node) ** j / sp.factorial(j) for j in range(len(rate))]
+        shares = [evaluation.exact(node) ** j / sp.factorial(j) for j in range(len(rate))]
         elements += _moments(ring, rate, shares, top)
     return elements
 

@@ -15,8 +15,8 @@ from strapgen.analysis.accumulation import antiderivative
 from strapgen.analysis.error_rate import ErrorRate, error_rate
 from strapgen.analysis.motion_rates import TIME, parameters
 from strapgen.backends import exact
+from strapgen.backends.exact import interpreter
 from strapgen.catalogue import Choice
-from strapgen.experiments.convergence import interpreter
 from strapgen.library import generated_sources
 from strapgen.simulation.motions import Motion
 from strapgen.support import checks

@@ -9,7 +9,7 @@ from strapgen.backends.protocol import Backend, Evaluator
 from strapgen.backends.registry import BACKENDS, Entry, classes, of_sources
 from strapgen.backends.step_sources import StepSources
 from strapgen.catalogue import Choice
-from strapgen.catalogue.methods.tableaux import Tableau
+from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
 from strapgen.library import generated_sources

@@ -4,14 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
-from typing import Any
+from functools import cache
+from typing import TYPE_CHECKING, Any
 
 import mpmath
 import numpy as np
 from numpy.typing import NDArray
 
+from strapgen.backends import exact
+from strapgen.catalogue import Choice
 from strapgen.ir.program import OPERATIONS, Program
+from strapgen.library import generated_sources
 from strapgen.support import stages
+
+if TYPE_CHECKING:
+    pass
 
 #: Decimal digits: a million steps lose six of them.
 DIGITS = 40
@@ -129,3 +136,18 @@ def propagate(program: Program, increments: Any, initial: Any = None) -> NDArray
         rows = np.asarray(increments, np.float64).reshape(-1, samples.size).tolist()
         run = states(program, ([mpmath.mpf(value) for value in row] for row in rows), held)
         return np.array([[float(value) for value in row] for row in run]).reshape(-1, *state.shape)
+
+
+#: Arithmetic of many digits, where a back end is named.
+EXACT = "exact"
+
+
+def interpreter(name: str, step: Program | None = None) -> exact.Interpreter:
+    """Return a kernel by name that runs in many digits: one that a step brings, or of the catalogue."""
+    programs = () if step is None else step.own
+    return exact.Interpreter(next((one for one in programs if one.kernel == name), None) or _program(name))
+
+
+@cache
+def _program(name: str) -> Program:
+    return generated_sources.program(Choice(name))

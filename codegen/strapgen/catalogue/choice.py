@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from strapgen.catalogue.methods.tableaux import Tableau
+from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.catalogue.names import KERNELS
 
 if TYPE_CHECKING:

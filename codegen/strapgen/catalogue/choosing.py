@@ -6,7 +6,8 @@ import os
 from typing import Any
 
 from strapgen.catalogue.choice import Choice
-from strapgen.catalogue.methods.tableaux import TABLEAUX, Tableau
+from strapgen.catalogue.methods.tableau import Tableau
+from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.catalogue.names import (
     ALGORITHMS,
     INTEGRATORS,

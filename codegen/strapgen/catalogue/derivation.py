@@ -7,12 +7,13 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from strapgen.catalogue.choice import Choice
-from strapgen.catalogue.methods.tableaux import TABLEAUX, Tableau
+from strapgen.catalogue.methods.tableau import Tableau
+from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.catalogue.names import INTEGRATORS, KERNELS, MOST_INCREMENTS, VECTORS
 
 if TYPE_CHECKING:
     from strapgen.catalogue.methods.coefficients import Number
-    from strapgen.catalogue.methods.steps import Method
+    from strapgen.catalogue.methods.method import Method
     from strapgen.symbolic.kernel import Kernel
 
 #: Where the modules lie that `names` tells of.
@@ -69,8 +70,8 @@ def derive(choice: Choice) -> Kernel:
             _method(choice.method), choice.increments, choice.previous
         )
         return derived
+    from strapgen.catalogue.kernels.attitude_step import step
     from strapgen.catalogue.kinematics import KINEMATICS
-    from strapgen.catalogue.methods.steps import step
 
     return step(KINEMATICS[choice.name], _method(choice.method), choice.increments, choice.previous)
 

@@ -15,7 +15,7 @@ from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
     from strapgen.catalogue import Choice
-    from strapgen.catalogue.methods.tableaux import Tableau
+    from strapgen.catalogue.methods.tableau import Tableau
 
 Algorithm = Annotated[
     str,

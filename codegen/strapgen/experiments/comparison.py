@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from strapgen import catalogue
 from strapgen.backends import BACKENDS, Backend, exact, of
 from strapgen.catalogue import Choice
-from strapgen.catalogue.methods.tableaux import Tableau
+from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.ir.fixed_settings import Settings
 from strapgen.library import generated_sources
 from strapgen.simulation.runs import attitude, drift_between, require_finite

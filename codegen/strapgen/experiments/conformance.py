@@ -13,13 +13,15 @@ from numpy.typing import NDArray
 
 from strapgen import fixedpoint, pipeline
 from strapgen.backends import Backend, exact, of
+from strapgen.backends.exact import interpreter
 from strapgen.backends.increments import windows
 from strapgen.catalogue import Choice
 from strapgen.experiments.comparison import certified_angle
-from strapgen.experiments.convergence import GENERAL, converge, interpreter, step_of_increments
+from strapgen.experiments.convergence import converge
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.program import Program
-from strapgen.simulation.motions import motion
+from strapgen.simulation.exact_attitudes import step_of_increments
+from strapgen.simulation.motions import GENERAL, motion
 from strapgen.simulation.runs import attitude, drift_between, simulate
 from strapgen.support.exceptions import CompilerError, InputError
 from strapgen.symbolic.kernel import Kernel

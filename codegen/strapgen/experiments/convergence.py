@@ -5,10 +5,9 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from fractions import Fraction
-from functools import cache
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -17,11 +16,11 @@ import numpy as np
 
 from strapgen import catalogue
 from strapgen.backends import BACKENDS, exact, of
+from strapgen.backends.exact import EXACT
 from strapgen.catalogue import Choice
+from strapgen.ir.attitude_step import Order
 from strapgen.ir.fixed_settings import Settings
-from strapgen.ir.order import Order
-from strapgen.ir.program import Program
-from strapgen.library import generated_sources
+from strapgen.simulation.exact_attitudes import exact_attitudes, step_of_increments
 from strapgen.simulation.motions import Motion
 from strapgen.simulation.runs import largest_increment, simulate
 from strapgen.support import checks
@@ -29,16 +28,12 @@ from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.targets import FIXED
 
 if TYPE_CHECKING:
-    from strapgen.symbolic.kernel import Kernel
+    pass
 
-#: Arithmetic of many digits, where a back end is named.
-EXACT = "exact"
 #: Finest steps, of those whose error is truncation, that the slope is fitted to.
 FITTED = 3
 #: Algorithms side by side in a report.
 _COLUMNS = 4
-#: A motion whose rate changes direction and size, of about 1 rad/s: settings of coning.
-GENERAL = {"a_rad_s": "1", "b_rad_s": "1.5", "g_rad_s": "0.6"}
 #: Errors beyond this are no beginning of a series, in rad.
 _MOST_ERROR = 0.3
 
@@ -186,22 +181,6 @@ def converge(
     return _fitted(kernel.name, backend, kernel.order, rungs)
 
 
-def step_of_increments(choice: Choice) -> Kernel:
-    """Return the kernel of a chosen attitude step.
-
-    Raises
-    ------
-    InputError, InputTypeError
-        If it takes no increments, or no choice is given.
-    """
-    if not isinstance(choice, Choice):
-        raise InputTypeError(f"choice is {choice!r}; what catalogue.choose returns is needed")
-    kernel = catalogue.derive(choice)
-    if kernel.companions is None or kernel.inputs[1].name != "increments":
-        raise InputError(f"kernel {kernel.name} takes no increments; a step that does is needed")
-    return kernel
-
-
 def _fitted(
     kernel: str, backend: str, order: Order | None, rungs: list[tuple[float, float | None, bool]]
 ) -> Convergence:
@@ -244,17 +223,6 @@ def _on_backend(
     return measure
 
 
-def interpreter(name: str, step: Program | None = None) -> exact.Interpreter:
-    """Return a kernel by name that runs in many digits: one that a step brings, or of the catalogue."""
-    programs = () if step is None else step.own
-    return exact.Interpreter(next((one for one in programs if one.kernel == name), None) or _program(name))
-
-
-@cache
-def _program(name: str) -> Program:
-    return generated_sources.program(Choice(name))
-
-
 def _exactly(choice: Choice, motion: Motion, rounding: float) -> _Measure:
     """Return what measures the error of a step length in many digits.
 
@@ -270,50 +238,6 @@ def _exactly(choice: Choice, motion: Motion, rounding: float) -> _Measure:
             return float(mpmath.sqrt(worst / 2)), 100 * rounding + 10.0 ** (10 - exact.DIGITS)
 
     return measure
-
-
-def exact_attitudes(
-    choice: Choice, motion: Motion
-) -> Callable[[Fraction, int], Iterator[tuple[list[Any], list[Any]]]]:
-    """Return what runs a step on a motion in the digits of mpmath.
-
-    Parameters
-    ----------
-    choice : Choice
-        An attitude step that takes increments.
-    motion : Motion
-
-    Returns
-    -------
-    callable
-        ``run(step, count)``: the computed and the true matrix, row by row, at time 0 and after every step.
-    """
-    program = generated_sources.program(choice)
-    assert program.companions is not None, "checked by the caller"
-    samples, previous = choice.increments_per_step, choice.previous
-
-    increment, truth = interpreter(f"{motion.name}-increments"), interpreter(f"{motion.name}-truth")
-    named = program.companions.attitude
-    attitude = None if named is None else interpreter(named, program)
-    identity = program.companions.identity
-
-    def run(length: Fraction, count: int) -> Iterator[tuple[list[Any], list[Any]]]:
-        parameters = [[mpmath.mpf(value)] for value in motion.parameters.values()]
-        width = length / samples
-        row = [
-            increment([exact.number((2 * k + 1) * width / 2)], [exact.number(width)], *parameters)
-            for k in range(-previous, count * samples)
-        ]
-        taken = (
-            [x for vector in row[k : k + previous + samples] for x in vector]
-            for k in range(0, count * samples, samples)
-        )
-        states = exact.states(program, taken, [exact.number(value) for value in identity])
-        for place, state in enumerate(states):
-            computed = attitude(state) if attitude else state
-            yield computed, truth([exact.number(place * length)], *parameters)
-
-    return run
 
 
 def as_text(found: Sequence[Convergence], title: str) -> str:

@@ -17,6 +17,7 @@ from strapgen.backends.fixed import FixedBackend
 from strapgen.backends.increments import pulses, windows
 from strapgen.catalogue import Choice
 from strapgen.ir.fixed_settings import Settings
+from strapgen.library import two_speed_sources
 from strapgen.simulation.runs import attitude, drift_between
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
@@ -38,7 +39,7 @@ TWO_SPEED = "two-speed"
 ALGORITHMS = (*catalogue.ALGORITHMS, TWO_SPEED)
 #: Fast cycles in a slow one.
 _FAST_CYCLES = 4
-_TWO_SPEEDS = tuple((name, _FAST_CYCLES) for name in two_speed.ALGORITHMS)
+_TWO_SPEEDS = tuple((name, _FAST_CYCLES) for name in two_speed_sources.ALGORITHMS)
 
 
 @dataclass(frozen=True)
@@ -216,7 +217,7 @@ def _in_two_speeds(
 ) -> Callable[[], Array]:
     """Return the run of an algorithm in two speeds, without acceleration: its matrices, one a record."""
     if settings is not None:
-        ranges = two_speed.ranges(float(np.abs(samples).max()), fast_cycles=_FAST_CYCLES)
+        ranges = two_speed_sources.ranges(float(np.abs(samples).max()), fast_cycles=_FAST_CYCLES)
         settings = replace(settings, ranges=ranges)
     loops = two_speed.TwoSpeed(algorithm, backend=backend, settings=settings)
     stride = every // _FAST_CYCLES

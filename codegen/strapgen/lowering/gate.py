@@ -17,8 +17,8 @@ from strapgen.ir.signals import Signal
 from strapgen.lowering.arithmetic import chain, gathered, plain, with_constant
 from strapgen.lowering.names import FACTOR
 from strapgen.lowering.share import Shared
+from strapgen.symbolic.evaluation import Direction, Wrapped
 from strapgen.symbolic.kernel import Kernel
-from strapgen.symbolic.rotations import Direction, Wrapped
 
 _FUNCTIONS = {
     sp.sin: "sin",

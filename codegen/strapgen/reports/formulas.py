@@ -11,7 +11,8 @@ import sympy as sp
 
 from strapgen.ir.program import Program
 from strapgen.symbolic.kernel import Kernel, Stage
-from strapgen.targets.printer import Printer, operations_text
+from strapgen.targets.contract import operations_text
+from strapgen.targets.printer import Printer
 
 
 def as_text(kernel: Kernel, notes: Sequence[str] | None = None) -> str:

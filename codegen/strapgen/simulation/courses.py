@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from strapgen import backends
 from strapgen.backends import BACKENDS, two_speed
 from strapgen.ir.fixed_settings import Settings
+from strapgen.library import two_speed_sources
 from strapgen.simulation.recording import InertialRecording
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
@@ -134,7 +135,7 @@ def course(
     angles, velocities = recording.increments[:used], recording.velocity_increments[:used]
     if BACKENDS[backend].target in FIXED:
         settings = settings or Settings()
-        needed = two_speed.ranges(
+        needed = two_speed_sources.ranges(
             float(np.abs(angles).max()), float(np.abs(velocities).max()), fast_cycles, slow_cycles
         )
         settings = replace(settings, ranges={**needed, **settings.ranges})

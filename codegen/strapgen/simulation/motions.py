@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,9 @@ from strapgen.backends import evaluator
 from strapgen.backends.increments import windows
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
+
+if TYPE_CHECKING:
+    pass
 
 Array = NDArray[np.float64]
 
@@ -179,3 +182,7 @@ def motion(name: str, /, **settings: float | str | Fraction) -> Motion:
         for key in used:
             parameters[parameter] = float(checks.number(key, settings[key])) * choices[key]
     return Motion(name, parameters)
+
+
+#: A motion whose rate changes direction and size, of about 1 rad/s: settings of coning.
+GENERAL = {"a_rad_s": "1", "b_rad_s": "1.5", "g_rad_s": "0.6"}

@@ -8,12 +8,11 @@ from typing import Any
 
 import sympy as sp
 
-from strapgen.ir.attitude_step import Companions
-from strapgen.ir.order import Order
+from strapgen.ir.attitude_step import Companions, Order
 from strapgen.ir.program import RESOLUTION
 from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import Signal
-from strapgen.symbolic.rotations import evaluate
+from strapgen.symbolic.evaluation import evaluate
 
 #: The distance from 1 to the next number of the target that a kernel is lowered for; 0 in exact arithmetic.
 resolution = sp.Symbol(RESOLUTION, real=True)

@@ -13,8 +13,8 @@ import sympy as sp
 from sympy.polys.polyerrors import CoercionFailed
 
 from strapgen.ir.program import RESOLUTION
+from strapgen.symbolic.evaluation import Direction, Wrapped
 from strapgen.symbolic.kernel import Kernel, evaluate_stages
-from strapgen.symbolic.rotations import Direction, Wrapped
 
 _NO_SERIES = "the square root of a series that begins with 0 is no series"
 
@@ -257,7 +257,7 @@ def outputs(kernel: Kernel, values: Mapping[str, Powers], ring: Any, top: int) -
 
 
 def function(expression: sp.Expr, arguments: list[Any]) -> Any:
-    """Evaluate a function of series, as `strapgen.symbolic.rotations.evaluate` expects it.
+    """Evaluate a function of series, as `strapgen.symbolic.evaluation.evaluate` expects it.
 
     Parameters
     ----------

@@ -8,6 +8,7 @@ from strapgen.ir.fixed_interface import Argument, ErrorFeedback, RoundingAccumul
 from strapgen.ir.fixed_settings import DEFAULT_ALLOWANCE, DEFAULT_ANGLE, Settings
 from strapgen.ir.integer_program import FixedProgram, Value
 from strapgen.ir.program import Program
+from strapgen.ir.signals import Signal
 
 
 def argument_text(argument: Argument) -> str:
@@ -84,3 +85,23 @@ def guards_text(values: tuple[Value, ...]) -> str:
         limits = _number(value.offset + value.low * unit), _number(value.offset + value.high * unit)
         names.setdefault(limits, []).append(value.name)
     return "; ".join(f"{', '.join(held)} from {low} to {high}" for (low, high), held in names.items())
+
+
+def elements_text(signal: Signal) -> str:
+    """Return the order of a signal's elements in words, for a contract."""
+    return (
+        f"{signal.elements[0]}, ..., {signal.elements[-1]}" if signal.size > 4 else ", ".join(signal.elements)
+    )
+
+
+def range_text(signal: Signal) -> str:
+    """Return the range of a signal in words, for a contract."""
+    if signal.bound is None:
+        return "any finite number"
+    return f"any finite number; at most {signal.bound} in magnitude in proper use"
+
+
+def operations_text(program: Program) -> str:
+    """Return the operation count in words."""
+    counts = ", ".join(f"{number} {kind}" for kind, number in program.operations.items() if number)
+    return f"{counts or 'none'}; {program.temporaries} temporaries"

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import re
-import textwrap
 from fractions import Fraction
 
-from strapgen.ir.program import DOUBLE_RESOLUTION, RESOLUTION, Constant, Node, Program, Reference
-from strapgen.ir.signals import Signal
+from strapgen.ir.program import DOUBLE_RESOLUTION, RESOLUTION, Constant, Node, Reference
 
 _SUM, _PRODUCT, _UNARY, _ATOM = range(4)
 
@@ -69,50 +66,3 @@ class Printer:
     def _negate(self, argument: Node) -> tuple[str, int]:
         # Two signs in a row are another operator in C.
         return f"-{self._inside(argument, _ATOM)}", _UNARY
-
-
-def elements_text(signal: Signal) -> str:
-    """Return the order of a signal's elements in words, for a contract."""
-    return (
-        f"{signal.elements[0]}, ..., {signal.elements[-1]}" if signal.size > 4 else ", ".join(signal.elements)
-    )
-
-
-def range_text(signal: Signal) -> str:
-    """Return the range of a signal in words, for a contract."""
-    if signal.bound is None:
-        return "any finite number"
-    return f"any finite number; at most {signal.bound} in magnitude in proper use"
-
-
-def operations_text(program: Program) -> str:
-    """Return the operation count in words."""
-    counts = ", ".join(f"{number} {kind}" for kind, number in program.operations.items() if number)
-    return f"{counts or 'none'}; {program.temporaries} temporaries"
-
-
-def fill(text: str, indent: str, width: int = 100) -> str:
-    """Wrap text at spaces, every line after the first with `indent`."""
-    return "\n".join(
-        textwrap.wrap(text, width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
-    )
-
-
-def fill_expression(text: str, indent: str, width: int = 100) -> str:
-    """Wrap an expression before its sums' signs, every line after the first with `indent`."""
-    return _filled(re.split(r" (?=[+-] )", text), indent, width)
-
-
-def fill_arguments(text: str, indent: str, width: int = 100) -> str:
-    """Wrap a declaration or a call after its commas, every line after the first with `indent`."""
-    return _filled(re.split(r"(?<=,) ", text), indent, width)
-
-
-def _filled(pieces: list[str], indent: str, width: int) -> str:
-    lines: list[str] = []
-    for piece in pieces:
-        if lines and len(lines[-1]) + 1 + len(piece) <= width:
-            lines[-1] += f" {piece}"
-        else:
-            lines.append(f"{indent if lines else ''}{piece}")
-    return "\n".join(lines)

@@ -9,7 +9,8 @@ import jinja2
 
 from strapgen.support import resources
 from strapgen.targets import contract
-from strapgen.targets.printer import elements_text, fill, fill_arguments, operations_text, range_text
+from strapgen.targets.contract import elements_text, operations_text, range_text
+from strapgen.targets.lines import fill, fill_arguments
 
 
 @cache

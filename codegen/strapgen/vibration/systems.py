@@ -15,9 +15,9 @@ from strapgen.catalogue import Choice
 from strapgen.ir.signals import Signal
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError, InputTypeError
+from strapgen.symbolic.evaluation import exact
 from strapgen.symbolic.kernel import Kernel
 from strapgen.symbolic.power_series import Powers
-from strapgen.symbolic.rotations import exact
 from strapgen.vibration.expansion import Expander, Expansion, Number
 from strapgen.vibration.waves import Shift, Wave
 

@@ -14,9 +14,10 @@ from gathering import each
 from strapgen import catalogue, derive, lower
 from strapgen.catalogue import ALGORITHMS, INTEGRATORS, MOST_INCREMENTS, MOST_PREVIOUS
 from strapgen.catalogue.methods.rate_fit import step_order
-from strapgen.catalogue.methods.steps import increments_signal, label, labels, turns_signal
-from strapgen.catalogue.methods.tableaux import TABLEAUX, Tableau, read
-from strapgen.ir.order import Order
+from strapgen.catalogue.methods.samples import increments_signal, label, labels, turns_signal
+from strapgen.catalogue.methods.tableau import Tableau
+from strapgen.catalogue.methods.tableaux import TABLEAUX, read
+from strapgen.ir.attitude_step import Order
 from strapgen.symbolic.kernel import Kernel
 
 ALGORITHM = pytest.mark.parametrize("algorithm", ALGORITHMS)

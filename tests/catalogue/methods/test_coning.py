@@ -318,8 +318,8 @@ def test_about_one_axis_the_rotation_vector_is_the_sum_of_the_increments(method,
 
 
 def test_a_method_without_rotation_vector_is_refused():
+    from strapgen.catalogue.kernels.attitude_step import rotation_vector
     from strapgen.catalogue.methods.runge_kutta import method
-    from strapgen.catalogue.methods.steps import rotation_vector
     from strapgen.catalogue.methods.tableaux import TABLEAUX
 
     with pytest.raises(ValueError, match="rk4 has no rotation vector"):

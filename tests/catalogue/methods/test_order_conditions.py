@@ -28,7 +28,8 @@ from strapgen.catalogue.methods.order_conditions import (
     word_coefficient,
     words,
 )
-from strapgen.catalogue.methods.tableaux import TABLEAUX, Tableau
+from strapgen.catalogue.methods.tableau import Tableau
+from strapgen.catalogue.methods.tableaux import TABLEAUX
 
 #: Exact series of many methods: with the long tests.
 pytestmark = pytest.mark.long

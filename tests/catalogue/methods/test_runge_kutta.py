@@ -12,9 +12,10 @@ from peano_baker import generic_rate, local_error
 
 from strapgen import derive
 from strapgen.catalogue import ALGORITHMS, MOST_INCREMENTS, STANDARD_METHODS
+from strapgen.catalogue.kernels.attitude_step import step
 from strapgen.catalogue.kinematics import KINEMATICS
 from strapgen.catalogue.methods.runge_kutta import method
-from strapgen.catalogue.methods.steps import increments_signal, step
+from strapgen.catalogue.methods.samples import increments_signal
 from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.support.exceptions import InputError
 

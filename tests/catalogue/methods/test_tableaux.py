@@ -14,7 +14,8 @@ from gathering import each
 
 from strapgen.catalogue import METHODS, STANDARD_METHODS
 from strapgen.catalogue.methods import tableaux
-from strapgen.catalogue.methods.tableaux import TABLEAUX, Tableau, read, verify
+from strapgen.catalogue.methods.tableau import Tableau
+from strapgen.catalogue.methods.tableaux import TABLEAUX, read, verify
 from strapgen.support import resources
 from strapgen.support.exceptions import InputError
 

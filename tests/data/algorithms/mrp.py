@@ -5,7 +5,7 @@ from fractions import Fraction
 import sympy as sp
 
 from strapgen.catalogue.methods.runge_kutta import advance
-from strapgen.catalogue.methods.steps import Samples
+from strapgen.catalogue.methods.samples import Samples
 from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.ir.attitude_step import Companions
 from strapgen.ir.signals import Signal

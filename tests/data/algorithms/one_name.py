@@ -3,9 +3,9 @@
 from dataclasses import replace
 
 from strapgen.catalogue import Choice, derive
+from strapgen.catalogue.kernels.attitude_step import step
 from strapgen.catalogue.kinematics import KINEMATICS
 from strapgen.catalogue.methods import runge_kutta
-from strapgen.catalogue.methods.steps import step
 from strapgen.catalogue.methods.tableaux import TABLEAUX
 
 

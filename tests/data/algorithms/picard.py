@@ -3,7 +3,7 @@
 from fractions import Fraction
 
 from strapgen.catalogue.kinematics import EULER
-from strapgen.catalogue.methods.steps import increments_signal
+from strapgen.catalogue.methods.samples import increments_signal
 from strapgen.ir.attitude_step import Companions
 from strapgen.ir.signals import Signal
 from strapgen.symbolic.kernel import KernelBuilder

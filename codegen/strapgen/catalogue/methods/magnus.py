@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import sympy as sp
 
-from strapgen.catalogue.methods.steps import PHI, Method, Samples, exponential
+from strapgen.catalogue.methods.method import PHI, Method, exponential
+from strapgen.catalogue.methods.samples import Samples
 from strapgen.ir.signals import Signal
 from strapgen.symbolic import rotations
 from strapgen.symbolic.kernel import KernelBuilder

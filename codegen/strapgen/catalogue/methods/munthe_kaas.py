@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import sympy as sp
 
+from strapgen.catalogue.methods.method import PHI, Method, exponential
 from strapgen.catalogue.methods.runge_kutta import advance
-from strapgen.catalogue.methods.steps import PHI, Method, Samples, exponential
+from strapgen.catalogue.methods.samples import Samples
 from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.ir.signals import Signal
 from strapgen.symbolic.kernel import KernelBuilder

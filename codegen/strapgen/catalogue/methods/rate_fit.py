@@ -8,7 +8,7 @@ from fractions import Fraction
 
 import sympy as sp
 
-from strapgen.symbolic.rotations import exact
+from strapgen.symbolic.evaluation import exact
 
 #: Coefficients of a polynomial of time, in steps from the beginning of the step, the constant one first.
 Coefficients = tuple[sp.Expr, ...]

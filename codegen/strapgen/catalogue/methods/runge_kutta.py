@@ -8,9 +8,10 @@ import sympy as sp
 
 from strapgen.catalogue.kinematics import Kinematics
 from strapgen.catalogue.methods.coefficients import Number
+from strapgen.catalogue.methods.method import Method, combination
 from strapgen.catalogue.methods.order_conditions import attitude_order
-from strapgen.catalogue.methods.steps import Method, Samples, combination
-from strapgen.catalogue.methods.tableaux import Tableau
+from strapgen.catalogue.methods.samples import Samples
+from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.ir.signals import Signal
 from strapgen.symbolic.kernel import Kernel, KernelBuilder
 

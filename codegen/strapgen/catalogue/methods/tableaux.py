@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import re
-import shlex
 import tomllib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from strapgen.catalogue.methods import coefficients, order_conditions
+from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 
@@ -32,63 +32,6 @@ MOST_TOLERANCE = Fraction(1, 10**12)
 
 #: Most bytes of a file; twenty stages of long expressions take far less.
 MOST_BYTES = 200_000
-
-
-@dataclass(frozen=True)
-class Tableau:
-    """An explicit Runge-Kutta method in exact numbers.
-
-    Parameters
-    ----------
-    name, title, source : str
-        Name on the command line, name in the literature, citation.
-    order : int
-        Classical order of the method.
-    nodes : tuple of Fraction or sympy.Expr
-        c_i, as fractions of the step. Only an irrational number is an expression.
-    matrix : tuple of tuple of Fraction or sympy.Expr
-        a_ij below the diagonal, the first row empty.
-    weights : tuple of Fraction or sympy.Expr
-        b_i.
-    embedded_weights : tuple of Fraction or sympy.Expr, optional
-        Weights of a second method on the same stages.
-    tolerance : Fraction
-        Largest residual of a condition that the rounding of published coefficients explains; 0 if they are exact.
-    file : str
-        Path of the file; empty for a tableau of the catalogue.
-
-    Examples
-    --------
-    >>> TABLEAUX["rk2"].weights
-    (Fraction(1, 2), Fraction(1, 2))
-    """
-
-    name: str
-    title: str
-    source: str
-    order: int
-    nodes: tuple[Number, ...]
-    matrix: tuple[tuple[Number, ...], ...]
-    weights: tuple[Number, ...]
-    embedded_weights: tuple[Number, ...] | None = None
-    tolerance: Fraction = Fraction(0)
-    file: str = field(default="", compare=False, repr=False)
-
-    @property
-    def option(self) -> str:
-        """The option that chooses it on the command line."""
-        return f"--tableau {shlex.quote(self.file)}" if self.file else f"--method {self.name}"
-
-    @property
-    def rational(self) -> bool:
-        """Whether every coefficient is a fraction."""
-        rows = (self.nodes, self.weights, self.embedded_weights or (), *self.matrix)
-        return all(isinstance(value, Fraction) for row in rows for value in row)
-
-    @cached_property
-    def largest_residual(self) -> Number:
-        """The largest residual of row sums and order conditions; not 0 only for rounded coefficients."""
-        return order_conditions.largest_residual(self)
 
 
 class _BuiltIn(Mapping[str, Tableau]):

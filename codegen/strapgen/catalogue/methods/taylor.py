@@ -16,7 +16,8 @@ from collections.abc import Sequence
 import sympy as sp
 
 from strapgen.catalogue.kinematics import DCM, EULER, Kinematics
-from strapgen.catalogue.methods.steps import Method, Samples
+from strapgen.catalogue.methods.method import Method
+from strapgen.catalogue.methods.samples import Samples
 from strapgen.ir.signals import Signal
 from strapgen.symbolic import rotations
 from strapgen.symbolic.kernel import KernelBuilder

@@ -12,8 +12,8 @@ from strapgen.catalogue.names import RESERVED
 from strapgen.ir.program import RESOLUTION
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
+from strapgen.symbolic.evaluation import Direction, Wrapped
 from strapgen.symbolic.kernel import Kernel
-from strapgen.symbolic.rotations import Direction, Wrapped
 
 _NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 #: What the names of a kernel's functions end with, in some target.

@@ -73,7 +73,7 @@ _MOST_SAMPLES = 6
 
 def _data(design: Design, terms: bool) -> dict[str, Any]:
     from strapgen.catalogue.methods.coning import method, sample_terms
-    from strapgen.catalogue.methods.steps import sample_names
+    from strapgen.catalogue.methods.samples import sample_names
 
     names = sample_names(design.samples, design.previous)
     residual = design.residual()

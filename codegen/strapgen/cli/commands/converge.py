@@ -112,11 +112,12 @@ def converge(
     import numpy as np
 
     from strapgen.experiments import convergence
+    from strapgen.simulation import motions
     from strapgen.simulation.motions import motion as make_motion
     from strapgen.support.files import write_files
 
     if motion is None and not settings:
-        given = convergence.GENERAL
+        given = motions.GENERAL
     profile = make_motion(motion or "coning", **given)
     with np.errstate(all="ignore"):  # a step that is too long for a method is part of the picture
         runs = (convergence.converge(choice, profile, ladder, duration, backend) for choice in choices)

@@ -11,7 +11,7 @@ from strapgen.cli.options import Format, check_format, print_json
 from strapgen.support import checks
 
 if TYPE_CHECKING:
-    from strapgen.catalogue.methods.tableaux import Tableau
+    from strapgen.catalogue.methods.tableau import Tableau
 
 #: Widest table; what is wider is listed coefficient by coefficient.
 _WIDEST = 120

@@ -37,8 +37,8 @@ def two_speed(
     Example: strapgen two-speed dcm --target c --out firmware
     """
     check_format(format)
-    from strapgen.backends import two_speed as made
     from strapgen.ir.fixed_settings import Settings
+    from strapgen.library import two_speed_sources
     from strapgen.support.files import write_files
 
     form = whole("sculling", sculling) or 0
@@ -55,14 +55,14 @@ def two_speed(
         settings = settings or Settings()
     elif settings is not None:
         raise InputError(f"the options of fixed point go with --target c-fixed, not with {target}")
-    sources = made.sources(algorithm, form, target, settings)
+    sources = two_speed_sources.sources(algorithm, form, target, settings)
     written = write_files(out or Path(), sources.files)
     if format == "json":
         print_json(
             {
                 "kernel": sources.kernel,
                 "target": target,
-                "loops": list(made.kernels(algorithm, form)),
+                "loops": list(two_speed_sources.kernels(algorithm, form)),
                 "files": [str(path) for path in written],
                 "operations": sources.operations,
             }

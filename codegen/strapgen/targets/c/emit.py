@@ -10,8 +10,9 @@ import numpy as np
 from strapgen.ir.program import Operation, Program, walk
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Function, Sources
+from strapgen.targets.lines import fill_expression
 from strapgen.targets.names import C, external, printed
-from strapgen.targets.printer import Printer, fill_expression
+from strapgen.targets.printer import Printer
 from strapgen.targets.rendering import render
 
 

@@ -25,8 +25,8 @@ from strapgen.ir.integer_program import (
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Function, Sources
 from strapgen.support.exceptions import InputError
+from strapgen.targets.lines import fill_expression
 from strapgen.targets.names import C, external, printed
-from strapgen.targets.printer import fill_expression
 from strapgen.targets.rendering import render
 
 

@@ -6,8 +6,9 @@ from fractions import Fraction
 
 from strapgen.ir.program import Operation, Program, Reference, walk
 from strapgen.ir.sources import Function, Sources
+from strapgen.targets.lines import fill_expression
 from strapgen.targets.names import PYTHON, printed
-from strapgen.targets.printer import Printer, fill_expression
+from strapgen.targets.printer import Printer
 from strapgen.targets.rendering import render
 
 _FUNCTIONS = {

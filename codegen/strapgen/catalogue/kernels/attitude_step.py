@@ -1,0 +1,138 @@
+"""Attitude steps: kinematics + method + what is known of the rate, fused, in transition form."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from strapgen.catalogue.kinematics import KINEMATICS, Kinematics
+from strapgen.catalogue.methods.method import Method
+from strapgen.catalogue.methods.samples import Samples
+from strapgen.ir.attitude_step import Companions
+from strapgen.ir.signals import Signal
+from strapgen.symbolic.kernel import Kernel, KernelBuilder
+
+
+def step(kinematics: Kinematics, method: Method, increments: int | None, previous: int = 0) -> Kernel:
+    """Derive one integration step from angle increments, or from rates, to the next state.
+
+    The method is applied to the identity, which gives the transition: the step is linear in the state. The
+    step length cancels, since increments and rates differ by it alone.
+
+    Parameters
+    ----------
+    kinematics : Kinematics
+        The attitude representation.
+    method : Method
+        The integration method.
+    increments : int or None
+        Angle increments a step, 1 to 8; None for a step that is given the rate at every node.
+    previous : int, optional
+        Increments before the step from which the rate is extracted too, 0 to 3.
+
+    Returns
+    -------
+    Kernel
+        Inputs ``state`` and ``increments`` (previous + increments, 3) in rad, or ``turns`` (nodes, 3) in rad: the
+        rates times the step length; output ``next``.
+    """
+    build = KernelBuilder()
+    state = build.input(kinematics.state)
+    samples = Samples(build, increments, previous, method.nodes)
+    transition = build.stage(kinematics.transition, method.transition(build, kinematics, samples))
+    build.output(kinematics.next, kinematics.product(state, transition))
+    suffix, option, given = chosen(method, increments, previous)
+    extracted = "" if increments is None else "rate extraction chapter 3 A; "
+    order = method.step_order(increments, previous)
+    return build.kernel(
+        f"{kinematics.name}-{suffix}",
+        f"{kinematics.title}: step by {method.title} from {given}",
+        f"{kinematics.source}; {extracted}{method.title}: {method.source}",
+        transition=kinematics.transition.name,
+        companions=Companions(
+            f"{kinematics.name}-product",
+            kinematics.orthonormalize,
+            kinematics.attitude,
+            tuple(Fraction(int(x)) for x in kinematics.identity),
+            previous,
+            method.isometry(None if increments is None else increments + previous),
+        ),
+        order=order,
+        arguments=f"{kinematics.name} {option}",
+        notes=(str(order).capitalize() + ".",) if order.limited else (),
+    )
+
+
+def rotation_vector(method: Method, increments: int | None, previous: int = 0) -> Kernel:
+    """Derive the rotation vector of one step from angle increments, or from rates.
+
+    Parameters
+    ----------
+    method : Method
+        A method whose transition is the exponential of a rotation vector.
+    increments, previous : int
+        As in `step`.
+
+    Returns
+    -------
+    Kernel
+        Input ``increments`` (previous + increments, 3) in rad, or ``turns``; output ``rotation_vector`` (3,) in rad.
+
+    Raises
+    ------
+    ValueError
+        If the method has no rotation vector.
+    """
+    if method.rotation_vector is None:
+        raise ValueError(f"{method.name} has no rotation vector")
+    build = KernelBuilder()
+    vector = method.rotation_vector(build, Samples(build, increments, previous, method.nodes))
+    build.output(
+        Signal.vector(
+            "rotation_vector",
+            "rotation_vector",
+            unit="rad",
+            meaning="rotation vector of the step, body axes",
+        ),
+        vector,
+    )
+    suffix, option, given = chosen(method, increments, previous)
+    order = method.step_order(increments, previous)
+    return build.kernel(
+        f"rotation-vector-{suffix}",
+        f"Rotation vector of a step by {method.title} from {given}",
+        method.source,
+        order=order,
+        arguments=f"rotation-vector {option}",
+        notes=(str(order).capitalize() + ".",) if order.limited else (),
+    )
+
+
+def chosen(method: Method, increments: int | None, previous: int) -> tuple[str, str, str]:
+    """Return the ending of a kernel's name, its options on the command line, and what it is given, in words."""
+    suffix = f"{method.name}-{increments or 'rates'}"
+    option = method.option or f"--method {method.name}"
+    if increments is None:
+        given = f"the rate at {len(method.nodes)} {'node' if len(method.nodes) == 1 else 'nodes'}"
+        option = f"{option} --rates"
+    else:
+        given = f"{increments} angle {'increment' if increments == 1 else 'increments'}"
+        option = f"{option} --increments {increments}"
+    if previous:
+        suffix, option = f"{suffix}-previous{previous}", f"{option} --previous {previous}"
+        given += f" and {previous} before {'it' if increments == 1 else 'them'}"
+    return suffix, option, given
+
+
+def product(name: str) -> Kernel:
+    """Return the kernel that advances a state by a transition, and a transition by the one that follows it.
+
+    Parameters
+    ----------
+    name : str
+        Name of the attitude algorithm.
+    """
+    kinematics = KINEMATICS[name]
+    build = KernelBuilder()
+    state, transition = build.input(kinematics.state), build.input(kinematics.transition)
+    build.output(kinematics.next, kinematics.product(state, transition))
+    return build.kernel(f"{name}-product", f"{kinematics.title}: state after a transition", kinematics.source)

@@ -1,0 +1,88 @@
+"""The sculling term of a step, by duality with coning."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import sympy as sp
+
+from strapgen.catalogue.kernels.attitude_step import chosen
+from strapgen.catalogue.methods import coning_coefficients
+from strapgen.catalogue.methods.coning import _METHODS
+from strapgen.catalogue.methods.method import Method
+from strapgen.catalogue.methods.samples import increments_signal, kept, sample_names
+from strapgen.ir.signals import Signal
+from strapgen.symbolic.evaluation import exact
+from strapgen.symbolic.kernel import Kernel, KernelBuilder
+from strapgen.symbolic.rotations import cross
+
+
+def sculling(method: Method, increments: int, previous: int = 0) -> Kernel:
+    """Derive the sculling term of a step, by duality with the coning coefficients of a method.
+
+    The term is half the integral of (integral of w) x a + (integral of a) x w, in body axes.
+
+    Parameters
+    ----------
+    method : Method
+        A result of the function `method`.
+    increments, previous : int
+        Samples of the step, and samples from before it.
+
+    Returns
+    -------
+    Kernel
+        Inputs ``increments`` in rad and ``velocity_increments`` in m/s, both (previous + increments, 3); output
+        ``sculling`` (3,) in m/s.
+    """
+    form = _METHODS[method.name.removeprefix("coning-")][0]
+    build = KernelBuilder()
+    angles = increments_signal(increments, previous)
+    names = [sample_names(increments, previous, letter) for letter in "dv"]
+    velocities = Signal(
+        "velocity_increments",
+        angles.shape,
+        tuple(f"{name}_{axis}" for name in names[1] for axis in "xyz"),
+        unit="m/s",
+        meaning="velocity increments of the step, body axes, oldest first: exact integrals of the specific force"
+        + kept(previous),
+    )
+    d, v = build.input(angles), build.input(velocities)
+    rows = [d[k, :].T for k in range(d.rows)], [v[k, :].T for k in range(v.rows)]
+    pairs = coning_coefficients.design(increments, previous, form).pairs
+    total = sp.zeros(3, 1)
+    for newer in range(1, d.rows):
+        for levered, crossed, what in ((0, 1, "angle"), (1, 0, "velocity")):
+            weights = {older: c for (older, other), c in pairs.items() if other == newer and c}
+            if not weights:
+                continue
+            name = f"{what}_lever_{names[crossed][newer]}"
+            signal = Signal.vector(
+                name,
+                name,
+                unit=(angles, velocities)[levered].unit,
+                meaning=f"sum of older {what} increments that is crossed with {names[crossed][newer]}",
+            )
+            lever = build.stage(signal, _combined(weights, rows[levered]))
+            total += cross(lever, rows[crossed][newer])
+    build.output(
+        Signal.vector(
+            "sculling", "sculling", unit="m/s", meaning="sculling term of the velocity change, body axes"
+        ),
+        total,
+    )
+    suffix, option, samples_text = chosen(method, increments, previous)
+    samples_text = samples_text.replace("angle ", "angle and velocity ")
+    return build.kernel(
+        f"sculling-{suffix}",
+        f"Sculling term of a step by {form} coning coefficients from {samples_text}",
+        f"{coning_coefficients.SOURCES[form]}; by duality: K. M. Roscoe, J. Guid. Control Dyn. 24 (2001) 201-205",
+        arguments=f"sculling {option}",
+    )
+
+
+def _combined(weights: dict[int, Fraction], vectors: list[sp.Matrix]) -> sp.Matrix:
+    total = sp.zeros(3, 1)
+    for k, c in weights.items():
+        total += exact(c) * vectors[k]
+    return total

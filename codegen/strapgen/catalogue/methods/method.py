@@ -1,0 +1,118 @@
+"""What an integration method is: a function from samples to a transition."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import sympy as sp
+
+from strapgen.catalogue.kinematics import Kinematics
+from strapgen.catalogue.methods import rate_fit
+from strapgen.catalogue.methods.coefficients import Number
+from strapgen.catalogue.methods.samples import Samples
+from strapgen.ir.attitude_step import Order
+from strapgen.ir.signals import Signal
+from strapgen.symbolic.evaluation import exact
+from strapgen.symbolic.kernel import KernelBuilder
+
+#: Signal of the rotation vector of a step.
+PHI = Signal.vector("phi", "phi", unit="rad", meaning="rotation vector of the step")
+
+
+@dataclass(frozen=True)
+class Method:
+    """A method of integrating the attitude over one step.
+
+    Parameters
+    ----------
+    name, title, source : str
+        Name on the command line, name in the literature, citation.
+    order : int
+        Classical order.
+    transition : callable
+        ``transition(build, kinematics, samples)`` writes the stages of the method into a kernel under construction and
+        returns the transition.
+    nodes : tuple of Fraction or Expr
+        Distinct nodes at which the method needs the rate; empty if it needs increments.
+    attitude_order : callable, optional
+        ``attitude_order(degree)``: order on the kinematics of the attitude for a rate that is a polynomial of at
+        most this degree, None for any; by default the classical order.
+    isometry : callable, optional
+        ``isometry(count)``: whether its transition from so many samples, None for rates at the nodes, is a rotation
+        whatever they are; by default it is not.
+    option : str
+        How the command line names it.
+    rotation_vector : callable, optional
+        ``rotation_vector(build, samples)`` writes the stages of the rotation vector of the step and returns it, where
+        the transition is its exponential.
+    limit : callable, optional
+        ``limit(increments, previous)``: order to which these samples can be used; by default that of the polynomial
+        through them.
+    """
+
+    name: str
+    title: str
+    source: str
+    order: int
+    transition: Callable[[KernelBuilder, Kinematics, Samples], sp.Matrix]
+    nodes: tuple[Number, ...] = ()
+    attitude_order: Callable[[int | None], int] | None = None
+    isometry: Callable[[int | None], bool] = lambda count: False
+    option: str = ""
+    rotation_vector: Callable[[KernelBuilder, Samples], sp.Matrix] | None = None
+    limit: Callable[[int, int], int] = rate_fit.step_order
+
+    def step_order(self, increments: int | None, previous: int = 0) -> Order:
+        """Return the order of the step from so many increments, None for rates at the nodes."""
+        of = self.attitude_order or (lambda degree: self.order)
+        attitude = of(None)
+        if increments is None:
+            return Order(self.order, attitude, None, attitude)
+        count = increments + previous
+        step = min(of(count - 1), self.limit(increments, previous))
+        return Order(self.order, attitude, count, step)
+
+
+def exponential(
+    name: str,
+    title: str,
+    source: str,
+    order: int,
+    rotation_vector: Callable[[KernelBuilder, Samples], sp.Matrix],
+    **rest: Any,
+) -> Method:
+    """Return the method whose transition is the exponential of a rotation vector.
+
+    Parameters
+    ----------
+    name, title, source, order
+        As in `Method`.
+    rotation_vector : callable
+        ``rotation_vector(build, samples)`` writes its stages and returns the rotation vector of the step.
+    **rest
+        As in `Method`.
+    """
+
+    def transition(build: KernelBuilder, kinematics: Kinematics, samples: Samples) -> sp.Matrix:
+        return kinematics.exponential(rotation_vector(build, samples))
+
+    return Method(
+        name,
+        title,
+        source,
+        order,
+        transition,
+        isometry=lambda count: True,
+        rotation_vector=rotation_vector,
+        **rest,
+    )
+
+
+def combination(coefficients: Sequence[Number], terms: Sequence[sp.Matrix], like: sp.Matrix) -> sp.Matrix:
+    """Return the sum of terms, each times its coefficient; zero of the shape of `like` if there are none."""
+    total = sp.zeros(*like.shape)
+    for coefficient, term in zip(coefficients, terms, strict=True):
+        total += exact(coefficient) * term
+    return total

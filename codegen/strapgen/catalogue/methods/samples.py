@@ -1,0 +1,164 @@
+"""What a step knows of the rate: angle increments, or rates at nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+
+import sympy as sp
+
+from strapgen.catalogue.methods import rate_fit
+from strapgen.catalogue.methods.coefficients import Number
+from strapgen.ir.attitude_step import Order
+from strapgen.ir.signals import Signal
+from strapgen.symbolic.kernel import KernelBuilder
+
+
+def sample_names(count: int, previous: int = 0, letter: str = "d") -> list[str]:
+    """Return the names of the samples that a step takes, oldest first.
+
+    Parameters
+    ----------
+    count, previous : int
+        Samples of the step itself, and those before it.
+    letter : str, optional
+        What a sample of the step is called.
+
+    Examples
+    --------
+    >>> sample_names(2, previous=1)
+    ['past1', 'd1', 'd2']
+    """
+    past = "past" if letter == "d" else f"past_{letter}"
+    return [f"{past}{k}" for k in range(previous, 0, -1)] + [f"{letter}{k}" for k in range(1, count + 1)]
+
+
+def increments_signal(count: int, previous: int = 0) -> Signal:
+    """Return the signal of the angle increments that a step takes, oldest first.
+
+    Parameters
+    ----------
+    count : int
+        Increments of the step itself.
+    previous : int, optional
+        Increments before the step.
+    """
+    return Signal(
+        "increments",
+        (previous + count, 3),
+        tuple(f"{name}_{axis}" for name in sample_names(count, previous) for axis in "xyz"),
+        unit="rad",
+        meaning="angle increments of the step, body axes, oldest first: exact integrals of the body rate"
+        + kept(previous),
+        bound=Fraction(1),
+    )
+
+
+def kept(previous: int) -> str:
+    """Return what a description of samples says of those before the step."""
+    return f"; the first {previous} are those before the step" if previous else ""
+
+
+def turns_signal(nodes: Sequence[Number]) -> Signal:
+    """Return the signal of the body rates of one step, each times the step length, in the order of the nodes."""
+    return Signal(
+        "turns",
+        (len(nodes), 3),
+        tuple(f"turn_{name}_{axis}" for name in labels(nodes).values() for axis in "xyz"),
+        unit="rad",
+        meaning=f"body rate times the step length, body axes, at nodes {', '.join(map(str, nodes))} of the step",
+        bound=Fraction(1),
+    )
+
+
+def label(node: Number) -> str:
+    """Return a node as part of a name: a short fraction with its numbers, another number with four decimals."""
+    text = str(node)
+    if not isinstance(node, Fraction) or len(text) > 11:
+        text = f"{float(node):.4f}"
+    return text.replace("/", "_").replace(".", "_").replace("-", "minus_")
+
+
+def labels(nodes: Sequence[Number]) -> dict[Number, str]:
+    """Return nodes with a label of its own for each: where two are the same, the later one gets a number."""
+    found: dict[Number, str] = {}
+    for node in dict.fromkeys(nodes):
+        name, number = label(node), 1
+        while name in found.values():
+            number += 1
+            name = f"{label(node)}_{number}"
+        found[node] = name
+    return found
+
+
+class Samples:
+    """What a step is given, and the rate that it knows from that.
+
+    Parameters
+    ----------
+    build : KernelBuilder
+        The kernel under construction; samples are declared as its input.
+    increments : int or None
+        Angle increments a step; None for rates at nodes.
+    previous : int
+        Increments before the step.
+    nodes : sequence of Fraction or Expr
+        Nodes at which the rate is needed, and given where there are no increments.
+    """
+
+    def __init__(
+        self,
+        build: KernelBuilder,
+        increments: int | None,
+        previous: int = 0,
+        nodes: Sequence[Number] = (),
+    ) -> None:
+        self._build = build
+        self._labels = labels(nodes)
+        if increments is None:
+            signal, self.fit = turns_signal(nodes), rate_fit.from_rates(nodes)
+        else:
+            signal = increments_signal(increments, previous)
+            self.fit = rate_fit.from_increments(increments, previous)
+        self._symbols = build.input(signal)
+        self.increments, self.previous = increments, previous
+
+    def order(self, method: int) -> Order:
+        """Return the order of a step by a method of this order on any kinematics."""
+        if self.increments is None:
+            return Order(method, method, None, method)
+        limit = rate_fit.step_order(self.increments, self.previous)
+        return Order(method, method, self.increments + self.previous, min(method, limit))
+
+    def turn(self, node: Number, scale: sp.Expr = sp.S.One) -> sp.Matrix:
+        """Name the rate times the step at a node, times `scale`, which is 1 or 1/2."""
+        half = "half_" if scale == sp.Rational(1, 2) else ""
+        meaning = f"{half.replace('_', ' the ')}rate times the step, at node {node}"
+        return self.combination(
+            f"{half}turn_{self._labels.get(node) or label(node)}", self.fit.at(node), meaning, scale
+        )
+
+    def combination(
+        self, name: str, weights: Sequence[sp.Expr], meaning: str, scale: sp.Expr = sp.S.One
+    ) -> sp.Matrix:
+        """Name a vector that is linear in the samples.
+
+        Parameters
+        ----------
+        name, meaning : str
+        weights : sequence of Expr
+            A weight for every sample.
+        scale : Expr, optional
+            Factor of all weights.
+
+        Returns
+        -------
+        Matrix, 3 x 1
+        """
+        vector = [
+            scale * sp.Add(*(weight * self._symbols[k, axis] for k, weight in enumerate(weights)))
+            for axis in range(3)
+        ]
+        if all(element.is_Symbol for element in vector):  # an input itself
+            return sp.Matrix(vector)
+        return self._build.stage(Signal.vector(name, name, unit="rad", meaning=meaning), vector)

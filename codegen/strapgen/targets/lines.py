@@ -1,0 +1,33 @@
+"""Lines of generated text, filled to a width."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+
+
+def fill(text: str, indent: str, width: int = 100) -> str:
+    """Wrap text at spaces, every line after the first with `indent`."""
+    return "\n".join(
+        textwrap.wrap(text, width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
+    )
+
+
+def fill_expression(text: str, indent: str, width: int = 100) -> str:
+    """Wrap an expression before its sums' signs, every line after the first with `indent`."""
+    return _filled(re.split(r" (?=[+-] )", text), indent, width)
+
+
+def fill_arguments(text: str, indent: str, width: int = 100) -> str:
+    """Wrap a declaration or a call after its commas, every line after the first with `indent`."""
+    return _filled(re.split(r"(?<=,) ", text), indent, width)
+
+
+def _filled(pieces: list[str], indent: str, width: int) -> str:
+    lines: list[str] = []
+    for piece in pieces:
+        if lines and len(lines[-1]) + 1 + len(piece) <= width:
+            lines[-1] += f" {piece}"
+        else:
+            lines.append(f"{indent if lines else ''}{piece}")
+    return "\n".join(lines)
