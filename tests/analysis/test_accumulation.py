@@ -7,11 +7,12 @@ import pytest
 import sympy as sp
 
 from strapgen.analysis.accumulation import accumulate
-from strapgen.analysis.agreement import SETTINGS, agreement, as_text
+from strapgen.analysis.agreement import SETTINGS, agreement
 from strapgen.analysis.error_rate import error_rate
 from strapgen.analysis.motion_rates import TIME
 from strapgen.analysis.series import STEP
 from strapgen.catalogue import ALGORITHMS, MOTIONS, choose, choose_step
+from strapgen.reports.agreement import agreement_text
 from strapgen.simulation.motions import motion
 from strapgen.support.exceptions import InputError
 
@@ -28,7 +29,7 @@ def test_prediction_leaves_the_next_order(name, algorithm, method):
     found = agreement(choose(algorithm, method, 2), motion(name, **SETTINGS[name]), ["1/16", "1/32"], 0.5)
     assert found.slopes[-1] > found.order + found.terms - 0.15
     assert found.rungs[-1].difference < 0.02 * found.rungs[-1].drift
-    assert "slope" in as_text(found)
+    assert "slope" in agreement_text(found)
 
 
 @pytest.mark.long

@@ -11,10 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from strapgen.analysis.constant_rate import constant_rate
-from strapgen.analysis.growth import as_text, contraction, growth, stability
+from strapgen.analysis.growth import contraction, growth, stability
 from strapgen.analysis.motion_rates import TIME, model, parameters
 from strapgen.backends import backend
 from strapgen.catalogue import ALGORITHMS, choose, choose_step
+from strapgen.reports.growth import stability_text
 from strapgen.simulation.motions import motion
 from strapgen.support.exceptions import InputError
 
@@ -87,7 +88,7 @@ def test_runs_grow_as_the_stretch_says(angle):
 
 
 def test_report():
-    text = as_text([stability(choose("dcm", method, 2)) for method in ("rk1", "rk4", "magnus4")])
+    text = stability_text([stability(choose("dcm", method, 2)) for method in ("rk1", "rk4", "magnus4")])
     assert "nowhere" in text
     assert "0 to 2.828" in text
     assert "kept" in text

@@ -6,8 +6,9 @@ import json
 
 import sympy as sp
 
-from strapgen.analysis.overview import as_table, choices, methods, overview
+from strapgen.analysis.overview import choices, methods, overview
 from strapgen.catalogue import METHODS, choose
+from strapgen.reports.overview import overview_text
 
 
 def test_rows():
@@ -20,7 +21,7 @@ def test_rows():
     assert magnus.contractive == "kept"
     # At the step where 544 operations a second do, 68 operations take 1/8 s.
     assert fourth.at_equal_work == fourth.coning_rate()
-    text = as_table(rows)
+    text = overview_text(rows)
     assert "1/1920 x^5" in text
     assert "1/12 w0 x w1" in text
     data = json.loads(json.dumps([row.as_dict() for row in rows]))

@@ -8,8 +8,9 @@ import pytest
 import sympy as sp
 
 from strapgen.analysis.constant_rate import ANGLE, constant_rate
-from strapgen.analysis.ratios import as_latex, as_text, claims, claims_as_text, quotient, versus
+from strapgen.analysis.ratios import claims, quotient, versus
 from strapgen.catalogue import choose
+from strapgen.reports.ratios import claims_text, ratio_latex, ratio_text
 
 R = sp.Rational
 
@@ -26,7 +27,7 @@ def test_the_claims_of_section_8():
         {0: -R(1, 4), 2: R(5, 84)},
         {0: 3, 2: R(51, 35)},
     ]
-    assert "1/4 + 9/80 x^2" in claims_as_text(claims())
+    assert "1/4 + 9/80 x^2" in claims_text(claims())
 
 
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
@@ -61,13 +62,13 @@ def test_steps_of_one_method_on_coning():
 def test_vectors_that_are_not_parallel_have_no_ratio():
     found = versus(choose("euler", "rk2", 2), choose("dcm", "rk2", 2), "general", 1)
     assert found.ratio is None
-    assert "not parallel" in as_text(found)
+    assert "not parallel" in ratio_text(found)
     assert found.as_dict()["ratio"] is None
 
 
 def test_an_exact_step_has_no_ratio():
     found = versus(choose("euler", "magnus4", 2), choose("dcm", "rk4", 2), "constant")
-    assert "euler-magnus4-2 loses nothing" in as_text(found)
+    assert "euler-magnus4-2 loses nothing" in ratio_text(found)
 
 
 def test_quotient_is_the_series_of_the_quotient():
@@ -84,6 +85,6 @@ def test_quotient_is_the_series_of_the_quotient():
 
 
 def test_latex():
-    text = as_latex(versus(choose("euler", "rk1"), choose("dcm", "rk1"), "constant"))
+    text = ratio_latex(versus(choose("euler", "rk1"), choose("dcm", "rk1"), "constant"))
     assert text.startswith("%")
     assert r"\frac{9 x^{2}}{80}" in text

@@ -14,6 +14,7 @@ import strapgen
 from strapgen.backends import BACKENDS
 from strapgen.experiments import comparison
 from strapgen.ir.fixed_settings import Settings
+from strapgen.reports.comparison import comparison_csv, comparison_json, comparison_text
 from strapgen.support.exceptions import InputError
 
 FIXED_NAMES = ("c-q31", "c-q15", "fixed-model")
@@ -91,15 +92,15 @@ def test_names_that_cannot_be_used(backends, reference, said):
 
 def test_the_three_forms_say_the_same(increments):
     rows = comparison.compare("euler", "rk4", 2, ["numpy", "c-q15"], increments)
-    data = json.loads(comparison.as_json(rows))
+    data = json.loads(comparison_json(rows))
     assert [list(row)[:8] for row in data] == [
         ["backend", "max_abs_rad", "rms_rad", "max_ulp", "bound_rad", "drift_deg", "ns_per_step", "bytes"]
     ] * 2
-    table = list(csv.DictReader(io.StringIO(comparison.as_csv(rows))))
+    table = list(csv.DictReader(io.StringIO(comparison_csv(rows))))
     for plain, cells in zip(data, table, strict=True):
         for key, value in plain.items():
             if key != "operations":
                 assert cells[key] == ("" if value is None else str(value))
         assert cells["multiply"] == str(plain["operations"]["multiply"])
-    text = comparison.as_text(rows, "title", "numpy", "drift")
+    text = comparison_text(rows, "title", "numpy", "drift")
     assert text.splitlines()[-1].startswith("c-q15") and f"{rows[1].bound_rad:.3g}" in text

@@ -10,6 +10,7 @@ import pytest
 from strapgen import catalogue
 from strapgen.catalogue import choose
 from strapgen.experiments import conformance
+from strapgen.reports.conformance import finding_text
 from strapgen.support.exceptions import InputError
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "modified_rodrigues.py"
@@ -130,7 +131,7 @@ def test_a_fault_is_found(fault, fails, says, tmp_path):
     if not fails:
         assert failed == []
     assert any(says in finding.text for finding in failed) or not says
-    assert any("FAILS" in conformance.as_text(finding) for finding in found.values()) == bool(fails)
+    assert any("FAILS" in finding_text(finding) for finding in found.values()) == bool(fails)
 
 
 def test_a_step_from_rates_is_refused():

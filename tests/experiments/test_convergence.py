@@ -16,6 +16,7 @@ from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.experiments import convergence
 from strapgen.experiments.convergence import Convergence, Rung, converge
 from strapgen.ir.attitude_step import Order
+from strapgen.reports.convergence import convergence_csv, convergence_text
 from strapgen.support.exceptions import InputError
 
 #: How far an observed order may be from the one of theory: the next term of the series is still there at these steps.
@@ -93,7 +94,7 @@ def test_rounding_that_hides_the_order_is_no_order(coning):
     found = converge(choose("euler", "rk4", 2), coning, ["1/64", "1/128", "1/256"], 1, "c-float")
     assert found.observed is None
     assert not any(rung.used for rung in found.rungs)
-    assert "rounding hides the order on c-float" in convergence.as_text([found], "title")
+    assert "rounding hides the order on c-float" in convergence_text([found], "title")
 
 
 @pytest.mark.long
@@ -159,12 +160,12 @@ FOUND = Convergence(
 
 
 def test_reports_have_every_figure():
-    text = convergence.as_text([FOUND] * 5, "A title")
+    text = convergence_text([FOUND] * 5, "A title")
     assert text.startswith("A title\n")
     assert text.count("euler-butcher6-3") == 10  # a heading and a note each, four side by side and one below
     assert "out of range" in text and "6.250e-04 (4.00)*" in text
     assert "method order 6, rate extraction order 3: the step is of order 4" in text
-    rows = list(csv.DictReader(io.StringIO(convergence.as_csv([FOUND]))))
+    rows = list(csv.DictReader(io.StringIO(convergence_csv([FOUND]))))
     assert [row["error_rad"] for row in rows] == ["", "0.01", "0.000625"]
     assert {row["predicted_order"] for row in rows} == {"4"}
     data = json.loads(json.dumps(FOUND.as_dict()))

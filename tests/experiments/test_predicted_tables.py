@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from strapgen.experiments.predicted_tables import as_text, predicted
+from strapgen.experiments.predicted_tables import predicted
 from strapgen.experiments.thesis_tables import TABLES
+from strapgen.reports.predicted_tables import predicted_text
 
 
 @pytest.mark.long
@@ -17,4 +18,4 @@ def test_every_figure_is_predicted(table):
         assert abs(entry.deviation) < 3e-3, entry
         assert abs(entry.drift_deg / entry.simulated_deg - 1) < 3e-3, entry
         assert entry.agrees, entry
-    assert f"Table {table.number}" in as_text(found)
+    assert f"Table {table.number}" in predicted_text(found)

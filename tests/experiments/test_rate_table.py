@@ -7,8 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from strapgen.experiments.rate_table import MOTIONS, angles, as_text, stress
+from strapgen.experiments.rate_table import MOTIONS, angles, stress
 from strapgen.ir.fixed_settings import Settings
+from strapgen.reports.rate_table import rate_table_text
 from strapgen.support.exceptions import InputError
 
 
@@ -57,7 +58,7 @@ def test_two_speeds():
     names = [(backend, f"{name} two-speed") for name in ("dcm", "euler") for backend in ("numpy", "c")]
     assert [(row.backend, row.algorithm) for row in rows] == names * 2
     assert all(row.drift_deg < 1e-9 for row in rows)
-    text = as_text(rows, "4", "0.01")
+    text = rate_table_text(rows, "4", "0.01")
     assert "oscillating; pitch up to" in text
 
 

@@ -8,8 +8,9 @@ import io
 import pytest
 
 from strapgen.experiments import word_length
-from strapgen.experiments.word_length import as_csv, as_text, cases, run, run_case
+from strapgen.experiments.word_length import cases, run, run_case
 from strapgen.reports import plots
+from strapgen.reports.word_length import word_length_csv, word_length_text
 from strapgen.support.exceptions import InputError
 
 SMALL = {"duration": "5", "words": (12, 16, 24), "carries": ("none", "full")}
@@ -58,15 +59,15 @@ def test_a_run_that_leaves_its_range_is_told():
     (outcome,) = run(cases(methods=("rk1",), words=(16,), carries=("none",), steps=("0.5",), duration="180"))
     assert outcome.drift_deg is None and outcome.rounding_deg is None
     assert outcome.dominates == "range"
-    assert " - " in as_text([outcome])
+    assert " - " in word_length_text([outcome])
 
 
 def test_forms(outcomes):
-    rows = list(csv.DictReader(io.StringIO(as_csv(outcomes))))
+    rows = list(csv.DictReader(io.StringIO(word_length_csv(outcomes))))
     assert len(rows) == len(outcomes)
     assert float(rows[0]["rounding_deg"]) == outcomes[0].rounding_deg
     assert rows[0]["settings"] == "a_deg_s=10 b_deg_s=10 g_deg_s=10"
-    text = as_text(outcomes)
+    text = word_length_text(outcomes)
     assert text.count("the method itself drifts by") == 2
     assert "pulses of 30 arcsec" in text
 

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -268,27 +267,3 @@ def stability(choice: Choice) -> Stability:
     """
     closed_form = constant_rate(choice)
     return Stability(closed_form.kernel, closed_form.stretch_squared, contraction(closed_form))
-
-
-def as_intervals(found: Sequence[tuple[float, float | None]] | None) -> str:
-    """Return intervals as text.
-
-    Examples
-    --------
-    >>> as_intervals([(0.0, 2.8284271)]), as_intervals([]), as_intervals(None)
-    ('0 to 2.828', 'nowhere', 'kept')
-    """
-    if found is None:
-        return "kept"
-    parts = [f"{low:.4g} up" if high is None else f"{low:.4g} to {high:.4g}" for low, high in found]
-    return ", ".join(parts) or "nowhere"
-
-
-def as_text(found: Sequence[Stability]) -> str:
-    """Return stabilities as a table."""
-    width = max(len(one.kernel) for one in found)
-    lines = [f"{'step':<{width}}  {'x at which no state grows':<26}  square of the stretch, x = |w| h"]
-    for one in found:
-        where = as_intervals(one.contractive)
-        lines.append(f"{one.kernel:<{width}}  {where:<26}  {sp.sstr(one.stretch_squared)}")
-    return "\n".join(lines)

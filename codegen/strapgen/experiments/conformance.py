@@ -328,9 +328,3 @@ def _restoring(choice: Choice, step: _Precise) -> Finding:
     allowed = 2 * before**2 + _UNITS_A_STEP * ready.unit
     text = f"C C' departs from the unit matrix by {before:.3g} before, {after:.3g} after"
     return Finding(name, after <= allowed, text, after, allowed)
-
-
-def as_text(finding: Finding) -> str:
-    """Return a finding as a line of a report."""
-    words = {True: "holds", False: "FAILS", None: "-"}
-    return f"  {words[finding.holds]:<6}{finding.name:<18}  {finding.text}"

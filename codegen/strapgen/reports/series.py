@@ -10,11 +10,12 @@ import sympy as sp
 
 from strapgen.analysis.accumulation import RunDrift, accumulate
 from strapgen.analysis.constant_rate import ConstantRate, constant_rate
-from strapgen.analysis.growth import Growth, as_intervals, contraction, growth
+from strapgen.analysis.growth import Growth, contraction, growth
 from strapgen.analysis.invariants import LATEX, as_text, scalar_as_text
 from strapgen.analysis.motion_rates import is_plain
 from strapgen.analysis.series import PARTS, STEP, ErrorSeries, series
 from strapgen.catalogue import Choice
+from strapgen.reports.growth import intervals_text
 from strapgen.support.exceptions import InputError
 
 
@@ -137,7 +138,7 @@ def as_report(found: Report) -> str:
             "in closed form, x = |w| h",
             f"angle lost in a step = {sp.sstr(constant.angle_lost)}",
             f"square of the stretch across the axis = {sp.sstr(constant.stretch_squared)}",
-            f"no state grows where x is: {as_intervals(contraction(constant))}",
+            f"no state grows where x is: {intervals_text(contraction(constant))}",
             "after N steps the drift is stretch^N sin(N angle lost) along w; orthonormalized sin(N angle lost)",
         ]
     lines += ["", *_growth_lines(found.growth)]

@@ -39,6 +39,7 @@ def check(
     choice = chosen(algorithm, method, tableau, increments, previous)
     from strapgen import catalogue
     from strapgen.experiments import conformance
+    from strapgen.reports.conformance import finding_text
 
     kernel = catalogue.derive(choice)
     if format == "text":
@@ -47,7 +48,7 @@ def check(
     for finding in conformance.check(choice):
         findings.append(finding)
         if format == "text":
-            typer.echo(conformance.as_text(finding))
+            typer.echo(finding_text(finding))
     failed = [finding.name for finding in findings if finding.holds is False]
     if format == "json":
         print_json(

@@ -129,6 +129,7 @@ def compare(
     import numpy as np
 
     from strapgen.experiments import comparison
+    from strapgen.reports.comparison import comparison_csv, comparison_json, comparison_text
 
     with np.errstate(all="ignore"):  # numbers that overflow are refused, in one line
         inputs = read_inputs(
@@ -154,12 +155,12 @@ def compare(
             settings=read_settings(samples, **stated, step=length),
         )
     if format == "json":
-        text = comparison.as_json(rows)
+        text = comparison_json(rows)
     elif format == "csv":
-        text = comparison.as_csv(rows)
+        text = comparison_csv(rows)
     else:
         drift = "drift from the truth" if inputs.truth is not None else f"drift from {reference}"
-        text = comparison.as_text(rows, f"{choice.kernel}: {inputs.title}", reference, drift)
+        text = comparison_text(rows, f"{choice.kernel}: {inputs.title}", reference, drift)
     text = text.rstrip("\n")
     if out is None:
         typer.echo(text)

@@ -112,6 +112,7 @@ def converge(
     import numpy as np
 
     from strapgen.experiments import convergence
+    from strapgen.reports.convergence import convergence_csv, convergence_text
     from strapgen.simulation import motions
     from strapgen.simulation.motions import motion as make_motion
     from strapgen.support.files import write_files
@@ -127,9 +128,9 @@ def converge(
     if format == "json":
         text = json.dumps([one.as_dict() for one in found])
     elif format == "csv":
-        text = convergence.as_csv(found).rstrip("\n")
+        text = convergence_csv(found).rstrip("\n")
     else:
-        text = convergence.as_text(found, title)
+        text = convergence_text(found, title)
     files: dict[str, str | bytes] = {}
     if out is not None:
         files[str(out)] = f"{text}\n"

@@ -182,6 +182,7 @@ def _emit(text: str, data: Any, format: str, out: Path | None, files: dict[str, 
 def _overview(algorithm: _Text, method: _Text, format: str) -> tuple[str, Any]:
     from strapgen import catalogue
     from strapgen.analysis import overview
+    from strapgen.reports.overview import overview_text
     from strapgen.support import checks
 
     if format == "latex":
@@ -198,14 +199,15 @@ def _overview(algorithm: _Text, method: _Text, format: str) -> tuple[str, Any]:
     if not choices:
         raise InputError("--method names no method")
     rows = list(track(overview.overview(choices), "deriving", len(choices)))
-    return overview.as_table(rows), [row.as_dict() for row in rows]
+    return overview_text(rows), [row.as_dict() for row in rows]
 
 
 def _versus(first: Choice, second: Choice, motion: str, count: int | None, format: str) -> tuple[str, Any]:
     from strapgen.analysis import ratios
+    from strapgen.reports.ratios import ratio_latex, ratio_text
 
     found = ratios.versus(first, second, motion, 2 if count is None else count)
-    return ratios.as_latex(found) if format == "latex" else ratios.as_text(found), found.as_dict()
+    return ratio_latex(found) if format == "latex" else ratio_text(found), found.as_dict()
 
 
 def _plotted(

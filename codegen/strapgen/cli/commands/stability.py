@@ -51,6 +51,7 @@ def stability(
         enough = str(catalogue.enough(name)) if ours and name else None
         choices.append(chosen(algorithm, name, None, enough, None))
     from strapgen.analysis import growth
+    from strapgen.reports.growth import stability_text
 
     found = [growth.stability(choice) for choice in choices]
     if plot is not None:
@@ -61,4 +62,4 @@ def stability(
     if format == "json":
         print_json([one.as_dict() for one in found])
         return
-    typer.echo(growth.as_text(found))
+    typer.echo(stability_text(found))

@@ -48,6 +48,7 @@ def stress(
     """
     check_format(format)
     from strapgen.experiments import rate_table as test
+    from strapgen.reports.rate_table import rate_table_text
 
     def names(option: str, value: str | None, default: tuple[str, ...]) -> tuple[str, ...]:
         if value is None:
@@ -66,4 +67,4 @@ def stress(
     if format == "json":
         print_json([row.as_dict() for row in rows])
     else:
-        typer.echo(test.as_text(rows, duration, sample))
+        typer.echo(rate_table_text(rows, duration, sample))

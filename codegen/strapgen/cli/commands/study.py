@@ -98,7 +98,8 @@ def word_length(
 
     import numpy as np
 
-    from strapgen.experiments.word_length import as_csv, as_text, cases, run
+    from strapgen.experiments.word_length import cases, run
+    from strapgen.reports.word_length import word_length_csv, word_length_text
     from strapgen.support.files import write_files
 
     planned = cases(
@@ -126,9 +127,9 @@ def word_length(
     if format == "json":
         text = json.dumps([outcome.as_dict() for outcome in outcomes])
     elif format == "csv":
-        text = as_csv(outcomes).rstrip("\n")
+        text = word_length_csv(outcomes).rstrip("\n")
     else:
-        text = as_text(outcomes)
+        text = word_length_text(outcomes)
     files: dict[str, str | bytes] = {}
     if out is not None:
         files[str(out)] = f"{text}\n"

@@ -72,6 +72,8 @@ def _predict(format: str) -> None:
     from strapgen.analysis import ratios
     from strapgen.experiments import predicted_tables
     from strapgen.experiments.thesis_tables import ALGORITHMS, ORDERS, TABLES
+    from strapgen.reports.predicted_tables import predicted_text
+    from strapgen.reports.ratios import claims_text
 
     cases = len(TABLES) * len(ALGORITHMS) * len(ORDERS)
     found = list(track(predicted_tables.predicted(), "predicting", cases))
@@ -84,8 +86,8 @@ def _predict(format: str) -> None:
             }
         )
         return
-    typer.echo(predicted_tables.as_text(found))
-    typer.echo(ratios.claims_as_text(claims))
+    typer.echo(predicted_text(found))
+    typer.echo(claims_text(claims))
 
 
 def _runnable() -> tuple[str, ...]:
