@@ -1,72 +1,308 @@
-"""Imports point one way: the README's table of the architecture, read as the order of layers."""
+"""The rules of the house: where modules live, which way imports point, how long things get, what they are called."""
 
 from __future__ import annotations
 
 import ast
 import re
+import subprocess
+import sys
+from collections import Counter, defaultdict
+from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
-
-from gathering import each
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "codegen" / "strapgen"
 
+#: The folders of the package from the ground up, and the front door among them: each imports what stands before it.
+ORDER = (
+    "support",
+    "ir",
+    "symbolic",
+    "fixedpoint",
+    "catalogue",
+    "lowering",
+    "targets",
+    "pipeline",
+    "library",
+    "toolchain",
+    "backends",
+    "simulation",
+    "analysis",
+    "vibration",
+    "experiments",
+    "reports",
+    "cli",
+)
+#: Folders that import without SymPy: what is in the cache runs without computer algebra.
+WITHOUT_SYMPY = (
+    *("support", "ir", "fixedpoint", "targets", "library", "toolchain", "backends", "simulation"),
+    *("cli", "catalogue/__init__.py", "catalogue/names.py", "catalogue/choice.py", "catalogue/choosing.py"),
+)
+#: The stages, by the module that has them.
+STAGES = {
+    "strapgen.catalogue.derivation": "derive",
+    "strapgen.lowering": "lower",
+    "strapgen.fixedpoint": "quantize",
+    "strapgen.targets": "emit",
+}
+#: How a stage reads where its module is imported.
+CALLS = {(module.rpartition(".")[2], name): name for module, name in STAGES.items()} | {
+    ("catalogue", "derive"): "derive"
+}
+MOST_LINES = 400
+MOST_BODY = 60
+MOST_COMMAND_BODY = 40
+MOST_PARAMETERS = 8
+MOST_ENTRIES = 26
+BANNED_MODULES = {"utils", "helpers", "common", "misc", "numpy", *sys.stdlib_module_names}
+BANNED_IDENTIFIERS = {
+    *("made", "found", "given", "taken", "kept", "asked", "wanted", "own", "ready"),
+    *("residual", "residuals", "companions"),
+}
 
-def layers() -> dict[str, int]:
-    """Return the row of the README's table in which each module or folder of the package stands."""
-    readme = (ROOT / "README.md").read_text()
-    rows = re.findall(r"^\| (`.*?) \| ", readme.split("## Architecture")[1], flags=re.MULTILINE)
-    names = [re.findall(r"`(\w+)(?:\.py|/)`", row.split("with")[0]) for row in rows]
-    return {name: row for row, members in enumerate(names) for name in members}
+
+def module_name(path: Path) -> str:
+    parts = ("strapgen", *path.relative_to(PACKAGE).with_suffix("").parts)
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
-LAYERS = layers()
+FILES = sorted(PACKAGE.rglob("*.py"))
+MODULES = {module_name(path): path for path in FILES}
 
 
-def part(module: str) -> str:
-    return module.removeprefix("strapgen.").split(".")[0]
+@cache
+def tree(path: Path) -> ast.Module:
+    return ast.parse(path.read_text())
 
 
-def imported(path: Path) -> set[str]:
-    """Return the parts of the package that a file imports, inside functions too."""
-    found = set()
-    for node in ast.walk(ast.parse(path.read_text())):
+def imports(path: Path) -> Iterator[str]:
+    """Yield the modules of the package that a file imports, inside functions and for types too."""
+    for node in ast.walk(tree(path)):
         if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "strapgen":
-            if node.module == "strapgen":
-                found |= {alias.name for alias in node.names if alias.name in LAYERS}
-            else:
-                found.add(part(node.module))
+            for alias in node.names:
+                full = f"{node.module}.{alias.name}"
+                yield full if full in MODULES else node.module
         elif isinstance(node, ast.Import):
-            found |= {part(a.name) for a in node.names if a.name.startswith("strapgen.")}
-    return found
+            yield from (alias.name for alias in node.names if alias.name.split(".")[0] == "strapgen")
 
 
-def test_every_part_stands_in_the_table():
-    parts = {
-        path.stem for path in PACKAGE.iterdir() if path.suffix == ".py" or (path / "__init__.py").is_file()
+def room(module: str) -> str:
+    return (*module.split("."), "")[1]
+
+
+def place(path: Path) -> str:
+    return path.relative_to(PACKAGE).as_posix()
+
+
+def functions(path: Path) -> Iterator[ast.FunctionDef]:
+    return (node for node in ast.walk(tree(path)) if isinstance(node, ast.FunctionDef))
+
+
+def body_lines(function: ast.FunctionDef) -> int:
+    """Return the lines of a function without its signature and its docstring."""
+    body = function.body[1:] if ast.get_docstring(function) is not None else function.body
+    return body[-1].end_lineno - body[0].lineno + 1 if body else 0
+
+
+def commands(path: Path) -> set[str]:
+    """Return the functions of a module that are commands: those whose parameters Typer reads."""
+    return (
+        {f.name for f in functions(path) if not f.name.startswith("_")} if "commands" in path.parts else set()
+    )
+
+
+def circle(graph: dict[str, set[str]]) -> list[str]:
+    """Return the modules of one circle of imports; empty if there is none."""
+    done: set[str] = set()
+
+    def visit(module: str, trail: list[str]) -> list[str]:
+        if module in trail:
+            return [*trail[trail.index(module) :], module]
+        if module in done:
+            return []
+        done.add(module)
+        return next(filter(None, (visit(other, [*trail, module]) for other in sorted(graph[module]))), [])
+
+    return next(filter(None, (visit(module, []) for module in sorted(graph))), [])
+
+
+def test_the_top_of_the_package_holds_the_folders_and_the_front_door_alone():
+    entries = {path.name for path in PACKAGE.iterdir() if path.name != "__pycache__"}
+    folders = set(ORDER) - {"pipeline"}
+    assert entries == folders | {"__init__.py", "__main__.py", "pipeline.py", "py.typed"}
+
+
+def test_the_page_on_architecture_has_a_row_for_every_folder():
+    table = (ROOT / "README.md").read_text().split("## Architecture")[1]
+    rows = re.findall(r"^\| `(\w+)(?:\.py|/)`", table, flags=re.MULTILINE)
+    assert tuple(rows) == ORDER
+
+
+def test_no_folder_holds_more_than_a_reader_takes_in():
+    folders = [PACKAGE, *(path for path in PACKAGE.iterdir() if path.is_dir() and path.name != "__pycache__")]
+    counts = {
+        folder.name: sum(
+            1
+            for entry in folder.iterdir()
+            if entry.is_dir() or entry.suffix == ".py"
+            if entry.name != "__pycache__"
+        )
+        for folder in folders
     }
-    assert parts - {"__init__", "__main__"} == set(LAYERS)
+    assert not {name: count for name, count in counts.items() if count > MOST_ENTRIES}
 
 
-@each("path", sorted(PACKAGE.rglob("*.py")), ids=lambda p: p.relative_to(PACKAGE).as_posix())
-def test_imports_point_up_the_table(path):
-    own = path.relative_to(PACKAGE).parts[0].removesuffix(".py")
-    if own in ("__init__", "__main__"):  # the package's front offers everything
-        return
-    later = {name for name in imported(path) if LAYERS[name] > LAYERS[own]}
-    assert not later, f"{own} imports {later}, which stand below it"
+def test_imports_point_down():
+    upward = []
+    for module, path in MODULES.items():
+        if room(module) not in ORDER:  # the package's front, which offers everything
+            continue
+        for other in imports(path):
+            if other == "strapgen":
+                if room(module) != "cli":
+                    upward.append(f"{module} imports the package itself")
+            elif ORDER.index(room(other)) > ORDER.index(room(module)):
+                upward.append(f"{module} imports {other}")
+    assert not upward, "\n".join(upward)
+
+
+def test_imports_form_no_circle():
+    graph = {
+        module: {other for other in imports(path) if other in MODULES and other != module}
+        for module, path in MODULES.items()
+        if room(module) in ORDER
+    }
+    graph = {module: {other for other in others if other in graph} for module, others in graph.items()}
+    assert not (modules := circle(graph)), " imports ".join(modules)
+
+
+def test_a_circle_is_seen():
+    assert circle({"a": {"b"}, "b": {"c"}, "c": {"b"}}) == ["b", "c", "b"]
+    assert circle({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == []
 
 
 def test_sympy_ends_at_the_gate():
-    for name in (
-        "program.py",
-        "signal.py",
-        "companions.py",
-        "targets",
-        "backends",
-        "cache.py",
-        "simulation.py",
-    ):
-        files = (PACKAGE / name).rglob("*.py") if (PACKAGE / name).is_dir() else [PACKAGE / name]
-        for path in files:
-            assert not re.search(r"^\s*(import|from) sympy", path.read_text(), flags=re.MULTILINE), path
+    prefixes = tuple(f"{name}/" for name in WITHOUT_SYMPY)
+    names = [
+        m for m, path in MODULES.items() if place(path).startswith(prefixes) or place(path) in WITHOUT_SYMPY
+    ]
+    assert len(names) > 50
+    lines = ["import sys, importlib", "sys.modules['sympy'] = None", f"for name in {names!r}:"]
+    code = "\n".join([*lines, "    importlib.import_module(name)"])
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_only_the_front_door_calls_two_stages():
+    offenders = []
+    for module, path in MODULES.items():
+        called = set()
+        for node in ast.walk(tree(path)):
+            if isinstance(node, ast.ImportFrom) and node.module in STAGES:
+                called |= {alias.name for alias in node.names if alias.name == STAGES[node.module]}
+            elif isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+                called |= {name for name in {CALLS.get((node.value.id, node.attr))} if name}
+        if len(called) > 1 and module != "strapgen.pipeline":
+            offenders.append(f"{module} calls {', '.join(sorted(called))}")
+    assert not offenders, "\n".join(offenders)
+
+
+def test_only_reports_and_the_command_line_lay_out_text():
+    offenders = []
+    for path in FILES:
+        if path.relative_to(PACKAGE).parts[0] in ("reports", "cli"):
+            continue
+        for node in ast.walk(tree(path)):
+            if isinstance(node, ast.Attribute) and node.attr in ("ljust", "rjust", "writerow", "writerows"):
+                offenders.append(f"{place(path)}:{node.lineno} {node.attr}")
+            elif isinstance(node, ast.FormattedValue) and node.format_spec is not None:
+                parts = node.format_spec.values
+                if parts and isinstance(parts[0], ast.Constant) and re.match(r"[<>^]", str(parts[0].value)):
+                    offenders.append(f"{place(path)}:{node.lineno} aligns")
+            elif isinstance(node, ast.FunctionDef) and node.name in ("as_text", "as_csv", "as_markdown"):
+                offenders.append(f"{place(path)}:{node.lineno} {node.name}")
+    assert not offenders, "\n".join(offenders)
+
+
+def test_modules_fit_on_a_few_screens():
+    long = {place(path): n for path in FILES if (n := len(path.read_text().splitlines())) > MOST_LINES}
+    assert not long
+
+
+def test_functions_can_be_held_in_mind():
+    long = []
+    for path in FILES:
+        for function in functions(path):
+            most = MOST_COMMAND_BODY if function.name in commands(path) else MOST_BODY
+            if (lines := body_lines(function)) > most:
+                long.append(f"{place(path)}:{function.lineno} {function.name}: {lines} lines, {most} allowed")
+    assert not long, "\n".join(long)
+
+
+def test_signatures_are_short():
+    long = []
+    for path in FILES:
+        for function in functions(path):
+            arguments = function.args
+            count = len([*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs])
+            if count > MOST_PARAMETERS and function.name not in commands(path):
+                long.append(f"{place(path)}:{function.lineno} {function.name}: {count} parameters")
+    assert not long, "\n".join(long)
+
+
+def test_no_module_is_named_as_a_known_one_or_says_nothing():
+    parts = {(place(path), part) for path in FILES for part in Path(place(path)).with_suffix("").parts}
+    assert not sorted(where for where, part in parts if part in BANNED_MODULES)
+
+
+def test_no_class_name_stands_twice():
+    where = defaultdict(list)
+    for path in FILES:
+        for node in ast.walk(tree(path)):
+            if isinstance(node, ast.ClassDef):
+                where[node.name].append(place(path))
+    assert not {name: places for name, places in where.items() if len(places) > 1}
+
+
+def names_of_things(path: Path) -> Iterator[tuple[int, str]]:
+    """Yield the names that a file gives to variables, parameters and private fields, with their lines.
+
+    Public parameters and fields keep their names: those of functions and classes without an underscore.
+    """
+    public = {
+        id(argument)
+        for function in functions(path)
+        if not function.name.startswith("_") or function.name == "__init__"
+        for argument in (*function.args.posonlyargs, *function.args.args, *function.args.kwonlyargs)
+    }
+    for node in ast.walk(tree(path)):
+        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            yield node.lineno, node.id
+        elif isinstance(node, ast.arg) and id(node) not in public:
+            yield node.lineno, node.arg
+        elif (
+            isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store) and node.attr.startswith("_")
+        ):
+            yield node.lineno, node.attr.lstrip("_")
+        elif isinstance(node, ast.alias) and node.asname:
+            yield node.lineno, node.asname
+
+
+def test_names_say_what_things_are():
+    offenders = []
+    for path in FILES:
+        fields = {
+            id(statement.target)
+            for node in ast.walk(tree(path))
+            if isinstance(node, ast.ClassDef)
+            for statement in node.body
+            if isinstance(statement, ast.AnnAssign)
+        }
+        stored = {
+            (n.lineno, n.id) for n in ast.walk(tree(path)) if isinstance(n, ast.Name) and id(n) in fields
+        }
+        for line, name in names_of_things(path):
+            if name in BANNED_IDENTIFIERS and (line, name) not in stored:
+                offenders.append(f"{place(path)}:{line} {name}")
+    counts = Counter(offender.split()[1] for offender in offenders)
+    assert not offenders, f"{len(offenders)} names, {dict(counts)}:\n" + "\n".join(offenders)

@@ -45,7 +45,8 @@ def test_neither_numpy_nor_sympy_is_loaded_with_the_package():
 def test_every_name_is_there_whatever_was_imported_before():
     for name in strapgen.__all__:
         assert getattr(strapgen, name) is not None
-    after = "import strapgen.cli, strapgen.backends.two_speed, strapgen.experiments.conformance, strapgen.vibration.spectrum, strapgen as s"
+    modules = ("cli", "backends.two_speed", "experiments.conformance", "vibration.spectrum")
+    after = f"import {', '.join(f'strapgen.{module}' for module in modules)}, strapgen as s"
     kinds = in_a_new_process(f"{after}; print(*(n + ':' + type(getattr(s, n)).__name__ for n in s.__all__))")
     assert kinds.split() == [f"{name}:{type(getattr(strapgen, name)).__name__}" for name in strapgen.__all__]
 
@@ -66,15 +67,18 @@ def test_what_type_checkers_see_is_what_python_loads():
     )
     seen = {}
     for statement in block.body:
+        if isinstance(statement, ast.Assign):  # a namespace that has another name than its module
+            (target,) = statement.targets
+            seen[target.id] = seen.pop(statement.value.id)
+            continue
         assert isinstance(statement, ast.ImportFrom) and statement.level == 0
         for alias in statement.names:
-            assert alias.asname == alias.name, "without it, a strict checker does not see the name"
-            seen[alias.name] = statement.module.removeprefix("strapgen").lstrip(".")
-    loaded = dict(strapgen._EXPORTS)
-    for name, module in strapgen._NAMESPACES.items():
-        folder, _, last = module.rpartition(".")
-        assert last == name
-        loaded[name] = folder
+            module = statement.module.removeprefix("strapgen").lstrip(".")
+            private = alias.asname == f"_{alias.name}"
+            assert private or alias.asname == alias.name, "a strict checker does not see the name"
+            full = f"{module}.{alias.name}".lstrip(".")
+            seen[alias.asname] = full if private or full in strapgen._NAMESPACES.values() else module
+    loaded = dict(strapgen._EXPORTS) | dict(strapgen._NAMESPACES)
     assert seen == loaded
     assert ["__version__", *loaded] == strapgen.__all__
     assert len(loaded) == len(strapgen._EXPORTS) + len(strapgen._NAMESPACES)

@@ -12,13 +12,14 @@ __version__ = "0.1.0"
 # For type checkers; a test holds it against the table below, from which Python loads a name when it is first used.
 if _typing.TYPE_CHECKING:
     from strapgen import vibration as vibration
-    from strapgen.backends import BACKENDS as BACKENDS
     from strapgen.backends import Backend as Backend
     from strapgen.backends import Evaluator as Evaluator
     from strapgen.backends import backend as backend
+    from strapgen.backends import build as build
     from strapgen.backends import evaluator as evaluator
     from strapgen.backends import exact as exact
-    from strapgen.backends import increments as gyro
+    from strapgen.backends import increments as _increments
+    from strapgen.backends.registry import BACKENDS as BACKENDS
     from strapgen.backends.two_speed import TwoSpeed as TwoSpeed
     from strapgen.catalogue import Choice as Choice
     from strapgen.catalogue import choose as choose
@@ -33,7 +34,7 @@ if _typing.TYPE_CHECKING:
     from strapgen.catalogue.methods.samples import increments_signal as increments_signal
     from strapgen.catalogue.methods.tableau import Tableau as Tableau
     from strapgen.catalogue.methods.tableaux import TABLEAUX as TABLEAUX
-    from strapgen.experiments import word_length as study
+    from strapgen.experiments import word_length as _word_length
     from strapgen.experiments.comparison import Comparison as Comparison
     from strapgen.experiments.comparison import compare as compare
     from strapgen.experiments.conformance import Finding as Finding
@@ -49,7 +50,6 @@ if _typing.TYPE_CHECKING:
     from strapgen.ir.recursion import Recursion as Recursion
     from strapgen.ir.signals import Signal as Signal
     from strapgen.ir.sources import Sources as Sources
-    from strapgen.pipeline import build as build
     from strapgen.pipeline import derive as derive
     from strapgen.pipeline import generate as generate
     from strapgen.pipeline import lower as lower
@@ -73,22 +73,27 @@ if _typing.TYPE_CHECKING:
     from strapgen.support.exceptions import InputTypeError as InputTypeError
     from strapgen.support.exceptions import MissingExtraError as MissingExtraError
     from strapgen.support.exceptions import StrapgenError as StrapgenError
-    from strapgen.symbolic import rotations as algebra
+    from strapgen.symbolic import rotations as _rotations
     from strapgen.symbolic.kernel import Kernel as Kernel
     from strapgen.symbolic.kernel import KernelBuilder as KernelBuilder
     from strapgen.symbolic.kernel import Stage as Stage
     from strapgen.symbolic.kernel import resolution as resolution
     from strapgen.targets import TARGETS as TARGETS
 
+    algebra = _rotations
+    gyro = _increments
+    study = _word_length
+
 #: Public names by the modules that define them.
 _NAMES = {
     "backends": (
-        "BACKENDS",
         "Backend",
         "Evaluator",
         "backend",
+        "build",
         "evaluator",
     ),
+    "backends.registry": ("BACKENDS",),
     "backends.two_speed": ("TwoSpeed",),
     "catalogue": (
         "Choice",
@@ -131,7 +136,6 @@ _NAMES = {
     "ir.signals": ("Signal",),
     "ir.sources": ("Sources",),
     "pipeline": (
-        "build",
         "derive",
         "generate",
         "lower",

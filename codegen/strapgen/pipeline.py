@@ -30,7 +30,6 @@ from strapgen.support import stages
 from strapgen.support.exceptions import InputTypeError
 
 if TYPE_CHECKING:
-    from strapgen.backends import Backend
     from strapgen.catalogue.methods.tableau import Tableau
     from strapgen.symbolic.kernel import Kernel
 
@@ -173,35 +172,6 @@ def generate(program: Program | FixedProgram, target: str, settings: Settings | 
         )
     _require_settings(settings)
     return targets.emit(program, target, settings)
-
-
-def build(sources: Sources) -> Backend:
-    """Turn the sources of an attitude step into a back end; C is compiled, once.
-
-    Parameters
-    ----------
-    sources : Sources
-
-    Returns
-    -------
-    Backend
-
-    Raises
-    ------
-    InputError
-        If the sources are of no attitude step.
-    CompilerError
-        If a C compiler is needed and there is none, or it fails.
-
-    Examples
-    --------
-    >>> build(generate(lower(derive("euler")), "numpy")).name
-    'numpy'
-    """
-    from strapgen.backends import build as build_backend
-
-    stages.require("build", sources, Sources)
-    return build_backend(sources)
 
 
 def _require_settings(settings: Any) -> None:

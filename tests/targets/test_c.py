@@ -24,7 +24,7 @@ from strapgen.catalogue import standard
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
 from strapgen.targets import emit
-from strapgen.targets.c import emit
+from strapgen.targets.c.emit import DOUBLE, FLOAT, CPrinter
 from strapgen.toolchain.compiler import C_FLAGS
 
 STRICT = ["-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-Werror", "-pedantic"]
@@ -529,18 +529,18 @@ wide = st.builds(
 @example(Fraction(10**22))
 @example(Fraction(1, 10**40))
 def test_literals_are_rounded_once(value):
-    assert read(emit.CPrinter(emit.DOUBLE).constant(value)) == nearest_double(value)
-    assert read(emit.CPrinter(emit.FLOAT).constant(value)) == nearest_single(value)
+    assert read(CPrinter(DOUBLE).constant(value)) == nearest_double(value)
+    assert read(CPrinter(FLOAT).constant(value)) == nearest_single(value)
 
 
 def test_the_trap_is_one():
     assert nearest_single(TRAP) == 1 + Fraction(1, 2**23)
     assert nearest_single(nearest_double(TRAP)) == 1
-    assert emit.CPrinter(emit.FLOAT).constant(TRAP) == "1.0000001f"
+    assert CPrinter(FLOAT).constant(TRAP) == "1.0000001f"
 
 
 def test_a_tie_goes_to_even():
-    printer = emit.CPrinter(emit.FLOAT)
+    printer = CPrinter(FLOAT)
     assert read(printer.constant(1 + Fraction(1, 2**24))) == 1
     assert read(printer.constant(1 + Fraction(3, 2**24))) == 1 + Fraction(1, 2**22)
 
@@ -549,8 +549,8 @@ def test_compiler_reads_literals_as_meant(tmp_path):
     needed("gcc")
     values = [TRAP, *(Fraction(top, bottom) for top in range(1, 40) for bottom in (3, 7, 24, 720, 99991))]
     lines = []
-    for real in (emit.DOUBLE, emit.FLOAT):
-        numbers = ", ".join(emit.CPrinter(real).constant(value) for value in values)
+    for real in (DOUBLE, FLOAT):
+        numbers = ", ".join(CPrinter(real).constant(value) for value in values)
         lines.append(f"const {real.name} {real.name}s[] = {{{numbers}}};")
     (tmp_path / "literals.c").write_text("\n".join(lines))
     built = tmp_path / "literals.so"

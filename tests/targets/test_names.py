@@ -21,10 +21,10 @@ import strapgen
 from strapgen import targets
 from strapgen.catalogue.user import admission
 from strapgen.fixedpoint import quantize
-from strapgen.ir import sources
 from strapgen.ir.attitude_step import Companions
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.signals import Signal
+from strapgen.ir.sources import Sources
 from strapgen.symbolic.kernel import Kernel, KernelBuilder
 from strapgen.targets import c_library, names
 from strapgen.toolchain import compiler
@@ -160,7 +160,7 @@ def reference() -> np.ndarray:
 EXPECTED = reference()
 
 
-def module(sources: sources.Sources) -> ModuleType:
+def module(sources: Sources) -> ModuleType:
     """Return the module of Python sources."""
     ((name, text),) = sources.files.items()
     result = ModuleType(name)
@@ -173,7 +173,7 @@ def declarations(header: str) -> str:
     return compiler._declarations(header)
 
 
-def library(folder: Path, several: list[sources.Sources]) -> tuple[cffi.FFI, object]:
+def library(folder: Path, several: list[Sources]) -> tuple[cffi.FFI, object]:
     """Compile C sources in one call of the compiler, and return them loaded."""
     ffi = cffi.FFI()
     for sources in several:

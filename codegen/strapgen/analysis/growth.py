@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -267,3 +268,17 @@ def stability(choice: Choice) -> Stability:
     """
     closed_form = constant_rate(choice)
     return Stability(closed_form.kernel, closed_form.stretch_squared, contraction(closed_form))
+
+
+def intervals_text(found: Sequence[tuple[float, float | None]] | None) -> str:
+    """Return intervals as text.
+
+    Examples
+    --------
+    >>> intervals_text([(0.0, 2.8284271)]), intervals_text([]), intervals_text(None)
+    ('0 to 2.828', 'nowhere', 'kept')
+    """
+    if found is None:
+        return "kept"
+    parts = [f"{low:.4g} up" if high is None else f"{low:.4g} to {high:.4g}" for low, high in found]
+    return ", ".join(parts) or "nowhere"

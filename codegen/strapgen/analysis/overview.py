@@ -12,14 +12,13 @@ import sympy as sp
 from strapgen import catalogue
 from strapgen.analysis.accumulation import accumulate
 from strapgen.analysis.constant_rate import constant_rate
-from strapgen.analysis.growth import contraction
+from strapgen.analysis.growth import contraction, intervals_text
 from strapgen.analysis.invariants import as_text
 from strapgen.analysis.motion_rates import is_plain, parameters
 from strapgen.analysis.series import series
 from strapgen.catalogue import Choice
 from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.library import generated_sources
-from strapgen.reports.growth import intervals_text
 
 #: Highest order of a Taylor method in the overview; with higher orders the error is far below that of any gyro.
 _HIGHEST_TAYLOR = 8

@@ -13,7 +13,7 @@ from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
 from strapgen.library import generated_sources
-from strapgen.support import checks
+from strapgen.support import checks, stages
 from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.targets import FIXED
 
@@ -179,5 +179,12 @@ def build(sources: Sources, orthonormalization: str | None = None) -> Backend:
         If the sources are of no attitude step.
     CompilerError
         If a C compiler is needed and there is none, or it fails.
+
+    Examples
+    --------
+    >>> from strapgen import derive, generate, lower
+    >>> build(generate(lower(derive("euler")), "numpy")).name
+    'numpy'
     """
+    stages.require("build", sources, Sources)
     return classes(sources.target)[1](StepSources(sources, None, orthonormalization))

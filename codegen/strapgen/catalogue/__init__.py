@@ -26,7 +26,6 @@ from strapgen.catalogue.names import (
     Recipe,
     StepVector,
 )
-from strapgen.catalogue.user import loading as user
 
 __all__ = [
     "ALGORITHMS",

@@ -6,21 +6,7 @@ from collections.abc import Sequence
 
 import sympy as sp
 
-from strapgen.analysis.growth import Stability
-
-
-def intervals_text(found: Sequence[tuple[float, float | None]] | None) -> str:
-    """Return intervals as text.
-
-    Examples
-    --------
-    >>> intervals_text([(0.0, 2.8284271)]), intervals_text([]), intervals_text(None)
-    ('0 to 2.828', 'nowhere', 'kept')
-    """
-    if found is None:
-        return "kept"
-    parts = [f"{low:.4g} up" if high is None else f"{low:.4g} to {high:.4g}" for low, high in found]
-    return ", ".join(parts) or "nowhere"
+from strapgen.analysis.growth import Stability, intervals_text
 
 
 def stability_text(found: Sequence[Stability]) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import sympy as sp
 
-from strapgen.analysis.overview import _SHORT, WORK, OverviewRow
+from strapgen.analysis.overview import _SHORT, CONING_DEG_S, STEP_S, WORK, OverviewRow
 
 
 def overview_text(rows: Sequence[OverviewRow]) -> str:

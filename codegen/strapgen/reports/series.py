@@ -10,12 +10,11 @@ import sympy as sp
 
 from strapgen.analysis.accumulation import RunDrift, accumulate
 from strapgen.analysis.constant_rate import ConstantRate, constant_rate
-from strapgen.analysis.growth import Growth, contraction, growth
+from strapgen.analysis.growth import Growth, contraction, growth, intervals_text
 from strapgen.analysis.invariants import LATEX, as_text, scalar_as_text
 from strapgen.analysis.motion_rates import is_plain
 from strapgen.analysis.series import PARTS, STEP, ErrorSeries, series
 from strapgen.catalogue import Choice
-from strapgen.reports.growth import intervals_text
 from strapgen.support.exceptions import InputError
 
 

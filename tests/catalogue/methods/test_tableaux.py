@@ -14,6 +14,7 @@ from gathering import each
 
 from strapgen.catalogue import METHODS, STANDARD_METHODS
 from strapgen.catalogue.methods import tableaux
+from strapgen.catalogue.methods.order_conditions import largest_residual
 from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.catalogue.methods.tableaux import TABLEAUX, read, verify
 from strapgen.support import resources
@@ -84,9 +85,9 @@ def test_a_file_is_one_that_a_user_could_hand_over(name):
 def test_only_rounded_coefficients_leave_a_residual(name):
     tableau = TABLEAUX[name]
     if name == "dormand-prince8":
-        assert 0.9 * tableau.tolerance < tableau.largest_residual <= tableau.tolerance < Fraction(1, 10**16)
+        assert 0.9 * tableau.tolerance < largest_residual(tableau) <= tableau.tolerance < Fraction(1, 10**16)
     else:
-        assert tableau.tolerance == tableau.largest_residual == 0
+        assert tableau.tolerance == largest_residual(tableau) == 0
 
 
 @BUILT_IN
@@ -139,7 +140,7 @@ def test_a_file_is_read_and_named_after_its_title(written):
     half = Fraction(1, 2)
     rows = ((0, 1), ((), (1,)), (half, half))
     assert tableau == Tableau("heun-written-by-hand", "Heun, written by hand", "the thesis", 2, *rows)
-    assert tableau.rational and tableau.largest_residual == 0
+    assert tableau.rational and largest_residual(tableau) == 0
 
 
 def test_whole_numbers_need_no_quotes_and_lines_may_end_as_on_windows(written):
@@ -175,7 +176,7 @@ def test_rounded_coefficients_pass_with_a_tolerance(written):
     with pytest.raises(InputError, match=r"order 1: sum b_i = .*1 is needed \(off by 1/100000000000000000\)"):
         read(written(**rounded))
     tableau = read(written(**rounded, tolerance='"1e-16"'))
-    assert tableau.largest_residual == Fraction(1, 10**17)
+    assert largest_residual(tableau) == Fraction(1, 10**17)
 
 
 WRONG = {

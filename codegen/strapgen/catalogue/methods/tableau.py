@@ -5,10 +5,7 @@ from __future__ import annotations
 import shlex
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import cached_property
 from typing import TYPE_CHECKING
-
-from strapgen.catalogue.methods import order_conditions
 
 if TYPE_CHECKING:
     from strapgen.catalogue.methods.coefficients import Number
@@ -64,8 +61,3 @@ class Tableau:
         """Whether every coefficient is a fraction."""
         rows = (self.nodes, self.weights, self.embedded_weights or (), *self.matrix)
         return all(isinstance(value, Fraction) for row in rows for value in row)
-
-    @cached_property
-    def largest_residual(self) -> Number:
-        """The largest residual of row sums and order conditions; not 0 only for rounded coefficients."""
-        return order_conditions.largest_residual(self)

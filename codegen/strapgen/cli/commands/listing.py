@@ -15,12 +15,13 @@ def list_names(format: Format = "text") -> None:
     check_format(format)
     from strapgen import catalogue
     from strapgen.backends import BACKENDS
+    from strapgen.catalogue.user import loading
     from strapgen.simulation.motions import keys
     from strapgen.targets import TARGETS
 
     installed = {
         name: f"from {point.value}"
-        for name, point in catalogue.user.installed().items()
+        for name, point in loading.installed().items()
         if name not in catalogue.ALGORITHMS and name not in catalogue.KERNELS
     }
     parts: dict[str, dict[str, str]] = {

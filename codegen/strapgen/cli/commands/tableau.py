@@ -62,7 +62,7 @@ def _data(chosen: Tableau) -> dict[str, Any]:
         "principal_error_norm": order_conditions.principal_error_norm(chosen),
         "embedded_order": None if embedded is None else order_conditions.embedded_order(chosen),
         "tolerance": float(chosen.tolerance),
-        "largest_residual": float(chosen.largest_residual),
+        "largest_residual": float(order_conditions.largest_residual(chosen)),
         "nodes": [text(value) for value in chosen.nodes],
         "matrix": [[text(value) for value in row] for row in chosen.matrix],
         "weights": [text(value) for value in chosen.weights],
