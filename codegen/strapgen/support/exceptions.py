@@ -19,3 +19,7 @@ class CompilerError(StrapgenError, RuntimeError):
 
 class MissingExtraError(StrapgenError, ImportError):
     """An optional dependency is not installed."""
+
+
+for _error in (StrapgenError, InputError, InputTypeError, CompilerError, MissingExtraError):
+    _error.__module__ = "strapgen"  # where users find them, and what a traceback shows
