@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from strapgen.fixedpoint import quantize
-from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.integer_program import (
     FixedProgram,
     IntegerMaximum,
@@ -22,9 +20,7 @@ from strapgen.ir.integer_program import (
     Value,
     used_by,
 )
-from strapgen.ir.program import Program
 from strapgen.ir.sources import Function, Sources
-from strapgen.support.exceptions import InputError
 from strapgen.targets.lines import fill_expression
 from strapgen.targets.names import C, external, printed
 from strapgen.targets.rendering import render
@@ -60,33 +56,22 @@ WORDS = {
 }
 
 
-def emit(program: Program | FixedProgram, target: str, settings: Settings | None = None) -> Sources:
-    """Generate a C header and source for a program.
+def emit(fixed: FixedProgram, target: str) -> Sources:
+    """Print a C header and source for a program.
 
     Parameters
     ----------
-    program : Program or FixedProgram
+    fixed : FixedProgram
+        With a word of `WORDS`.
     target : str
         "c-fixed".
-    settings : Settings, optional
-        What the program is quantized for, if it is not yet.
 
     Returns
     -------
     Sources
         Two files. The function ``<name>`` works on one sample, ``<name>_array`` on many; a step has
         ``<name>_propagate`` too, the loop over runs and steps.
-
-    Raises
-    ------
-    InputError
-        If C has no such word.
     """
-    chosen = program.interface.settings if isinstance(program, FixedProgram) else settings or Settings()
-    if chosen.word not in WORDS:
-        allowed = ", ".join(map(str, WORDS))
-        raise InputError(f"word is {chosen.word}; in C it is {allowed} bits; the integer model takes any")
-    fixed = program if isinstance(program, FixedProgram) else quantize(program, chosen)
     interface, name = fixed.interface, external(fixed.name)
     arguments = (*interface.inputs, *interface.outputs)
     scalars = [argument.signal.name for argument in arguments if not argument.signal.shape]

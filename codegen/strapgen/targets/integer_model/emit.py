@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from strapgen.fixedpoint import quantize
-from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.integer_program import (
     FixedProgram,
     IntegerMaximum,
@@ -17,29 +15,25 @@ from strapgen.ir.integer_program import (
     Term,
     Value,
 )
-from strapgen.ir.program import Program
 from strapgen.ir.sources import Function, Sources
 from strapgen.targets.names import PYTHON, printed
 from strapgen.targets.rendering import render
 
 
-def emit(program: Program | FixedProgram, target: str, settings: Settings | None = None) -> Sources:
-    """Generate a Python module for a program.
+def emit(fixed: FixedProgram, target: str) -> Sources:
+    """Print a Python module for a program.
 
     Parameters
     ----------
-    program : Program or FixedProgram
+    fixed : FixedProgram
     target : str
         "fixed-model".
-    settings : Settings, optional
-        What the program is quantized for, if it is not yet.
 
     Returns
     -------
     Sources
         One file. The function ``<name>`` takes and returns integers, or arrays of them.
     """
-    fixed = program if isinstance(program, FixedProgram) else quantize(program, settings or Settings())
     interface = fixed.interface
     named, files = printed(fixed, _files, PYTHON)
     function = Function(
