@@ -464,7 +464,7 @@ def sources(name: str, word: int) -> Any:
         return emit(fixed(name, word), "c-fixed")
     if name in MOTIONS:
         return emit(motion(name, word), "c-fixed")
-    return emit(programs()[name], "c-fixed", Settings(word=word))
+    return pipeline.generate(programs()[name], "c-fixed", Settings(word=word))
 
 
 @pytest.mark.long
