@@ -82,8 +82,8 @@ def derive(
     >>> derive("euler", method="rk4", rates=True).inputs[1].elements[:4]
     ('turn_0_x', 'turn_0_y', 'turn_0_z', 'turn_1_2_x')
     """
-    stages.require("derive", algorithm, str, os.PathLike, Choice)
     if not isinstance(algorithm, Choice):
+        stages.require("derive", algorithm, str, os.PathLike, Choice)
         algorithm = catalogue.choose(algorithm, method, increments, rates, previous)
     elif (method, increments, rates, previous) != (None, None, False, 0):
         raise InputError(f"the choice of {algorithm.kernel} is complete; derive takes it alone")
@@ -149,7 +149,7 @@ def generate(program: Program | FixedProgram, target: str, settings: Settings | 
     target : str
         "numpy", "c", "c-float", "c-fixed" or "fixed-model".
     settings : Settings, optional
-        What fixed point is made for, where the program is not quantized yet.
+        Word, ranges and rounding for a `Program` and a fixed-point target.
 
     Raises
     ------
@@ -165,6 +165,9 @@ def generate(program: Program | FixedProgram, target: str, settings: Settings | 
     _require_target(target, settings)
     if isinstance(program, Program) and target in targets.FIXED:
         program = quantize(program, settings)
+    elif isinstance(program, FixedProgram) and settings is not None:
+        kernel = program.program.kernel
+        raise InputError(f"the program of {kernel} is quantized already; settings do not go with it")
     kernel = program.kernel if isinstance(program, Program) else program.program.kernel
     with timed("generate", f"{kernel} for {target}"):
         return targets.emit(program, target)

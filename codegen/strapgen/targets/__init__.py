@@ -81,10 +81,9 @@ def emit(program: Program | FixedProgram, target: str) -> Sources:
     """
     entry = TARGETS[checks.choice("target", target, TARGETS)]
     if not isinstance(program, entry.program):
-        kind, takers = ("fixed-point", FIXED) if target not in FIXED else ("real", set(TARGETS) - set(FIXED))
-        raise InputError(
-            f"target {target} does not take {kind} programs; these do: {', '.join(sorted(takers))}"
-        )
+        if target in FIXED:
+            raise InputError(f"target {target} takes quantized programs alone; strapgen.quantize makes them")
+        raise InputError(f"target {target} does not take fixed-point programs; these do: {', '.join(FIXED)}")
     if isinstance(program, FixedProgram):
         _require_word(target, program.word)
     sources: Sources = import_module(f"{__name__}.{entry.module}.emit").emit(program, target)
