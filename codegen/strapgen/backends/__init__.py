@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 
 from strapgen import catalogue
@@ -86,6 +87,7 @@ def evaluator(kernel: str | Choice, backend: str = "numpy", settings: Settings |
            [ 0., -1.,  0.],
            [ 0.,  0.,  1.]])
     """
+    stages.require("evaluator", kernel, str, Choice)
     checks.choice("backend", backend, BACKENDS)
     if not isinstance(kernel, Choice):
         checks.choice("kernel", kernel, catalogue.KERNELS)
@@ -140,6 +142,7 @@ def backend(
     >>> backend("dcm", method="rk2").increments
     2
     """
+    stages.require("backend", algorithm, str, os.PathLike)
     checks.choice("backend", backend, BACKENDS)
     choice = catalogue.choose_step(algorithm, method, increments, previous=previous)
     return of(choice, backend, orthonormalization, settings)

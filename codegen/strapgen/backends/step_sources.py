@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
+from strapgen import pipeline
 from strapgen.backends.registry import of_sources
 from strapgen.catalogue import Choice
 from strapgen.ir.sources import Sources
 from strapgen.library import generated_sources
 from strapgen.support.exceptions import InputError
-from strapgen.targets import emit
 
 if TYPE_CHECKING:
     from strapgen.backends.protocol import Evaluator
@@ -68,7 +68,7 @@ class StepSources:
         settings = fixed.companion_settings if fixed else None
         for program in self.step.own:
             if program.kernel == kernel:
-                return emit(program, target, settings)
+                return pipeline.generate(program, target, settings)
         choice = Choice(kernel) if self.choice is None else self.choice.companion(kernel)
         return generated_sources.sources(choice, target, settings)
 

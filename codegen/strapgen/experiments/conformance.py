@@ -11,7 +11,7 @@ import mpmath
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen import fixedpoint, pipeline
+from strapgen import fixedpoint
 from strapgen.backends import Backend, exact, of
 from strapgen.backends.exact import interpreter
 from strapgen.backends.increments import windows
@@ -20,6 +20,7 @@ from strapgen.experiments.comparison import certified_angle
 from strapgen.experiments.convergence import converge
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.program import Program
+from strapgen.library import generated_sources
 from strapgen.simulation.exact_attitudes import step_of_increments
 from strapgen.simulation.motions import GENERAL, motion
 from strapgen.simulation.runs import attitude, drift_between, simulate
@@ -86,7 +87,7 @@ def check(choice: Choice) -> Iterator[Finding]:
     >>> found["order"], found["at rest"]
     (True, True)
     """
-    step = _Precise(step_of_increments(choice))
+    step = _Precise(step_of_increments(choice), generated_sources.program(choice))
     looks: dict[str, Callable[[], Iterable[Finding]]] = {
         "no rotation": lambda: [_no_rotation(step)],
         "at rest": lambda: [_at_rest(step)],
@@ -108,10 +109,10 @@ def check(choice: Choice) -> Iterator[Finding]:
 class _Precise:
     """A step and its attitude in many digits."""
 
-    def __init__(self, kernel: Kernel) -> None:
+    def __init__(self, kernel: Kernel, program: Program) -> None:
         companions = kernel.companions
         assert companions is not None, "checked before"
-        self.program = pipeline.lower(kernel)
+        self.program = program
         self.identity = companions.identity
         self.restoring = companions.orthonormalize
         self._attitude = (

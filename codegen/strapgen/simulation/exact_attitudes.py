@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import mpmath
 
-from strapgen import catalogue
+from strapgen import pipeline
 from strapgen.backends import exact
 from strapgen.backends.exact import interpreter
 from strapgen.catalogue import Choice
@@ -30,7 +30,7 @@ def step_of_increments(choice: Choice) -> Kernel:
     """
     if not isinstance(choice, Choice):
         raise InputTypeError(f"choice is {choice!r}; what catalogue.choose returns is needed")
-    kernel = catalogue.derive(choice)
+    kernel = pipeline.derive(choice)
     if kernel.companions is None or kernel.inputs[1].name != "increments":
         raise InputError(f"kernel {kernel.name} takes no increments; a step that does is needed")
     return kernel
