@@ -34,7 +34,7 @@ def test_every_back_end_against_every_kind_of_reference(algorithm, reference, in
     for row in rows:
         assert 0 <= row.rms_rad <= row.max_abs_rad
         assert row.ns_per_step > 0
-        assert (row.bytes is None) == (row.backend in ("numpy", "fixed-model"))
+        assert (row.bytes is None) == (row.backend in ("numpy", "fixed-model", "exact"))
         assert (row.bound_rad is None) == (row.backend not in FIXED_NAMES)
         assert row.drift_deg <= math.degrees(row.max_abs_rad) * math.sqrt(3) * (1 + 1e-9)
         if row.backend == reference:
@@ -47,6 +47,8 @@ def test_every_back_end_against_every_kind_of_reference(algorithm, reference, in
     if reference == "exact":
         # Doubles round at 2**-53, singles at 2**-24.
         assert by_name["c"].max_abs_rad < 1e-13 < by_name["c-float"].max_abs_rad
+    if reference == "numpy":
+        assert 0 < by_name["exact"].max_abs_rad < 1e-13
 
 
 @pytest.mark.parametrize("carry", ["none", "state", "full"])
