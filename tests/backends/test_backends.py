@@ -385,3 +385,12 @@ def test_exponentials_have_no_hole_at_zero(method, algorithm, size):
         end = backend.propagate(turn)[-1]
         wanted = strapgen.backend(algorithm, "rk4", 2, name).propagate(turn)[-1]
         np.testing.assert_allclose(end, wanted, rtol=0, atol=roundoff(backend, 3))
+
+
+def test_a_choice_is_a_back_end_like_its_name(backend_name, rng):
+    increments = random_increments(rng, 20, 1)
+    by_name = strapgen.backend("dcm", "rk2", 1, backend_name)
+    by_choice = strapgen.backend(strapgen.choose("dcm", "rk2", 1), backend=backend_name)
+    np.testing.assert_array_equal(by_choice.propagate(increments), by_name.propagate(increments))
+    with pytest.raises(InputError, match="previous is 1, but the choice of dcm-rk2-1 has its own"):
+        strapgen.backend(strapgen.choose("dcm", "rk2", 1), backend=backend_name, previous=1)
