@@ -8,8 +8,9 @@ from functools import cache
 import mpmath
 import sympy as sp
 
-from strapgen import catalogue, generate
+from strapgen import catalogue
 from strapgen.backends import BACKENDS, fitted
+from strapgen.backends.kernel_sources import sources_of_program
 from strapgen.catalogue import Choice
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
@@ -46,4 +47,4 @@ def precisely(kernel: Kernel, values: Mapping[str, mpmath.mpf]) -> dict[str, mpm
 
 def generated(program: Program, backend_name: str) -> Sources:
     """Return the sources that a back end by this name runs."""
-    return generate(program, BACKENDS[backend_name].target, fitted(backend_name, None))
+    return sources_of_program(program, BACKENDS[backend_name].target, fitted(backend_name, None))

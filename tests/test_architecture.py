@@ -151,6 +151,16 @@ def test_imports_point_down():
     assert not upward, "\n".join(upward)
 
 
+def test_imports_form_no_circle():
+    graph = {
+        module: {other for other in imports(path) if other in MODULES and other != module}
+        for module, path in MODULES.items()
+        if room(module) in ORDER
+    }
+    graph = {module: {other for other in others if other in graph} for module, others in graph.items()}
+    assert not (modules := circle(graph)), " imports ".join(modules)
+
+
 def test_a_circle_is_seen():
     assert circle({"a": {"b"}, "b": {"c"}, "c": {"b"}}) == ["b", "c", "b"]
     assert circle({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == []

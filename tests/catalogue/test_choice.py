@@ -17,10 +17,10 @@ from strapgen import catalogue, vibration
 from strapgen.analysis.constant_rate import constant_rate
 from strapgen.analysis.prediction import predict
 from strapgen.analysis.series import series
-from strapgen.backends import of
+from strapgen.backends import backend
 from strapgen.cli import main
 from strapgen.experiments import conformance
-from strapgen.experiments.comparison import compare_choice
+from strapgen.experiments.comparison import compare
 from strapgen.experiments.convergence import converge
 from strapgen.simulation.motions import GENERAL
 from strapgen.support.exceptions import InputError
@@ -68,7 +68,7 @@ def test_each_runs_as_its_own_method(chosen, rng):
     for name in ("numpy", "c"):
         for method, choice in chosen.items():
             wanted = strapgen.backend("euler", method, backend=name).propagate(d)
-            np.testing.assert_array_equal(of(choice, name).propagate(d), wanted)
+            np.testing.assert_array_equal(backend(choice, backend=name).propagate(d), wanted)
 
 
 def test_each_has_the_companions_that_it_brings(chosen, rng):
@@ -79,12 +79,12 @@ def test_each_has_the_companions_that_it_brings(chosen, rng):
         np.testing.assert_array_equal(mend(state), strapgen.evaluator(scheme)(state))
         for name in ("numpy", "c", "c-q31"):
             wanted = strapgen.backend("euler", method, backend=name, orthonormalization=scheme)
-            backend = of(chosen[method], name, orthonormalization="mend")
-            np.testing.assert_array_equal(backend.propagate(d, 1, 5), wanted.propagate(d, 1, 5))
+            mended = backend(chosen[method], backend=name, orthonormalization="mend")
+            np.testing.assert_array_equal(mended.propagate(d, 1, 5), wanted.propagate(d, 1, 5))
     with pytest.raises(
         InputError, match=r"orthonormalization 'euler-normalize' is not known; allowed: mend$"
     ):
-        of(chosen["rk1"], orthonormalization="euler-normalize")
+        backend(chosen["rk1"], orthonormalization="euler-normalize")
 
 
 def test_an_evaluator_takes_a_choice_of_a_user_s_kernel(chosen, rng):
@@ -134,8 +134,8 @@ def test_each_has_its_own_analysis(chosen):
 def test_each_is_compared_and_checked_for_itself(chosen, rng):
     d = rng.normal(scale=0.02, size=(20, 2, 3))
     for method, choice in chosen.items():
-        (row,) = compare_choice(choice, ["numpy"], d, reference="exact")
-        (wanted,) = compare_choice(catalogue.choose("euler", method), ["numpy"], d, reference="exact")
+        (row,) = compare(choice, backends=["numpy"], increments=d, reference="exact")
+        (wanted,) = compare("euler", method, None, ["numpy"], d, reference="exact")
         assert (row.max_abs_rad, row.drift_deg) == (wanted.max_abs_rad, wanted.drift_deg)
     findings = {finding.name: finding for finding in conformance.check(chosen["rk3"])}
     assert findings["order"].measured == pytest.approx(3, abs=0.15)

@@ -112,4 +112,7 @@ class Evaluator(ABC):
             for array, signal in zip(inputs, self.function.inputs, strict=True)
         ]
         outputs = self.evaluate(shaped, (count,))
-        return [np.asarray(output).reshape(count, -1) for output in outputs], feedback
+        return [
+            np.asarray(output).reshape(count, signal.size)
+            for output, signal in zip(outputs, self.function.outputs, strict=True)
+        ], feedback

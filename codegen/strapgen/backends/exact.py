@@ -263,7 +263,7 @@ class ExactBackend(Backend):
         history = np.full((runs, 1 + steps // record_every, initial[0].size), np.nan)
         with mpmath.workdps(DIGITS):
             for run, records in enumerate(history):
-                rows = in_digits(increments[run].reshape(steps, -1))
+                rows = in_digits(increments[run].reshape(steps, 3 * self.samples))
                 start = list(in_digits(initial[run].ravel()))
                 # From a division by zero on, states are not numbers, as in floating point.
                 with suppress(ZeroDivisionError):

@@ -153,6 +153,8 @@ class LoopsFromPython(Loops):
 
     def run(self, cycles: Cycles) -> tuple[Array, Array]:
         """Run whole navigation cycles, see `Loops.run`."""
+        if not len(cycles.samples["turn"]):
+            return np.empty((0, cycles.start["state"].shape[1])), np.empty((0, 3))
         fast, slow, navigation = range(len(LOOPS))
         loops = self.sources.loops
         zero = self._zero(cycles)
@@ -187,11 +189,7 @@ class LoopsFromPython(Loops):
                 changes.append(call(navigation, 0)["velocity_change"])
                 memory.update({name: zero[name] for name in recursion(loops[slow]).begun_anew})
             attitudes.append(memory["state"])
-        none = np.empty((0, cycles.start["state"].shape[1])), np.empty((0, 3))
-        return (
-            np.concatenate(attitudes) if attitudes else none[0],
-            np.concatenate(changes) if changes else none[1],
-        )
+        return np.concatenate(attitudes), np.concatenate(changes)
 
     def _zero(self, cycles: Cycles) -> dict[str, Array]:
         """Return zeros for all that is handed on from call to call."""
