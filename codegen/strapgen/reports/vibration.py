@@ -11,12 +11,11 @@ import sympy as sp
 
 from strapgen.reports.latex import align_environment
 from strapgen.reports.table import Column, Table
+from strapgen.reports.units import READABLE_UNITS
 from strapgen.support.exceptions import InputError
 from strapgen.vibration import Assessment
 from strapgen.vibration.mean_rates import Rates
 
-#: For each unit of a rate the unit that a person reads, and the factor to it.
-READABLE_UNITS = {"rad/s": ("deg/h", math.degrees(3600)), "m/s^2": ("micro-g", 1e6 / 9.80665)}
 #: The units as parts of the names of data.
 _UNIT_SUFFIXES = {"rad/s": "rad_s", "m/s^2": "m_s2"}
 #: The name of the fast loop and the slow loop together.
