@@ -10,7 +10,7 @@ from typing import Any
 import sympy as sp
 
 from strapgen.reports.latex import align_environment
-from strapgen.reports.table import Column, Table
+from strapgen.reports.table import Column, TextTable
 from strapgen.reports.units import READABLE_UNITS
 from strapgen.support.exceptions import InputError
 from strapgen.vibration import Assessment
@@ -135,7 +135,7 @@ def vibration_text(outcomes: Sequence[CaseRates], title: str) -> str:
     return "\n".join(lines)
 
 
-def _rate_table(group: Sequence[CaseRates], unit: str) -> Table:
+def _rate_table(group: Sequence[CaseRates], unit: str) -> TextTable:
     """Return the rates of one unit, each above its error of quadrature if there is one."""
     readable, factor = READABLE_UNITS[unit]
     rows: list[list[Any]] = []
@@ -156,7 +156,7 @@ def _rate_table(group: Sequence[CaseRates], unit: str) -> Table:
         ),
         Column(f"error, {readable}", spec=".6g", least=18),
     ]
-    return Table(columns, rows)
+    return TextTable(columns, rows)
 
 
 def vibration_latex(cases: Sequence[AssessedCase]) -> str:
