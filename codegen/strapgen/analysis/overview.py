@@ -9,7 +9,7 @@ from typing import Any
 
 import sympy as sp
 
-from strapgen import catalogue
+from strapgen import catalogue, pipeline
 from strapgen.analysis.accumulation import accumulate
 from strapgen.analysis.constant_rate import constant_rate
 from strapgen.analysis.growth import contraction
@@ -170,7 +170,7 @@ def overview(chosen: Iterable[Choice]) -> Iterator[OverviewRow]:
 
 
 def _row(choice: Choice) -> OverviewRow:
-    kernel = catalogue.derive(choice)
+    kernel = pipeline.derive(choice)
     general = series(choice, "general", 1)
     fixed = constant_rate(choice)
     lost = fixed.series(1)

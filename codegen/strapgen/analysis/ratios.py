@@ -112,7 +112,7 @@ def versus(first: Choice, second: Choice, motion: str = "general", terms: int = 
     {0: 1/4, 2: 9/80}
     """
     checks.choice("motion", motion, MOTIONS)
-    kernels = [catalogue.derive(choice).name for choice in (first, second)]
+    kernels = [choice.kernel for choice in (first, second)]
     one: Terms
     other: Terms
     if motion == "constant":
