@@ -259,6 +259,50 @@ def test_the_stages_of_the_rules_exist():
     assert resolved("strapgen.derive") == "strapgen.pipeline.derive"
 
 
+def layouts(source: ast.Module) -> Iterator[tuple[int, str]]:
+    """Yield what lays out columns in a source: alignment, padding, rows of comma-separated values, and its line."""
+    for node in ast.walk(source):
+        if isinstance(node, ast.Attribute) and node.attr in ("ljust", "rjust", "writerow", "writerows"):
+            yield node.lineno, node.attr
+        elif isinstance(node, ast.FormattedValue) and node.format_spec is not None:
+            spec = "".join(
+                str(part.value) for part in node.format_spec.values if isinstance(part, ast.Constant)
+            )
+            align = [part for part in node.format_spec.values[:1] if isinstance(part, ast.FormattedValue)]
+            if re.match(r"[<>^]", spec) or any("align" in ast.unparse(part) for part in align):
+                yield node.lineno, "aligns"
+
+
+def test_one_module_lays_out_tables():
+    """Beside it the command line prints lists of its own; everything else computes, or says what a column holds."""
+    offenders = [
+        f"{place(path)}:{line} {what}"
+        for path in FILES
+        if path.relative_to(PACKAGE).parts[0] != "cli" and place(path) != "reports/table.py"
+        for line, what in layouts(tree(path))
+    ]
+    assert not offenders, "\n".join(offenders)
+
+
+def test_only_reports_and_the_command_line_have_texts_of_results():
+    offenders = [
+        f"{place(path)}:{node.lineno} {node.name}"
+        for path in FILES
+        if path.relative_to(PACKAGE).parts[0] not in ("reports", "cli")
+        for node in ast.walk(tree(path))
+        if isinstance(node, ast.FunctionDef) and node.name in ("as_text", "as_csv", "as_markdown")
+    ]
+    assert not offenders, "\n".join(offenders)
+
+
+@pytest.mark.parametrize(
+    "text", ["name.ljust(3)", "f'{x:>10.3e}'", "f'{x:<{width}}'", "f'{x:{align}{width}}'", "w.writerow(r)"]
+)
+def test_a_layout_is_seen(text):
+    assert list(layouts(ast.parse(text)))
+    assert not list(layouts(ast.parse("f'{x:.3e} {x:+.2%} {x:{spec}}'")))
+
+
 def test_no_module_is_named_as_a_known_one_or_says_nothing():
     parts = {(place(path), part) for path in FILES for part in Path(place(path)).with_suffix("").parts}
     assert not sorted(where for where, part in parts if part in BANNED_MODULES)

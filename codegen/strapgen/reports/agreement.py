@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from strapgen.analysis.agreement import Agreement
-from strapgen.reports.table import SECONDS, Column, Table
+from strapgen.reports.table import SECONDS, Column, TextTable
 
 _COLUMNS = (
     Column("step, s", spec=SECONDS, least=12),
@@ -32,4 +32,4 @@ def agreement_text(agreement: Agreement) -> str:
         f"{agreement.kernel}, {agreement.motion} motion: drift in rad, "
         f"simulated and predicted by {agreement.terms} terms"
     )
-    return f"{title}\n{Table(_COLUMNS, rows).as_text()}"
+    return f"{title}\n{TextTable(_COLUMNS, rows).as_text()}"

@@ -8,7 +8,7 @@ from dataclasses import fields
 from typing import Any
 
 from strapgen.experiments.comparison import Comparison
-from strapgen.reports.table import ANGLE, Column, Table
+from strapgen.reports.table import ANGLE, Column, TextTable
 
 _COLUMNS = (
     Column("", "<"),
@@ -36,7 +36,7 @@ def comparison_csv(rows: Sequence[Comparison]) -> str:
         [*(getattr(row, name) for name in names), *(row.operations.get(kind, 0) for kind in kinds)]
         for row in rows
     ]
-    return Table([Column(name) for name in (*names, *kinds)], values).as_csv()
+    return TextTable([Column(name) for name in (*names, *kinds)], values).as_csv()
 
 
 def comparison_text(rows: Sequence[Comparison], title: str, reference: str, drift: str) -> str:
@@ -57,7 +57,7 @@ def comparison_text(rows: Sequence[Comparison], title: str, reference: str, drif
         f"{drift} in deg; time of a run with all states kept",
         "",
     ]
-    return "\n".join([*lines, *Table(_COLUMNS, [_cells(row) for row in rows]).lines()])
+    return "\n".join([*lines, *TextTable(_COLUMNS, [_cells(row) for row in rows]).lines()])
 
 
 def _cells(row: Comparison) -> list[Any]:

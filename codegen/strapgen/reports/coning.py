@@ -9,7 +9,7 @@ from strapgen.catalogue.methods.coning import method, sample_terms
 from strapgen.catalogue.methods.coning_coefficients import SOURCES, Design
 from strapgen.catalogue.methods.rotation_series import Scalars
 from strapgen.catalogue.methods.samples import sample_names
-from strapgen.reports.table import Column, Table
+from strapgen.reports.table import Column, TextTable
 
 _PAIR_COLUMNS = (Column(align="<"), Column(), Column(spec=".9f", least=12))
 #: Where the terms of third and fourth order are to be found, for the forms that have some.
@@ -106,4 +106,4 @@ def _pair_lines(design: Design, data: Mapping[str, Any]) -> list[str]:
             data["pairs"], data["coefficients"], design.pairs.values(), strict=True
         )
     ]
-    return Table(_PAIR_COLUMNS, rows).lines("  ")
+    return TextTable(_PAIR_COLUMNS, rows).lines("  ")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from strapgen.experiments.convergence import Convergence, Rung
-from strapgen.reports.table import ERROR, SECONDS, Column, Table
+from strapgen.reports.table import ERROR, SECONDS, Column, TextTable
 
 #: Algorithms side by side in a report.
 _MOST_COLUMNS = 4
@@ -25,7 +25,7 @@ def convergence_text(outcomes: Sequence[Convergence], title: str) -> str:
     return "\n".join([*lines, *([""] if notes else []), *notes])
 
 
-def _table(outcomes: Sequence[Convergence]) -> Table:
+def _table(outcomes: Sequence[Convergence]) -> TextTable:
     """Return a row for every step, then the orders; cells end where the mark of a fitted error stands."""
     rows: list[list[object]] = [
         [rung.step_s, *(_cell(one.rungs[k]) for one in outcomes)] for k, rung in enumerate(outcomes[0].rungs)
@@ -34,7 +34,7 @@ def _table(outcomes: Sequence[Convergence]) -> Table:
     rows.append(
         ["predicted", *(None if one.predicted is None else f"{one.predicted}     " for one in outcomes)]
     )
-    return Table([Column("step, s", spec=SECONDS), *(Column(one.kernel) for one in outcomes)], rows)
+    return TextTable([Column("step, s", spec=SECONDS), *(Column(one.kernel) for one in outcomes)], rows)
 
 
 def _cell(rung: Rung) -> str:
@@ -54,4 +54,4 @@ def convergence_csv(outcomes: Sequence[Convergence]) -> str:
         for one in outcomes
         for rung in one.rungs
     ]
-    return Table([Column(name) for name in _CSV_NAMES], rows).as_csv()
+    return TextTable([Column(name) for name in _CSV_NAMES], rows).as_csv()

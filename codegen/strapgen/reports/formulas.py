@@ -11,6 +11,7 @@ import sympy as sp
 
 from strapgen.ir.program import Program
 from strapgen.reports.latex import align_environment
+from strapgen.reports.table import Column, TextTable
 from strapgen.symbolic.kernel import Kernel, Stage
 from strapgen.targets.contract import operations_text
 from strapgen.targets.printer import Printer
@@ -68,6 +69,13 @@ def program_as_text(program: Program) -> str:
             lines += ["", f"  # {assignment.meaning}"]
         lines.append(f"  {assignment.name} = {printer.text(assignment.value)}")
     return "\n".join(lines)
+
+
+def operations_as_text(kernel: Kernel, program: Program) -> str:
+    """Return the number of operations of each kind, and of temporaries, as a table."""
+    columns = (Column(align="<", least=12), Column(least=5, gap=0))
+    counts = {**program.operations, "temporaries": program.temporaries}
+    return "\n".join([kernel.name, *TextTable(columns, list(counts.items())).lines("  ")])
 
 
 def program_as_data(program: Program) -> dict[str, str]:

@@ -8,7 +8,7 @@ import sympy as sp
 
 from strapgen.analysis.growth import Stability
 from strapgen.analysis.notation import intervals_text
-from strapgen.reports.table import Column, Table
+from strapgen.reports.table import Column, TextTable
 
 _COLUMNS = (
     Column("step", "<"),
@@ -22,4 +22,4 @@ def stability_text(stabilities: Sequence[Stability]) -> str:
     rows = [
         (one.kernel, intervals_text(one.contractive), sp.sstr(one.stretch_squared)) for one in stabilities
     ]
-    return Table(_COLUMNS, rows).as_text()
+    return TextTable(_COLUMNS, rows).as_text()

@@ -9,7 +9,7 @@ from typing import Any
 import sympy as sp
 
 from strapgen.analysis.overview import CONING_DEG_S, STEP_S, WORK, OverviewRow
-from strapgen.reports.table import ERROR, Column, Table
+from strapgen.reports.table import ERROR, Column, TextTable
 
 #: Most terms of a vector that are written out.
 _MOST_TERMS = 3
@@ -37,12 +37,12 @@ def overview_text(rows: Sequence[OverviewRow]) -> str:
     drifts = [(row.kernel, _general(row)) for row in rows]
     return "\n".join(
         [
-            *Table(_COLUMNS, [_cells(row) for row in rows]).lines(),
+            *TextTable(_COLUMNS, [_cells(row) for row in rows]).lines(),
             "",
             *_NOTES,
             "",
             "drift of a step, leading term for the rate w0 + w1 t + w2 t^2/2 + ...",
-            *Table([Column(align="<")] * 2, drifts).lines("  "),
+            *TextTable([Column(align="<")] * 2, drifts).lines("  "),
         ]
     )
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from strapgen.experiments.predicted_tables import PredictedEntry
 from strapgen.experiments.thesis_tables import TABLES
-from strapgen.reports.table import Column, Table
+from strapgen.reports.table import Column, TextTable
 
 _COLUMNS = (
     Column("", "<", least=20),
@@ -31,7 +31,7 @@ def predicted_text(entries: Sequence[PredictedEntry]) -> str:
         lines += [
             f"Table {table.number}: {table.title}",
             f"  drift in deg, and its ratio to that of direction cosines {ratio}",
-            *Table(_COLUMNS, rows).lines("  "),
+            *TextTable(_COLUMNS, rows).lines("  "),
             "",
         ]
     if not all(entry.agrees for entry in entries):

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from strapgen.experiments.rate_table import RATE_DEG_S, Row
-from strapgen.reports.table import ERROR, Column, Table
+from strapgen.reports.table import ERROR, Column, TextTable
 
 
 def rate_table_text(rows: Sequence[Row], duration: str, sample: str) -> str:
@@ -35,5 +35,5 @@ def rate_table_text(rows: Sequence[Row], duration: str, sample: str) -> str:
             [name, *(drifts[name, backend] for backend in backends)]
             for name in dict.fromkeys(row.algorithm for row in here)
         ]
-        lines += ["", f"{motion}; pitch up to {steepest:.2f} deg", *Table(columns, cells).lines()]
+        lines += ["", f"{motion}; pitch up to {steepest:.2f} deg", *TextTable(columns, cells).lines()]
     return "\n".join(lines)

@@ -8,7 +8,7 @@ import sympy as sp
 
 from strapgen.analysis.ratios import STEP_ANGLE, Claim, Ratio, columns
 from strapgen.reports.latex import align_environment
-from strapgen.reports.table import Column, Table
+from strapgen.reports.table import Column, TextTable
 
 
 def ratio_text(comparison: Ratio) -> str:
@@ -50,7 +50,7 @@ def claims_text(claims: Sequence[Claim]) -> str:
     """Return claims as a table."""
     rows = [(claim.statement, _leading_terms(claim)) for claim in claims]
     title = "Ratios of the drift at a constant rate, x = |w| h (for three axes: of the one axis)"
-    return "\n".join([title, *Table([Column(align="<")] * 2, rows).lines("  ")])
+    return "\n".join([title, *TextTable([Column(align="<")] * 2, rows).lines("  ")])
 
 
 def _leading_terms(claim: Claim) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from strapgen.reports.table import Column, Table
+from strapgen.reports.table import Column, TextTable
 from strapgen.simulation.recording import History
 from strapgen.simulation.runs import Run
 
@@ -84,7 +84,7 @@ def run_text(run: Run, settings: dict[str, Any]) -> str:
     lines = [
         _settings_text(settings),
         "",
-        *Table(_ERROR_COLUMNS, [(run.time[k], *parts[k]) for k in shown]).lines(),
+        *TextTable(_ERROR_COLUMNS, [(run.time[k], *parts[k]) for k in shown]).lines(),
     ]
     if len(shown) < len(run.time):
         lines.append(
@@ -110,7 +110,7 @@ def _matrix_lines(run: Run) -> list[str]:
     """Return the matrices at the end of a run side by side."""
     computed, true = run.computed[-1], run.true[-1]
     rows = np.hstack([computed, true, computed - true, run.error[-1]])
-    return Table(_MATRIX_TITLES, []).lines() + Table(_MATRIX_COLUMNS, rows.tolist()).lines()
+    return TextTable(_MATRIX_TITLES, []).lines() + TextTable(_MATRIX_COLUMNS, rows.tolist()).lines()
 
 
 def _settings_text(settings: dict[str, Any]) -> str:
@@ -141,7 +141,7 @@ def history_text(history: History, elements: Sequence[str], settings: dict[str, 
     states = history.states.reshape(len(history.time), -1)
     columns = [_TIME_COLUMN, *(Column(element, spec=".9f", least=12, gap=1) for element in elements)]
     rows = [(history.time[k], *states[k]) for k in shown]
-    lines = [_settings_text(settings), "", *Table(columns, rows).lines()]
+    lines = [_settings_text(settings), "", *TextTable(columns, rows).lines()]
     if len(shown) < len(history.time):
         lines.append(f"({len(shown)} of {len(history.time)} records; --format csv prints all)")
     if history.unused:
@@ -188,7 +188,7 @@ def course_text(course: Course, settings: dict[str, Any]) -> str:
     titles = [*(f"{name}, deg" for name in ANGLES), *(f"dv{axis}, m/s" for axis in AXES)]
     columns = [_TIME_COLUMN, *(Column(title, spec=".8f", least=13, gap=1) for title in titles)]
     values = np.column_stack([course.time, np.degrees(course.angles), course.velocity_changes])
-    lines = [_settings_text(settings), "", *Table(columns, values[shown].tolist()).lines()]
+    lines = [_settings_text(settings), "", *TextTable(columns, values[shown].tolist()).lines()]
     if len(shown) < len(course.time):
         lines.append(f"({len(shown)} of {len(course.time)} cycles; --format csv prints all)")
     if course.unused:
@@ -206,4 +206,4 @@ def _thinned(count: int) -> list[int]:
 
 
 def _csv(names: Iterable[str], rows: Sequence[Sequence[float]]) -> str:
-    return Table([Column(name) for name in names], rows).as_csv()
+    return TextTable([Column(name) for name in names], rows).as_csv()

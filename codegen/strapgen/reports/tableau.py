@@ -8,7 +8,7 @@ from typing import Any
 from strapgen.catalogue.methods import order_conditions
 from strapgen.catalogue.methods.coefficients import text
 from strapgen.catalogue.methods.tableau import Tableau
-from strapgen.reports.table import Column, Table
+from strapgen.reports.table import Column, TextTable
 
 #: Widest table; a wider tableau is listed coefficient by coefficient.
 _WIDEST = 120
@@ -62,7 +62,7 @@ def tableau_text(data: Mapping[str, Any]) -> str:
             f"{data['name']}: {data['title']}",
             f"source: {data['source']}",
             "",
-            *Table(_TWO_COLUMNS, [(fact, str(value)) for fact, value in facts.items()]).lines(),
+            *TextTable(_TWO_COLUMNS, [(fact, str(value)) for fact, value in facts.items()]).lines(),
             "",
             *(tableau if max(map(len, tableau)) <= _WIDEST else _coefficient_lines(data)),
         ]
@@ -78,7 +78,7 @@ def _tableau_lines(data: Mapping[str, Any]) -> list[str]:
         for head, row in zip([*data["nodes"], *[""] * len(bottom)], [*data["matrix"], *bottom], strict=True)
     ]
     columns = [Column(), Column(gap=1), Column(gap=1), *[Column()] * (stages - 1)]
-    lines = Table(columns, rows).lines()
+    lines = TextTable(columns, rows).lines()
     before = lines[-1].index("|")
     rule = "-" * before + "+" + "-" * (max(map(len, lines)) - before - 1)
     return [*lines[:stages], rule, *lines[stages:]]
@@ -93,4 +93,4 @@ def _coefficient_lines(data: Mapping[str, Any]) -> list[str]:
     for letter, row in (("b", data["weights"]), ("e", data["embedded_weights"] or [])):
         named += [(f"{letter}_{place}", value) for place, value in enumerate(row, 1) if value != "0"]
     note = ["", "e: the embedded weights"] if data["embedded_weights"] else []
-    return Table(_TWO_COLUMNS, named).lines() + note
+    return TextTable(_TWO_COLUMNS, named).lines() + note

@@ -10,13 +10,12 @@ from typing import Any
 import sympy as sp
 
 from strapgen.reports.latex import align_environment
-from strapgen.reports.table import Column, Table
+from strapgen.reports.table import Column, TextTable
+from strapgen.reports.units import READABLE_UNITS
 from strapgen.support.exceptions import InputError
 from strapgen.vibration import Assessment
 from strapgen.vibration.mean_rates import Rates
 
-#: For each unit of a rate the unit that a person reads, and the factor to it.
-READABLE_UNITS = {"rad/s": ("deg/h", math.degrees(3600)), "m/s^2": ("micro-g", 1e6 / 9.80665)}
 #: The units as parts of the names of data.
 _UNIT_SUFFIXES = {"rad/s": "rad_s", "m/s^2": "m_s2"}
 #: The name of the fast loop and the slow loop together.
@@ -136,7 +135,7 @@ def vibration_text(outcomes: Sequence[CaseRates], title: str) -> str:
     return "\n".join(lines)
 
 
-def _rate_table(group: Sequence[CaseRates], unit: str) -> Table:
+def _rate_table(group: Sequence[CaseRates], unit: str) -> TextTable:
     """Return the rates of one unit, each above its error of quadrature if there is one."""
     readable, factor = READABLE_UNITS[unit]
     rows: list[list[Any]] = []
@@ -157,7 +156,7 @@ def _rate_table(group: Sequence[CaseRates], unit: str) -> Table:
         ),
         Column(f"error, {readable}", spec=".6g", least=18),
     ]
-    return Table(columns, rows)
+    return TextTable(columns, rows)
 
 
 def vibration_latex(cases: Sequence[AssessedCase]) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from strapgen.experiments.word_length import Outcome
-from strapgen.reports.table import ANGLE, Column, Table
+from strapgen.reports.table import ANGLE, Column, TextTable
 
 _COLUMNS = (
     Column("word", least=6),
@@ -41,7 +41,7 @@ def by_method_step_and_pulse(outcomes: Sequence[Outcome]) -> dict[tuple[str, str
 def word_length_csv(outcomes: Sequence[Outcome]) -> str:
     """Return outcomes as comma-separated values."""
     rows = [outcome.as_dict() | {"settings": settings_text(outcome, " ")} for outcome in outcomes]
-    return Table([Column(name) for name in rows[0]], [list(row.values()) for row in rows]).as_csv()
+    return TextTable([Column(name) for name in rows[0]], [list(row.values()) for row in rows]).as_csv()
 
 
 def word_length_text(outcomes: Sequence[Outcome]) -> str:
@@ -56,7 +56,7 @@ def word_length_text(outcomes: Sequence[Outcome]) -> str:
             f"({settings_text(first)}), {gyro}",
             f"the method itself drifts by {first.truncation_deg:{ANGLE}} deg",
             "",
-            *Table(_COLUMNS, [_cells(outcome) for outcome in group]).lines(),
+            *TextTable(_COLUMNS, [_cells(outcome) for outcome in group]).lines(),
             "",
         ]
     return "\n".join([*lines, *_NOTES])

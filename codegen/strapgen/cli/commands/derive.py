@@ -58,5 +58,4 @@ def derive(
     elif show == "program":
         typer.echo(formulas.program_as_text(program))
     else:
-        counts = {**program.operations, "temporaries": program.temporaries}
-        typer.echo("\n".join([kernel.name, *(f"  {kind:<12}{number:>5}" for kind, number in counts.items())]))
+        typer.echo(formulas.operations_as_text(kernel, program))
