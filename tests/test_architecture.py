@@ -177,6 +177,7 @@ def test_sympy_ends_at_the_gate():
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
+@cache
 def names_of_imports(module: ast.Module) -> dict[str, str]:
     """Return what every imported name of a module stands for, inside functions and for types too."""
     names: dict[str, str] = {}

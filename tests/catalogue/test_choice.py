@@ -18,10 +18,12 @@ from strapgen.analysis.constant_rate import constant_rate
 from strapgen.analysis.prediction import predict
 from strapgen.analysis.series import series
 from strapgen.backends import backend
+from strapgen.catalogue.methods import tableaux
 from strapgen.cli import main
 from strapgen.experiments import conformance
 from strapgen.experiments.comparison import compare
 from strapgen.experiments.convergence import converge
+from strapgen.library import generated_sources
 from strapgen.simulation.motions import GENERAL
 from strapgen.support.exceptions import InputError
 from strapgen.symbolic.kernel import Kernel
@@ -29,6 +31,19 @@ from strapgen.symbolic.kernel import Kernel
 #: A file whose kernel has one name, whatever its options are: Euler parameters by a tableau.
 FILE = str(Path(__file__).resolve().parents[1] / "data" / "algorithms" / "one_name.py")
 METHODS = ("rk1", "rk3")
+#: A file whose step puts a number, or an element of the state, in the first place of its matrix.
+NAMED_PI = """
+import sympy as sp
+from strapgen import Companions, KernelBuilder, Signal, increments_signal
+
+def algorithm():
+    build = KernelBuilder()
+    state = build.input(Signal("state", (3, 3), ("pi", *(f"C_{{k}}" for k in range(2, 10)))))
+    build.input(increments_signal(2))
+    build.output(Signal.matrix("next", "next"), [{number}, *list(state)[1:]])
+    step = Companions(None, None, None, (1, 0, 0, 0, 1, 0, 0, 0, 1))
+    return build.kernel("named-pi", "A matrix", "none", companions=step)
+"""
 
 
 @pytest.fixture
@@ -162,6 +177,29 @@ def test_an_algorithm_is_held_against_itself_by_another_method(says):
     assert users["first_terms"] != users["second_terms"]
 
 
+def test_a_number_and_an_input_of_its_name_are_two_formulas(tmp_path):
+    """Both print as ``pi``: the number, and an element of the state of this name."""
+    identities, values = set(), set()
+    for number in ("sp.pi", "sp.Symbol('pi', real=True)"):
+        (tmp_path / "pi.py").write_text(NAMED_PI.format(number=number))
+        choice = catalogue.choose(str(tmp_path / "pi.py"))
+        identities.add(choice.identity)
+        values.add(float(of(choice).propagate(np.full((1, 2, 3), 0.5))[-1][0, 0]))
+    assert len(identities) == len(values) == 2
+
+
+def test_the_same_tableau_in_two_files_is_generated_by_two_commands(tmp_path):
+    head = 'name = "Heun 2"\nsource = "test"\norder = 2\n'
+    text = f'{head}nodes = ["0", "1"]\nmatrix = [[], ["1"]]\nweights = ["1/2", "1/2"]\n'
+    files = [tmp_path / "a" / "heun.toml", tmp_path / "b" / "heun.toml"]
+    for file in files:
+        file.parent.mkdir()
+        file.write_text(text)
+        choice = catalogue.choose("euler", tableaux.read(file), 1)
+        (code,) = generated_sources.sources(choice, "numpy").files.values()
+        assert f"--tableau {file} " in " ".join(code.split())
+
+
 def test_two_kernels_of_one_step_need_two_names(tmp_path):
     text = Path(FILE).read_text()
     (tmp_path / "twice.py").write_text(text.replace('name="matrix-from-mine"),', 'name="mend"),'))
@@ -183,7 +221,7 @@ def held(value: object, depth: int = 3) -> Iterator[str]:
 
 def test_no_module_of_the_package_holds_a_user_s_kernel(chosen):
     for choice in chosen.values():
-        strapgen.simulate(of(choice), strapgen.motion("constant", x_rad_s=1), "0.01", "0.02")
+        strapgen.simulate(backend(choice), strapgen.motion("constant", x_rad_s=1), "0.01", "0.02")
     holding = [
         f"{name}.{attribute}"
         for name, module in list(sys.modules.items())

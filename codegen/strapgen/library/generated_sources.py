@@ -60,7 +60,7 @@ def sources(choice: Choice, target: str, settings: Settings | None = None) -> So
     target : str
         A key of `strapgen.targets.TARGETS`.
     settings : Settings, optional
-        What fixed point is made for.
+        Word, ranges and rounding of fixed point; by default 32 bits and 1/8 rad.
 
     Returns
     -------

@@ -79,7 +79,7 @@ def ranges(
     Returns
     -------
     dict of str to Fraction
-        For `Settings`: by the names of inputs.
+        The `ranges` of `Settings`, by the names of inputs.
 
     Examples
     --------
@@ -116,7 +116,7 @@ def loops(
     target : str, optional
         A key of `strapgen.targets.TARGETS`.
     settings : Settings, optional
-        What fixed point is made for; ranges and formats by the names of the loops' inputs.
+        Word, rounding, and ranges and formats by the names of the loops' inputs, for fixed point.
 
     Returns
     -------

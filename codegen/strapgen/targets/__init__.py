@@ -1,4 +1,4 @@
-"""Targets: programs become source text."""
+"""Targets print programs as source text."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ __all__ = ["FIXED", "TARGETS", "Function", "Sources", "Target", "emit", "require
 class Target(NamedTuple):
     """A target: its title, the folder here whose ``emit(program, target)`` prints it, and the program that it takes.
 
-    `words` are the lengths of word that it has, in bits; None stands for any.
+    `words` are the lengths of word that it supports, in bits; None stands for any.
     """
 
     title: str

@@ -26,20 +26,20 @@ _P = TypeVar("_P", Program, FixedProgram)
 
 
 class Key(NamedTuple):
-    """Something that has a name: of kind "function", "signal", "value" or "residual"."""
+    """A named part of a program, of kind "function", "signal", "value" or "residual" (an error feedback)."""
 
     kind: str
     name: str
 
 
 def keys(program: Program | FixedProgram, joined: Iterable[str] = ()) -> list[Key]:
-    """Return everything that a program names, each once, signals first.
+    """Return the named parts of a program, each once: the function, signals, then values.
 
     Parameters
     ----------
     program : Program or FixedProgram
     joined : iterable of str
-        Signals that have one name with their only element.
+        Signals that share their name with their only element.
     """
     plain = program if isinstance(program, Program) else program.program
     signals = [*plain.inputs, *(result.signal for result in plain.results)]
@@ -70,7 +70,7 @@ def renamed(program: _P, names: Mapping[Key, str], joined: Iterable[str] = ()) -
 
 
 class _Renaming:
-    """Names, and how each part of a program takes them."""
+    """The new names, and a method that renames each kind of part."""
 
     def __init__(self, names: Mapping[Key, str], joined: frozenset[str]) -> None:
         self.names, self.joined = names, joined

@@ -1,8 +1,8 @@
 """Building turns source text into a module that can be called.
 
-The numpy target is imported as it is. C is compiled through cffi in API mode and cached by content, so that
-a second call compiles nothing. Many sources compile together into one module: the compiler's start, Python's headers
-and the linker, which cost more than a kernel does, are paid once.
+Python code is executed as it is. C is compiled through cffi in API mode and cached by content, so that a second call
+compiles nothing. Many sources can be compiled into one module, which costs little more than one of them: starting the
+compiler, reading Python's headers and linking take longer than a kernel.
 """
 
 from __future__ import annotations

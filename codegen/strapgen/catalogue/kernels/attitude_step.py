@@ -1,4 +1,4 @@
-"""Attitude steps: kinematics + method + what is known of the rate, fused, in transition form."""
+"""Attitude steps in transition form, from a kinematics, a method and samples of the rate."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ def step(kinematics: Kinematics, method: Method, increments: int | None, previou
     method : Method
         The integration method.
     increments : int or None
-        Angle increments a step, 1 to 8; None for a step that is given the rate at every node.
+        Angle increments a step, 1 to 8; None for a step that takes the rate at every node.
     previous : int, optional
-        Increments before the step from which the rate is extracted too, 0 to 3.
+        Increments from before the step, 0 to 3, that the rate extraction uses too.
 
     Returns
     -------

@@ -16,7 +16,7 @@ from strapgen.symbolic.evaluation import Direction, Wrapped
 from strapgen.symbolic.kernel import Kernel
 
 _NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
-#: What the names of a kernel's functions end with, in some target.
+#: Endings of the names of a kernel's functions in all targets.
 _FUNCTION_OF = re.compile(
     r"(-float|-q\d+)?(-array|-batch|-propagate|-orthonormalizer|-transition)$|(-float|-q\d+)$"
 )
@@ -30,7 +30,7 @@ ALLOWED = (
 
 
 def require(kernel: Kernel) -> None:
-    """Check the kernel of an attitude step, and the kernels that it brings.
+    """Check the kernel of a user's attitude step, and the kernels that come with it.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def require(kernel: Kernel) -> None:
     Raises
     ------
     InputError
-        If something is not as it must be.
+        If a stage could not work on the kernel; the message names the fault.
     """
     names = [each.name for each in (kernel, *kernel.own)]
     for each in (kernel, *kernel.own):

@@ -1,4 +1,4 @@
-"""Kernels of users in the cache: derived once for a file, what it reads, and its options."""
+"""Users' kernels in the cache: each is derived again only if its file, a file that it reads, or an option changes."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ def kernel(what: list[str], folder: Path | None, derive: Callable[[], tuple[Kern
     Parameters
     ----------
     what : list of str
-        What tells it from others: the file with its content, or the entry point, and the options.
+        Parts of the key: kind and name, the content of the file or the entry point, and the options.
     folder : Path or None
         The folder of the file.
     derive : callable
-        Returns the kernel, checked, and what was read for it.
+        Returns the checked kernel and the record of the files that its code read.
 
     Raises
     ------
@@ -55,7 +55,7 @@ def kernel(what: list[str], folder: Path | None, derive: Callable[[], tuple[Kern
 
 
 def _installed() -> list[str]:
-    """Return what is installed, with versions: the names of its folders of metadata."""
+    """Return the installed packages with their versions, as the names of their metadata folders."""
     return sorted(
         path.name
         for folder in map(Path, installed_folders())
@@ -89,7 +89,7 @@ def _store(key: str, data: bytes, record: Record) -> None:
 
 
 def _pickled(derived: Kernel) -> bytes | None:
-    """Return a kernel as bytes; None if it cannot be had back from them, for instance if it holds a user's class."""
+    """Return a kernel as bytes; None if they do not restore it, for instance because it holds a user's class."""
     try:
         data = pickle.dumps(derived)
         restored: Any = pickle.loads(data)

@@ -1,7 +1,6 @@
-"""The fixed-point C target.
+"""The fixed-point C target: a header with the contract of every function, and a C99 source on integers alone.
 
-Integers alone, no undefined or implementation-defined behaviour, an error code for input that the formats were not
-chosen for.
+The code has no undefined or implementation-defined behaviour, and returns an error code for input out of range.
 """
 
 from __future__ import annotations
@@ -28,17 +27,17 @@ from strapgen.targets.rendering import render
 
 @dataclass(frozen=True)
 class Word:
-    """The integer types of a length of word.
+    """The C types for words of one length.
 
     Parameters
     ----------
     bits : int
     type, residual : str
-        Type of a word in memory, and of one without a sign.
+        Types of a word in memory, and of an error feedback, which has no sign.
     fast : str
-        Type of a word in a calculation: at least as long, whatever the processor is fastest with.
+        Type of a word in a calculation: the fastest of the processor that is long enough.
     wide, magnitude : str
-        Type of a product, and of a magnitude of one.
+        Types of a product, and of the magnitude of a product.
     """
 
     bits: int
@@ -93,7 +92,7 @@ def emit(fixed: FixedProgram, target: str) -> Sources:
 
 
 def _files(fixed: FixedProgram, name: str) -> dict[str, str]:
-    """Return the header and the source of a program whose names are as they are printed."""
+    """Return the header and the source of a program with its printed names."""
     interface, word = fixed.interface, WORDS[fixed.word]
     printer = _Printer(fixed, word)
     signals = [(a.signal, "const ") for a in interface.inputs] + [(a.signal, "") for a in interface.outputs]
@@ -155,7 +154,7 @@ class _Printer:
         self.names |= {name for argument in fixed.interface.inputs for name in argument.signal.elements}
 
     def memory(self, name: str) -> str:
-        """Return the name of an argument's memory; that of a scalar is not the name of its value."""
+        """Return the name of an argument's array; it differs from the names of all values."""
         return f"{name}_words" if name in self.names else name
 
     def code(self) -> dict[str, list[str]]:
@@ -251,7 +250,7 @@ class _Printer:
         return lines + self._result(value, kind, self._joined(terms))
 
     def _result(self, value: Value, kind: str, text: str) -> list[str]:
-        """Return the statement that keeps a sum; a checked word is checked before it is narrowed."""
+        """Return the statements that store a sum; a word with a range check is checked before it is narrowed."""
         if value.guarded and not value.wide:
             name = f"{value.name}_unchecked"
             return [
@@ -313,7 +312,7 @@ class _Printer:
         )
 
     def constant(self, value: int, wide: bool = False) -> str:
-        """Return an integer as a constant expression that holds it, of a wide number where that is asked."""
+        """Return an integer as a constant expression, with the type of a wide number if `wide` is true."""
         if value < 0:
             return f"(-{self.constant(-value, wide)})"
         if value < 1 << 15:
