@@ -5,12 +5,13 @@ BIN := .venv/bin
 READY := .venv/.ready
 BENCH := .venv-bench/.ready
 
-.PHONY: help demo test test-long check bench generate clean
+.PHONY: help demo test test-long test-modules check bench generate clean
 
 help:
 	@echo "make demo      set up, regenerate the code, build it, print the five tables on every back end"
 	@echo "make test      set up, run the test suite"
 	@echo "make test-long the tests that take long: every word, rounding and residual on every kernel"
+	@echo "make test-modules  list anew which kernels the tests compile"
 	@echo "make check     generated code in step, ruff, mypy"
 	@echo "make bench     measure against other code generators, and the back ends; about a quarter of an hour"
 	@echo "make generate  rebuild generated/"
@@ -33,6 +34,12 @@ test: $(READY)
 
 test-long: $(READY)
 	$(BIN)/python -m pytest -n auto --dist worksteal -m long
+
+# With an empty cache, so that every module is built and noted.
+test-modules: $(READY)
+	folder=$$(mktemp -d) && STRAPGEN_CACHE_DIR=$$folder/cache $(BIN)/python -m pytest -n auto --dist worksteal \
+	  -m "not long" --record-modules $$folder/modules \
+	  && sort -u $$folder/modules > tests/data/modules.jsonl && rm -r $$folder
 
 check: $(READY)
 	$(BIN)/strapgen generate --all --check

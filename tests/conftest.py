@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import ExitStack
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
+import session_library
+import typer.main
 from gathering import SEED
 
 import strapgen
@@ -26,6 +31,16 @@ BACKEND_NAMES = [
 #: Back ends on which Cayley-Klein parameters run too. Their programs are those of Euler parameters but for names, which
 #: tests/lowering proves: numpy and C in double show it, the others would compile the same C again.
 CAYLEY_KLEIN = ("numpy", "c")
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the option that writes the forecast of the session's library."""
+    parser.addoption(
+        "--record-modules",
+        metavar="FILE",
+        type=Path,
+        help="append a line to FILE for every kernel that tests compile, and compile each when it is needed",
+    )
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -51,6 +66,26 @@ def optimization(pytestconfig: pytest.Config) -> Iterator[None]:
             flags = tuple("-O1" if flag == "-O3" else flag for flag in compiler.C_FLAGS)
             assert flags != compiler.C_FLAGS
             patch.setattr(compiler, "_flags", flags)
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def compiled(optimization: None, request: pytest.FixtureRequest) -> Iterator[None]:
+    """Compile what the tests of a large session need, together and before they begin."""
+    with ExitStack() as stack:
+        file = request.config.getoption("record_modules")
+        if file is not None:
+            stack.enter_context(session_library.recorded(file.absolute()))
+        elif len(request.session.items) >= session_library.FEWEST_TESTS:
+            session_library.provide()
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def one_command_line() -> Iterator[None]:
+    """Build the commands once: typer reads the signatures of all of them whenever its application is called."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(typer.main, "get_command", cache(typer.main.get_command))
         yield
 
 

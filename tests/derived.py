@@ -2,20 +2,32 @@
 
 from __future__ import annotations
 
+import json
+import pickle
 from collections.abc import Mapping
 from functools import cache
+from pathlib import Path
 
 import mpmath
+import session_library
 import sympy as sp
 
-from strapgen import catalogue
+from strapgen import catalogue, fixedpoint
 from strapgen.backends import BACKENDS, fitted
 from strapgen.backends.kernel_sources import sources_of_program
 from strapgen.catalogue import Choice
+from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.integer_program import FixedProgram
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
 from strapgen.library import generated_sources
 from strapgen.symbolic.kernel import Kernel
+
+#: Kernels of the standard catalogue that fixed point can be made of without ranges from a user: all but the models of
+#: motions, whose rates have none, as tests/library proves.
+FIXED_POINT = [
+    choice for choice in catalogue.standard() if not choice.kernel.endswith(("-truth", "-increments"))
+]
 
 
 @cache
@@ -25,6 +37,21 @@ def kernel(choice: Choice) -> Kernel:
 
 def program(choice: Choice) -> Program:
     return generated_sources.program(choice)
+
+
+@cache
+def _quantized(identity: str, choice: Choice, settings: str) -> FixedProgram:
+    def fill(draft: Path) -> None:
+        made = fixedpoint.quantize(program(choice), Settings.from_dict(json.loads(settings)))
+        (draft / "fixed.pickle").write_bytes(pickle.dumps(made))
+
+    folder = session_library.folder("test-quantized", [identity, settings], fill)
+    return pickle.loads((folder / "fixed.pickle").read_bytes())
+
+
+def quantized(choice: Choice, settings: Settings) -> FixedProgram:
+    """Return a kernel of the catalogue in fixed point."""
+    return _quantized(choice.identity, choice, json.dumps(settings.as_dict(), sort_keys=True))
 
 
 @cache

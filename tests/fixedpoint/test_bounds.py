@@ -4,33 +4,27 @@ from __future__ import annotations
 
 from dataclasses import replace
 from fractions import Fraction
-from functools import cache
 
 import numpy as np
 import pytest
-from derived import program
+from derived import FIXED_POINT, program, quantized
 from evidence import corners_and_random, exactly, in_double
 from scipy.spatial.transform import Rotation
 
 import strapgen
-from strapgen import build, generate, quantize
+from strapgen import build, generate
 from strapgen.backends import backend as make_backend
 from strapgen.backends import evaluator as make_evaluator
 from strapgen.backends import exact
 from strapgen.backends.fixed import ModelEvaluator
 from strapgen.catalogue import Choice, standard
-from strapgen.fixedpoint import can_lower, function_series
+from strapgen.fixedpoint import function_series
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.integer_program import IntegerSum
 from strapgen.support.exceptions import InputError
 
 STEPS = [choice for choice in standard() if choice.method]
-OTHERS = [choice for choice in standard() if not choice.method and can_lower(program(choice))]
-
-
-@cache
-def lowered(choice: Choice, settings: Settings):
-    return quantize(program(choice), settings)
+OTHERS = [choice for choice in FIXED_POINT if not choice.method]
 
 
 def evaluator_of(fixed) -> ModelEvaluator:
@@ -72,9 +66,9 @@ def test_every_value_keeps_its_range_and_its_error_bound(choice, word, rounding,
     loose = choice.name == "dcm-orthonormalize-optimal"
     if word == 8 and (loose or (choice.name, rounding) == ("euler-angles-from-dcm", "truncation")):
         with pytest.raises(InputError, match="words of 8 bits are too short"):
-            lowered(choice, Settings(word, Fraction(1, 60), rounding))
+            quantized(choice, Settings(word, Fraction(1, 60), rounding))
         return
-    fixed = lowered(choice, Settings(word, Fraction(1, 60), rounding))
+    fixed = quantized(choice, Settings(word, Fraction(1, 60), rounding))
     function, seen = spied(fixed)
     inputs = corners_and_random(evaluator_of(fixed), 25, rng)
     compared = 0
@@ -108,7 +102,7 @@ def test_every_value_keeps_its_range_and_its_error_bound(choice, word, rounding,
 @pytest.mark.parametrize("algorithm", ["euler", "dcm"])
 def test_the_bound_of_a_step_is_near_the_worst_of_many(algorithm, word, rng):
     settings = Settings.of(word=word, max_rate_deg_s=400, step="0.01", increments=2)
-    fixed = lowered(Choice(algorithm, "rk4", 2), settings)
+    fixed = quantized(Choice(algorithm, "rk4", 2), settings)
     model = evaluator_of(fixed)
     inputs = corners_and_random(model, 100_000, rng)
     (computed,), _ = model.run(inputs, model.fresh(len(inputs[0])))
@@ -169,7 +163,7 @@ def test_small_increments_keep_the_bound_in_c(angle, rounding, rng):
 @pytest.mark.parametrize("choice", STEPS, ids=lambda choice: choice.kernel)
 def test_no_transition_stretches_more_than_the_bound_says(choice, rng):
     angle = 1 / 40
-    fixed = lowered(choice, Settings(32, Fraction(1, 40)))
+    fixed = quantized(choice, Settings(32, Fraction(1, 40)))
     growth = float(fixed.interface.accumulation.growth)
     part = program(choice).transition_program()
     rows = [*rng.choice([-angle, angle], size=(64, 6)), *rng.uniform(-angle, angle, (200, 6))]
@@ -306,9 +300,9 @@ def test_the_reference_in_many_places_is_that_of_mpmath():
 
 def test_a_transition_kept_beside_the_increments_needs_no_residual():
     # With the state's residuals alone, the transition is split: its rounding is that of its terms of higher order.
-    fixed = lowered(Choice("euler", "rk4", 2), Settings(16, Fraction(1, 76), carry="state"))
+    fixed = quantized(Choice("euler", "rk4", 2), Settings(16, Fraction(1, 76), carry="state"))
     (rest,) = (value for value in fixed.body if value.name == "p_x")
-    plain = lowered(Choice("euler", "rk4", 2), Settings(16, Fraction(1, 76)))
+    plain = quantized(Choice("euler", "rk4", 2), Settings(16, Fraction(1, 76)))
     (whole,) = (value for value in plain.body if value.name == "p_x")
     assert rest.error < whole.error / 15
     assert isinstance(rest.definition, IntegerSum) and rest.definition.residual is None
@@ -324,7 +318,7 @@ def test_guards_refuse_what_is_too_far_from_a_proper_input():
 
 
 def test_a_back_end_is_built_from_a_quantized_program():
-    fixed = lowered(Choice("euler", "rk4", 2), Settings(16, Fraction(1, 76)))
+    fixed = quantized(Choice("euler", "rk4", 2), Settings(16, Fraction(1, 76)))
     for target in ("c-fixed", "fixed-model"):
         made = build(generate(fixed, target))
         assert made.unit == 2.0**-14

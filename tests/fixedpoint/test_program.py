@@ -8,14 +8,13 @@ from itertools import pairwise, product
 
 import numpy as np
 import pytest
-from derived import program
+from derived import FIXED_POINT, program
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from strapgen import generate, quantize
 from strapgen.backends.fixed import ModelEvaluator
-from strapgen.catalogue import Choice, standard
-from strapgen.fixedpoint import can_lower
+from strapgen.catalogue import Choice
 from strapgen.fixedpoint.derivation import quantities
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.ir.fixed_settings import Settings
@@ -206,8 +205,8 @@ def test_longer_words_have_smaller_bounds():
 #: Kernels for integers; of the longest steps, many seconds each in all settings, the longest with the long tests.
 LOWERED = [
     pytest.param(c, marks=pytest.mark.long if c.kernel == "dcm-rk4-2" else (), id=c.kernel)
-    for c in standard()
-    if can_lower(program(c)) and c.kernel != "dcm-rk3-2"
+    for c in FIXED_POINT
+    if c.kernel != "dcm-rk3-2"
 ]
 
 

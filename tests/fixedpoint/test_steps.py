@@ -7,11 +7,12 @@ from fractions import Fraction
 import mpmath
 import numpy as np
 import pytest
-from derived import precisely
+from derived import precisely, program, quantized
 
 import strapgen
 from strapgen.backends.exact import propagate
 from strapgen.backends.increments import windows
+from strapgen.catalogue import Choice
 from strapgen.ir.fixed_settings import Settings
 
 EXPONENTIALS = ("magnus2", "magnus4", "magnus6", "munthe-kaas4")
@@ -63,7 +64,7 @@ def test_a_call_is_inside_its_bound(algorithm, method, previous, rng):
 @pytest.mark.parametrize("algorithm", ["dcm", "euler"])
 def test_the_bound_of_an_exponential_is_a_few_places(algorithm, method):
     # The root of a small square is inexact; cosine and sin(x)/x are taken from the square itself.
-    fixed = strapgen.quantize(strapgen.lower(strapgen.derive(algorithm, method, 2)))
+    fixed = quantized(Choice(algorithm, method, 2), Settings())
     unit = fixed.formats["next"].unit
     assert fixed.error_bounds["next"] <= 5 * unit
     # Its transitions are rotations: errors add up and do not grow.
@@ -80,7 +81,7 @@ def test_a_run_of_exponentials_is_inside_its_bound(algorithm, method, name, carr
     backend = strapgen.backend(algorithm, method, 2, name, settings=settings)
     increments = rng.uniform(-0.03, 0.03, size=(200, 2, 3))
     for given, rounded in ((backend.representable(increments), False), (increments, True)):
-        exact = propagate(strapgen.lower(strapgen.derive(algorithm, method, 2)), given)
+        exact = propagate(program(Choice(algorithm, method, 2)), given)
         off = np.linalg.norm(backend.propagate(given) - exact, axis=-1).max()
         bound = backend.rounding_bound(200, rounded)
         assert off <= bound < (3e-6 if name == "c-q31" else 0.2)
@@ -89,8 +90,7 @@ def test_a_run_of_exponentials_is_inside_its_bound(algorithm, method, name, carr
 @pytest.mark.parametrize("largest", [Fraction(1, 100), Fraction(1, 2), 2, 4])
 def test_an_exponential_for_increments_of_any_size(largest):
     # Beyond 5/4 rad the angle is reduced, and the root is taken.
-    program = strapgen.lower(strapgen.derive("euler", "magnus4", 2))
-    fixed = strapgen.quantize(program, Settings().fitted(float(largest)))
+    fixed = quantized(Choice("euler", "magnus4", 2), Settings().fitted(float(largest)))
     few_places, root_near_zero = Fraction(8) / 2**30, Fraction(1, 500)
     assert fixed.error_bounds["next"] < (few_places if largest < 1 else root_near_zero)
 

@@ -1,0 +1,171 @@
+"""One library of C for all tests of a session: its processes compile together what the tests build, before they begin.
+
+A compiled module costs more for the compiler's start, Python's headers and the linker than for the kernel in it.
+tests/data/modules.jsonl lists the kernels that tests build, a line each. The list is no more than a forecast: a module
+that it lacks is built alone when a test needs it, and one too many costs a few hundredths of a second.
+``make test-modules`` writes it anew.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import re
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from functools import cache as memoized
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from strapgen.catalogue import Choice
+from strapgen.catalogue.names import ALGORITHMS, KERNELS, METHODS, VECTORS
+from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.sources import Sources
+from strapgen.library import generated_sources
+from strapgen.support import cache
+from strapgen.support.exceptions import InputError
+from strapgen.toolchain import compiler
+
+#: The kernels that tests build: kernel, target, and what fixed point is made for.
+FORECAST = Path(__file__).parent / "data" / "modules.jsonl"
+#: A session of fewer tests builds what it needs.
+FEWEST_TESTS = 1000
+#: Sources that are compiled in one call of the compiler; several calls keep all processes busy.
+_TOGETHER = 48
+
+_STEP = re.compile(
+    f"({'|'.join([*ALGORITHMS, *VECTORS])})-({'|'.join(METHODS)})-([0-9]+|rates)(?:-previous([0-9]))?"
+)
+
+
+def choice_by_name(kernel: str) -> Choice | None:
+    """Return the choice of a kernel of the catalogue; None for the name of any other kernel."""
+    if kernel in KERNELS:
+        return Choice(kernel)
+    step = _STEP.fullmatch(kernel)
+    if step is None:
+        return None
+    name, method, count, previous = step.groups()
+    return Choice(name, method, None if count == "rates" else int(count), int(previous or 0))
+
+
+def line(sources: Sources) -> str | None:
+    """Return the line of the forecast for C sources; None if the catalogue does not lead to the same text."""
+    choice = choice_by_name(sources.kernel)
+    settings = sources.fixed.settings if sources.fixed else None
+    if choice is None:
+        return None
+    try:
+        again = generated_sources.sources(choice, sources.target, settings)
+    except InputError:
+        return None
+    if again.files != sources.files:
+        return None
+    return json.dumps([sources.kernel, sources.target, settings and settings.as_dict()])
+
+
+def _sources(entry: list[Any]) -> Sources | None:
+    """Return the sources of a line; None if the catalogue no longer has them."""
+    kernel, target, settings = entry
+    choice = choice_by_name(kernel)
+    try:
+        return choice and generated_sources.sources(choice, target, settings and Settings.from_dict(settings))
+    except (InputError, TypeError, KeyError):
+        return None
+
+
+@contextmanager
+def _lock(path: Path, wait: bool) -> Iterator[bool]:
+    """Hold a lock between processes, which ends with this one at the latest; say whether it is held."""
+    with path.open("w") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+        except BlockingIOError:
+            yield False
+        else:
+            yield True
+
+
+def _share(folder: Path, tasks: dict[str, Callable[[], None]]) -> None:
+    """Do tasks that other processes do too: each of them once, by whichever comes first; return when all are done."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for wait in (False, True):  # what others work on comes last
+        for name, task in tasks.items():
+            done = folder / f"{name}.done"
+            if done.exists():
+                continue
+            with _lock(folder / f"{name}.lock", wait) as held:
+                if held and not done.exists():
+                    task()
+                    done.touch()
+
+
+def folder(name: str, parts: Iterable[str], fill: Callable[[Path], None]) -> Path:
+    """Return a folder that one process of the session fills for all; the parts are what its files depend on."""
+    locks = cache.root() / "session-library"
+    locks.mkdir(parents=True, exist_ok=True)
+    key = cache.digest([cache.generator_digest(), *parts])
+    with _lock(locks / f"{name}-{key}.lock", wait=True):
+        return cache.entry(name, key, fill)
+
+
+def provide() -> None:
+    """Compile what the forecast lists, together with the other processes of the session."""
+    entries = [json.loads(text) for text in FORECAST.read_text().splitlines()]
+    state = cache.digest([cache.generator_digest(), FORECAST.read_bytes(), *compiler._flags])
+    folder = cache.root() / "session-library" / state
+
+    @memoized
+    def sources(number: int) -> Sources | None:
+        return _sources(entries[number])
+
+    kernels: dict[str, list[int]] = {}
+    for number, (kernel, *_) in enumerate(entries):
+        kernels.setdefault(kernel, []).append(number)
+
+    def generate(numbers: list[int]) -> None:
+        for number in numbers:
+            sources(number)
+
+    # What takes longest comes first: many increments and methods of high order have the longest names.
+    ordered = sorted(kernels, key=lambda name: (-len(kernels[name]), name))
+    _share(folder, {f"generate-{name}": lambda n=kernels[name]: generate(n) for name in ordered})
+
+    # The nth variant of every kernel goes into the nth layer, in which no name occurs twice.
+    layers: dict[int, list[int]] = {}
+    variants: dict[tuple[str, str, int], int] = {}
+    for number, (kernel, target, settings) in enumerate(entries):
+        name = (kernel, target, settings["word"] if settings else 0)
+        variants[name] = variants.get(name, -1) + 1
+        layers.setdefault(variants[name], []).append(number)
+    groups = [
+        numbers[start : start + _TOGETHER]
+        for numbers in layers.values()
+        for start in range(0, len(numbers), _TOGETHER)
+    ]
+
+    def compile_group(numbers: list[int]) -> None:
+        compiler.compile_together(s for s in map(sources, numbers) if s is not None)
+
+    _share(
+        folder, {f"compile-{number}": lambda g=group: compile_group(g) for number, group in enumerate(groups)}
+    )
+
+
+@contextmanager
+def recorded(path: Path) -> Iterator[None]:
+    """Append a line for all that is built in the session's cache to a file."""
+    build, root = compiler._build, cache.root()
+
+    def noted(many: list[Sources], name: str, key: str) -> Path:
+        if cache.root() == root and cache.lookup("builds", key) is None:
+            for text in filter(None, map(line, many)):
+                with path.open("a") as file:
+                    file.write(text + "\n")
+        return build(many, name, key)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(compiler, "_build", noted)
+        yield
