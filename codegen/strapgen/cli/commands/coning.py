@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from strapgen.cli.options import Format, check_format, print_json, whole
+from strapgen.cli.options import whole
+from strapgen.cli.output import Format, check_format, print_json
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 

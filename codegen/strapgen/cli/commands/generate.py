@@ -3,37 +3,25 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from strapgen.cli.fixed_options import (
-    Allowance,
-    Carry,
-    Fixes,
-    MaxAngle,
-    MaxRate,
-    Ranges,
-    Rounding,
-    Step,
-    Word,
-    read_settings,
-)
-from strapgen.cli.options import (
-    Format,
-    Increments,
-    Method,
-    Previous,
-    Rates,
-    TableauFile,
-    check_format,
-    chosen,
-    print_json,
-)
+from strapgen.cli.fixed_options import FixedOptions
+from strapgen.cli.option_groups import grouped
+from strapgen.cli.options import MethodOptions
+from strapgen.cli.output import Format, check_format, print_json
 from strapgen.cli.progress import track
+from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 
+if TYPE_CHECKING:
+    from strapgen.ir.integer_program import FixedProgram
+    from strapgen.ir.program import Program
+    from strapgen.ir.sources import Sources
 
+
+@grouped
 def generate(
     algorithm: Annotated[
         str | None,
@@ -41,11 +29,8 @@ def generate(
             help="dcm, euler, cayley-klein, another kernel of strapgen list, or your own Python file."
         ),
     ] = None,
-    method: Method = None,
-    tableau: TableauFile = None,
-    increments: Increments = None,
-    previous: Previous = None,
-    rates: Rates = False,
+    *,
+    method: MethodOptions,
     target: Annotated[
         str | None,
         typer.Option(
@@ -64,15 +49,7 @@ def generate(
     check: Annotated[
         bool, typer.Option("--check", help="With --all: write nothing, exit 1 with a diff if out of step.")
     ] = False,
-    word: Word = None,
-    max_rate_deg_s: MaxRate = None,
-    step: Step = None,
-    max_angle_rad: MaxAngle = None,
-    rounding: Rounding = None,
-    carry: Carry = None,
-    drift_allowance: Allowance = None,
-    ranges: Ranges = None,
-    fix: Fixes = None,
+    fixed: FixedOptions,
     format: Format = "text",
 ) -> None:
     """Generate source code for an algorithm, or for the standard catalogue.
@@ -91,84 +68,101 @@ def generate(
     check_format(format)
     if check and not all_:
         raise InputError("--check goes with --all")
-    stated: dict[str, Any] = {
-        "word": word,
-        "max_rate_deg_s": max_rate_deg_s,
-        "step": step,
-        "max_angle_rad": max_angle_rad,
-        "rounding": rounding,
-        "carry": carry,
-        "drift_allowance": drift_allowance,
-        "ranges": ranges,
-        "formats": fix,
-    }
     if all_:
-        for name, value in (
-            ("an algorithm", algorithm),
-            ("--method", method),
-            ("--tableau", tableau),
-            ("--increments", increments),
-            ("--previous", previous),
-            ("--rates", rates or None),
-            ("--target", target),
-            ("a fixed-point option", next(filter(None, stated.values()), None)),
-        ):
-            if value is not None:
-                raise InputError(f"--all generates the whole catalogue; {name} does not go with it")
+        _check_alone(algorithm, method, target, fixed)
         _generate_all(out, check, format)
         return
     if algorithm is None:
         raise InputError("an algorithm is needed, or --all; strapgen list shows them")
     from strapgen import pipeline
     from strapgen.library import generated_sources
-    from strapgen.support import checks
     from strapgen.support.files import write_files
     from strapgen.targets import FIXED, TARGETS
 
-    choice = chosen(algorithm, method, tableau, increments, previous, rates, step=False)
-    settings = read_settings(choice.increments_per_step, **stated)
+    choice = method.choose(algorithm, step=False)
+    settings = fixed.settings(choice.increments_per_step)
     target = checks.choice("target", "numpy" if target is None else target, TARGETS)
     if settings is not None and target not in FIXED:
         raise InputError(
             f"the options of fixed point go with --target {' or '.join(FIXED)}, not with {target}"
         )
     program = generated_sources.program(choice)
-    takes = {signal.name for signal in program.inputs}
-    if not takes & {"increments", "turns"} and (max_rate_deg_s or step or max_angle_rad):
-        raise InputError(
-            f"kernel {program.kernel} takes no increments; a largest rate or angle does not go with it"
-        )
-    fixed = pipeline.quantize(program, settings) if target in FIXED else None
-    if carry not in (None, "none") and fixed is not None and not fixed.interface.residuals:
+    _check_increments(program, fixed)
+    quantized = pipeline.quantize(program, settings) if target in FIXED else None
+    if fixed.carry not in (None, "none") and quantized is not None and not quantized.interface.residuals:
         raise InputError(
             f"kernel {program.kernel} rounds no state that goes on to the next step; --carry keeps nothing"
         )
-    sources = pipeline.generate(fixed or program, target)
+    sources = pipeline.generate(quantized or program, target)
     written = write_files(out or Path(), sources.files)
-    operations = sources.operations
     if format == "json":
-        data = {
-            "kernel": sources.kernel,
-            "target": target,
-            "files": [str(path) for path in written],
-            "operations": {kind: operations[kind] for kind in ("add", "multiply", "divide", "sqrt")},
-            "temporaries": sources.temporaries,
-        }
-        print_json(data | (fixed.as_data() if fixed else {}))
-        return
-    counts = ", ".join(f"{number} {kind}" for kind, number in operations.items() if number) or "no operations"
-    typer.echo(f"{sources.kernel} for {target}: {counts}, {sources.temporaries} temporaries")
-    for path in written:
-        typer.echo(f"  {path}")
-    if fixed is not None:
-        for name, bound in fixed.error_bounds.items():
-            format_ = fixed.formats[name]
-            places = float(bound / format_.unit)
-            useless = 2 * bound >= max(map(abs, fixed.ranges[name]))
-            typer.echo(
-                f"  {name}: {format_}, error at most {float(bound):.4g}, {places:.4f} of the last place"
-                + (": of the size of the value, which certifies nothing" if useless else "")
-            )
+        print_json(_data(sources, target, written) | (quantized.as_data() if quantized else {}))
+    else:
+        typer.echo(_text(sources, target, written))
+        if quantized is not None:
+            typer.echo(_bounds(quantized))
+
+
+def _check_alone(
+    algorithm: str | None, method: MethodOptions, target: str | None, fixed: FixedOptions
+) -> None:
+    """Refuse what does not go with the whole catalogue."""
+    for name, value in (
+        ("an algorithm", algorithm),
+        ("--method", method.method),
+        ("--tableau", method.tableau),
+        ("--increments", method.increments),
+        ("--previous", method.previous),
+        ("--rates", method.rates or None),
+        ("--target", target),
+        ("a fixed-point option", fixed.stated or None),
+    ):
+        if value is not None:
+            raise InputError(f"--all generates the whole catalogue; {name} does not go with it")
+
+
+def _check_increments(program: Program, fixed: FixedOptions) -> None:
+    """Refuse a largest rate or angle for a kernel that takes neither."""
+    inputs = {signal.name for signal in program.inputs}
+    if not inputs & {"increments", "turns"} and {*fixed.stated} & {
+        "--max-rate-deg-s",
+        "--step",
+        "--max-angle-rad",
+    }:
+        raise InputError(
+            f"kernel {program.kernel} takes no increments; a largest rate or angle does not go with it"
+        )
+
+
+def _data(sources: Sources, target: str, written: list[Path]) -> dict[str, Any]:
+    operations = sources.operations
+    return {
+        "kernel": sources.kernel,
+        "target": target,
+        "files": [str(path) for path in written],
+        "operations": {kind: operations[kind] for kind in ("add", "multiply", "divide", "sqrt")},
+        "temporaries": sources.temporaries,
+    }
+
+
+def _text(sources: Sources, target: str, written: list[Path]) -> str:
+    counts = [f"{number} {kind}" for kind, number in sources.operations.items() if number]
+    head = f"{', '.join(counts) or 'no operations'}, {sources.temporaries} temporaries"
+    return "\n".join([f"{sources.kernel} for {target}: {head}", *(f"  {path}" for path in written)])
+
+
+def _bounds(program: FixedProgram) -> str:
+    """Return the format of every output of a program in fixed point, and how far its rounding can be off."""
+    lines = []
+    for name, bound in program.error_bounds.items():
+        format_ = program.formats[name]
+        useless = 2 * bound >= max(map(abs, program.ranges[name]))
+        lines.append(
+            f"  {name}: {format_}, error at most {float(bound):.4g}, "
+            f"{float(bound / format_.unit):.4f} of the last place"
+            + (": of the size of the value, which certifies nothing" if useless else "")
+        )
+    return "\n".join(lines)
 
 
 def _generate_all(out: Path | None, check: bool, format: str) -> None:

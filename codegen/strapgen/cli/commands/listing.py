@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from strapgen.cli.options import Format, check_format, print_json
+from strapgen.cli.output import Format, check_format, print_json
 
 
 def list_names(format: Format = "text") -> None:

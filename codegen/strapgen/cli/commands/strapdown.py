@@ -3,20 +3,35 @@
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from strapgen.cli.fixed_options import Carry, Fixes, Ranges, Rounding, Word, check_fixed, settings_for_run
-from strapgen.cli.options import check_format, whole
+from strapgen.cli.fixed_options import FixedOptions
+from strapgen.cli.option_groups import Shown, grouped
+from strapgen.cli.options import whole
+from strapgen.cli.output import Output
 from strapgen.support.exceptions import InputError
 
-_Text = str | None
+
+@dataclass(frozen=True)
+class CourseOutput(Output):
+    """Where the course along a recording goes."""
+
+    format: Annotated[
+        str | None,
+        typer.Option(
+            "--format", help="text, json or csv.  [default: text; csv with --out]", show_default=False
+        ),
+    ] = None
 
 
+@grouped
 def strapdown(
     algorithm: Annotated[str, typer.Argument(help="dcm or euler.")],
+    *,
     increments: Annotated[
         Path,
         typer.Option(
@@ -52,21 +67,8 @@ def strapdown(
             help="Rate of the navigation frame in deg/h, navigation axes.",
         ),
     ] = "0,0,0",
-    word: Word = None,
-    rounding: Rounding = None,
-    carry: Carry = None,
-    ranges: Ranges = None,
-    fix: Fixes = None,
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", help="File for the output.  [default: the terminal]", show_default=False),
-    ] = None,
-    format: Annotated[
-        _Text,
-        typer.Option(
-            "--format", help="text, json or csv.  [default: text; csv with --out]", show_default=False
-        ),
-    ] = None,
+    fixed: Annotated[FixedOptions, Shown(only=("word", "rounding", "carry", "ranges", "formats"))],
+    output: Annotated[CourseOutput, Shown(only=("out", "format"))],
 ) -> None:
     """Run an algorithm in two speeds along recorded gyro and accelerometer increments.
 
@@ -79,26 +81,22 @@ def strapdown(
       strapgen strapdown dcm --increments-csv examples/inertial_log.csv \\
         --fast-cycles 4 --slow-cycles 25 --backend c
     """  # noqa: D301
-    chosen = format or ("text" if out is None else "csv")
-    check_format(chosen, "csv")
+    output.check()
     import numpy as np
 
     from strapgen.reports import runs
     from strapgen.simulation import recording
     from strapgen.simulation.courses import NavigationFrame, course
-    from strapgen.support.files import write_files
 
-    words = {"word": word, "rounding": rounding, "carry": carry}
-    check_fixed(backend, words | {"range": ranges, "fix": fix})
+    fixed.check_backend(backend)
     data = recording.read_inertial(increments)
-    stated = words | {"ranges": ranges, "formats": fix}
-    settings = settings_for_run(backend, 1, stated, data.interval, lambda: data.largest)
+    settings = fixed.settings_for_run(backend, 1, data.interval, lambda: data.largest)
     begin, rate = (
         np.radians(_three(name, text))
         for name, text in (("initial-deg", initial), ("frame-rate-deg-h", frame_rate))
     )
     with np.errstate(all="ignore"):  # numbers that overflow are refused, in one line
-        made = course(
+        covered = course(
             algorithm,
             data,
             fast_cycles=whole("fast-cycles", fast_cycles) or 0,
@@ -108,22 +106,18 @@ def strapdown(
             settings=settings,
             frame=NavigationFrame(begin, rate / 3600),
         )
-    named: dict[str, Any] = {
+    facts = {
         "algorithm": f"{algorithm} in two speeds",
         "backend": backend,
         "source": str(increments),
     }
-    if chosen == "csv":
-        text = runs.course_csv(made)
-    elif chosen == "json":
-        text = json.dumps(runs.course_data(made, named))
+    format = output.format or ("text" if output.out is None else "csv")
+    if format == "csv":
+        output.deliver(runs.course_csv(covered))
+    elif format == "json":
+        output.deliver(json.dumps(runs.course_data(covered, facts)))
     else:
-        text = runs.course_text(made, named)
-    text = text.rstrip("\n")
-    if out is None:
-        typer.echo(text)
-    else:
-        write_files(Path(), {str(out): f"{text}\n"})
+        output.deliver(runs.course_text(covered, facts))
 
 
 def _three(name: str, text: str) -> list[float]:

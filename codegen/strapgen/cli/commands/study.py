@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from strapgen.cli.inputs import pairs
-from strapgen.cli.options import Increments, check_format, whole
+from strapgen.cli.option_groups import Shown, grouped
+from strapgen.cli.options import Increments, listed, whole
+from strapgen.cli.output import Output, as_json
 from strapgen.cli.progress import track
+from strapgen.cli.sample_source import pairs
 from strapgen.support.exceptions import InputError
+
+if TYPE_CHECKING:
+    from strapgen.experiments.word_length import Outcome
 
 app = typer.Typer(help="Sweep settings and see what they do to the drift.", rich_markup_mode=None)
 
@@ -22,7 +25,9 @@ def _group() -> None:
 
 
 @app.command("word-length")
+@grouped
 def word_length(
+    *,
     algorithm: Annotated[str, typer.Option("--algorithm", help="dcm, euler or cayley-klein.")] = "euler",
     methods: Annotated[
         str, typer.Option("--methods", metavar="NAME,...", help="Integration methods.")
@@ -61,14 +66,7 @@ def word_length(
             "--jobs", metavar="N", help="Processes.  [default: one a processor]", show_default=False
         ),
     ] = None,
-    plot: Annotated[
-        Path | None, typer.Option("--plot", help="Image file for the plot.", show_default=False)
-    ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", help="File for the output.  [default: the terminal]", show_default=False),
-    ] = None,
-    format: Annotated[str, typer.Option("--format", help="text, json or csv.")] = "text",
+    output: Annotated[Output, Shown(only=("plot", "out", "format"))],
 ) -> None:
     """Drift against word length: every combination of word, rounding, carry, step, method and gyro pulse.
 
@@ -82,14 +80,15 @@ def word_length(
       strapgen study word-length --words 12,16,20,24,32 \\
         --carries none,full --plot out/word-length.png
     """  # noqa: D301
-    check_format(format, "csv")
+    output.check()
     from strapgen import catalogue
     from strapgen.support import checks
 
     checks.choice("algorithm", algorithm, catalogue.ALGORITHMS)
     checks.choice("motion", motion, catalogue.MOTIONS)
-    for name in _split("methods", methods):
-        catalogue.choose(algorithm, name, whole("increments", increments))
+    names, samples = listed("--methods", methods), whole("increments", increments)
+    for name in names:
+        catalogue.choose(algorithm, name, samples)
     count = whole("jobs", jobs)
     if count is not None:
         checks.count("jobs", count, largest=1024)
@@ -99,50 +98,37 @@ def word_length(
     import numpy as np
 
     from strapgen.experiments.word_length import cases, run
-    from strapgen.reports.word_length import word_length_csv, word_length_text
-    from strapgen.support.files import write_files
 
     planned = cases(
         algorithm=algorithm,
-        methods=_split("methods", methods),
-        increments=whole("increments", increments) or 2,
-        words=[whole("words", word) or 0 for word in _split("words", words)],
-        roundings=_split("roundings", roundings),
-        carries=_split("carries", carries),
-        steps=_split("steps", steps),
+        methods=names,
+        increments=samples or 2,
+        words=[checks.whole("words", word) for word in listed("--words", words)],
+        roundings=listed("--roundings", roundings),
+        carries=listed("--carries", carries),
+        steps=listed("--steps", steps),
         duration=duration,
-        pulses_arcsec=_split("pulses-arcsec", pulses_arcsec),
+        pulses_arcsec=listed("--pulses-arcsec", pulses_arcsec),
         motion_name=motion,
         settings=None if settings is None else pairs(settings),
     )
     _ = planned[0].profile  # a motion that lacks a parameter is told before anything runs
     with np.errstate(all="ignore"):
-        found = {done.case: done for done in track(run(planned, count), "running", len(planned))}
-    outcomes = [found[case] for case in planned]
+        outcomes = {done.case: done for done in track(run(planned, count), "running", len(planned))}
+    _deliver([outcomes[case] for case in planned], output)
+
+
+def _deliver(outcomes: list[Outcome], output: Output) -> None:
+    from strapgen.reports.word_length import word_length_csv, word_length_text
+
     image = None
-    if plot is not None:
+    if output.plot is not None:
         from strapgen.reports import plots
 
-        image = plots.study_image(outcomes, plot)
-    if format == "json":
-        text = json.dumps([outcome.as_dict() for outcome in outcomes])
-    elif format == "csv":
-        text = word_length_csv(outcomes).rstrip("\n")
+        image = plots.study_image(outcomes, output.plot)
+    if output.format == "json":
+        output.deliver(as_json([outcome.as_dict() for outcome in outcomes]), image)
+    elif output.format == "csv":
+        output.deliver(word_length_csv(outcomes), image)
     else:
-        text = word_length_text(outcomes)
-    files: dict[str, str | bytes] = {}
-    if out is not None:
-        files[str(out)] = f"{text}\n"
-    if plot is not None and image is not None:
-        files[str(plot)] = image
-    write_files(Path(), files)
-    if out is None:
-        typer.echo(text)
-
-
-def _split(option: str, text: str) -> list[str]:
-    """Read a list; every value once."""
-    values = [value.strip() for value in text.split(",") if value.strip()]
-    if not values:
-        raise InputError(f"--{option} is {text!r}; at least one value is needed")
-    return list(dict.fromkeys(values))
+        output.deliver(word_length_text(outcomes), image)

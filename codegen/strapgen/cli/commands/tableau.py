@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from strapgen.cli.options import Format, check_format, print_json
+from strapgen.cli.output import Format, check_format, print_json
 from strapgen.support import checks
 
 if TYPE_CHECKING:
