@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -10,10 +10,6 @@ from strapgen.cli.options import whole
 from strapgen.cli.output import Format, check_format, print_json
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
-
-if TYPE_CHECKING:
-    from strapgen.catalogue.methods.coning_coefficients import Design
-    from strapgen.catalogue.methods.rotation_series import Scalars
 
 
 def coning(
@@ -52,94 +48,24 @@ def coning(
     check_format(format)
     from strapgen import catalogue
     from strapgen.catalogue.methods import coning_coefficients as derivation
+    from strapgen.reports import coning as reports
 
     count = checks.count("samples", whole("samples", samples), largest=catalogue.MOST_INCREMENTS)
-    kept = checks.count("previous", whole("previous", previous), smallest=0, largest=catalogue.MOST_PREVIOUS)
+    before = checks.count(
+        "previous", whole("previous", previous), smallest=0, largest=catalogue.MOST_PREVIOUS
+    )
     checks.choice("form", form, derivation.FORMS)
-    if terms and count + kept > _MOST_SAMPLES:
+    if terms and count + before > _MOST_SAMPLES:
         raise InputError(
-            f"terms of third and fourth order are listed for up to {_MOST_SAMPLES} samples; {count + kept} are given"
+            f"terms of third and fourth order are listed for up to {_MOST_SAMPLES} samples; {count + before} are given"
         )
-    design = derivation.design(count, kept, form)
-    data = _data(design, terms)
+    design = derivation.design(count, before, form)
+    data = reports.coning_data(design, terms)
     if format == "json":
         print_json(data)
     else:
-        typer.echo(_text(design, data))
+        typer.echo(reports.coning_text(design, data))
 
 
-#: Samples, those kept included, for which terms of third and fourth order are listed.
+#: Samples, those before the slow cycle included, for which terms of third and fourth order are listed.
 _MOST_SAMPLES = 6
-
-
-def _data(design: Design, terms: bool) -> dict[str, Any]:
-    from strapgen.catalogue.methods.coning import method, sample_terms
-    from strapgen.catalogue.methods.samples import sample_names
-
-    names = sample_names(design.samples, design.previous)
-    residual = design.residual()
-    order = method(design.form).step_order(design.samples, design.previous)
-    data: dict[str, Any] = {
-        "coefficients": [str(c) for c in design.pairs.values()],
-        "residual": residual.expression,
-        "leading": residual.leading_expression,
-        "pairs": [[names[older], names[newer]] for older, newer in design.pairs],
-        "order": order.step,
-    }
-    if terms:
-        third, fourth = sample_terms(design.samples, design.previous)
-        data["third_order"] = {names[k]: _products(row, names) for k, row in third.items()}
-        data["fourth_order"] = {
-            f"{names[k]} x {names[m]}": _products(row, names) for (k, m), row in fourth.items()
-        }
-    return data
-
-
-def _products(row: Scalars, names: list[str]) -> dict[str, str]:
-    return {f"{names[i]}.{names[j]}": str(c) for (i, j), c in row.items()}
-
-
-def _text(design: Design, data: dict[str, Any]) -> str:
-    from strapgen.catalogue.methods import coning_coefficients as derivation
-
-    before = (
-        f" and {design.previous} before {'it' if design.samples == 1 else 'them'}" if design.previous else ""
-    )
-    samples = f"{design.samples} {'sample' if design.samples == 1 else 'samples'}{before}"
-    pairs = [f"{older} x {newer}" for older, newer in data["pairs"]]
-    width = max(map(len, pairs), default=0)
-    length = max(map(len, data["coefficients"]), default=0)
-    lines = [
-        f"{design.form} coning coefficients, {samples}",
-        f"source of the form: {derivation.SOURCES[design.form]}",
-        "",
-        *(
-            f"  {pair:<{width}}  {c:>{length}}  {float(value):12.9f}"
-            for pair, c, value in zip(pairs, data["coefficients"], design.pairs.values(), strict=True)
-        ),
-        *([] if pairs else ["  one sample has no pairs: there is no correction"]),
-        "",
-        "residual: mean drift on coning, computed minus true, rad/s, to second order in alpha",
-        f"  {data['residual']}",
-        f"  leading term {data['leading']}",
-        "  alpha: half-angle of the cone in rad; omega: its frequency in rad/s; T: time between samples in s",
-        f"order of a step on any motion: {data['order']}",
-    ]
-    if design.form == "combined":
-        lines.append("terms of third and fourth order: kept by the kernels of this form; --terms lists them")
-    if design.form == "uncompressed":
-        lines.append("terms of third and fourth order: kept by method coning-polynomial; --terms lists them")
-    for kind in ("third", "fourth"):
-        rows = data.get(f"{kind}_order", {})
-        if rows:
-            lines += ["", f"terms of {kind} order: each vector times its sum of scalar products"]
-        for vector, row in rows.items():
-            lines.append(f"  {vector} * ({' + '.join(f'{c} {product}' for product, c in row.items())})")
-    option = f"--method coning-{design.form} --increments {design.samples}"
-    if design.previous:
-        option += f" --previous {design.previous}"
-    lines += [
-        "",
-        f"kernels: strapgen derive rotation-vector {option}; euler, dcm and sculling take the same options",
-    ]
-    return "\n".join(lines).replace("+ -", "- ")

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -14,8 +14,8 @@ from strapgen.cli.options import Previous, Rates, TableauFile, check_format, cho
 from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
+    from strapgen.reports.vibration import AssessedCase
     from strapgen.vibration import Assessment
-    from strapgen.vibration.mean_rates import Rates as MeanRates
 
 _Text = str | None
 
@@ -144,6 +144,7 @@ def vibration(
         format,
     )
     from strapgen import vibration as assessing
+    from strapgen.reports import vibration as reports
     from strapgen.support.files import write_files
 
     cases = [
@@ -158,10 +159,10 @@ def vibration(
             random=spectrum is not None,
         )
     ]
-    found: list[_Outcome] = []
-    given: dict[str, Any] = {}
+    outcomes: list[reports.CaseRates] = []
+    amplitudes: dict[str, Any] = {}
     if spectrum is None:
-        given = {
+        amplitudes = {
             "theta_x": theta_x,
             "theta_y": "0" if theta_y is None else theta_y,
             "phase": phase,
@@ -171,8 +172,10 @@ def vibration(
         words += "" if theta_y is None else f", {theta_y} rad about y"
         words += "" if acceleration is None else f", {acceleration} m/s^2 along y"
         words += f", phase {phase} rad"
-        found = [
-            _Outcome(case, case.assessment.rates(frequency or "", step or "", cycles=case.cycles, **given))
+        outcomes = [
+            reports.CaseRates(
+                case, case.assessment.rates(frequency or "", step or "", cycles=case.cycles, **amplitudes)
+            )
             for case in cases
         ]
     else:
@@ -181,42 +184,22 @@ def vibration(
         for case in cases:
             if case.moved(set(shaken.transfers)):
                 random = assessing.random_rates(case.assessment, shaken, step or "", cycles=case.cycles)
-                found.append(_Outcome(case, random.rates, random.quadrature))
-        if not found:
+                outcomes.append(reports.CaseRates(case, random.rates, random.quadrature))
+        if not outcomes:
             raise InputError(
                 f"{spectrum} moves {', '.join(shaken.transfers)}; angles about x and y, or an angle and "
                 f"an acceleration across it, are needed for {cases[0].assessment.kernel}"
             )
     if plot is not None:
-        write_files(Path(), {str(plot): _image(cases, given, step, frequency, span, words, plot)})
+        write_files(Path(), {str(plot): _image(cases, amplitudes, step, frequency, span, words, plot)})
     title = f"{words}; step {step} s"
     if format == "json":
-        data = _merged(found)
+        data = reports.vibration_data(outcomes)
         print_json(data[0] if len(data) == 1 else data)
     elif format == "latex":
-        typer.echo(_latex(cases))
+        typer.echo(reports.vibration_latex(cases))
     else:
-        typer.echo(_text(found, title))
-
-
-class _Case(NamedTuple):
-    """What is assessed, with the fast cycles in a step, and the samples."""
-
-    assessment: Assessment
-    cycles: int | None
-    samples: int
-
-    def moved(self, transfers: set[str]) -> bool:
-        """Tell whether a spectrum moves what this needs."""
-        if self.assessment.unit == "rad/s":
-            return {"angle_x", "angle_y"} <= transfers
-        return {"angle_x", "acceleration_y"} <= transfers or {"angle_y", "acceleration_x"} <= transfers
-
-
-class _Outcome(NamedTuple):
-    case: _Case
-    rates: MeanRates
-    quadrature: MeanRates | None = None
+        typer.echo(reports.vibration_text(outcomes, title))
 
 
 def _check_vibration(
@@ -275,9 +258,10 @@ def _assessed(
     drift: bool,
     sculling: bool,
     random: bool,
-) -> list[_Case]:
-    """Return what can be assessed of an algorithm, of what is asked for."""
+) -> list[AssessedCase]:
+    """Return a case for each quantity of an algorithm that the options ask for."""
     from strapgen.catalogue.user import loading
+    from strapgen.reports.vibration import AssessedCase
     from strapgen.support import checks
     from strapgen.vibration import assessment, systems
 
@@ -315,107 +299,18 @@ def _assessed(
         if not wanted:
             needed = {"drift": "--theta-y-rad", "sculling": "--acceleration-y"}[can[0]]
             raise InputError(f"{algorithm} has {' and '.join(can)} rates alone; {needed} is needed")
-    return [_Case(of(quantity), cycles, samples) for quantity in wanted]
+    return [AssessedCase(of(quantity), cycles, samples) for quantity in wanted]
 
 
 #: Lowest and highest frequency of a plot, by the sampling frequency.
 _PLOTTED = 1e-6, 100.0
 #: The fast loop and the slow loop together.
 _TWO_SPEED = "two-speed"
-#: What the rates of a fast loop are.
-_FAST_LOOP = (
-    "continuous and computed are the part of the fast loop within a slow cycle T_m; the slow loop adds the term in T_m "
-    "to both, so that the error is that of both loops"
-)
-_UNITS = {"rad/s": "rad_s", "m/s^2": "m_s2"}
-#: What a person reads, and its factor.
-_READ = {"rad/s": ("deg/h", math.degrees(3600)), "m/s^2": ("micro-g", 1e6 / 9.80665)}
-
-
-def _merged(found: list[_Outcome]) -> list[dict[str, Any]]:
-    """Return plain JSON data, an object an algorithm."""
-    groups: dict[str, list[_Outcome]] = {}
-    for outcome in found:
-        groups.setdefault(_label(outcome.case), []).append(outcome)
-    merged = []
-    for group in groups.values():
-        data: dict[str, Any] = {}
-        for case, rates, quadrature in group:
-            unit = _UNITS[case.assessment.unit]
-            data |= {f"{part}_{unit}": value for part, value in rates._asdict().items()}
-            if quadrature is not None:
-                data |= {f"{part}_quadrature_{unit}": value for part, value in quadrature._asdict().items()}
-        data |= {"kernel": group[0].case.assessment.kernel, "increments": group[0].case.samples}
-        for case, _, quadrature in group:
-            if quadrature is None:
-                data[f"{_quantity(case)}_closed_form"] = {
-                    part: case.assessment.text(part) for part in ("computed", "continuous")
-                }
-        merged.append(data)
-    return merged
-
-
-def _quantity(case: _Case) -> str:
-    return "drift" if case.assessment.unit == "rad/s" else "sculling"
-
-
-def _label(case: _Case) -> str:
-    return case.assessment.kernel + ("" if case.cycles is None else f", {case.cycles} cycles")
-
-
-def _text(found: list[_Outcome], title: str) -> str:
-    lines = [f"mean rates about z, to second order in the amplitudes; {title}"]
-    for unit, (read, factor) in _READ.items():
-        group = [outcome for outcome in found if outcome.case.assessment.unit == unit]
-        if not group:
-            continue
-        width = max(len(_label(outcome.case)) for outcome in group)
-        heads = [f"{part}, {unit}" for part in ("continuous", "computed", "error")] + [f"error, {read}"]
-        lines += [
-            "",
-            f"{_quantity(group[0].case):<{width}} " + "".join(f"{h:>20}" for h in heads),
-        ]
-        for outcome in group:
-            if not math.isfinite(outcome.rates.error * factor):
-                raise InputError(
-                    f"{_label(outcome.case)}: the error in {read} is beyond the range of double; "
-                    "take smaller amplitudes"
-                )
-            cells = "".join(f"{value:>20.9e}" for value in outcome.rates)
-            lines.append(f"{_label(outcome.case):<{width}} {cells}{outcome.rates.error * factor:>20.6g}")
-            if outcome.quadrature is not None:
-                spread = "".join(f"{value:>20.1e}" for value in outcome.quadrature)
-                lines.append(f"{'  quadrature':<{width}} {spread}")
-    if any(o.case.cycles is not None and o.case.assessment.kernel != _TWO_SPEED for o in found):
-        lines += ["", _FAST_LOOP]
-    if all(outcome.quadrature is None for outcome in found) and len({_label(o.case) for o in found}) == 1:
-        for outcome in found:
-            made = outcome.case.assessment
-            lines += [
-                "",
-                f"closed form of the {_quantity(outcome.case)} rate in {made.unit}",
-            ]
-            lines += [f"  {part:<10} = {made.text(part)}" for part in ("continuous", "computed")]
-    return "\n".join(lines)
-
-
-def _latex(cases: list[_Case]) -> str:
-    """Return the closed forms as one LaTeX align environment."""
-    import sympy as sp
-
-    rows = []
-    for case in cases:
-        made = case.assessment
-        letter = r"\dot\phi_z" if made.unit == "rad/s" else r"\dot v_z"
-        for part in ("continuous", "computed", "error"):
-            index = rf"\mathrm{{{part}}}" if len(cases) == 1 else rf"\mathrm{{{part},\ {_label(case)}}}"
-            rows.append(f"{letter}^{{{index}}} &= {sp.latex(made.expression(part))}")
-    return "\\begin{align*}\n" + " \\\\\n".join(rows) + "\n\\end{align*}"
 
 
 def _image(
-    cases: list[_Case],
-    given: dict[str, Any],
+    cases: list[AssessedCase],
+    amplitudes: dict[str, Any],
     step: _Text,
     frequency: _Text,
     span: _Text,
@@ -444,7 +339,7 @@ def _image(
             )
     hertz = curves.frequencies(low, high)
     drawn = [
-        (_label(case), curves.curve(case.assessment, hertz, step or "", cycles=case.cycles, **given))
+        (case.label, curves.curve(case.assessment, hertz, step or "", cycles=case.cycles, **amplitudes))
         for case in cases
     ]
     return plots.vibration_image(

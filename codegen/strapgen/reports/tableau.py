@@ -1,0 +1,98 @@
+"""Butcher tableaux and what their order conditions say, as plain data and as text."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from strapgen.catalogue.methods import order_conditions
+from strapgen.catalogue.methods.coefficients import text
+from strapgen.catalogue.methods.tableau import Tableau
+
+#: Widest table; a wider tableau is listed coefficient by coefficient.
+_WIDEST = 120
+
+
+def tableau_data(tableau: Tableau) -> dict[str, Any]:
+    """Return a tableau and its order conditions, evaluated exactly, as plain JSON data; coefficients are text."""
+    embedded = tableau.embedded_weights
+    return {
+        "name": tableau.name,
+        "title": tableau.title,
+        "source": tableau.source,
+        "stages": len(tableau.nodes),
+        "order": order_conditions.order(tableau),
+        "attitude_order": order_conditions.attitude_order(tableau),
+        "conditions": order_conditions.conditions(tableau),
+        "principal_error_norm": order_conditions.principal_error_norm(tableau),
+        "embedded_order": None if embedded is None else order_conditions.embedded_order(tableau),
+        "tolerance": float(tableau.tolerance),
+        "largest_residual": float(order_conditions.largest_residual(tableau)),
+        "nodes": [text(value) for value in tableau.nodes],
+        "matrix": [[text(value) for value in row] for row in tableau.matrix],
+        "weights": [text(value) for value in tableau.weights],
+        "embedded_weights": None if embedded is None else [text(value) for value in embedded],
+    }
+
+
+def tableau_text(data: Mapping[str, Any]) -> str:
+    """Return a tableau as text: as books print it, or as a list of its coefficients where that would be too wide.
+
+    Parameters
+    ----------
+    data : mapping
+        What `tableau_data` returns.
+    """
+    facts = {
+        "stages": data["stages"],
+        "classical order": data["order"],
+        "order on attitude kinematics": data["attitude_order"],
+        "conditions checked exactly": data["conditions"],
+        "principal error norm": f"{data['principal_error_norm']:.5g}",
+    }
+    if data["embedded_order"] is not None:
+        facts["order of the embedded weights"] = data["embedded_order"]
+    if data["tolerance"]:
+        facts["largest residual"] = f"{data['largest_residual']:.3g}, tolerance {data['tolerance']:.3g}"
+    width = max(map(len, facts))
+    tableau = _tableau_lines(data)
+    return "\n".join(
+        [
+            f"{data['name']}: {data['title']}",
+            f"source: {data['source']}",
+            "",
+            *(f"{fact:<{width}}  {value}" for fact, value in facts.items()),
+            "",
+            *(tableau if max(map(len, tableau)) <= _WIDEST else _coefficient_lines(data)),
+        ]
+    )
+
+
+def _tableau_lines(data: Mapping[str, Any]) -> list[str]:
+    """Return the tableau as it is printed in books."""
+    bottom = [row for row in (data["weights"], data["embedded_weights"]) if row]
+    widths = [
+        max(len(row[k]) for row in (*data["matrix"], *bottom) if k < len(row)) for k in range(data["stages"])
+    ]
+    first = max(map(len, data["nodes"]))
+
+    def line(head: str, row: list[str]) -> str:
+        cells = (f"{cell:>{width}}" for cell, width in zip(row, widths, strict=False))
+        return f"{head:>{first}} | {'  '.join(cells)}".rstrip()
+
+    rule = "-" * first + "-+-" + "-" * (sum(widths) + 2 * len(widths) - 2)
+    rows = [line(node, row) for node, row in zip(data["nodes"], data["matrix"], strict=True)]
+    return [*rows, rule, *(line("", row) for row in bottom)]
+
+
+def _coefficient_lines(data: Mapping[str, Any]) -> list[str]:
+    """Return what is not zero in the tableau, a coefficient a line."""
+    named = []
+    for stage, (node, row) in enumerate(zip(data["nodes"], data["matrix"], strict=True), 1):
+        named.append((f"c_{stage}", node))
+        named += [(f"a_{stage},{place}", value) for place, value in enumerate(row, 1) if value != "0"]
+    for letter, row in (("b", data["weights"]), ("e", data["embedded_weights"] or [])):
+        named += [(f"{letter}_{place}", value) for place, value in enumerate(row, 1) if value != "0"]
+    width = max(len(name) for name, _ in named)
+    note = ["", "e: the embedded weights"] if data["embedded_weights"] else []
+    return [f"{name:<{width}}  {value}" for name, value in named] + note

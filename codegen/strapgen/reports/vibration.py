@@ -1,0 +1,164 @@
+"""Mean rates under vibration, as plain data, text and LaTeX."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import sympy as sp
+
+from strapgen.support.exceptions import InputError
+from strapgen.vibration import Assessment
+from strapgen.vibration.mean_rates import Rates
+
+#: For each unit of a rate the unit that a person reads, and the factor to it.
+READABLE_UNITS = {"rad/s": ("deg/h", math.degrees(3600)), "m/s^2": ("micro-g", 1e6 / 9.80665)}
+#: The units as parts of the names of data.
+_UNIT_SUFFIXES = {"rad/s": "rad_s", "m/s^2": "m_s2"}
+#: The name of the fast loop and the slow loop together.
+_TWO_SPEED = "two-speed"
+_FAST_LOOP_NOTE = (
+    "continuous and computed are the part of the fast loop within a slow cycle T_m; the slow loop adds the term in T_m "
+    "to both, so that the error is that of both loops"
+)
+
+
+@dataclass(frozen=True)
+class AssessedCase:
+    """An assessment as it stands in a report.
+
+    Parameters
+    ----------
+    assessment : Assessment
+    cycles : int or None
+        Fast cycles in a step of an algorithm in two speeds; None for any other algorithm.
+    samples : int
+        Samples in a step.
+    """
+
+    assessment: Assessment
+    cycles: int | None
+    samples: int
+
+    @property
+    def label(self) -> str:
+        """The kernel, with its fast cycles if it has any."""
+        return self.assessment.kernel + ("" if self.cycles is None else f", {self.cycles} cycles")
+
+    @property
+    def quantity(self) -> str:
+        """The quantity that is assessed, "drift" or "sculling"."""
+        return "drift" if self.assessment.unit == "rad/s" else "sculling"
+
+    @property
+    def is_fast_loop(self) -> bool:
+        """Whether the algorithm is a fast loop alone."""
+        return self.cycles is not None and self.assessment.kernel != _TWO_SPEED
+
+    def moved(self, transfers: set[str]) -> bool:
+        """Tell whether a spectrum with these transfers moves what this case needs."""
+        if self.assessment.unit == "rad/s":
+            return {"angle_x", "angle_y"} <= transfers
+        return {"angle_x", "acceleration_y"} <= transfers or {"angle_y", "acceleration_x"} <= transfers
+
+
+@dataclass(frozen=True)
+class CaseRates:
+    """The mean rates of a case.
+
+    Parameters
+    ----------
+    case : AssessedCase
+    rates : Rates
+        In the unit of the assessment.
+    quadrature : Rates or None
+        Estimates of the error of quadrature under random vibration; None at one frequency.
+    """
+
+    case: AssessedCase
+    rates: Rates
+    quadrature: Rates | None = None
+
+
+def vibration_data(outcomes: Sequence[CaseRates]) -> list[dict[str, Any]]:
+    """Return mean rates as plain JSON data, an object for each algorithm."""
+    groups: dict[str, list[CaseRates]] = {}
+    for outcome in outcomes:
+        groups.setdefault(outcome.case.label, []).append(outcome)
+    return [_algorithm_data(group) for group in groups.values()]
+
+
+def _algorithm_data(group: Sequence[CaseRates]) -> dict[str, Any]:
+    """Return the rates of one algorithm, and their closed forms at one frequency."""
+    data: dict[str, Any] = {}
+    for outcome in group:
+        unit = _UNIT_SUFFIXES[outcome.case.assessment.unit]
+        data |= {f"{part}_{unit}": value for part, value in outcome.rates._asdict().items()}
+        if outcome.quadrature is not None:
+            errors = outcome.quadrature._asdict()
+            data |= {f"{part}_quadrature_{unit}": value for part, value in errors.items()}
+    first = group[0].case
+    data |= {"kernel": first.assessment.kernel, "increments": first.samples}
+    for outcome in group:
+        if outcome.quadrature is None:
+            data[f"{outcome.case.quantity}_closed_form"] = {
+                part: outcome.case.assessment.text(part) for part in ("computed", "continuous")
+            }
+    return data
+
+
+def vibration_text(outcomes: Sequence[CaseRates], title: str) -> str:
+    """Return mean rates as text: a table for drift and one for sculling; closed forms where one algorithm is assessed.
+
+    Raises
+    ------
+    InputError
+        If a rate in the unit that a person reads is beyond the range of double.
+    """
+    lines = [f"mean rates about z, to second order in the amplitudes; {title}"]
+    for unit in READABLE_UNITS:
+        group = [outcome for outcome in outcomes if outcome.case.assessment.unit == unit]
+        if group:
+            lines += ["", *_rate_lines(group, unit)]
+    if any(outcome.case.is_fast_loop for outcome in outcomes):
+        lines += ["", _FAST_LOOP_NOTE]
+    one_algorithm = len({outcome.case.label for outcome in outcomes}) == 1
+    if one_algorithm and all(outcome.quadrature is None for outcome in outcomes):
+        for outcome in outcomes:
+            assessment = outcome.case.assessment
+            lines += ["", f"closed form of the {outcome.case.quantity} rate in {assessment.unit}"]
+            lines += [f"  {part:<10} = {assessment.text(part)}" for part in ("continuous", "computed")]
+    return "\n".join(lines)
+
+
+def _rate_lines(group: Sequence[CaseRates], unit: str) -> list[str]:
+    """Return the rates of one unit as a table, each above its error of quadrature if there is one."""
+    readable, factor = READABLE_UNITS[unit]
+    width = max(len(outcome.case.label) for outcome in group)
+    heads = [*(f"{part}, {unit}" for part in Rates._fields), f"error, {readable}"]
+    lines = [f"{group[0].case.quantity:<{width}} " + "".join(f"{head:>20}" for head in heads)]
+    for outcome in group:
+        label, error = outcome.case.label, outcome.rates.error * factor
+        if not math.isfinite(error):
+            raise InputError(
+                f"{label}: the error in {readable} is beyond the range of double; take smaller amplitudes"
+            )
+        cells = "".join(f"{value:>20.9e}" for value in outcome.rates)
+        lines.append(f"{label:<{width}} {cells}{error:>20.6g}")
+        if outcome.quadrature is not None:
+            cells = "".join(f"{value:>20.1e}" for value in outcome.quadrature)
+            lines.append(f"{'  quadrature':<{width}} {cells}")
+    return lines
+
+
+def vibration_latex(cases: Sequence[AssessedCase]) -> str:
+    """Return the closed forms as one LaTeX align environment."""
+    rows = []
+    for case in cases:
+        letter = r"\dot\phi_z" if case.quantity == "drift" else r"\dot v_z"
+        for part in ("continuous", "computed", "error"):
+            index = rf"\mathrm{{{part}}}" if len(cases) == 1 else rf"\mathrm{{{part},\ {case.label}}}"
+            rows.append(f"{letter}^{{{index}}} &= {sp.latex(case.assessment.expression(part))}")
+    return "\\begin{align*}\n" + " \\\\\n".join(rows) + "\n\\end{align*}"
