@@ -65,7 +65,8 @@ class FixedOptions:
         _Text,
         typer.Option(
             "--carry",
-            help="Rounding residuals kept between steps: none, state, or full: of state and transition.  [default: none]",
+            help="Rounding residuals kept between steps: none, state, or full: of state and transition.  "
+            "[default: none]",
             show_default=False,
         ),
     ] = None
