@@ -287,7 +287,7 @@ def calls(draw: st.DrawFn) -> list[Names]:
 def test_every_target_computes_the_same_under_any_names(several, tmp_path_factory):
     kernels = [step(called) for called in several]
     for kernel in kernels:
-        admission._require_names(kernel, frozenset())
+        admission._require_names(kernel)
         admission._require_formulas(kernel)
     check_c(tmp_path_factory.mktemp("names"), kernels, [check_python(kernel) for kernel in kernels])
 
@@ -330,7 +330,7 @@ KNOWN = [
 def test_kernels_are_called_as_functions_of_the_library_are(tmp_path):
     kernels = [step(HARMLESS._replace(kernel=name)) for name in KNOWN]
     for kernel in kernels:
-        admission._require_names(kernel, frozenset())
+        admission._require_names(kernel)
     check_c(tmp_path, kernels, [check_python(kernel) for kernel in kernels])
     # Where no standard is asked for, compilers and headers know more functions.
     code = sorted(path.name for path in tmp_path.glob("*.c"))

@@ -1,6 +1,6 @@
 """Compiles cffi extensions one after another, in a separate process.
 
-Run as ``python -P extension.py``. Every line of standard input is a JSON object: the module's ``name``, the
+Run as ``python -P worker.py``. Every line of standard input is a JSON object: the module's ``name``, the
 declarations ``cdef``, the ``header`` of its C text, the C ``sources``, ``libraries`` and ``flags``, the ``folder`` to
 work in and the ``environment``. For every line one is printed: an object with the ``path`` of the compiled module, or
 null, and what was ``said``. What setuptools and the compiler do to environment, folder and output stays in this
