@@ -9,7 +9,7 @@ from inspect import Parameter, Signature
 from typing import Any, NamedTuple, TypeVar, get_type_hints
 
 Command = TypeVar("Command", bound=Callable[..., Any])
-#: What a parameter is when its annotation does not say: all of a group, in its place.
+#: Typer passes every value by its name, so that one without a default may stand behind others.
 _KEYWORD = Parameter.KEYWORD_ONLY
 
 
@@ -74,9 +74,13 @@ def _options(group: type[Any], only: tuple[str, ...]) -> list[Parameter]:
     if unknown := {*only} - {*fields}:
         raise TypeError(f"{group.__name__} has no option {', '.join(sorted(unknown))}")
     return [
-        Parameter(name, _KEYWORD, default=fields[name].default, annotation=hints[name])
+        Parameter(name, _KEYWORD, default=_default(fields[name]), annotation=hints[name])
         for name in only or fields
     ]
+
+
+def _default(field: dataclasses.Field[Any]) -> Any:
+    return Parameter.empty if field.default is dataclasses.MISSING else field.default
 
 
 def _insert(options: dict[str, Parameter], more: list[Parameter], before: str) -> dict[str, Parameter]:

@@ -12,11 +12,13 @@ from strapgen.cli.options import STEP_OPTIONS, MethodOptions, StepAlgorithm, lim
 from strapgen.cli.output import Output, as_json
 from strapgen.cli.progress import track
 from strapgen.cli.sample_source import MotionSettings, pairs
+from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
     from strapgen.catalogue import Choice
     from strapgen.experiments.convergence import Convergence
+    from strapgen.simulation.motions import Motion
 
 _Text = str | None
 
@@ -60,6 +62,38 @@ class SeveralMethods(MethodOptions):
         return replace(choice, increments=catalogue.enough(choice.method))
 
 
+@dataclass(frozen=True)
+class Ladder:
+    """Options of the runs, on one motion with a ladder of steps."""
+
+    motion: Annotated[
+        _Text, typer.Option("--motion", help="Motion.  [default: coning]", show_default=False)
+    ] = None
+    settings: MotionSettings = None
+    steps: Annotated[
+        str, typer.Option("--steps", metavar="S,...", help="Ladder of steps in s, divisors of the duration.")
+    ] = "1/2,1/4,1/8,1/16,1/32,1/64,1/128"
+    duration: Annotated[str, typer.Option("--duration", metavar="S", help="Duration in s.")] = "2"
+
+    def check(self) -> None:
+        """Check the name of the motion."""
+        from strapgen.catalogue import MOTIONS
+
+        if self.motion is not None:
+            checks.choice("motion", self.motion, MOTIONS)
+
+    def profile(self) -> tuple[Motion, str]:
+        """Return the motion, and the runs in words."""
+        from strapgen.simulation import motions
+
+        parameters = pairs(self.settings or [])
+        if self.motion is None and not self.settings:
+            parameters = motions.GENERAL
+        profile = motions.motion(self.motion or "coning", **parameters)
+        words = ", ".join(f"{key}={value}" for key, value in parameters.items())
+        return profile, f"{self.duration} s of {profile.name} motion, {words}"
+
+
 @grouped
 def converge(
     algorithm: StepAlgorithm,
@@ -68,14 +102,7 @@ def converge(
     backend: Annotated[
         str, typer.Option("--backend", help="exact (mpmath, for any order) or a back end; see strapgen list.")
     ] = "exact",
-    motion: Annotated[
-        _Text, typer.Option("--motion", help="Motion.  [default: coning]", show_default=False)
-    ] = None,
-    settings: MotionSettings = None,
-    steps: Annotated[
-        str, typer.Option("--steps", metavar="S,...", help="Ladder of steps in s, divisors of the duration.")
-    ] = "1/2,1/4,1/8,1/16,1/32,1/64,1/128",
-    duration: Annotated[str, typer.Option("--duration", metavar="S", help="Duration in s.")] = "2",
+    ladder: Ladder,
     fail_beyond: Annotated[
         _Text,
         typer.Option(
@@ -98,31 +125,23 @@ def converge(
         --plot out/orders.png
     """  # noqa: D301
     output.check()
-    from strapgen import catalogue
     from strapgen.backends import BACKENDS
-    from strapgen.support import checks
 
     checks.choice("backend", backend, [*BACKENDS, "exact"])
     most = limit("fail-beyond", fail_beyond)
-    if motion is not None:
-        checks.choice("motion", motion, catalogue.MOTIONS)
-    parameters = pairs(settings or [])
-    ladder = listed("--steps", steps)
+    ladder.check()
     choices = methods.choices(algorithm)
+    profile, words = ladder.profile()
+    steps = listed("--steps", ladder.steps)
 
     import numpy as np
 
     from strapgen.experiments import convergence
-    from strapgen.simulation import motions
 
-    if motion is None and not settings:
-        parameters = motions.GENERAL
-    profile = motions.motion(motion or "coning", **parameters)
     with np.errstate(all="ignore"):  # a step that is too long for a method is part of the picture
-        runs = (convergence.converge(choice, profile, ladder, duration, backend) for choice in choices)
+        runs = (convergence.converge(choice, profile, steps, ladder.duration, backend) for choice in choices)
         orders = list(track(runs, "running", len(choices)))
-    words = ", ".join(f"{key}={value}" for key, value in parameters.items())
-    _deliver(orders, f"{duration} s of {profile.name} motion, {words}; {backend}", output)
+    _deliver(orders, f"{words}; {backend}", output)
     far = [order.kernel for order in orders if most is not None and not _within(order, most)]
     if far:
         typer.echo(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -14,6 +14,9 @@ from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import whole
 from strapgen.cli.output import Output
 from strapgen.support.exceptions import InputError
+
+if TYPE_CHECKING:
+    from strapgen.simulation.courses import NavigationFrame
 
 
 @dataclass(frozen=True)
@@ -26,6 +29,33 @@ class CourseOutput(Output):
             "--format", help="text, json or csv.  [default: text; csv with --out]", show_default=False
         ),
     ] = None
+
+
+@dataclass(frozen=True)
+class Start:
+    """Options of the attitude at the start, and of the frame in which the attitude is."""
+
+    initial: Annotated[
+        str,
+        typer.Option("--initial-deg", metavar="R,P,H", help="Roll, pitch, heading at the start in deg."),
+    ] = "0,0,0"
+    frame_rate: Annotated[
+        str,
+        typer.Option(
+            "--frame-rate-deg-h",
+            metavar="X,Y,Z",
+            help="Rate of the navigation frame in deg/h, navigation axes.",
+        ),
+    ] = "0,0,0"
+
+    def frame(self) -> NavigationFrame:
+        """Return the navigation frame with the attitude at its start."""
+        import numpy as np
+
+        from strapgen.simulation.courses import NavigationFrame
+
+        begin = np.radians(_three("initial-deg", self.initial))
+        return NavigationFrame(begin, np.radians(_three("frame-rate-deg-h", self.frame_rate)) / 3600)
 
 
 @grouped
@@ -55,18 +85,7 @@ def strapdown(
     backend: Annotated[
         str, typer.Option("--backend", help="numpy, c, c-float, c-q31, c-q15 or fixed-model.")
     ] = "numpy",
-    initial: Annotated[
-        str,
-        typer.Option("--initial-deg", metavar="R,P,H", help="Roll, pitch, heading at the start in deg."),
-    ] = "0,0,0",
-    frame_rate: Annotated[
-        str,
-        typer.Option(
-            "--frame-rate-deg-h",
-            metavar="X,Y,Z",
-            help="Rate of the navigation frame in deg/h, navigation axes.",
-        ),
-    ] = "0,0,0",
+    start: Start,
     fixed: Annotated[FixedOptions, Shown(only=("word", "rounding", "carry", "ranges", "formats"))],
     output: Annotated[CourseOutput, Shown(only=("out", "format"))],
 ) -> None:
@@ -86,15 +105,12 @@ def strapdown(
 
     from strapgen.reports import runs
     from strapgen.simulation import recording
-    from strapgen.simulation.courses import NavigationFrame, course
+    from strapgen.simulation.courses import course
 
     fixed.check_backend(backend)
     data = recording.read_inertial(increments)
     settings = fixed.settings_for_run(backend, 1, data.interval, lambda: data.largest)
-    begin, rate = (
-        np.radians(_three(name, text))
-        for name, text in (("initial-deg", initial), ("frame-rate-deg-h", frame_rate))
-    )
+    frame = start.frame()
     with np.errstate(all="ignore"):  # numbers that overflow are refused, in one line
         covered = course(
             algorithm,
@@ -104,7 +120,7 @@ def strapdown(
             sculling=whole("sculling", sculling) or 0,
             backend=backend,
             settings=settings,
-            frame=NavigationFrame(begin, rate / 3600),
+            frame=frame,
         )
     facts = {
         "algorithm": f"{algorithm} in two speeds",

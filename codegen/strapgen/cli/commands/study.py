@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -11,6 +12,7 @@ from strapgen.cli.options import Increments, listed, whole
 from strapgen.cli.output import Output, as_json
 from strapgen.cli.progress import track
 from strapgen.cli.sample_source import pairs
+from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
@@ -24,29 +26,48 @@ def _group() -> None:
     """Sweep settings and see what they do to the drift."""
 
 
+@dataclass(frozen=True)
+class Sweep:
+    """Options of what is combined: every value of a list with every one of the others."""
+
+    methods: Annotated[str, typer.Option("--methods", metavar="NAME,...", help="Integration methods.")] = (
+        "rk4"
+    )
+    increments: Increments = None
+    words: Annotated[str, typer.Option("--words", metavar="BITS,...", help="Lengths of word, 8 to 64.")] = (
+        "8,10,12,14,16,18,20,24,28,32"
+    )
+    roundings: Annotated[
+        str, typer.Option("--roundings", metavar="NAME,...", help="nearest, truncation.")
+    ] = "nearest"
+    carries: Annotated[
+        str, typer.Option("--carries", metavar="NAME,...", help="Residuals kept: none, state, full.")
+    ] = "none,state,full"
+    steps: Annotated[str, typer.Option("--steps", metavar="S,...", help="Steps in s.")] = "0.125"
+    pulses_arcsec: Annotated[
+        str,
+        typer.Option("--pulses-arcsec", metavar="ANGLE,...", help="Gyro pulses in arc seconds, 0 for none."),
+    ] = "0"
+
+    def values(self) -> dict[str, Any]:
+        """Return the lists by the parameters of `word_length.cases`."""
+        return {
+            "methods": listed("--methods", self.methods),
+            "increments": whole("increments", self.increments) or 2,
+            "words": [checks.whole("words", word) for word in listed("--words", self.words)],
+            "roundings": listed("--roundings", self.roundings),
+            "carries": listed("--carries", self.carries),
+            "steps": listed("--steps", self.steps),
+            "pulses_arcsec": listed("--pulses-arcsec", self.pulses_arcsec),
+        }
+
+
 @app.command("word-length")
 @grouped
 def word_length(
     *,
     algorithm: Annotated[str, typer.Option("--algorithm", help="dcm, euler or cayley-klein.")] = "euler",
-    methods: Annotated[
-        str, typer.Option("--methods", metavar="NAME,...", help="Integration methods.")
-    ] = "rk4",
-    increments: Increments = None,
-    words: Annotated[
-        str, typer.Option("--words", metavar="BITS,...", help="Lengths of word, 8 to 64.")
-    ] = "8,10,12,14,16,18,20,24,28,32",
-    roundings: Annotated[
-        str, typer.Option("--roundings", metavar="NAME,...", help="nearest, truncation.")
-    ] = "nearest",
-    carries: Annotated[
-        str, typer.Option("--carries", metavar="NAME,...", help="Residuals kept: none, state, full.")
-    ] = "none,state,full",
-    steps: Annotated[str, typer.Option("--steps", metavar="S,...", help="Steps in s.")] = "0.125",
-    pulses_arcsec: Annotated[
-        str,
-        typer.Option("--pulses-arcsec", metavar="ANGLE,...", help="Gyro pulses in arc seconds, 0 for none."),
-    ] = "0",
+    sweep: Sweep,
     motion: Annotated[
         str, typer.Option("--motion", help="constant, sinusoidal, coning or polynomial.")
     ] = "coning",
@@ -82,13 +103,11 @@ def word_length(
     """  # noqa: D301
     output.check()
     from strapgen import catalogue
-    from strapgen.support import checks
 
     checks.choice("algorithm", algorithm, catalogue.ALGORITHMS)
     checks.choice("motion", motion, catalogue.MOTIONS)
-    names, samples = listed("--methods", methods), whole("increments", increments)
-    for name in names:
-        catalogue.choose(algorithm, name, samples)
+    for name in listed("--methods", sweep.methods):
+        catalogue.choose(algorithm, name, whole("increments", sweep.increments))
     count = whole("jobs", jobs)
     if count is not None:
         checks.count("jobs", count, largest=1024)
@@ -101,16 +120,10 @@ def word_length(
 
     planned = cases(
         algorithm=algorithm,
-        methods=names,
-        increments=samples or 2,
-        words=[checks.whole("words", word) for word in listed("--words", words)],
-        roundings=listed("--roundings", roundings),
-        carries=listed("--carries", carries),
-        steps=listed("--steps", steps),
         duration=duration,
-        pulses_arcsec=listed("--pulses-arcsec", pulses_arcsec),
         motion_name=motion,
         settings=None if settings is None else pairs(settings),
+        **sweep.values(),
     )
     _ = planned[0].profile  # a motion that lacks a parameter is told before anything runs
     with np.errstate(all="ignore"):
