@@ -76,7 +76,7 @@ def not_ignored(paths: Iterable[str]) -> list[str]:
 def shown_commands() -> list[str]:
     """Return every command of README, docs, examples and help texts, each on one line."""
     pages = [ROOT / "README.md", *(ROOT / "docs").glob("*.md"), *(ROOT / "examples").glob("*.py")]
-    pages += (ROOT / "codegen" / "strapgen" / "cli").glob("*.py")
+    pages += (ROOT / "codegen" / "strapgen" / "cli").rglob("*.py")
     texts = (re.sub(r"\\+\n\s*", "", page.read_text()) for page in pages)
     return [
         line
