@@ -40,32 +40,38 @@ class FixedOptions:
         typer.Option(
             "--max-rate-deg-s",
             metavar="RATE",
-            help="Largest body rate on an axis that fixed-point formats are chosen for, in deg/s; with --step.",
+            help="Largest body rate about an axis in deg/s; with the step it says what fixed-point formats must hold.",
             show_default=False,
         ),
     ] = None
     step: Annotated[
         _Text,
-        typer.Option("--step", metavar="S", help="Step in s, with --max-rate-deg-s.", show_default=False),
+        typer.Option(
+            "--step", metavar="S", help="Step in s that goes with --max-rate-deg-s.", show_default=False
+        ),
     ] = None
     max_angle_rad: Annotated[
         _Text,
         typer.Option(
             "--max-angle-rad",
             metavar="RAD",
-            help="Instead: largest element of an angle increment, in rad.  [default: 1/8]",
+            help="Largest element of an angle increment in rad, in place of a rate and a step.  [default: 1/8]",
             show_default=False,
         ),
     ] = None
     rounding: Annotated[
         _Text,
-        typer.Option("--rounding", help="nearest or truncation.  [default: nearest]", show_default=False),
+        typer.Option(
+            "--rounding",
+            help="How results are rounded: nearest or truncation.  [default: nearest]",
+            show_default=False,
+        ),
     ] = None
     carry: Annotated[
         _Text,
         typer.Option(
             "--carry",
-            help="Rounding residuals kept between steps: none, state, or full: of state and transition.  "
+            help="Rounding errors fed back from step to step: none, state, or full, those of state and transition.  "
             "[default: none]",
             show_default=False,
         ),
@@ -75,7 +81,7 @@ class FixedOptions:
         typer.Option(
             "--drift-allowance",
             metavar="A",
-            help="By how much an element of a state may exceed 1.  [default: 1/16]",
+            help="By how much an element of the state may exceed 1 in magnitude.  [default: 1/16]",
             show_default=False,
         ),
     ] = None
@@ -84,13 +90,13 @@ class FixedOptions:
         typer.Option(
             "--range",
             metavar="NAME=MAX",
-            help="Largest magnitude of an input whose range is not known otherwise.",
+            help="Largest magnitude of an input whose range strapgen does not know, in the unit of the input.",
         ),
     ] = None
     formats: Annotated[
         list[str] | None,
         typer.Option(
-            "--fix", metavar="NAME=Qm.n", help="A format that is not to be chosen, of an argument or value."
+            "--fix", metavar="NAME=Qm.n", help="Format of an argument or a value that you choose yourself."
         ),
     ] = None
 

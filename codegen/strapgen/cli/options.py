@@ -27,7 +27,10 @@ StepAlgorithm = Annotated[
 Increments = Annotated[
     str | None,
     typer.Option(
-        "--increments", metavar="N", help="Angle increments a step, 1 to 8.  [default: 2]", show_default=False
+        "--increments",
+        metavar="N",
+        help="Angle increments in a step, 1 to 8.  [default: 2]",
+        show_default=False,
     ),
 ]
 
@@ -49,7 +52,7 @@ class MethodOptions:
         typer.Option(
             "--tableau",
             metavar="FILE",
-            help="A method of your own: a Butcher tableau in TOML.",
+            help="TOML file with a Butcher tableau, a method of your own.",
             show_default=False,
         ),
     ] = None
@@ -59,13 +62,16 @@ class MethodOptions:
         typer.Option(
             "--previous",
             metavar="N",
-            help="Increments before the step that it takes too, 0 to 3.  [default: 0]",
+            help="Increments from before the step that it also takes, 0 to 3.  [default: 0]",
             show_default=False,
         ),
     ] = None
     rates: Annotated[
         bool,
-        typer.Option("--rates", help="The step takes the rate at the method's nodes, times the step length."),
+        typer.Option(
+            "--rates",
+            help="Let the step take the rate at the method's nodes, times the step length, not increments.",
+        ),
     ] = False
 
     def choose(self, algorithm: str, *, step: bool = True) -> Choice:

@@ -13,7 +13,7 @@ import typer
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 
-Format = Annotated[str, typer.Option("--format", help="text or json.")]
+Format = Annotated[str, typer.Option("--format", help="Format of the output: text or json.")]
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,9 @@ class Output:
     plot: Annotated[
         Path | None, typer.Option("--plot", help="Image file for the plot.", show_default=False)
     ] = None
-    format: Annotated[str | None, typer.Option("--format", help="text, json or csv.")] = "text"
+    format: Annotated[
+        str | None, typer.Option("--format", help="Format of the output: text, json or csv.")
+    ] = "text"
     formats: ClassVar[tuple[str, ...]] = ("text", "json", "csv")
 
     def check(self) -> None:

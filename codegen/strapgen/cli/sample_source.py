@@ -22,7 +22,9 @@ _Text = str | None
 
 MotionSettings = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE...", help="Parameters of the motion; see strapgen list."),
+    typer.Option(
+        "--set", metavar="KEY=VALUE...", help="Parameters of the motion; strapgen list shows their names."
+    ),
 ]
 
 
@@ -53,7 +55,11 @@ class SampleSource:
 
     motion: Annotated[
         _Text,
-        typer.Option("--motion", help="constant, sinusoidal, coning or polynomial.", show_default=False),
+        typer.Option(
+            "--motion",
+            help="Motion to run on: constant, sinusoidal, coning or polynomial.",
+            show_default=False,
+        ),
     ] = None
     settings: MotionSettings = None
     step: Annotated[_Text, typer.Option("--step", metavar="S", help="Step in s.", show_default=False)] = None
@@ -62,23 +68,30 @@ class SampleSource:
     ] = None
     increments_csv: Annotated[
         Path | None,
-        typer.Option("--increments-csv", help="Recorded increments instead: columns t, dx, dy, dz; s, rad."),
+        typer.Option(
+            "--increments-csv",
+            help="Recorded increments in place of a motion: columns t in s, and dx, dy, dz in rad.",
+        ),
     ] = None
     rates_csv: Annotated[
         Path | None,
         typer.Option(
-            "--rates-csv", help="Recorded rates instead: first four columns time in s, three rates."
+            "--rates-csv",
+            help="Recorded rates in place of a motion: the first four columns are the time in s and three rates.",
         ),
     ] = None
     rate_unit: Annotated[
-        _Text, typer.Option("--rate-unit", help="deg/s or rad/s, for --rates-csv.", show_default=False)
+        _Text,
+        typer.Option(
+            "--rate-unit", help="Unit of the rates in --rates-csv: deg/s or rad/s.", show_default=False
+        ),
     ] = None
     resample_hz: Annotated[
         _Text,
         typer.Option(
             "--resample-hz",
             metavar="HZ",
-            help="Integrate uneven recorded rates over an even grid.",
+            help="Frequency in Hz of the even grid over which uneven recorded rates are integrated.",
             show_default=False,
         ),
     ] = None
@@ -87,7 +100,7 @@ class SampleSource:
         typer.Option(
             "--pulse-arcsec",
             metavar="ANGLE",
-            help="Angle of a gyro pulse in arc seconds: increments become whole pulses, the rest is carried on.",
+            help="Angle of a gyro pulse in arc seconds; increments become whole pulses, and the rest is carried on.",
             show_default=False,
         ),
     ] = None

@@ -14,7 +14,8 @@ from strapgen.cli.output import Format, check_format, print_json
 @grouped
 def check(
     algorithm: Annotated[
-        str, typer.Argument(help="A Python file with an algorithm of your own; or dcm, euler, cayley-klein.")
+        str,
+        typer.Argument(help="A Python file with an algorithm of your own, or dcm, euler or cayley-klein."),
     ],
     *,
     method: Annotated[MethodOptions, Shown(only=STEP_OPTIONS)],
@@ -22,8 +23,8 @@ def check(
 ) -> None:
     """Test an algorithm as the project tests its own, and show what holds; exit with 1 if something fails.
 
-    Identities are checked in arithmetic of 40 digits, the order on a ladder of steps, the back ends against exact
-    arithmetic. What stands behind a dash is measured, and yours to judge.
+    Identities are checked in arithmetic of 40 digits, the order on a ladder of steps, and the back ends against exact
+    arithmetic. What stands behind a dash is measured and is yours to judge.
 
     Example: strapgen check examples/modified_rodrigues.py
     """

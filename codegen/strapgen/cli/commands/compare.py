@@ -32,7 +32,7 @@ def compare(
         typer.Option(
             "--fail-above",
             metavar="RAD",
-            help="Exit with 1 if a back end is further from the reference.",
+            help="Exit with 1 if a back end is further than this angle in rad from the reference.",
             show_default=False,
         ),
     ] = None,
@@ -40,9 +40,9 @@ def compare(
 ) -> None:
     """Run an algorithm on several back ends in lock-step and show how far each is from a reference.
 
-    Angles in rad, in units of the last place, and for fixed point beside the certified bound; drift, time a step,
-    operations and bytes of object code. Formats of fixed point are chosen for the increments of the run, or for
-    --max-rate-deg-s.
+    The table shows the angles from the reference in rad and in units of the last place, for fixed point beside the
+    certified bound; then the drift, the time of a step, its operations and the bytes of its object code. Fixed-point
+    formats are chosen for the increments of the run, or for --max-rate-deg-s if you give it.
 
     Example:
 

@@ -38,7 +38,7 @@ class SeveralMethods(MethodOptions):
         typer.Option(
             "--increments",
             metavar="N",
-            help="Angle increments a step, 1 to 8, or enough: what the method needs.  [default: 2]",
+            help="Angle increments in a step, 1 to 8, or enough for as many as the method needs.  [default: 2]",
             show_default=False,
         ),
     ] = None
@@ -67,11 +67,19 @@ class Ladder:
     """Options of the runs, on one motion with a ladder of steps."""
 
     motion: Annotated[
-        _Text, typer.Option("--motion", help="Motion.  [default: coning]", show_default=False)
+        _Text,
+        typer.Option(
+            "--motion",
+            help="Motion to run on: constant, sinusoidal, coning or polynomial.  [default: coning]",
+            show_default=False,
+        ),
     ] = None
     settings: MotionSettings = None
     steps: Annotated[
-        str, typer.Option("--steps", metavar="S,...", help="Ladder of steps in s, divisors of the duration.")
+        str,
+        typer.Option(
+            "--steps", metavar="S,...", help="Ladder of steps in s, each of them a divisor of the duration."
+        ),
     ] = "1/2,1/4,1/8,1/16,1/32,1/64,1/128"
     duration: Annotated[str, typer.Option("--duration", metavar="S", help="Duration in s.")] = "2"
 
@@ -108,15 +116,15 @@ def converge(
         typer.Option(
             "--fail-beyond",
             metavar="D",
-            help="Exit with 1 if an observed order is further than this from theory.",
+            help="Exit with 1 if an observed order is further than this from the predicted one.",
             show_default=False,
         ),
     ] = None,
     output: Output,
 ) -> None:
-    """Show the order of algorithms: their errors on a ladder of steps, and the slope beside the one of theory.
+    """Measure the order of an algorithm: its errors on a ladder of steps, and their slope beside the predicted order.
 
-    Without a motion it is coning of about 1 rad/s on a constant rate, which turns in every direction.
+    Without --motion the runs are on coning of about 1 rad/s and a constant rate, which turns in every direction.
 
     Example:
 

@@ -17,10 +17,12 @@ def derive(
     algorithm: Algorithm,
     *,
     method: MethodOptions,
-    show: Annotated[str, typer.Option("--show", help="text, latex, program or operations.")] = "text",
+    show: Annotated[
+        str, typer.Option("--show", help="What to show: text, latex, program or operations.")
+    ] = "text",
     format: Format = "text",
 ) -> None:
-    """Show a kernel: its formulas as text or LaTeX, the program lowered from them, or how much that computes.
+    """Show a kernel: its formulas as text or LaTeX, the program lowered from them, or its number of operations.
 
     Example: strapgen derive euler --method rk4 --increments 2 --show operations
     """

@@ -35,7 +35,7 @@ def generate(
         str | None,
         typer.Option(
             "--target",
-            help="numpy, c, c-float, c-fixed or fixed-model.  [default: numpy]",
+            help="Target of the code: numpy, c, c-float, c-fixed or fixed-model.  [default: numpy]",
             show_default=False,
         ),
     ] = None,
@@ -47,14 +47,18 @@ def generate(
     ] = None,
     all_: Annotated[bool, typer.Option("--all", help="Rebuild the whole standard catalogue.")] = False,
     check: Annotated[
-        bool, typer.Option("--check", help="With --all: write nothing, exit 1 with a diff if out of step.")
+        bool,
+        typer.Option(
+            "--check",
+            help="With --all: write nothing, and exit with 1 and a diff if the folder is out of step.",
+        ),
     ] = False,
     fixed: FixedOptions,
     format: Format = "text",
 ) -> None:
     """Generate source code for an algorithm, or for the standard catalogue.
 
-    Fixed point is made for a largest increment: state the largest rate and the step.
+    Fixed-point code is certified up to a largest increment: state the largest rate and the step.
 
     Example:
 

@@ -33,20 +33,26 @@ class Versus:
         typer.Option(
             "--versus",
             metavar="ALGORITHM",
-            help="Another algorithm: both, and their exact ratio.",
+            help="Another algorithm, to see both and their exact ratio.",
             show_default=False,
         ),
     ] = None
     versus_method: Annotated[
         _Text,
         typer.Option(
-            "--versus-method", metavar="NAME", help="Its method.  [default: the same]", show_default=False
+            "--versus-method",
+            metavar="NAME",
+            help="Method of the other algorithm.  [default: the same]",
+            show_default=False,
         ),
     ] = None
     versus_increments: Annotated[
         _Text,
         typer.Option(
-            "--versus-increments", metavar="N", help="Its increments.  [default: as many]", show_default=False
+            "--versus-increments",
+            metavar="N",
+            help="Increments in a step of the other algorithm.  [default: as many]",
+            show_default=False,
         ),
     ] = None
 
@@ -108,11 +114,13 @@ class SeriesOutput(Output):
         Path | None,
         typer.Option(
             "--plot",
-            help="Image file: predicted against simulated drift on the motion with the parameters --set.",
+            help="Image file for the predicted and the simulated drift, on the motion with the parameters --set.",
             show_default=False,
         ),
     ] = None
-    format: Annotated[_Text, typer.Option("--format", help="text, latex or json.")] = "text"
+    format: Annotated[_Text, typer.Option("--format", help="Format of the output: text, latex or json.")] = (
+        "text"
+    )
     formats: ClassVar[tuple[str, ...]] = ("text", "json", "latex")
 
     def deliver_report(
@@ -138,12 +146,15 @@ def series(
     method: MethodOptions,
     motion: Annotated[
         str,
-        typer.Option("--motion", help="general, or constant, sinusoidal, coning or polynomial."),
+        typer.Option(
+            "--motion",
+            help="Motion that the series are for: general, constant, sinusoidal, coning or polynomial.",
+        ),
     ] = "general",
     terms: Annotated[
         str,
         typer.Option(
-            "--terms", metavar="N", help="Terms of drift, scale and skew that are not zero, 1 to 6."
+            "--terms", metavar="N", help="Number of terms of drift, scale and skew that are not zero, 1 to 6."
         ),
     ] = "2",
     versus: Versus,
@@ -151,7 +162,7 @@ def series(
         bool,
         typer.Option(
             "--all",
-            help="The whole catalogue side by side, on as many increments as each method needs; with ALGORITHM or "
+            help="Show the whole catalogue side by side, on as many increments as each method needs; with ALGORITHM or "
             "--method NAME,... only these.",
         ),
     ] = False,
@@ -160,9 +171,9 @@ def series(
 ) -> None:
     """Show what an algorithm loses: drift, scale and skew as exact power series in the step length h.
 
-    For the general smooth rate w0 + w1 t + w2 t^2/2 + ... in vector-invariant form, S(a, b) = a b' + b a'; for the
-    motions of the catalogue in their own symbols, t the time at the beginning of the step, with what adds up in a run,
-    and at a constant rate in closed form.
+    Without --motion the series hold for every smooth rate w0 + w1 t + w2 t^2/2 + ...; they are in vector-invariant
+    form, where S(a, b) stands for a b' + b a'. For a motion of the catalogue they are in its own symbols, where t is
+    the time at the beginning of the step, with what adds up in a run; at a constant rate they are in closed form.
 
     Example: strapgen series euler --method rk4 --increments 2 --motion constant
 
@@ -185,11 +196,10 @@ def series(
         ratio = ratios.versus(choice, versus.choose(versus.versus, method), motion, most)
         output.deliver_report(ratio, ratio_text, ratio_latex)
         return
-    from strapgen.reports import series as layout
+    from strapgen.reports.series import as_latex, as_report, report
 
     image = None if output.plot is None else plot.draw(choice, motion, count, output.plot)
-    report = layout.report(choice, motion, most)
-    output.deliver_report(report, layout.as_report, layout.as_latex, image)
+    output.deliver_report(report(choice, motion, most), as_report, as_latex, image)
 
 
 def _check_plot(motion: str, versus: Versus, plot: DriftPlot, output: Output) -> None:

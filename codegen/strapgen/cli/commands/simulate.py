@@ -35,14 +35,16 @@ class Intervals:
         typer.Option(
             "--orthonormalize",
             metavar="S",
-            help="Orthonormalize every so many s.  [default: never]",
+            help="Interval of orthonormalization in s.  [default: never]",
             show_default=False,
         ),
     ] = None
     scheme: Annotated[
         _Text,
         typer.Option(
-            "--scheme", help="Kernel that orthonormalizes.  [default: the thesis's]", show_default=False
+            "--scheme",
+            help="Kernel that orthonormalizes; strapgen list shows them.  [default: the thesis's]",
+            show_default=False,
         ),
     ] = None
     record: Annotated[
@@ -50,7 +52,7 @@ class Intervals:
         typer.Option(
             "--record",
             metavar="S",
-            help="Record every so many s, a divisor of the duration.  [default: every step]",
+            help="Interval of records in s, a divisor of the duration.  [default: every step]",
             show_default=False,
         ),
     ] = None
@@ -66,7 +68,9 @@ class RunOutput(Output):
     format: Annotated[
         _Text,
         typer.Option(
-            "--format", help="text, json or csv.  [default: text; csv for recorded data]", show_default=False
+            "--format",
+            help="Format of the output: text, json or csv.  [default: text; csv for recorded data]",
+            show_default=False,
         ),
     ] = None
 
@@ -89,10 +93,10 @@ def simulate(
 ) -> None:
     """Run an algorithm on a motion with known attitude, or on recorded gyro data.
 
-    Recorded times that are not even are refused unless --resample-hz is given; then intervals of up to ten times the
-    median are bridged by a straight line.
+    Recorded times that are not even are refused unless you give --resample-hz; then a straight line bridges intervals
+    of up to ten times the median.
 
-    Formats of fixed point are chosen for the increments of the run, or for --max-rate-deg-s.
+    Fixed-point formats are chosen for the increments of the run, or for --max-rate-deg-s if you give it.
 
     Example:
 
@@ -155,7 +159,7 @@ def _on_motion(
 ) -> tuple[str, bytes | None]:
     """Simulate; return the output and, if there is a file for it, the image."""
     from strapgen.reports import plots
-    from strapgen.reports import runs as layout
+    from strapgen.reports.runs import matrices_data, run_csv, run_data, run_text
     from strapgen.simulation import runs
 
     pulse = source.pulse
@@ -172,16 +176,16 @@ def _on_motion(
         title = f"{backend.kernel}, {backend.name}: {profile.name} motion, step {step} s"
         image = plots.run_image(run, title, output.plot)
     if output.format == "csv":
-        return layout.run_csv(run), image
+        return run_csv(run), image
     facts = _facts(backend, choice) | {
         "motion": profile.name,
         "step_s": float(checks.number("step", step)),
         "duration_s": float(checks.number("duration", duration)),
     }
     if output.format != "json":
-        return layout.run_text(run, facts), image
-    data = layout.run_data(run, facts)
-    return json.dumps(data | layout.matrices_data(run) if matrices else data), image
+        return run_text(run, facts), image
+    data = run_data(run, facts)
+    return json.dumps(data | matrices_data(run) if matrices else data), image
 
 
 def _on_recording(
@@ -189,7 +193,7 @@ def _on_recording(
 ) -> tuple[str, bytes | None]:
     """Propagate recorded data; return the output and, if there is a file for it, the image."""
     from strapgen.reports import plots
-    from strapgen.reports import runs as layout
+    from strapgen.reports.runs import history_csv, history_data, history_text
     from strapgen.simulation import recording
 
     pulse = source.pulse
@@ -202,7 +206,7 @@ def _on_recording(
         image = plots.history_image(history, backend.elements, title, output.plot)
     facts = _facts(backend, choice) | {"source": str(source.file)}
     if output.format == "text":
-        return layout.history_text(history, backend.elements, facts), image
+        return history_text(history, backend.elements, facts), image
     if output.format == "json":
-        return json.dumps(layout.history_data(history, backend.elements, facts)), image
-    return layout.history_csv(history, backend.elements), image
+        return json.dumps(history_data(history, backend.elements, facts)), image
+    return history_csv(history, backend.elements), image

@@ -16,7 +16,9 @@ from strapgen.cli.output import Output, as_json
 class GrowthOutput(Output):
     """Where the growth of the state goes: text or JSON on the terminal, and an image."""
 
-    format: Annotated[str | None, typer.Option("--format", help="text or json.")] = "text"
+    format: Annotated[str | None, typer.Option("--format", help="Format of the output: text or json.")] = (
+        "text"
+    )
     formats: ClassVar[tuple[str, ...]] = ("text", "json")
 
 
@@ -29,7 +31,7 @@ def stability(
         typer.Option(
             "--method",
             metavar="NAME,...",
-            help="Integration methods.  [default: rk1,rk2,rk3,rk4; that of an algorithm of your own]",
+            help="Integration methods.  [default: rk1,rk2,rk3,rk4; for your own algorithm its own]",
             show_default=False,
         ),
     ] = None,
@@ -37,8 +39,8 @@ def stability(
 ) -> None:
     """Show at which constant rates a step lets the state grow, and at which it contracts.
 
-    The square of the factor by which a step of the angle x = |w| h stretches the state across the axis, exactly, and
-    the angles at which it is at most 1.
+    You see the exact square of the factor by which a step of the angle x = |w| h stretches the state across the axis,
+    and the angles at which it is at most 1.
 
     Example: strapgen stability dcm --method rk3,rk4,butcher5 --plot out/stability.png
     """

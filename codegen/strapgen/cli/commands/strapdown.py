@@ -26,7 +26,9 @@ class CourseOutput(Output):
     format: Annotated[
         str | None,
         typer.Option(
-            "--format", help="text, json or csv.  [default: text; csv with --out]", show_default=False
+            "--format",
+            help="Format of the output: text, json or csv.  [default: text; csv with --out]",
+            show_default=False,
         ),
     ] = None
 
@@ -37,14 +39,14 @@ class Start:
 
     initial: Annotated[
         str,
-        typer.Option("--initial-deg", metavar="R,P,H", help="Roll, pitch, heading at the start in deg."),
+        typer.Option("--initial-deg", metavar="R,P,H", help="Roll, pitch and heading at the start in deg."),
     ] = "0,0,0"
     frame_rate: Annotated[
         str,
         typer.Option(
             "--frame-rate-deg-h",
             metavar="X,Y,Z",
-            help="Rate of the navigation frame in deg/h, navigation axes.",
+            help="Rate of the navigation frame in deg/h, in navigation axes.",
         ),
     ] = "0,0,0"
 
@@ -67,19 +69,20 @@ def strapdown(
         typer.Option(
             "--increments-csv",
             metavar="FILE",
-            help="Recorded increments of the fast cycles: columns t, dx, dy, dz, dvx, dvy, dvz; s, rad, m/s.",
+            help="Recorded increments of the fast cycles: columns t in s, dx, dy, dz in rad, and dvx, dvy, dvz in m/s.",
         ),
     ],
     fast_cycles: Annotated[
-        str, typer.Option("--fast-cycles", metavar="N", help="Fast cycles in a slow cycle.")
+        str, typer.Option("--fast-cycles", metavar="N", help="Number of fast cycles in a slow cycle.")
     ],
     slow_cycles: Annotated[
-        str, typer.Option("--slow-cycles", metavar="N", help="Slow cycles in a navigation cycle.")
+        str, typer.Option("--slow-cycles", metavar="N", help="Number of slow cycles in a navigation cycle.")
     ] = "1",
     sculling: Annotated[
         str,
         typer.Option(
-            "--sculling", help="Sculling integral: 1 with the rotation compensation in it, 2 without."
+            "--sculling",
+            help="Form of the sculling integral: 1 includes the rotation compensation, 2 does not.",
         ),
     ] = "2",
     backend: Annotated[
@@ -91,8 +94,8 @@ def strapdown(
 ) -> None:
     """Run an algorithm in two speeds along recorded gyro and accelerometer increments.
 
-    Printed after every navigation cycle: attitude as roll, pitch, heading, and the integral of the specific force over
-    the cycle, in navigation axes. Formats of fixed point are chosen for the recording.
+    After every navigation cycle you see the attitude as roll, pitch and heading, and the integral of the specific force
+    over the cycle in navigation axes. Fixed-point formats are chosen for the recording.
 
     Example:
 

@@ -21,7 +21,7 @@ def stress(
         typer.Option(
             "--algorithms",
             metavar="NAME,...",
-            help="dcm, euler, cayley-klein, two-speed.  [default: all]",
+            help="Algorithms to turn: dcm, euler, cayley-klein, two-speed.  [default: all]",
             show_default=False,
         ),
     ] = None,
@@ -36,15 +36,15 @@ def stress(
     ] = None,
     duration: Annotated[str, typer.Option("--duration", metavar="S", help="Duration in s.")] = "3600",
     sample: Annotated[
-        str, typer.Option("--sample", metavar="S", help="Time from gyro sample to sample in s.")
+        str, typer.Option("--sample", metavar="S", help="Time between gyro samples in s.")
     ] = "0.01",
     fixed: Annotated[FixedOptions, Shown(only=("rounding", "carry"))],
     format: Format = "text",
 ) -> None:
     """Turn every algorithm on every back end at 70 deg/s about all three axes, steadily and to and fro.
 
-    The rate-table test of 1984: the pitch passes 90 deg again and again. Printed is the largest drift of the run; steps
-    are orthonormalized every second.
+    This is the rate-table test of 1984: the pitch passes 90 deg again and again. You see the largest drift of every
+    run; the state is orthonormalized every second.
 
     Example: strapgen stress --duration 20 --algorithms euler,two-speed --backends numpy,c
     """

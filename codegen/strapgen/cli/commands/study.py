@@ -34,19 +34,26 @@ class Sweep:
         "rk4"
     )
     increments: Increments = None
-    words: Annotated[str, typer.Option("--words", metavar="BITS,...", help="Lengths of word, 8 to 64.")] = (
-        "8,10,12,14,16,18,20,24,28,32"
-    )
+    words: Annotated[
+        str, typer.Option("--words", metavar="BITS,...", help="Word lengths in bits, 8 to 64.")
+    ] = "8,10,12,14,16,18,20,24,28,32"
     roundings: Annotated[
-        str, typer.Option("--roundings", metavar="NAME,...", help="nearest, truncation.")
+        str, typer.Option("--roundings", metavar="NAME,...", help="Roundings: nearest, truncation.")
     ] = "nearest"
     carries: Annotated[
-        str, typer.Option("--carries", metavar="NAME,...", help="Residuals kept: none, state, full.")
+        str,
+        typer.Option(
+            "--carries",
+            metavar="NAME,...",
+            help="Rounding errors fed back from step to step: none, state, full.",
+        ),
     ] = "none,state,full"
     steps: Annotated[str, typer.Option("--steps", metavar="S,...", help="Steps in s.")] = "0.125"
     pulses_arcsec: Annotated[
         str,
-        typer.Option("--pulses-arcsec", metavar="ANGLE,...", help="Gyro pulses in arc seconds, 0 for none."),
+        typer.Option(
+            "--pulses-arcsec", metavar="ANGLE,...", help="Angles of gyro pulses in arc seconds, 0 for none."
+        ),
     ] = "0"
 
     def values(self) -> dict[str, Any]:
@@ -66,17 +73,19 @@ class Sweep:
 @grouped
 def word_length(
     *,
-    algorithm: Annotated[str, typer.Option("--algorithm", help="dcm, euler or cayley-klein.")] = "euler",
+    algorithm: Annotated[
+        str, typer.Option("--algorithm", help="Algorithm: dcm, euler or cayley-klein.")
+    ] = "euler",
     sweep: Sweep,
     motion: Annotated[
-        str, typer.Option("--motion", help="constant, sinusoidal, coning or polynomial.")
+        str, typer.Option("--motion", help="Motion to run on: constant, sinusoidal, coning or polynomial.")
     ] = "coning",
     settings: Annotated[
         list[str] | None,
         typer.Option(
             "--set",
             metavar="KEY=VALUE...",
-            help="Parameters of the motion.  [default: that of the thesis's table 5]",
+            help="Parameters of the motion.  [default: those of table 5 of the thesis]",
             show_default=False,
         ),
     ] = None,
@@ -84,16 +93,19 @@ def word_length(
     jobs: Annotated[
         str | None,
         typer.Option(
-            "--jobs", metavar="N", help="Processes.  [default: one a processor]", show_default=False
+            "--jobs",
+            metavar="N",
+            help="Number of processes.  [default: one for each processor]",
+            show_default=False,
         ),
     ] = None,
     output: Annotated[Output, Shown(only=("plot", "out", "format"))],
 ) -> None:
-    """Drift against word length: every combination of word, rounding, carry, step, method and gyro pulse.
+    """Show the drift against word length, for every combination of word, rounding, carry, step, method and gyro pulse.
 
-    The integer model runs each one on a motion with known attitude. Shown are the drift from the truth, what the
+    The integer model runs each one on a motion with known attitude. You see the drift from the truth, what the
     arithmetic adds to it beside its certified bound, what rounded increments add, and what the method itself loses.
-    Finished runs are kept in the cache: a study that was stopped goes on where it was.
+    Finished runs stay in the cache, so that a study that was stopped goes on where it was.
 
     Example:
 

@@ -21,10 +21,11 @@ def two_speed(
     sculling: Annotated[
         str,
         typer.Option(
-            "--sculling", help="Sculling integral: 1 with the rotation compensation in it, 2 without."
+            "--sculling",
+            help="Form of the sculling integral: 1 includes the rotation compensation, 2 does not.",
         ),
     ] = "2",
-    target: Annotated[str, typer.Option("--target", help="c, c-float or c-fixed.")] = "c",
+    target: Annotated[str, typer.Option("--target", help="Target of the code: c, c-float or c-fixed.")] = "c",
     out: Annotated[
         Path | None, typer.Option("--out", help="Folder to write to.  [default: here]", show_default=False)
     ] = None,
@@ -34,7 +35,7 @@ def two_speed(
     ],
     format: Format = "text",
 ) -> None:
-    """Generate the C of an algorithm in two speeds: a function for every loop, and one for the whole.
+    """Generate the C code of an algorithm in two speeds: a function for every loop, and one for the whole.
 
     Example: strapgen two-speed dcm --target c --out firmware
     """

@@ -33,14 +33,19 @@ class AssessedMethods(MethodOptions):
 
     method: Annotated[
         _Text,
-        typer.Option("--method", metavar="NAME,...", help="Methods.  [default: rk4]", show_default=False),
+        typer.Option(
+            "--method",
+            metavar="NAME,...",
+            help="Integration methods.  [default: that of the algorithm; rk4 for an attitude step]",
+            show_default=False,
+        ),
     ] = None
     increments: Annotated[
         _Text,
         typer.Option(
             "--increments",
             metavar="N,...",
-            help="Angle increments a step; in two speeds the fast cycles in a step.  [default: 2]",
+            help="Angle increments in a step; in two speeds the fast cycles in a step.  [default: 2]",
             show_default=False,
         ),
     ] = None
@@ -66,7 +71,7 @@ class VibrationSource:
         typer.Option(
             "--step",
             metavar="S",
-            help="Step T in s; of algorithms in two speeds the slow cycle.",
+            help="Step T in s; for an algorithm in two speeds the slow cycle.",
             show_default=False,
         ),
     ] = None
@@ -84,14 +89,14 @@ class VibrationSource:
     ] = None
     phase: Annotated[
         _Text,
-        typer.Option("--phase-rad", metavar="P", help="Phase of y before x in rad.", show_default=False),
+        typer.Option("--phase-rad", metavar="P", help="Phase in rad by which y leads x.", show_default=False),
     ] = None
     acceleration: Annotated[
         _Text,
         typer.Option(
             "--acceleration-y",
             metavar="M_S2",
-            help="Amplitude of the acceleration along y in m/s^2: the sculling rates too.",
+            help="Amplitude of the acceleration along y in m/s^2; it adds the sculling rates.",
             show_default=False,
         ),
     ] = None
@@ -100,7 +105,7 @@ class VibrationSource:
         typer.Option(
             "--spectrum",
             metavar="FILE",
-            help="Random vibration in place of one frequency: a CSV of frequency_hz, density, angle_x_rad, "
+            help="CSV file of random vibration in place of one frequency: columns frequency_hz, density, angle_x_rad, "
             "angle_x_phase_rad, ...",
             show_default=False,
         ),
@@ -189,18 +194,20 @@ class VibrationOutput(Output):
 
     plot: Annotated[
         Path | None,
-        typer.Option("--plot", help="Image file for the errors against frequency.", show_default=False),
+        typer.Option("--plot", help="Image file for the errors over the frequency.", show_default=False),
     ] = None
     span: Annotated[
         _Text,
         typer.Option(
             "--plot-hz",
             metavar="LOW,HIGH",
-            help="Frequencies of the plot.  [default: up to half the sampling frequency]",
+            help="Lowest and highest frequency of the plot in Hz.  [default: up to half the sampling frequency]",
             show_default=False,
         ),
     ] = None
-    format: Annotated[_Text, typer.Option("--format", help="text, json or latex.")] = "text"
+    format: Annotated[_Text, typer.Option("--format", help="Format of the output: text, json or latex.")] = (
+        "text"
+    )
     formats: ClassVar[tuple[str, ...]] = ("text", "json", "latex")
 
     def frequencies(self, sampling: float, marked: float) -> tuple[float, float]:
@@ -241,8 +248,8 @@ def vibration(
     Closed forms to second order in the amplitudes are derived from the algorithm itself. Several methods, or numbers of
     increments, stand side by side.
 
-    Of a fast loop, continuous and computed are its part within a slow cycle T_m, without the term in T_m: the slow loop
-    adds that to both, so that the error is that of both loops.
+    For a fast loop, continuous and computed are its part within a slow cycle T_m, without the term in T_m: the slow
+    loop adds that to both, so that the error is that of both loops.
 
     Example:
 
@@ -255,15 +262,15 @@ def vibration(
     cases = [case for method in methods.each() for case in _assessed(algorithm, method, source)]
     outcomes, words = source.rates(cases)
     image = None if output.plot is None else _image(cases, source, output, output.plot)
-    from strapgen.reports import vibration as layout
+    from strapgen.reports.vibration import vibration_data, vibration_latex, vibration_text
 
     if output.format == "json":
-        data = layout.vibration_data(outcomes)
+        data = vibration_data(outcomes)
         output.deliver(as_json(data[0] if len(data) == 1 else data), image)
     elif output.format == "latex":
-        output.deliver(layout.vibration_latex(cases), image)
+        output.deliver(vibration_latex(cases), image)
     else:
-        output.deliver(layout.vibration_text(outcomes, f"{words}; step {source.step} s"), image)
+        output.deliver(vibration_text(outcomes, f"{words}; step {source.step} s"), image)
 
 
 def _parts(option: str, text: _Text) -> list[_Text]:
