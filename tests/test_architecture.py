@@ -11,6 +11,8 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "codegen" / "strapgen"
 
@@ -39,17 +41,16 @@ WITHOUT_SYMPY = (
     *("support", "ir", "fixedpoint", "targets", "library", "toolchain", "backends", "simulation"),
     *("cli", "catalogue/__init__.py", "catalogue/names.py", "catalogue/choice.py", "catalogue/choosing.py"),
 )
-#: The stages, by the module that has them.
+#: The functions that do the work of a stage, and the folder to which each belongs.
 STAGES = {
-    "strapgen.catalogue.derivation": "derive",
-    "strapgen.lowering": "lower",
-    "strapgen.fixedpoint": "quantize",
-    "strapgen.targets": "emit",
+    "strapgen.catalogue.derivation.derive": "catalogue",
+    "strapgen.lowering.lower": "lowering",
+    "strapgen.fixedpoint.quantize": "fixedpoint",
+    "strapgen.fixedpoint.quantization.lowered": "fixedpoint",
+    "strapgen.targets.emit": "targets",
 }
-#: How a stage reads where its module is imported.
-CALLS = {(module.rpartition(".")[2], name): name for module, name in STAGES.items()} | {
-    ("catalogue", "derive"): "derive"
-}
+#: The stages as the front door offers them.
+DOORS = {f"strapgen.pipeline.{name}" for name in ("derive", "lower", "quantize", "generate")}
 MOST_LINES = 400
 MOST_BODY = 60
 MOST_COMMAND_BODY = 40
@@ -166,18 +167,86 @@ def test_sympy_ends_at_the_gate():
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-def test_only_the_front_door_calls_two_stages():
+def names_of_imports(module: ast.Module) -> dict[str, str]:
+    """Return what every imported name of a module stands for, inside functions and for types too."""
+    names: dict[str, str] = {}
+    for node in ast.walk(module):
+        if isinstance(node, ast.ImportFrom):
+            names |= {alias.asname or alias.name: f"{node.module}.{alias.name}" for alias in node.names}
+        elif isinstance(node, ast.Import):
+            for alias in node.names:
+                top = alias.name.partition(".")[0]
+                names |= {alias.asname: alias.name} if alias.asname else {top: top}
+    return names
+
+
+def resolved(name: str) -> str:
+    """Return the name of a thing where it is defined, through all modules that pass it on."""
+    module, _, rest = name.rpartition(".")
+    if module in MODULES and name not in MODULES:
+        passed_on = names_of_imports(tree(MODULES[module])).get(rest, name)
+        return name if passed_on == name else resolved(passed_on)
+    return name
+
+
+def uses(module: ast.Module) -> set[str]:
+    """Return the full names of all that a module imports or reaches through what it imports."""
+    names = names_of_imports(module)
+    full = set(names.values())
+    for node in ast.walk(module):
+        parts: list[str] = []
+        while isinstance(node, ast.Attribute):
+            parts.insert(0, node.attr)
+            node = node.value
+        if parts and isinstance(node, ast.Name) and node.id in names:
+            full.add(".".join([names[node.id], *parts]))
+    return {resolved(name) for name in full}
+
+
+def test_only_the_front_door_composes_stages():
     offenders = []
     for module, path in MODULES.items():
-        called = set()
-        for node in ast.walk(tree(path)):
-            if isinstance(node, ast.ImportFrom) and node.module in STAGES:
-                called |= {alias.name for alias in node.names if alias.name == STAGES[node.module]}
-            elif isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
-                called |= {name for name in {CALLS.get((node.value.id, node.attr))} if name}
-        if len(called) > 1 and module != "strapgen.pipeline":
-            offenders.append(f"{module} calls {', '.join(sorted(called))}")
+        if module in ("strapgen", "strapgen.pipeline"):  # the first offers what the second has
+            continue
+        names = uses(tree(path))
+        offenders += [
+            f"{module} calls {name}" for name in names & set(STAGES) if STAGES[name] != room(module)
+        ]
+        offenders += [
+            f"{module} uses {name}"
+            for name in names
+            if re.fullmatch(r"strapgen\.targets\.\w+\.emit\.emit", name)
+        ]
+        if len(doors := names & DOORS) > 1:
+            offenders.append(f"{module} composes {', '.join(sorted(doors))}")
     assert not offenders, "\n".join(offenders)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "from strapgen.catalogue import derive",
+        "from strapgen.catalogue import derive as kernel_of",
+        "def f(choice):\n    from strapgen import catalogue as c\n    return c.derive(choice)",
+        "import strapgen.catalogue\nkernel = strapgen.catalogue.derivation.derive",
+        "from strapgen.catalogue import derivation\nstage = [derivation.derive]",
+    ],
+)
+def test_a_stage_is_seen_however_it_is_called(text):
+    assert "strapgen.catalogue.derivation.derive" in uses(ast.parse(text))
+
+
+def test_the_stages_of_the_rules_exist():
+    assert set(uses(tree(MODULES["strapgen.pipeline"]))) >= set(STAGES) - {
+        "strapgen.fixedpoint.quantization.lowered"
+    }
+    functions = {
+        f"strapgen.pipeline.{node.name}"
+        for node in tree(MODULES["strapgen.pipeline"]).body
+        if isinstance(node, ast.FunctionDef)
+    }
+    assert functions >= DOORS
+    assert resolved("strapgen.derive") == "strapgen.pipeline.derive"
 
 
 def test_no_module_is_named_as_a_known_one_or_says_nothing():

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import pickle
 import shlex
+import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +24,7 @@ from strapgen.experiments.comparison import compare_choice
 from strapgen.experiments.convergence import converge
 from strapgen.simulation.motions import GENERAL
 from strapgen.support.exceptions import InputError
+from strapgen.symbolic.kernel import Kernel
 
 #: A file whose kernel has one name, whatever its options are: Euler parameters by a tableau.
 FILE = str(Path(__file__).resolve().parents[1] / "data" / "algorithms" / "one_name.py")
@@ -164,3 +167,29 @@ def test_two_kernels_of_one_step_need_two_names(tmp_path):
     (tmp_path / "twice.py").write_text(text.replace('name="matrix-from-mine"),', 'name="mend"),'))
     with pytest.raises(InputError, match="kernel mine: two of its kernels are called mend; every one needs"):
         catalogue.choose(str(tmp_path / "twice.py"))
+
+
+def held(value: object, depth: int = 3) -> Iterator[str]:
+    """Yield the names of users' kernels that a container holds, at any of a few depths."""
+    if isinstance(value, Kernel):
+        yield value.name
+    elif depth and isinstance(value, dict):
+        for entry in value.values():
+            yield from held(entry, depth - 1)
+    elif depth and isinstance(value, list | set | tuple):
+        for entry in value:
+            yield from held(entry, depth - 1)
+
+
+def test_no_module_of_the_package_holds_a_user_s_kernel(chosen):
+    for choice in chosen.values():
+        strapgen.simulate(of(choice), strapgen.motion("constant", x_rad_s=1), "0.01", "0.02")
+    holding = [
+        f"{name}.{attribute}"
+        for name, module in list(sys.modules.items())
+        if name.partition(".")[0] == "strapgen"
+        for attribute, value in vars(module).items()
+        if "mine" in held(value)
+    ]
+    assert holding == []
+    assert list(held({"a": [catalogue.derive(chosen["rk1"])]})) == ["mine"], "the check would see one"

@@ -72,8 +72,8 @@ SAID = {
     ("lower", "program"): "lower takes a Kernel, not a Program; strapgen.generate takes it",
     ("lower", "none"): "lower takes a Kernel, not None; strapgen.derive makes one",
     ("lower", "array"): "lower takes a Kernel, not an ndarray; strapgen.derive makes one",
-    ("derive", "kernel"): "derive takes a name or a path, not a Kernel; strapgen.lower takes it",
-    ("derive", "number"): "derive takes a name or a path, not 3; strapgen list shows the names",
+    ("derive", "kernel"): "derive takes a name or a path or a Choice, not a Kernel; strapgen.lower takes it",
+    ("derive", "number"): "derive takes a name or a path or a Choice, not 3; strapgen list shows the names",
     ("quantize", "kernel"): "quantize takes a Program, not a Kernel; strapgen.lower(kernel) makes one",
     ("quantize", "fixed"): "quantize takes a Program, not a FixedProgram; strapgen.generate takes it",
     (

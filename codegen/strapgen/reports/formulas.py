@@ -10,6 +10,7 @@ from typing import Any
 import sympy as sp
 
 from strapgen.ir.program import Program
+from strapgen.reports.latex import align_environment
 from strapgen.symbolic.kernel import Kernel, Stage
 from strapgen.targets.contract import operations_text
 from strapgen.targets.printer import Printer
@@ -87,7 +88,7 @@ def as_latex(kernel: Kernel) -> str:
         for stage in (*kernel.stages, *kernel.outputs)
         for element, expression in zip(stage.signal.elements, stage.expressions, strict=True)
     ]
-    return "\\begin{align*}\n" + " \\\\\n".join(rows) + "\n\\end{align*}"
+    return align_environment(rows)
 
 
 def _latex_name(element: str) -> str:

@@ -63,7 +63,7 @@ def require(function: str, value: Any, *classes: type) -> None:
     >>> require("derive", 3, str)
     Traceback (most recent call last):
         ...
-    strapgen.support.exceptions.InputTypeError: derive takes a name, not 3; strapgen list shows the names
+    strapgen.InputTypeError: derive takes a name, not 3; strapgen list shows the names
     """
     if isinstance(value, classes):
         return

@@ -159,9 +159,9 @@ def printed(
 
 def _chosen(marks: Mapping[Key, str], language: Language, scopes: list[set[str]]) -> dict[Key, str]:
     """Return the name of everything that is marked: its own where that is free, and else one like it."""
-    taken = [{name for name in scope if _MARK not in name} for scope in scopes]
+    reserved = [{name for name in scope if _MARK not in name} for scope in scopes]
     places: dict[str, list[tuple[str, set[str]]]] = {mark: [] for mark in marks.values()}
-    for scope, names in zip(scopes, taken, strict=True):
+    for scope, names in zip(scopes, reserved, strict=True):
         for token in sorted(name for name in scope if _MARK in name):
             (mark,) = re.findall(rf"{_MARK}\d+{_MARK}", token)
             places[mark].append((token, names))

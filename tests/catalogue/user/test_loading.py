@@ -17,6 +17,7 @@ from peano_baker import evaluated, generic_rate, increments, local_error, true_r
 
 import strapgen
 from strapgen import catalogue
+from strapgen.catalogue.methods import tableaux
 from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.catalogue.user import loading
 from strapgen.cli import main
@@ -95,7 +96,7 @@ def test_a_path_with_blanks_is_quoted_in_the_command(folder):
 def test_a_tableau_of_a_file_reaches_the_algorithm(folder):
     text = (Path(catalogue.__file__).parent / "methods" / "butcher_tableaux" / "ralston3.toml").read_text()
     (folder / "mine.toml").write_text(text.replace('name = "', 'name = "My '))
-    tableau = catalogue.tableaux.read("mine.toml")
+    tableau = tableaux.read("mine.toml")
     kernel = strapgen.derive("mrp.py", tableau)
     assert kernel.name == f"mrp-{tableau.name}-2"
     assert kernel.arguments == "mrp.py --tableau mine.toml"
@@ -455,5 +456,5 @@ def test_what_lies_beside_a_file_can_be_imported_and_what_it_prints_is_no_output
 
 
 def test_a_name_that_is_none():
-    with pytest.raises(InputTypeError, match="derive takes a name or a path, not None"):
+    with pytest.raises(InputTypeError, match="derive takes a name or a path or a Choice, not None"):
         strapgen.derive(None)

@@ -180,18 +180,18 @@ def step_order(increments: int, previous: int = 0) -> int:
 
 def _lagrange(nodes: list[sp.Expr]) -> list[Coefficients]:
     """Return the polynomials that are 1 at one of the nodes and 0 at the others."""
-    found = []
-    for j, own in enumerate(nodes):
+    polynomials = []
+    for j, node in enumerate(nodes):
         coefficients: list[sp.Expr] = [sp.Integer(1)]
         for k, other in enumerate(nodes):
             if k != j:
                 raised = [sp.Integer(0), *coefficients]
-                kept = [*coefficients, sp.Integer(0)]
+                padded = [*coefficients, sp.Integer(0)]
                 coefficients = [
-                    _reduced((a - other * b) / (own - other)) for a, b in zip(raised, kept, strict=True)
+                    _reduced((a - other * b) / (node - other)) for a, b in zip(raised, padded, strict=True)
                 ]
-        found.append(tuple(coefficients))
-    return found
+        polynomials.append(tuple(coefficients))
+    return polynomials
 
 
 def _reduced(number: sp.Expr) -> sp.Expr:

@@ -80,15 +80,15 @@ def label(node: Number) -> str:
 
 
 def labels(nodes: Sequence[Number]) -> dict[Number, str]:
-    """Return nodes with a label of its own for each: where two are the same, the later one gets a number."""
-    found: dict[Number, str] = {}
+    """Return a label for each node; of two equal labels the later one gets a number."""
+    names: dict[Number, str] = {}
     for node in dict.fromkeys(nodes):
         name, number = label(node), 1
-        while name in found.values():
+        while name in names.values():
             number += 1
             name = f"{label(node)}_{number}"
-        found[node] = name
-    return found
+        names[node] = name
+    return names
 
 
 class Samples:

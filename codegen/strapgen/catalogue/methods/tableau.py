@@ -36,6 +36,7 @@ class Tableau:
 
     Examples
     --------
+    >>> from strapgen.catalogue.methods.tableaux import TABLEAUX
     >>> TABLEAUX["rk2"].weights
     (Fraction(1, 2), Fraction(1, 2))
     """

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from strapgen.catalogue.user.isolation import Record, installed_folders
 from strapgen.support import cache
 from strapgen.support.exceptions import InputError
+from strapgen.support.timing import from_cache, timed
 
 if TYPE_CHECKING:
     from strapgen.symbolic.kernel import Kernel
@@ -42,8 +43,10 @@ def kernel(what: list[str], folder: Path | None, derive: Callable[[], tuple[Kern
     key = cache.digest([cache.generator_digest(), sys.version, *_installed(), *what])
     with contextlib.suppress(InputError):  # no cache folder: derived every time
         if (stored := _stored(key, folder)) is not None:
+            from_cache(f"kernel of {what[1]}")
             return stored
-    derived, record = derive()
+    with timed("derive", what[1]):
+        derived, record = derive()
     data = None if record.outside or not record.holds(folder) else _pickled(derived)
     if data is not None:
         with contextlib.suppress(InputError):

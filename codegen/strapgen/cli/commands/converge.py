@@ -108,7 +108,7 @@ def converge(
     *,
     methods: Annotated[SeveralMethods, Shown(only=STEP_OPTIONS)],
     backend: Annotated[
-        str, typer.Option("--backend", help="exact (mpmath, for any order) or a back end; see strapgen list.")
+        str, typer.Option("--backend", help="Back end; exact (40 digits) shows any order. See strapgen list.")
     ] = "exact",
     ladder: Ladder,
     fail_beyond: Annotated[
@@ -135,7 +135,7 @@ def converge(
     output.check()
     from strapgen.backends import BACKENDS
 
-    checks.choice("backend", backend, [*BACKENDS, "exact"])
+    checks.choice("backend", backend, BACKENDS)
     most = limit("fail-beyond", fail_beyond)
     ladder.check()
     choices = methods.choices(algorithm)

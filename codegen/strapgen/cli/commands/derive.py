@@ -29,11 +29,12 @@ def derive(
     check_format(format)
     checks.choice("show", show, ("text", "latex", "program", "operations"))
     choice = method.choose(algorithm, step=False)
-    from strapgen import catalogue, pipeline
+    from strapgen import pipeline
+    from strapgen.library import generated_sources
     from strapgen.reports import formulas
 
-    kernel = catalogue.derive(choice)
-    program = pipeline.lower(kernel)
+    kernel = pipeline.derive(choice)
+    program = generated_sources.program(choice)
     if format == "json":
         data = formulas.as_data(kernel, program)
         if show == "latex":

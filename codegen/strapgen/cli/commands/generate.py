@@ -16,8 +16,7 @@ from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
-    from strapgen.ir.integer_program import FixedProgram
-    from strapgen.ir.program import Program
+    from strapgen.catalogue import Choice
     from strapgen.ir.sources import Sources
 
 
@@ -78,7 +77,6 @@ def generate(
         return
     if algorithm is None:
         raise InputError("an algorithm is needed, or --all; strapgen list shows them")
-    from strapgen import pipeline
     from strapgen.library import generated_sources
     from strapgen.support.files import write_files
     from strapgen.targets import FIXED, TARGETS
@@ -90,21 +88,17 @@ def generate(
         raise InputError(
             f"the options of fixed point go with --target {' or '.join(FIXED)}, not with {target}"
         )
-    program = generated_sources.program(choice)
-    _check_increments(program, fixed)
-    quantized = pipeline.quantize(program, settings) if target in FIXED else None
-    if fixed.carry not in (None, "none") and quantized is not None and not quantized.interface.residuals:
+    _check_increments(choice, fixed)
+    sources = generated_sources.sources(choice, target, settings)
+    if fixed.carry not in (None, "none") and sources.fixed is not None and not sources.fixed.residuals:
         raise InputError(
-            f"kernel {program.kernel} rounds no state that goes on to the next step; --carry keeps nothing"
+            f"kernel {choice.kernel} rounds no state that goes on to the next step; --carry keeps nothing"
         )
-    sources = pipeline.generate(quantized or program, target)
     written = write_files(out or Path(), sources.files)
     if format == "json":
-        print_json(_data(sources, target, written) | (quantized.as_data() if quantized else {}))
+        print_json(_data(choice, sources, target, written))
     else:
         typer.echo(_text(sources, target, written))
-        if quantized is not None:
-            typer.echo(_bounds(quantized))
 
 
 def _check_alone(
@@ -125,45 +119,48 @@ def _check_alone(
             raise InputError(f"--all generates the whole catalogue; {name} does not go with it")
 
 
-def _check_increments(program: Program, fixed: FixedOptions) -> None:
+def _check_increments(choice: Choice, fixed: FixedOptions) -> None:
     """Refuse a largest rate or angle for a kernel that takes neither."""
-    inputs = {signal.name for signal in program.inputs}
-    if not inputs & {"increments", "turns"} and {*fixed.stated} & {
-        "--max-rate-deg-s",
-        "--step",
-        "--max-angle-rad",
-    }:
+    from strapgen.library import generated_sources
+
+    if not {*fixed.stated} & {"--max-rate-deg-s", "--step", "--max-angle-rad"}:
+        return
+    names = {signal.name for signal in generated_sources.program(choice).inputs}
+    if not names & {"increments", "turns"}:
         raise InputError(
-            f"kernel {program.kernel} takes no increments; a largest rate or angle does not go with it"
+            f"kernel {choice.kernel} takes no increments; a largest rate or angle does not go with it"
         )
 
 
-def _data(sources: Sources, target: str, written: list[Path]) -> dict[str, Any]:
+def _data(choice: Choice, sources: Sources, target: str, written: list[Path]) -> dict[str, Any]:
+    from strapgen import pipeline
+    from strapgen.library import generated_sources
+
     operations = sources.operations
-    return {
+    data = {
         "kernel": sources.kernel,
         "target": target,
         "files": [str(path) for path in written],
         "operations": {kind: operations[kind] for kind in ("add", "multiply", "divide", "sqrt")},
         "temporaries": sources.temporaries,
     }
+    if sources.fixed is None:
+        return data
+    program = generated_sources.program(choice)
+    return data | pipeline.quantize(program, sources.fixed.settings).as_data()
 
 
 def _text(sources: Sources, target: str, written: list[Path]) -> str:
+    """Return the operations and the files, in fixed point with the format and the error of every output."""
     counts = [f"{number} {kind}" for kind, number in sources.operations.items() if number]
     head = f"{', '.join(counts) or 'no operations'}, {sources.temporaries} temporaries"
-    return "\n".join([f"{sources.kernel} for {target}: {head}", *(f"  {path}" for path in written)])
-
-
-def _bounds(program: FixedProgram) -> str:
-    """Return the format of every output of a program in fixed point, and how far its rounding can be off."""
-    lines = []
-    for name, bound in program.error_bounds.items():
-        format_ = program.formats[name]
-        useless = 2 * bound >= max(map(abs, program.ranges[name]))
+    lines = [f"{sources.kernel} for {target}: {head}", *(f"  {path}" for path in written)]
+    for output in sources.fixed.outputs if sources.fixed else ():
+        bound, unit = max(output.errors), output.format.unit
+        useless = 2 * bound >= max(abs(output.low), abs(output.high)) * unit
         lines.append(
-            f"  {name}: {format_}, error at most {float(bound):.4g}, "
-            f"{float(bound / format_.unit):.4f} of the last place"
+            f"  {output.signal.name}: {output.format}, error at most {float(bound):.4g}, "
+            f"{float(bound / unit):.4f} of the last place"
             + (": of the size of the value, which certifies nothing" if useless else "")
         )
     return "\n".join(lines)

@@ -196,10 +196,11 @@ def series(
         ratio = ratios.versus(choice, versus.choose(versus.versus, method), motion, most)
         output.deliver_report(ratio, ratio_text, ratio_latex)
         return
-    from strapgen.reports.series import as_latex, as_report, report
+    from strapgen.analysis.error_analysis import analyse
+    from strapgen.reports.series import series_latex, series_text
 
     image = None if output.plot is None else plot.draw(choice, motion, count, output.plot)
-    output.deliver_report(report(choice, motion, most), as_report, as_latex, image)
+    output.deliver_report(analyse(choice, motion, most), series_text, series_latex, image)
 
 
 def _check_plot(motion: str, versus: Versus, plot: DriftPlot, output: Output) -> None:

@@ -81,7 +81,7 @@ def simulate(
     *,
     method: Annotated[MethodOptions, Shown(only=STEP_OPTIONS)],
     backend: Annotated[
-        str, typer.Option("--backend", help="numpy, c, c-float, c-q31, c-q15 or fixed-model.")
+        str, typer.Option("--backend", help="numpy, c, c-float, c-q31, c-q15, fixed-model or exact.")
     ] = "numpy",
     source: SampleSource,
     intervals: Annotated[Intervals, Shown(before="increments_csv")],
@@ -125,11 +125,13 @@ def simulate(
 
     import numpy as np
 
-    from strapgen.backends import of
+    from strapgen import backends
 
     def build(seconds: float, largest: Callable[[], float]) -> Backend:
         settings = fixed.settings_for_run(backend, choice.increments_per_step, seconds, largest)
-        return of(choice, backend, intervals.scheme, settings)
+        return backends.backend(
+            choice, backend=backend, orthonormalization=intervals.scheme, settings=settings
+        )
 
     with np.errstate(all="ignore"):  # numbers that overflow are refused, in one line
         if source.motion is None:
