@@ -95,7 +95,7 @@ def test_a_path_with_blanks_is_quoted_in_the_command(folder):
 def test_a_tableau_of_a_file_reaches_the_algorithm(folder):
     text = (Path(catalogue.__file__).parent / "methods" / "butcher_tableaux" / "ralston3.toml").read_text()
     (folder / "mine.toml").write_text(text.replace('name = "', 'name = "My '))
-    tableau = catalogue.tableaux.read("mine.toml")
+    tableau = strapgen.tableaux.read("mine.toml")
     kernel = strapgen.derive("mrp.py", tableau)
     assert kernel.name == f"mrp-{tableau.name}-2"
     assert kernel.arguments == "mrp.py --tableau mine.toml"
