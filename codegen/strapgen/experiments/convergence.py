@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from itertools import pairwise
 from typing import Any
@@ -67,6 +67,8 @@ class Convergence:
     observed : float or None
         Slope of the logarithm of the error, fitted to the finest rungs whose error is truncation; None where no two
         rungs show it.
+    arguments : str
+        Name and options of the kernel on the command line; they tell kernels of one name apart.
     """
 
     kernel: str
@@ -74,6 +76,7 @@ class Convergence:
     order: Order | None
     rungs: tuple[Rung, ...]
     observed: float | None
+    arguments: str = ""
 
     @property
     def hidden(self) -> str:
@@ -171,7 +174,23 @@ def converge(
     for length, count in zip(lengths, counts, strict=True):
         error, floor = measure(length, count)
         rungs.append((float(length), error, error is not None and floor < error < _MOST_ERROR))
-    return _fitted(kernel.name, backend, kernel.order, rungs)
+    return replace(_fitted(kernel.name, backend, kernel.order, rungs), arguments=kernel.arguments)
+
+
+def labels(outcomes: Sequence[Convergence]) -> list[str]:
+    """Return a name for every outcome: that of its kernel, and the options where several kernels have one name.
+
+    Examples
+    --------
+    >>> by_rk1, by_rk4 = (Convergence("mine", "exact", None, (), None, f"mine.py --method {m}") for m in ("rk1", "rk4"))
+    >>> labels([by_rk1, by_rk4])
+    ['mine, mine.py --method rk1', 'mine, mine.py --method rk4']
+    """
+    names = [outcome.kernel for outcome in outcomes]
+    return [
+        f"{one.kernel}, {one.arguments}" if one.arguments and names.count(one.kernel) > 1 else one.kernel
+        for one in outcomes
+    ]
 
 
 def _fitted(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from strapgen.experiments.convergence import Convergence, Rung
+from strapgen.experiments.convergence import Convergence, Rung, labels
 from strapgen.reports.table import ERROR, SECONDS, Column, TextTable
 
 #: Algorithms side by side in a report.
@@ -18,14 +18,17 @@ _CSV_NAMES = (
 def convergence_text(outcomes: Sequence[Convergence], title: str) -> str:
     """Return outcomes as a report: the error and the local slope at every step, the observed and predicted orders."""
     lines = [title, "largest error in rad; in brackets the slope from the step before; * fitted"]
+    names = labels(outcomes)
     for first in range(0, len(outcomes), _MOST_COLUMNS):
-        lines += ["", *_table(outcomes[first : first + _MOST_COLUMNS]).lines()]
-    notes = [f"{one.kernel}: {one.order}" for one in outcomes if one.order is not None and one.order.limited]
-    notes += [f"{one.kernel}: {one.hidden}" for one in outcomes if one.hidden]
+        some = slice(first, first + _MOST_COLUMNS)
+        lines += ["", *_table(outcomes[some], names[some]).lines()]
+    named = list(zip(names, outcomes, strict=True))
+    notes = [f"{name}: {one.order}" for name, one in named if one.order is not None and one.order.limited]
+    notes += [f"{name}: {one.hidden}" for name, one in named if one.hidden]
     return "\n".join([*lines, *([""] if notes else []), *notes])
 
 
-def _table(outcomes: Sequence[Convergence]) -> TextTable:
+def _table(outcomes: Sequence[Convergence], names: Sequence[str]) -> TextTable:
     """Return a row for every step, then the orders; cells end where the mark of a fitted error stands."""
     rows: list[list[object]] = [
         [rung.step_s, *(_cell(one.rungs[k]) for one in outcomes)] for k, rung in enumerate(outcomes[0].rungs)
@@ -34,7 +37,7 @@ def _table(outcomes: Sequence[Convergence]) -> TextTable:
     rows.append(
         ["predicted", *(None if one.predicted is None else f"{one.predicted}     " for one in outcomes)]
     )
-    return TextTable([Column("step, s", spec=SECONDS), *(Column(one.kernel) for one in outcomes)], rows)
+    return TextTable([Column("step, s", spec=SECONDS), *map(Column, names)], rows)
 
 
 def _cell(rung: Rung) -> str:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from strapgen.experiments.convergence import labels
 from strapgen.reports.plots import figures
 
 if TYPE_CHECKING:
@@ -39,8 +40,8 @@ def convergence_image(outcomes: Sequence[Convergence], title: str, path: str | P
     figure, grid = figures.grid_of_axes(1, 1, (8.0, 6.0))
     axes = grid[0, 0]
     colours = figures.colours(len(outcomes), 0.85)
-    for number, (outcome, colour) in enumerate(zip(outcomes, colours, strict=True)):
-        _draw_algorithm(axes, outcome, colour, "osD^v<>p"[number % 8])
+    for number, (outcome, name) in enumerate(zip(outcomes, labels(outcomes), strict=True)):
+        _draw_algorithm(axes, outcome, name, colours[number], "osD^v<>p"[number % 8])
     rungs = [rung for outcome in outcomes for rung in outcome.rungs]
     if any(rung.error_rad for rung in rungs):  # else all are exact: nothing to draw
         axes.set_yscale("log")
@@ -62,7 +63,7 @@ def convergence_image(outcomes: Sequence[Convergence], title: str, path: str | P
     return figures.image(figure, path)
 
 
-def _draw_algorithm(axes: Any, outcome: Convergence, colour: Any, marker: str) -> None:
+def _draw_algorithm(axes: Any, outcome: Convergence, name: str, colour: Any, marker: str) -> None:
     """Draw the errors of one algorithm, filled where the slope is fitted, and the predicted slope dashed."""
     rungs = [rung for rung in outcome.rungs if rung.error_rad]
     steps = [rung.step_s for rung in rungs]
@@ -79,7 +80,7 @@ def _draw_algorithm(axes: Any, outcome: Convergence, colour: Any, marker: str) -
             markersize=5.5,
             color=colour,
             markerfacecolor=colour if used else "white",
-            label=f"{outcome.kernel}: {slope}{theory}" if used else None,
+            label=f"{figures.printable(name)}: {slope}{theory}" if used else None,
         )
     fitted = [rung for rung in rungs if rung.used]
     if outcome.predicted is not None and fitted:
