@@ -12,8 +12,9 @@ import mpmath
 import session_library
 import sympy as sp
 
-from strapgen import catalogue, fixedpoint, generate
+from strapgen import catalogue, fixedpoint
 from strapgen.backends import BACKENDS, fitted
+from strapgen.backends.kernel_sources import sources_of_program
 from strapgen.catalogue import Choice
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.integer_program import FixedProgram
@@ -73,4 +74,4 @@ def precisely(kernel: Kernel, values: Mapping[str, mpmath.mpf]) -> dict[str, mpm
 
 def generated(program: Program, backend_name: str) -> Sources:
     """Return the sources that a back end by this name runs."""
-    return generate(program, BACKENDS[backend_name].target, fitted(backend_name, None))
+    return sources_of_program(program, BACKENDS[backend_name].target, fitted(backend_name, None))

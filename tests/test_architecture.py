@@ -11,6 +11,8 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "codegen" / "strapgen"
 
@@ -39,17 +41,16 @@ WITHOUT_SYMPY = (
     *("support", "ir", "fixedpoint", "targets", "library", "toolchain", "backends", "simulation"),
     *("cli", "catalogue/__init__.py", "catalogue/names.py", "catalogue/choice.py", "catalogue/choosing.py"),
 )
-#: The stages, by the module that has them.
+#: The functions that do the work of a stage, and the folder to which each belongs.
 STAGES = {
-    "strapgen.catalogue.derivation": "derive",
-    "strapgen.lowering": "lower",
-    "strapgen.fixedpoint": "quantize",
-    "strapgen.targets": "emit",
+    "strapgen.catalogue.derivation.derive": "catalogue",
+    "strapgen.lowering.lower": "lowering",
+    "strapgen.fixedpoint.quantize": "fixedpoint",
+    "strapgen.fixedpoint.quantization.lowered": "fixedpoint",
+    "strapgen.targets.emit": "targets",
 }
-#: How a stage reads where its module is imported.
-CALLS = {(module.rpartition(".")[2], name): name for module, name in STAGES.items()} | {
-    ("catalogue", "derive"): "derive"
-}
+#: The stages as the front door offers them.
+DOORS = {f"strapgen.pipeline.{name}" for name in ("derive", "lower", "quantize", "generate")}
 MOST_LINES = 400
 MOST_BODY = 60
 MOST_COMMAND_BODY = 40
@@ -150,6 +151,16 @@ def test_imports_point_down():
     assert not upward, "\n".join(upward)
 
 
+def test_imports_form_no_circle():
+    graph = {
+        module: {other for other in imports(path) if other in MODULES and other != module}
+        for module, path in MODULES.items()
+        if room(module) in ORDER
+    }
+    graph = {module: {other for other in others if other in graph} for module, others in graph.items()}
+    assert not (modules := circle(graph)), " imports ".join(modules)
+
+
 def test_a_circle_is_seen():
     assert circle({"a": {"b"}, "b": {"c"}, "c": {"b"}}) == ["b", "c", "b"]
     assert circle({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == []
@@ -166,18 +177,131 @@ def test_sympy_ends_at_the_gate():
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-def test_only_the_front_door_calls_two_stages():
+@cache
+def names_of_imports(module: ast.Module) -> dict[str, str]:
+    """Return what every imported name of a module stands for, inside functions and for types too."""
+    names: dict[str, str] = {}
+    for node in ast.walk(module):
+        if isinstance(node, ast.ImportFrom):
+            names |= {alias.asname or alias.name: f"{node.module}.{alias.name}" for alias in node.names}
+        elif isinstance(node, ast.Import):
+            for alias in node.names:
+                top = alias.name.partition(".")[0]
+                names |= {alias.asname: alias.name} if alias.asname else {top: top}
+    return names
+
+
+def resolved(name: str) -> str:
+    """Return the name of a thing where it is defined, through all modules that pass it on."""
+    module, _, rest = name.rpartition(".")
+    if module in MODULES and name not in MODULES:
+        passed_on = names_of_imports(tree(MODULES[module])).get(rest, name)
+        return name if passed_on == name else resolved(passed_on)
+    return name
+
+
+def uses(module: ast.Module) -> set[str]:
+    """Return the full names of all that a module imports or reaches through what it imports."""
+    names = names_of_imports(module)
+    full = set(names.values())
+    for node in ast.walk(module):
+        parts: list[str] = []
+        while isinstance(node, ast.Attribute):
+            parts.insert(0, node.attr)
+            node = node.value
+        if parts and isinstance(node, ast.Name) and node.id in names:
+            full.add(".".join([names[node.id], *parts]))
+    return {resolved(name) for name in full}
+
+
+def test_only_the_front_door_composes_stages():
     offenders = []
     for module, path in MODULES.items():
-        called = set()
-        for node in ast.walk(tree(path)):
-            if isinstance(node, ast.ImportFrom) and node.module in STAGES:
-                called |= {alias.name for alias in node.names if alias.name == STAGES[node.module]}
-            elif isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
-                called |= {name for name in {CALLS.get((node.value.id, node.attr))} if name}
-        if len(called) > 1 and module != "strapgen.pipeline":
-            offenders.append(f"{module} calls {', '.join(sorted(called))}")
+        if module in ("strapgen", "strapgen.pipeline"):  # the first offers what the second has
+            continue
+        names = uses(tree(path))
+        offenders += [
+            f"{module} calls {name}" for name in names & set(STAGES) if STAGES[name] != room(module)
+        ]
+        offenders += [
+            f"{module} uses {name}"
+            for name in names
+            if re.fullmatch(r"strapgen\.targets\.\w+\.emit\.emit", name)
+        ]
+        if len(doors := names & DOORS) > 1:
+            offenders.append(f"{module} composes {', '.join(sorted(doors))}")
     assert not offenders, "\n".join(offenders)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "from strapgen.catalogue import derive",
+        "from strapgen.catalogue import derive as kernel_of",
+        "def f(choice):\n    from strapgen import catalogue as c\n    return c.derive(choice)",
+        "import strapgen.catalogue\nkernel = strapgen.catalogue.derivation.derive",
+        "from strapgen.catalogue import derivation\nstage = [derivation.derive]",
+    ],
+)
+def test_a_stage_is_seen_however_it_is_called(text):
+    assert "strapgen.catalogue.derivation.derive" in uses(ast.parse(text))
+
+
+def test_the_stages_of_the_rules_exist():
+    assert set(uses(tree(MODULES["strapgen.pipeline"]))) >= set(STAGES) - {
+        "strapgen.fixedpoint.quantization.lowered"
+    }
+    functions = {
+        f"strapgen.pipeline.{node.name}"
+        for node in tree(MODULES["strapgen.pipeline"]).body
+        if isinstance(node, ast.FunctionDef)
+    }
+    assert functions >= DOORS
+    assert resolved("strapgen.derive") == "strapgen.pipeline.derive"
+
+
+def layouts(source: ast.Module) -> Iterator[tuple[int, str]]:
+    """Yield what lays out columns in a source: alignment, padding, rows of comma-separated values, and its line."""
+    for node in ast.walk(source):
+        if isinstance(node, ast.Attribute) and node.attr in ("ljust", "rjust", "writerow", "writerows"):
+            yield node.lineno, node.attr
+        elif isinstance(node, ast.FormattedValue) and node.format_spec is not None:
+            spec = "".join(
+                str(part.value) for part in node.format_spec.values if isinstance(part, ast.Constant)
+            )
+            align = [part for part in node.format_spec.values[:1] if isinstance(part, ast.FormattedValue)]
+            if re.match(r"[<>^]", spec) or any("align" in ast.unparse(part) for part in align):
+                yield node.lineno, "aligns"
+
+
+def test_one_module_lays_out_tables():
+    """Beside it the command line prints lists of its own; everything else computes, or says what a column holds."""
+    offenders = [
+        f"{place(path)}:{line} {what}"
+        for path in FILES
+        if path.relative_to(PACKAGE).parts[0] != "cli" and place(path) != "reports/table.py"
+        for line, what in layouts(tree(path))
+    ]
+    assert not offenders, "\n".join(offenders)
+
+
+def test_only_reports_and_the_command_line_have_texts_of_results():
+    offenders = [
+        f"{place(path)}:{node.lineno} {node.name}"
+        for path in FILES
+        if path.relative_to(PACKAGE).parts[0] not in ("reports", "cli")
+        for node in ast.walk(tree(path))
+        if isinstance(node, ast.FunctionDef) and node.name in ("as_text", "as_csv", "as_markdown")
+    ]
+    assert not offenders, "\n".join(offenders)
+
+
+@pytest.mark.parametrize(
+    "text", ["name.ljust(3)", "f'{x:>10.3e}'", "f'{x:<{width}}'", "f'{x:{align}{width}}'", "w.writerow(r)"]
+)
+def test_a_layout_is_seen(text):
+    assert list(layouts(ast.parse(text)))
+    assert not list(layouts(ast.parse("f'{x:.3e} {x:+.2%} {x:{spec}}'")))
 
 
 def test_no_module_is_named_as_a_known_one_or_says_nothing():

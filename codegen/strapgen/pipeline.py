@@ -1,41 +1,53 @@
-"""The front door: the stages of the generator in order, each with its input and its output.
+"""The compiler on one page. `compile` calls the stages in order, and no other module composes them.
 
-algorithm, method, increments
-    | derive      exact formulas
-Kernel
-    | lower       straight-line code
-Program
-    | quantize    for fixed point alone: integers, with ranges and error bounds
-FixedProgram
-    | generate    source text
-Sources
-    | build       compiled, callable
-Backend
-    | simulate    against the truth
-Run
+choice --derive--> Kernel --lower--> Program --quantize--> FixedProgram --generate--> Sources
+
+The formulas of a kernel are exact. A program is straight-line code; fixed point alone quantizes it, to integers with
+proved ranges and error bounds. `strapgen.build` makes a back end of the sources, `strapgen.simulate` tests it.
 """
 
 from __future__ import annotations
 
 import os
-from dataclasses import replace
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from strapgen import catalogue, fixedpoint, targets
+from strapgen.catalogue import Choice
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.integer_program import FixedProgram
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
 from strapgen.support import stages
-from strapgen.support.exceptions import InputTypeError
+from strapgen.support.exceptions import InputError, InputTypeError
+from strapgen.support.timing import timed
 
 if TYPE_CHECKING:
     from strapgen.catalogue.methods.tableau import Tableau
     from strapgen.symbolic.kernel import Kernel
 
 
+def lowered(choice: Choice) -> Program:
+    """Derive a choice and lower it: the program that all targets share."""
+    return lower(derive(choice))
+
+
+def compile(
+    choice: Choice,
+    target: str,
+    settings: Settings | None = None,
+    lowered: Callable[[Choice], Program] = lowered,
+) -> Sources:
+    """Compile a choice for a target; `lowered` returns its program, for instance from a cache."""
+    _require_target(target, settings)
+    program = lowered(choice)
+    if target in targets.FIXED:
+        return generate(quantize(program, settings), target)
+    return generate(program, target)
+
+
 def derive(
-    algorithm: str,
+    algorithm: str | Choice,
     method: str | Tableau | None = None,
     increments: int | None = None,
     *,
@@ -46,22 +58,17 @@ def derive(
 
     Parameters
     ----------
-    algorithm : str
-        An attitude algorithm ("dcm", "euler", "cayley-klein") or another kernel of the catalogue.
+    algorithm : str or Choice
+        An attitude algorithm ("dcm", "euler", "cayley-klein") or another kernel that ``strapgen list`` shows; a Python
+        file; or what `strapgen.choose` returned, to which the other parameters do not apply.
     method : str or Tableau, optional
-        Integration method of an attitude algorithm: a name that ``strapgen list`` shows, or a tableau; by default
-        "rk4".
+        Integration method of an attitude algorithm, by name or as a tableau; by default "rk4".
     increments : int, optional
         Angle increments a step, 1 to 8 (default 2), of an attitude algorithm.
     rates : bool, optional
-        Whether the step is given the body rate at every node of its method, times the step length, in place
-        of increments.
+        Whether the step takes the body rate at every node of its method, times the step length, in place of increments.
     previous : int, optional
         Increments before the step that it takes too, 0 to 3 (default 0): a fit of higher degree for a slow gyro.
-
-    Returns
-    -------
-    Kernel
 
     Raises
     ------
@@ -75,20 +82,17 @@ def derive(
     >>> derive("euler", method="rk4", rates=True).inputs[1].elements[:4]
     ('turn_0_x', 'turn_0_y', 'turn_0_z', 'turn_1_2_x')
     """
-    stages.require("derive", algorithm, str, os.PathLike)
-    return catalogue.derive(catalogue.choose(algorithm, method, increments, rates, previous))
+    if not isinstance(algorithm, Choice):
+        stages.require("derive", algorithm, str, os.PathLike, Choice)
+        algorithm = catalogue.choose(algorithm, method, increments, rates, previous)
+    elif (method, increments, rates, previous) != (None, None, False, 0):
+        raise InputError(f"the choice of {algorithm.kernel} is complete; derive takes it alone")
+    with timed("derive", algorithm.kernel):
+        return catalogue.derive(algorithm)
 
 
 def lower(kernel: Kernel) -> Program:
     """Turn a kernel into straight-line code with the fewest operations that are known for it.
-
-    Parameters
-    ----------
-    kernel : Kernel
-
-    Returns
-    -------
-    Program
 
     Raises
     ------
@@ -102,11 +106,12 @@ def lower(kernel: Kernel) -> Program:
     >>> lower(derive("euler")).operations["divide"]
     0
     """
-    from strapgen.lowering import lower as lower_kernel
+    from strapgen import lowering  # loads SymPy, as only deriving and lowering do
     from strapgen.symbolic.kernel import Kernel
 
     stages.require("lower", kernel, Kernel)
-    return replace(lower_kernel(kernel), own=tuple(map(lower_kernel, kernel.own)))
+    with timed("lower", kernel.name):
+        return lowering.lower(kernel)
 
 
 def quantize(program: Program, settings: Settings | None = None) -> FixedProgram:
@@ -117,10 +122,6 @@ def quantize(program: Program, settings: Settings | None = None) -> FixedProgram
     program : Program
     settings : Settings, optional
         Word, largest increment, rounding and what else a user states; by default 32 bits and 1/8 rad.
-
-    Returns
-    -------
-    FixedProgram
 
     Raises
     ------
@@ -135,25 +136,20 @@ def quantize(program: Program, settings: Settings | None = None) -> FixedProgram
     """
     stages.require("quantize", program, Program)
     _require_settings(settings)
-    return fixedpoint.quantize(program, settings or Settings())
+    with timed("quantize", program.kernel):
+        return fixedpoint.quantize(program, settings or Settings())
 
 
 def generate(program: Program | FixedProgram, target: str, settings: Settings | None = None) -> Sources:
-    """Turn a program into source text.
+    """Turn a program into source text; for a fixed-point target a `Program` is quantized first.
 
     Parameters
     ----------
     program : Program or FixedProgram
-        A fixed-point target takes either; a program is quantized first.
     target : str
         "numpy", "c", "c-float", "c-fixed" or "fixed-model".
     settings : Settings, optional
-        What fixed point is made for, where the program is not quantized yet.
-
-    Returns
-    -------
-    Sources
-        Text by file name, and the interface of the generated function.
+        Word, ranges and rounding for a `Program` and a fixed-point target.
 
     Raises
     ------
@@ -166,12 +162,23 @@ def generate(program: Program | FixedProgram, target: str, settings: Settings | 
     ['euler_rk4_2.c', 'euler_rk4_2.h']
     """
     stages.require("generate", program, Program, FixedProgram)
+    _require_target(target, settings)
+    if isinstance(program, Program) and target in targets.FIXED:
+        program = quantize(program, settings)
+    elif isinstance(program, FixedProgram) and settings is not None:
+        kernel = program.program.kernel
+        raise InputError(f"the program of {kernel} is quantized already; settings do not go with it")
+    kernel = program.kernel if isinstance(program, Program) else program.program.kernel
+    with timed("generate", f"{kernel} for {target}"):
+        return targets.emit(program, target)
+
+
+def _require_target(target: Any, settings: Any) -> None:
     if not isinstance(target, str):
-        raise InputTypeError(
-            f"target is {stages.describe(target)}; a name is needed: {', '.join(targets.TARGETS)}"
-        )
+        names = ", ".join(targets.TARGETS)
+        raise InputTypeError(f"target is {stages.describe(target)}; a name is needed: {names}")
     _require_settings(settings)
-    return targets.emit(program, target, settings)
+    targets.require(target, settings)
 
 
 def _require_settings(settings: Any) -> None:

@@ -7,10 +7,11 @@ import json
 import pytest
 import sympy as sp
 
-from strapgen.analysis.invariants import LATEX, as_text
+from strapgen.analysis.error_analysis import analyse
+from strapgen.analysis.notation import LATEX, covariant_text
 from strapgen.analysis.series import MOTIONS, STEP, series
 from strapgen.catalogue import ALGORITHMS, METHODS, choose, choose_step, derive, enough, nodes
-from strapgen.reports.series import as_latex, as_report, report
+from strapgen.reports.series import series_latex, series_text
 from strapgen.support.exceptions import InputError
 
 W = sp.symbols("w_x w_y w_z")
@@ -29,7 +30,7 @@ def test_the_order_is_that_of_theory_or_better(algorithm, motion):
 
 @pytest.mark.parametrize("motion", ["constant", "general"])
 def test_json_is_what_was_agreed(motion):
-    data = json.loads(json.dumps(report(choose("euler", "rk4", 2), motion, 2).as_dict()))
+    data = json.loads(json.dumps(analyse(choose("euler", "rk4", 2), motion, 2).as_dict()))
     assert data["order"] == 4
     letters = W if motion == "constant" else [sp.Symbol(f"w{j}_{axis}") for j in range(9) for axis in "xyz"]
     for part in ("drift", "scale", "skew"):
@@ -44,19 +45,19 @@ def test_json_is_what_was_agreed(motion):
 
 def test_the_vector_invariant_form_is_the_components():
     found = series(choose("dcm", "rk2", 1), "general", 1)
-    assert as_text(found.invariant[3].drift) == "-1/6 |w0|^2 w0 + 1/12 w0 x w1"
+    assert covariant_text(found.invariant[3].drift) == "-1/6 |w0|^2 w0 + 1/12 w0 x w1"
     w0, w1 = (sp.Matrix(sp.symbols(f"w{j}_x w{j}_y w{j}_z")) for j in (0, 1))
     wanted = w0.cross(w1) / 12 - w0.dot(w0) * w0 / 6
     assert all(sp.expand(a - b) == 0 for a, b in zip(found.drift[3], wanted, strict=True))
-    assert r"\boldsymbol\omega_{0} \times \boldsymbol\omega_{1}" in as_text(
+    assert r"\boldsymbol\omega_{0} \times \boldsymbol\omega_{1}" in covariant_text(
         found.invariant[3].drift, notation=LATEX
     )
 
 
 def test_exponentials_lose_nothing_at_a_constant_rate():
-    found = report(choose("dcm", "magnus4", 2), "constant")
+    found = analyse(choose("dcm", "magnus4", 2), "constant")
     assert found.step.order is None
-    assert "nothing, to the power" in as_report(found)
+    assert "nothing, to the power" in series_text(found)
 
 
 @pytest.mark.parametrize("method", ["rk4", "magnus4", "fehlberg5"])
@@ -96,20 +97,20 @@ def test_rounded_coefficients_show_no_order_that_is_not_there():
 
 def test_a_users_step_that_is_not_linear_has_no_closed_form_of_a_run(own_algorithm):
     choice = choose_step(str(own_algorithm("mrp")))
-    found = report(choice, "constant", 1)
+    found = analyse(choice, "constant", 1)
     assert found.step.order == 4
     assert found.run is None
-    assert "not linear in its state" in as_report(found)
+    assert "not linear in its state" in series_text(found)
 
 
 @pytest.mark.parametrize("motion", MOTIONS)
 def test_reports_say_every_part(motion):
-    found = report(choose("dcm", "rk2", 2), motion, 1)
-    text = as_report(found)
+    found = analyse(choose("dcm", "rk2", 2), motion, 1)
+    text = series_text(found)
     assert "order 2" in text
     assert "growth in a step" in text
     assert ("in closed form" in text) == (motion == "constant")
-    latex = as_latex(found)
+    latex = series_latex(found)
     assert latex.count(r"\begin{align*}") == latex.count(r"\end{align*}") == 1
 
 

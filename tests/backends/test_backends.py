@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from tolerances import one_call, roundoff
 
 import strapgen
+from strapgen.backends import BACKENDS
 from strapgen.backends import numpy_backend as numpy_module
 from strapgen.backends.increments import windows
 from strapgen.support.exceptions import InputError, InputTypeError
@@ -75,8 +76,12 @@ def test_orthonormalization_comes_after_every_so_many_steps(make, algorithm, rng
     orthonormalize_every=st.one_of(st.none(), st.integers(1, 60)),
     runs=st.integers(1, 3),
 )
-def test_records_are_samples_of_the_full_history(make, steps, record_every, orthonormalize_every, runs):
+def test_records_are_samples_of_the_full_history(
+    make, backend_name, steps, record_every, orthonormalize_every, runs
+):
     backend = make("euler", "rk2")
+    if BACKENDS[backend_name].slow:
+        steps %= 20
     increments = random_increments(np.random.default_rng(steps), runs, steps, 2)
     every = backend.propagate(increments, 1, orthonormalize_every)
     assert every.shape == (runs, steps + 1, 4)
@@ -380,3 +385,12 @@ def test_exponentials_have_no_hole_at_zero(method, algorithm, size):
         end = backend.propagate(turn)[-1]
         wanted = strapgen.backend(algorithm, "rk4", 2, name).propagate(turn)[-1]
         np.testing.assert_allclose(end, wanted, rtol=0, atol=roundoff(backend, 3))
+
+
+def test_a_choice_is_a_back_end_like_its_name(backend_name, rng):
+    increments = random_increments(rng, 20, 1)
+    by_name = strapgen.backend("dcm", "rk2", 1, backend_name)
+    by_choice = strapgen.backend(strapgen.choose("dcm", "rk2", 1), backend=backend_name)
+    np.testing.assert_array_equal(by_choice.propagate(increments), by_name.propagate(increments))
+    with pytest.raises(InputError, match="previous is 1, but the choice of dcm-rk2-1 has its own"):
+        strapgen.backend(strapgen.choose("dcm", "rk2", 1), backend=backend_name, previous=1)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from fractions import Fraction
 
 import numpy as np
@@ -11,6 +13,7 @@ from derived import program
 import strapgen
 from strapgen.backends import exact
 from strapgen.catalogue import Choice
+from strapgen.support.exceptions import InputTypeError
 
 
 @pytest.mark.parametrize("method", ["rk1", "rk4"])
@@ -38,5 +41,54 @@ def test_double_is_near_the_exact_run(algorithm, rng):
 
 
 def test_only_steps_are_run():
-    with pytest.raises(ValueError, match="error_matrix is no attitude step"):
+    with pytest.raises(ValueError, match="kernel error-matrix is no attitude step"):
         exact.propagate(program(Choice("error-matrix")), np.zeros((1, 2, 3)))
+
+
+def test_the_back_end_is_the_reference_on_every_record(algorithm, rng):
+    """Runs side by side, records and orthonormalization: each state is the rounded one of the run in 40 digits."""
+    increments = rng.normal(scale=0.01, size=(2, 12, 2, 3))
+    backend = strapgen.backend(algorithm, "rk4", backend="exact")
+    states = backend.propagate(increments, 3)
+    for run, history in zip(increments, states, strict=True):
+        whole = exact.propagate(program(Choice(algorithm, "rk4", 2)), run)
+        np.testing.assert_array_equal(history, whole[::3])
+    restored = backend.propagate(increments[0], 1, 12)
+    # The last state is restored before it is rounded: once in 40 digits, not twice in double.
+    assert np.abs(restored[-1] - backend.orthonormalize(states[0, -1])).max() <= 4 * 2.0**-53
+    np.testing.assert_array_equal(restored[:-1:3], states[0, :-1])
+
+
+@pytest.mark.parametrize("backend_name", ["numpy", "exact"])
+def test_what_floating_point_makes_no_number_is_none_in_many_digits(backend_name):
+    """A zero quaternion has no direction: its length divides by zero, and nothing raises."""
+    normalize = strapgen.evaluator("euler-normalize", backend_name)
+    with np.errstate(all="ignore"):
+        states = normalize([[0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 2.0]])
+    assert np.isnan(states[0]).all()
+    np.testing.assert_array_equal(states[1], [0, 0, 0, 1])
+
+
+def test_a_run_that_divides_by_zero_goes_on_as_no_number():
+    backend = strapgen.backend("euler", "rk1", backend="exact")
+    states = backend.propagate(np.zeros((4, 2, 3)), orthonormalize_every=2, initial=np.zeros(4))
+    np.testing.assert_array_equal(states[:2], np.zeros((2, 4)))
+    assert np.isnan(states[2:]).all()
+
+
+def test_no_computer_algebra_where_the_program_is_cached(tmp_path):
+    backend = strapgen.backend("euler", "rk2", backend="exact")
+    backend.matrices(backend.orthonormalize(backend.identity))
+    code = (
+        "import sys; sys.modules['sympy'] = None; import numpy as np, strapgen;"
+        "backend = strapgen.backend('euler', 'rk2', backend='exact');"
+        "backend.matrices(backend.propagate(np.full((3, 2, 3), 0.01), orthonormalize_every=2))"
+    )
+    subprocess.run([sys.executable, "-c", code], cwd=tmp_path, check=True)
+
+
+def test_sources_with_text_are_refused():
+    with pytest.raises(
+        InputTypeError, match="sources of euler-rk4-2 for numpy hold text; a program is needed"
+    ):
+        exact.ExactEvaluator(strapgen.backend("euler").sources)

@@ -14,7 +14,8 @@ import pytest
 
 import strapgen
 from strapgen import catalogue
-from strapgen.backends import BACKENDS, of
+from strapgen.backends import BACKENDS
+from strapgen.backends.two_speed import TwoSpeed
 from strapgen.support.exceptions import InputError
 
 ALGORITHMS = Path(__file__).resolve().parents[1] / "data" / "algorithms"
@@ -61,6 +62,20 @@ def test_a_copy_of_an_evaluator_gives_the_same(name):
     np.testing.assert_array_equal(copied(evaluator)(state), evaluator(state))
 
 
+@pytest.mark.parametrize("name", BACKENDS)
+def test_a_copy_of_an_algorithm_in_two_speeds_runs_bit_for_bit_the_same(name, rng):
+    runner = TwoSpeed("euler", 2, name)
+    copy = copied(runner)
+    assert (copy.name, copy.loops, copy.state) == (runner.name, runner.loops, runner.state)
+    angles, velocities = rng.uniform(-0.02, 0.02, (24, 3)), rng.uniform(-0.1, 0.1, (24, 3))
+    for one, other in zip(
+        copy.run(angles, velocities, fast_cycles=4, slow_cycles=3),
+        runner.run(angles, velocities, fast_cycles=4, slow_cycles=3),
+        strict=True,
+    ):
+        np.testing.assert_array_equal(one, other)
+
+
 def test_a_back_end_that_was_built_by_hand_can_be_copied(increments):
     backend = strapgen.build(strapgen.generate(strapgen.lower(strapgen.derive(FILE)), "numpy"))
     np.testing.assert_array_equal(
@@ -69,7 +84,7 @@ def test_a_back_end_that_was_built_by_hand_can_be_copied(increments):
 
 
 def test_a_copy_refuses_what_the_back_end_refuses(increments):
-    backend = of(catalogue.choose(str(ALGORITHMS / "mrp.py")), "numpy")
+    backend = strapgen.backend(catalogue.choose(str(ALGORITHMS / "mrp.py")))
     with pytest.raises(InputError, match="has nothing to orthonormalize its state with"):
         copied(backend).propagate(increments, 1, 4)
 

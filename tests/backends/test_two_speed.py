@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import shutil
 import subprocess
 from fractions import Fraction
@@ -13,6 +14,8 @@ from scipy.integrate import quad_vec
 from scipy.spatial.transform import Rotation
 
 from strapgen.backends import BACKENDS
+from strapgen.backends.loops import LoopsFromPython, LoopSources
+from strapgen.backends.registry import evaluator_class
 from strapgen.backends.two_speed import TwoSpeed
 from strapgen.ir.fixed_settings import Settings
 from strapgen.library.two_speed_sources import ALGORITHMS, SCULLING, loops, sources
@@ -145,6 +148,7 @@ def test_back_ends_agree(algorithm, sculling, backend_name, rng):
     attitude, velocity = {
         "numpy": (0, 0),
         "c": (0, 1e-15),
+        "exact": (1e-15, 1e-15),
         "c-float": (4e-6, 4e-6),
         "c-q31": (2e-8, 1e-6),
         "fixed-model": (2e-8, 1e-6),
@@ -167,8 +171,8 @@ def test_the_whole_is_its_loops_bit_for_bit(backend, carry, rng):
     runner = made("euler", 2, backend, carry)
     angles, velocities, turns = noisy(48, rng)
     whole = runner.run(angles, velocities, fast_cycles=4, slow_cycles=3, turns=turns)
-    single = TwoSpeed.__new__(TwoSpeed)
-    single.__dict__ = runner.__dict__ | {"_whole": None}
+    single = pickle.loads(pickle.dumps(runner))
+    single._runner = LoopsFromPython(LoopSources(runner.loops), evaluator_class(runner.loops[0].target))
     parts = single.run(angles, velocities, fast_cycles=4, slow_cycles=3, turns=turns)
     for one, other in zip(whole, parts, strict=True):
         np.testing.assert_array_equal(one, other)
@@ -267,7 +271,7 @@ def test_what_does_not_fit_is_told(given, said):
 
 
 def test_no_samples_make_no_cycles():
-    for name in ("numpy", "c", "c-q31"):
+    for name in BACKENDS:
         run = made("dcm", 2, name).run(np.zeros((0, 3)), np.zeros((0, 3)), fast_cycles=2)
         assert run.attitudes.shape == (0, 3, 3) and run.velocity_changes.shape == (0, 3)
 
@@ -308,7 +312,8 @@ def test_a_run_in_c_goes_on_from_its_memory(rng):
     angles, velocities, turns = noisy(48, rng)
     runner = made("dcm", 2, "c")
     wanted = runner.run(angles, velocities, fast_cycles=4, slow_cycles=3, turns=turns)
-    ffi, lib = runner._whole.ffi, runner._whole.lib
+    module = compiler.load(sources("dcm", 2, "c"))
+    ffi, lib = module.ffi, module.lib
     memory = ffi.new("dcm_two_speed_2_memory *")
     pointer = lambda array: ffi.from_buffer("double[]", np.ascontiguousarray(array))  # noqa: E731
     lib.dcm_two_speed_2_begin(memory, pointer(np.eye(3)))
@@ -387,6 +392,8 @@ def test_what_is_handed_on_has_the_range_of_what_it_was(name, partner):
 
 
 def test_a_refusal_names_the_loop(backend_name):
+    if BACKENDS[backend_name].many_digits:  # its numbers have no largest one
+        return
     if BACKENDS[backend_name].target not in FIXED:
         with pytest.raises(InputError, match="does not stay finite"):
             made("dcm", 2, backend_name).run(

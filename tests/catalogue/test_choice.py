@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import pickle
 import shlex
+import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -15,17 +17,33 @@ from strapgen import catalogue, vibration
 from strapgen.analysis.constant_rate import constant_rate
 from strapgen.analysis.prediction import predict
 from strapgen.analysis.series import series
-from strapgen.backends import of
+from strapgen.backends import backend
+from strapgen.catalogue.methods import tableaux
 from strapgen.cli import main
 from strapgen.experiments import conformance
-from strapgen.experiments.comparison import compare_choice
+from strapgen.experiments.comparison import compare
 from strapgen.experiments.convergence import converge
+from strapgen.library import generated_sources
 from strapgen.simulation.motions import GENERAL
 from strapgen.support.exceptions import InputError
+from strapgen.symbolic.kernel import Kernel
 
 #: A file whose kernel has one name, whatever its options are: Euler parameters by a tableau.
 FILE = str(Path(__file__).resolve().parents[1] / "data" / "algorithms" / "one_name.py")
 METHODS = ("rk1", "rk3")
+#: A file whose step puts a number, or an element of the state, in the first place of its matrix.
+NAMED_PI = """
+import sympy as sp
+from strapgen import Companions, KernelBuilder, Signal, increments_signal
+
+def algorithm():
+    build = KernelBuilder()
+    state = build.input(Signal("state", (3, 3), ("pi", *(f"C_{{k}}" for k in range(2, 10)))))
+    build.input(increments_signal(2))
+    build.output(Signal.matrix("next", "next"), [{number}, *list(state)[1:]])
+    step = Companions(None, None, None, (1, 0, 0, 0, 1, 0, 0, 0, 1))
+    return build.kernel("named-pi", "A matrix", "none", companions=step)
+"""
 
 
 @pytest.fixture
@@ -65,7 +83,7 @@ def test_each_runs_as_its_own_method(chosen, rng):
     for name in ("numpy", "c"):
         for method, choice in chosen.items():
             wanted = strapgen.backend("euler", method, backend=name).propagate(d)
-            np.testing.assert_array_equal(of(choice, name).propagate(d), wanted)
+            np.testing.assert_array_equal(backend(choice, backend=name).propagate(d), wanted)
 
 
 def test_each_has_the_companions_that_it_brings(chosen, rng):
@@ -76,12 +94,12 @@ def test_each_has_the_companions_that_it_brings(chosen, rng):
         np.testing.assert_array_equal(mend(state), strapgen.evaluator(scheme)(state))
         for name in ("numpy", "c", "c-q31"):
             wanted = strapgen.backend("euler", method, backend=name, orthonormalization=scheme)
-            backend = of(chosen[method], name, orthonormalization="mend")
-            np.testing.assert_array_equal(backend.propagate(d, 1, 5), wanted.propagate(d, 1, 5))
+            mended = backend(chosen[method], backend=name, orthonormalization="mend")
+            np.testing.assert_array_equal(mended.propagate(d, 1, 5), wanted.propagate(d, 1, 5))
     with pytest.raises(
         InputError, match=r"orthonormalization 'euler-normalize' is not known; allowed: mend$"
     ):
-        of(chosen["rk1"], orthonormalization="euler-normalize")
+        backend(chosen["rk1"], orthonormalization="euler-normalize")
 
 
 def test_an_evaluator_takes_a_choice_of_a_user_s_kernel(chosen, rng):
@@ -131,8 +149,8 @@ def test_each_has_its_own_analysis(chosen):
 def test_each_is_compared_and_checked_for_itself(chosen, rng):
     d = rng.normal(scale=0.02, size=(20, 2, 3))
     for method, choice in chosen.items():
-        (row,) = compare_choice(choice, ["numpy"], d, reference="exact")
-        (wanted,) = compare_choice(catalogue.choose("euler", method), ["numpy"], d, reference="exact")
+        (row,) = compare(choice, backends=["numpy"], increments=d, reference="exact")
+        (wanted,) = compare("euler", method, None, ["numpy"], d, reference="exact")
         assert (row.max_abs_rad, row.drift_deg) == (wanted.max_abs_rad, wanted.drift_deg)
     findings = {finding.name: finding for finding in conformance.check(chosen["rk3"])}
     assert findings["order"].measured == pytest.approx(3, abs=0.15)
@@ -159,8 +177,57 @@ def test_an_algorithm_is_held_against_itself_by_another_method(says):
     assert users["first_terms"] != users["second_terms"]
 
 
+def test_a_number_and_an_input_of_its_name_are_two_formulas(tmp_path):
+    """Both print as ``pi``: the number, and an element of the state of this name."""
+    identities, values = set(), set()
+    for number in ("sp.pi", "sp.Symbol('pi', real=True)"):
+        (tmp_path / "pi.py").write_text(NAMED_PI.format(number=number))
+        choice = catalogue.choose(str(tmp_path / "pi.py"))
+        identities.add(choice.identity)
+        values.add(float(of(choice).propagate(np.full((1, 2, 3), 0.5))[-1][0, 0]))
+    assert len(identities) == len(values) == 2
+
+
+def test_the_same_tableau_in_two_files_is_generated_by_two_commands(tmp_path):
+    head = 'name = "Heun 2"\nsource = "test"\norder = 2\n'
+    text = f'{head}nodes = ["0", "1"]\nmatrix = [[], ["1"]]\nweights = ["1/2", "1/2"]\n'
+    files = [tmp_path / "a" / "heun.toml", tmp_path / "b" / "heun.toml"]
+    for file in files:
+        file.parent.mkdir()
+        file.write_text(text)
+        choice = catalogue.choose("euler", tableaux.read(file), 1)
+        (code,) = generated_sources.sources(choice, "numpy").files.values()
+        assert f"--tableau {file} " in " ".join(code.split())
+
+
 def test_two_kernels_of_one_step_need_two_names(tmp_path):
     text = Path(FILE).read_text()
     (tmp_path / "twice.py").write_text(text.replace('name="matrix-from-mine"),', 'name="mend"),'))
     with pytest.raises(InputError, match="kernel mine: two of its kernels are called mend; every one needs"):
         catalogue.choose(str(tmp_path / "twice.py"))
+
+
+def held(value: object, depth: int = 3) -> Iterator[str]:
+    """Yield the names of users' kernels that a container holds, at any of a few depths."""
+    if isinstance(value, Kernel):
+        yield value.name
+    elif depth and isinstance(value, dict):
+        for entry in value.values():
+            yield from held(entry, depth - 1)
+    elif depth and isinstance(value, list | set | tuple):
+        for entry in value:
+            yield from held(entry, depth - 1)
+
+
+def test_no_module_of_the_package_holds_a_user_s_kernel(chosen):
+    for choice in chosen.values():
+        strapgen.simulate(backend(choice), strapgen.motion("constant", x_rad_s=1), "0.01", "0.02")
+    holding = [
+        f"{name}.{attribute}"
+        for name, module in list(sys.modules.items())
+        if name.partition(".")[0] == "strapgen"
+        for attribute, value in vars(module).items()
+        if "mine" in held(value)
+    ]
+    assert holding == []
+    assert list(held({"a": [catalogue.derive(chosen["rk1"])]})) == ["mine"], "the check would see one"

@@ -9,13 +9,14 @@ import math
 
 import numpy as np
 import pytest
+from gathering import each
 
 import strapgen
 from strapgen.backends import BACKENDS
 from strapgen.experiments import comparison
 from strapgen.ir.fixed_settings import Settings
 from strapgen.reports.comparison import comparison_csv, comparison_json, comparison_text
-from strapgen.support.exceptions import InputError
+from strapgen.support.exceptions import InputError, InputTypeError
 
 FIXED_NAMES = ("c-q31", "c-q15", "fixed-model")
 
@@ -34,7 +35,7 @@ def test_every_back_end_against_every_kind_of_reference(algorithm, reference, in
     for row in rows:
         assert 0 <= row.rms_rad <= row.max_abs_rad
         assert row.ns_per_step > 0
-        assert (row.bytes is None) == (row.backend in ("numpy", "fixed-model"))
+        assert (row.bytes is None) == (row.backend in ("numpy", "fixed-model", "exact"))
         assert (row.bound_rad is None) == (row.backend not in FIXED_NAMES)
         assert row.drift_deg <= math.degrees(row.max_abs_rad) * math.sqrt(3) * (1 + 1e-9)
         if row.backend == reference:
@@ -47,6 +48,8 @@ def test_every_back_end_against_every_kind_of_reference(algorithm, reference, in
     if reference == "exact":
         # Doubles round at 2**-53, singles at 2**-24.
         assert by_name["c"].max_abs_rad < 1e-13 < by_name["c-float"].max_abs_rad
+    if reference == "numpy":
+        assert 0 < by_name["exact"].max_abs_rad < 1e-13
 
 
 @pytest.mark.parametrize("carry", ["none", "state", "full"])
@@ -104,3 +107,33 @@ def test_the_three_forms_say_the_same(increments):
         assert cells["multiply"] == str(plain["operations"]["multiply"])
     text = comparison_text(rows, "title", "numpy", "drift")
     assert text.splitlines()[-1].startswith("c-q15") and f"{rows[1].bound_rad:.3g}" in text
+
+
+def test_a_choice_is_compared_like_its_name(increments):
+    by_name = comparison.compare("euler", "rk2", 2, ["numpy", "c-q31"], increments, reference="exact")
+    choice = strapgen.choose("euler", "rk2", 2)
+    by_choice = comparison.compare(
+        choice, backends=["numpy", "c-q31"], increments=increments, reference="exact"
+    )
+    for one, other in zip(by_name, by_choice, strict=True):
+        assert one.as_dict() | {"ns_per_step": 0} == other.as_dict() | {"ns_per_step": 0}
+
+
+@each(
+    ("options", "error", "said"),
+    [
+        ({"increments": None}, InputTypeError, "increments is None"),
+        ({"method": "rk4"}, InputError, "method is 'rk4', but the choice of euler-rk2-2 has its own"),
+        ({"samples": 2}, InputError, "increments is 2, but the choice of euler-rk2-2 has its own"),
+    ],
+)
+def test_what_does_not_go_with_a_choice_is_told(options, error, said):
+    with pytest.raises(error, match=said):
+        comparison.compare(
+            strapgen.choose("euler", "rk2", 2), **({"increments": np.zeros((2, 2, 3))} | options)
+        )
+
+
+def test_slow_back_ends_are_compared_where_they_are_named():
+    rows = comparison.compare("euler", "rk1", 1, increments=np.full((2, 1, 3), 0.01))
+    assert [row.backend for row in rows] == [name for name, entry in BACKENDS.items() if not entry.slow]

@@ -24,6 +24,12 @@ REPRODUCED = {
 BASE_DEG = {1: 0.2855, 2: 0.856, 4: 6.251e-2, 5: 1.026}
 ORDERS = (1, 2, 4)
 
+#: Back ends of the quick tests; a table takes arithmetic of 40 digits a quarter of a minute.
+LONG_RUNS = [
+    pytest.param(name, marks=pytest.mark.long) if entry.slow or name in ("c-float", "c-q15") else name
+    for name, entry in BACKENDS.items()
+]
+
 # Two figures stand nearer to the round-off of double precision than the rest.
 LOOSER = {(4, "dcm", 4): 0.03, (4, "euler", 4): 0.15, (1, "dcm", 4): 0.03, (1, "euler", 4): 0.03}
 
@@ -44,6 +50,7 @@ def certify(table, rows, backend_name):
             assert not row.roundoff_dominates and row.agrees
 
 
+@pytest.mark.parametrize("backend_name", LONG_RUNS, indirect=True)
 @pytest.mark.parametrize("table", TABLES, ids=lambda table: f"table-{table.number}")
 def test_tables(table, backend_name, make):
     rows = list(entries(table, backend_name))
@@ -67,6 +74,7 @@ def test_tables(table, backend_name, make):
         assert rows[0].drift_deg == pytest.approx(BASE_DEG[table.number], rel=0.001)
 
 
+@pytest.mark.parametrize("backend_name", LONG_RUNS, indirect=True)
 def test_the_contradiction_of_table_2_is_told(backend_name):
     noted = [row for row in entries(TABLES[1], backend_name) if "2.391" in (row.note or "")]
     assert [(row.algorithm, row.order) for row in noted] == [("dcm", 1)]

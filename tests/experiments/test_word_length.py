@@ -74,9 +74,9 @@ def test_forms(outcomes):
 
 def test_image(outcomes):
     pytest.importorskip("matplotlib")
-    assert plots.study_image(outcomes, "study.png").startswith(b"\x89PNG")
+    assert plots.word_length_image(outcomes, "study.png").startswith(b"\x89PNG")
     with pytest.raises(InputError, match="file type 'xyz'"):
-        plots.study_image(outcomes, "study.xyz")
+        plots.word_length_image(outcomes, "study.xyz")
 
 
 @pytest.mark.parametrize(

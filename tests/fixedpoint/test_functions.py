@@ -16,6 +16,7 @@ from gathering import each
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from strapgen import generate
 from strapgen.backends.fixed import CFixedEvaluator, FixedEvaluator, ModelEvaluator
 from strapgen.fixedpoint import can_lower, function_series, quantize
 from strapgen.ir.fixed_settings import Settings
@@ -464,7 +465,7 @@ def sources(name: str, word: int) -> Any:
         return emit(fixed(name, word), "c-fixed")
     if name in MOTIONS:
         return emit(motion(name, word), "c-fixed")
-    return emit(programs()[name], "c-fixed", Settings(word=word))
+    return generate(programs()[name], "c-fixed", Settings(word=word))
 
 
 @pytest.mark.long

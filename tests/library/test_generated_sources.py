@@ -6,7 +6,7 @@ import subprocess
 import sys
 
 import strapgen
-from strapgen import catalogue
+from strapgen import catalogue, pipeline
 from strapgen.library import generated_sources
 from strapgen.support import cache
 
@@ -57,7 +57,7 @@ def test_another_target_and_other_settings_derive_nothing_again(monkeypatch, tmp
     def never(_choice):
         raise AssertionError("derived again")
 
-    monkeypatch.setattr(generated_sources, "derive", never)
+    monkeypatch.setattr(pipeline, "derive", never)
     settings = strapgen.Settings(16)
     assert generated_sources.sources(choice, "c-fixed", settings) == strapgen.generate(
         wanted, "c-fixed", settings

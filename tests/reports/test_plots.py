@@ -11,6 +11,7 @@ import strapgen
 from strapgen.experiments.convergence import Convergence, Rung
 from strapgen.ir.attitude_step import Order
 from strapgen.reports import plots
+from strapgen.reports.plots import figures as drawing
 from strapgen.simulation.recording import History
 from strapgen.simulation.runs import Run, simulate
 from strapgen.support.exceptions import InputError, MissingExtraError
@@ -35,7 +36,7 @@ def figures(monkeypatch: pytest.MonkeyPatch) -> list:
         saved.append(figure)
         return b""
 
-    monkeypatch.setattr(plots, "_image", keep)
+    monkeypatch.setattr(drawing, "image", keep)
     return saved
 
 

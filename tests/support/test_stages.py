@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 import strapgen
 from strapgen.backends import exact
 from strapgen.simulation import recording
+from strapgen.support import stages
 from strapgen.support.exceptions import InputTypeError
 
 
@@ -21,6 +23,7 @@ def arguments() -> dict[str, object]:
     sources = strapgen.generate(program, "numpy")
     return {
         "name": "euler",
+        "choice": strapgen.choose("euler-product"),
         "kernel": kernel,
         "program": program,
         "fixed": strapgen.quantize(program),
@@ -41,6 +44,8 @@ STAGES = {
     "generate": lambda value: strapgen.generate(value, "c"),
     "generate in fixed point": lambda value: strapgen.generate(value, "c-fixed"),
     "build": lambda value: strapgen.build(value),
+    "backend": lambda value: strapgen.backend(value),
+    "evaluator": lambda value: strapgen.evaluator(value),
     "simulate": lambda value: strapgen.simulate(value, arguments()["motion"], 1, 1),
     "simulate along": lambda value: strapgen.simulate(arguments()["backend"], value, 1, 1),
     "recording": lambda value: recording.propagate(value, None),
@@ -52,12 +57,14 @@ STAGES = {
 
 #: What each stage takes; everything else is a wrong pairing.
 TAKEN = {
-    "derive": {"name"},
+    "derive": {"name", "choice"},
     "lower": {"kernel"},
     "quantize": {"program"},
     "generate": {"program", "fixed"},
     "generate in fixed point": {"program", "fixed"},
     "build": {"sources"},
+    "backend": {"name"},
+    "evaluator": {"name", "choice"},
     "simulate": {"backend"},
     "simulate along": {"motion"},
     "recording": {"backend"},
@@ -72,8 +79,8 @@ SAID = {
     ("lower", "program"): "lower takes a Kernel, not a Program; strapgen.generate takes it",
     ("lower", "none"): "lower takes a Kernel, not None; strapgen.derive makes one",
     ("lower", "array"): "lower takes a Kernel, not an ndarray; strapgen.derive makes one",
-    ("derive", "kernel"): "derive takes a name or a path, not a Kernel; strapgen.lower takes it",
-    ("derive", "number"): "derive takes a name or a path, not 3; strapgen list shows the names",
+    ("derive", "kernel"): "derive takes a name or a path or a Choice, not a Kernel; strapgen.lower takes it",
+    ("derive", "number"): "derive takes a name or a path or a Choice, not 3; strapgen list shows the names",
     ("quantize", "kernel"): "quantize takes a Program, not a Kernel; strapgen.lower(kernel) makes one",
     ("quantize", "fixed"): "quantize takes a Program, not a FixedProgram; strapgen.generate takes it",
     (
@@ -86,6 +93,10 @@ SAID = {
         "generate",
         "sources",
     ): "generate takes a Program or a FixedProgram, not Sources; strapgen.build takes them",
+    ("lower", "choice"): "lower takes a Kernel, not a Choice; strapgen.derive(choice) makes one",
+    ("backend", "sources"): "backend takes a name or a path, not Sources; strapgen.build takes them",
+    ("backend", "motion"): "backend takes a name or a path, not a Motion; strapgen.simulate takes it",
+    ("evaluator", "program"): "evaluator takes a name or a Choice, not a Program; strapgen.generate takes it",
     ("build", "program"): "build takes Sources, not a Program; strapgen.generate(program, target) makes them",
     ("build", "kernel"): "build takes Sources, not a Kernel; "
     "strapgen.generate(strapgen.lower(kernel), target) makes them",
@@ -119,8 +130,28 @@ def test_every_wrong_pairing_of_stages_is_told_in_one_line():
     assert {pair: said[pair] for pair in SAID} == SAID
 
 
+def test_messages_name_calls_that_exist():
+    tables = (stages._NEXT, stages._NAMED, stages._MAKERS, stages._TAKERS)
+    names = [
+        found for pair in re.findall(r"strapgen\.(\w+)|'(\w+)\(", str(tables)) for found in pair if found
+    ]
+    assert {"derive", "lower", "generate", "build", "backend", "motion", "choose", "Settings"} <= set(names)
+    assert not set(names) - set(dir(strapgen))
+    classes = [*stages._NEXT, *stages._MAKERS, *stages._TAKERS, *(made for _, made in stages._NEXT.values())]
+    assert not {name for name in classes if name != "str"} - set(dir(strapgen))
+
+
 def test_what_is_taken_is_not_refused():
-    for stage in ("lower", "quantize", "generate in fixed point", "build", "simulate", "exact", "settings"):
+    for stage in (
+        "derive",
+        "lower",
+        "quantize",
+        "generate in fixed point",
+        "build",
+        "simulate",
+        "exact",
+        "settings",
+    ):
         for argument in TAKEN[stage]:
             STAGES[stage](arguments()[argument])
 

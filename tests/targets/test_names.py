@@ -129,7 +129,9 @@ def printed_names() -> list[str]:
     """Return every name that stands in the code of a step with harmless names, of the code around it and of its own."""
     found: set[str] = set()
     for target in targets.TARGETS:
-        texts = targets.emit(REFERENCE, target, FIXED if target in targets.FIXED else None).files.values()
+        texts = strapgen.generate(
+            REFERENCE, target, FIXED if target in targets.FIXED else None
+        ).files.values()
         language = names.PYTHON if target in ("numpy", "fixed-model") else names.C
         found = found.union(*language.scopes(texts))
     return sorted(name for name in found if name.isidentifier())
@@ -203,11 +205,11 @@ def library(folder: Path, several: list[Sources]) -> tuple[cffi.FFI, object]:
 def check_python(kernel: Kernel) -> np.ndarray:
     """Check the Python targets, and return the run of the integer model."""
     program = strapgen.lower(kernel)
-    sources = targets.emit(program, "numpy")
+    sources = strapgen.generate(program, "numpy")
     function = getattr(module(sources), sources.function.name)
     np.testing.assert_allclose(function(EXPECTED[:-1], INCREMENTS[:, None]), EXPECTED[1:], rtol=0, atol=1e-14)
     fixed = quantize(program, FIXED)
-    model = targets.emit(fixed, "fixed-model")
+    model = strapgen.generate(fixed, "fixed-model")
     function = getattr(module(model), model.function.name)
     state, increments = model.fixed.inputs
     now = [round(x / float(state.format.unit)) for x in START]
@@ -223,8 +225,8 @@ def check_python(kernel: Kernel) -> np.ndarray:
 
 def check_c(folder: Path, kernels: list[Kernel], models: list[np.ndarray]) -> None:
     """Check that the C targets compile together and that their loops compute the run."""
-    sources = [targets.emit(strapgen.lower(k), target) for k in kernels for target in ("c", "c-float")]
-    fixed = [targets.emit(quantize(strapgen.lower(k), FIXED), "c-fixed") for k in kernels]
+    sources = [strapgen.generate(strapgen.lower(k), target) for k in kernels for target in ("c", "c-float")]
+    fixed = [strapgen.generate(quantize(strapgen.lower(k), FIXED), "c-fixed") for k in kernels]
     ffi, lib = library(folder, sources + fixed)
     for made in sources:
         kind, most = {"c": (np.float64, 1e-14), "c-float": (np.float32, 1e-6)}[made.target]
@@ -347,7 +349,7 @@ def test_names_that_are_free_stay_as_they_are():
     ]
     elements = tuple("abcdefghilmnopqr")
     for target in ("c", "numpy"):
-        sources = targets.emit(strapgen.lower(step(HARMLESS._replace(elements=elements))), target)
+        sources = strapgen.generate(strapgen.lower(step(HARMLESS._replace(elements=elements))), target)
         text = "".join(sources.files.values())
         assert all(re.search(rf"^ *(const double )?{name} = ", text, re.MULTILINE) for name in elements[:4])
         assert sources.function.name == "harmless"
@@ -358,7 +360,7 @@ def test_names_that_would_become_the_same_are_kept_apart():
     elements = (*chosen, *HARMLESS.elements[len(chosen) :])
     kernel = step(HARMLESS._replace(elements=elements))
     check_python(kernel)
-    sources = targets.emit(strapgen.lower(kernel), "c")
+    sources = strapgen.generate(strapgen.lower(kernel), "c")
     text = sources.files["harmless.c"]
     assert all(
         f"const double {name} = " in text for name in ("int_v3", "int_", "k_v2", "k_", "double_v2", "double_")
@@ -369,14 +371,14 @@ def test_the_interface_keeps_the_names_of_the_kernel():
     called = HARMLESS._replace(elements=(*"kqjp", "i", "count", "out", "batch", "x", "status", *"abcdef"))
     for target in targets.TARGETS:
         settings_ = FIXED if target in targets.FIXED else None
-        sources = targets.emit(strapgen.lower(step(called)), target, settings_)
+        sources = strapgen.generate(strapgen.lower(step(called)), target, settings_)
         inputs = sources.interface()["function"]["inputs"]
         assert [signal["elements"] for signal in inputs] == [("i", "count", "out"), ("batch", "x", "status")]
 
 
 def test_the_model_speaks_of_the_names_of_the_kernel():
     called = HARMLESS._replace(kernel="for", stage="k", elements=("if", *HARMLESS.elements[1:]))
-    model = targets.emit(strapgen.lower(step(called)), "fixed-model", FIXED)
+    model = strapgen.generate(strapgen.lower(step(called)), "fixed-model", FIXED)
     assert '"if"' in "".join(model.files.values())
 
 
@@ -412,7 +414,7 @@ def test_names_of_common_subexpressions_are_free_for_elements():
 def test_a_function_is_found_in_its_module_whatever_the_process_has():
     # No standard knows this function; the library of this process may.
     kernel = step(HARMLESS._replace(kernel="gnu-get-libc-version"))
-    sources = targets.emit(strapgen.lower(kernel), "c")
+    sources = strapgen.generate(strapgen.lower(kernel), "c")
     module = compiler.load(sources)
     result = module.ffi.new("double[3]")
     getattr(module.lib, sources.function.name)(list(START), list(INCREMENTS[0]), result)

@@ -157,7 +157,7 @@ def simulated(choice, periods, steps, step, theta, phase):
     else:
         rows, count, previous = oscillation(choice, frequency, step, steps, theta, phase)
         samples = windows(np.array(rows), count, previous)
-    ready = backends.of(choice, "numpy")
+    ready = backends.backend(choice)
     end = attitude(ready, ready.propagate(samples)[-1:])[0]
     return math.atan2(end[1, 0] - end[0, 1], end[0, 0] + end[1, 1]) / (steps * step)
 

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +14,8 @@ from numpy.typing import NDArray
 
 from strapgen.analysis import motion_rates, one_step
 from strapgen.analysis.constant_rate import ANGLE, ConstantRate, constant_rate
-from strapgen.analysis.invariants import scalar, scalar_as_text, scalar_value
+from strapgen.analysis.invariants import scalar, scalar_value
+from strapgen.analysis.notation import scalar_text
 from strapgen.analysis.one_step import Step
 from strapgen.analysis.series import MOST_TERMS, MOTIONS, STEP
 from strapgen.catalogue import Choice
@@ -57,7 +57,7 @@ class Growth:
                 data[name] = sp.sstr(sp.Add(*(x * STEP**p for p, x in terms.items())), order="lex")
         if self.invariant:
             data["invariant"] = {
-                name: {str(power): scalar_as_text(one) for power, one in rows.items()}
+                name: {str(power): scalar_text(one) for power, one in rows.items()}
                 for name, rows in self.invariant.items()
             }
         return data
@@ -268,17 +268,3 @@ def stability(choice: Choice) -> Stability:
     """
     closed_form = constant_rate(choice)
     return Stability(closed_form.kernel, closed_form.stretch_squared, contraction(closed_form))
-
-
-def intervals_text(found: Sequence[tuple[float, float | None]] | None) -> str:
-    """Return intervals as text.
-
-    Examples
-    --------
-    >>> intervals_text([(0.0, 2.8284271)]), intervals_text([]), intervals_text(None)
-    ('0 to 2.828', 'nowhere', 'kept')
-    """
-    if found is None:
-        return "kept"
-    parts = [f"{low:.4g} up" if high is None else f"{low:.4g} to {high:.4g}" for low, high in found]
-    return ", ".join(parts) or "nowhere"

@@ -12,7 +12,7 @@ from typing import Any
 
 import sympy as sp
 
-from strapgen import catalogue
+from strapgen import catalogue, pipeline
 from strapgen.catalogue import Choice
 from strapgen.catalogue.methods.coefficients import Number
 from strapgen.support.exceptions import InputError, InputTypeError
@@ -83,7 +83,7 @@ def step(choice: Choice) -> Step:
     """
     if not isinstance(choice, Choice):
         raise InputTypeError(f"choice is {choice!r}; what catalogue.choose returns is needed")
-    kernel = catalogue.derive(choice)
+    kernel = pipeline.derive(choice)
     if kernel.companions is None:
         raise InputError(f"kernel {kernel.name} is no attitude step")
     nodes = None if kernel.inputs[1].name == "increments" else catalogue.nodes(choice)
@@ -200,7 +200,7 @@ def split(error: Sequence[Any]) -> dict[str, list[Any]]:
 
 
 def _error_matrix() -> Kernel:
-    return catalogue.derive(catalogue.choose("error-matrix"))
+    return pipeline.derive("error-matrix")
 
 
 def computed_state(attitude_step: Step, ring: Any, rate: Rate, top: int) -> list[Powers]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sympy as sp
 
-from strapgen import catalogue
+from strapgen import catalogue, pipeline
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 from strapgen.symbolic.power_series import Powers, outputs
@@ -45,7 +45,7 @@ def effect(scheme: str, order: int = 2) -> dict[int, sp.Matrix]:
     """
     checks.choice("scheme", scheme, catalogue.orthonormalizations("dcm"))
     checks.count("order", order, largest=4)
-    kernel = catalogue.derive(catalogue.choose(scheme))
+    kernel = pipeline.derive(scheme)
     ring, *elements = sp.ring([str(symbol) for symbol in ERROR], sp.QQ)
 
     (computed,) = kernel.inputs

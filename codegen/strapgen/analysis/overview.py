@@ -9,12 +9,12 @@ from typing import Any
 
 import sympy as sp
 
-from strapgen import catalogue
+from strapgen import catalogue, pipeline
 from strapgen.analysis.accumulation import accumulate
 from strapgen.analysis.constant_rate import constant_rate
-from strapgen.analysis.growth import contraction, intervals_text
-from strapgen.analysis.invariants import as_text
+from strapgen.analysis.growth import contraction
 from strapgen.analysis.motion_rates import is_plain, parameters
+from strapgen.analysis.notation import covariant_text, intervals_text
 from strapgen.analysis.series import series
 from strapgen.catalogue import Choice
 from strapgen.catalogue.methods.tableaux import TABLEAUX
@@ -26,8 +26,6 @@ _HIGHEST_TAYLOR = 8
 CONING_DEG_S, STEP_S = 10.0, 0.125
 #: Operations per second at equal work: those of the fourth-order step of Euler parameters at `STEP_S`.
 WORK = 544.0
-#: Most terms of a vector that a table shows.
-_SHORT = 3
 
 
 @dataclass(frozen=True)
@@ -172,7 +170,7 @@ def overview(chosen: Iterable[Choice]) -> Iterator[OverviewRow]:
 
 
 def _row(choice: Choice) -> OverviewRow:
-    kernel = catalogue.derive(choice)
+    kernel = pipeline.derive(choice)
     general = series(choice, "general", 1)
     fixed = constant_rate(choice)
     lost = fixed.series(1)
@@ -191,7 +189,7 @@ def _row(choice: Choice) -> OverviewRow:
         None if constant_power is None else lost[constant_power],
         coning_power,
         None if coning is None else _along(coning, a),
-        "0" if drift is None else as_text(general.invariant[drift].drift),
+        "0" if drift is None else covariant_text(general.invariant[drift].drift),
         intervals_text(contraction(fixed)),
     )
 

@@ -10,7 +10,7 @@ from typing import Any
 import mpmath
 import sympy as sp
 
-from strapgen import catalogue
+from strapgen import pipeline
 from strapgen.analysis.accumulation import antiderivative
 from strapgen.analysis.error_rate import ErrorRate, error_rate
 from strapgen.analysis.motion_rates import TIME, parameters
@@ -247,7 +247,7 @@ def _about_an_axis(rates: ErrorRate, settings: list[Any], h: Any) -> Transfer:
 
 def _orthonormalization(choice: Choice) -> Callable[[Matrix], Matrix]:
     """Return the function that orthonormalizes a computed matrix, by the scheme of the algorithm."""
-    kernel = catalogue.derive(choice)
+    kernel = pipeline.derive(choice)
     step_kernels = kernel.companions
     assert step_kernels is not None, "checked by error_rate"
     if step_kernels.orthonormalize is None:

@@ -17,7 +17,7 @@ from strapgen.catalogue import Choice
 from strapgen.support import checks
 
 #: The angle of a step at a constant rate, |w| h.
-_ANGLE = sp.Symbol("x")
+STEP_ANGLE = sp.Symbol("x")
 #: Most terms of a quotient that is reduced and factored.
 _LONG = 100
 #: Coefficients of a drift by power of the step or of the angle; each is a vector, or one number in a tuple.
@@ -67,13 +67,14 @@ class Ratio:
             "motion": self.motion,
             "quantity": self.quantity,
             "symbol": self.symbol.name,
-            "first_terms": [_sum(row, self.symbol) for row in _columns(self.terms[0])],
-            "second_terms": [_sum(row, self.symbol) for row in _columns(self.terms[1])],
+            "first_terms": [_sum(row, self.symbol) for row in columns(self.terms[0])],
+            "second_terms": [_sum(row, self.symbol) for row in columns(self.terms[1])],
             "ratio": None if self.ratio is None else _sum(self.ratio, self.symbol),
         }
 
 
-def _columns(terms: Terms) -> list[dict[int, sp.Expr]]:
+def columns(terms: Terms) -> list[dict[int, sp.Expr]]:
+    """Return the coefficients of each element by power: one dict for a number, three for a vector."""
     length = max((len(row) for row in terms.values()), default=1)
     return [{power: row[k] for power, row in terms.items()} for k in range(length)]
 
@@ -111,12 +112,12 @@ def versus(first: Choice, second: Choice, motion: str = "general", terms: int = 
     {0: 1/4, 2: 9/80}
     """
     checks.choice("motion", motion, MOTIONS)
-    kernels = [catalogue.derive(choice).name for choice in (first, second)]
+    kernels = [choice.kernel for choice in (first, second)]
     one: Terms
     other: Terms
     if motion == "constant":
         one, other = ({p: (x,) for p, x in constant_rate(c).series(terms).items()} for c in (first, second))
-        quantity, symbol = "angle lost in a step, rad", _ANGLE
+        quantity, symbol = "angle lost in a step, rad", STEP_ANGLE
     elif motion == "general":
         one, other = (series(c, motion, terms).drift for c in (first, second))
         quantity, symbol = "drift of a step, rad", STEP
@@ -224,7 +225,7 @@ class Claim:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the claim as plain JSON data."""
-        return {"statement": self.statement, "ratio": _sum(self.ratio, _ANGLE)}
+        return {"statement": self.statement, "ratio": _sum(self.ratio, STEP_ANGLE)}
 
 
 def claims() -> list[Claim]:

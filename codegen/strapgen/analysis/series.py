@@ -14,7 +14,8 @@ import sympy as sp
 
 from strapgen import catalogue
 from strapgen.analysis import motion_rates, one_step
-from strapgen.analysis.invariants import Invariants, as_text, invariants, matrix
+from strapgen.analysis.invariants import Invariants, invariants, matrix
+from strapgen.analysis.notation import covariant_text
 from strapgen.analysis.one_step import Step, errors
 from strapgen.catalogue import Choice
 from strapgen.support import checks
@@ -82,8 +83,8 @@ class ErrorSeries:
         if self.motion == "general":
             data["invariant"] = {
                 str(power): {
-                    "drift": as_text(one.drift),
-                    "scale_and_skew": as_text(one.symmetric, symmetric=True),
+                    "drift": covariant_text(one.drift),
+                    "scale_and_skew": covariant_text(one.symmetric, symmetric=True),
                 }
                 for power, one in self.invariant.items()
             }

@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 
 from strapgen import catalogue
-from strapgen.backends.protocol import Backend, Evaluator
-from strapgen.backends.registry import BACKENDS, Entry, classes, of_sources
+from strapgen.backends.evaluators import Evaluator
+from strapgen.backends.kernel_sources import sources_of_choice
+from strapgen.backends.protocol import Backend
+from strapgen.backends.registry import BACKENDS, DEFAULT_BACKENDS, Entry, backend_class, of_sources
 from strapgen.backends.step_sources import StepSources
 from strapgen.catalogue import Choice
 from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
-from strapgen.library import generated_sources
 from strapgen.support import checks, stages
 from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.targets import FIXED
 
 __all__ = [
     "BACKENDS",
+    "DEFAULT_BACKENDS",
     "Backend",
     "Entry",
     "Evaluator",
@@ -26,13 +29,23 @@ __all__ = [
     "build",
     "evaluator",
     "fitted",
-    "of",
     "of_sources",
 ]
 
 
 def fitted(backend: str, settings: Settings | None) -> Settings | None:
-    """Return the settings that a back end runs with: its own word, and defaults where none are given.
+    """Return the settings that a back end runs with, in its own word; where none are stated, the defaults.
+
+    Parameters
+    ----------
+    backend : str
+        A key of `BACKENDS`.
+    settings : Settings or None
+
+    Returns
+    -------
+    Settings or None
+        None in floating point.
 
     Raises
     ------
@@ -61,12 +74,12 @@ def evaluator(kernel: str | Choice, backend: str = "numpy", settings: Settings |
     Parameters
     ----------
     kernel : str or Choice
-        Name of a kernel that takes no method, for instance "dcm-from-euler"; or what `catalogue.choose` returned, a
-        user's algorithm too, and `Choice.companion` for the kernels that it brings.
+        Name of a kernel that takes no method, for instance "dcm-from-euler"; or any choice that `catalogue.choose` or
+        `Choice.companion` returns, of a user's algorithm too.
     backend : str, optional
         A key of `BACKENDS`.
     settings : Settings, optional
-        What fixed point is made for.
+        Settings of fixed point.
 
     Returns
     -------
@@ -86,16 +99,16 @@ def evaluator(kernel: str | Choice, backend: str = "numpy", settings: Settings |
            [ 0., -1.,  0.],
            [ 0.,  0.,  1.]])
     """
+    stages.require("evaluator", kernel, str, Choice)
     checks.choice("backend", backend, BACKENDS)
     if not isinstance(kernel, Choice):
         checks.choice("kernel", kernel, catalogue.KERNELS)
         kernel = catalogue.choose(kernel)
-    chosen = fitted(backend, settings)
-    return of_sources(generated_sources.sources(kernel, BACKENDS[backend].target, chosen))
+    return of_sources(sources_of_choice(kernel, BACKENDS[backend].target, fitted(backend, settings)))
 
 
 def backend(
-    algorithm: str,
+    algorithm: str | Choice,
     method: str | Tableau | None = None,
     increments: int | None = None,
     backend: str = "numpy",
@@ -108,21 +121,22 @@ def backend(
 
     Parameters
     ----------
-    algorithm : str
-        "dcm", "euler" or "cayley-klein"; a Python file, or the entry point of a user's algorithm.
+    algorithm : str or Choice
+        "dcm", "euler" or "cayley-klein"; a Python file, or the entry point of a user's algorithm; or a choice that
+        `catalogue.choose` returns, with which `method`, `increments` and `previous` do not go.
     method : str or Tableau, optional
         A name that ``strapgen list`` shows, or a tableau; by default "rk4".
     increments : int, optional
-        Angle increments a step, 1 to 8; by default 2.
+        Angle increments per step, 1 to 8; by default 2.
     backend : str, optional
         A key of `BACKENDS`.
     orthonormalization : str, optional
         Kernel that orthonormalizes, for instance "dcm-orthonormalize-optimal"; by default the thesis's.
     settings : Settings, optional
-        What fixed point is made for: largest increment, rounding, residuals, and the word of "fixed-model". By default
-        increments of up to 1/8 rad.
+        Settings of fixed point: largest increment, rounding, error feedback, and the word of "fixed-model". By default
+        increments are at most 1/8 rad.
     previous : int, optional
-        Increments before the step that it takes too, 0 to 3; by default 0.
+        Number of increments from before the step that it takes in addition, 0 to 3; by default 0.
 
     Returns
     -------
@@ -139,29 +153,39 @@ def backend(
     --------
     >>> backend("dcm", method="rk2").increments
     2
+    >>> backend(catalogue.choose("dcm", "rk2"), backend="c").name
+    'c'
     """
+    stages.require("backend", algorithm, str, os.PathLike)
     checks.choice("backend", backend, BACKENDS)
-    choice = catalogue.choose_step(algorithm, method, increments, previous=previous)
-    return of(choice, backend, orthonormalization, settings)
-
-
-def of(
-    choice: Choice,
-    backend: str = "numpy",
-    orthonormalization: str | None = None,
-    settings: Settings | None = None,
-) -> Backend:
-    """Return a chosen attitude step as a back end; parameters and errors are those of `backend`."""
-    checks.choice("backend", backend, BACKENDS)
+    choice = chosen_step(algorithm, method, increments, previous)
     if orthonormalization is not None:
         checks.choice("orthonormalization", orthonormalization, choice.orthonormalizations)
-    chosen = fitted(backend, settings)
-    step = generated_sources.sources(choice, BACKENDS[backend].target, chosen)
-    return classes(step.target)[1](StepSources(step, choice, orthonormalization))
+    step = sources_of_choice(choice, BACKENDS[backend].target, fitted(backend, settings))
+    return backend_class(step.target)(StepSources(step, choice, orthonormalization))
+
+
+def chosen_step(
+    algorithm: str | Choice, method: str | Tableau | None, increments: int | None, previous: int = 0
+) -> Choice:
+    """Return the choice of an attitude step from its name and options; a choice is returned as it is.
+
+    Raises
+    ------
+    InputError
+        If a name or number is not allowed, or options go with a choice, which has its own.
+    """
+    if not isinstance(algorithm, Choice):
+        return catalogue.choose_step(algorithm, method, increments, previous=previous)
+    options = {"method": method, "increments": increments, "previous": previous or None}
+    for option, value in options.items():
+        if value is not None:
+            raise InputError(f"{option} is {value!r}, but the choice of {algorithm.kernel} has its own")
+    return algorithm
 
 
 def build(sources: Sources, orthonormalization: str | None = None) -> Backend:
-    """Make a back end of the generated sources of an attitude step; C is compiled, once.
+    """Return the generated sources of an attitude step as a back end; C is compiled, once.
 
     Parameters
     ----------
@@ -176,7 +200,7 @@ def build(sources: Sources, orthonormalization: str | None = None) -> Backend:
     Raises
     ------
     InputError
-        If the sources are of no attitude step.
+        If the sources are not those of an attitude step.
     CompilerError
         If a C compiler is needed and there is none, or it fails.
 
@@ -187,4 +211,4 @@ def build(sources: Sources, orthonormalization: str | None = None) -> Backend:
     'numpy'
     """
     stages.require("build", sources, Sources)
-    return classes(sources.target)[1](StepSources(sources, None, orthonormalization))
+    return backend_class(sources.target)(StepSources(sources, None, orthonormalization))

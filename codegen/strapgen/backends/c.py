@@ -1,4 +1,4 @@
-"""The C back ends: generated C in double and in float, called through cffi. All loops are in C."""
+"""The C back ends: generated C in double and in float, called through cffi, with all loops in C."""
 
 from __future__ import annotations
 
@@ -6,19 +6,21 @@ from typing import Any
 
 import numpy as np
 
-from strapgen.backends.protocol import Array, Backend, Evaluator
+from strapgen.backends.evaluators import Array, Evaluator
+from strapgen.backends.protocol import Backend
 from strapgen.backends.step_sources import StepSources
 from strapgen.ir.sources import Sources
 from strapgen.toolchain import compiler
 
-_TYPES = {"c": ("double", np.float64), "c-float": ("float", np.float32)}
+#: Name of the C type of a target's numbers, and the same type in numpy.
+REAL_TYPES = {"c": ("double", np.float64), "c-float": ("float", np.float32)}
 
 
 class CEvaluator(Evaluator):
     """A generated C function."""
 
     def __init__(self, sources: Sources) -> None:
-        self.real, dtype = _TYPES[sources.target]
+        self.real, dtype = REAL_TYPES[sources.target]
         super().__init__(sources, dtype)
         self.module = compiler.load(sources)
         self._array = getattr(self.module.lib, f"{sources.function.name}_array")
@@ -49,19 +51,19 @@ class CBackend(Backend):
     """Runs generated C."""
 
     def __init__(self, parts: StepSources) -> None:
-        super().__init__(parts)
-        step = self._step
-        assert isinstance(step, CEvaluator)
+        step = CEvaluator(parts.step)
+        super().__init__(parts, step)
         self._module, self._pointer = step.module, step.pointer
         name = self.sources.function.name
         self._generated_propagate = getattr(self._module.lib, f"{name}_propagate")
         self._orthonormalizer = self._module.ffi.NULL
         if self._orthonormalization is not None:
-            orthonormalizer = parts.evaluator(self._orthonormalization)
-            assert isinstance(orthonormalizer, CEvaluator)
-            self._orthonormalizer = self._module.ffi.cast(
-                f"{name}_orthonormalizer", orthonormalizer.address()
-            )
+            address = self.beside(self._orthonormalization).address()
+            self._orthonormalizer = self._module.ffi.cast(f"{name}_orthonormalizer", address)
+
+    def beside(self, kernel: str) -> CEvaluator:
+        """Return another kernel in C, see `Backend.beside`."""
+        return CEvaluator(self._sources(kernel))
 
     def _propagate(
         self, increments: Array, record_every: int, orthonormalize_every: int, initial: Array

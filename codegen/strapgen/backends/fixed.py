@@ -1,6 +1,6 @@
 """The fixed-point back ends: generated C on integers, and the integer model in Python.
 
-Both turn numbers into integers at the door, and refuse those that the formats were not chosen for.
+Both convert every input to integers and refuse a number outside the range that the formats were chosen for.
 """
 
 from __future__ import annotations
@@ -11,11 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from strapgen.backends.protocol import Array, Backend, Evaluator
+from strapgen.backends.evaluators import Array, Evaluator
+from strapgen.backends.protocol import Backend
 from strapgen.backends.step_sources import StepSources
 from strapgen.ir.fixed_interface import Argument, Interface
 from strapgen.ir.sources import Sources
-from strapgen.support.exceptions import InputError
+from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.toolchain import compiler
 
 
@@ -55,7 +56,10 @@ class FixedEvaluator(Evaluator):
     """
 
     def __init__(self, sources: Sources) -> None:
-        assert sources.fixed is not None, "fixed-point sources tell their formats"
+        if sources.fixed is None:
+            raise InputTypeError(
+                f"sources of {sources.kernel} for {sources.target} have no fixed-point formats"
+            )
         super().__init__(sources, np.float64)
         self.kernel = sources.kernel
         self.interface: Interface = sources.fixed
@@ -90,32 +94,16 @@ class FixedEvaluator(Evaluator):
         )
 
     def fresh(self, count: int) -> Array:
-        """Return the residuals of so many fresh starts, (count, number of residuals)."""
-        words = np.array([residual.fresh for residual in self.interface.residuals], self.integer_type)
+        """Return the error feedback with which `count` independent runs begin, (count, number of words)."""
+        words = np.array([feedback.fresh for feedback in self.interface.residuals], self.integer_type)
         return np.tile(words, (count, 1))
 
     @abstractmethod
-    def run(self, inputs: Sequence[Array], residuals: Array) -> tuple[tuple[Array, ...], Array]:
-        """Call the function on integers.
-
-        Parameters
-        ----------
-        inputs : sequence of array, (count, size)
-        residuals : array, (count, number of residuals)
-
-        Returns
-        -------
-        outputs : tuple of array, (count, size)
-        residuals : array, (count, number of residuals)
-
-        Raises
-        ------
-        InputError
-            If the function refuses a call.
-        """
+    def run(self, inputs: Sequence[Array], feedback: Array) -> tuple[tuple[Array, ...], Array]:
+        """Call the function on integers, see `Evaluator.run`."""
 
     def refused(self, status: int, where: str = "") -> InputError:
-        """Return the error that stands for a status of the generated code."""
+        """Return the error of a user's input that a status of the generated code stands for."""
         if status == 1:
             limits = ", ".join(
                 f"{a.signal.name} up to {float(a.high * a.format.unit):.6g}" for a in self.interface.inputs
@@ -133,22 +121,22 @@ class CFixedEvaluator(FixedEvaluator):
     def __init__(self, sources: Sources) -> None:
         super().__init__(sources)
         word = self.interface.settings.word
-        self.word_type, self.residual_type = np.dtype(f"int{word}"), np.dtype(f"uint{word}")
+        self.word_type, self.feedback_type = np.dtype(f"int{word}"), np.dtype(f"uint{word}")
         self.module = compiler.load(sources)
         self._array = getattr(self.module.lib, f"{sources.function.name}_array")
 
-    def run(self, inputs: Sequence[Array], residuals: Array) -> tuple[tuple[Array, ...], Array]:
-        """Call the function on integers."""
-        count = len(residuals)
-        given = [np.ascontiguousarray(array, self.word_type) for array in inputs]
-        kept = np.array(residuals, self.residual_type)
+    def run(self, inputs: Sequence[Array], feedback: Array) -> tuple[tuple[Array, ...], Array]:
+        """Call the function on integers, see `Evaluator.run`."""
+        count = len(feedback)
+        words = [np.ascontiguousarray(array, self.word_type) for array in inputs]
+        feedback = np.array(feedback, self.feedback_type)
         outputs = tuple(np.empty((count, a.signal.size), self.word_type) for a in self.interface.outputs)
         status = self.module.ffi.new("int *")
-        arrays = [*given, *([kept] if self.interface.residuals else []), *outputs]
+        arrays = [*words, *([feedback] if self.interface.residuals else []), *outputs]
         done = self._array(count, status, *(self.pointer(array) for array in arrays))
         if status[0]:
             raise self.refused(status[0], f" (sample {done})" if count > 1 else "")
-        return outputs, kept
+        return outputs, feedback
 
     def pointer(self, array: Array) -> Any:
         """Return the C pointer to a contiguous array's first element."""
@@ -161,7 +149,7 @@ class CFixedEvaluator(FixedEvaluator):
 
 
 class ModelEvaluator(FixedEvaluator):
-    """A generated Python function on integers, checked on the way."""
+    """A generated Python function on integers that checks the range of every value."""
 
     def __init__(self, sources: Sources) -> None:
         super().__init__(sources)
@@ -169,16 +157,15 @@ class ModelEvaluator(FixedEvaluator):
         self.generated: Callable[..., Any] = getattr(module, sources.function.name)
         self.out_of_range: type[Exception] = module.OutOfRange
 
-    def run(self, inputs: Sequence[Array], residuals: Array) -> tuple[tuple[Array, ...], Array]:
-        """Call the function on integers."""
+    def run(self, inputs: Sequence[Array], feedback: Array) -> tuple[tuple[Array, ...], Array]:
+        """Call the function on integers, see `Evaluator.run`."""
+        count = len(feedback)
         arguments = [list(np.moveaxis(array, -1, 0)) for array in inputs]
         if self.interface.residuals:
-            arguments.append(list(np.moveaxis(residuals, -1, 0)))
+            arguments.append(list(np.moveaxis(feedback, -1, 0)))
         results = list(self.step(*arguments))
-        kept = residuals
         if self.interface.residuals:
-            kept = np.stack(np.broadcast_arrays(*results.pop()), axis=-1)
-        count = len(residuals)
+            feedback = np.stack(np.broadcast_arrays(*results.pop()), axis=-1)
         outputs = tuple(
             np.stack(
                 [np.broadcast_to(np.asarray(element, self.integer_type), (count,)) for element in result],
@@ -186,10 +173,10 @@ class ModelEvaluator(FixedEvaluator):
             )
             for result in results
         )
-        return outputs, kept
+        return outputs, feedback
 
     def step(self, *arguments: Any, where: str = "") -> Any:
-        """Call the generated function; what it refuses is told as the error of a user's input."""
+        """Call the generated function; a value out of range is raised as the error of a user's input."""
         try:
             return self.generated(*arguments)
         except self.out_of_range as error:
@@ -199,20 +186,20 @@ class ModelEvaluator(FixedEvaluator):
 class FixedBackend(Backend):
     """Runs a step in fixed point."""
 
-    def __init__(self, parts: StepSources) -> None:
-        super().__init__(parts)
-        assert isinstance(self._step, FixedEvaluator)
-        self.evaluator: FixedEvaluator = self._step
-        self.interface = self.evaluator.interface
+    def __init__(self, parts: StepSources, step: FixedEvaluator) -> None:
+        super().__init__(parts, step)
+        self.evaluator = step
+        self.interface = step.interface
         self.unit = float(self.interface.outputs[0].format.unit)
+        self.increment_unit = float(self.interface.inputs[1].format.unit)
 
     def rounding_bound(self, steps: int, rounded_inputs: bool = False) -> float | None:
-        """Return the certified bound of a run's rounding, see `Backend.rounding_bound`; None without transition."""
-        adds_up = self.interface.accumulation
-        return None if adds_up is None else adds_up.bound(steps, rounded_inputs)
+        """Return the certified bound of a run's rounding, see `Backend.rounding_bound`; None without a transition."""
+        accumulation = self.interface.accumulation
+        return None if accumulation is None else accumulation.bound(steps, rounded_inputs)
 
     def representable(self, increments: Any) -> Array:
-        """Return increments rounded to what the back end takes."""
+        """Return increments rounded to the input's format."""
         argument = self.interface.inputs[1]
         return self.evaluator.numbers(argument, self.evaluator.integers(argument, increments))
 
@@ -220,9 +207,9 @@ class FixedBackend(Backend):
         """Return a call that propagates integers, see `Backend.prepared`."""
         state, samples = self.interface.inputs
         rows = np.asarray(increments).reshape(1, -1, samples.signal.size)
-        given = self.evaluator.integers(samples, rows)
+        words = self.evaluator.integers(samples, rows)
         start = self.evaluator.integers(state, self.identity.reshape(1, -1))
-        return lambda: self.propagate_integers(given, 1, 0, start)
+        return lambda: self.propagate_integers(words, 1, 0, start)
 
     def _propagate(
         self, increments: Array, record_every: int, orthonormalize_every: int, initial: Array
@@ -260,13 +247,16 @@ class CFixedBackend(FixedBackend):
     """Runs generated fixed-point C."""
 
     def __init__(self, parts: StepSources) -> None:
-        super().__init__(parts)
+        step = CFixedEvaluator(parts.step)
+        super().__init__(parts, step)
         self.name = f"c-q{self.interface.settings.word - 1}"
-        step = self.evaluator
-        assert isinstance(step, CFixedEvaluator)
         self._c = step
         self._function = self.sources.function.name
         self._generated = getattr(step.module.lib, f"{self._function}_propagate")
+
+    def beside(self, kernel: str) -> CFixedEvaluator:
+        """Return another kernel in fixed-point C, see `Backend.beside`."""
+        return CFixedEvaluator(self._sources(kernel))
 
     def propagate_integers(
         self, increments: Array, record_every: int, orthonormalize_every: int, initial: Array
@@ -274,16 +264,15 @@ class CFixedBackend(FixedBackend):
         """Propagate integers in C."""
         runs, steps = increments.shape[:2]
         ffi, kind = self._c.module.ffi, self._c.word_type
-        given = [np.ascontiguousarray(array, kind) for array in (initial, increments)]
-        residuals = self.evaluator.fresh(runs).astype(self._c.residual_type)
+        words = [np.ascontiguousarray(array, kind) for array in (initial, increments)]
+        feedback = self.evaluator.fresh(runs).astype(self._c.feedback_type)
         history = np.empty((runs, 1 + steps // record_every, initial.shape[-1]), kind)
         orthonormalizer = ffi.NULL
         if orthonormalize_every:
-            made = self.beside(self._need_orthonormalization())
-            assert isinstance(made, CFixedEvaluator)
-            orthonormalizer = ffi.cast(f"{self._function}_orthonormalizer", made.address())
+            address = self.beside(self._need_orthonormalization()).address()
+            orthonormalizer = ffi.cast(f"{self._function}_orthonormalizer", address)
         stopped = ffi.new("size_t[2]")
-        arrays = [*given, *([residuals] if self.interface.residuals else []), history]
+        arrays = [*words, *([feedback] if self.interface.residuals else []), history]
         status = self._generated(
             runs,
             steps,
@@ -300,42 +289,53 @@ class CFixedBackend(FixedBackend):
 
 
 class ModelBackend(FixedBackend):
-    """Runs the integer model: independent runs side by side, one run on Python's own integers."""
+    """Runs the integer model: independent runs side by side in numpy, a single run on Python's own integers."""
+
+    def __init__(self, parts: StepSources) -> None:
+        self._model = ModelEvaluator(parts.step)
+        super().__init__(parts, self._model)
+
+    def beside(self, kernel: str) -> ModelEvaluator:
+        """Return another kernel in the integer model, see `Backend.beside`."""
+        return ModelEvaluator(self._sources(kernel))
 
     def propagate_integers(
         self, increments: Array, record_every: int, orthonormalize_every: int, initial: Array
     ) -> Array:
-        """Propagate integers in Python."""
-        step = self.evaluator
-        assert isinstance(step, ModelEvaluator)
+        """Propagate integers in Python, see `FixedBackend.propagate_integers`."""
         normalize = self.beside(self._need_orthonormalization()) if orthonormalize_every else None
         runs, steps = increments.shape[:2]
         single = runs == 1
-        fresh = self.evaluator.fresh(runs)
-        kept: list[Any]
+        fresh = self._model.fresh(runs)
+        feedback: list[Any]
         if single:
-            state, samples, kept = initial[0].tolist(), increments[0].tolist(), fresh[0].tolist()
+            state, samples, feedback = initial[0].tolist(), increments[0].tolist(), fresh[0].tolist()
         else:
             state = list(np.moveaxis(initial, -1, 0))
             samples = np.moveaxis(increments, 0, -1)
-            kept = list(np.moveaxis(fresh, -1, 0))
+            feedback = list(np.moveaxis(fresh, -1, 0))
         records = [state]
         for number in range(steps):
             where = f" in step {number + 1}"
-            if kept:
-                state, kept = step.step(state, list(samples[number]), kept, where=where)
-            else:
-                (state,) = step.step(state, list(samples[number]), where=where)
+            state, feedback = _stepped(self._model, [state, list(samples[number])], feedback, where)
             if normalize is not None and (number + 1) % orthonormalize_every == 0:
-                assert isinstance(normalize, ModelEvaluator)
+                # The first words of the step's feedback are those of its state.
                 count = len(normalize.interface.residuals)
-                if count:
-                    state, left = normalize.step(state, kept[:count], where=where)
-                    kept = [*left, *kept[count:]]
-                else:
-                    (state,) = normalize.step(state, where=where)
+                state, first = _stepped(normalize, [state], feedback[:count], where)
+                feedback = [*first, *feedback[count:]]
             if (number + 1) % record_every == 0:
                 records.append(state)
         if single:
-            return np.array(records, step.integer_type)[None]
+            return np.array(records, self._model.integer_type)[None]
         return np.stack([np.stack(np.broadcast_arrays(*record), axis=-1) for record in records], axis=1)
+
+
+def _stepped(
+    model: ModelEvaluator, arguments: list[Any], feedback: list[Any], where: str
+) -> tuple[Any, list[Any]]:
+    """Call a function of one output; return the output and the error feedback, empty where there is none."""
+    if feedback:
+        state, feedback = model.step(*arguments, feedback, where=where)
+    else:
+        (state,) = model.step(*arguments, where=where)
+    return state, feedback

@@ -1,9 +1,9 @@
 """The numpy back end: transitions of all steps at once, then their products as a blocked scan.
 
-The state after n steps is the product of n transitions, and the product is associative. So the steps are cut
-into blocks that are multiplied up side by side, as in a parallel prefix sum: Python loops over the places in
-a block, numpy over the blocks. Arrays are kept with the element first, (elements, ..., steps), so that every
-operation runs over contiguous memory.
+The state after n steps is the product of n transitions, and the product is associative. The steps are therefore cut
+into blocks whose products grow side by side, as in a parallel prefix sum: Python loops over the places in a block,
+numpy over the blocks. Arrays have the element first, (elements, ..., steps), so that every operation runs over
+contiguous memory.
 """
 
 from __future__ import annotations
@@ -12,48 +12,42 @@ from collections.abc import Callable
 
 import numpy as np
 
-from strapgen.backends.protocol import Array, Backend, Evaluator
+from strapgen.backends.evaluators import Array
+from strapgen.backends.numpy_evaluator import NumpyEvaluator
+from strapgen.backends.protocol import Backend
 from strapgen.backends.step_sources import StepSources
-from strapgen.ir.sources import Sources
 from strapgen.toolchain import compiler
 
-#: Steps times runs that are held at once: some megabytes, which stay in the cache.
+#: Largest number of steps times runs in one span: some megabytes, which stay in the processor's cache.
 _SPAN = 1 << 18
-#: Width of a scan: wide enough to hide the cost of a numpy call.
+#: Number of products in one numpy call of a scan, large enough to hide the cost of the call.
 _WIDTH = 1024
-#: Steps in one elementwise pass: its temporaries stay in the nearest caches.
+#: Steps in one elementwise pass, whose temporaries stay in the nearest caches.
 _PASS = 1 << 13
 
 
-class NumpyEvaluator(Evaluator):
-    """A generated numpy function."""
-
-    def __init__(self, sources: Sources) -> None:
-        super().__init__(sources, np.float64)
-        self._generated = getattr(compiler.load(sources), sources.function.name)
-
-    def evaluate(self, arrays: list[Array], batch: tuple[int, ...]) -> tuple[Array, ...]:
-        """Evaluate on checked arrays."""
-        result = self._generated(*arrays)
-        return result if isinstance(result, tuple) else (result,)
-
-
 class NumpyBackend(Backend):
-    """Runs generated numpy code; many runs and long runs alike without a loop over them."""
+    """Runs generated numpy code, with no Python loop over the steps of a long run or over many runs."""
 
     def __init__(self, parts: StepSources) -> None:
-        super().__init__(parts)
+        step = NumpyEvaluator(parts.step)
+        super().__init__(parts, step)
+        self._generated_step: Callable[..., Array] = step.generated
+        self._product = parts.step_kernels.product
         if self._product is not None:
             name = f"{self.sources.function.name}_transition"
             self._transition: Callable[..., Array] = getattr(compiler.load(self.sources), name)
-            product = parts.evaluator(self._product)
-            assert isinstance(product, NumpyEvaluator)
-            self._generated_product: Callable[..., Array] = product._generated
+            self._generated_product: Callable[..., Array] = self.beside(self._product).generated
         if self._orthonormalization is not None:
-            orthonormalizer = parts.evaluator(self._orthonormalization)
-            assert isinstance(orthonormalizer, NumpyEvaluator)
-            self._orthonormalize: Callable[..., Array] = orthonormalizer._generated
+            self._orthonormalize: Callable[..., Array] = self.beside(self._orthonormalization).generated
         self._elements = self.identity.size
+
+    def beside(self, kernel: str) -> NumpyEvaluator:
+        """Return another kernel in numpy, see `Backend.beside`."""
+        return NumpyEvaluator(self._sources(kernel))
+
+    def _kernels(self) -> list[tuple[str | None, str]]:
+        return [*super()._kernels(), (self._product, self.sources.target)]
 
     def _propagate(
         self, increments: Array, record_every: int, orthonormalize_every: int, initial: Array
@@ -80,12 +74,10 @@ class NumpyBackend(Backend):
     def _run_in_turn(
         self, increments: Array, record_every: int, orthonormalize_every: int, history: Array
     ) -> None:
-        """Run step after step, all runs side by side: what a step that is not linear in the state needs."""
-        step = self._step
-        assert isinstance(step, NumpyEvaluator)
+        """Run one step after the other, for a step that is not linear in the state; all runs go side by side."""
         state = history[:, 0]
         for number in range(increments.shape[1]):
-            state = step._generated(state, increments[:, number])
+            state = self._generated_step(state, increments[:, number])
             if orthonormalize_every and (number + 1) % orthonormalize_every == 0:
                 state = self._orthonormalize(state)
             if (number + 1) % record_every == 0:
@@ -94,10 +86,10 @@ class NumpyBackend(Backend):
     def _run_span(
         self, increments: Array, length: int, segments: int, orthonormalize: bool, state: Array
     ) -> tuple[Array, Array]:
-        """Run segments of `length` steps, the last one perhaps shorter; return all states and the last.
+        """Run segments of `length` steps, of which the last may be shorter; return all states and the last.
 
-        Segments are scanned side by side from the identity; then a loop over them carries the state through
-        their totals and orthonormalizes between them.
+        The segments are scanned side by side from the identity. A loop over them then takes the state through their
+        products and orthonormalizes between them.
         """
         runs, steps = increments.shape[:2]
         width = runs * segments
@@ -135,7 +127,7 @@ class NumpyBackend(Backend):
     def _transitions(self, increments: Array, length: int, segments: int, blocks: int, depth: int) -> Array:
         """Return the transitions, (elements, depth, blocks, runs * segments).
 
-        Steps beyond the end have zero increments, so that their transition is the identity.
+        Steps beyond the end have zero increments; their transition is the identity.
         """
         runs, steps = increments.shape[:2]
         whole = np.zeros((runs, segments * length, self.samples * 3))
@@ -151,7 +143,7 @@ class NumpyBackend(Backend):
         return result.reshape(self._elements, depth, blocks, runs * segments)
 
     def _scan(self, transitions: Array) -> Array:
-        """Return the products of all transitions up to each place, (elements, length, width)."""
+        """Return the product of all transitions up to each place, (elements, length, width)."""
         elements, length, width = transitions.shape
         blocks, depth = _cut(length, width)
         padded = np.empty((elements, blocks * depth, width))
@@ -165,7 +157,7 @@ class NumpyBackend(Backend):
         return local.transpose(0, 2, 1, 3).reshape(elements, blocks * depth, width)[:, :length]
 
     def _accumulate(self, local: Array) -> None:
-        """Multiply up the transitions of every block in place, (elements, depth, ...)."""
+        """Replace each transition by the product up to it, in every block at once, (elements, depth, ...)."""
         for k in range(1, local.shape[1]):
             self._multiply(local[:, k - 1], local[:, k], local[:, k])
 
@@ -186,15 +178,15 @@ class NumpyBackend(Backend):
 
 
 def _cut(length: int, width: int) -> tuple[int, int]:
-    """Return into how many blocks, of how many places, a scan of so many steps side by side is cut."""
+    """Return the number of blocks for a scan of `length` steps in `width` columns, and the places in each."""
     blocks = max(1, min(round(_WIDTH / width), length // 16))
     return blocks, -(-length // blocks)
 
 
 def _spans(steps: int, segment: int, most: int) -> list[tuple[int, int, int]]:
-    """Cut the steps into spans: first step, steps a segment, segments.
+    """Cut the steps into spans: first step, steps per segment, number of segments.
 
-    A span holds whole segments between orthonormalizations, or a part of one if they are long.
+    A segment lies between two orthonormalizations; a span holds whole segments, or a part of a long one.
     """
     spans: list[tuple[int, int, int]] = []
     first = 0

@@ -1,4 +1,4 @@
-"""The protocol of back ends: all that simulator, truth models and tests see of generated code."""
+"""The protocol of back ends: all that simulator, truth models and tests see of an algorithm that runs."""
 
 from __future__ import annotations
 
@@ -7,88 +7,27 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from strapgen.backends.evaluators import Array, Evaluator
+from strapgen.backends.numpy_evaluator import NumpyEvaluator
 from strapgen.backends.step_sources import StepSources
 from strapgen.ir.sources import Sources
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 
-Array = NDArray[Any]
-
-
-class Evaluator(ABC):
-    """A generated function, called with arrays of samples. It can be pickled: the sources are, and built again.
-
-    Parameters
-    ----------
-    sources : Sources
-        What it is made of.
-    dtype : dtype
-        Type of the numbers that it computes with; a class of one target knows it.
-    """
-
-    def __init__(self, sources: Sources, dtype: Any) -> None:
-        self.sources = sources
-        self.function = sources.function
-        self.dtype = np.dtype(dtype)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Return what makes it again in another process: its class and its sources."""
-        return type(self), (self.sources,)
-
-    def __call__(self, *values: Any) -> Any:
-        """Call the function.
-
-        Parameters
-        ----------
-        *values : array_like
-            The inputs in order, each (..., shape of the signal); leading axes broadcast.
-
-        Returns
-        -------
-        array or tuple of array
-            The outputs.
-
-        Raises
-        ------
-        InputError, InputTypeError
-            If the number of inputs, a shape, a dtype or a value does not fit.
-        """
-        signals = self.function.inputs
-        if len(values) != len(signals):
-            names = ", ".join(signal.name for signal in signals)
-            raise InputError(
-                f"{self.function.name} got {len(values)} inputs; {len(signals)} are needed: {names}"
-            )
-        arrays = [
-            checks.real_array(signal.name, value, signal.shape, self.dtype)
-            for signal, value in zip(signals, values, strict=True)
-        ]
-        leading = [a.shape[: a.ndim - len(s.shape)] for a, s in zip(arrays, signals, strict=True)]
-        try:
-            batch = np.broadcast_shapes(*leading)
-        except ValueError:
-            shapes = ", ".join(f"{s.name} {a.shape}" for s, a in zip(signals, arrays, strict=True))
-            raise InputError(f"the leading axes of {shapes} do not broadcast together") from None
-        results = self.evaluate(arrays, batch)
-        return results[0] if len(results) == 1 else results
-
-    @abstractmethod
-    def evaluate(self, arrays: list[Array], batch: tuple[int, ...]) -> tuple[Array, ...]:
-        """Evaluate on checked arrays whose leading axes broadcast to `batch`."""
-
 
 class Backend(ABC):
-    """An attitude algorithm, compiled and ready to run.
+    """An attitude algorithm that runs.
 
-    It can be pickled, so that a pool of processes can run it: its sources are, with those of the kernels beside the
-    step, and built again, C from the cache.
+    It can be pickled, so that a pool of processes can run it: the sources of the step and of its kernels travel, and
+    compiled C comes from the cache.
 
     Parameters
     ----------
     parts : StepSources
-        Sources of an attitude step, and of what goes with it.
+        Sources of an attitude step and of its kernels.
+    step : Evaluator
+        The step as a callable; the class of one target builds it.
 
     Attributes
     ----------
@@ -97,13 +36,13 @@ class Backend(ABC):
     kernel : str
         Name of the kernel that it runs.
     dtype : dtype
-        Type of the numbers that it computes with.
+        Type of its states.
     takes : str
-        What a step takes: "increments", or "turns": rates at the nodes times the step length.
+        Name of the step's second input: "increments", or "turns" where a step takes rates at nodes times its length.
     increments, previous : int
-        How many of them belong to a step, and how many from before it that it takes too.
+        Number of increments that belong to a step, and of those from before it that it takes in addition.
     samples : int
-        How many a step takes, both together.
+        Number of increments that a step takes in all.
     state_shape : tuple of int
         Shape of the state.
     elements : tuple of str
@@ -111,55 +50,61 @@ class Backend(ABC):
     identity : array
         The state of zero rotation.
     attitude : str or None
-        Kernel that turns a state into a direction cosine matrix; None where the state is one.
+        Kernel that converts the state to a direction cosine matrix; None where the state is one.
     unit : float
-        Unit of the last place of a state's element near 1.
+        Unit in the last place of a state's element near 1.
+    increment_unit : float or None
+        Unit in the last place of an increment in rad, in fixed point; None in floating point.
     sources : Sources
-        What it was made of.
+        Sources of the step.
     """
 
-    def __init__(self, parts: StepSources) -> None:
-        sources = parts.step
-        companions = sources.companions
-        if companions is None:
-            raise InputError(f"kernel {sources.kernel} is no attitude step; back ends are built from steps")
+    increment_unit: float | None = None
+
+    def __init__(self, parts: StepSources, step: Evaluator) -> None:
+        sources, kernels = parts.step, parts.step_kernels
         state, samples = sources.function.inputs
         self.sources = sources
         self.name = sources.target
         self.kernel = sources.kernel
         self.takes = samples.name
         self.samples = samples.shape[0]
-        self.previous = companions.previous
+        self.previous = kernels.previous
         self.increments = self.samples - self.previous
         self.state_shape = state.shape
         self.elements = state.elements
-        self.attitude = companions.attitude
+        self.attitude = kernels.attitude
         self._parts = parts
-        self._product = companions.product
-        self._orthonormalization = parts.orthonormalization or companions.orthonormalize
-        self._step: Evaluator = parts.evaluator(sources.kernel)
-        self.dtype = self._step.dtype
-        self.identity: Array = np.array([float(x) for x in companions.identity], self.dtype).reshape(
-            state.shape
-        )
+        self._orthonormalization = parts.orthonormalization or kernels.orthonormalize
+        self._step = step
+        self.dtype = step.dtype
+        self.identity: Array = np.array([float(x) for x in kernels.identity], self.dtype).reshape(state.shape)
         self.unit = float(np.finfo(self.dtype).eps)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return what makes it again in another process: its class, and sources that need nothing else."""
-        return type(self), (self._parts.complete(),)
+        """Return the class and its sources, from which another process builds the same back end."""
+        return type(self), (self._parts.complete(self._kernels()),)
 
+    def _kernels(self) -> list[tuple[str | None, str]]:
+        """Return the kernels that it may need beside the step, each with its target."""
+        return [(self._orthonormalization, self.sources.target), (self.attitude, "numpy")]
+
+    @abstractmethod
     def beside(self, kernel: str) -> Evaluator:
-        """Return a kernel that works on the same state, on the same target: an orthonormalization.
+        """Return another kernel on the same target as the step: one that restores a state, or converts it.
 
         Parameters
         ----------
         kernel : str
-            One that the step brings, or of the catalogue.
+            A kernel that the step brings, or of the catalogue.
         """
-        return self._parts.evaluator(kernel)
+
+    def _sources(self, kernel: str) -> Sources:
+        """Return the sources of a kernel for the step's own target."""
+        return self._parts.sources(kernel, self.sources.target)
 
     def matrices(self, states: Any) -> Array:
-        """Return the attitude that states stand for.
+        """Return the attitude of states.
 
         Parameters
         ----------
@@ -173,7 +118,7 @@ class Backend(ABC):
         states = np.asarray(states, np.float64)
         if self.attitude is None:
             return np.array(states)
-        result: Array = self._parts.evaluator(self.attitude, "numpy")(states)
+        result: Array = NumpyEvaluator(self._parts.sources(self.attitude, "numpy"))(states)
         return result
 
     def rounding_bound(self, steps: int, rounded_inputs: bool = False) -> float | None:
@@ -183,7 +128,7 @@ class Backend(ABC):
         ----------
         steps : int
         rounded_inputs : bool, optional
-            Whether increments that are no integers of the input's format are counted too.
+            Whether the bound covers increments that must be rounded to the input's format first.
 
         Returns
         -------
@@ -194,19 +139,21 @@ class Backend(ABC):
         return None
 
     def representable(self, increments: Any) -> Array:
-        """Return increments rounded to what the back end takes: in floating point, as they are."""
+        """Return increments rounded to the numbers that the step takes: in floating point, to `dtype`."""
         return np.asarray(increments, self.dtype)
 
     def prepared(self, increments: Any) -> Callable[[], Any]:
-        """Return a call that propagates from zero rotation, keeping all states, with every conversion done: for timing.
+        """Return a call that propagates from zero rotation and records all states, for timing.
+
+        Every conversion of the increments is done before.
 
         Parameters
         ----------
         increments : array_like, (N, K, 3)
             Angle increments in rad.
         """
-        ready = np.ascontiguousarray(increments, self.dtype)
-        return lambda: self.propagate(ready)
+        converted = np.ascontiguousarray(increments, self.dtype)
+        return lambda: self.propagate(converted)
 
     def need_increments(self) -> None:
         """Check that steps take angle increments.
@@ -275,8 +222,8 @@ class Backend(ABC):
         Parameters
         ----------
         increments : array_like, (..., N, samples, 3)
-            Angle increments of N steps in rad, body axes; leading axes are independent runs. `gyro.windows` makes them
-            of increments in a row.
+            Angle increments of N steps in rad, body axes; leading axes are independent runs. `gyro.windows` cuts a
+            row of increments into those of each step.
         record_every : int, optional
             Steps from record to record.
         orthonormalize_every : int, optional

@@ -4,70 +4,111 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from importlib import import_module
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
-    from strapgen.backends.protocol import Backend, Evaluator
+    from strapgen.backends.evaluators import Evaluator
+    from strapgen.backends.loops import Loops
+    from strapgen.backends.protocol import Backend
+    from strapgen.backends.step_sources import StepSources
     from strapgen.ir.sources import Sources
 
 _PACKAGE = __name__.rpartition(".")[0]
 
 
 class Entry(NamedTuple):
-    """A back end: what it is, the target that it runs, the module and classes of this package that run it.
+    """A back end of the table.
 
-    `word` is the length of word in fixed point, None where it is the user's choice or there is none.
+    Parameters
+    ----------
+    title : str
+        One line that says what it is.
+    target : str
+        The target whose text it runs; a name that is no target where it runs the program itself.
+    evaluator, backend, loops : str
+        Module and class of this package that run a kernel, an attitude step, and an algorithm in two speeds.
+    word : int or None
+        Bits of a word in fixed point; None where the user chooses them, or in floating point.
+    slow : bool
+        Whether Python executes every single operation. A run on all back ends leaves such a one out by default.
+    many_digits : bool
+        Whether it computes in so many digits that rounding cannot be seen; the class then has methods that return them.
     """
 
     title: str
     target: str
-    module: str
     evaluator: str
     backend: str
+    loops: str = "loops.LoopsFromPython"
     word: int | None = None
+    slow: bool = False
+    many_digits: bool = False
 
+
+_C = ("c.CEvaluator", "c.CBackend", "loops_in_c.LoopsInC")
+_C_FIXED = ("fixed.CFixedEvaluator", "fixed.CFixedBackend", "loops_in_c.LoopsInC")
 
 #: Back ends by name.
 BACKENDS = {
     "numpy": Entry(
-        "generated numpy code in double", "numpy", "numpy_backend", "NumpyEvaluator", "NumpyBackend"
+        "generated numpy code in double",
+        "numpy",
+        "numpy_evaluator.NumpyEvaluator",
+        "numpy_backend.NumpyBackend",
     ),
-    "c": Entry("generated C in double, compiled", "c", "c", "CEvaluator", "CBackend"),
-    "c-float": Entry("generated C in float, compiled", "c-float", "c", "CEvaluator", "CBackend"),
-    "c-q31": Entry(
-        "generated C in 32-bit fixed point, compiled",
-        "c-fixed",
-        "fixed",
-        "CFixedEvaluator",
-        "CFixedBackend",
-        32,
-    ),
-    "c-q15": Entry(
-        "generated C in 16-bit fixed point, compiled",
-        "c-fixed",
-        "fixed",
-        "CFixedEvaluator",
-        "CFixedBackend",
-        16,
-    ),
+    "c": Entry("generated C in double, compiled", "c", *_C),
+    "c-float": Entry("generated C in float, compiled", "c-float", *_C),
+    "c-q31": Entry("generated C in 32-bit fixed point, compiled", "c-fixed", *_C_FIXED, word=32),
+    "c-q15": Entry("generated C in 16-bit fixed point, compiled", "c-fixed", *_C_FIXED, word=16),
     "fixed-model": Entry(
         "integer model of the fixed-point C in Python, any word",
         "fixed-model",
-        "fixed",
-        "ModelEvaluator",
-        "ModelBackend",
+        "fixed.ModelEvaluator",
+        "fixed.ModelBackend",
+        slow=True,
+    ),
+    "exact": Entry(
+        "arithmetic of 40 digits in Python, rounded to double at the end",
+        "exact",
+        "exact.ExactEvaluator",
+        "exact.ExactBackend",
+        "exact_loops.ExactLoops",
+        slow=True,
+        many_digits=True,
     ),
 }
 
+#: Back ends on which an experiment runs by default.
+DEFAULT_BACKENDS = tuple(name for name, entry in BACKENDS.items() if not entry.slow)
 
-def classes(target: str) -> tuple[type[Evaluator], type[Backend]]:
-    """Return the classes that run the sources of a target."""
-    entry = next(entry for entry in BACKENDS.values() if entry.target == target)
-    module = import_module(f"{_PACKAGE}.{entry.module}")
-    return getattr(module, entry.evaluator), getattr(module, entry.backend)
+
+def _of_target(target: str) -> Entry:
+    return next(entry for entry in BACKENDS.values() if entry.target == target)
+
+
+def _class(place: str) -> Any:
+    module, _, name = place.partition(".")
+    return getattr(import_module(f"{_PACKAGE}.{module}"), name)
+
+
+def evaluator_class(target: str) -> Callable[[Sources], Evaluator]:
+    """Return the class that runs a kernel for a target."""
+    loaded: Callable[[Sources], Evaluator] = _class(_of_target(target).evaluator)
+    return loaded
+
+
+def backend_class(target: str) -> Callable[[StepSources], Backend]:
+    """Return the class that runs an attitude step for a target."""
+    loaded: Callable[[StepSources], Backend] = _class(_of_target(target).backend)
+    return loaded
+
+
+def loops_class(target: str) -> type[Loops]:
+    """Return the class that runs an algorithm in two speeds for a target."""
+    loaded: type[Loops] = _class(_of_target(target).loops)
+    return loaded
 
 
 def of_sources(sources: Sources) -> Evaluator:
-    """Return the generated function of any kernel as a callable."""
-    make: Callable[[Sources], Evaluator] = classes(sources.target)[0]
-    return make(sources)
+    """Return any kernel as a callable from its sources."""
+    return evaluator_class(sources.target)(sources)

@@ -1,34 +1,35 @@
-"""Sources of an attitude step and of the kernels beside it: all that a back end is built from, and plain data."""
+"""All that a back end is built from, as plain data: the sources of an attitude step and of the step's kernels."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
-from strapgen.backends.registry import of_sources
+from strapgen.backends.kernel_sources import sources_of_choice, sources_of_program
 from strapgen.catalogue import Choice
+from strapgen.ir.attitude_step import Companions
 from strapgen.ir.sources import Sources
-from strapgen.library import generated_sources
 from strapgen.support.exceptions import InputError
-from strapgen.targets import emit
-
-if TYPE_CHECKING:
-    from strapgen.backends.protocol import Evaluator
 
 
 @dataclass(frozen=True)
 class StepSources:
-    """Sources of an attitude step, and of its product, orthonormalization and attitude when they are needed.
+    """Sources of an attitude step, and of its product, orthonormalization and attitude as they are needed.
 
     Parameters
     ----------
     step : Sources
     choice : Choice or None
-        What was chosen; None where the step itself brings the kernels that are not in the catalogue.
+        The choice of the step; None where the step brings every kernel that is not in the catalogue.
     orthonormalization : str or None
         Kernel that orthonormalizes; by default the one that goes with the step.
     beside : dict of (str, str) to Sources or str
-        Sources of other kernels by name and target; for what cannot be generated, why not.
+        Sources of other kernels by name and target; where a kernel cannot be generated, the reason.
+
+    Raises
+    ------
+    InputError
+        If the sources are not those of an attitude step.
     """
 
     step: Sources
@@ -36,23 +37,23 @@ class StepSources:
     orthonormalization: str | None = None
     beside: dict[tuple[str, str], Sources | str] = field(default_factory=dict)
 
-    def evaluator(self, kernel: str, target: str | None = None) -> Evaluator:
-        """Return the step or a kernel beside it as a callable, by default on the step's own target.
+    def __post_init__(self) -> None:
+        _ = self.step_kernels
+
+    @property
+    def step_kernels(self) -> Companions:
+        """Names of the step's kernels, and what else its sources tell of an attitude step."""
+        if self.step.companions is None:
+            raise InputError(f"kernel {self.step.kernel} is no attitude step; back ends are built from steps")
+        return self.step.companions
+
+    def sources(self, kernel: str, target: str) -> Sources:
+        """Return the sources of the step or of another kernel.
 
         Raises
         ------
         InputError
             If the kernel cannot be generated for the target.
-        """
-        return of_sources(self.sources(kernel, target or self.step.target))
-
-    def sources(self, kernel: str, target: str) -> Sources:
-        """Return the sources of the step, or of a kernel beside it.
-
-        Raises
-        ------
-        InputError
-            If it cannot be generated for the target.
         """
         if (kernel, target) == (self.step.kernel, self.step.target):
             return self.step
@@ -68,24 +69,20 @@ class StepSources:
         settings = fixed.companion_settings if fixed else None
         for program in self.step.own:
             if program.kernel == kernel:
-                return emit(program, target, settings)
+                return sources_of_program(program, target, settings)
         choice = Choice(kernel) if self.choice is None else self.choice.companion(kernel)
-        return generated_sources.sources(choice, target, settings)
+        return sources_of_choice(choice, target, settings)
 
-    def complete(self) -> StepSources:
-        """Return the same with all that the step may need, so that no kernel has to be derived where it is taken."""
-        names = self.step.companions
-        assert names is not None, "checked when a back end is built"
-        target = self.step.target
-        needed = [(self.orthonormalization or names.orthonormalize, target)]
-        needed += [(names.attitude, "numpy")]
-        if target == "numpy":
-            needed += [(names.product, target)]
+    def complete(self, needed: Iterable[tuple[str | None, str]]) -> StepSources:
+        """Return the same with the sources of the kernels and targets that are needed.
+
+        A process that unpickles it then derives no kernel.
+        """
         beside: dict[tuple[str, str], Sources | str] = {}
-        for kernel, language in needed:
+        for kernel, target in needed:
             if kernel is not None:
                 try:
-                    beside[kernel, language] = self.sources(kernel, language)
-                except InputError as error:  # found only where it is used, as without a copy
-                    beside[kernel, language] = str(error)
+                    beside[kernel, target] = self.sources(kernel, target)
+                except InputError as error:  # raised only where the kernel is used, as without a copy
+                    beside[kernel, target] = str(error)
         return replace(self, choice=None, beside=beside)

@@ -1,8 +1,9 @@
-"""A choice of kernel: what `choose` returns, and all that its users ask of it."""
+"""A choice says which kernel to derive. `choose` returns it, and all later stages take it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 from strapgen.catalogue.methods.tableau import Tableau
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Choice:
-    """A kernel that was chosen: a value, which says all that its derivation needs.
+    """The choice of a kernel, with everything that its derivation needs.
 
     Parameters
     ----------
@@ -23,10 +24,10 @@ class Choice:
     method : str or Tableau, optional
         Method of an attitude step of the catalogue, or of a vector of one.
     increments : int, optional
-        Increments of a step. A step of the catalogue without increments is given the body rate at every node of its
+        Increments of a step. A step of the catalogue without increments takes the body rate at every node of its
         method.
     previous : int, optional
-        Increments before the step that it takes too.
+        Number of increments from before the step that it takes in addition to its own.
     user_kernel : Kernel, optional
         A user's kernel itself, with the kernels that it brings; None for one of the catalogue.
     """
@@ -35,12 +36,12 @@ class Choice:
     method: str | Tableau | None = None
     increments: int | None = None
     previous: int = 0
-    # Equal choices have equal kernels; a hash of the name and the numbers is enough to tell most others apart.
+    # Equality compares the kernels; the hash leaves them out, because most choices differ in name or numbers.
     user_kernel: Kernel | None = field(default=None, hash=False, repr=False)
 
     @classmethod
     def of_user(cls, kernel: Kernel) -> Choice:
-        """Return the choice of a user's kernel: an attitude step, or a kernel that one brings."""
+        """Return the choice of a user's kernel: an attitude step, or a kernel that comes with one."""
         if kernel.companions is None:
             return cls(kernel.name, user_kernel=kernel)
         previous = kernel.companions.previous
@@ -59,33 +60,38 @@ class Choice:
         before = f"-previous{self.previous}" if self.previous else ""
         return f"{self.name}-{self.method_name}-{self.increments or 'rates'}{before}"
 
-    @property
+    @cached_property
     def identity(self) -> str:
-        """What tells this choice from every other one: its kernel's name, and what a user made it of."""
+        """Text that differs between choices with different kernels or generated files: the key of the library's cache.
+
+        It is the name of the kernel and, where that is a user's to choose, the tableau with its file or the kernel.
+        """
         if self.user_kernel is not None:
-            return f"{self.kernel} {self.user_kernel!r}"
-        return f"{self.kernel} {self.method!r}" if isinstance(self.method, Tableau) else self.kernel
+            return f"{self.kernel} {self.user_kernel!r} {_formulas(self.user_kernel)}"
+        if isinstance(self.method, Tableau):
+            return f"{self.kernel} {self.method!r} {self.method.file}"
+        return self.kernel
 
     @property
     def increments_per_step(self) -> int:
-        """How many increments belong to a step: 1 for one that takes rates, each over a whole step."""
+        """Number of increments in a step; 1 for a step that takes rates, where each covers the whole step."""
         return self.increments or 1
 
     @property
     def orthonormalizations(self) -> list[str]:
-        """Kernels that orthonormalize the state: of a user's step the one that it names."""
+        """Names of the kernels that orthonormalize the state; for a user's step, the one that it names."""
         if self.user_kernel is None:
             return orthonormalizations(self.name)
         step = self.user_kernel.companions
         return [] if step is None or step.orthonormalize is None else [step.orthonormalize]
 
     def companion(self, name: str) -> Choice:
-        """Return the choice of a kernel that goes with this one: one that a user's kernel brings, or of the catalogue.
+        """Return the choice of a kernel that a step needs: the user's own if there is one, else that of the catalogue.
 
         Parameters
         ----------
         name : str
-            Product, orthonormalization or attitude of a step, as its `companions` name them.
+            Name of the product, orthonormalization or attitude kernel in the step's `companions`.
 
         Examples
         --------
@@ -96,13 +102,22 @@ class Choice:
         return next((Choice.of_user(kernel) for kernel in brought if kernel.name == name), Choice(name))
 
 
+def _formulas(kernel: Kernel) -> str:
+    """Return all formulas with the class of every part: `repr` shows the number pi and a symbol of that name alike."""
+    from sympy import srepr
+
+    kernels = (kernel, *kernel.own)
+    stages = [stage for each in kernels for stage in (*each.stages, *each.outputs)]
+    return " ".join(srepr(expression) for stage in stages for expression in stage.expressions)
+
+
 def increments(choice: Choice) -> int:
-    """Return how many increments belong to a step, see `Choice.increments_per_step`."""
+    """Return the number of increments in a step, see `Choice.increments_per_step`."""
     return choice.increments_per_step
 
 
 def previous(choice: Choice) -> int:
-    """Return how many increments before it a step takes too."""
+    """Return the number of increments from before the step that it takes."""
     return choice.previous
 
 

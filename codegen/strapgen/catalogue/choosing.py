@@ -1,4 +1,4 @@
-"""Choosing: names and options, checked and filled in."""
+"""Choosing checks names and options, fills in the defaults and returns a `Choice`."""
 
 from __future__ import annotations
 
@@ -39,15 +39,14 @@ def choose(
         A name of the catalogue, a user's Python file, or the entry point of one.
     method : str or Tableau, optional
     increments, previous : int, optional
-        Increments of a step, and increments before it that it takes too.
+        Increments in a step, and increments from before it that it takes in addition.
     rates : bool, optional
-        Whether the step takes the rate at the nodes of its method instead.
+        Whether the step takes the rate at the nodes of its method in place of increments.
 
     Raises
     ------
     InputError
-        If a name is unknown, a method is given for a kernel that takes none, or increments for a step that
-        takes rates.
+        If a name is unknown, or an option does not go with the kernel or with another option.
 
     Examples
     --------
@@ -102,7 +101,7 @@ def choose(
 def _choose_users(
     name: str, method: str | Tableau | None, increments: int | None, rates: bool, previous: int
 ) -> Choice:
-    """Load a user's algorithm with the options that are given."""
+    """Load a user's algorithm with the options that the user chose."""
     if rates:
         raise InputError(f"{name}: an algorithm of a user takes increments, not rates")
     options: dict[str, Any] = {}
@@ -139,6 +138,6 @@ def choose_step(
 
 
 def standard() -> list[Choice]:
-    """Return the standard catalogue: every algorithm by the thesis's methods on two increments, and all else."""
+    """Return the standard catalogue: attitude steps by the thesis's methods on two increments, and other kernels."""
     steps = [Choice(algorithm, method, 2) for algorithm in ALGORITHMS for method in STANDARD_METHODS]
     return steps + [Choice(name) for name, recipe in KERNELS.items() if recipe.standard]

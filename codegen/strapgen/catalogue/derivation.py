@@ -1,4 +1,4 @@
-"""What a choice stands for: its kernel derived exactly, and its method."""
+"""Deriving the kernel of a choice, and what is known of its method beforehand."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from strapgen.catalogue.methods.method import Method
     from strapgen.symbolic.kernel import Kernel
 
-#: Where the modules lie that `names` tells of.
+#: The package of the modules in `names`.
 _PACKAGE = __name__.rpartition(".")[0]
 
 
@@ -28,7 +28,7 @@ def nodes(choice: Choice) -> tuple[Number, ...]:
 
 
 def rounding(choice: Choice) -> Fraction:
-    """Return by how much published coefficients of a chosen method may be off, which are rounded: mostly 0."""
+    """Return the largest rounding error of a method's published coefficients; 0 if they are exact, as most are."""
     method = choice.method
     if isinstance(method, str):
         method = TABLEAUX.get(method)
@@ -36,7 +36,7 @@ def rounding(choice: Choice) -> Fraction:
 
 
 def enough(method: str | Tableau) -> int:
-    """Return how many increments a step needs for the order of its method.
+    """Return the smallest number of increments with which a step reaches the order of its method.
 
     Examples
     --------
@@ -77,20 +77,20 @@ def derive(choice: Choice) -> Kernel:
 
 
 def companion(kernel: Kernel, name: str) -> Kernel:
-    """Return a kernel that goes with a step: one that it brings, or one of the catalogue.
+    """Return a kernel that a step needs: the user's own if there is one, else that of the catalogue.
 
     Parameters
     ----------
     kernel : Kernel
         An attitude step.
     name : str
-        Product, orthonormalization or attitude, as its `companions` name them.
+        Name of the product, orthonormalization or attitude kernel in the step's `companions`.
     """
     return next((brought for brought in kernel.own if brought.name == name), None) or derive(Choice(name))
 
 
 def _method(method: str | Tableau) -> Method:
-    """Load a method by its name, or make one of a tableau."""
+    """Load a method by its name or from its tableau."""
     from strapgen.catalogue.methods import runge_kutta
 
     if isinstance(method, Tableau):

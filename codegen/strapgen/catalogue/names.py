@@ -1,4 +1,4 @@
-"""The names of the catalogue: plain data, so that listing and checking them imports no computer algebra."""
+"""The catalogue's names as plain data: listing and checking them needs no computer algebra."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ ALGORITHMS = {
 
 
 class Integrator(NamedTuple):
-    """A method without tableau: a module of the catalogue whose ``method`` makes it of its arguments, or its order."""
+    """A method without a tableau; ``method(*arguments)``, or ``method(order)``, of its module returns it."""
 
     title: str
     module: str
@@ -66,10 +66,10 @@ INTEGRATORS = {
 #: Integration methods.
 METHODS = {**TITLES, **{name: integrator.title for name, integrator in INTEGRATORS.items()}}
 
-#: Methods of the standard catalogue: the thesis's.
+#: Methods of the standard catalogue, which are those of the thesis.
 STANDARD_METHODS = ("rk1", "rk2", "rk3", "rk4")
 
-#: Most angle increments that one step may take, and most that it may keep from the steps before.
+#: Largest number of angle increments in a step, and of increments from before the step that it can use.
 MOST_INCREMENTS = 8
 MOST_PREVIOUS = 3
 
@@ -83,7 +83,7 @@ MOTIONS = {
 
 
 class Recipe(NamedTuple):
-    """Where a kernel that takes no method is derived: a module of the catalogue, a function, its arguments."""
+    """A kernel that takes no method: the module, the function and its arguments that derive it."""
 
     title: str
     module: str
@@ -92,7 +92,7 @@ class Recipe(NamedTuple):
     standard: bool = True
 
 
-#: Orders of the updates that are cut off.
+#: Orders at which the series of an update can be cut off.
 UPDATE_ORDERS = range(1, 21)
 
 #: Kernels of algorithms in two speeds that are in the standard catalogue; their variants are not.
@@ -254,7 +254,7 @@ KERNELS = {
 
 
 class StepVector(NamedTuple):
-    """A vector of one step, by a method: a module of the catalogue, a function, modules of methods that go with it."""
+    """A vector of a step: the module and function that derive it, and the modules of the methods that it can use."""
 
     title: str
     module: str
@@ -264,11 +264,11 @@ class StepVector(NamedTuple):
 
     @property
     def methods(self) -> list[str]:
-        """Names of the methods that go with it."""
+        """Names of the methods that can compute it."""
         return [name for name, integrator in INTEGRATORS.items() if integrator.module in self.families]
 
 
-#: Vectors of a step that are derived by a method.
+#: Vectors of a step that a method computes.
 VECTORS = {
     "rotation-vector": StepVector(
         "rotation vector of a step",
@@ -287,5 +287,5 @@ VECTORS = {
 }
 
 
-#: Names that no algorithm of a user may have.
+#: Names that a user's algorithm cannot have.
 RESERVED = (*ALGORITHMS, *VECTORS, *KERNELS)

@@ -1,7 +1,8 @@
-"""Options of the program itself."""
+"""Options of the program itself, before the name of a command: --version and --verbose."""
 
 from __future__ import annotations
 
+import logging
 import platform
 from importlib.metadata import PackageNotFoundError, version
 from typing import Annotated
@@ -13,8 +14,8 @@ import strapgen
 _SHAPES_OUTPUT = ("sympy", "numpy", "jinja2", "cffi", "typer", "rich")
 
 
-def _show(wanted: bool) -> None:
-    if not wanted:
+def _show(chosen: bool) -> None:
+    if not chosen:
         return
     lines = [f"strapgen {strapgen.__version__}", f"python {platform.python_version()}"]
     for name in _SHAPES_OUTPUT:
@@ -41,12 +42,31 @@ def _compiler() -> str:
     return said.splitlines()[0] if said else path
 
 
+def _log_stages(context: typer.Context) -> None:
+    """Write the log of the stages to stderr, a line each, until the command ends."""
+    logger, handler = logging.getLogger("strapgen"), logging.StreamHandler()
+    level = logger.level
+    logger.addHandler(handler)
+    logger.setLevel(logging.INFO)
+
+    def stop() -> None:
+        logger.removeHandler(handler)
+        logger.setLevel(level)
+
+    context.call_on_close(stop)
+
+
 def options(
+    context: typer.Context,
     show_version: Annotated[
         bool,
         typer.Option(
             "--version", callback=_show, is_eager=True, help="Show all versions that shape the output."
         ),
+    ] = False,
+    verbose: Annotated[
+        bool,
+        typer.Option("--verbose", help="Show on stderr how long each stage takes, and what the cache holds."),
     ] = False,
 ) -> None:
     """Derive strapdown attitude algorithms, generate numpy and C code for them, and test it against truth.
@@ -54,3 +74,5 @@ def options(
     Example: strapgen simulate euler --backend c --motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10
     --step 0.125 --duration 180
     """
+    if verbose:
+        _log_stages(context)

@@ -11,31 +11,26 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen import catalogue
-from strapgen.backends import BACKENDS, Backend, exact, of
+from strapgen.backends import BACKENDS, DEFAULT_BACKENDS, Backend, chosen_step
+from strapgen.backends import backend as attitude_backend
 from strapgen.catalogue import Choice
 from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.ir.fixed_settings import Settings
-from strapgen.library import generated_sources
 from strapgen.simulation.runs import attitude, drift_between, require_finite
 from strapgen.support import checks
-from strapgen.support.exceptions import InputError
+from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.targets import FIXED
 from strapgen.toolchain import compiler
 
 Array = NDArray[np.float64]
 
-#: What may be compared with: any back end, or arithmetic of many digits.
-EXACT = "exact"
-#: Back ends that are compared by default.
-DEFAULT = ("numpy", "c", "c-float", "c-q31", "c-q15")
-#: Runs that are timed; the shortest counts.
+#: Number of timed runs, of which the shortest counts.
 _TIMED = 3
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """What a back end does to an algorithm.
+    """A back end beside a reference.
 
     Parameters
     ----------
@@ -43,18 +38,18 @@ class Comparison:
     max_abs_rad, rms_rad : float
         Largest and root-mean-square angle from the reference's attitude over all steps, in rad.
     max_ulp : float
-        Largest difference of an element of the state, in units of the last place of the back end's format near 1.
+        Largest difference of an element of the state, in units in the last place of the back end's format near 1.
     bound_rad : float or None
-        Certified bound of `max_abs_rad` in fixed point, against exact arithmetic on the given increments; None in
-        floating point, and where no bound of use is known.
+        Certified bound of `max_abs_rad` in fixed point, against exact arithmetic on the increments of the run; None in
+        floating point, and where no useful bound is known.
     drift_deg : float
         Mean drift (thesis, chapter 5) from the truth, or from the reference where the truth is not known, in deg.
     ns_per_step : float
-        Time of a step in a run with all states kept, in nanoseconds.
+        Time of a step in nanoseconds, in a run that records all states.
     bytes : int or None
-        Code and constants in object code; None for Python.
+        Size of code and constants in object code; None for Python.
     operations : dict of str to int
-        Operations of a step by kind.
+        Number of operations of a step by kind.
     """
 
     backend: str
@@ -73,33 +68,34 @@ class Comparison:
 
 
 def compare(
-    algorithm: str,
-    method: str | Tableau | None,
-    samples: int | None,
-    backends: Sequence[str],
-    increments: Any,
+    algorithm: str | Choice,
+    method: str | Tableau | None = None,
+    samples: int | None = None,
+    backends: Sequence[str] = DEFAULT_BACKENDS,
+    increments: Any = None,
     *,
     reference: str = "numpy",
     truth: Array | None = None,
     settings: Settings | None = None,
-    previous: int = 0,
 ) -> list[Comparison]:
-    """Run an algorithm on several back ends and hold each against a reference.
+    """Run an algorithm on several back ends and compare each with a reference.
 
     Parameters
     ----------
-    algorithm, method, samples, previous
-        As for `strapgen.backend`; samples are the increments of a step.
-    backends : sequence of str
-        Keys of `BACKENDS`.
+    algorithm, method
+        As for `strapgen.backend`. A choice also says how many increments from before a step it takes.
+    samples : int, optional
+        Number of increments per step.
+    backends : sequence of str, optional
+        Keys of `BACKENDS`; by default all but the slow ones.
     increments : array_like, (N, K, 3)
-        Angle increments of N steps in rad; every back end is given the same ones and rounds them to its own format.
+        Angle increments of N steps in rad; every back end rounds the same ones to its own format.
     reference : str, optional
-        A back end, or "exact".
+        A key of `BACKENDS`; "exact" shows all rounding.
     truth : array, (1 + N, 3, 3), optional
         True direction cosine matrices.
     settings : Settings, optional
-        What fixed point is made for; by default increments of the size of these.
+        Settings of fixed point; by default for increments of the size of these.
 
     Returns
     -------
@@ -108,8 +104,9 @@ def compare(
 
     Raises
     ------
-    InputError
-        If a name is not allowed, or a run leaves the range of a back end's numbers.
+    InputError, InputTypeError
+        If a name is not allowed, the increments are missing or do not fit, or a run leaves the range of a back end's
+        numbers.
 
     Examples
     --------
@@ -117,54 +114,45 @@ def compare(
     >>> [row.backend for row in rows], rows[0].max_abs_rad
     (['numpy', 'c'], 0.0)
     """
-    choice = catalogue.choose_step(algorithm, method, samples, previous=previous)
-    return compare_choice(choice, backends, increments, reference=reference, truth=truth, settings=settings)
-
-
-def compare_choice(
-    choice: Choice,
-    backends: Sequence[str],
-    increments: Any,
-    *,
-    reference: str = "numpy",
-    truth: Array | None = None,
-    settings: Settings | None = None,
-) -> list[Comparison]:
-    """Run a chosen attitude step on several back ends; parameters and errors are those of `compare`."""
+    choice = chosen_step(algorithm, method, samples)
     for name in backends:
         checks.choice("backend", name, BACKENDS)
-    checks.choice("reference", reference, [*BACKENDS, EXACT])
+    checks.choice("reference", reference, BACKENDS)
     if not backends:
         raise InputError("no back end is named; at least one is needed")
+    if increments is None:
+        raise InputTypeError("increments is None; an array (steps, samples, 3) in rad is needed")
     d = np.asarray(increments, np.float64)
-    chosen = (settings or Settings()).for_increments(float(np.abs(d).max(initial=0.0)))
+    fixed = (settings or Settings()).for_increments(float(np.abs(d).max(initial=0.0)))
 
-    def make(name: str) -> Backend:
-        own = chosen if BACKENDS[name].target in FIXED else None
-        return of(choice, name, settings=own)
+    def load(name: str) -> Backend:
+        return attitude_backend(
+            choice, backend=name, settings=fixed if BACKENDS[name].target in FIXED else None
+        )
 
-    wanted = _reference(make, choice, reference, d)
-    matrices = attitude(make("numpy"), wanted)
-    return [_compared(make(name), d, wanted, matrices, truth) for name in backends]
-
-
-def _reference(make: Any, choice: Choice, reference: str, increments: Array) -> Array:
-    """Return the states of the reference, in double."""
-    if reference == EXACT:
-        return exact.propagate(generated_sources.program(choice), increments)
-    backend = make(reference)
-    states: Array = backend.propagate(increments).astype(np.float64)
-    require_finite(backend, states, np.arange(len(states), dtype=np.float64))
-    return states
+    standard = load(reference)
+    states: Array = standard.propagate(d).astype(np.float64)
+    require_finite(standard, states, np.arange(len(states), dtype=np.float64))
+    matrices = attitude(standard, states)
+    return [
+        _compared(load(name), d, states, matrices, truth, 1 if BACKENDS[name].slow else _TIMED)
+        for name in backends
+    ]
 
 
 def _compared(
-    candidate: Backend, increments: Array, wanted: Array, matrices: Array, truth: Array | None
+    candidate: Backend,
+    increments: Array,
+    reference: Array,
+    matrices: Array,
+    truth: Array | None,
+    timed: int,
 ) -> Comparison:
+    """Compare a back end with the states and the attitudes of the reference."""
     steps = len(increments)
     states = candidate.propagate(increments)
     run, seconds = candidate.prepared(increments), math.inf
-    for _ in range(_TIMED if candidate.name != "fixed-model" else 1):
+    for _ in range(timed):
         start = time.perf_counter()
         run()
         seconds = min(seconds, time.perf_counter() - start)
@@ -176,8 +164,8 @@ def _compared(
         candidate.name,
         float(angles.max()),
         float(np.sqrt(np.mean(angles**2))),
-        float(np.abs(states.astype(np.float64) - wanted).max() / candidate.unit),
-        certified_angle(candidate, increments, wanted),
+        float(np.abs(states.astype(np.float64) - reference).max() / candidate.unit),
+        certified_angle(candidate, increments, reference),
         math.degrees(float(np.linalg.norm(np.abs(drifts).max(axis=0)))),
         seconds / max(1, steps) * 1e9,
         compiler.code_size(candidate.sources),
@@ -185,31 +173,31 @@ def _compared(
     )
 
 
-def certified_angle(candidate: Backend, increments: Array, wanted: Array) -> float | None:
+def certified_angle(candidate: Backend, increments: Array, reference: Array) -> float | None:
     """Return the certified bound of the angle between a run in fixed point and the exact one.
 
-    The angle is measured as the length of the drift vector, the skew-symmetric part of the product of one matrix and
-    the other one's transpose. With states that differ by at most b in length, and reference states of at most length s,
-    it is at most sqrt(3/2) s b for rows of matrices, and 2 s b (s^2 + s b) for Euler parameters.
+    The angle is the length of the drift vector, the skew-symmetric part of the product of one matrix and the transpose
+    of the other. Where states differ by at most b in length, and reference states have at most length s, it is at most
+    sqrt(3/2) s b for rows of matrices, and 2 s b (s^2 + s b) for Euler parameters.
 
     Parameters
     ----------
     candidate : Backend
     increments : array, (N, K, 3)
-    wanted : array, (1 + N, state shape)
+    reference : array, (1 + N, state shape)
         States of the exact run.
 
     Returns
     -------
     float or None
-        In rad; None in floating point, and where no bound of use is known.
+        In rad; None in floating point, and where no useful bound is known.
     """
     rounded = not np.array_equal(candidate.representable(increments), increments)
     length = candidate.rounding_bound(len(increments), rounded)
     if length is None or not math.isfinite(length):
         return None
     if candidate.attitude is None:
-        size = float(np.linalg.norm(wanted, ord=2, axis=(-2, -1)).max())
+        size = float(np.linalg.norm(reference, ord=2, axis=(-2, -1)).max())
         return math.sqrt(1.5) * size * length
-    size = float(np.linalg.norm(wanted, axis=-1).max())
+    size = float(np.linalg.norm(reference, axis=-1).max())
     return 2 * size * length * (size**2 + size * length)

@@ -1,4 +1,4 @@
-"""The standard behaviour of an attitude step: what any algorithm has to do, measured."""
+"""The standard behaviour of an attitude step: measurements that any algorithm has to pass."""
 
 from __future__ import annotations
 
@@ -11,44 +11,46 @@ import mpmath
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen import fixedpoint, pipeline
-from strapgen.backends import Backend, exact, of
+from strapgen import fixedpoint
+from strapgen.backends import Backend, exact
+from strapgen.backends import backend as attitude_backend
 from strapgen.backends.exact import interpreter
 from strapgen.backends.increments import windows
 from strapgen.catalogue import Choice
 from strapgen.experiments.comparison import certified_angle
 from strapgen.experiments.convergence import converge
+from strapgen.ir.attitude_step import Companions
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.program import Program
+from strapgen.library import generated_sources
 from strapgen.simulation.exact_attitudes import step_of_increments
 from strapgen.simulation.motions import GENERAL, motion
 from strapgen.simulation.runs import attitude, drift_between, simulate
 from strapgen.support.exceptions import CompilerError, InputError
-from strapgen.symbolic.kernel import Kernel
 
-#: How far an observed order may be from the one of theory.
+#: Largest allowed difference of an observed order from the one of theory.
 ORDER_WITHIN = 0.15
 #: Largest departure from an identity that holds exactly, in arithmetic of many digits.
 _EXACTLY = 1e-25
-#: Units of the last place that rounding adds to an attitude in a step, as a bound for short formulas.
+#: Units in the last place that rounding adds to an attitude in a step; a bound for short formulas.
 _UNITS_A_STEP = 64
 _STEPS = 200
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One behaviour.
+    """The outcome of one check.
 
     Parameters
     ----------
     name : str
-        What is looked at.
+        Name of the check.
     holds : bool or None
-        Whether it is as it must be; None where there is nothing that it must be, or it could not be looked at.
+        Whether the step passes; None where nothing is required, or nothing could be measured.
     text : str
-        What was measured, in words.
+        The measurement in words.
     measured, allowed : float or None
-        The figure, and the largest that is allowed.
+        The measured figure, and the largest that passes.
     """
 
     name: str
@@ -63,7 +65,7 @@ class Finding:
 
 
 def check(choice: Choice) -> Iterator[Finding]:
-    """Look at an attitude step as a user of it would, and yield what is found.
+    """Check the behaviour of an attitude step as its user sees it.
 
     Parameters
     ----------
@@ -82,12 +84,13 @@ def check(choice: Choice) -> Iterator[Finding]:
     Examples
     --------
     >>> from strapgen.catalogue import choose
-    >>> found = {finding.name: finding.holds for finding in check(choose("euler"))}
-    >>> found["order"], found["at rest"]
+    >>> holds = {finding.name: finding.holds for finding in check(choose("euler"))}
+    >>> holds["order"], holds["at rest"]
     (True, True)
     """
-    step = _Precise(step_of_increments(choice))
-    looks: dict[str, Callable[[], Iterable[Finding]]] = {
+    step_of_increments(choice)  # refuses what is no such step
+    step = _Precise(generated_sources.program(choice))
+    checks: dict[str, Callable[[], Iterable[Finding]]] = {
         "no rotation": lambda: [_no_rotation(step)],
         "at rest": lambda: [_at_rest(step)],
         "direction": lambda: [_direction(step)],
@@ -97,10 +100,10 @@ def check(choice: Choice) -> Iterator[Finding]:
         "back ends": lambda: _back_ends(choice, step.program),
         "orthonormalization": lambda: [_restoring(choice, step)],
     }
-    for name, look in looks.items():
+    for name, measure in checks.items():
         try:
-            yield from look()
-        # Of the algorithm: a division by zero, a number out of range.
+            yield from measure()
+        # Errors of the algorithm: a division by zero, a number out of range.
         except (ArithmeticError, ValueError) as error:
             yield Finding(name, False, f"it stops with {type(error).__name__}: {error or 'division by zero'}")
 
@@ -108,15 +111,12 @@ def check(choice: Choice) -> Iterator[Finding]:
 class _Precise:
     """A step and its attitude in many digits."""
 
-    def __init__(self, kernel: Kernel) -> None:
-        companions = kernel.companions
-        assert companions is not None, "checked before"
-        self.program = pipeline.lower(kernel)
-        self.identity = companions.identity
-        self.restoring = companions.orthonormalize
-        self._attitude = (
-            None if companions.attitude is None else interpreter(companions.attitude, self.program)
-        )
+    def __init__(self, program: Program) -> None:
+        self.program = program
+        kernels = _step_kernels(program)
+        self.identity = kernels.identity
+        self.restoring = kernels.orthonormalize
+        self._attitude = None if kernels.attitude is None else interpreter(kernels.attitude, program)
 
     def attitude(self, state: list[Any]) -> Any:
         """Return the direction cosine matrix of a state."""
@@ -124,7 +124,7 @@ class _Precise:
         return mpmath.matrix([elements[3 * row : 3 * row + 3] for row in range(3)])
 
     def run(self, increments: NDArray[np.float64], turn: Any = None) -> list[list[Any]]:
-        """Return the states of a run from zero rotation, all increments turned by a matrix first."""
+        """Return the states of a run from zero rotation; the matrix `turn` rotates all increments first."""
         rows = []
         for vectors in increments:
             row: list[Any] = []
@@ -135,20 +135,28 @@ class _Precise:
         return exact.states(self.program, rows, [exact.number(x) for x in self.identity])
 
 
+def _step_kernels(program: Program) -> Companions:
+    """Return the kernels of an attitude step."""
+    if program.companions is None:
+        raise InputError(f"kernel {program.kernel} is no attitude step")
+    return program.companions
+
+
 def _samples(program: Program) -> int:
+    """Return the number of increments that a step takes in all."""
     return program.inputs[1].shape[0]
 
 
 def _random(program: Program, steps: int, size: float = 0.02) -> NDArray[np.float64]:
-    """Return increments that an algorithm with kept samples may see too: those of a window repeat in the next."""
-    companions = program.companions
-    assert companions is not None, "checked before"
-    previous, taken = companions.previous, _samples(program)
-    row = np.random.default_rng(1969).uniform(-size, size, (previous + steps * (taken - previous), 3))
-    return windows(row, taken - previous, previous)
+    """Return random increments; a step that takes increments from before it sees those of the step before."""
+    previous = _step_kernels(program).previous
+    count = _samples(program) - previous
+    row = np.random.default_rng(1969).uniform(-size, size, (previous + steps * count, 3))
+    return windows(row, count, previous)
 
 
 def _exact_finding(name: str, off: Any, holds: str, fails: str) -> Finding:
+    """Return the finding on an identity that holds but for the rounding of many digits."""
     off = float(off)
     fine = off <= _EXACTLY
     return Finding(name, fine, holds if fine else f"{fails}, off by {off:.3g}", off, _EXACTLY)
@@ -180,15 +188,15 @@ def _at_rest(step: _Precise) -> Finding:
 
 
 def _direction(step: _Precise) -> Finding:
-    """Compare a small rotation with the truth and with its opposite: a sign that is wrong shows here by name."""
-    taken = _samples(step.program)
-    own = taken - (step.program.companions.previous if step.program.companions else 0)
+    """Compare a small rotation with the true one and with its opposite, which tells a wrong sign."""
+    samples = _samples(step.program)
+    count = samples - _step_kernels(step.program).previous
     worst, mirrored = 0.0, math.inf
     size = 0.01
     with mpmath.workdps(exact.DIGITS):
         for axis in range(3):
-            increments = np.zeros((1, taken, 3))
-            increments[..., axis] = size / own
+            increments = np.zeros((1, samples, 3))
+            increments[..., axis] = size / count
             matrix = step.attitude(step.run(increments)[-1])
             i, j = (axis + 1) % 3, (axis + 2) % 3
             turned = float(matrix[j, i] - matrix[i, j]) / 2
@@ -204,7 +212,7 @@ def _direction(step: _Precise) -> Finding:
 
 
 def _turning_frame(step: _Precise) -> Finding:
-    """Turn all increments by a rotation: every attitude must turn with them."""
+    """Rotate all increments: every attitude must rotate with them."""
     increments = _random(step.program, 5)
     with mpmath.workdps(exact.DIGITS):
         u = [mpmath.mpf(x) for x in ("0.48", "-0.6", "0.64")]  # of length 1
@@ -223,24 +231,24 @@ def _turning_frame(step: _Precise) -> Finding:
 
 
 def _order(choice: Choice) -> Finding:
-    found = converge(choice, motion("coning", **GENERAL), ["1/8", "1/16", "1/32", "1/64", "1/128"], 1)
-    if found.observed is None:
-        return Finding("order", False, f"no order is seen: {found.hidden}")
-    if found.predicted is None:
-        text = f"observed {found.observed:.3f}; the kernel states none to compare with"
-        return Finding("order", None, text, found.observed)
-    off = abs(found.observed - found.predicted)
-    text = f"observed {found.observed:.3f}, stated {found.predicted}"
-    return Finding("order", off <= ORDER_WITHIN, text, found.observed, ORDER_WITHIN)
+    ladder = converge(choice, motion("coning", **GENERAL), ["1/8", "1/16", "1/32", "1/64", "1/128"], 1)
+    if ladder.observed is None:
+        return Finding("order", False, f"no order is seen: {ladder.hidden}")
+    if ladder.predicted is None:
+        text = f"observed {ladder.observed:.3f}; the kernel states none to compare with"
+        return Finding("order", None, text, ladder.observed)
+    off = abs(ladder.observed - ladder.predicted)
+    text = f"observed {ladder.observed:.3f}, stated {ladder.predicted}"
+    return Finding("order", off <= ORDER_WITHIN, text, ladder.observed, ORDER_WITHIN)
 
 
 def _long_run(choice: Choice) -> Iterator[Finding]:
     """Run the thesis's coning of 10 deg/s, 180 s in steps of 1/8 s."""
-    ready = of(choice)
+    backend = attitude_backend(choice)
     profile = motion("coning", a_deg_s=10, b_deg_s=10, g_deg_s=10)
     try:
         with np.errstate(all="ignore"):
-            run = simulate(ready, profile, "0.125", 180)
+            run = simulate(backend, profile, "0.125", 180)
     except InputError as error:
         yield Finding("drift", False, f"coning at 10 deg/s for 180 s: {error}")
         return
@@ -256,35 +264,36 @@ def _long_run(choice: Choice) -> Iterator[Finding]:
 def _back_ends(choice: Choice, program: Program) -> Iterator[Finding]:
     increments = _random(program, _STEPS)
     exact_states = exact.propagate(program, increments)
-    wanted = attitude(of(choice), exact_states)
+    exact_matrices = attitude(attitude_backend(choice), exact_states)
 
-    def angle(states: Any, ready: Backend) -> float:
-        return float(np.linalg.norm(drift_between(attitude(ready, states), wanted), axis=-1).max())
+    def angle(states: Any, backend: Backend) -> float:
+        drift = drift_between(attitude(backend, states), exact_matrices)
+        return float(np.linalg.norm(drift, axis=-1).max())
 
     for name in ("numpy", "c", "c-float"):
         try:
-            ready = of(choice, name)
+            backend = attitude_backend(choice, backend=name)
         except CompilerError as error:
             yield Finding(f"back end {name}", None, f"not looked at: {error}")
             continue
-        states = ready.propagate(increments)
-        off, allowed = angle(states, ready), _UNITS_A_STEP * _STEPS * ready.unit
+        states = backend.propagate(increments)
+        off, allowed = angle(states, backend), _UNITS_A_STEP * _STEPS * backend.unit
         text = f"{_STEPS} steps: {off:.3g} rad from exact arithmetic"
         yield Finding(f"back end {name}", off <= allowed, text, off, allowed)
-        yield _loop(ready, increments, states)
+        yield _loop(backend, increments, states)
     yield _fixed(choice, program, increments, exact_states, angle)
 
 
-def _loop(ready: Backend, increments: NDArray[np.float64], states: Any) -> Finding:
-    """Hold the loop over steps against single steps."""
-    state = ready.identity
+def _loop(backend: Backend, increments: NDArray[np.float64], states: Any) -> Finding:
+    """Compare the loop over steps with single steps."""
+    state = backend.identity
     off = 0.0
     for row, looped in zip(increments[:20], states[1:], strict=False):
-        state = ready.step(state, row.astype(ready.dtype))
+        state = backend.step(state, row.astype(backend.dtype))
         off = max(off, float(np.abs(state - looped).max()))
-    allowed = _UNITS_A_STEP * 20 * ready.unit if ready.name == "numpy" else 0.0
+    allowed = _UNITS_A_STEP * 20 * backend.unit if backend.name == "numpy" else 0.0
     text = f"20 steps at once and one by one differ by {off:.3g}"
-    return Finding(f"loop {ready.name}", off <= allowed, text, off, allowed)
+    return Finding(f"loop {backend.name}", off <= allowed, text, off, allowed)
 
 
 def _fixed(
@@ -299,11 +308,11 @@ def _fixed(
         return Finding(name, None, "no fixed point: an input has no stated bound, or an operation is unknown")
     try:
         settings = Settings().fitted(float(np.abs(increments).max()))
-        ready = of(choice, "c-q31", settings=settings)
-        off = angle(ready.propagate(increments), ready)
+        backend = attitude_backend(choice, backend="c-q31", settings=settings)
+        off = angle(backend.propagate(increments), backend)
     except (InputError, CompilerError) as error:
         return Finding(name, None, f"no fixed point: {error}")
-    allowed = certified_angle(ready, increments, exact_states)
+    allowed = certified_angle(backend, increments, exact_states)
     if allowed is None:
         return Finding(name, None, f"{_STEPS} steps: {off:.3g} rad, without a certified bound", off)
     text = f"{_STEPS} steps: {off:.3g} rad from exact arithmetic"
@@ -311,20 +320,20 @@ def _fixed(
 
 
 def _restoring(choice: Choice, step: _Precise) -> Finding:
-    """Restore a disturbed state: its attitude must be a rotation again, but for the square of what was wrong."""
+    """Restore a disturbed state: its attitude must be a rotation again, up to the square of the disturbance."""
     name = "orthonormalization"
     if step.restoring is None:
         return Finding(name, None, "there is none")
-    ready = of(choice)
-    state = np.asarray(ready.propagate(_random(step.program, 20))[-1])
+    backend = attitude_backend(choice)
+    state = np.asarray(backend.propagate(_random(step.program, 20))[-1])
     state = state + 1e-4 * np.random.default_rng(1984).standard_normal(state.shape)
 
     def defect(state: Any) -> float:
-        matrix = attitude(ready, state)
+        matrix = attitude(backend, state)
         return float(np.abs(matrix @ matrix.T - np.eye(3)).max())
 
-    # A scheme may be of first order: what it leaves is of the order of the square of what was there.
-    before, after = defect(state), defect(ready.orthonormalize(state))
-    allowed = 2 * before**2 + _UNITS_A_STEP * ready.unit
+    # A scheme may be of first order, which leaves a defect of the order of the square of the one before.
+    before, after = defect(state), defect(backend.orthonormalize(state))
+    allowed = 2 * before**2 + _UNITS_A_STEP * backend.unit
     text = f"C C' departs from the unit matrix by {before:.3g} before, {after:.3g} after"
     return Finding(name, after <= allowed, text, after, allowed)

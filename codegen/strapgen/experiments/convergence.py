@@ -7,14 +7,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from fractions import Fraction
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import mpmath
 import numpy as np
 
 from strapgen import catalogue
-from strapgen.backends import BACKENDS, exact, of
-from strapgen.backends.exact import EXACT
+from strapgen.backends import BACKENDS, exact
+from strapgen.backends import backend as attitude_backend
 from strapgen.catalogue import Choice
 from strapgen.ir.attitude_step import Order
 from strapgen.ir.fixed_settings import Settings
@@ -25,12 +25,9 @@ from strapgen.support import checks
 from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.targets import FIXED
 
-if TYPE_CHECKING:
-    pass
-
-#: Finest steps, of those whose error is truncation, that the slope is fitted to.
+#: Number of steps that the slope is fitted to: the finest of those whose error is truncation.
 FITTED = 3
-#: Errors beyond this are no beginning of a series, in rad.
+#: Largest error in rad that the slope is fitted to; beyond it, the terms after the first count too.
 _MOST_ERROR = 0.3
 
 
@@ -45,7 +42,7 @@ class Rung:
     error_rad : float or None
         Largest error over the run; None where the run left the range of the back end's numbers.
     slope : float or None
-        Slope from the rung before.
+        Slope between the previous rung and this one.
     used : bool
         Whether the observed order is fitted to it.
     """
@@ -64,12 +61,12 @@ class Convergence:
     ----------
     kernel, backend : str
     order : Order or None
-        What theory says; None where a user's algorithm does not.
+        Orders in theory; None where a user's algorithm states none.
     rungs : tuple of Rung
         From the longest step to the shortest.
     observed : float or None
-        Slope of the logarithm of the error, fitted to the finest rungs whose error is truncation; None where rounding
-        hides it.
+        Slope of the logarithm of the error, fitted to the finest rungs whose error is truncation; None where no two
+        rungs show it.
     """
 
     kernel: str
@@ -80,7 +77,7 @@ class Convergence:
 
     @property
     def hidden(self) -> str:
-        """Why there is no observed order; "" if there is one."""
+        """The reason why there is no observed order; "" if there is one."""
         errors = [rung.error_rad for rung in self.rungs if rung.error_rad is not None]
         if self.observed is not None:
             return ""
@@ -117,28 +114,28 @@ def converge(
     motion: Motion,
     steps: Sequence[float | str | Fraction],
     duration: float | str | Fraction,
-    backend: str = EXACT,
+    backend: str = "exact",
     settings: Settings | None = None,
 ) -> Convergence:
-    """Run an algorithm on a motion with a ladder of steps and fit the order.
+    """Run an algorithm on a motion with a ladder of steps, and fit the order.
 
-    The error is the largest distance over the run of the computed matrix from the true one, as the root of half the sum
-    of the squares of all elements: for a pure drift its angle in rad; scale and skew count too.
+    The error of a run is the largest distance of the computed matrix from the true one, the root of half the sum of the
+    squares of all elements. For a pure drift it is the angle in rad; scale and skew count too.
 
     Parameters
     ----------
     choice : Choice
         An attitude step that takes increments.
     motion : Motion
-        A motion whose rate changes direction shows the order; on others an algorithm may do better.
+        A motion whose rate changes direction, to show the order; on others an algorithm may do better.
     steps : sequence of number
         Steps in s, each a divisor of the duration.
     duration : number
         In s.
     backend : str, optional
-        A key of `BACKENDS`, or "exact": arithmetic of many digits, which shows the order of any method.
+        A key of `BACKENDS`. "exact" shows the order of any method, since its rounding cannot be seen.
     settings : Settings, optional
-        What fixed point is made for, by default the increments of each run.
+        Settings of fixed point, by default for the increments of each run.
 
     Returns
     -------
@@ -147,17 +144,17 @@ def converge(
     Raises
     ------
     InputError
-        If a name or number is not allowed, or fewer than two steps are given.
+        If a name or number is not allowed, or there are fewer than two steps.
 
     Examples
     --------
     >>> from strapgen import motion
     >>> coning = motion("coning", a_rad_s=1, b_rad_s=2, g_rad_s=0.5)
-    >>> found = converge(catalogue.choose("euler", "rk2", 2), coning, ["1/8", "1/16", "1/32"], 1)
-    >>> found.predicted, round(found.observed, 1)
+    >>> ladder = converge(catalogue.choose("euler", "rk2", 2), coning, ["1/8", "1/16", "1/32"], 1)
+    >>> ladder.predicted, round(ladder.observed, 1)
     (2, 2.0)
     """
-    checks.choice("backend", backend, [*BACKENDS, EXACT])
+    checks.choice("backend", backend, BACKENDS)
     kernel = step_of_increments(choice)
     total = checks.number("duration", duration, positive=True)
     if isinstance(steps, str):
@@ -166,8 +163,8 @@ def converge(
     if len(lengths) < 2:
         raise InputError("a slope takes two steps or more; give different ones")
     counts = [checks.multiple("duration", total, "step", length) for length in lengths]
-    if backend == EXACT:
-        measure = _exactly(choice, motion, float(catalogue.rounding(choice)))
+    if BACKENDS[backend].many_digits:
+        measure = _in_many_digits(choice, motion, float(catalogue.rounding(choice)))
     else:
         measure = _on_backend(choice, motion, total, backend, settings)
     rungs = []
@@ -189,17 +186,18 @@ def _fitted(
     if len(chosen) > 1:
         logs = np.array([(math.log(rungs[k][0]), math.log(rungs[k][1] or 1.0)) for k in chosen])
         observed = float(np.polyfit(logs[:, 0], logs[:, 1], 1)[0])
-    made = tuple(Rung(length, error, slopes[k], k in chosen) for k, (length, error, _) in enumerate(rungs))
-    return Convergence(kernel, backend, order, made, observed)
+    ladder = tuple(Rung(length, error, slopes[k], k in chosen) for k, (length, error, _) in enumerate(rungs))
+    return Convergence(kernel, backend, order, ladder, observed)
 
 
+#: Takes a step length and the number of steps; returns the error of the run and the error that rounding may cause.
 _Measure = Callable[[Fraction, int], tuple[float | None, float]]
 
 
 def _on_backend(
     choice: Choice, motion: Motion, total: Fraction, backend: str, settings: Settings | None
 ) -> _Measure:
-    """Return what measures the error of a step length on a back end, and the error that rounding may make."""
+    """Return the function that measures a step length on a back end."""
     samples, previous = choice.increments_per_step, choice.previous
 
     def measure(length: Fraction, count: int) -> tuple[float | None, float]:
@@ -207,22 +205,22 @@ def _on_backend(
         if BACKENDS[backend].target in FIXED:
             largest = largest_increment(motion, length, total, samples, previous=previous)
             chosen = (settings or Settings()).fitted(largest)
-        ready = of(choice, backend, settings=chosen)
+        stepper = attitude_backend(choice, backend=backend, settings=chosen)
         try:
-            run = simulate(ready, motion, length, total)
+            run = simulate(stepper, motion, length, total)
         except InputError:  # the state leaves the range of its numbers
             return None, 0.0
         distances = np.linalg.norm(run.computed - run.true, axis=(-2, -1)) / math.sqrt(2)
         # Rounding adds up to a unit of the last place a step, in a state of a few elements.
-        return float(distances.max()), 8 * ready.unit * count
+        return float(distances.max()), 8 * stepper.unit * count
 
     return measure
 
 
-def _exactly(choice: Choice, motion: Motion, rounding: float) -> _Measure:
-    """Return what measures the error of a step length in many digits.
+def _in_many_digits(choice: Choice, motion: Motion, rounding: float) -> _Measure:
+    """Return the function that measures a step length without visible rounding.
 
-    Where the published coefficients of a method are rounded themselves, that is the floor.
+    Where the published coefficients of a method are rounded, their rounding is the smallest error that means something.
     """
     attitudes = exact_attitudes(choice, motion)
 

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapgen import catalogue
-from strapgen.backends import BACKENDS, evaluator, of, two_speed
-from strapgen.backends.fixed import FixedBackend
+from strapgen.backends import BACKENDS, evaluator, two_speed
+from strapgen.backends import DEFAULT_BACKENDS as DEFAULT_BACKENDS
+from strapgen.backends import backend as attitude_backend
 from strapgen.backends.increments import pulses, windows
 from strapgen.catalogue import Choice
 from strapgen.ir.fixed_settings import Settings
@@ -30,11 +31,9 @@ RATE_DEG_S = 70.0
 #: Rate in rad/s of the swing's phase: the angle on each axis swings by 140 deg, enough to pass 90 deg of pitch.
 SWING_RAD_S = 0.5
 MOTIONS = ("linear", "oscillating")
-#: Attitude methods that are run where none are named, and increments of each.
+#: Methods of the attitude steps, and the increments of each step.
 METHODS = (("rk1", 2), ("rk2", 2), ("rk3", 2), ("rk4", 2), ("magnus4", 2), ("coning-combined", 4))
-#: Back ends that are run where none are named: the model gives the bits of the C.
-DEFAULT_BACKENDS = tuple(name for name in BACKENDS if name != "fixed-model")
-#: The algorithms in two speeds, beside the attitude steps.
+#: The name under which the algorithms in two speeds run beside the attitude steps.
 TWO_SPEED = "two-speed"
 ALGORITHMS = (*catalogue.ALGORITHMS, TWO_SPEED)
 #: Fast cycles in a slow one.
@@ -51,7 +50,7 @@ class Row:
     motion, algorithm, backend : str
     drift_deg : float or None
         Largest angle between computed and true attitude over the run, in degrees; None where the run left the range of
-        its numbers.
+        the back end's numbers.
     pitch_deg : float or None
         Largest pitch of the computed attitude, in degrees.
     """
@@ -68,7 +67,7 @@ class Row:
 
 
 def angles(motion: str, times: Array) -> Array:
-    """Return the angle about each axis that the table has turned at times in s; its axis (1, 1, 1) stays where it is.
+    """Return the rotation vector of the table at times in s; its axis is (1, 1, 1).
 
     Parameters
     ----------
@@ -79,7 +78,7 @@ def angles(motion: str, times: Array) -> Array:
     Returns
     -------
     array, (N, 3)
-        In rad: a rotation vector, for the axis is fixed.
+        In rad.
 
     Examples
     --------
@@ -104,15 +103,15 @@ def stress(
     Parameters
     ----------
     duration, sample, record : number
-        Duration, time between gyro samples, and time from record to record, in s; each a multiple of the next. A step
-        takes as many samples as its method needs, and so does a slow cycle. Attitudes are orthonormalized at every
-        record, but for the algorithms in two speeds, which need no more than their exact update. In fixed point the
-        gyro counts pulses of one unit of the increments.
+        Duration, time between gyro samples, and time from record to record, in s. The record is a multiple of the
+        sample, and the duration of the record. A step or a slow cycle takes as many samples as its method needs.
+        Attitude steps are orthonormalized at every record; the exact update of the algorithms in two speeds needs no
+        orthonormalization. In fixed point the gyro counts pulses of one unit of the increments.
     backends : sequence of str, optional
     algorithms : sequence of str, optional
-        Attitude algorithms, and "two-speed", matrix and quaternion.
+        Attitude algorithms, and "two-speed" for both algorithms in two speeds.
     settings : Settings, optional
-        What fixed point is made for: rounding, and what is carried from step to step.
+        Settings of fixed point: rounding and error feedback.
 
     Yields
     ------
@@ -157,7 +156,16 @@ Case = tuple[str, str, str, int, str]
 
 
 def cases(algorithms: Sequence[str], backends: Sequence[str]) -> Iterator[Case]:
-    """Yield what every run is of.
+    """Yield the cases of the test.
+
+    Parameters
+    ----------
+    algorithms, backends : sequence of str
+        As for `stress`.
+
+    Yields
+    ------
+    Case
 
     Raises
     ------
@@ -170,13 +178,13 @@ def cases(algorithms: Sequence[str], backends: Sequence[str]) -> Iterator[Case]:
         checks.choice("algorithm", name, ALGORITHMS)
     for motion in MOTIONS:
         for algorithm in algorithms:
-            for method, taken in _TWO_SPEEDS if algorithm == TWO_SPEED else METHODS:
+            for method, count in _TWO_SPEEDS if algorithm == TWO_SPEED else METHODS:
                 for backend in backends:
-                    yield motion, algorithm, method, taken, backend
+                    yield motion, algorithm, method, count, backend
 
 
 def _row(case: Case, samples: Array, every: int, true: Array, settings: Settings | None) -> Row:
-    motion, algorithm, method, taken, backend = case
+    motion, algorithm, method, count, backend = case
     if BACKENDS[backend].target in FIXED:
         settings = (settings or Settings()).fitted(float(np.abs(samples).max()))
     else:
@@ -184,8 +192,8 @@ def _row(case: Case, samples: Array, every: int, true: Array, settings: Settings
     if algorithm == TWO_SPEED:
         name, run = f"{method} {TWO_SPEED}", _in_two_speeds(method, backend, settings, samples, every)
     else:
-        choice = catalogue.choose(algorithm, method, taken)
-        name, run = choice.kernel, _in_steps(choice, taken, backend, settings, samples, every)
+        choice = catalogue.choose(algorithm, method, count)
+        name, run = choice.kernel, _in_steps(choice, backend, settings, samples, every)
     try:
         computed = run()
     except InputError:  # the state leaves the range of its numbers
@@ -202,20 +210,21 @@ def _row(case: Case, samples: Array, every: int, true: Array, settings: Settings
 
 
 def _in_steps(
-    choice: Choice, taken: int, backend: str, settings: Settings | None, samples: Array, every: int
+    choice: Choice, backend: str, settings: Settings | None, samples: Array, every: int
 ) -> Callable[[], Array]:
-    """Return the run of an attitude step: its matrices, one a record."""
-    made = of(choice, backend, settings=settings)
-    given = windows(samples, taken)
-    if isinstance(made, FixedBackend):
-        given = pulses(given, made.interface.inputs[1].format.unit)
-    return lambda: attitude(made, made.propagate(given, every // taken, every // taken))
+    """Return the run of an attitude step, which returns one matrix per record."""
+    stepper = attitude_backend(choice, backend=backend, settings=settings)
+    increments = windows(samples, stepper.increments)
+    if stepper.increment_unit is not None:
+        increments = pulses(increments, stepper.increment_unit)
+    steps = every // stepper.increments
+    return lambda: attitude(stepper, stepper.propagate(increments, steps, steps))
 
 
 def _in_two_speeds(
     algorithm: str, backend: str, settings: Settings | None, samples: Array, every: int
 ) -> Callable[[], Array]:
-    """Return the run of an algorithm in two speeds, without acceleration: its matrices, one a record."""
+    """Return the run of an algorithm in two speeds without acceleration, which returns one matrix per record."""
     if settings is not None:
         ranges = two_speed_sources.ranges(float(np.abs(samples).max()), fast_cycles=_FAST_CYCLES)
         settings = replace(settings, ranges=ranges)
@@ -223,8 +232,8 @@ def _in_two_speeds(
     stride = every // _FAST_CYCLES
 
     def run() -> Array:
-        made = loops.run(samples, np.zeros_like(samples), fast_cycles=_FAST_CYCLES)
-        recorded = np.asarray(made.attitudes, np.float64)[stride - 1 :: stride]
+        history = loops.run(samples, np.zeros_like(samples), fast_cycles=_FAST_CYCLES)
+        recorded = np.asarray(history.attitudes, np.float64)[stride - 1 :: stride]
         matrices = recorded if algorithm == "dcm" else evaluator(f"dcm-from-{algorithm}")(recorded)
         return np.concatenate([np.eye(3)[None], matrices])
 

@@ -1,4 +1,4 @@
-"""The five tables of the thesis, run again."""
+"""The five tables of the thesis, computed again on every back end."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from strapgen.backends import BACKENDS, Backend, backend
+from strapgen.backends import DEFAULT_BACKENDS as DEFAULT_BACKENDS
 from strapgen.ir.fixed_settings import Settings
 from strapgen.simulation.motions import motion
 from strapgen.simulation.runs import Run, largest_increment, simulate
@@ -40,11 +41,11 @@ class Table:
     mean : bool
         Whether the drift is the mean over the axes, or that of the worst axis.
     printed : dict
-        The printed figures by algorithm and order; repaired as the transcription says.
+        The printed figures by algorithm and order, corrected where the transcription says so.
     base : str
-        Printed drift of the first-order direction cosine matrix in degrees, "" if none.
+        Printed drift of the first-order direction cosine matrix in degrees; "" if there is none.
     by_order : bool
-        Whether a figure is the ratio to the direction cosine matrix of the same order, or of the first.
+        Whether a figure is the ratio to the direction cosine matrix of the same order, or of first order.
     """
 
     number: int
@@ -131,11 +132,11 @@ class TableEntry:
     normalised : float
         Drift over that of the direction cosine matrix, of first order or (table 3) of the same order.
     thesis : str
-        What the thesis prints.
+        The figure in the thesis's print.
     agrees : bool
-        Whether `normalised`, rounded or cut, has the printed digits.
+        Whether `normalised`, rounded or truncated, has the printed digits.
     note : str or None
-        What must be said about the entry.
+        Remark on the entry.
     roundoff_dominates : bool
         Whether the drift differs from that of the run in double by more than half of it.
     """
@@ -159,9 +160,9 @@ class TableEntry:
 def agrees(value: float, printed: str) -> bool:
     """Return whether a figure has the digits that the thesis prints.
 
-    The thesis rounds some figures and cuts others, so one less than a unit above is as good as one within
-    half a unit. Two entries are not measured to their last digit: .75e-6 and .225e-5 are sixteenths of the
-    printed .12e-4 and .36e-4 and are only as exact as those.
+    The thesis rounds some figures and truncates others: a figure up to half a unit below the printed one agrees, and so
+    does one less than a unit above it. The entries .75e-6 and .225e-5 are sixteenths of the printed .12e-4 and .36e-4
+    and only as exact as those.
 
     Examples
     --------
@@ -174,11 +175,10 @@ def agrees(value: float, printed: str) -> bool:
         return agrees(16 * value, _SIXTEENTHS[printed])
     if "/" in printed:
         return math.isclose(value, float(Fraction(printed)), rel_tol=_FRACTION_TOLERANCE)
-    wanted = Decimal(printed)
-    exponent = -2 if wanted == 1 else wanted.as_tuple().exponent
-    assert isinstance(exponent, int)
-    unit = Decimal(1).scaleb(exponent)
-    return -unit / 2 <= Decimal(value) - wanted < unit
+    figure = Decimal(printed)
+    digits = 2 if figure == 1 else len(printed.partition("e")[0].partition(".")[2])
+    unit = Decimal(1).scaleb(int(printed.partition("e")[2] or 0) - digits)
+    return -unit / 2 <= Decimal(value) - figure < unit
 
 
 def drift_deg(table: Table, run: Run) -> float:
@@ -187,7 +187,15 @@ def drift_deg(table: Table, run: Run) -> float:
 
 
 def table_settings(table: Table, backend_name: str, settings: Settings | None) -> Settings | None:
-    """Return what a table's runs are made for in fixed point, its own increments; None for other back ends."""
+    """Return the settings of fixed point for a table's increments; None for a back end in floating point.
+
+    Parameters
+    ----------
+    table : Table
+    backend_name : str
+    settings : Settings or None
+        Settings beside the largest increment.
+    """
     if BACKENDS[backend_name].target not in FIXED:
         return None
     profile = motion(table.motion, **table.settings)
@@ -202,13 +210,17 @@ def entries(table: Table, backend_name: str, settings: Settings | None = None) -
     table : Table
     backend_name : str
     settings : Settings, optional
-        What fixed point is made for beside the table's own increments.
+        Settings of fixed point beside the largest increment, which is the table's own.
+
+    Yields
+    ------
+    TableEntry
     """
     chosen = table_settings(table, backend_name, settings)
     profile = motion(table.motion, **table.settings)
 
-    def run(made: Backend, every: Fraction | None = INTERVAL) -> float:
-        return drift_deg(table, simulate(made, profile, STEP, DURATION, every, INTERVAL))
+    def run(stepper: Backend, every: Fraction | None = INTERVAL) -> float:
+        return drift_deg(table, simulate(stepper, profile, STEP, DURATION, every, INTERVAL))
 
     def drift(algorithm: str, order: int, every: Fraction | None = INTERVAL) -> float:
         return run(backend(algorithm, f"rk{order}", 2, backend_name, settings=chosen), every)
@@ -247,40 +259,42 @@ def entries(table: Table, backend_name: str, settings: Settings | None = None) -
         )
 
 
-#: What the tables run by default: the integer model gives what the fixed-point C gives.
-DEFAULT_BACKENDS = tuple(name for name in BACKENDS if name != "fixed-model")
-
-
 def build_all(
     backends: tuple[str, ...] = DEFAULT_BACKENDS, settings: Settings | None = None
 ) -> Iterator[str]:
-    """Generate and compile what the tables run, one algorithm after the other.
+    """Generate and compile the kernels of the tables, one algorithm after the other.
+
+    Parameters
+    ----------
+    backends : tuple of str, optional
+    settings : Settings, optional
+        As for `entries`.
 
     Yields
     ------
     str
-        Name of the kernel that is ready.
+        Name of each kernel after it is compiled.
     """
     for name in backends:
         angles = {table_settings(table, name, settings): table for table in TABLES}
         for algorithm in ALGORITHMS:
             for order in ORDERS:
                 for chosen in angles:
-                    made = backend(algorithm, f"rk{order}", 2, name, settings=chosen)
-                    made.orthonormalize(made.identity)
-                yield made.kernel
+                    stepper = backend(algorithm, f"rk{order}", 2, name, settings=chosen)
+                    stepper.orthonormalize(stepper.identity)
+                yield stepper.kernel
 
 
 def run_tables(
     backends: tuple[str, ...] = DEFAULT_BACKENDS, settings: Settings | None = None
 ) -> Iterator[TableEntry]:
-    """Run all tables on the given back ends, table by table.
+    """Run all tables on several back ends, table by table.
 
     Parameters
     ----------
     backends : tuple of str, optional
     settings : Settings, optional
-        What fixed point is made for beside the tables' own increments.
+        As for `entries`.
 
     Yields
     ------

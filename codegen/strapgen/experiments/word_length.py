@@ -1,4 +1,4 @@
-"""The word-length study: what rounding, quantization and truncation each add to the drift of an algorithm."""
+"""The word-length study: how much rounding, quantization and truncation each add to the drift of an algorithm."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import os
 import signal
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -37,7 +37,7 @@ class Case:
     ----------
     algorithm, method : str
     increments : int
-        Increments a step.
+        Increments per step.
     word : int
         Bits of a word.
     rounding, carry : str
@@ -45,7 +45,8 @@ class Case:
     step, duration : str
         In s.
     pulse_arcsec : str
-        Angle of a gyro pulse in arc seconds; "0" for none: then increments are rounded to their format alone.
+        Angle of a gyro pulse in arc seconds. With "0" the gyro does not count pulses, and increments are rounded to
+        their format alone.
     motion : str
     settings : tuple of (str, str)
         Parameters of the motion.
@@ -71,7 +72,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a case showed, all angles in degrees, the largest of the run.
+    """The result of a case; an angle is the largest of the run, in degrees.
 
     Parameters
     ----------
@@ -79,13 +80,14 @@ class Outcome:
     drift_deg : float or None
         Drift from the truth; None if the run left the range of its format.
     rounding_deg : float or None
-        What the arithmetic adds: the angle from the same algorithm in double on the same rounded increments.
+        Effect of the arithmetic: the angle from the same algorithm in double on the same rounded increments; None if
+        the run left the range of its format.
     quantization_deg : float
-        What rounded increments add: the angle between the runs in double on those and on the exact ones.
+        Effect of rounded increments: the angle between the runs in double on rounded and on exact increments.
     truncation_deg : float
-        Drift of the run in double on exact increments: the floor of the method.
+        Effect of the method: the drift of the run in double on exact increments.
     bound_deg : float or None
-        Certified bound of `rounding_deg`; None where no bound of use is known.
+        Certified bound of `rounding_deg`; None where no useful bound is known.
     """
 
     case: Case
@@ -97,7 +99,7 @@ class Outcome:
 
     @property
     def dominates(self) -> str:
-        """What adds most to the drift: "rounding", "quantization" or "truncation"; "range" if the run left it."""
+        """The largest part of the drift: "rounding", "quantization" or "truncation"; "range" if the run left it."""
         if self.rounding_deg is None:
             return "range"
         parts = {
@@ -114,61 +116,100 @@ class Outcome:
         return data | rest | {"dominates": self.dominates}
 
 
-def cases(
-    *,
-    algorithm: str = "euler",
-    methods: Sequence[str] = ("rk4",),
-    increments: int = 2,
-    words: Sequence[int] = (8, 10, 12, 14, 16, 18, 20, 24, 28, 32),
-    roundings: Sequence[str] = ("nearest",),
-    carries: Sequence[str] = ("none", "state", "full"),
-    steps: Sequence[str] = ("0.125",),
-    duration: str = "180",
-    pulses_arcsec: Sequence[str] = ("0",),
-    motion_name: str = "coning",
-    settings: dict[str, str] | None = None,
-) -> list[Case]:
-    """Return every combination of the given values, checked.
+@dataclass(frozen=True)
+class Study:
+    """What a study runs: one algorithm on one motion, in every combination of the values that are swept.
+
+    Parameters
+    ----------
+    algorithm : str
+    increments : int
+        Increments per step.
+    methods, words, roundings, carries, steps, pulses_arcsec : sequence
+        Values that are swept, see `Case`.
+    duration : str
+        In s.
+    motion_name : str
+    settings : dict of str to str, optional
+        Parameters of the motion; by default those of the thesis's table 5.
+    """
+
+    algorithm: str = "euler"
+    increments: int = 2
+    methods: Sequence[str] = ("rk4",)
+    words: Sequence[int] = (8, 10, 12, 14, 16, 18, 20, 24, 28, 32)
+    roundings: Sequence[str] = ("nearest",)
+    carries: Sequence[str] = ("none", "state", "full")
+    steps: Sequence[str] = ("0.125",)
+    pulses_arcsec: Sequence[str] = ("0",)
+    duration: str = "180"
+    motion_name: str = "coning"
+    settings: dict[str, str] | None = None
+
+    def cases(self) -> list[Case]:
+        """Return every combination, unchecked."""
+        parameters = tuple((self.settings or {"a_deg_s": "10", "b_deg_s": "10", "g_deg_s": "10"}).items())
+        swept = product(
+            self.methods, self.steps, self.pulses_arcsec, self.roundings, self.carries, self.words
+        )
+        return [
+            Case(
+                algorithm=self.algorithm,
+                method=method,
+                increments=self.increments,
+                word=word,
+                rounding=rounding,
+                carry=carry,
+                step=step,
+                duration=self.duration,
+                pulse_arcsec=pulse,
+                motion=self.motion_name,
+                settings=parameters,
+            )
+            for method, step, pulse, rounding, carry, word in swept
+        ]
+
+
+def cases(study: Study | None = None, **values: Any) -> list[Case]:
+    """Return every combination of the values of a study, checked.
+
+    Parameters
+    ----------
+    study : Study, optional
+    **values
+        Fields of `Study` that replace those of `study`.
+
+    Returns
+    -------
+    list of Case
 
     Raises
     ------
     InputError
         If a value is not allowed, or there are too many combinations.
+
+    Examples
+    --------
+    >>> [(case.word, case.carry) for case in cases(words=(12, 16), carries=("full",))]
+    [(12, 'full'), (16, 'full')]
     """
-    parameters = tuple((settings or {"a_deg_s": "10", "b_deg_s": "10", "g_deg_s": "10"}).items())
-    made = [
-        Case(
-            algorithm,
-            method,
-            increments,
-            word,
-            rounding,
-            carry,
-            step,
-            duration,
-            pulse,
-            motion_name,
-            parameters,
-        )
-        for method, step, pulse, rounding, carry, word in product(
-            methods, steps, pulses_arcsec, roundings, carries, words
-        )
-    ]
-    if not 0 < len(made) <= _MOST_CASES:
-        raise InputError(f"the study has {len(made)} cases; 1 to {_MOST_CASES} are allowed")
-    total = checks.number("duration", duration, positive=True)
-    for step in steps:
+    study = replace(study or Study(), **values)
+    planned = study.cases()
+    if not 0 < len(planned) <= _MOST_CASES:
+        raise InputError(f"the study has {len(planned)} cases; 1 to {_MOST_CASES} are allowed")
+    total = checks.number("duration", study.duration, positive=True)
+    for step in study.steps:
         checks.multiple("duration", total, "step", checks.number("step", step, positive=True))
-    for pulse in pulses_arcsec:
+    for pulse in study.pulses_arcsec:
         if checks.number("pulse-arcsec", pulse) < 0:
             raise InputError(f"pulse-arcsec is {pulse}; 0 for none, or a number above 0 is needed")
-    for case in made:
+    for case in planned:
         Settings(case.word, rounding=case.rounding, carry=case.carry)
-    return made
+    return planned
 
 
 def run_case(case: Case) -> Outcome:
-    """Run one case, or read what it showed from the cache: a study that was stopped goes on where it was.
+    """Run one case, or read its outcome from the cache, so that a study that was stopped continues where it was.
 
     Parameters
     ----------
@@ -195,13 +236,13 @@ def _run(case: Case) -> Outcome:
     steps = checks.multiple("duration", checks.number("duration", case.duration, positive=True), "step", h)
     exact = case.profile.increments(h, steps, case.increments)
     pulse = float(checks.number("pulse-arcsec", case.pulse_arcsec)) / 3600
-    given = pulses(exact, math.radians(pulse)) if pulse else exact
+    measured = pulses(exact, math.radians(pulse)) if pulse else exact
     settings = Settings(case.word, rounding=case.rounding, carry=case.carry)
-    settings = settings.fitted(float(np.abs(given).max()))
+    settings = settings.fitted(float(np.abs(measured).max()))
     double = backend(case.algorithm, case.method, case.increments, "numpy")
     fixed = backend(case.algorithm, case.method, case.increments, "fixed-model", settings=settings)
-    # A gyro's counter is as long as it must be: pulses reach the algorithm exactly, in the unit of its format.
-    rounded = fixed.representable(given)
+    # The counter of a gyro is as long as it must be: the algorithm receives every pulse, in the unit of its format.
+    rounded = fixed.representable(measured)
     truth = case.profile.attitude(np.arange(1 + steps) * float(h))
     plain, same = double.propagate(exact), double.propagate(rounded)
     plain_attitude, same_attitude = attitude(double, plain), attitude(double, same)
@@ -213,7 +254,7 @@ def _run(case: Case) -> Outcome:
     try:
         states = attitude(fixed, fixed.propagate(rounded))
         drift, rounding = largest(states, truth), largest(states, same_attitude)
-    except InputError:  # a short word without residuals: the state leaves its range
+    except InputError:  # in a short word without error feedback the state leaves its range
         pass
     bound = certified_angle(fixed, rounded, same)
     return Outcome(
@@ -227,7 +268,7 @@ def _run(case: Case) -> Outcome:
 
 
 def run(planned: Sequence[Case], jobs: int | None = None) -> Iterator[Outcome]:
-    """Run cases side by side and yield the outcomes as they come.
+    """Run cases side by side, and yield each outcome when its case ends.
 
     Parameters
     ----------
@@ -244,7 +285,7 @@ def run(planned: Sequence[Case], jobs: int | None = None) -> Iterator[Outcome]:
         yield from map(run_case, planned)
         return
     others = set(multiprocessing.active_children())
-    # An interrupt is for this process: it stops the others.
+    # An interrupt reaches this process alone, which then stops the others.
     pool = ProcessPoolExecutor(workers, initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN))
     pending = [pool.submit(run_case, case) for case in planned]
     try:

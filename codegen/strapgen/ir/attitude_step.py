@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 from fractions import Fraction
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,15 @@ class Companions:
     identity: tuple[Fraction, ...]
     previous: int = 0
     isometry: bool = False
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the record as plain JSON data."""
+        return asdict(self) | {"identity": [str(element) for element in self.identity]}
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Companions:
+        """Rebuild the record from `as_dict`."""
+        return cls(**{**data, "identity": tuple(map(Fraction, data["identity"]))})
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,8 @@
-"""Sources: what a target emits, with all that a back end must know to call it."""
+"""Sources are the text that a target prints, with everything that a back end needs to call it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any
 
 from strapgen.ir.attitude_step import Companions
@@ -15,7 +14,7 @@ from strapgen.ir.signals import Signal
 
 @dataclass(frozen=True)
 class Function:
-    """A generated function: its name and what goes in and out."""
+    """A generated function: its name, its inputs and its outputs."""
 
     name: str
     inputs: tuple[Signal, ...]
@@ -29,7 +28,7 @@ class Sources:
     Parameters
     ----------
     kernel, target : str
-        What was generated, and for which target.
+        Names of the kernel and of the target.
     files : dict of str to str
         Text by file name.
     function : Function
@@ -39,13 +38,14 @@ class Sources:
     temporaries : int
         Intermediate values of one call.
     companions : Companions or None
-        What belongs to an attitude step; None for every other kernel.
+        The kernels that go with an attitude step; None for every other kernel.
     fixed : Interface or None
         Formats, ranges and error bounds of fixed-point code; None for every other target.
     recursion : Recursion or None
-        Which outputs are inputs of the next call.
+        The outputs that are inputs of the next call.
     own : tuple of Program
-        Kernels that a user's step brings; empty where they are found through its choice.
+        Programs of the kernels that a user's step brings. Sources from the cache have none: there the step's choice
+        has the kernels.
     """
 
     kernel: str
@@ -60,8 +60,7 @@ class Sources:
     own: tuple[Program, ...] = ()
 
     def interface(self) -> dict[str, Any]:
-        """Return everything but the text as plain JSON data."""
-        companions = self.companions
+        """Return everything but the text and the programs of `own` as plain JSON data."""
         return {
             "kernel": self.kernel,
             "target": self.target,
@@ -73,15 +72,7 @@ class Sources:
             },
             "operations": self.operations,
             "temporaries": self.temporaries,
-            "companions": companions
-            and {
-                "product": companions.product,
-                "orthonormalize": companions.orthonormalize,
-                "attitude": companions.attitude,
-                "identity": [str(element) for element in companions.identity],
-                "previous": companions.previous,
-                "isometry": companions.isometry,
-            },
+            "companions": self.companions and self.companions.as_dict(),
             "fixed": self.fixed and self.fixed.as_dict(),
             "recursion": self.recursion and self.recursion.as_dict(),
         }
@@ -89,10 +80,7 @@ class Sources:
     @classmethod
     def restore(cls, interface: dict[str, Any], files: dict[str, str]) -> Sources:
         """Rebuild sources from `interface` and the text of the files."""
-        function, companions = interface["function"], interface["companions"]
-        if companions is not None:
-            identity = tuple(Fraction(element) for element in companions["identity"])
-            companions = Companions(**companions | {"identity": identity})
+        function = interface["function"]
         return cls(
             interface["kernel"],
             interface["target"],
@@ -104,7 +92,7 @@ class Sources:
             ),
             interface["operations"],
             interface["temporaries"],
-            companions,
+            interface["companions"] and Companions.from_dict(interface["companions"]),
             interface["fixed"] and Interface.from_dict(interface["fixed"]),
             interface["recursion"] and Recursion.from_dict(interface["recursion"]),
         )

@@ -1,1 +1,1 @@
-"""Generated sources: by choice, from the cache; the standard catalogue as a tree of files."""
+"""The library returns programs and sources from the cache, and the standard catalogue as a tree of files."""

@@ -1,8 +1,8 @@
-"""The library: lowered programs and generated sources by name, made when first asked for and cached.
+"""Programs and generated sources by choice, from the cache; what is not there yet, `pipeline` compiles.
 
-The key is the generator itself, its code and templates: a change of either makes new sources, so what runs is
-never out of step with the derivation. A second use loads neither SymPy nor Jinja; another target or other settings of
-the same kernel derive nothing again.
+The key of an entry is the choice with the generator itself, its code and templates: after a change of either, entries
+are generated again, and what runs agrees with the derivation. A second use loads neither SymPy nor Jinja; another
+target or other settings of the same kernel derive nothing again.
 """
 
 from __future__ import annotations
@@ -11,18 +11,18 @@ import json
 import pickle
 from pathlib import Path
 
-from strapgen.catalogue import Choice, derive
+from strapgen import pipeline
+from strapgen.catalogue import Choice
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
 from strapgen.support import cache
-from strapgen.targets import emit
 
 _programs: dict[str, Program] = {}
 
 
 def program(choice: Choice) -> Program:
-    """Return a kernel of the catalogue as straight-line code, derived once for all targets and settings.
+    """Return a kernel as straight-line code, derived and lowered once for all targets and settings.
 
     Parameters
     ----------
@@ -41,19 +41,17 @@ def program(choice: Choice) -> Program:
     """
 
     def fill(draft: Path) -> None:
-        from strapgen import pipeline  # imported here, as SymPy is: a program in the cache needs neither
-
-        (draft / "program.pickle").write_bytes(pickle.dumps(pipeline.lower(derive(choice))))
+        (draft / "program.pickle").write_bytes(pickle.dumps(pipeline.lowered(choice)))
 
     key = cache.digest([cache.generator_digest(), choice.identity])
     if key not in _programs:
-        folder = cache.entry("programs", key, fill)
+        folder = cache.entry("programs", key, fill, f"program of {choice.kernel}")
         _programs[key] = pickle.loads((folder / "program.pickle").read_bytes())
     return _programs[key]
 
 
 def sources(choice: Choice, target: str, settings: Settings | None = None) -> Sources:
-    """Return the generated sources of a kernel of the catalogue.
+    """Return the generated sources of a kernel.
 
     Parameters
     ----------
@@ -62,21 +60,26 @@ def sources(choice: Choice, target: str, settings: Settings | None = None) -> So
     target : str
         A key of `strapgen.targets.TARGETS`.
     settings : Settings, optional
-        What fixed point is made for.
+        Word, ranges and rounding of fixed point; by default 32 bits and 1/8 rad.
 
     Returns
     -------
     Sources
+
+    Raises
+    ------
+    InputError
+        If the target is unknown, or does not go with the kernel or the settings.
     """
 
     def fill(draft: Path) -> None:
-        made = emit(program(choice), target, settings)
-        for name, text in made.files.items():
+        compiled = pipeline.compile(choice, target, settings, program)
+        for name, text in compiled.files.items():
             (draft / name).write_text(text)
-        (draft / "interface.json").write_text(json.dumps(made.interface()))
+        (draft / "interface.json").write_text(json.dumps(compiled.interface()))
 
-    asked = json.dumps(settings.as_dict(), sort_keys=True) if settings else ""
-    key = cache.digest([cache.generator_digest(), choice.identity, target, asked])
-    folder = cache.entry("sources", key, fill)
+    stated = json.dumps(settings.as_dict(), sort_keys=True) if settings else ""
+    key = cache.digest([cache.generator_digest(), choice.identity, target, stated])
+    folder = cache.entry("sources", key, fill, f"sources of {choice.kernel} for {target}")
     interface = json.loads((folder / "interface.json").read_text())
     return Sources.restore(interface, {name: (folder / name).read_text() for name in interface["files"]})

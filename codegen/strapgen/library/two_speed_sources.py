@@ -1,4 +1,4 @@
-"""Generated sources of algorithms in two speeds: loops whose formats fit together, and the C of the whole."""
+"""Generated sources of algorithms in two speeds: three loops, in fixed point with formats that match, and their C."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from fractions import Fraction
 
+from strapgen import targets
 from strapgen.catalogue import Choice
 from strapgen.ir.fixed_settings import DEFAULT_ANGLE, Settings
 from strapgen.ir.sources import Sources
@@ -18,24 +19,16 @@ from strapgen.targets.two_speed_c.emit import whole
 
 #: Attitude algorithms in two speeds.
 ALGORITHMS = {"dcm": "direction cosine matrix", "euler": "Euler parameters, scalar last"}
-
-
-#: Which sculling integral the fast loop makes.
+#: Forms of the sculling integral that the fast loop computes.
 SCULLING = {1: "with the rotation compensation in it", 2: "with the rotation compensation in the slow loop"}
 
-
-#: Room for the rounding of sums, and the smallest increments that formats are made for.
+#: Factor on stated increments that leaves room for the rounding of sums.
 _SPARE = Fraction(33, 32)
-
-
+#: Smallest increments that formats are chosen for, in rad and m/s.
 _LEAST = Fraction(1, 2**16)
-
-
-#: What has the range and the format of another input, unless its own is stated.
+#: Inputs that have the range of another input, if no range of theirs is stated.
 _AS = {"previous_increment": "increment", "previous_turn": "turn"}
-
-
-#: What is summed in a cycle, and the increments of which it is the sum: exact where both have one format.
+#: Sums over a cycle, with the increments that they add up: exact where both have the same format.
 _SUMMED = {
     "angle_sum": ("increment", "previous_increment"),
     "velocity_sum": ("velocity_increment",),
@@ -74,7 +67,7 @@ def kernels(algorithm: str, sculling: int = 2) -> tuple[str, str, str]:
 def ranges(
     angle: float, velocity: float = 0.0, fast_cycles: int = 1, slow_cycles: int = 1
 ) -> dict[str, Fraction]:
-    """Return ranges for the loops' inputs in fixed point that hold what increments of a stated size sum up to.
+    """Return ranges of the loops' inputs that hold the sums of increments up to a stated size, for fixed point.
 
     Parameters
     ----------
@@ -86,7 +79,7 @@ def ranges(
     Returns
     -------
     dict of str to Fraction
-        For `Settings`: by the names of inputs.
+        The `ranges` of `Settings`, by the names of inputs.
 
     Examples
     --------
@@ -112,9 +105,9 @@ def ranges(
 def loops(
     algorithm: str, sculling: int = 2, target: str = "c", settings: Settings | None = None
 ) -> tuple[Sources, Sources, Sources]:
-    """Return the generated loops; in fixed point in formats that fit together.
+    """Return the generated loops; in fixed point the formats of what passes between them match.
 
-    The increments get the format of their sums, so that no sum is ever rounded.
+    The increments have the format of their sums, so that no sum is rounded.
 
     Parameters
     ----------
@@ -123,7 +116,7 @@ def loops(
     target : str, optional
         A key of `strapgen.targets.TARGETS`.
     settings : Settings, optional
-        What fixed point is made for; ranges and formats by the names of the loops' inputs.
+        Word, rounding, and ranges and formats by the names of the loops' inputs, for fixed point.
 
     Returns
     -------
@@ -135,49 +128,60 @@ def loops(
         If a name is unknown, or a range or a format does not go with the loops.
     """
     names = kernels(algorithm, sculling)
+    targets.require(target, settings)
     if target not in FIXED:
-        if settings is not None:
-            raise InputError(f"target {target} takes no fixed-point settings; these do: {', '.join(FIXED)}")
         fast, slow, navigation = (generated_sources.sources(Choice(name), target) for name in names)
         return fast, slow, navigation
-    asked = _without_largest_angle(settings or Settings())
-    inputs = [
-        {s.name for s in generated_sources.sources(Choice(name), "numpy").function.inputs} for name in names
-    ]
-    for what, given in (("range", asked.ranges), ("format", asked.formats)):
-        unknown = set(given) - set().union(*inputs)
-        if unknown:
-            known = ", ".join(sorted(set().union(*inputs)))
-            raise InputError(f"no loop has an input {sorted(unknown)[0]!r} for a {what}; inputs are: {known}")
+    settings = _without_largest_angle(settings or Settings())
+    inputs = {name: _inputs(name) for name in names}
+    _require_inputs(settings, set().union(*inputs.values()))
+    ranges = {name: settings.ranges[other] for name, other in _AS.items() if other in settings.ranges}
+    settings = replace(settings, ranges=ranges | dict(settings.ranges))
 
-    stated = {
-        **{name: asked.ranges[other] for name, other in _AS.items() if other in asked.ranges},
-        **asked.ranges,
-    }
+    def loop(name: str, formats: Mapping[str, str]) -> Sources:
+        return _fixed_loop(name, target, _of_inputs(replace(settings, formats=formats), inputs[name]))
 
-    def made(number: int, formats: Mapping[str, str]) -> Sources:
-        own = inputs[number]
-        chosen = replace(
-            asked,
-            ranges={name: value for name, value in stated.items() if name in own},
-            formats={name: text for name, text in formats.items() if name in own},
-        )
-        loop = generated_sources.sources(Choice(names[number]), target, chosen)
-        if chosen.carry == "none" or loop.fixed is None or loop.fixed.residuals:
-            return loop
-        # A loop that rounds nothing to carry on is the one that `strapgen generate` makes without the option.
-        return generated_sources.sources(Choice(names[number]), target, replace(chosen, carry="none"))
-
-    formats = dict(asked.formats)
-    natural = _formats(made(0, formats))
+    formats = dict(settings.formats)
+    natural = _formats(loop(names[0], formats))
     for total, increments in _SUMMED.items():
         formats |= {name: natural[total] for name in increments if name not in formats}
     result = []
-    for number in range(len(names)):
-        result.append(made(number, formats))
-        formats |= {name: text for name, text in _formats(result[-1]).items() if name not in formats}
+    for name in names:
+        result.append(loop(name, formats))
+        formats |= {other: text for other, text in _formats(result[-1]).items() if other not in formats}
     fast, slow, navigation = result
     return fast, slow, navigation
+
+
+def _inputs(kernel: str) -> set[str]:
+    """Return the names of a loop's inputs."""
+    return {signal.name for signal in generated_sources.program(Choice(kernel)).inputs}
+
+
+def _require_inputs(settings: Settings, known: set[str]) -> None:
+    """Check that every range and format is for an input of some loop."""
+    for what, stated in (("range", settings.ranges), ("format", settings.formats)):
+        for name in sorted(set(stated) - known):
+            inputs = ", ".join(sorted(known))
+            raise InputError(f"no loop has an input {name!r} for a {what}; inputs are: {inputs}")
+
+
+def _of_inputs(settings: Settings, inputs: set[str]) -> Settings:
+    """Return settings with the ranges and formats of some inputs alone."""
+    return replace(
+        settings,
+        ranges={name: value for name, value in settings.ranges.items() if name in inputs},
+        formats={name: text for name, text in settings.formats.items() if name in inputs},
+    )
+
+
+def _fixed_loop(kernel: str, target: str, settings: Settings) -> Sources:
+    """Return a loop in fixed point; without error feedback where it rounds nothing that goes on to the next call."""
+    loop = generated_sources.sources(Choice(kernel), target, settings)
+    if settings.carry == "none" or loop.fixed is None or loop.fixed.residuals:
+        return loop
+    # The same sources as from `strapgen generate` without the option.
+    return generated_sources.sources(Choice(kernel), target, replace(settings, carry="none"))
 
 
 def _formats(sources: Sources) -> dict[str, str]:
@@ -188,7 +192,7 @@ def _formats(sources: Sources) -> dict[str, str]:
 def sources(
     algorithm: str, sculling: int = 2, target: str = "c", settings: Settings | None = None
 ) -> Sources:
-    """Return the C of all loops: one function each, and one for the whole.
+    """Return the C of all loops, with one function for each and one that runs them all.
 
     Parameters
     ----------

@@ -34,7 +34,8 @@ def lower(kernel: Kernel) -> Program:
     Returns
     -------
     Program
-        With the inputs, outputs and transition of the kernel, in its units and frames.
+        With the inputs, outputs and transition of the kernel, in its units and frames, and with the programs of the
+        kernels that it brings.
 
     Raises
     ------
@@ -61,7 +62,7 @@ def lower(kernel: Kernel) -> Program:
     program = min(programs, key=cost)
     if core is not None and program is not programs[0]:
         canonical.verify(core, program)
-    return program
+    return replace(program, own=tuple(map(lower, kernel.own)))
 
 
 def candidates(kernel: Kernel, core: canonical.Core | None) -> Iterator[Program]:

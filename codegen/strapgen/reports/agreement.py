@@ -3,19 +3,33 @@
 from __future__ import annotations
 
 from strapgen.analysis.agreement import Agreement
+from strapgen.reports.table import SECONDS, Column, TextTable
+
+_COLUMNS = (
+    Column("step, s", spec=SECONDS, least=12),
+    Column("simulated", spec=".4e", least=12),
+    Column("difference", spec=".4e", least=12),
+    Column("relative", spec=".1e", least=9),
+    Column("slope", "<", ".2f", missing=""),
+)
 
 
-def agreement_text(found: Agreement) -> str:
-    """Return the agreement as a table."""
-    lines = [
-        f"{found.kernel}, {found.motion} motion: drift in rad, simulated and predicted by {found.terms} terms",
-        f"{'step, s':>12}  {'simulated':>12}  {'difference':>12}  {'relative':>9}  slope",
-    ]
-    slopes = ["", *(f"{slope:.2f}" for slope in found.slopes)]
-    slopes += [""] * (len(found.rungs) - len(slopes))
-    for rung, slope in zip(found.rungs, slopes, strict=True):
-        relative = f"{rung.difference / rung.drift:.1e}" if rung.drift else "-"
-        lines.append(
-            f"{rung.step_s:>12.6g}  {rung.drift:>12.4e}  {rung.difference:>12.4e}  {relative:>9}  {slope}".rstrip()
+def agreement_text(agreement: Agreement) -> str:
+    """Return the agreement as a table: a row for every step length."""
+    slopes: list[float | None] = [None, *agreement.slopes]
+    slopes += [None] * (len(agreement.rungs) - len(slopes))
+    rows = [
+        (
+            rung.step_s,
+            rung.drift,
+            rung.difference,
+            rung.difference / rung.drift if rung.drift else None,
+            slope,
         )
-    return "\n".join(lines)
+        for rung, slope in zip(agreement.rungs, slopes, strict=True)
+    ]
+    title = (
+        f"{agreement.kernel}, {agreement.motion} motion: drift in rad, "
+        f"simulated and predicted by {agreement.terms} terms"
+    )
+    return f"{title}\n{TextTable(_COLUMNS, rows).as_text()}"

@@ -9,7 +9,9 @@ from strapgen.catalogue.methods.coning import method, sample_terms
 from strapgen.catalogue.methods.coning_coefficients import SOURCES, Design
 from strapgen.catalogue.methods.rotation_series import Scalars
 from strapgen.catalogue.methods.samples import sample_names
+from strapgen.reports.table import Column, TextTable
 
+_PAIR_COLUMNS = (Column(align="<"), Column(), Column(spec=".9f", least=12))
 #: Where the terms of third and fourth order are to be found, for the forms that have some.
 _HIGHER_TERMS = {
     "combined": "kept by the kernels of this form",
@@ -96,12 +98,12 @@ def _samples_text(design: Design) -> str:
 
 def _pair_lines(design: Design, data: Mapping[str, Any]) -> list[str]:
     """Return a line for each pair: its samples, its coefficient exactly and as a decimal."""
-    pairs = [f"{older} x {newer}" for older, newer in data["pairs"]]
-    if not pairs:
+    if not design.pairs:
         return ["  one sample has no pairs: there is no correction"]
-    width = max(map(len, pairs))
-    length = max(map(len, data["coefficients"]))
-    return [
-        f"  {pair:<{width}}  {c:>{length}}  {float(value):12.9f}"
-        for pair, c, value in zip(pairs, data["coefficients"], design.pairs.values(), strict=True)
+    rows = [
+        (f"{older} x {newer}", text, float(number))
+        for (older, newer), text, number in zip(
+            data["pairs"], data["coefficients"], design.pairs.values(), strict=True
+        )
     ]
+    return TextTable(_PAIR_COLUMNS, rows).lines("  ")

@@ -10,6 +10,8 @@ from typing import Any
 import sympy as sp
 
 from strapgen.ir.program import Program
+from strapgen.reports.latex import align_environment
+from strapgen.reports.table import Column, TextTable
 from strapgen.symbolic.kernel import Kernel, Stage
 from strapgen.targets.contract import operations_text
 from strapgen.targets.printer import Printer
@@ -69,6 +71,13 @@ def program_as_text(program: Program) -> str:
     return "\n".join(lines)
 
 
+def operations_as_text(kernel: Kernel, program: Program) -> str:
+    """Return the number of operations of each kind, and of temporaries, as a table."""
+    columns = (Column(align="<", least=12), Column(least=5, gap=0))
+    counts = {**program.operations, "temporaries": program.temporaries}
+    return "\n".join([kernel.name, *TextTable(columns, list(counts.items())).lines("  ")])
+
+
 def program_as_data(program: Program) -> dict[str, str]:
     """Return the straight-line code of a program by the names that it assigns, in order, with exact constants."""
     printer = _ExactPrinter()
@@ -87,7 +96,7 @@ def as_latex(kernel: Kernel) -> str:
         for stage in (*kernel.stages, *kernel.outputs)
         for element, expression in zip(stage.signal.elements, stage.expressions, strict=True)
     ]
-    return "\\begin{align*}\n" + " \\\\\n".join(rows) + "\n\\end{align*}"
+    return align_environment(rows)
 
 
 def _latex_name(element: str) -> str:

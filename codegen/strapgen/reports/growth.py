@@ -6,14 +6,20 @@ from collections.abc import Sequence
 
 import sympy as sp
 
-from strapgen.analysis.growth import Stability, intervals_text
+from strapgen.analysis.growth import Stability
+from strapgen.analysis.notation import intervals_text
+from strapgen.reports.table import Column, TextTable
+
+_COLUMNS = (
+    Column("step", "<"),
+    Column("x at which no state grows", "<", least=26),
+    Column("square of the stretch, x = |w| h", "<"),
+)
 
 
-def stability_text(found: Sequence[Stability]) -> str:
+def stability_text(stabilities: Sequence[Stability]) -> str:
     """Return stabilities as a table."""
-    width = max(len(one.kernel) for one in found)
-    lines = [f"{'step':<{width}}  {'x at which no state grows':<26}  square of the stretch, x = |w| h"]
-    for one in found:
-        where = intervals_text(one.contractive)
-        lines.append(f"{one.kernel:<{width}}  {where:<26}  {sp.sstr(one.stretch_squared)}")
-    return "\n".join(lines)
+    rows = [
+        (one.kernel, intervals_text(one.contractive), sp.sstr(one.stretch_squared)) for one in stabilities
+    ]
+    return TextTable(_COLUMNS, rows).as_text()

@@ -4,69 +4,75 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import sympy as sp
 
-from strapgen.analysis.overview import _SHORT, CONING_DEG_S, STEP_S, WORK, OverviewRow
+from strapgen.analysis.overview import CONING_DEG_S, STEP_S, WORK, OverviewRow
+from strapgen.reports.table import ERROR, Column, TextTable
+
+#: Most terms of a vector that are written out.
+_MOST_TERMS = 3
+_COLUMNS = (
+    Column("algorithm", "<"),
+    Column("order"),
+    Column("operations"),
+    Column("constant", "<"),
+    Column("coning, deg/h", spec=ERROR),
+    Column("per operation", spec=".2e"),
+    Column("equal work", spec=".2e"),
+    Column("contractive", "<"),
+)
+_NOTES = (
+    "constant       angle in rad that a step loses at a constant rate, x = |w| h; - none",
+    f"coning         leading secular drift rate for a = b = g = {CONING_DEG_S:g} deg/s, step {STEP_S:g} s",
+    "per operation  that drift of a step in rad, over the operations of the step",
+    f"equal work     the drift rate in deg/h where the step is so long that {WORK:g} operations a second do",
+    "contractive    angles x of a step at which no state grows; kept: its length is kept exactly",
+)
 
 
 def overview_text(rows: Sequence[OverviewRow]) -> str:
-    """Return rows as a table for a person."""
-    head = [
-        "algorithm",
-        "order",
-        "operations",
-        "constant",
-        "coning, deg/h",
-        "per operation",
-        "equal work",
-        "contractive",
-    ]
-    lines = [head]
-    for row in rows:
-        rate = row.coning_rate()
-        lines.append(
-            [
-                row.kernel,
-                "-" if row.order is None else str(row.order),
-                str(row.operations),
-                _power(row.constant, row.constant_power),
-                "-" if rate is None else f"{math.degrees(rate) * 3600:.3e}",
-                "-" if row.per_operation is None else f"{row.per_operation:.2e}",
-                "-" if row.at_equal_work is None else f"{math.degrees(row.at_equal_work) * 3600:.2e}",
-                row.contractive,
-            ]
-        )
-    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    text = [
-        "  ".join(
-            cell.ljust(width) if k in (0, 3, 7) else cell.rjust(width)
-            for k, (cell, width) in enumerate(zip(line, widths, strict=True))
-        ).rstrip()
-        for line in lines
-    ]
-    rates = f"a = b = g = {CONING_DEG_S:g} deg/s"
-    notes = [
-        "",
-        "constant       angle in rad that a step loses at a constant rate, x = |w| h; - none",
-        f"coning         leading secular drift rate for {rates}, step {STEP_S:g} s",
-        "per operation  that drift of a step in rad, over the operations of the step",
-        f"equal work     the drift rate in deg/h where the step is so long that {WORK:g} operations a second do",
-        "contractive    angles x of a step at which no state grows; kept: its length is kept exactly",
-        "",
-        "drift of a step, leading term for the rate w0 + w1 t + w2 t^2/2 + ...",
-    ]
-    longest = max(len(row.kernel) for row in rows)
-    for row in rows:
-        terms = len(row.general.replace(" - ", " + ").split(" + "))
-        shown = row.general if terms <= _SHORT else f"{terms} terms: strapgen series, or --format json"
-        notes.append(f"  {row.kernel:<{longest}}  {shown}")
-    return "\n".join([*text, *notes])
+    """Return rows as text: a table, what its columns mean, and the drift of a step of each algorithm."""
+    drifts = [(row.kernel, _general(row)) for row in rows]
+    return "\n".join(
+        [
+            *TextTable(_COLUMNS, [_cells(row) for row in rows]).lines(),
+            "",
+            *_NOTES,
+            "",
+            "drift of a step, leading term for the rate w0 + w1 t + w2 t^2/2 + ...",
+            *TextTable([Column(align="<")] * 2, drifts).lines("  "),
+        ]
+    )
 
 
-def _power(number: sp.Expr | None, power: int | None) -> str:
+def _cells(row: OverviewRow) -> list[Any]:
+    return [
+        row.kernel,
+        row.order,
+        row.operations,
+        _power(row.constant, row.constant_power),
+        _deg_h(row.coning_rate()),
+        row.per_operation,
+        _deg_h(row.at_equal_work),
+        row.contractive,
+    ]
+
+
+def _deg_h(rate: float | None) -> float | None:
+    """Return a rate in rad/s in deg/h."""
+    return None if rate is None else math.degrees(rate) * 3600
+
+
+def _general(row: OverviewRow) -> str:
+    terms = len(row.general.replace(" - ", " + ").split(" + "))
+    return row.general if terms <= _MOST_TERMS else f"{terms} terms: strapgen series, or --format json"
+
+
+def _power(number: sp.Expr | None, power: int | None) -> str | None:
     if number is None or power is None:
-        return "-"
+        return None
     size = sp.Rational(number) if number.is_Rational else None
     if size is None or size.q > 10**9:
         return f"{float(number):.4g} x^{power}"

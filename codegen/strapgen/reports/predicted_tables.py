@@ -5,32 +5,48 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from strapgen.experiments.predicted_tables import PredictedEntry
-from strapgen.experiments.thesis_tables import (
-    TABLES,
+from strapgen.experiments.thesis_tables import TABLES
+from strapgen.reports.table import Column, TextTable
+
+_COLUMNS = (
+    Column("", "<", least=20),
+    Column("predicted", spec=".4g", least=9),
+    Column("simulated", spec=".4g", least=9),
+    Column("ratio", spec=".4g", least=10),
+    Column("simulated", spec=".4g", least=9),
+    Column("off by", spec="+.2%", least=7),
+    Column("thesis", least=8),
+    Column("", "<", gap=1),
 )
 
 
-def predicted_text(found: Sequence[PredictedEntry]) -> str:
+def predicted_text(entries: Sequence[PredictedEntry]) -> str:
     """Return predicted tables as text."""
     lines = []
     for table in TABLES:
-        rows = [entry for entry in found if entry.table == table.number]
+        rows = [_cells(entry) for entry in entries if entry.table == table.number]
         if not rows:
             continue
         ratio = "of the same order" if table.by_order else "of first order"
         lines += [
             f"Table {table.number}: {table.title}",
             f"  drift in deg, and its ratio to that of direction cosines {ratio}",
-            f"  {'':<20}{'predicted':>11}{'simulated':>11}{'ratio':>12}{'simulated':>11}{'off by':>9}{'thesis':>10}",
+            *TextTable(_COLUMNS, rows).lines("  "),
+            "",
         ]
-        for row in rows:
-            name = f"{row.algorithm}, order {row.order}"
-            mark = "" if row.agrees else " *"
-            lines.append(
-                f"  {name:<20}{row.drift_deg:>11.4g}{row.simulated_deg:>11.4g}{row.normalised:>12.4g}"
-                f"{row.simulated:>11.4g}{row.deviation:>+9.2%}{row.thesis:>10}{mark}"
-            )
-        lines.append("")
-    if not all(entry.agrees for entry in found):
+    if not all(entry.agrees for entry in entries):
         lines.append("* not the thesis's figure in its printed digits\n")
     return "\n".join(lines)
+
+
+def _cells(entry: PredictedEntry) -> tuple[str | float, ...]:
+    return (
+        f"{entry.algorithm}, order {entry.order}",
+        entry.drift_deg,
+        entry.simulated_deg,
+        entry.normalised,
+        entry.simulated,
+        entry.deviation,
+        entry.thesis,
+        "" if entry.agrees else "*",
+    )

@@ -6,53 +6,53 @@ from collections.abc import Sequence
 
 import sympy as sp
 
-from strapgen.analysis.ratios import _ANGLE, Claim, Ratio, _columns
+from strapgen.analysis.ratios import STEP_ANGLE, Claim, Ratio, columns
+from strapgen.reports.latex import align_environment
+from strapgen.reports.table import Column, TextTable
 
 
-def ratio_text(found: Ratio) -> str:
+def ratio_text(comparison: Ratio) -> str:
     """Return a comparison as text."""
-    lines = [f"{found.first} over {found.second}, {found.motion} motion: {found.quantity}"]
-    if found.symbol == _ANGLE:
+    lines = [
+        f"{comparison.first} over {comparison.second}, {comparison.motion} motion: {comparison.quantity}"
+    ]
+    if comparison.symbol == STEP_ANGLE:
         lines.append("x = |w| h, the angle of a step")
-    data = found.as_dict()
-    for name, key in ((found.first, "first_terms"), (found.second, "second_terms")):
+    data = comparison.as_dict()
+    for name, key in ((comparison.first, "first_terms"), (comparison.second, "second_terms")):
         axes = ("",) if len(data[key]) == 1 else (", x", ", y", ", z")
         lines += ["", *(f"{name}{axis} = {text}" for axis, text in zip(axes, data[key], strict=True))]
-    lines += ["", f"ratio = {data['ratio']}" if found.ratio is not None else _no_ratio(found)]
+    lines += ["", f"ratio = {data['ratio']}" if comparison.ratio is not None else _no_ratio(comparison)]
     return "\n".join(lines)
 
 
 def _no_ratio(comparison: Ratio) -> str:
-    empty = [
-        n
-        for n, terms in zip((comparison.first, comparison.second), comparison.terms, strict=True)
-        if not terms
-    ]
-    return (
-        f"no ratio: {' and '.join(empty)} loses nothing"
-        if empty
-        else "no ratio: the vectors are not parallel"
-    )
+    names = (comparison.first, comparison.second)
+    exact = [name for name, terms in zip(names, comparison.terms, strict=True) if not terms]
+    if exact:
+        return f"no ratio: {' and '.join(exact)} loses nothing"
+    return "no ratio: the vectors are not parallel"
 
 
-def ratio_latex(found: Ratio) -> str:
+def ratio_latex(comparison: Ratio) -> str:
     """Return a comparison as LaTeX: lines of an align environment of the package amsmath."""
     rows = []
-    for name, terms in zip((found.first, found.second), found.terms, strict=True):
-        for row in _columns(terms):
-            total = sp.Add(*(x * found.symbol**power for power, x in row.items()))
+    for name, terms in zip((comparison.first, comparison.second), comparison.terms, strict=True):
+        for row in columns(terms):
+            total = sp.Add(*(x * comparison.symbol**power for power, x in row.items()))
             rows.append(rf"  \text{{{name}}} &= {sp.latex(total)}")
-    if found.expression is not None:
-        rows.append(rf"  \text{{ratio}} &= {sp.latex(found.expression)}")
-    body = " \\\\\n".join(rows)
-    return f"% {found.quantity}, {found.motion} motion\n\\begin{{align*}}\n{body}\n\\end{{align*}}"
+    if comparison.expression is not None:
+        rows.append(rf"  \text{{ratio}} &= {sp.latex(comparison.expression)}")
+    return f"% {comparison.quantity}, {comparison.motion} motion\n{align_environment(rows)}"
 
 
-def claims_text(found: Sequence[Claim]) -> str:
+def claims_text(claims: Sequence[Claim]) -> str:
     """Return claims as a table."""
-    width = max(len(claim.statement) for claim in found)
-    lines = ["Ratios of the drift at a constant rate, x = |w| h (for three axes: of the one axis)"]
-    for claim in found:
-        terms = [f"{value}" + (f" x^{power}" if power else "") for power, value in claim.ratio.items()]
-        lines.append(f"  {claim.statement:<{width}}  {' + '.join(terms).replace('+ -', '- ')}")
-    return "\n".join(lines)
+    rows = [(claim.statement, _leading_terms(claim)) for claim in claims]
+    title = "Ratios of the drift at a constant rate, x = |w| h (for three axes: of the one axis)"
+    return "\n".join([title, *TextTable([Column(align="<")] * 2, rows).lines("  ")])
+
+
+def _leading_terms(claim: Claim) -> str:
+    terms = [f"{value}" + (f" x^{power}" if power else "") for power, value in claim.ratio.items()]
+    return " + ".join(terms).replace("+ -", "- ")

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from strapgen.reports.table import Column, TextTable
 from strapgen.simulation.recording import History
 from strapgen.simulation.runs import Run
 
@@ -21,6 +20,28 @@ ANGLES = ("roll", "pitch", "heading")
 SKEW_PLANES = ("y-z", "z-x", "x-y")
 _PLACES = [f"{row}{column}" for row in "123" for column in "123"]
 _MOST_ROWS = 36
+#: Parts of an error matrix, and the unit in the names of their columns.
+_PARTS = (("scale", ""), ("skew", "_deg"), ("drift", "_deg"))
+
+
+def _three(group: str, names: Sequence[str], spec: str) -> list[Column]:
+    """Return three columns of numbers close together, under one title."""
+    return [Column(name, spec=spec, least=12, gap=1 if k else 2, group=group) for k, name in enumerate(names)]
+
+
+_ERROR_COLUMNS = (
+    Column("s", spec=".3f", least=9, group="time"),
+    *_three("scale", AXES, ".4e"),
+    *_three("skew, deg", SKEW_PLANES, ".4e"),
+    *_three("drift, deg", AXES, ".4e"),
+)
+_MATRIX_TITLES = [
+    Column(title, "<", least=38) for title in ("computed C", "true C", "computed - true", "error matrix E")
+]
+_MATRIX_COLUMNS = [
+    column for spec in (".9f", ".9f", ".4e", ".4e") for column in _three("", ("", "", ""), spec)
+]
+_TIME_COLUMN = Column("time, s", spec=".4f", least=10)
 
 
 def run_data(run: Run, settings: dict[str, Any]) -> dict[str, Any]:
@@ -56,41 +77,44 @@ def run_csv(run: Run) -> str:
     return _csv(header, np.hstack(columns).tolist())
 
 
-_PARTS = (("scale", ""), ("skew", "_deg"), ("drift", "_deg"))
-
-
 def run_text(run: Run, settings: dict[str, Any]) -> str:
     """Return a run as a report: the nine errors in time, the matrices at the end, the mean drift."""
-    words = ", ".join(f"{key} {value}" for key, value in settings.items() if value is not None)
-    lines = [words, ""]
-    lines.append(f"{'time':>9}  {'scale':^38}  {'skew, deg':^38}  {'drift, deg':^38}")
-    names = [f"{name:>12}" for name in (*AXES, *SKEW_PLANES, *AXES)]
-    lines.append(f"{'s':>9}  {' '.join(names[:3])}  {' '.join(names[3:6])}  {' '.join(names[6:])}")
     shown = _thinned(len(run.time))
-    for k in shown:
-        parts = (run.scale[k], np.degrees(run.skew[k]), np.degrees(run.drift[k]))
-        cells = "  ".join(" ".join(f"{value:12.4e}" for value in part) for part in parts)
-        lines.append(f"{run.time[k]:9.3f}  {cells}")
+    parts = np.hstack([run.scale, np.degrees(run.skew), np.degrees(run.drift)])
+    lines = [
+        _settings_text(settings),
+        "",
+        *TextTable(_ERROR_COLUMNS, [(run.time[k], *parts[k]) for k in shown]).lines(),
+    ]
     if len(shown) < len(run.time):
         lines.append(
             f"({len(shown)} of {len(run.time)} records; --format csv prints all, --record S thins them)"
         )
-    lines += ["", f"at {run.time[-1]:g} s"]
-    titles = ("computed C", "true C", "computed - true", "error matrix E")
-    lines.append("  ".join(f"{title:<38}" for title in titles).rstrip())
-    matrices = (run.computed[-1], run.true[-1], run.computed[-1] - run.true[-1], run.error[-1])
-    for row in range(3):
-        cells = "  ".join(" ".join(_cell(v, k > 1) for v in m[row]) for k, m in enumerate(matrices))
-        lines.append(cells)
     largest = ", ".join(
         f"{axis} {value:.6g}" for axis, value in zip(AXES, np.degrees(run.drift_by_axis), strict=True)
     )
-    lines += ["", f"largest drift, deg: {largest}", f"mean drift, deg: {np.degrees(run.mean_drift):.6g}"]
-    return "\n".join(lines)
+    return "\n".join(
+        [
+            *lines,
+            "",
+            f"at {run.time[-1]:g} s",
+            *_matrix_lines(run),
+            "",
+            f"largest drift, deg: {largest}",
+            f"mean drift, deg: {np.degrees(run.mean_drift):.6g}",
+        ]
+    )
 
 
-def _cell(value: float, small: bool) -> str:
-    return f"{value:12.4e}" if small else f"{value:12.9f}"
+def _matrix_lines(run: Run) -> list[str]:
+    """Return the matrices at the end of a run side by side."""
+    computed, true = run.computed[-1], run.true[-1]
+    rows = np.hstack([computed, true, computed - true, run.error[-1]])
+    return TextTable(_MATRIX_TITLES, []).lines() + TextTable(_MATRIX_COLUMNS, rows.tolist()).lines()
+
+
+def _settings_text(settings: dict[str, Any]) -> str:
+    return ", ".join(f"{key} {value}" for key, value in settings.items() if value is not None)
 
 
 def history_csv(history: History, elements: Sequence[str]) -> str:
@@ -113,12 +137,11 @@ def history_data(history: History, elements: Sequence[str], settings: dict[str, 
 
 def history_text(history: History, elements: Sequence[str], settings: dict[str, Any]) -> str:
     """Return an attitude history as a report."""
-    lines = [", ".join(f"{key} {value}" for key, value in settings.items() if value is not None)]
-    lines += ["", f"{'time, s':>10} " + " ".join(f"{element:>12}" for element in elements)]
     shown = _thinned(len(history.time))
     states = history.states.reshape(len(history.time), -1)
-    for k in shown:
-        lines.append(f"{history.time[k]:10.4f} " + " ".join(f"{value:12.9f}" for value in states[k]))
+    columns = [_TIME_COLUMN, *(Column(element, spec=".9f", least=12, gap=1) for element in elements)]
+    rows = [(history.time[k], *states[k]) for k in shown]
+    lines = [_settings_text(settings), "", *TextTable(columns, rows).lines()]
     if len(shown) < len(history.time):
         lines.append(f"({len(shown)} of {len(history.time)} records; --format csv prints all)")
     if history.unused:
@@ -161,13 +184,11 @@ def course_data(course: Course, settings: dict[str, Any]) -> dict[str, Any]:
 
 def course_text(course: Course, settings: dict[str, Any]) -> str:
     """Return attitude and velocity along a recording as a report."""
-    lines = [", ".join(f"{key} {value}" for key, value in settings.items())]
-    titles = [*(f"{name}, deg" for name in ANGLES), *(f"dv{axis}, m/s" for axis in AXES)]
-    lines += ["", f"{'time, s':>10} " + " ".join(f"{title:>13}" for title in titles)]
     shown = _thinned(len(course.time))
-    rows = np.column_stack([np.degrees(course.angles), course.velocity_changes])
-    for k in shown:
-        lines.append(f"{course.time[k]:10.4f} " + " ".join(f"{value:13.8f}" for value in rows[k]))
+    titles = [*(f"{name}, deg" for name in ANGLES), *(f"dv{axis}, m/s" for axis in AXES)]
+    columns = [_TIME_COLUMN, *(Column(title, spec=".8f", least=13, gap=1) for title in titles)]
+    values = np.column_stack([course.time, np.degrees(course.angles), course.velocity_changes])
+    lines = [_settings_text(settings), "", *TextTable(columns, values[shown].tolist()).lines()]
     if len(shown) < len(course.time):
         lines.append(f"({len(shown)} of {len(course.time)} cycles; --format csv prints all)")
     if course.unused:
@@ -184,9 +205,5 @@ def _thinned(count: int) -> list[int]:
     return sorted({round(k * (count - 1) / _MOST_ROWS) for k in range(_MOST_ROWS + 1)})
 
 
-def _csv(header: Iterable[str], rows: Iterable[Iterable[Any]]) -> str:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(header)
-    writer.writerows(rows)
-    return text.getvalue()
+def _csv(names: Iterable[str], rows: Sequence[Sequence[float]]) -> str:
+    return TextTable([Column(name) for name in names], rows).as_csv()

@@ -8,9 +8,11 @@ from typing import Any
 from strapgen.catalogue.methods import order_conditions
 from strapgen.catalogue.methods.coefficients import text
 from strapgen.catalogue.methods.tableau import Tableau
+from strapgen.reports.table import Column, TextTable
 
 #: Widest table; a wider tableau is listed coefficient by coefficient.
 _WIDEST = 120
+_TWO_COLUMNS = (Column(align="<"), Column(align="<"))
 
 
 def tableau_data(tableau: Tableau) -> dict[str, Any]:
@@ -54,14 +56,13 @@ def tableau_text(data: Mapping[str, Any]) -> str:
         facts["order of the embedded weights"] = data["embedded_order"]
     if data["tolerance"]:
         facts["largest residual"] = f"{data['largest_residual']:.3g}, tolerance {data['tolerance']:.3g}"
-    width = max(map(len, facts))
     tableau = _tableau_lines(data)
     return "\n".join(
         [
             f"{data['name']}: {data['title']}",
             f"source: {data['source']}",
             "",
-            *(f"{fact:<{width}}  {value}" for fact, value in facts.items()),
+            *TextTable(_TWO_COLUMNS, [(fact, str(value)) for fact, value in facts.items()]).lines(),
             "",
             *(tableau if max(map(len, tableau)) <= _WIDEST else _coefficient_lines(data)),
         ]
@@ -71,18 +72,16 @@ def tableau_text(data: Mapping[str, Any]) -> str:
 def _tableau_lines(data: Mapping[str, Any]) -> list[str]:
     """Return the tableau as it is printed in books."""
     bottom = [row for row in (data["weights"], data["embedded_weights"]) if row]
-    widths = [
-        max(len(row[k]) for row in (*data["matrix"], *bottom) if k < len(row)) for k in range(data["stages"])
+    stages = data["stages"]
+    rows = [
+        [head, "|", *row, *[""] * (stages - len(row))]
+        for head, row in zip([*data["nodes"], *[""] * len(bottom)], [*data["matrix"], *bottom], strict=True)
     ]
-    first = max(map(len, data["nodes"]))
-
-    def line(head: str, row: list[str]) -> str:
-        cells = (f"{cell:>{width}}" for cell, width in zip(row, widths, strict=False))
-        return f"{head:>{first}} | {'  '.join(cells)}".rstrip()
-
-    rule = "-" * first + "-+-" + "-" * (sum(widths) + 2 * len(widths) - 2)
-    rows = [line(node, row) for node, row in zip(data["nodes"], data["matrix"], strict=True)]
-    return [*rows, rule, *(line("", row) for row in bottom)]
+    columns = [Column(), Column(gap=1), Column(gap=1), *[Column()] * (stages - 1)]
+    lines = TextTable(columns, rows).lines()
+    before = lines[-1].index("|")
+    rule = "-" * before + "+" + "-" * (max(map(len, lines)) - before - 1)
+    return [*lines[:stages], rule, *lines[stages:]]
 
 
 def _coefficient_lines(data: Mapping[str, Any]) -> list[str]:
@@ -93,6 +92,5 @@ def _coefficient_lines(data: Mapping[str, Any]) -> list[str]:
         named += [(f"a_{stage},{place}", value) for place, value in enumerate(row, 1) if value != "0"]
     for letter, row in (("b", data["weights"]), ("e", data["embedded_weights"] or [])):
         named += [(f"{letter}_{place}", value) for place, value in enumerate(row, 1) if value != "0"]
-    width = max(len(name) for name, _ in named)
     note = ["", "e: the embedded weights"] if data["embedded_weights"] else []
-    return [f"{name:<{width}}  {value}" for name, value in named] + note
+    return TextTable(_TWO_COLUMNS, named).lines() + note

@@ -9,12 +9,13 @@ from typing import Any
 
 import sympy as sp
 
+from strapgen.reports.latex import align_environment
+from strapgen.reports.table import Column, TextTable
+from strapgen.reports.units import READABLE_UNITS
 from strapgen.support.exceptions import InputError
 from strapgen.vibration import Assessment
 from strapgen.vibration.mean_rates import Rates
 
-#: For each unit of a rate the unit that a person reads, and the factor to it.
-READABLE_UNITS = {"rad/s": ("deg/h", math.degrees(3600)), "m/s^2": ("micro-g", 1e6 / 9.80665)}
 #: The units as parts of the names of data.
 _UNIT_SUFFIXES = {"rad/s": "rad_s", "m/s^2": "m_s2"}
 #: The name of the fast loop and the slow loop together.
@@ -121,7 +122,7 @@ def vibration_text(outcomes: Sequence[CaseRates], title: str) -> str:
     for unit in READABLE_UNITS:
         group = [outcome for outcome in outcomes if outcome.case.assessment.unit == unit]
         if group:
-            lines += ["", *_rate_lines(group, unit)]
+            lines += ["", *_rate_table(group, unit).lines()]
     if any(outcome.case.is_fast_loop for outcome in outcomes):
         lines += ["", _FAST_LOOP_NOTE]
     one_algorithm = len({outcome.case.label for outcome in outcomes}) == 1
@@ -129,28 +130,33 @@ def vibration_text(outcomes: Sequence[CaseRates], title: str) -> str:
         for outcome in outcomes:
             assessment = outcome.case.assessment
             lines += ["", f"closed form of the {outcome.case.quantity} rate in {assessment.unit}"]
-            lines += [f"  {part:<10} = {assessment.text(part)}" for part in ("continuous", "computed")]
+            lines += [f"  continuous = {assessment.text('continuous')}"]
+            lines += [f"  computed   = {assessment.text('computed')}"]
     return "\n".join(lines)
 
 
-def _rate_lines(group: Sequence[CaseRates], unit: str) -> list[str]:
-    """Return the rates of one unit as a table, each above its error of quadrature if there is one."""
+def _rate_table(group: Sequence[CaseRates], unit: str) -> TextTable:
+    """Return the rates of one unit, each above its error of quadrature if there is one."""
     readable, factor = READABLE_UNITS[unit]
-    width = max(len(outcome.case.label) for outcome in group)
-    heads = [*(f"{part}, {unit}" for part in Rates._fields), f"error, {readable}"]
-    lines = [f"{group[0].case.quantity:<{width}} " + "".join(f"{head:>20}" for head in heads)]
+    rows: list[list[Any]] = []
     for outcome in group:
         label, error = outcome.case.label, outcome.rates.error * factor
         if not math.isfinite(error):
             raise InputError(
                 f"{label}: the error in {readable} is beyond the range of double; take smaller amplitudes"
             )
-        cells = "".join(f"{value:>20.9e}" for value in outcome.rates)
-        lines.append(f"{label:<{width}} {cells}{error:>20.6g}")
+        rows.append([label, *outcome.rates, error])
         if outcome.quadrature is not None:
-            cells = "".join(f"{value:>20.1e}" for value in outcome.quadrature)
-            lines.append(f"{'  quadrature':<{width}} {cells}")
-    return lines
+            rows.append(["  quadrature", *(f"{value:.1e}" for value in outcome.quadrature), ""])
+    columns = [
+        Column(group[0].case.quantity, "<"),
+        *(
+            Column(f"{part}, {unit}", spec=".9e", least=least)
+            for part, least in zip(Rates._fields, (19, 18, 18), strict=True)
+        ),
+        Column(f"error, {readable}", spec=".6g", least=18),
+    ]
+    return TextTable(columns, rows)
 
 
 def vibration_latex(cases: Sequence[AssessedCase]) -> str:
@@ -161,4 +167,4 @@ def vibration_latex(cases: Sequence[AssessedCase]) -> str:
         for part in ("continuous", "computed", "error"):
             index = rf"\mathrm{{{part}}}" if len(cases) == 1 else rf"\mathrm{{{part},\ {case.label}}}"
             rows.append(f"{letter}^{{{index}}} &= {sp.latex(case.assessment.expression(part))}")
-    return "\\begin{align*}\n" + " \\\\\n".join(rows) + "\n\\end{align*}"
+    return align_environment(rows)

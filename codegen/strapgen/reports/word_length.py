@@ -2,56 +2,74 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Sequence
+from typing import Any
 
 from strapgen.experiments.word_length import Outcome
+from strapgen.reports.table import ANGLE, Column, TextTable
+
+_COLUMNS = (
+    Column("word", least=6),
+    Column("rounding", "<", least=10),
+    Column("carry", "<", least=7, gap=1),
+    Column("drift", spec=ANGLE, least=8),
+    Column("arithmetic", spec=ANGLE),
+    Column("certified", spec=ANGLE),
+    Column("increments", spec=ANGLE),
+    Column("most from", "<"),
+)
+_NOTES = (
+    "all angles in deg, the largest along the run: lengths of the drift vector, where a mean drift adds up what is",
+    "largest on each axis; -: the state leaves its range, or no bound is known",
+)
+
+
+def settings_text(outcome: Outcome, separator: str = ", ") -> str:
+    """Return the settings of the motion of an outcome as text."""
+    return separator.join(f"{key}={value}" for key, value in outcome.case.settings)
+
+
+def by_method_step_and_pulse(outcomes: Sequence[Outcome]) -> dict[tuple[str, str, str], list[Outcome]]:
+    """Return outcomes in groups that differ in word, rounding and carry alone: those of one table, or one panel."""
+    groups: dict[tuple[str, str, str], list[Outcome]] = {}
+    for outcome in outcomes:
+        case = outcome.case
+        groups.setdefault((case.method, case.step, case.pulse_arcsec), []).append(outcome)
+    return groups
 
 
 def word_length_csv(outcomes: Sequence[Outcome]) -> str:
     """Return outcomes as comma-separated values."""
-    buffer = io.StringIO()
-    rows = [outcome.as_dict() for outcome in outcomes]
-    for row in rows:
-        row["settings"] = " ".join(f"{key}={value}" for key, value in row["settings"].items())
-    writer = csv.DictWriter(buffer, rows[0].keys(), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows({key: "" if value is None else value for key, value in row.items()} for row in rows)
-    return buffer.getvalue()
+    rows = [outcome.as_dict() | {"settings": settings_text(outcome, " ")} for outcome in outcomes]
+    return TextTable([Column(name) for name in rows[0]], [list(row.values()) for row in rows]).as_csv()
 
 
 def word_length_text(outcomes: Sequence[Outcome]) -> str:
     """Return outcomes as tables for a reader: one for each method, step and pulse, a row for each word and carry."""
     lines: list[str] = []
-    groups: dict[tuple[str, str, str], list[Outcome]] = {}
-    for outcome in outcomes:
-        case = outcome.case
-        groups.setdefault((case.method, case.step, case.pulse_arcsec), []).append(outcome)
-    for (method, step, pulse), group in groups.items():
-        case, first = group[0].case, group[0]
-        words = ", ".join(f"{key}={value}" for key, value in case.settings)
+    for (method, step, pulse), group in by_method_step_and_pulse(outcomes).items():
+        first = group[0]
+        case = first.case
         gyro = "increments rounded to their format" if float(pulse) == 0 else f"pulses of {pulse} arcsec"
         lines += [
-            f"{case.algorithm} {method}, step {step} s, {case.duration} s of {case.motion} motion ({words}), {gyro}",
-            f"the method itself drifts by {first.truncation_deg:.3g} deg",
+            f"{case.algorithm} {method}, step {step} s, {case.duration} s of {case.motion} motion "
+            f"({settings_text(first)}), {gyro}",
+            f"the method itself drifts by {first.truncation_deg:{ANGLE}} deg",
             "",
-            f"{'word':>6}  {'rounding':<11}{'carry':<7}{'drift':>10}{'arithmetic':>12}{'certified':>11}"
-            f"{'increments':>12}  most from",
+            *TextTable(_COLUMNS, [_cells(outcome) for outcome in group]).lines(),
+            "",
         ]
-        for outcome in group:
-            lines.append(
-                f"{outcome.case.word:>6}  {outcome.case.rounding:<11}{outcome.case.carry:<7}"
-                f"{_angle(outcome.drift_deg):>10}{_angle(outcome.rounding_deg):>12}"
-                f"{_angle(outcome.bound_deg):>11}{_angle(outcome.quantization_deg):>12}  {outcome.dominates}"
-            )
-        lines.append("")
-    lines += [
-        "all angles in deg, the largest along the run: lengths of the drift vector, where a mean drift adds up what is",
-        "largest on each axis; -: the state leaves its range, or no bound is known",
+    return "\n".join([*lines, *_NOTES])
+
+
+def _cells(outcome: Outcome) -> list[Any]:
+    return [
+        outcome.case.word,
+        outcome.case.rounding,
+        outcome.case.carry,
+        outcome.drift_deg,
+        outcome.rounding_deg,
+        outcome.bound_deg,
+        outcome.quantization_deg,
+        outcome.dominates,
     ]
-    return "\n".join(lines)
-
-
-def _angle(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3g}"

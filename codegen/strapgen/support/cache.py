@@ -3,6 +3,9 @@
 An entry is filled in a separate folder and then renamed into place. Two processes can therefore create the same entry
 at once, and a process that is killed or fails leaves nothing that is ever read. Every entry holds the hashes of its
 files, and a damaged one is created again.
+
+The cache is part of the ground, and not of the library that fills most of it, because the catalogue needs it too: it
+keeps the kernels of users' files here.
 """
 
 from __future__ import annotations
@@ -21,6 +24,7 @@ from pathlib import Path
 
 from strapgen.support import resources
 from strapgen.support.exceptions import InputError
+from strapgen.support.timing import from_cache
 
 _UNUSED_DAYS = 60
 _MANIFEST = "manifest.json"
@@ -91,7 +95,7 @@ def discard(kind: str, key: str) -> None:
     shutil.rmtree(root() / kind / key, ignore_errors=True)
 
 
-def entry(kind: str, key: str, fill: Callable[[Path], None]) -> Path:
+def entry(kind: str, key: str, fill: Callable[[Path], None], what: str = "") -> Path:
     """Return the folder of a cache entry; if there is none, create it by `fill`.
 
     Parameters
@@ -102,6 +106,8 @@ def entry(kind: str, key: str, fill: Callable[[Path], None]) -> Path:
         Hash of everything that the content depends on.
     fill : callable
         ``fill(folder)`` writes the files of the entry into an empty folder.
+    what : str, optional
+        What the entry holds, for the log: a line says that it comes from the cache, if it does.
 
     Returns
     -------
@@ -113,6 +119,8 @@ def entry(kind: str, key: str, fill: Callable[[Path], None]) -> Path:
         If the cache folder cannot be written.
     """
     if (there := lookup(kind, key)) is not None:
+        if what:
+            from_cache(what)
         return there
     place = root() / kind / key
     try:

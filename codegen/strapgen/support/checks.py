@@ -54,7 +54,7 @@ def choice(what: str, value: str, allowed: Iterable[str]) -> str:
 
 
 def double(text: str) -> float:
-    """Return the number that a text writes, in double precision; nan if it writes none.
+    """Return the number that a text holds, in double precision; nan if it is no number.
 
     Every number that a file or a command line holds is read here or by `whole`: digits are 0 to 9, without underscores.
 
@@ -72,7 +72,7 @@ def double(text: str) -> float:
 
 
 def whole(what: str, text: str) -> int:
-    """Return the whole number that a text writes.
+    """Return the whole number that a text holds.
 
     Raises
     ------

@@ -17,7 +17,7 @@ _NEW = os.O_CREAT | os.O_EXCL | os.O_WRONLY | getattr(os, "O_BINARY", 0)
 
 
 def write_files(folder: str | Path, files: Mapping[str, str | bytes]) -> list[Path]:
-    """Write files into a folder, which is made if need be.
+    """Write files into a folder, which is created if it does not exist.
 
     Every text is first written in full beside its place; only then are they renamed into it. A file that exists keeps
     its permissions; a new one has those that the umask leaves.
@@ -68,7 +68,7 @@ def write_files(folder: str | Path, files: Mapping[str, str | bytes]) -> list[Pa
 
 
 def check_folder(folder: str | Path) -> None:
-    """Check that files can be written into a folder, before the work that makes them; nothing is made.
+    """Check that files can be written into a folder, before the work that makes them; nothing is created.
 
     Raises
     ------

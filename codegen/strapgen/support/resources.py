@@ -1,4 +1,4 @@
-"""Where the templates and the checked-in generated sources lie: in the wheel, or in the checkout."""
+"""The folders of templates and generated sources, in the wheel or in the checkout."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the stages of the generator take: an argument that belongs to another stage is refused in one line."""
+"""Checks of the stages' arguments: one of another stage is refused with the call that is missing."""
 
 from __future__ import annotations
 
@@ -7,19 +7,21 @@ from typing import Any
 
 from strapgen.support.exceptions import InputTypeError
 
-#: The call that makes the next stage's argument, by the class of this one's, and the class of what it makes.
+#: The call that takes an argument of a class to the next stage, and the class that it returns.
 _NEXT = {
     "str": ("derive({})", "Kernel"),
+    "Choice": ("derive({})", "Kernel"),
     "Kernel": ("lower({})", "Program"),
     "Program": ("generate({}, target)", "Sources"),
     "FixedProgram": ("generate({}, target)", "Sources"),
     "Sources": ("build({})", "Backend"),
 }
-#: What makes an argument from a name at once.
+#: The call that makes an argument from a name at once.
 _NAMED = {"Backend": "backend({})", "Motion": "motion({}, ...)"}
-#: What makes an argument otherwise.
+#: The function that makes an argument, where no call leads to it.
 _MAKERS = {
     "str": "strapgen list shows the names",
+    "Choice": "strapgen.choose makes one",
     "Kernel": "strapgen.derive makes one",
     "Program": "strapgen.lower makes one",
     "FixedProgram": "strapgen.quantize makes one",
@@ -28,8 +30,9 @@ _MAKERS = {
     "Motion": "strapgen.motion makes one",
     "Settings": "strapgen.Settings makes them",
 }
-#: What takes an argument that has come to another stage.
+#: The function that takes an argument which was passed to another one.
 _TAKERS = {
+    "Choice": "strapgen.derive takes it",
     "Kernel": "strapgen.lower takes it",
     "Program": "strapgen.generate takes it",
     "FixedProgram": "strapgen.generate takes it",
@@ -41,16 +44,16 @@ _TAKERS = {
 
 
 def require(function: str, value: Any, *classes: type) -> None:
-    """Check that an argument is what a stage takes.
+    """Check that an argument has a class that a stage takes.
 
     Parameters
     ----------
     function : str
-        The stage, as a user calls it.
+        Name of the stage, as a user calls it.
     value : object
-        What it is called with.
+        The argument.
     *classes : type
-        What it takes.
+        The classes that the stage takes.
 
     Raises
     ------
@@ -86,13 +89,13 @@ def describe(value: Any) -> str:
 
 
 def _stage_class(value: Any) -> str:
-    """Return the name of a class that stages exchange, for a back end that of all of them; else of the value's own."""
+    """Return the name of the class of a value; of a class that stages exchange for those derived from it."""
     names = [cls.__name__ for cls in type(value).__mro__]
     return next((name for name in names if name in _MAKERS), names[0])
 
 
 def _remedy(value: Any, needed: str) -> str:
-    """Return which call makes what is needed of what is there; or what takes what is there."""
+    """Return the call that makes a needed class from a value; if there is none, the function that takes the value."""
     reached = _stage_class(value)
     call = describe(value) if reached == "str" else reached.lower()
     if reached == "str" and needed in _NAMED:

@@ -1,8 +1,8 @@
-"""What a kernel's functions and files in C may not be called: names of the C library and of its headers.
+"""Names of the C library and its headers, which no function or file of a kernel can have.
 
-The names are those that C99 to C23 and POSIX.1-2008 declare, with what compilers and libraries add where no standard is
-asked for; those that end in ``_t`` are left to a rule. They matter for external names alone: inside a function any of
-them is free, unless the function calls it.
+C99 to C23 and POSIX.1-2008 declare them, or compilers and libraries add them when no standard is set. A rule covers the
+names that end in ``_t``. Only external names are concerned: a function can use any of these for a variable, unless it
+calls the library's function.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What headers and docstrings of fixed-point code say about arguments."""
+"""Contracts in words: what headers and docstrings of generated code say about arguments, ranges and errors."""
 
 from __future__ import annotations
 
@@ -69,10 +69,10 @@ def accumulation_text(accumulation: RoundingAccumulation, program: Program) -> s
 
 
 def residuals_text(residuals: tuple[ErrorFeedback, ...]) -> str:
-    """Return the residuals with their formats in words."""
+    """Return the words of error feedback with their formats, in words."""
     parts = []
-    for fraction in dict.fromkeys(residual.fraction for residual in residuals):
-        names = [residual.name for residual in residuals if residual.fraction == fraction]
+    for fraction in dict.fromkeys(feedback.fraction for feedback in residuals):
+        names = [feedback.name for feedback in residuals if feedback.fraction == fraction]
         parts.append(f"{', '.join(names)} in units of 2^{-fraction}")
     return "; ".join(parts)
 

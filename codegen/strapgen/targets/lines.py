@@ -1,4 +1,4 @@
-"""Lines of generated text, filled to a width."""
+"""Breaking the lines of generated text."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""Names in generated code: those of a kernel, made legal where a language or the code around them has them already.
+"""Names in generated code: a kernel's names, changed where the language or the template already uses them.
 
-What a template owns is read off the text that it prints. A program is printed once with marks in place of its names;
-every identifier without a mark is then one of the code around it, and stands in the scopes where the marks show which
-names it can meet. So no list of a template's variables has to be kept, and a name that meets none stays as it is.
+A program is first printed with marks in place of its names. Every identifier without a mark then belongs to the
+template, and the scope in which it stands shows the marks with which it can collide. So no list of a template's
+variables is needed, and a name that collides with none stays.
 """
 
 from __future__ import annotations
@@ -50,12 +50,12 @@ _IDENTIFIER = re.compile(rf"(?<![\w.])[A-Za-z_{_MARK}]\w*")
 
 @dataclass(frozen=True)
 class Language:
-    """What a language says about names.
+    """The rules of a language for names.
 
     Parameters
     ----------
     allows : callable
-        Tells whether an identifier may stand for a quantity.
+        Returns whether an identifier can name a quantity.
     scopes : callable
         Returns the identifiers of each scope of some files.
     """
@@ -71,7 +71,7 @@ def _c_allows(name: str) -> bool:
 
 
 def _c_scopes(texts: Iterable[str]) -> list[set[str]]:
-    """Return the identifiers of each declaration and function; macros of the code count in all of them."""
+    """Return the identifiers of each declaration and function; every one includes the macros of the code."""
     macros: set[str] = set()
     scopes: list[set[str]] = [set()]
     for text in texts:
@@ -93,7 +93,7 @@ def _python_allows(name: str) -> bool:
 
 
 def _python_scopes(texts: Iterable[str]) -> list[set[str]]:
-    """Return the names that each function uses, and first those that the modules do."""
+    """Return the names that the modules use, then those of each function."""
     module: set[str] = set()
     scopes: list[set[str]] = [module]
 
@@ -115,7 +115,7 @@ PYTHON = Language(_python_allows, _python_scopes)
 
 
 def external(name: str) -> str:
-    """Return the name of a kernel's function in C, which no library, header or keyword has.
+    """Return the name of a kernel's function in C, changed if a library, a header or a keyword has it.
 
     Examples
     --------
@@ -132,13 +132,13 @@ def printed(
     language: Language,
     joined: Iterable[str] = (),
 ) -> tuple[_P, dict[str, str]]:
-    """Print a program with names that the language and the code around them leave free.
+    """Print a program with names that collide neither with the language nor with the template.
 
     Parameters
     ----------
     program : Program or FixedProgram
     text : callable
-        Prints a program into files; takes the kernel's name of every name that stands for another one too.
+        ``text(program, names)`` prints a program into files; `names` has the kernel's name of every changed one.
     language : Language
     joined : iterable of str
         Signals that have one name with their only element.
@@ -158,10 +158,10 @@ def printed(
 
 
 def _chosen(marks: Mapping[Key, str], language: Language, scopes: list[set[str]]) -> dict[Key, str]:
-    """Return the name of everything that is marked: its own where that is free, and else one like it."""
-    taken = [{name for name in scope if _MARK not in name} for scope in scopes]
+    """Return a name for every mark: the kernel's where it is free, otherwise a similar one."""
+    reserved = [{name for name in scope if _MARK not in name} for scope in scopes]
     places: dict[str, list[tuple[str, set[str]]]] = {mark: [] for mark in marks.values()}
-    for scope, names in zip(scopes, taken, strict=True):
+    for scope, names in zip(scopes, reserved, strict=True):
         for token in sorted(name for name in scope if _MARK in name):
             (mark,) = re.findall(rf"{_MARK}\d+{_MARK}", token)
             places[mark].append((token, names))
@@ -184,7 +184,7 @@ def _chosen(marks: Mapping[Key, str], language: Language, scopes: list[set[str]]
 
 
 def _alike(key: Key) -> Iterator[str]:
-    """Yield names like one that is not free."""
+    """Yield names that are similar to one that is not free."""
     if key.kind == "function":
         yield f"{key.name}_Kernel"
     base = key.name.lstrip("_") or "value"

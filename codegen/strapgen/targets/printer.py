@@ -1,4 +1,4 @@
-"""Printing the nodes of a program: what all targets share."""
+"""The printer of expressions that the printers of all targets extend."""
 
 from __future__ import annotations
 
@@ -10,10 +10,9 @@ _SUM, _PRODUCT, _UNARY, _ATOM = range(4)
 
 
 class Printer:
-    """Prints nodes with as few parentheses as keep the order of the operations.
+    """Prints nodes with the fewest parentheses that keep the order of the operations.
 
-    A target's printer says how a constant and each function look; sums and products look the same in
-    every language here.
+    Sums and products look the same in every language here; a target's printer prints constants and functions.
     """
 
     #: The step from 1 to the next number of the target.
@@ -48,8 +47,8 @@ class Printer:
         return self.function(node.kind, [self.text(argument) for argument in node.arguments]), _ATOM
 
     def _inside(self, node: Node, level: int) -> str:
-        text, own = self._print(node)
-        return text if own >= level else f"({text})"
+        text, binding = self._print(node)
+        return text if binding >= level else f"({text})"
 
     def _add(self, left: Node, right: Node) -> tuple[str, int]:
         return f"{self._inside(left, _SUM)} + {self._inside(right, _PRODUCT)}", _SUM

@@ -1,4 +1,4 @@
-"""A program under other names: the same code, to be printed."""
+"""Renaming: the same program with other names for its function, signals and values."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from strapgen.ir.fixed_interface import Argument, ErrorFeedback, Interface
 from strapgen.ir.integer_program import (
     FixedProgram,
     IntegerDefinition,
-    IntegerInput,
     IntegerMaximum,
     IntegerQuotient,
     IntegerRoot,
@@ -27,20 +26,20 @@ _P = TypeVar("_P", Program, FixedProgram)
 
 
 class Key(NamedTuple):
-    """Something that has a name: of kind "function", "signal", "value" or "residual"."""
+    """A named part of a program, of kind "function", "signal", "value" or "residual" (an error feedback)."""
 
     kind: str
     name: str
 
 
 def keys(program: Program | FixedProgram, joined: Iterable[str] = ()) -> list[Key]:
-    """Return everything that a program names, each once, signals first.
+    """Return the named parts of a program, each once: the function, signals, then values.
 
     Parameters
     ----------
     program : Program or FixedProgram
     joined : iterable of str
-        Signals that have one name with their only element.
+        Signals that share their name with their only element.
     """
     plain = program if isinstance(program, Program) else program.program
     signals = [*plain.inputs, *(result.signal for result in plain.results)]
@@ -51,7 +50,7 @@ def keys(program: Program | FixedProgram, joined: Iterable[str] = ()) -> list[Ke
         names += [Key("value", assignment.name) for assignment in program.body]
     else:
         names += [Key("value", value.name) for value in program.body]
-        names += [Key("residual", residual.name) for residual in program.interface.residuals]
+        names += [Key("residual", feedback.name) for feedback in program.interface.residuals]
     return list(dict.fromkeys(names))
 
 
@@ -62,7 +61,7 @@ def renamed(program: _P, names: Mapping[Key, str], joined: Iterable[str] = ()) -
     ----------
     program : Program or FixedProgram
     names : mapping of Key to str
-        Names by what they stand for; what is missing keeps its own.
+        Names by what they stand for; a name that is missing stays.
     joined : iterable of str
         As for `keys`.
     """
@@ -71,7 +70,7 @@ def renamed(program: _P, names: Mapping[Key, str], joined: Iterable[str] = ()) -
 
 
 class _Renaming:
-    """Names, and how each part of a program takes them."""
+    """The new names, and a method that renames each kind of part."""
 
     def __init__(self, names: Mapping[Key, str], joined: frozenset[str]) -> None:
         self.names, self.joined = names, joined
@@ -127,41 +126,41 @@ class _Renaming:
             interface,
             inputs=tuple(map(self.argument, interface.inputs)),
             outputs=tuple(map(self.argument, interface.outputs)),
-            residuals=tuple(map(self.residual, interface.residuals)),
+            residuals=tuple(map(self.feedback, interface.residuals)),
         )
 
     def argument(self, argument: Argument) -> Argument:
         values = tuple(map(self.value, argument.values))
         return replace(argument, signal=self.signal(argument.signal), values=values)
 
-    def residual(self, residual: ErrorFeedback) -> ErrorFeedback:
-        return replace(residual, name=self.names.get(Key("residual", residual.name), residual.name))
+    def feedback(self, feedback: ErrorFeedback) -> ErrorFeedback:
+        return replace(feedback, name=self.names.get(Key("residual", feedback.name), feedback.name))
 
     def fixed_value(self, value: Value) -> Value:
         return replace(value, name=self.value(value.name), definition=self.definition(value.definition))
 
     def definition(self, definition: IntegerDefinition) -> IntegerDefinition:
-        if isinstance(definition, IntegerSum):
-            return replace(
-                definition,
-                fine=tuple(map(self.term, definition.fine)),
-                coarse=tuple(map(self.term, definition.coarse)),
-                residual=definition.residual and self.residual(definition.residual),
-            )
-        if isinstance(definition, IntegerQuotient):
-            return IntegerQuotient(self.scaled(definition.numerator), self.value(definition.denominator))
-        if isinstance(definition, IntegerRoot):
-            return IntegerRoot(self.scaled(definition.argument))
-        if isinstance(definition, IntegerMaximum):
-            return IntegerMaximum(tuple(map(self.scaled, definition.arguments)))
-        if isinstance(definition, IntegerInput):
-            return definition
-        assert isinstance(definition, IntegerSelection)
-        cases = tuple(
-            (self.scaled(left), self.scaled(right), self.scaled(value))
-            for left, right, value in definition.cases
-        )
-        return IntegerSelection(cases, self.scaled(definition.otherwise))
+        match definition:
+            case IntegerSum(residual=feedback):
+                return replace(
+                    definition,
+                    fine=tuple(map(self.term, definition.fine)),
+                    coarse=tuple(map(self.term, definition.coarse)),
+                    residual=feedback and self.feedback(feedback),
+                )
+            case IntegerQuotient(numerator, denominator):
+                return IntegerQuotient(self.scaled(numerator), self.value(denominator))
+            case IntegerRoot(argument):
+                return IntegerRoot(self.scaled(argument))
+            case IntegerMaximum(arguments):
+                return IntegerMaximum(tuple(map(self.scaled, arguments)))
+            case IntegerSelection(cases, otherwise):
+                renamed_cases = tuple(
+                    (self.scaled(left), self.scaled(right), self.scaled(value))
+                    for left, right, value in cases
+                )
+                return IntegerSelection(renamed_cases, self.scaled(otherwise))
+        return definition  # an element of an input
 
     def term(self, term: Term) -> Term:
         return replace(term, names=tuple(map(self.value, term.names)))

@@ -1,8 +1,8 @@
 """Building turns source text into a module that can be called.
 
-The numpy target is imported as it is. C is compiled through cffi in API mode and cached by content, so that
-a second call compiles nothing. Many sources compile together into one module: the compiler's start, Python's headers
-and the linker, which cost more than a kernel does, are paid once.
+Python code is executed as it is. C is compiled through cffi in API mode and cached by content, so that a second call
+compiles nothing. Many sources can be compiled into one module, which costs little more than one of them: starting the
+compiler, reading Python's headers and linking take longer than a kernel.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ from typing import Any
 from strapgen.ir.sources import Sources
 from strapgen.support import cache
 from strapgen.support.exceptions import CompilerError
+from strapgen.support.timing import timed
 
 #: Flags in addition to those of Python. Without contraction to fused multiply-add every machine computes the same bits.
 #: Without notes for debuggers, which Python's flags switch on, compiling takes a tenth less time.
@@ -68,7 +69,8 @@ def load(sources: Sources) -> Any:
     """
     key = cache.digest([sources.target, *sources.files, *sources.files.values()])
     if key not in _loaded:
-        _loaded[key] = _compiled(sources) if sources.target.startswith("c") else _import_text(sources)
+        with timed("build", f"{sources.kernel} for {sources.target}"):
+            _loaded[key] = _compiled(sources) if sources.target.startswith("c") else _import_text(sources)
     return _loaded[key]
 
 
@@ -197,7 +199,13 @@ def _key(many: Iterable[Sources]) -> str:
 
 def _build(many: Sequence[Sources], name: str, key: str) -> Path:
     """Return the folder of a compiled module."""
-    return cache.entry("builds", key, lambda draft: _compile(many, name, compiler(), draft))
+    kernels = ", ".join(sources.kernel for sources in many)
+
+    def fill(draft: Path) -> None:
+        with timed("compile", kernels):
+            _compile(many, name, compiler(), draft)
+
+    return cache.entry("builds", key, fill, f"compiled {kernels}")
 
 
 def code_size(sources: Sources) -> int | None:

@@ -12,7 +12,7 @@ from functools import lru_cache
 
 import sympy as sp
 
-from strapgen import catalogue
+from strapgen import catalogue, pipeline
 from strapgen.catalogue import Choice
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError, InputTypeError
@@ -234,7 +234,7 @@ def of(choice: Choice, quantity: str = "drift") -> Assessment:
 
 
 def _of(choice: Choice, quantity: str) -> Assessment:
-    kernel = catalogue.derive(choice)
+    kernel = pipeline.derive(choice)
     if quantity == "sculling" and kernel.companions is not None:
         return _dual(of(choice))
     assess = {"drift": drift, "sculling": sculling}[quantity]

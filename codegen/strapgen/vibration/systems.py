@@ -10,7 +10,7 @@ from typing import Any
 
 import sympy as sp
 
-from strapgen import catalogue
+from strapgen import catalogue, pipeline
 from strapgen.catalogue import Choice
 from strapgen.ir.signals import Signal
 from strapgen.support import checks
@@ -173,7 +173,7 @@ def _rotation_about_z(expander: Expander, matrix: Sequence[Powers]) -> dict[str,
 def _of_vector(
     kernel: Kernel, sampled: Sequence[Signal], nodes: Sequence[Fraction | sp.Expr], previous: int
 ) -> System:
-    slow = catalogue.derive(Choice(_SLOW_LOOP))
+    slow = pipeline.derive(Choice(_SLOW_LOOP))
     assert slow.recursion is not None
     expander = Expander([kernel, slow])
     output = kernel.outputs[-1].signal

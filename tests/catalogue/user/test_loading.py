@@ -456,5 +456,5 @@ def test_what_lies_beside_a_file_can_be_imported_and_what_it_prints_is_no_output
 
 
 def test_a_name_that_is_none():
-    with pytest.raises(InputTypeError, match="derive takes a name or a path, not None"):
+    with pytest.raises(InputTypeError, match="derive takes a name or a path or a Choice, not None"):
         strapgen.derive(None)

@@ -1,1 +1,1 @@
-"""What comes out: attitude steps, conversions, updates, loops of two speeds, motions."""
+"""Kernels: attitude steps, conversions, updates, loops of two speeds, motions."""

@@ -1,4 +1,4 @@
-"""Attitude steps: kinematics + method + what is known of the rate, fused, in transition form."""
+"""Attitude steps in transition form, from a kinematics, a method and samples of the rate."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ def step(kinematics: Kinematics, method: Method, increments: int | None, previou
     method : Method
         The integration method.
     increments : int or None
-        Angle increments a step, 1 to 8; None for a step that is given the rate at every node.
+        Angle increments a step, 1 to 8; None for a step that takes the rate at every node.
     previous : int, optional
-        Increments before the step from which the rate is extracted too, 0 to 3.
+        Increments from before the step, 0 to 3, that the rate extraction uses too.
 
     Returns
     -------
@@ -40,12 +40,12 @@ def step(kinematics: Kinematics, method: Method, increments: int | None, previou
     samples = Samples(build, increments, previous, method.nodes)
     transition = build.stage(kinematics.transition, method.transition(build, kinematics, samples))
     build.output(kinematics.next, kinematics.product(state, transition))
-    suffix, option, given = chosen(method, increments, previous)
+    suffix, option, source = chosen(method, increments, previous)
     extracted = "" if increments is None else "rate extraction chapter 3 A; "
     order = method.step_order(increments, previous)
     return build.kernel(
         f"{kinematics.name}-{suffix}",
-        f"{kinematics.title}: step by {method.title} from {given}",
+        f"{kinematics.title}: step by {method.title} from {source}",
         f"{kinematics.source}; {extracted}{method.title}: {method.source}",
         transition=kinematics.transition.name,
         companions=Companions(
@@ -95,11 +95,11 @@ def rotation_vector(method: Method, increments: int | None, previous: int = 0) -
         ),
         vector,
     )
-    suffix, option, given = chosen(method, increments, previous)
+    suffix, option, source = chosen(method, increments, previous)
     order = method.step_order(increments, previous)
     return build.kernel(
         f"rotation-vector-{suffix}",
-        f"Rotation vector of a step by {method.title} from {given}",
+        f"Rotation vector of a step by {method.title} from {source}",
         method.source,
         order=order,
         arguments=f"rotation-vector {option}",
@@ -108,19 +108,19 @@ def rotation_vector(method: Method, increments: int | None, previous: int = 0) -
 
 
 def chosen(method: Method, increments: int | None, previous: int) -> tuple[str, str, str]:
-    """Return the ending of a kernel's name, its options on the command line, and what it is given, in words."""
+    """Return the ending of a kernel's name, its options on the command line, and its inputs in words."""
     suffix = f"{method.name}-{increments or 'rates'}"
     option = method.option or f"--method {method.name}"
     if increments is None:
-        given = f"the rate at {len(method.nodes)} {'node' if len(method.nodes) == 1 else 'nodes'}"
+        source = f"the rate at {len(method.nodes)} {'node' if len(method.nodes) == 1 else 'nodes'}"
         option = f"{option} --rates"
     else:
-        given = f"{increments} angle {'increment' if increments == 1 else 'increments'}"
+        source = f"{increments} angle {'increment' if increments == 1 else 'increments'}"
         option = f"{option} --increments {increments}"
     if previous:
         suffix, option = f"{suffix}-previous{previous}", f"{option} --previous {previous}"
-        given += f" and {previous} before {'it' if increments == 1 else 'them'}"
-    return suffix, option, given
+        source += f" and {previous} before {'it' if increments == 1 else 'them'}"
+    return suffix, option, source
 
 
 def product(name: str) -> Kernel:

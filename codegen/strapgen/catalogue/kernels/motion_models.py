@@ -1,6 +1,6 @@
 """Motions with a closed-form attitude: body rate, exact angle increments, true direction cosine matrix.
 
-Where the textbook form of a formula is 0/0, it is written with sin(x)/x, which has a value there.
+Formulas whose textbook form is 0/0 somewhere are written with sin(x)/x, which has a value there.
 """
 
 from __future__ import annotations

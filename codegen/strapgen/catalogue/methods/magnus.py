@@ -1,8 +1,8 @@
 """Magnus series: the rotation vector of a step from integrals of the rate, and its exponential.
 
-The series of order 2 is the integral of the rate. That of order 4 adds the whole term of second order in the rate, and
-that of order 6 those of third and fourth order to the sixth power of the step. A step on more samples than the order
-needs thereby uses all that they know of the motion's coning, whose drift is of second order in the rate.
+The series of order 2 is the integral of the rate. The series of order 4 adds the complete term of second order in the
+rate; that of order 6 adds the terms of third and fourth order up to the sixth power of the step. Coning drift is of
+second order in the rate, so a step on more samples than its order needs gains from all of them.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from strapgen.symbolic.kernel import KernelBuilder
 
 SOURCE = "S. Blanes, F. Casas, J. A. Oteo, J. Ros, Phys. Rep. 470 (2009) 151-238, section 5.3"
 
-#: Nodes of Gauss and Legendre by their number, for steps that are given rates.
+#: Gauss-Legendre nodes by their number, for steps that take rates.
 _GAUSS = {
     1: (sp.Rational(1, 2),),
     2: (sp.Rational(1, 2) - sp.sqrt(3) / 6, sp.Rational(1, 2) + sp.sqrt(3) / 6),
@@ -51,7 +51,7 @@ def method(order: int) -> Method:
 
 
 def _moment(samples: Samples, power: int) -> sp.Matrix:
-    """Name the integral over the step of the rate times (t - 1/2)^power, t in steps."""
+    """Add a stage for the integral over the step of the rate times (t - 1/2)^power, t in steps; return its symbols."""
     meaning = (
         "integral of the rate over the step"
         if power == 0
@@ -115,7 +115,7 @@ def _sixth(build: KernelBuilder, samples: Samples) -> sp.Matrix:
         return build.stage(Signal.vector(name, name, unit="rad", meaning=meaning), value)
 
     def alpha(number: int, meaning: str, *factors: sp.Expr) -> sp.Matrix:
-        """Name a combination of the moments, which is one of the samples."""
+        """Add a stage for a combination of the moments, which is linear in the samples; return its symbols."""
         moments = [samples.fit.moment(power) for power in range(3)]
         weights = [
             sum((f * w for f, w in zip(factors, column, strict=True)), sp.S.Zero)

@@ -1,4 +1,4 @@
-"""What an integration method is: a function from samples to a transition."""
+"""An integration method turns the samples of a step into its transition."""
 
 from __future__ import annotations
 
@@ -37,19 +37,19 @@ class Method:
     nodes : tuple of Fraction or Expr
         Distinct nodes at which the method needs the rate; empty if it needs increments.
     attitude_order : callable, optional
-        ``attitude_order(degree)``: order on the kinematics of the attitude for a rate that is a polynomial of at
-        most this degree, None for any; by default the classical order.
+        ``attitude_order(degree)`` returns the order on attitude kinematics for a polynomial rate of at most this
+        degree, or for any rate if it is None; by default the classical order.
     isometry : callable, optional
-        ``isometry(count)``: whether its transition from so many samples, None for rates at the nodes, is a rotation
-        whatever they are; by default it is not.
+        ``isometry(count)`` returns whether its transition from so many samples is a rotation for any samples; None
+        stands for rates at the nodes. By default it is not.
     option : str
-        How the command line names it.
+        The option that chooses it on the command line.
     rotation_vector : callable, optional
         ``rotation_vector(build, samples)`` writes the stages of the rotation vector of the step and returns it, where
         the transition is its exponential.
     limit : callable, optional
-        ``limit(increments, previous)``: order to which these samples can be used; by default that of the polynomial
-        through them.
+        ``limit(increments, previous)`` returns the highest order that these samples allow; by default that of the
+        polynomial through them.
     """
 
     name: str
@@ -65,7 +65,7 @@ class Method:
     limit: Callable[[int, int], int] = rate_fit.step_order
 
     def step_order(self, increments: int | None, previous: int = 0) -> Order:
-        """Return the order of the step from so many increments, None for rates at the nodes."""
+        """Return the orders of a step on so many increments; None stands for rates at the nodes."""
         of = self.attitude_order or (lambda degree: self.order)
         attitude = of(None)
         if increments is None:

@@ -1,4 +1,4 @@
-"""Rate extraction: the body rate over one step, as the polynomial that fits its samples."""
+"""Rate extraction: fitting the samples of a step by a polynomial body rate."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Fit:
         ----------
         power : int
         middle : Rational, optional
-            The moment from which the time counts.
+            The instant from which time counts, in steps.
 
         Examples
         --------
@@ -98,7 +98,7 @@ class Fit:
 
 
 def legendre(degree: int, middle: sp.Rational = sp.S.Zero) -> Coefficients:
-    """Return the Legendre polynomial of the step in powers of the time from a moment of it, the constant one first.
+    """Return the coefficients of a Legendre polynomial of the step in powers of time, from the constant term on.
 
     Over the step, from time 0 to 1, these polynomials are orthogonal to each other; each is 1 at its end.
 
@@ -106,7 +106,7 @@ def legendre(degree: int, middle: sp.Rational = sp.S.Zero) -> Coefficients:
     ----------
     degree : int
     middle : Rational, optional
-        The moment from which the time of the powers counts.
+        The instant from which the time of the powers counts, in steps.
 
     Examples
     --------
@@ -128,7 +128,7 @@ def from_increments(increments: int, previous: int = 0) -> Fit:
     increments : int
         Number of equally spaced increments in the step.
     previous : int, optional
-        Number of increments before the step that are fitted too.
+        Number of increments from before the step that the fit includes.
     """
     times = [sp.Rational(k, increments) for k in range(-previous, increments + 1)]
     cardinal = _lagrange(times)
@@ -150,7 +150,7 @@ def from_rates(nodes: Sequence[Fraction | sp.Expr]) -> Fit:
 
 
 def step_order(increments: int, previous: int = 0) -> int:
-    """Return the order to which a step can be exact that knows the rate from its increments alone.
+    """Return the highest order of a step whose only samples are increments.
 
     The fit of n = increments + previous increments errs by h^n e(t), where the integral of e over the step is zero:
     what is left is the commutator of e and the rate, whose first term is the integral of the sample polynomial
@@ -180,20 +180,20 @@ def step_order(increments: int, previous: int = 0) -> int:
 
 def _lagrange(nodes: list[sp.Expr]) -> list[Coefficients]:
     """Return the polynomials that are 1 at one of the nodes and 0 at the others."""
-    found = []
-    for j, own in enumerate(nodes):
+    polynomials = []
+    for j, node in enumerate(nodes):
         coefficients: list[sp.Expr] = [sp.Integer(1)]
         for k, other in enumerate(nodes):
             if k != j:
                 raised = [sp.Integer(0), *coefficients]
-                kept = [*coefficients, sp.Integer(0)]
+                padded = [*coefficients, sp.Integer(0)]
                 coefficients = [
-                    _reduced((a - other * b) / (own - other)) for a, b in zip(raised, kept, strict=True)
+                    _reduced((a - other * b) / (node - other)) for a, b in zip(raised, padded, strict=True)
                 ]
-        found.append(tuple(coefficients))
-    return found
+        polynomials.append(tuple(coefficients))
+    return polynomials
 
 
 def _reduced(number: sp.Expr) -> sp.Expr:
-    """Return a number with roots multiplied out and taken from below the line."""
+    """Return a number expanded, and with a rational denominator."""
     return number if number.is_Rational else sp.radsimp(sp.expand(number))

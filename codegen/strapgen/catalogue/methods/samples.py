@@ -1,4 +1,4 @@
-"""What a step knows of the rate: angle increments, or rates at nodes."""
+"""Samples of a step: angle increments, or body rates at nodes."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ def sample_names(count: int, previous: int = 0, letter: str = "d") -> list[str]:
     Parameters
     ----------
     count, previous : int
-        Samples of the step itself, and those before it.
+        Samples of the step, and samples from before it.
     letter : str, optional
-        What a sample of the step is called.
+        Beginning of the names of the step's samples.
 
     Examples
     --------
@@ -39,9 +39,9 @@ def increments_signal(count: int, previous: int = 0) -> Signal:
     Parameters
     ----------
     count : int
-        Increments of the step itself.
+        Increments of the step.
     previous : int, optional
-        Increments before the step.
+        Increments from before the step.
     """
     return Signal(
         "increments",
@@ -55,7 +55,7 @@ def increments_signal(count: int, previous: int = 0) -> Signal:
 
 
 def kept(previous: int) -> str:
-    """Return what a description of samples says of those before the step."""
+    """Return the part of a signal's meaning that tells of samples from before the step."""
     return f"; the first {previous} are those before the step" if previous else ""
 
 
@@ -72,7 +72,7 @@ def turns_signal(nodes: Sequence[Number]) -> Signal:
 
 
 def label(node: Number) -> str:
-    """Return a node as part of a name: a short fraction with its numbers, another number with four decimals."""
+    """Return a node as part of a name: a short fraction as it is, any other number with four decimals."""
     text = str(node)
     if not isinstance(node, Fraction) or len(text) > 11:
         text = f"{float(node):.4f}"
@@ -80,30 +80,30 @@ def label(node: Number) -> str:
 
 
 def labels(nodes: Sequence[Number]) -> dict[Number, str]:
-    """Return nodes with a label of its own for each: where two are the same, the later one gets a number."""
-    found: dict[Number, str] = {}
+    """Return a label for each node; of two equal labels the later one gets a number."""
+    names: dict[Number, str] = {}
     for node in dict.fromkeys(nodes):
         name, number = label(node), 1
-        while name in found.values():
+        while name in names.values():
             number += 1
             name = f"{label(node)}_{number}"
-        found[node] = name
-    return found
+        names[node] = name
+    return names
 
 
 class Samples:
-    """What a step is given, and the rate that it knows from that.
+    """The samples of a step under construction, and the rate that follows from them.
 
     Parameters
     ----------
     build : KernelBuilder
         The kernel under construction; samples are declared as its input.
     increments : int or None
-        Angle increments a step; None for rates at nodes.
+        Number of angle increments a step; None for rates at nodes.
     previous : int
-        Increments before the step.
+        Number of increments from before the step.
     nodes : sequence of Fraction or Expr
-        Nodes at which the rate is needed, and given where there are no increments.
+        Nodes at which the method needs the rate; without increments the samples are the rates there.
     """
 
     def __init__(
@@ -131,7 +131,7 @@ class Samples:
         return Order(method, method, self.increments + self.previous, min(method, limit))
 
     def turn(self, node: Number, scale: sp.Expr = sp.S.One) -> sp.Matrix:
-        """Name the rate times the step at a node, times `scale`, which is 1 or 1/2."""
+        """Add a stage for the rate times the step at a node, times `scale`, 1 or 1/2, and return its symbols."""
         half = "half_" if scale == sp.Rational(1, 2) else ""
         meaning = f"{half.replace('_', ' the ')}rate times the step, at node {node}"
         return self.combination(
@@ -141,7 +141,7 @@ class Samples:
     def combination(
         self, name: str, weights: Sequence[sp.Expr], meaning: str, scale: sp.Expr = sp.S.One
     ) -> sp.Matrix:
-        """Name a vector that is linear in the samples.
+        """Add a stage for a vector that is linear in the samples, and return its symbols.
 
         Parameters
         ----------

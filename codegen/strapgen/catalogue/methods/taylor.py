@@ -3,10 +3,10 @@
 With the rate sum_j g_j t^j and the transition sum_n P_n t^n, dP/dt = f(P, g), f bilinear, gives
 (n + 1) P_(n+1) = sum_j f(P_(n-j), g_j).
 
-On a motion that is fast for the sampling the coefficients of the polynomial through three samples or more grow with
-their power of time, and what they add up to at the end of the step is small: cut off before they cancel, the series is
-no rotation, and the state grows or shrinks from step to step. From three samples on it is therefore taken from the
-middle of the step to both of its ends, where time is at most half a step, and normalized.
+With three samples or more, and a motion that is fast for the sampling, the polynomial's coefficients grow with the
+power of time and nearly cancel at the end of the step. A series that is cut off before they cancel is no rotation: the
+state grows or shrinks from step to step. From three samples on the series therefore starts in the middle of the step,
+so that time is at most half a step at both ends, and the result is normalized.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def _centred(build: KernelBuilder, kinematics: Kinematics, samples: Samples, ord
 def _rates(
     samples: Samples, scale: sp.Rational, order: int, middle: sp.Rational = sp.S.Zero
 ) -> list[sp.Matrix]:
-    """Name the coefficients of the powers of time in the generator, up to the order.
+    """Add stages for the coefficients of the powers of time in the generator, up to the order; return their symbols.
 
     Time counts from a moment of the step, in steps; from the middle, in halves of the step.
     """
@@ -109,7 +109,7 @@ def _terms(
     order: int,
     length: str = "the step length",
 ) -> list[sp.Matrix]:
-    """Name the terms of the series up to the order, that of order 0 being the identity."""
+    """Add stages for the terms of the series up to the order; the term of order 0 is the identity."""
     terms = [kinematics.identity]
     for power in range(1, order + 1):
         total = sp.zeros(*kinematics.identity.shape)

@@ -1,1 +1,1 @@
-"""What users bring: their files are loaded, and their kernels checked."""
+"""Algorithms that users bring: loading their files, and checking and caching their kernels."""

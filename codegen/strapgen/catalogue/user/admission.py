@@ -1,4 +1,4 @@
-"""What a user's kernel must be, so that all that follows can rely on it: every refusal is one line."""
+"""Admission: the checks that a user's kernel passes before any stage works on it. A refusal is one line."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from strapgen.symbolic.evaluation import Direction, Wrapped
 from strapgen.symbolic.kernel import Kernel
 
 _NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
-#: What the names of a kernel's functions end with, in some target.
+#: Endings of the names of a kernel's functions in all targets.
 _FUNCTION_OF = re.compile(
     r"(-float|-q\d+)?(-array|-batch|-propagate|-orthonormalizer|-transition)$|(-float|-q\d+)$"
 )
@@ -30,7 +30,7 @@ ALLOWED = (
 
 
 def require(kernel: Kernel) -> None:
-    """Check the kernel of an attitude step, and the kernels that it brings.
+    """Check the kernel of a user's attitude step, and the kernels that come with it.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def require(kernel: Kernel) -> None:
     Raises
     ------
     InputError
-        If something is not as it must be.
+        If a stage could not work on the kernel; the message names the fault.
     """
     names = [each.name for each in (kernel, *kernel.own)]
     for each in (kernel, *kernel.own):
@@ -93,7 +93,7 @@ def _require_names(kernel: Kernel) -> None:
 
 
 def _require_functions(kernel: Kernel, others: set[str]) -> None:
-    """Check that none of a kernel's functions is called as one of another kernel: they go into one program."""
+    """Check that no function of a kernel has the name of another kernel's: both may be linked into one program."""
     other = _FUNCTION_OF.sub("", kernel.name)
     if other != kernel.name and other in others:
         _refuse(kernel, f"{other} has a function of this name; another name is needed")
@@ -129,7 +129,7 @@ def _require_formulas(kernel: Kernel) -> None:
 
 
 def _faults(expression: sp.Basic) -> Iterator[str]:
-    """Yield what stands in an expression and cannot be generated."""
+    """Yield the parts of an expression that cannot be generated."""
     if expression.has(sp.Float):
         yield f"the inexact number {min(map(float, expression.atoms(sp.Float)))}"
     elif expression.is_number:
@@ -163,8 +163,8 @@ def _faults(expression: sp.Basic) -> Iterator[str]:
 
 
 def _require_step(kernel: Kernel) -> None:
-    companions = kernel.companions
-    if companions is None:
+    step = kernel.companions
+    if step is None:
         _refuse(kernel, "it has no companions; an attitude step needs them")
         return
     names = [signal.name for signal in kernel.inputs]
@@ -174,14 +174,14 @@ def _require_step(kernel: Kernel) -> None:
     state = kernel.inputs[0]
     if len(kernel.outputs) != 1 or kernel.outputs[0].signal.shape != state.shape:
         _refuse(kernel, f"one output of the shape of the state, {state.shape}, is needed")
-    if len(companions.identity) != state.size:
-        _refuse(kernel, f"identity has {len(companions.identity)} elements, the state {state.size}")
-    for number in companions.identity:
+    if len(step.identity) != state.size:
+        _refuse(kernel, f"identity has {len(step.identity)} elements, the state {state.size}")
+    for number in step.identity:
         if not hasattr(number, "numerator") or isinstance(number, bool):
             _refuse(kernel, f"identity holds {number!r}; whole numbers or fractions are needed")
-    if not 0 <= companions.previous < samples[0]:
-        _refuse(kernel, f"{companions.previous} of its {samples[0]} increments are previous ones")
-    if (companions.product is None) != (kernel.transition is None):
+    if not 0 <= step.previous < samples[0]:
+        _refuse(kernel, f"{step.previous} of its {samples[0]} increments are previous ones")
+    if (step.product is None) != (kernel.transition is None):
         _refuse(kernel, "a product and a transition go together")
     stages = {stage.signal.name: stage.signal for stage in kernel.stages}
     if kernel.transition is not None and kernel.transition not in stages:
@@ -191,19 +191,19 @@ def _require_step(kernel: Kernel) -> None:
         )
     if sum(stage.signal.name == kernel.transition for stage in kernel.stages) > 1:
         _refuse(kernel, f"two of its stages are called {kernel.transition}, as its transition is")
-    if companions.attitude is None and state.shape != (3, 3):
+    if step.attitude is None and state.shape != (3, 3):
         _refuse(kernel, "attitude is None, but the state is no matrix (3, 3)")
 
 
 def _companions(kernel: Kernel) -> list[tuple[str, str]]:
-    companions = kernel.companions
-    assert companions is not None, "checked before"
+    step = kernel.companions
+    assert step is not None, "checked before"
     roles = ("product", "orthonormalize", "attitude")
-    return [(role, name) for role in roles if (name := getattr(companions, role)) is not None]
+    return [(role, name) for role in roles if (name := getattr(step, role)) is not None]
 
 
 def _require_shapes(kernel: Kernel, role: str, companion: Kernel) -> None:
-    """Check that a companion takes and gives what its role asks for."""
+    """Check that a companion has the inputs and outputs of its role."""
     state = kernel.inputs[0].shape
     transitions = [stage.signal.shape for stage in kernel.stages if stage.signal.name == kernel.transition]
     takes, gives = {

@@ -1,7 +1,7 @@
-"""Running a user's code as if in a process of its own: what it imports does not stay, and what it reads is recorded.
+"""Isolation: a user's code runs as if in a separate process, and every file that it reads is recorded.
 
-Modules that belong to no installed package are imported anew for every file, from their source; the program's own ones
-are put back afterwards. So a file never gets a module that lay beside another one.
+Modules that belong to no installed package are imported again from source for every file, and afterwards the program's
+modules are restored. So a user's file never sees a module that lies beside another user's file.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from typing import Any
 from strapgen.support.cache import digest
 from strapgen.support.resources import PACKAGE
 
-#: What a file does beyond reading files: a kernel that depends on it cannot be known from files alone.
+#: Audit events beyond reading a file. The files read cannot tell whether a kernel that depends on one has changed.
 _OUTSIDE = {
     "os.listdir": "lists a folder",
     "os.scandir": "lists a folder",
@@ -43,19 +43,19 @@ _ONE_AT_A_TIME = threading.RLock()
 
 @dataclass
 class Record:
-    """What a user's code read.
+    """The files and modules that a user's code read, by which a cached kernel is found to be out of date.
 
     Parameters
     ----------
     files : dict of str to str
-        Digest of every file by its path, "" where there was none; without those of Python, of installed packages and of
-        strapgen, whose versions tell.
+        Digest of every file by its path, "" if the file was missing. Files of Python, of installed packages and of
+        strapgen are left out, because their versions are part of the cache's key.
     modules : dict of str to str
-        Where every module that was looked for on the path was found, "" where it was not.
+        File of every module that was searched on the path, "" if there was none.
     path : list of str
         Folders that the code put on Python's path.
     outside : str
-        What else the kernel may depend on; "" if nothing.
+        Another thing that the kernel may depend on, such as a program that ran; "" if there is none.
     """
 
     files: dict[str, str] = field(default_factory=dict)
@@ -64,7 +64,7 @@ class Record:
     outside: str = ""
 
     def read(self, path: str) -> None:
-        """Note a file with its content."""
+        """Record a file with the digest of its content."""
         if Path(path).exists() and not Path(path).is_file():  # a device or a pipe
             self.outside = f"reads {path}, which is no file"
             return
@@ -74,7 +74,7 @@ class Record:
             self.outside = f"reads {path}: {error.strerror}"
 
     def holds(self, folder: Path | None) -> bool:
-        """Tell whether all that was read is still the same."""
+        """Return whether every file and module is still the same."""
         try:
             if any(content(path) != before for path, before in self.files.items()):
                 return False
@@ -100,7 +100,7 @@ def content(path: str) -> str:
 
 
 def _folders(paths: Iterable[str]) -> tuple[str, ...]:
-    """Return folders as beginnings of the paths in them, with links followed and not."""
+    """Return the prefixes of all paths in some folders, with links resolved and not resolved."""
     return tuple(
         f"{place}{os.sep}" for path in paths for place in dict.fromkeys((path, os.path.realpath(path)))
     )
@@ -129,7 +129,7 @@ def _is_installed(path: str) -> bool:
 
 
 def _place(module: ModuleType | None) -> str:
-    """Return the file or the folder of a module; "" of one that is built in."""
+    """Return the file or the folder of a module; "" for a built-in one."""
     file = getattr(module, "__file__", None)
     if file:
         return str(file)
@@ -140,14 +140,14 @@ def _place(module: ModuleType | None) -> str:
 
 
 class _Loader(SourceFileLoader):
-    """Loads a module from its source, never from bytecode that may be older than a second edit."""
+    """Loads a module from its source; bytecode can be out of date when a file is edited twice in a second."""
 
     def __init__(self, name: str, path: str, record: Record) -> None:
         super().__init__(name, path)
         self._record = record
 
     def get_code(self, fullname: str) -> CodeType:
-        """Compile the source, and note which it was."""
+        """Compile the source, and record its digest."""
         source = self.get_data(self.path)
         self._record.files[os.path.realpath(self.path)] = digest([source])
         code: CodeType = self.source_to_code(source, self.path)
@@ -155,7 +155,7 @@ class _Loader(SourceFileLoader):
 
 
 class _Finder:
-    """Finds modules where Python would, notes where, and has those of no installed package loaded from source."""
+    """Finds modules as Python does and records them; those of no installed package are loaded from source."""
 
     def __init__(self, record: Record, anew: tuple[str, ...]) -> None:
         self._record = record
@@ -178,7 +178,7 @@ _watching: list[Record | None] = []
 
 
 def _watch(event: str, arguments: tuple[Any, ...]) -> None:
-    """Note what Python reports of files, programs and the network while a user's code runs."""
+    """Record the events of files, programs and the network that Python reports while a user's code runs."""
     if not _watching or (event != "open" and event not in _OUTSIDE):
         return
     if sys._getframe(1).f_code.co_filename.startswith("<frozen importlib"):
@@ -207,19 +207,19 @@ def _watch(event: str, arguments: tuple[Any, ...]) -> None:
 
 @cache
 def _begin_watching() -> None:
-    """Have Python report to `_watch`, for as long as this process lives: such a hook cannot be taken off."""
+    """Install `_watch` as an audit hook; Python cannot remove such a hook while the process lives."""
     sys.addaudithook(_watch)
 
 
 def depends_on(what: str) -> None:
-    """Note that the code which runs, if any does, depends on more than it reads itself."""
+    """Record that the user's code that is running, if any, depends on more than the files that it reads."""
     record = _watching[-1] if _watching else None
     if record is not None:
         record.outside = what
 
 
 def load_source(path: Path, name: str, record: Record) -> ModuleType:
-    """Run a file as a module, which `sys.modules` knows while the session lasts."""
+    """Run a file as a module and enter it in `sys.modules` for the length of the session."""
     spec = importlib.util.spec_from_file_location(name, path, loader=_Loader(name, str(path), record))
     assert spec is not None and spec.loader is not None, "it has the loader that it was given"
     module = importlib.util.module_from_spec(spec)
@@ -230,19 +230,19 @@ def load_source(path: Path, name: str, record: Record) -> ModuleType:
 
 @contextmanager
 def session(folder: Path | None = None, anew: tuple[str, ...] = ()) -> Iterator[Record]:
-    """Run a user's code: only within this block, one at a time.
+    """Isolate the user's code that runs in the block; one block runs at a time.
 
     Parameters
     ----------
     folder : Path, optional
         The folder of its file; what lies there can be imported.
     anew : tuple of str, optional
-        Installed packages that are imported anew too, because they are the user's.
+        Installed packages that are imported again too, because they are the user's.
 
     Yields
     ------
     Record
-        What the code read; complete after the block.
+        The files and modules that the code read; complete after the block.
     """
     with _ONE_AT_A_TIME:
         record = Record()
@@ -284,7 +284,7 @@ def _is_users(name: str, module: ModuleType | None, anew: tuple[str, ...]) -> bo
 
 
 def _removable(modules: dict[str, ModuleType], anew: tuple[str, ...], record: Record) -> list[str]:
-    """Return the modules of no installed package; compiled ones cannot be loaded twice, nor can what goes with them."""
+    """Return the modules of no installed package, but for packages with compiled modules: these cannot load twice."""
     users = [name for name, module in modules.items() if _is_users(name, module, anew)]
     compiled = {name.partition(".")[0] for name in users if _is_compiled(modules[name])}
     if compiled:
@@ -293,7 +293,7 @@ def _removable(modules: dict[str, ModuleType], anew: tuple[str, ...], record: Re
 
 
 def _put_back(before: dict[str, ModuleType], anew: tuple[str, ...], record: Record) -> None:
-    """Note what was imported, remove it if it is the user's, and put back what was there before."""
+    """Record the modules that were imported, remove the user's, and restore those from before the session."""
     for name, module in list(sys.modules.items()):
         if before.get(name) is module:
             continue

@@ -1,4 +1,4 @@
-"""Kernels of users in the cache: derived once for a file, what it reads, and its options."""
+"""Users' kernels in the cache: each is derived again only if its file, a file that it reads, or an option changes."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from strapgen.catalogue.user.isolation import Record, installed_folders
 from strapgen.support import cache
 from strapgen.support.exceptions import InputError
+from strapgen.support.timing import from_cache, timed
 
 if TYPE_CHECKING:
     from strapgen.symbolic.kernel import Kernel
@@ -28,11 +29,11 @@ def kernel(what: list[str], folder: Path | None, derive: Callable[[], tuple[Kern
     Parameters
     ----------
     what : list of str
-        What tells it from others: the file with its content, or the entry point, and the options.
+        Parts of the key: kind and name, the content of the file or the entry point, and the options.
     folder : Path or None
         The folder of the file.
     derive : callable
-        Returns the kernel, checked, and what was read for it.
+        Returns the checked kernel and the record of the files that its code read.
 
     Raises
     ------
@@ -42,8 +43,10 @@ def kernel(what: list[str], folder: Path | None, derive: Callable[[], tuple[Kern
     key = cache.digest([cache.generator_digest(), sys.version, *_installed(), *what])
     with contextlib.suppress(InputError):  # no cache folder: derived every time
         if (stored := _stored(key, folder)) is not None:
+            from_cache(f"kernel of {what[1]}")
             return stored
-    derived, record = derive()
+    with timed("derive", what[1]):
+        derived, record = derive()
     data = None if record.outside or not record.holds(folder) else _pickled(derived)
     if data is not None:
         with contextlib.suppress(InputError):
@@ -52,7 +55,7 @@ def kernel(what: list[str], folder: Path | None, derive: Callable[[], tuple[Kern
 
 
 def _installed() -> list[str]:
-    """Return what is installed, with versions: the names of its folders of metadata."""
+    """Return the installed packages with their versions, as the names of their metadata folders."""
     return sorted(
         path.name
         for folder in map(Path, installed_folders())
@@ -86,7 +89,7 @@ def _store(key: str, data: bytes, record: Record) -> None:
 
 
 def _pickled(derived: Kernel) -> bytes | None:
-    """Return a kernel as bytes; None if it cannot be had back from them, for instance if it holds a user's class."""
+    """Return a kernel as bytes; None if they do not restore it, for instance because it holds a user's class."""
     try:
         data = pickle.dumps(derived)
         restored: Any = pickle.loads(data)

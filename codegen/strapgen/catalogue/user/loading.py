@@ -1,7 +1,7 @@
-"""Algorithms that users bring: a Python file, or an entry point of an installed package.
+"""Loading users' algorithms from a Python file, or from an entry point of an installed package.
 
-Both give a function called ``algorithm`` that returns the `Kernel` of an attitude step. Its parameters, if it has any,
-are chosen by name from `OPTIONS`. Each runs as if in a process of its own, see `isolation`, and its kernel is cached.
+Either has a function ``algorithm`` that returns the `Kernel` of an attitude step; its parameters, if it has any, are
+names in `OPTIONS`. It runs in isolation, see `isolation`, and its kernel is cached.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 GROUP = "strapgen.algorithms"
 #: Name of the function in a file.
 FUNCTION = "algorithm"
-#: What the function may take: a `Tableau`, and how many increments.
+#: Parameters that the function may have: a `Tableau`, and numbers of increments.
 OPTIONS = ("method", "increments", "previous")
 
 
@@ -39,14 +39,14 @@ def installed() -> dict[str, EntryPoint]:
 
 
 def load(name: str, **options: Any) -> Kernel:
-    """Load an algorithm: its kernel, checked, from the cache if nothing has changed since it was derived.
+    """Return the checked kernel of a user's algorithm, from the cache if nothing has changed since it was derived.
 
     Parameters
     ----------
     name : str
         A Python file, or the name of an entry point.
     **options
-        Of `OPTIONS`, those that the user chose.
+        The options that the user chose, with names in `OPTIONS`.
 
     Returns
     -------
@@ -102,7 +102,7 @@ def _of_entry_point(name: str, options: dict[str, Any], texts: list[str]) -> Ker
 
 @contextlib.contextmanager
 def _isolated(folder: Path | None, anew: tuple[str, ...] = ()) -> Iterator[isolation.Record]:
-    """Begin a session with all imported that strapgen itself needs in it."""
+    """Begin a session; the modules that strapgen needs in it are imported before."""
     from strapgen.catalogue.user import admission  # noqa: F401
 
     with isolation.session(folder, anew) as record:
@@ -126,7 +126,7 @@ def _called(name: str, function: Any, options: dict[str, Any]) -> Kernel:
 
 
 def _arguments(name: str, options: dict[str, Any]) -> str:
-    """Return what makes a kernel again on the command line: file or entry point as they were given, and the options."""
+    """Return the arguments that choose the kernel on the command line: file or entry point, and the options."""
     words = [shlex.quote(checks.text("the name of the file", name))]
     for option, value in options.items():
         if option == "method":
@@ -137,7 +137,7 @@ def _arguments(name: str, options: dict[str, Any]) -> str:
 
 
 def _require(name: str, kernel: Any) -> None:
-    """Check what a user's function returned."""
+    """Check that a user's function returned a kernel that the stages can work on."""
     from strapgen.catalogue.user import admission
     from strapgen.symbolic.kernel import Kernel
 
@@ -155,7 +155,7 @@ def _allowed(takes: list[str]) -> str:
 
 @contextlib.contextmanager
 def _guarded(name: str) -> Iterator[None]:
-    """Run a user's code; where it fails, say where and why in one line. What it prints is no output of ours."""
+    """Run a user's code: a failure becomes one line with its place, and what the code prints goes to stderr."""
     try:
         with contextlib.redirect_stdout(sys.stderr):
             yield

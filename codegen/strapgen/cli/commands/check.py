@@ -37,11 +37,11 @@ def check(
     """
     check_format(format)
     choice = chosen(algorithm, method, tableau, increments, previous)
-    from strapgen import catalogue
+    from strapgen import pipeline
     from strapgen.experiments import conformance
     from strapgen.reports.conformance import finding_text
 
-    kernel = catalogue.derive(choice)
+    kernel = pipeline.derive(choice)
     if format == "text":
         typer.echo(f"{kernel.name}: {kernel.title}\n")
     findings = []

@@ -44,7 +44,7 @@ def compare(
         str, typer.Option("--backends", metavar="NAME,...", help="Back ends to compare; see strapgen list.")
     ] = "numpy,c,c-float,c-q31,c-q15",
     reference: Annotated[
-        str, typer.Option("--reference", help="What to compare with: a back end, or exact (mpmath).")
+        str, typer.Option("--reference", help="Back end to compare with; exact has 40 digits.")
     ] = "numpy",
     motion: MotionName = None,
     settings: MotionSettings = None,
@@ -102,7 +102,7 @@ def compare(
         checks.choice("backend", name, BACKENDS)
     if not names:
         raise InputError("--backends names no back end")
-    checks.choice("reference", reference, [*BACKENDS, "exact"])
+    checks.choice("reference", reference, BACKENDS)
     limit = None if fail_above is None else float(checks.number("fail-above", fail_above))
     check_source(motion, settings, step, duration, increments_csv, rates_csv, rate_unit, resample_hz)
     stated = {
@@ -112,7 +112,7 @@ def compare(
         "carry": carry,
         "drift_allowance": drift_allowance,
     }
-    if not any(BACKENDS[name].target in FIXED for name in {*names, reference} - {"exact"}):
+    if not any(BACKENDS[name].target in FIXED for name in (*names, reference)):
         for option, value in stated.items():
             if value is not None:
                 raise InputError(
@@ -146,10 +146,10 @@ def compare(
             choice.previous,
         )
         length = None if max_rate_deg_s is None else repr(inputs.step)
-        rows = comparison.compare_choice(
+        rows = comparison.compare(
             choice,
-            names,
-            inputs.increments,
+            backends=names,
+            increments=inputs.increments,
             reference=reference,
             truth=inputs.truth,
             settings=read_settings(samples, **stated, step=length),

@@ -41,7 +41,7 @@ def converge(
     ] = None,
     previous: Previous = None,
     backend: Annotated[
-        str, typer.Option("--backend", help="exact (mpmath, for any order) or a back end; see strapgen list.")
+        str, typer.Option("--backend", help="Back end; exact (40 digits) shows any order. See strapgen list.")
     ] = "exact",
     motion: Annotated[
         _Text, typer.Option("--motion", help="Motion.  [default: coning]", show_default=False)
@@ -84,7 +84,7 @@ def converge(
     from strapgen.backends import BACKENDS
     from strapgen.support import checks
 
-    checks.choice("backend", backend, [*BACKENDS, "exact"])
+    checks.choice("backend", backend, BACKENDS)
     limit = None if fail_beyond is None else float(checks.number("fail-beyond", fail_beyond))
     if limit is not None and limit < 0:
         raise InputError(f"fail-beyond is {fail_beyond}; a number that is not below 0 is needed")

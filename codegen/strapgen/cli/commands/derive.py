@@ -38,11 +38,12 @@ def derive(
     check_format(format)
     checks.choice("show", show, ("text", "latex", "program", "operations"))
     choice = chosen(algorithm, method, tableau, increments, previous, rates, step=False)
-    from strapgen import catalogue, pipeline
+    from strapgen import pipeline
+    from strapgen.library import generated_sources
     from strapgen.reports import formulas
 
-    kernel = catalogue.derive(choice)
-    program = pipeline.lower(kernel)
+    kernel = pipeline.derive(choice)
+    program = generated_sources.program(choice)
     if format == "json":
         data = formulas.as_data(kernel, program)
         if show == "latex":
@@ -57,5 +58,4 @@ def derive(
     elif show == "program":
         typer.echo(formulas.program_as_text(program))
     else:
-        counts = {**program.operations, "temporaries": program.temporaries}
-        typer.echo("\n".join([kernel.name, *(f"  {kind:<12}{number:>5}" for kind, number in counts.items())]))
+        typer.echo(formulas.operations_as_text(kernel, program))

@@ -132,18 +132,18 @@ def generate(
         raise InputError(
             f"the options of fixed point go with --target {' or '.join(FIXED)}, not with {target}"
         )
-    program = generated_sources.program(choice)
-    takes = {signal.name for signal in program.inputs}
-    if not takes & {"increments", "turns"} and (max_rate_deg_s or step or max_angle_rad):
+    if max_rate_deg_s or step or max_angle_rad:
+        names = {signal.name for signal in generated_sources.program(choice).inputs}
+        if not names & {"increments", "turns"}:
+            raise InputError(
+                f"kernel {choice.kernel} takes no increments; a largest rate or angle does not go with it"
+            )
+    sources = generated_sources.sources(choice, target, settings)
+    fixed = sources.fixed
+    if carry not in (None, "none") and fixed is not None and not fixed.residuals:
         raise InputError(
-            f"kernel {program.kernel} takes no increments; a largest rate or angle does not go with it"
+            f"kernel {choice.kernel} rounds no state that goes on to the next step; --carry keeps nothing"
         )
-    fixed = pipeline.quantize(program, settings) if target in FIXED else None
-    if carry not in (None, "none") and fixed is not None and not fixed.interface.residuals:
-        raise InputError(
-            f"kernel {program.kernel} rounds no state that goes on to the next step; --carry keeps nothing"
-        )
-    sources = pipeline.generate(fixed or program, target)
     written = write_files(out or Path(), sources.files)
     operations = sources.operations
     if format == "json":
@@ -154,19 +154,23 @@ def generate(
             "operations": {kind: operations[kind] for kind in ("add", "multiply", "divide", "sqrt")},
             "temporaries": sources.temporaries,
         }
-        print_json(data | (fixed.as_data() if fixed else {}))
+        if fixed is not None:
+            program = generated_sources.program(choice)
+            data |= pipeline.quantize(program, fixed.settings).as_data()
+        print_json(data)
         return
     counts = ", ".join(f"{number} {kind}" for kind, number in operations.items() if number) or "no operations"
     typer.echo(f"{sources.kernel} for {target}: {counts}, {sources.temporaries} temporaries")
     for path in written:
         typer.echo(f"  {path}")
     if fixed is not None:
-        for name, bound in fixed.error_bounds.items():
-            format_ = fixed.formats[name]
-            places = float(bound / format_.unit)
-            useless = 2 * bound >= max(map(abs, fixed.ranges[name]))
+        for output in fixed.outputs:
+            bound, unit = max(output.errors), output.format.unit
+            places = float(bound / unit)
+            useless = 2 * bound >= max(abs(output.low), abs(output.high)) * unit
             typer.echo(
-                f"  {name}: {format_}, error at most {float(bound):.4g}, {places:.4f} of the last place"
+                f"  {output.signal.name}: {output.format}, error at most {float(bound):.4g}, "
+                f"{places:.4f} of the last place"
                 + (": of the size of the value, which certifies nothing" if useless else "")
             )
 

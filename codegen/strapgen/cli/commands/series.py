@@ -157,12 +157,13 @@ def series(
         )
         _emit(*_versus(choice, other, motion, count, format), format, out, {})
         return
-    from strapgen.reports import series as reports
+    from strapgen.analysis.error_analysis import analyse
+    from strapgen.reports.series import series_latex, series_text
 
     files = {} if plot is None else _plotted(choice, motion, settings, steps, duration, count, plot)
-    found = reports.report(choice, motion, 2 if count is None else count)
-    text = reports.as_latex(found) if format == "latex" else reports.as_report(found)
-    _emit(text, found.as_dict(), format, out, files)
+    analysis = analyse(choice, motion, 2 if count is None else count)
+    text = series_latex(analysis) if format == "latex" else series_text(analysis)
+    _emit(text, analysis.as_dict(), format, out, files)
 
 
 def _emit(text: str, data: Any, format: str, out: Path | None, files: dict[str, str | bytes]) -> None:

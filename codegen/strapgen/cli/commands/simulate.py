@@ -58,7 +58,7 @@ def simulate(
     increments: Increments = None,
     previous: Previous = None,
     backend: Annotated[
-        str, typer.Option("--backend", help="numpy, c, c-float, c-q31, c-q15 or fixed-model.")
+        str, typer.Option("--backend", help="numpy, c, c-float, c-q31, c-q15, fixed-model or exact.")
     ] = "numpy",
     motion: MotionName = None,
     settings: MotionSettings = None,
@@ -145,7 +145,7 @@ def simulate(
 
     import numpy as np
 
-    from strapgen.backends import of as make_backend
+    from strapgen.backends import backend as make_backend
     from strapgen.support.files import write_files
 
     samples = choice.increments_per_step, choice.previous
@@ -162,7 +162,7 @@ def simulate(
 
     def ready(seconds: float, largest: Callable[[], float]) -> Backend:
         settings = settings_for_run(backend, samples[0], stated, seconds, largest)
-        return make_backend(choice, backend, scheme, settings)
+        return make_backend(choice, backend=backend, orthonormalization=scheme, settings=settings)
 
     with np.errstate(all="ignore"):  # numbers that overflow are refused, in one line
         if motion is not None:

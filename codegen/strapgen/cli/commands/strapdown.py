@@ -38,7 +38,7 @@ def strapdown(
         ),
     ] = "2",
     backend: Annotated[
-        str, typer.Option("--backend", help="numpy, c, c-float, c-q31, c-q15 or fixed-model.")
+        str, typer.Option("--backend", help="numpy, c, c-float, c-q31, c-q15, fixed-model or exact.")
     ] = "numpy",
     initial: Annotated[
         str,

@@ -27,7 +27,7 @@ def stress(
         typer.Option(
             "--backends",
             metavar="NAME,...",
-            help="Back ends.  [default: all but fixed-model, whose bits are those of the C]",
+            help="Back ends.  [default: all but the slow ones, fixed-model and exact]",
             show_default=False,
         ),
     ] = None,

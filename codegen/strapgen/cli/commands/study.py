@@ -123,7 +123,7 @@ def word_length(
     if plot is not None:
         from strapgen.reports import plots
 
-        image = plots.study_image(outcomes, plot)
+        image = plots.word_length_image(outcomes, plot)
     if format == "json":
         text = json.dumps([outcome.as_dict() for outcome in outcomes])
     elif format == "csv":

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import textwrap
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -11,9 +10,6 @@ from strapgen.cli.fixed_options import Carry, Rounding, read_settings
 from strapgen.cli.options import Format, check_format, print_json
 from strapgen.cli.progress import track
 from strapgen.support.exceptions import InputError
-
-if TYPE_CHECKING:
-    from strapgen.experiments.thesis_tables import Table, TableEntry
 
 
 def tables(
@@ -49,6 +45,7 @@ def tables(
         return
     from strapgen.backends import BACKENDS
     from strapgen.experiments.thesis_tables import ALGORITHMS, ORDERS, TABLES, build_all, run_tables
+    from strapgen.reports.thesis_tables import thesis_table_text
     from strapgen.support import checks
     from strapgen.targets import FIXED
 
@@ -64,7 +61,8 @@ def tables(
         print_json([entry.as_dict() for entry in entries])
         return
     for table in TABLES:
-        _print_table(table, [entry for entry in entries if entry.table == table.number])
+        here = [entry for entry in entries if entry.table == table.number]
+        typer.echo(f"{thesis_table_text(table, here)}\n")
 
 
 def _predict(format: str) -> None:
@@ -102,47 +100,3 @@ def _runnable() -> tuple[str, ...]:
         typer.echo(f"strapgen: only numpy is shown: {error}", err=True)
         return ("numpy",)
     return DEFAULT_BACKENDS
-
-
-def _mark(entry: TableEntry) -> str:
-    """Return what stands behind a figure: round-off says more than that the figure is not the thesis's."""
-    return "r" if entry.roundoff_dominates else "" if entry.agrees else "*"
-
-
-_NAMES = {"dcm": "direction cosines", "euler": "Euler parameters"}
-
-
-def _print_table(table: Table, entries: list[TableEntry]) -> None:
-    """Print one table: for each algorithm the thesis's line, then one for each back end."""
-    from strapgen.experiments.thesis_tables import ALGORITHMS, ORDERS
-
-    ratio = "of the same order" if table.by_order else "of first order"
-    lines = [f"Table {table.number}: {table.title}"]
-    lines.append(f"  drift in deg, and its ratio to that of direction cosines {ratio}")
-    lines.append(" " * 14 + "".join(f"{f'order {order}':>20}    " for order in ORDERS))
-    lines.append(" " * 14 + f"{'drift':>11}{'ratio':>11}  " * len(ORDERS))
-    for algorithm in ALGORITHMS:
-        lines.append(f"  {_NAMES[algorithm]}")
-        drifts = [table.base if (algorithm, order) == ("dcm", 1) else "" for order in ORDERS]
-        printed = zip(drifts, table.printed[algorithm], strict=True)
-        lines.append(
-            f"    {'thesis':<10}" + "".join(f"{drift:>11}{figure:>11}  " for drift, figure in printed)
-        )
-        for backend in dict.fromkeys(entry.backend for entry in entries):
-            cells = [
-                f"{e.drift_deg:>11.4g}{e.normalised:>11.4g}{_mark(e):<2}"
-                for e in entries
-                if (e.backend, e.algorithm) == (backend, algorithm)
-            ]
-            lines.append(f"    {backend:<10}" + "".join(cells))
-    if not all(entry.agrees for entry in entries):
-        lines.append("  * not the thesis's figure in its printed digits")
-    if any(entry.roundoff_dominates for entry in entries):
-        lines.append("  r round-off dominates: over half of what the method itself loses")
-    notes: dict[tuple[str, int], str] = {}
-    for entry in entries:
-        if entry.note:  # back ends differ in its figures alone; the first one's stand for all
-            notes.setdefault((entry.algorithm, entry.order), entry.note)
-    for note in notes.values():
-        lines += [f"  {line}" for line in textwrap.wrap(note, 90)]
-    typer.echo("\n".join(line.rstrip() for line in lines) + "\n")

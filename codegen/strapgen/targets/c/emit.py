@@ -29,7 +29,7 @@ class Real:
     suffix : str
         Suffix of its literals and of the functions of math.h.
     infix : str
-        What function and file names have after the kernel's, so that both types link into one program.
+        Ending of function and file names, so that the code of both types links into one program.
     bytes : int
         Size of a number.
     """
@@ -82,7 +82,7 @@ class CPrinter(Printer):
 
 
 def _nearest_single(value: Fraction) -> np.float32:
-    """Round once, not through double."""
+    """Return the nearest single; rounding to double first could miss it."""
     near = np.float32(float(value))
     candidates = (near, np.nextafter(near, np.float32(-np.inf)), np.nextafter(near, np.float32(np.inf)))
     return min(candidates, key=lambda c: (abs(Fraction(float(c)) - value), int(c.view(np.uint32)) & 1))
@@ -105,7 +105,7 @@ def emit(program: Program, target: str = "c") -> Sources:
     """
     real = REALS[target]
     name = external(f"{program.name}{real.infix}")
-    # A scalar that goes in is its own argument.
+    # A scalar input has one name, which is that of its argument and of its element.
     scalars = [signal.name for signal in program.inputs if not signal.shape]
     _, files = printed(program, lambda named, _: _files(named, name, real), C, scalars)
     function = Function(name, program.inputs, tuple(result.signal for result in program.outputs))
@@ -122,7 +122,7 @@ def emit(program: Program, target: str = "c") -> Sources:
 
 
 def _files(program: Program, name: str, real: Real) -> dict[str, str]:
-    """Return the header and the source of a program whose names are as they are printed."""
+    """Return the header and the source of a program with its printed names."""
     printer = CPrinter(real)
     nodes = [node for a in program.body for node in walk(a.value) if isinstance(node, Operation)]
     values = {
@@ -158,8 +158,8 @@ def _code(
 ) -> dict[str, object]:
     """Return the statements of a program: loads, assignments, stores.
 
-    `indices` gives the index of the element, by the signal's name, where it is not the plain ``[{}]``;
-    `depth` is how many blocks deep the statements stand.
+    `indices` has the index of an element by the signal's name, if it is not ``[{}]``; `depth` is the number of blocks
+    around the statements.
     """
     real, used, indices = printer.real.name, program.used(program.outputs), indices or {}
 
@@ -193,12 +193,12 @@ def _code(
     }
 
 
-#: Steps whose part without the state is computed together: enough for the compiler to take several at once.
+#: Number of steps whose part without the state is computed together; the compiler vectorizes such a block.
 _BLOCK = 16
 
 
 def _loop(program: Program, printer: CPrinter) -> dict[str, object]:
-    """Return the statements of a step in a loop, cut where the state comes in."""
+    """Return the statements of a step in a loop, in two parts: without the state, and with it."""
     ahead, behind = program.split()
     (increments,), (prepared,) = ahead.inputs, ahead.outputs
     signals = [(signal, "const ") for signal in program.inputs]

@@ -1,15 +1,12 @@
-"""The fixed-point C target.
+"""The fixed-point C target: a header with the contract of every function, and a C99 source on integers alone.
 
-Integers alone, no undefined or implementation-defined behaviour, an error code for input that the formats were not
-chosen for.
+The code has no undefined or implementation-defined behaviour, and returns an error code for input out of range.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from strapgen.fixedpoint import quantize
-from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.integer_program import (
     FixedProgram,
     IntegerMaximum,
@@ -22,9 +19,7 @@ from strapgen.ir.integer_program import (
     Value,
     used_by,
 )
-from strapgen.ir.program import Program
 from strapgen.ir.sources import Function, Sources
-from strapgen.support.exceptions import InputError
 from strapgen.targets.lines import fill_expression
 from strapgen.targets.names import C, external, printed
 from strapgen.targets.rendering import render
@@ -32,17 +27,17 @@ from strapgen.targets.rendering import render
 
 @dataclass(frozen=True)
 class Word:
-    """The integer types of a length of word.
+    """The C types for words of one length.
 
     Parameters
     ----------
     bits : int
     type, residual : str
-        Type of a word in memory, and of one without a sign.
+        Types of a word in memory, and of an error feedback, which has no sign.
     fast : str
-        Type of a word in a calculation: at least as long, whatever the processor is fastest with.
+        Type of a word in a calculation: the fastest of the processor that is long enough.
     wide, magnitude : str
-        Type of a product, and of a magnitude of one.
+        Types of a product, and of the magnitude of a product.
     """
 
     bits: int
@@ -60,33 +55,22 @@ WORDS = {
 }
 
 
-def emit(program: Program | FixedProgram, target: str, settings: Settings | None = None) -> Sources:
-    """Generate a C header and source for a program.
+def emit(fixed: FixedProgram, target: str) -> Sources:
+    """Print a C header and source for a program.
 
     Parameters
     ----------
-    program : Program or FixedProgram
+    fixed : FixedProgram
+        With a word of `WORDS`.
     target : str
         "c-fixed".
-    settings : Settings, optional
-        What the program is quantized for, if it is not yet.
 
     Returns
     -------
     Sources
         Two files. The function ``<name>`` works on one sample, ``<name>_array`` on many; a step has
         ``<name>_propagate`` too, the loop over runs and steps.
-
-    Raises
-    ------
-    InputError
-        If C has no such word.
     """
-    chosen = program.interface.settings if isinstance(program, FixedProgram) else settings or Settings()
-    if chosen.word not in WORDS:
-        allowed = ", ".join(map(str, WORDS))
-        raise InputError(f"word is {chosen.word}; in C it is {allowed} bits; the integer model takes any")
-    fixed = program if isinstance(program, FixedProgram) else quantize(program, chosen)
     interface, name = fixed.interface, external(fixed.name)
     arguments = (*interface.inputs, *interface.outputs)
     scalars = [argument.signal.name for argument in arguments if not argument.signal.shape]
@@ -108,22 +92,22 @@ def emit(program: Program | FixedProgram, target: str, settings: Settings | None
 
 
 def _files(fixed: FixedProgram, name: str) -> dict[str, str]:
-    """Return the header and the source of a program whose names are as they are printed."""
+    """Return the header and the source of a program with its printed names."""
     interface, word = fixed.interface, WORDS[fixed.word]
     printer = _Printer(fixed, word)
     signals = [(a.signal, "const ") for a in interface.inputs] + [(a.signal, "") for a in interface.outputs]
-    residuals = len(interface.residuals)
+    feedback_words = len(interface.residuals)
     pieces = [f"{constant}{word.type} {s.name}[{s.size}]" for s, constant in signals]
     inner = [f"{constant}{word.type} {printer.memory(s.name)}[{s.size}]" for s, constant in signals]
     arrays = [f"{constant}{word.type} *{s.name}" for s, constant in signals]
     calls = [f"{s.name} + {s.size} * k" for s, _ in signals]
     names = [s.name for s, _ in signals]
-    if residuals:
+    if feedback_words:
         place = len(interface.inputs)
-        pieces.insert(place, f"{word.residual} residuals[{residuals}]")
+        pieces.insert(place, f"{word.residual} residuals[{feedback_words}]")
         inner.insert(place, f"{word.residual} *restrict residuals")
         arrays.insert(place, f"{word.residual} *residuals")
-        calls.insert(place, f"residuals + {residuals} * k")
+        calls.insert(place, f"residuals + {feedback_words} * k")
         names.insert(place, "residuals")
     definitions = [value.definition for value in fixed.body]
     values = {
@@ -135,7 +119,7 @@ def _files(fixed: FixedProgram, name: str) -> dict[str, str]:
         "word": word,
         "state": interface.inputs[0].signal,
         "samples": interface.inputs[-1].signal,
-        "residuals": residuals,
+        "residuals": feedback_words,
         "parameters": ", ".join(pieces),
         "inner_parameters": ", ".join(inner),
         "arrays": ", ".join(arrays),
@@ -163,14 +147,14 @@ class _Printer:
         self.fixed, self.word = fixed, word
         self.uses_shift = False
         self.wide_names = {value.name for value in fixed.body if value.wide}
-        self.places = {residual.name: k for k, residual in enumerate(fixed.interface.residuals)}
+        self.places = {feedback.name: k for k, feedback in enumerate(fixed.interface.residuals)}
         self.checks = any(value.guarded for value in fixed.body)
         self.nearest = fixed.interface.settings.rounding == "nearest"
         self.names = {value.name for value in fixed.body}
         self.names |= {name for argument in fixed.interface.inputs for name in argument.signal.elements}
 
     def memory(self, name: str) -> str:
-        """Return the name of an argument's memory; that of a scalar is not the name of its value."""
+        """Return the name of an argument's array; it differs from the names of all values."""
         return f"{name}_words" if name in self.names else name
 
     def code(self) -> dict[str, list[str]]:
@@ -201,40 +185,35 @@ class _Printer:
         """Return the statements that compute a value."""
         lines = [f"/* {value.meaning} */"] if value.meaning else []
         kind = self.word.wide if value.wide else self.word.fast
-        definition, name = value.definition, value.name
-        if isinstance(definition, IntegerSum):
-            lines += self._sum(value, definition, kind)
-        elif isinstance(definition, IntegerQuotient):
-            lines += self._narrow(
-                value, kind, f"quotient_({self.scaled(definition.numerator)}, {definition.denominator})"
-            )
-        elif isinstance(definition, IntegerRoot):
-            lines.append(
-                f"const {kind} {name} = root_(({self.word.magnitude})({self.scaled(definition.argument)}));"
-            )
-        elif isinstance(definition, IntegerMaximum):
-            lines.append(f"{kind} {name} = {self.cast(self.scaled(definition.arguments[0]), value)};")
-            for argument in definition.arguments[1:]:
-                text = self.scaled(argument)
-                lines.append(f"if ({text} > {name})\n        {name} = {self.cast(text, value)};")
-        else:
-            assert isinstance(definition, IntegerSelection)
-            text = self.scaled(definition.otherwise)
-            for left, right, chosen in reversed(definition.cases):
-                text = (
-                    f"{self.scaled(left)} >= {self.scaled(right)} ? {self.scaled(chosen)}\n        : {text}"
-                )
-            lines.append(f"const {kind} {name} = {self.cast(f'({text})', value)};")
-        if value.guarded and not (isinstance(definition, IntegerSum) and not value.wide):
+        name = value.name
+        match value.definition:
+            case IntegerSum() as total:
+                lines += self._sum(value, total, kind)
+            case IntegerQuotient(numerator, denominator):
+                text = f"quotient_({self.scaled(numerator)}, {denominator})"
+                lines.append(f"const {kind} {name} = {self.cast(text, value)};")
+            case IntegerRoot(argument):
+                text = f"root_(({self.word.magnitude})({self.scaled(argument)}))"
+                lines.append(f"const {kind} {name} = {text};")
+            case IntegerMaximum((first, *others)):
+                lines.append(f"{kind} {name} = {self.cast(self.scaled(first), value)};")
+                for other in others:
+                    text = self.scaled(other)
+                    lines.append(f"if ({text} > {name})\n        {name} = {self.cast(text, value)};")
+            case IntegerSelection(cases, otherwise):
+                text = self.scaled(otherwise)
+                for left, right, result in reversed(cases):
+                    condition = f"{self.scaled(left)} >= {self.scaled(right)}"
+                    text = f"{condition} ? {self.scaled(result)}\n        : {text}"
+                lines.append(f"const {kind} {name} = {self.cast(f'({text})', value)};")
+        # The word of a sum is checked before it is narrowed.
+        if value.guarded and (value.wide or not isinstance(value.definition, IntegerSum)):
             lines.append(self._guard(name, value))
         return lines
 
     def _guard(self, name: str, value: Value) -> str:
         limits = self.constant(value.low), self.constant(value.high)
         return f"if ({name} < {limits[0]}\n        || {name} > {limits[1]})\n        return 2;"
-
-    def _narrow(self, value: Value, kind: str, text: str) -> list[str]:
-        return [f"const {kind} {value.name} = {self.cast(text, value)};"]
 
     def cast(self, text: str, value: Value) -> str:
         """Return an expression of a wide number as one of the value's type."""
@@ -249,21 +228,21 @@ class _Printer:
                 [*coarse, *([] if not definition.fine else [self.term(t) for t in definition.fine])]
             )
             return self._result(value, kind, total or "0")
-        residual, lines = definition.residual, []
-        if residual is None:
+        feedback, lines = definition.residual, []
+        if feedback is None:
             half = f" + {self.constant(1 << (definition.shift - 1), wide=True)}" if self.nearest else ""
             rounded = self._shifted(fine + half, -definition.shift)
         else:
-            place = f"residuals[{self.places[residual.name]}]"
-            kept = self._scaled_text(f"({wide}){place}", residual.shift)
+            place = f"residuals[{self.places[feedback.name]}]"
+            fed_back = self._scaled_text(f"({wide}){place}", feedback.shift)
             before = self._shifted(fine, -definition.drop) if definition.drop else fine
-            lines.append(_declared(wide, f"{name}_sum", f"{before} + {kept}"))
+            lines.append(_declared(wide, f"{name}_sum", f"{before} + {fed_back}"))
             left = (
-                f"({self.word.magnitude}){name}_sum << {-residual.shift}" if residual.shift else f"{name}_sum"
+                f"({self.word.magnitude}){name}_sum << {-feedback.shift}" if feedback.shift else f"{name}_sum"
             )
             word = self.word.residual
-            if self.checks:  # what is refused later must not have touched it
-                lines.append(f"const {word} next_{residual.name} = ({word})({left});")
+            if self.checks:  # a call that a later check refuses leaves it as it was
+                lines.append(f"const {word} next_{feedback.name} = ({word})({left});")
             else:
                 lines.append(f"{place} = ({word})({left});")
             rounded = self._shifted(f"{name}_sum", -definition.shift)
@@ -271,7 +250,7 @@ class _Printer:
         return lines + self._result(value, kind, self._joined(terms))
 
     def _result(self, value: Value, kind: str, text: str) -> list[str]:
-        """Return the statement that keeps a sum; a checked word is checked before it is narrowed."""
+        """Return the statements that store a sum; a word with a range check is checked before it is narrowed."""
         if value.guarded and not value.wide:
             name = f"{value.name}_unchecked"
             return [
@@ -333,7 +312,7 @@ class _Printer:
         )
 
     def constant(self, value: int, wide: bool = False) -> str:
-        """Return an integer as a constant expression that holds it, of a wide number where that is asked."""
+        """Return an integer as a constant expression, with the type of a wide number if `wide` is true."""
         if value < 0:
             return f"(-{self.constant(-value, wide)})"
         if value < 1 << 15:

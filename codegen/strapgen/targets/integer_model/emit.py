@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from strapgen.fixedpoint import quantize
-from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.integer_program import (
     FixedProgram,
+    IntegerDefinition,
     IntegerMaximum,
     IntegerQuotient,
     IntegerRoot,
@@ -17,29 +16,25 @@ from strapgen.ir.integer_program import (
     Term,
     Value,
 )
-from strapgen.ir.program import Program
 from strapgen.ir.sources import Function, Sources
 from strapgen.targets.names import PYTHON, printed
 from strapgen.targets.rendering import render
 
 
-def emit(program: Program | FixedProgram, target: str, settings: Settings | None = None) -> Sources:
-    """Generate a Python module for a program.
+def emit(fixed: FixedProgram, target: str) -> Sources:
+    """Print a Python module for a program.
 
     Parameters
     ----------
-    program : Program or FixedProgram
+    fixed : FixedProgram
     target : str
         "fixed-model".
-    settings : Settings, optional
-        What the program is quantized for, if it is not yet.
 
     Returns
     -------
     Sources
         One file. The function ``<name>`` takes and returns integers, or arrays of them.
     """
-    fixed = program if isinstance(program, FixedProgram) else quantize(program, settings or Settings())
     interface = fixed.interface
     named, files = printed(fixed, _files, PYTHON)
     function = Function(
@@ -61,7 +56,7 @@ def emit(program: Program | FixedProgram, target: str, settings: Settings | None
 
 
 def _files(fixed: FixedProgram, other: Mapping[str, str]) -> dict[str, str]:
-    """Return the module of a program whose names are as they are printed; what it says has their other names."""
+    """Return the module of a program with its printed names; messages show the names of `other`."""
     interface = fixed.interface
     text = render(
         "integer_model/module.py.j2",
@@ -71,7 +66,7 @@ def _files(fixed: FixedProgram, other: Mapping[str, str]) -> dict[str, str]:
         other=other,
         statements=[statement for value in fixed.body for statement in _statements(value, fixed, other)],
         nearest=interface.settings.rounding == "nearest",
-        fresh=[_fresh(residual.name) for residual in interface.residuals],
+        fresh=[_fresh(feedback.name) for feedback in interface.residuals],
     )
     return {f"{fixed.name}.py": text}
 
@@ -83,50 +78,57 @@ def _fresh(name: str) -> str:
 def _statements(value: Value, fixed: FixedProgram, other: Mapping[str, str]) -> list[str]:
     """Return the lines that compute a value and check it on the way."""
     name, definition = value.name, value.definition
-    said = other.get(name, name)
+    label = other.get(name, name)
     lines = [f"# {value.meaning}"] if value.meaning else []
     if isinstance(definition, IntegerSum):
-        lines += _sum(value, definition, fixed, said)
+        lines += _sum(value, definition, fixed, label)
     else:
-        if isinstance(definition, IntegerQuotient):
-            text = f"_quotient({_scaled(definition.numerator)}, {definition.denominator})"
-        elif isinstance(definition, IntegerRoot):
-            text = f"_root({_scaled(definition.argument)})"
-        elif isinstance(definition, IntegerMaximum):
-            text = _scaled(definition.arguments[0])
-            for argument in definition.arguments[1:]:
-                text = f"_larger({text}, {_scaled(argument)})"
-        else:
-            assert isinstance(definition, IntegerSelection)
-            text = _scaled(definition.otherwise)
-            for left, right, chosen in reversed(definition.cases):
-                text = f"_chosen({_scaled(left)} >= {_scaled(right)}, {_scaled(chosen)}, {text})"
-        lines.append(f"{name} = {text}")
+        lines.append(f"{name} = {_expression(definition)}")
     check = "_require" if value.guarded else "_within"
-    lines.append(f'{check}("{said}", {name}, {value.low}, {value.high})')
+    lines.append(f'{check}("{label}", {name}, {value.low}, {value.high})')
     return lines
 
 
-def _sum(value: Value, definition: IntegerSum, fixed: FixedProgram, said: str) -> list[str]:
+def _expression(definition: IntegerDefinition) -> str:
+    """Return a quotient, a root, a maximum or a selection as an expression."""
+    match definition:
+        case IntegerQuotient(numerator, denominator):
+            return f"_quotient({_scaled(numerator)}, {denominator})"
+        case IntegerRoot(argument):
+            return f"_root({_scaled(argument)})"
+        case IntegerMaximum((first, *others)):
+            text = _scaled(first)
+            for argument in others:
+                text = f"_larger({text}, {_scaled(argument)})"
+            return text
+        case IntegerSelection(cases, otherwise):
+            text = _scaled(otherwise)
+            for left, right, result in reversed(cases):
+                text = f"_chosen({_scaled(left)} >= {_scaled(right)}, {_scaled(result)}, {text})"
+            return text
+    raise TypeError(f"{type(definition).__name__} is no expression")
+
+
+def _sum(value: Value, definition: IntegerSum, fixed: FixedProgram, label: str) -> list[str]:
     name = value.name
     fine = [_term(term) for term in definition.fine]
     coarse = [_term(term) for term in definition.coarse]
     if not definition.shift:
-        return [f'{name} = _total("{said}", {value.peak}, {", ".join([*coarse, *fine]) or 0})']
-    residual, lines = definition.residual, []
-    if residual is not None and definition.drop:
-        lines.append(f'{name}_kept = _total("{said}", {value.peak}, {", ".join(fine)}) >> {definition.drop}')
+        return [f'{name} = _total("{label}", {value.peak}, {", ".join([*coarse, *fine]) or 0})']
+    feedback, lines = definition.residual, []
+    if feedback is not None and definition.drop:
+        lines.append(f'{name}_kept = _total("{label}", {value.peak}, {", ".join(fine)}) >> {definition.drop}')
         fine = [f"{name}_kept"]
-    if residual is not None:
-        fine.append(_shifted(residual.name, residual.shift))
+    if feedback is not None:
+        fine.append(_shifted(feedback.name, feedback.shift))
     elif fixed.interface.settings.rounding == "nearest":
         fine.append(str(1 << (definition.shift - 1)))
-    lines.append(f'{name}_sum = _total("{said}", {value.peak}, {", ".join(fine)})')
-    if residual is not None:
+    lines.append(f'{name}_sum = _total("{label}", {value.peak}, {", ".join(fine)})')
+    if feedback is not None:
         mask = (1 << fixed.word) - 1
-        lines.append(f"{_fresh(residual.name)} = {_shifted(f'{name}_sum', -residual.shift)} & {mask}")
+        lines.append(f"{_fresh(feedback.name)} = {_shifted(f'{name}_sum', -feedback.shift)} & {mask}")
     rounded = _shifted(f"{name}_sum", -definition.shift)
-    lines.append(f'{name} = _total("{said}", {value.peak}, {", ".join([rounded, *coarse])})')
+    lines.append(f'{name} = _total("{label}", {value.peak}, {", ".join([rounded, *coarse])})')
     return lines
 
 

@@ -1,4 +1,4 @@
-"""The numpy target: one module a kernel, its functions vectorised over leading axes."""
+"""The numpy target: one module for each kernel, with functions that are vectorised over leading axes."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def emit(program: Program, target: str = "numpy") -> Sources:
 
 
 def _files(program: Program, target: str) -> dict[str, str]:
-    """Return the module of a program whose names are as they are printed."""
+    """Return the module of a program with its printed names."""
     functions = [program] if program.transition is None else [program, program.transition_program()]
     kinds = {
         node.kind

@@ -1,9 +1,10 @@
-"""Three loops in one C function: fast, slow and navigation cycles around what each loop hands on."""
+"""C of an algorithm in two speeds: the functions of its three loops, and one that runs them in turn on one memory."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.recursion import Recursion
@@ -13,24 +14,24 @@ from strapgen.targets.c.emit import REALS
 from strapgen.targets.c_fixed.emit import WORDS
 from strapgen.targets.rendering import render
 
-#: What the loops are called, from the fastest.
+#: Names of the loops, from the fastest.
 LOOPS = ("fast", "slow", "navigation")
-#: What takes rounding out of an attitude, by the size of its state.
+#: The kernel that removes rounding from an attitude, by the size of its state.
 _NORMALIZATION = {9: "dcm-orthonormalize-first-order", 4: "euler-normalize-first-order"}
 
 
 @dataclass(frozen=True)
 class Wiring:
-    """Where the arguments of loops come from and go to.
+    """The sources and destinations of the loops' arguments.
 
     Parameters
     ----------
     memory : tuple of Signal
-        What is handed on, within a loop or from loop to loop.
+        Values that pass from call to call of a loop, or from loop to loop.
     samples : tuple of tuple of Signal
-        What each loop is given from outside.
+        The other inputs of each loop.
     results : tuple of tuple of Signal
-        What each loop gives back beside what is handed on.
+        The other outputs of each loop.
     """
 
     memory: tuple[Signal, ...]
@@ -38,18 +39,18 @@ class Wiring:
     results: tuple[tuple[Signal, ...], ...]
 
     def memory_named(self, name: str) -> Signal:
-        """Return what is handed on by its name."""
+        """Return a signal of the memory by its name."""
         return next(signal for signal in self.memory if signal.name == name)
 
 
 def recursion(sources: Sources) -> Recursion:
     """Return the recursion of a loop."""
-    assert sources.recursion is not None, "a loop tells what it hands on"
+    assert sources.recursion is not None, "every loop has one"
     return sources.recursion
 
 
 def wiring(loops: Sequence[Sources]) -> Wiring:
-    """Return where the arguments of loops come from and go to: what has one name is one quantity."""
+    """Return how the arguments of loops are connected: arguments of the same name are the same quantity."""
     held = {name for loop in loops for name, _ in recursion(loop).states}
     memory = {signal.name: signal for loop in loops for signal in loop.function.inputs if signal.name in held}
     return Wiring(
@@ -62,53 +63,29 @@ def wiring(loops: Sequence[Sources]) -> Wiring:
 
 
 def whole(name: str, title: str, command: str, loops: Sequence[Sources]) -> Sources:
-    """Generate the function that runs all loops.
+    """Generate the C of all loops: one function for a cycle of each, and one that runs whole navigation cycles.
 
     Parameters
     ----------
     name : str
         Name of the algorithm on the command line.
     title : str
-        One line that says what it computes.
+        A line for the head of the files.
     command : str
-        What generates it.
+        The command line that generates the files.
     loops : sequence of Sources
         The C of the fast, slow and navigation loop; in fixed point in formats that fit together.
 
     Returns
     -------
     Sources
-        The function with its memory, and the files of the loops.
+        The files of the whole, and those of the loops.
     """
     fast, slow, _ = loops
-    fixed = fast.fixed
-    wires = wiring(loops)
+    numbers, wires = _numbers(fast), wiring(loops)
     state = wires.memory_named(slow.function.inputs[0].name)
-    real = None if fixed else REALS[fast.target]
-    if fixed is not None:
-        suffix, type_ = f"_q{fixed.settings.word - 1}", WORDS[fixed.settings.word].type
-        residual_type = WORDS[fixed.settings.word].residual
-    else:
-        assert real is not None
-        suffix, type_, residual_type = real.infix, real.name, ""
-    identifier = name.replace("-", "_") + suffix
-    arguments: dict[str, Argument] = {}
-    for loop in loops:
-        if loop.fixed is not None:
-            arguments |= {a.signal.name: a for a in (*loop.fixed.inputs, *loop.fixed.outputs)}
-    residuals = {
-        which: loop.fixed.residuals
-        for which, loop in zip(LOOPS, loops, strict=True)
-        if loop.fixed is not None
-    }
-    own_names = {
-        which: [s.name for s in (*taken, *given)]
-        for which, taken, given in zip(LOOPS, wires.samples, wires.results, strict=True)
-    }
-    own_parameters = {
-        which: [*(f"const {type_} *{s.name}" for s in taken), *(f"{type_} *{s.name}" for s in given)]
-        for which, taken, given in zip(LOOPS, wires.samples, wires.results, strict=True)
-    }
+    identifier = name.replace("-", "_") + numbers.suffix
+    outputs = (state, *wires.results[2])
     values = {
         "name": identifier,
         "title": title,
@@ -117,35 +94,16 @@ def whole(name: str, title: str, command: str, loops: Sequence[Sources]) -> Sour
         "headers": [next(file for file in loop.files if file.endswith(".h")) for loop in loops],
         "loops": LOOPS,
         "normalization": _NORMALIZATION[state.size],
-        "type": type_,
-        "residual_type": residual_type,
-        "word": fixed.settings.word if fixed else 0,
+        "type": numbers.type,
+        "residual_type": numbers.feedback_type,
+        "word": numbers.word,
         "memory": wires.memory,
         "state": state,
         "samples": wires.samples,
         "results": wires.results[2],
-        "arguments": arguments,
-        "residuals": {which: kept for which, kept in residuals.items() if kept},
-        "calls": {
-            which: f"{loop.function.name}({_call(loop, which, wires)})"
-            for which, loop in zip(LOOPS, loops, strict=True)
-        },
-        # What a loop has summed begins anew when the next slower one has taken it.
-        "clears": dict(zip(LOOPS, [(), *(recursion(loop).begun_anew for loop in loops[:-1])], strict=True)),
-        "parameters": {
-            which: ", ".join([f"{identifier}_memory *memory", *own]) for which, own in own_parameters.items()
-        },
-        "checked": {which: ["memory", *names] for which, names in own_names.items()},
-        "given": {which: ", ".join(["memory", *names]) for which, names in own_names.items()},
-        "arrays": "".join(
-            [f", const {type_} *{s.name}" for group in wires.samples for s in group]
-            + [f", {type_} *{s.name}" for s in (state, *wires.results[2])]
-        ),
-        "pointers": [
-            "memory",
-            *(s.name for group in wires.samples for s in group),
-            *(s.name for s in (state, *wires.results[2])),
-        ],
+        **_contracts(loops),
+        **_cycles(loops, wires, numbers.type, identifier),
+        **_run(wires, numbers.type, outputs),
     }
     files = {
         f"{identifier}.h": render("two_speed_c/header.h.j2", **values),
@@ -153,12 +111,65 @@ def whole(name: str, title: str, command: str, loops: Sequence[Sources]) -> Sour
     }
     for loop in loops:
         files |= loop.files
-    counts = dict.fromkeys(fast.operations, 0)
-    for loop in loops:
-        counts = {kind: counts[kind] + loop.operations[kind] for kind in counts}
-    function = Function(identifier, sum(wires.samples, ()), (state, *wires.results[2]))
+    counts = {kind: sum(loop.operations[kind] for loop in loops) for kind in fast.operations}
     temporaries = sum(loop.temporaries for loop in loops)
+    function = Function(identifier, sum(wires.samples, ()), outputs)
     return Sources(name, fast.target, files, function, counts, temporaries, None)
+
+
+class _Numbers(NamedTuple):
+    """The numbers of the loops in C: ending of names, types of a number and of error feedback, bits of a word."""
+
+    suffix: str
+    type: str
+    feedback_type: str = ""
+    word: int = 0
+
+
+def _numbers(loop: Sources) -> _Numbers:
+    """Return the numbers of a loop; a word of 0 bits stands for floating point."""
+    if loop.fixed is None:
+        real = REALS[loop.target]
+        return _Numbers(real.infix, real.name)
+    word = WORDS[loop.fixed.settings.word]
+    return _Numbers(f"_q{word.bits - 1}", word.type, word.residual, word.bits)
+
+
+def _contracts(loops: Sequence[Sources]) -> dict[str, object]:
+    """Return what the header says about fixed point: arguments by name, and the error feedback of each loop."""
+    interfaces = {which: loop.fixed for which, loop in zip(LOOPS, loops, strict=True) if loop.fixed}
+    arguments: dict[str, Argument] = {}
+    for interface in interfaces.values():
+        arguments |= {a.signal.name: a for a in (*interface.inputs, *interface.outputs)}
+    feedback = {which: interface.residuals for which, interface in interfaces.items() if interface.residuals}
+    return {"arguments": arguments, "residuals": feedback}
+
+
+def _cycles(loops: Sequence[Sources], wires: Wiring, type_: str, identifier: str) -> dict[str, object]:
+    """Return the text of the function of one cycle, for each loop by name."""
+    names, parameters = {}, {}
+    for which, samples, results in zip(LOOPS, wires.samples, wires.results, strict=True):
+        names[which] = ["memory", *(signal.name for signal in (*samples, *results))]
+        pointers = [f"const {type_} *{s.name}" for s in samples] + [f"{type_} *{s.name}" for s in results]
+        parameters[which] = ", ".join([f"{identifier}_memory *memory", *pointers])
+    return {
+        "parameters": parameters,
+        "checked": names,
+        "given": {which: ", ".join(arguments) for which, arguments in names.items()},
+        "calls": {
+            which: f"{loop.function.name}({_call(loop, which, wires)})"
+            for which, loop in zip(LOOPS, loops, strict=True)
+        },
+        # A sum of a loop is reset to zero when the next slower loop has used it.
+        "clears": dict(zip(LOOPS, [(), *(recursion(loop).begun_anew for loop in loops[:-1])], strict=True)),
+    }
+
+
+def _run(wires: Wiring, type_: str, outputs: Sequence[Signal]) -> dict[str, object]:
+    """Return the text of the function that runs whole navigation cycles: its arrays, and the pointers to check."""
+    samples = sum(wires.samples, ())
+    arrays = [f", const {type_} *{s.name}" for s in samples] + [f", {type_} *{s.name}" for s in outputs]
+    return {"arrays": "".join(arrays), "pointers": ["memory", *(s.name for s in (*samples, *outputs))]}
 
 
 def _call(loop: Sources, which: str, wires: Wiring) -> str:

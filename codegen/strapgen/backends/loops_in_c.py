@@ -1,0 +1,76 @@
+"""The loops of an algorithm in two speeds in one generated C function."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from strapgen.backends.c import REAL_TYPES
+from strapgen.backends.evaluators import Array, Evaluator
+from strapgen.backends.loops import Cycles, Loops, LoopsFromPython, LoopSources
+from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.sources import Sources
+from strapgen.library import two_speed_sources
+from strapgen.support.exceptions import InputTypeError
+from strapgen.toolchain import compiler
+
+
+class LoopsInC(Loops):
+    """Runs all loops in one call of a generated C function."""
+
+    def __init__(self, sources: LoopSources, evaluator: Callable[[Sources], Evaluator]) -> None:
+        super().__init__(sources, evaluator)
+        if sources.whole is None:
+            raise InputTypeError("the loops have no C of the whole; LoopsInC.generated returns it")
+        fixed = sources.loops[0].fixed
+        if fixed is None:
+            self._type, real = REAL_TYPES[sources.whole.target]
+            self.dtype = np.dtype(real)
+            self._kind = self.dtype
+        else:
+            self._kind = np.dtype(f"int{fixed.settings.word}")
+            self._type = f"{self._kind.name}_t"
+        self._function = sources.whole.function.name
+        self._module = compiler.load(sources.whole)
+
+    @classmethod
+    def generated(cls, algorithm: str, sculling: int, target: str, settings: Settings | None) -> LoopSources:
+        """Return the loops and the C of the whole, see `Loops.generated`."""
+        loops = super().generated(algorithm, sculling, target, settings).loops
+        return LoopSources(loops, two_speed_sources.sources(algorithm, sculling, target, settings))
+
+    def run(self, cycles: Cycles) -> tuple[Array, Array]:
+        """Run whole navigation cycles in C, see `Loops.run`."""
+        ffi, lib = self._module.ffi, self._module.lib
+        memory = ffi.new(f"{self._function}_memory *")
+        values = {
+            name: np.ascontiguousarray(array, self._kind)
+            for name, array in {**cycles.samples, **cycles.start}.items()
+        }
+        getattr(lib, f"{self._function}_begin")(memory, self._pointer(values["state"]))
+        for name in ("previous_turn", "previous_increment"):
+            getattr(memory, name)[0:3] = values[name][0].tolist()
+        slow_cycles = len(values["turn"])
+        navigation_cycles = slow_cycles // cycles.slow
+        attitudes = np.empty((slow_cycles, values["state"].shape[1]), self._kind)
+        changes = np.empty((navigation_cycles, 3), self._kind)
+        if navigation_cycles:
+            inputs = [values[signal.name] for group in self.wires.samples for signal in group]
+            status = getattr(lib, f"{self._function}_run")(
+                navigation_cycles,
+                cycles.slow,
+                cycles.fast,
+                memory,
+                *map(self._pointer, (*inputs, attitudes, changes)),
+            )
+            if status:
+                # One by one, the loops raise the error that names the loop and its input.
+                LoopsFromPython(self.sources, self.evaluator).run(cycles)
+                raise AssertionError("the loops by themselves refuse what the whole refuses")
+        return attitudes, changes
+
+    def _pointer(self, array: Array) -> Any:
+        """Return the C pointer to a contiguous array's first element."""
+        return self._module.ffi.from_buffer(f"{self._type}[]", array)

@@ -1,0 +1,11 @@
+"""LaTeX that several reports write."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+
+def align_environment(rows: Iterable[str]) -> str:
+    """Return rows as one align environment of the package amsmath; each has its & before the relation."""
+    body = " \\\\\n".join(rows)
+    return f"\\begin{{align*}}\n{body}\n\\end{{align*}}"

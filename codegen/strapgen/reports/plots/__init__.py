@@ -1,0 +1,12 @@
+"""Plots as image files, a module for what each shows; they need the extra `plot`."""
+
+from strapgen.reports.plots.agreement import agreement_image as agreement_image
+from strapgen.reports.plots.convergence import convergence_image as convergence_image
+from strapgen.reports.plots.figures import require_kind as require_kind
+from strapgen.reports.plots.runs import history_image as history_image
+from strapgen.reports.plots.runs import plot_history as plot_history
+from strapgen.reports.plots.runs import plot_run as plot_run
+from strapgen.reports.plots.runs import run_image as run_image
+from strapgen.reports.plots.stability import stability_image as stability_image
+from strapgen.reports.plots.vibration import vibration_image as vibration_image
+from strapgen.reports.plots.word_length import word_length_image as word_length_image

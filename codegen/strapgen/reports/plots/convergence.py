@@ -1,0 +1,89 @@
+"""Error against step, beside the slope of theory."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from strapgen.reports.plots import figures
+
+if TYPE_CHECKING:
+    from strapgen.experiments.convergence import Convergence
+
+
+def convergence_image(outcomes: Sequence[Convergence], title: str, path: str | Path) -> bytes:
+    """Return error against step, a line an algorithm, beside a line of the slope that theory says.
+
+    Parameters
+    ----------
+    outcomes : sequence of Convergence
+    title : str
+    path : path
+        File for the image; its ending says which kind.
+
+    Returns
+    -------
+    bytes
+        The content of the file.
+
+    Raises
+    ------
+    MissingExtraError
+        If matplotlib is not installed.
+    InputError
+        If the kind of image is unknown.
+    """
+    figure, grid = figures.grid_of_axes(1, 1, (8.0, 6.0))
+    axes = grid[0, 0]
+    colours = figures.colours(len(outcomes), 0.85)
+    for number, (outcome, colour) in enumerate(zip(outcomes, colours, strict=True)):
+        _draw_algorithm(axes, outcome, colour, "osD^v<>p"[number % 8])
+    rungs = [rung for outcome in outcomes for rung in outcome.rungs]
+    if any(rung.error_rad for rung in rungs):  # else all are exact: nothing to draw
+        axes.set_yscale("log")
+        axes.set_ylim(top=10)
+    figures.step_ticks(axes, sorted({rung.step_s for rung in rungs}))
+    axes.set_ylabel("largest error, rad")
+    figures.style(axes)
+    axes.legend(
+        alignment="left",
+        title="order: slope of filled points; theory is dashed",
+        title_fontsize=9,
+        frameon=True,
+        framealpha=0.85,
+        edgecolor="none",
+        fontsize=9,
+        loc="lower right",
+    )
+    axes.set_title(figures.printable(title), loc="left", fontsize=11)
+    return figures.image(figure, path)
+
+
+def _draw_algorithm(axes: Any, outcome: Convergence, colour: Any, marker: str) -> None:
+    """Draw the errors of one algorithm, filled where the slope is fitted, and the predicted slope dashed."""
+    rungs = [rung for rung in outcome.rungs if rung.error_rad]
+    steps = [rung.step_s for rung in rungs]
+    slope = "order hidden" if outcome.observed is None else f"{outcome.observed:.2f}"
+    theory = "" if outcome.predicted is None else f", theory {outcome.predicted}"
+    axes.plot(steps, [rung.error_rad for rung in rungs], color=colour, linewidth=1.2, alpha=0.6)
+    for used in (True, False):
+        points = [rung for rung in rungs if rung.used is used]
+        axes.plot(
+            [rung.step_s for rung in points],
+            [rung.error_rad for rung in points],
+            linestyle="none",
+            marker=marker,
+            markersize=5.5,
+            color=colour,
+            markerfacecolor=colour if used else "white",
+            label=f"{outcome.kernel}: {slope}{theory}" if used else None,
+        )
+    fitted = [rung for rung in rungs if rung.used]
+    if outcome.predicted is not None and fitted:
+        anchor = fitted[-1]
+        wide = np.array([anchor.step_s, max(steps)])
+        line = (anchor.error_rad or 0.0) * (wide / anchor.step_s) ** outcome.predicted
+        axes.plot(wide, line, color=colour, linewidth=0.9, linestyle="--")

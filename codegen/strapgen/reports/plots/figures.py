@@ -1,0 +1,121 @@
+"""What all plots share: matplotlib without a screen, kinds of image files, the look of axes, titles and legends."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from strapgen.support.exceptions import InputError, MissingExtraError
+
+COLOURS = ("#1f5f8b", "#b5562b", "#3d7a4f")
+
+
+def pyplot() -> Any:
+    """Return matplotlib's pyplot, drawing to files alone.
+
+    Raises
+    ------
+    MissingExtraError
+        If matplotlib is not installed.
+    """
+    try:
+        import matplotlib
+    except ImportError:
+        raise MissingExtraError("plots need matplotlib: pip install 'strapgen[plot]'") from None
+    matplotlib.use("Agg")
+    import matplotlib.pyplot
+
+    return matplotlib.pyplot
+
+
+def require_kind(path: str | Path) -> str:
+    """Return the kind of image that a file's ending says.
+
+    Raises
+    ------
+    MissingExtraError
+        If matplotlib is not installed.
+    InputError
+        If the kind is unknown.
+    """
+    pyplot()
+    from matplotlib.backend_bases import FigureCanvasBase
+
+    kind = Path(path).suffix.lstrip(".").lower()
+    allowed = sorted(FigureCanvasBase.get_supported_filetypes())
+    if kind not in allowed:
+        raise InputError(f"plot {path}: file type {kind!r} is not known; allowed: {', '.join(allowed)}")
+    return kind
+
+
+def image(figure: Any, path: str | Path) -> bytes:
+    """Return a figure as the content of an image file, of the kind that the file's ending says; it is closed."""
+    pyplot().close(figure)  # pyplot lets go of it, it can still be drawn
+    kind = require_kind(path)
+    content = io.BytesIO()
+    figure.savefig(content, format=kind, dpi=150)
+    return content.getvalue()
+
+
+def grid_of_axes(rows: int, columns: int, size: tuple[float, float], **options: Any) -> tuple[Any, Any]:
+    """Return a figure of a size in inches, and its axes as an array (rows, columns), with the axis of x shared."""
+    figure, grid = pyplot().subplots(
+        rows, columns, figsize=size, sharex=True, layout="constrained", squeeze=False, **options
+    )
+    return figure, grid
+
+
+def colours(count: int, last: float) -> Any:
+    """Return so many colours from dark to light; `last` is how far they go, 0 to 1."""
+    import numpy as np
+
+    return pyplot().get_cmap("viridis")(np.linspace(0.0, last, count))
+
+
+def title(figure: Any, text: str) -> None:
+    """Write a title at the left of a figure."""
+    figure.suptitle(printable(text), fontsize=11, x=0.01, ha="left")
+
+
+def printable(text: str) -> str:
+    """Return text without what cannot be encoded, as names of files may have it."""
+    return text.encode(errors="replace").decode()
+
+
+def style(axes: Any, grid: str = "both") -> None:
+    """Give axes an open frame and a light grid."""
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid(alpha=0.25, linewidth=0.6, axis=grid)
+
+
+def style_over_time(axes: Any) -> None:
+    """Give axes of a quantity over time their look, with a line at zero."""
+    style(axes)
+    axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
+    axes.margins(x=0)
+    axes.axhline(0, color="0.6", linewidth=0.8, zorder=0)
+
+
+def step_ticks(axes: Any, steps: Iterable[float]) -> None:
+    """Show steps in s on a logarithmic axis of x, as fractions where they are."""
+    steps = list(steps)
+    axes.set_xscale("log", base=2)
+    axes.set_xticks(steps, [fraction(step) for step in steps])
+    axes.minorticks_off()
+    axes.set_xlabel("step, s")
+
+
+def common_legend(figure: Any, panels: Iterable[Any], **options: Any) -> None:
+    """Give panels one legend outside of them, each label once."""
+    handles: dict[str, Any] = {}
+    for axes in panels:
+        handles |= {label: handle for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
+    figure.legend(handles.values(), handles.keys(), frameon=False, fontsize=9, **options)
+
+
+def fraction(number: float) -> str:
+    """Return a number as one part of a whole where it is one."""
+    parts = round(1 / number)
+    return f"1/{parts}" if parts > 1 and abs(parts * number - 1) < 1e-9 else f"{number:g}"

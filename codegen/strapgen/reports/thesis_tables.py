@@ -1,0 +1,87 @@
+"""The thesis's tables, simulated, as text."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+from typing import Any
+
+from strapgen.experiments.thesis_tables import ALGORITHMS, ORDERS, Table, TableEntry
+from strapgen.reports.table import Column, TextTable
+
+_NAMES = {"dcm": "direction cosines", "euler": "Euler parameters"}
+#: Drift and ratio at one order, and the mark behind them.
+_FIGURES = (
+    Column("drift", spec=".4g", least=9),
+    Column("ratio", spec=".4g", least=9),
+    Column(align="<", least=2, gap=0),
+)
+#: Width of the notes in characters.
+_WIDTH = 90
+
+
+def thesis_table_text(table: Table, entries: Sequence[TableEntry]) -> str:
+    """Return one table as text: for each algorithm the thesis's line, then one for each back end.
+
+    Parameters
+    ----------
+    table : Table
+    entries : sequence of TableEntry
+        Those of this table, for all algorithms and orders.
+    """
+    backends = list(dict.fromkeys(entry.backend for entry in entries))
+    label = Column(align="<", least=max([10, *map(len, backends)]))
+    rows: list[list[Any]] = []
+    for algorithm in ALGORITHMS:
+        rows.append(_printed_row(table, algorithm))
+        rows += [_row(entries, backend, algorithm) for backend in backends]
+    head, *lines = TextTable([label, *_FIGURES * len(ORDERS)], rows).lines("    ")
+    # An order stands over the middle of its figures.
+    orders = [Column(f"order {order}", least=18, gap=6 if k else 2) for k, order in enumerate(ORDERS)]
+    ratio = "of the same order" if table.by_order else "of first order"
+    text = [
+        f"Table {table.number}: {table.title}",
+        f"  drift in deg, and its ratio to that of direction cosines {ratio}",
+        *TextTable([label, *orders], []).lines("    "),
+        head,
+    ]
+    for k, algorithm in enumerate(ALGORITHMS):
+        first = k * (1 + len(backends))
+        text += [f"  {_NAMES[algorithm]}", *lines[first : first + 1 + len(backends)]]
+    return "\n".join([*text, *_notes(entries)])
+
+
+def _printed_row(table: Table, algorithm: str) -> list[Any]:
+    """Return the figures that the thesis prints of an algorithm."""
+    row = ["thesis"]
+    for order, figure in zip(ORDERS, table.printed[algorithm], strict=True):
+        row += [table.base if (algorithm, order) == ("dcm", 1) else "", figure, ""]
+    return row
+
+
+def _row(entries: Sequence[TableEntry], backend: str, algorithm: str) -> list[Any]:
+    """Return the simulated figures of an algorithm on a back end."""
+    row: list[Any] = [backend]
+    for entry in entries:
+        if (entry.backend, entry.algorithm) == (backend, algorithm):
+            row += [entry.drift_deg, entry.normalised, _mark(entry)]
+    return row
+
+
+def _mark(entry: TableEntry) -> str:
+    """Return what stands behind a figure: round-off says more than that the figure is not the thesis's."""
+    return "r" if entry.roundoff_dominates else "" if entry.agrees else "*"
+
+
+def _notes(entries: Sequence[TableEntry]) -> list[str]:
+    """Return what the marks mean that stand in the table, and what is to be said about figures of the thesis."""
+    lines = []
+    if not all(entry.agrees for entry in entries):
+        lines.append("  * not the thesis's figure in its printed digits")
+    if any(entry.roundoff_dominates for entry in entries):
+        lines.append("  r round-off dominates: over half of what the method itself loses")
+    notes: dict[tuple[str, int], str] = {}
+    for entry in entries:
+        if entry.note:  # back ends differ in its figures alone; the first one's stand for all
+            notes.setdefault((entry.algorithm, entry.order), entry.note)
+    return lines + [f"  {line}" for note in notes.values() for line in textwrap.wrap(note, _WIDTH)]

@@ -1,0 +1,180 @@
+"""The front door: one composition of the stages, how long they take, and the way of a choice through the modules."""
+
+from __future__ import annotations
+
+import logging
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from types import FrameType
+
+import pytest
+
+import strapgen
+from strapgen import pipeline, targets
+from strapgen.catalogue import Choice, choose
+from strapgen.cli import main
+from strapgen.library import generated_sources
+from strapgen.support.exceptions import InputError
+
+EXAMPLE = Path(__file__).resolve().parents[1] / "examples" / "modified_rodrigues.py"
+#: The modules of the stages themselves.
+STAGES = (
+    *("strapgen.catalogue.derivation", "strapgen.catalogue.kernels", "strapgen.catalogue.methods"),
+    *("strapgen.symbolic", "strapgen.lowering", "strapgen.fixedpoint", "strapgen.targets"),
+)
+#: The modules that a choice passes through beside the stages, from the command line to the text of generated C.
+TRIP = {
+    "strapgen.cli.commands.generate",
+    "strapgen.cli.options",
+    "strapgen.catalogue.choosing",
+    "strapgen.catalogue.choice",
+    "strapgen.library.generated_sources",
+    "strapgen.pipeline",
+}
+
+
+@pytest.fixture
+def empty_cache(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """Let everything be derived anew: no entry on disk, no program in memory."""
+    monkeypatch.setenv("STRAPGEN_CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setattr(generated_sources, "_programs", {})
+    return tmp_path
+
+
+def run(*words: str) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(words)
+    assert ended.value.code == 0
+
+
+def modules_with_a_choice(*words: str) -> set[str]:
+    """Run a command; return the modules in which a function takes, holds or returns a choice."""
+    modules: set[str] = set()
+
+    def look(frame: FrameType, event: str, value: object) -> None:
+        name = frame.f_globals.get("__name__", "")
+        if event in ("call", "return") and name.startswith("strapgen"):
+            values = [*frame.f_locals.values(), value]
+            if any(isinstance(each, Choice) for each in values):
+                modules.add(name)
+
+    sys.setprofile(look)
+    try:
+        run(*words)
+    finally:
+        sys.setprofile(None)
+    return modules
+
+
+@pytest.mark.parametrize("algorithm", ["euler", str(EXAMPLE)])
+def test_a_choice_passes_through_few_modules(algorithm, empty_cache):
+    words = ("generate", algorithm, "--method", "rk1", "--increments", "1", "--target", "c")
+    modules = modules_with_a_choice(*words, "--out", str(empty_cache))
+    assert "strapgen.catalogue.derivation" in modules  # nothing came from a cache
+    assert {name for name in modules if not name.startswith(STAGES)} == TRIP
+    assert len(TRIP) <= 8
+
+
+def test_compiling_is_the_stages_in_order():
+    choice = choose("euler", "rk2", 1)
+    program = strapgen.lower(strapgen.derive("euler", "rk2", 1))
+    for target in targets.TARGETS:
+        word = strapgen.Settings(16) if target in targets.FIXED else None
+        code = strapgen.quantize(program, word) if target in targets.FIXED else program
+        assert pipeline.compile(choice, target, word) == strapgen.generate(code, target)
+
+
+def test_bad_targets_and_settings_are_refused_before_anything_is_derived(monkeypatch):
+    def never(_choice: Choice) -> None:
+        raise AssertionError("derived")
+
+    choice, cases = (
+        choose("euler"),
+        [("rust", None, "'rust' is not known"), ("c", 16, "takes no fixed-point")],
+    )
+    for target, word, message in [*cases, ("c-fixed", 24, "word is 24; in C it is 16, 32, 64 bits")]:
+        with pytest.raises(InputError, match=message):
+            pipeline.compile(choice, target, word and strapgen.Settings(word), never)
+
+
+def test_settings_beside_a_quantized_program_are_refused():
+    fixed = strapgen.quantize(strapgen.lower(strapgen.derive("euler-product")))
+    with pytest.raises(InputError, match="euler-product is quantized already; settings do not go with it"):
+        strapgen.generate(fixed, "c-fixed", strapgen.Settings(16))
+
+
+def test_targets_take_their_own_kind_of_program():
+    program = strapgen.lower(strapgen.derive("euler-product"))
+    with pytest.raises(InputError, match="target c does not take fixed-point programs; these do: c-fixed, f"):
+        targets.emit(strapgen.quantize(program), "c")
+    with pytest.raises(InputError, match="target c-fixed takes quantized programs alone"):
+        targets.emit(program, "c-fixed")
+
+
+def test_deriving_takes_names_or_a_complete_choice():
+    assert pipeline.derive(choose("dcm", "rk2", 1)) == pipeline.derive("dcm", "rk2", 1)
+    for options in ({"method": "rk2"}, {"increments": 1}, {"rates": True}, {"previous": 1}):
+        with pytest.raises(InputError, match="the choice of dcm-rk2-1 is complete"):
+            pipeline.derive(choose("dcm", "rk2", 1), **options)
+
+
+# How long the stages take
+
+
+@pytest.fixture
+def stage_log(caplog: pytest.LogCaptureFixture) -> Iterator[pytest.LogCaptureFixture]:
+    with caplog.at_level(logging.INFO, logger="strapgen"):
+        yield caplog
+
+
+def test_every_stage_is_timed(empty_cache, stage_log):
+    strapgen.backend("euler", "rk1", 1, "c-q31")
+    records = [(r.stage, r.what) for r in stage_log.records if r.name == "strapgen" and r.seconds > 0]
+    assert records == [
+        *((stage, "euler-rk1-1") for stage in ("derive", "lower", "quantize")),
+        ("generate", "euler-rk1-1 for c-fixed"),
+        *[("compile", "euler-rk1-1"), ("build", "euler-rk1-1 for c-fixed")],
+    ]
+
+
+def test_a_stage_that_fails_has_no_time(stage_log):
+    program = strapgen.lower(strapgen.derive("coning-truth"))
+    stage_log.clear()
+    with pytest.raises(InputError):
+        strapgen.quantize(program)
+    assert not stage_log.records
+
+
+def test_verbose_shows_stages_on_stderr_and_what_the_cache_holds(empty_cache, capsys):
+    words = ("generate", "euler", "--target", "c", "--out", str(empty_cache))
+    run("--verbose", *words)
+    first = capsys.readouterr()
+    assert re.fullmatch(
+        r"derive euler-rk4-2: \d+\.\d{3} s\nlower euler-rk4-2: \d+\.\d{3} s\n"
+        r"generate euler-rk4-2 for c: \d+\.\d{3} s\n",
+        first.err,
+    )
+    run("--verbose", *words)
+    second = capsys.readouterr()
+    assert second.err == "sources of euler-rk4-2 for c: from the cache\n"
+    run(*words)
+    third = capsys.readouterr()
+    assert third.err == ""
+    assert first.out == second.out == third.out
+
+
+def test_verbose_tells_of_users_kernels(empty_cache, capsys):
+    words = ("--verbose", "generate", str(EXAMPLE), "--out", str(empty_cache))
+    run(*words)
+    assert capsys.readouterr().err.startswith(f"derive {EXAMPLE}: ")
+    run(*words)
+    assert capsys.readouterr().err.startswith(f"kernel of {EXAMPLE}: from the cache\n")
+
+
+def test_verbose_ends_with_its_command(empty_cache, capsys):
+    with pytest.raises(SystemExit):
+        main(["--verbose", "generate", "eulr"])
+    assert not logging.getLogger("strapgen").handlers
+    assert logging.getLogger("strapgen").level == logging.NOTSET
