@@ -47,7 +47,7 @@ def test_templates_and_generated_sources_are_in_the_wheel(wheel):
         }
         assert shipped
         assert shipped <= names
-    assert {"strapgen/cli/generate.py", "strapgen/py.typed"} <= names
+    assert {"strapgen/cli/commands/generate.py", "strapgen/py.typed"} <= names
     assert {f"strapgen/catalogue/methods/butcher_tableaux/{method}.toml" for method in TABLEAUX} <= names
     assert not any("__pycache__" in name or name.startswith(("tests/", "codegen/")) for name in names)
 

@@ -184,7 +184,7 @@ def test_a_number_and_an_input_of_its_name_are_two_formulas(tmp_path):
         (tmp_path / "pi.py").write_text(NAMED_PI.format(number=number))
         choice = catalogue.choose(str(tmp_path / "pi.py"))
         identities.add(choice.identity)
-        values.add(float(of(choice).propagate(np.full((1, 2, 3), 0.5))[-1][0, 0]))
+        values.add(float(backend(choice).propagate(np.full((1, 2, 3), 0.5))[-1][0, 0]))
     assert len(identities) == len(values) == 2
 
 

@@ -60,14 +60,15 @@ CONING = "--motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 --step 0.125 --
 
 @pytest.fixture
 def strapgen_says(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """Run a command line in a folder of its own and return what it prints; it must succeed and be quiet."""
+    """Run a command line in a folder of its own and return what it prints; it must succeed and name its files alone."""
     monkeypatch.chdir(tmp_path)
 
     def run(command: str, *more: str) -> str:
         with pytest.raises(SystemExit) as stop:
             main([*shlex.split(command), *more])
         said = capsys.readouterr()
-        assert (stop.value.code, said.err) == (0, "")
+        assert stop.value.code == 0, said.err
+        assert re.fullmatch(r"(wrote [^\n]+\n)?", said.err)
         return said.out
 
     return run

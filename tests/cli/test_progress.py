@@ -10,7 +10,7 @@ import time
 import pytest
 
 from strapgen.cli import progress
-from strapgen.cli.options import chosen
+from strapgen.cli.options import MethodOptions
 
 
 class Terminal(io.StringIO):
@@ -66,5 +66,5 @@ def test_a_file_that_takes_its_time_shows_that_it_is_derived(tmp_path, impatient
     path.write_text("def algorithm():\n    import time; time.sleep(0.5)\n    return 3\n")
     monkeypatch.setattr(sys, "stderr", stream := Terminal())
     with pytest.raises(ValueError, match=r"returned int; a Kernel is needed"):
-        chosen(str(path), None, None, None, None)
+        MethodOptions().choose(str(path))
     assert re.search(r"deriving \S*slow\.py \d s", stream.getvalue())

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -15,166 +16,182 @@ if TYPE_CHECKING:
 
     from strapgen.ir.fixed_settings import Settings
 
-Word = Annotated[
-    str | None,
-    typer.Option(
-        "--word",
-        metavar="BITS",
-        help="Bits of a word: 16, 32 or 64 in C, 8 to 64 in the integer model.  [default: 32]",
-        show_default=False,
-    ),
-]
-MaxRate = Annotated[
-    str | None,
-    typer.Option(
-        "--max-rate-deg-s",
-        metavar="RATE",
-        help="Largest body rate on an axis that fixed-point formats are chosen for, in deg/s; with --step.",
-        show_default=False,
-    ),
-]
-Step = Annotated[
-    str | None,
-    typer.Option("--step", metavar="S", help="Step in s, with --max-rate-deg-s.", show_default=False),
-]
-MaxAngle = Annotated[
-    str | None,
-    typer.Option(
-        "--max-angle-rad",
-        metavar="RAD",
-        help="Instead: largest element of an angle increment, in rad.  [default: 1/8]",
-        show_default=False,
-    ),
-]
-Rounding = Annotated[
-    str | None,
-    typer.Option("--rounding", help="nearest or truncation.  [default: nearest]", show_default=False),
-]
-Carry = Annotated[
-    str | None,
-    typer.Option(
-        "--carry",
-        help="Rounding residuals kept between steps: none, state, or full: of state and transition.  [default: none]",
-        show_default=False,
-    ),
-]
-Allowance = Annotated[
-    str | None,
-    typer.Option(
-        "--drift-allowance",
-        metavar="A",
-        help="By how much an element of a state may exceed 1.  [default: 1/16]",
-        show_default=False,
-    ),
-]
-Ranges = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--range",
-        metavar="NAME=MAX",
-        help="Largest magnitude of an input whose range is not known otherwise.",
-    ),
-]
-Fixes = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--fix", metavar="NAME=Qm.n", help="A format that is not to be chosen, of an argument or value."
-    ),
-]
+_Text = str | None
+
+#: The options of a run, whose own increments or largest rate the formats are chosen for.
+RUN_OPTIONS = ("word", "max_rate_deg_s", "rounding", "carry", "drift_allowance")
 
 
-def read_settings(
-    increments: int,
-    *,
-    word: str | None = None,
-    max_rate_deg_s: str | None = None,
-    step: str | None = None,
-    max_angle_rad: str | None = None,
-    rounding: str | None = None,
-    carry: str | None = None,
-    drift_allowance: str | None = None,
-    ranges: Iterable[str] | None = None,
-    formats: Iterable[str] | None = None,
-) -> Settings | None:
-    """Return the settings that options state; None if none of them is given."""
-    given = (word, max_rate_deg_s, step, max_angle_rad, rounding, carry, drift_allowance, ranges, formats)
-    if not any(given):
-        return None
-    from strapgen.ir.fixed_settings import Settings
-    from strapgen.support import checks
+@dataclass(frozen=True)
+class FixedOptions:
+    """Options that say what fixed point is like, and which numbers it must hold."""
 
-    bits = whole("word", word)
-    return Settings.of(
-        word=32 if bits is None else bits,
-        max_rate_deg_s=max_rate_deg_s,
-        step=step,
-        increments=increments,
-        largest_angle=max_angle_rad,
-        rounding=rounding or "nearest",
-        carry=carry or "none",
-        **(
-            {}
-            if drift_allowance is None
-            else {"allowance": checks.number("drift-allowance", drift_allowance)}
+    word: Annotated[
+        _Text,
+        typer.Option(
+            "--word",
+            metavar="BITS",
+            help="Bits of a word: 16, 32 or 64 in C, 8 to 64 in the integer model.  [default: 32]",
+            show_default=False,
         ),
-        ranges=_numbers(ranges or ()),
-        formats=dict(_pair("--fix", text) for text in formats or ()),
-    )
+    ] = None
+    max_rate_deg_s: Annotated[
+        _Text,
+        typer.Option(
+            "--max-rate-deg-s",
+            metavar="RATE",
+            help="Largest body rate about an axis in deg/s; with the step it says what fixed-point formats must hold.",
+            show_default=False,
+        ),
+    ] = None
+    step: Annotated[
+        _Text,
+        typer.Option(
+            "--step", metavar="S", help="Step in s that goes with --max-rate-deg-s.", show_default=False
+        ),
+    ] = None
+    max_angle_rad: Annotated[
+        _Text,
+        typer.Option(
+            "--max-angle-rad",
+            metavar="RAD",
+            help="Largest element of an angle increment in rad, in place of a rate and a step.  [default: 1/8]",
+            show_default=False,
+        ),
+    ] = None
+    rounding: Annotated[
+        _Text,
+        typer.Option(
+            "--rounding",
+            help="How results are rounded: nearest or truncation.  [default: nearest]",
+            show_default=False,
+        ),
+    ] = None
+    carry: Annotated[
+        _Text,
+        typer.Option(
+            "--carry",
+            help="Rounding errors fed back from step to step: none, state, or full, those of state and transition.  "
+            "[default: none]",
+            show_default=False,
+        ),
+    ] = None
+    drift_allowance: Annotated[
+        _Text,
+        typer.Option(
+            "--drift-allowance",
+            metavar="A",
+            help="By how much an element of the state may exceed 1 in magnitude.  [default: 1/16]",
+            show_default=False,
+        ),
+    ] = None
+    ranges: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--range",
+            metavar="NAME=MAX",
+            help="Largest magnitude of an input whose range strapgen does not know, in the unit of the input.",
+        ),
+    ] = None
+    formats: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--fix", metavar="NAME=Qm.n", help="Format of an argument or a value that you choose yourself."
+        ),
+    ] = None
 
+    @property
+    def stated(self) -> dict[str, Any]:
+        """What the command line states, by option."""
+        options = {
+            "--word": self.word,
+            "--max-rate-deg-s": self.max_rate_deg_s,
+            "--step": self.step,
+            "--max-angle-rad": self.max_angle_rad,
+            "--rounding": self.rounding,
+            "--carry": self.carry,
+            "--drift-allowance": self.drift_allowance,
+            "--range": self.ranges,
+            "--fix": self.formats,
+        }
+        return {option: value for option, value in options.items() if value not in (None, [])}
 
-def check_fixed(backend: str, stated: Mapping[str, Any]) -> None:
-    """Refuse options of fixed point for a back end in floating point."""
-    from strapgen.backends import BACKENDS
-    from strapgen.support import checks
-    from strapgen.targets import FIXED
+    def settings(self, increments: int) -> Settings | None:
+        """Return what fixed point is generated for, with so many increments a step; None if nothing is stated."""
+        if not self.stated:
+            return None
+        from strapgen.ir.fixed_settings import Settings
+        from strapgen.support import checks
 
-    checks.choice("backend", backend, BACKENDS)
-    for name, value in stated.items():
-        if value and BACKENDS[backend].target not in FIXED:
-            raise InputError(f"--{name.replace('_', '-')} is for fixed-point back ends, not for {backend}")
-
-
-def settings_for_run(
-    backend: str,
-    increments: int | None,
-    stated: Mapping[str, Any],
-    step: float,
-    largest: Callable[[], float],
-) -> Settings | None:
-    """Return what a run in fixed point is made for: what is stated, and else its own increments.
-
-    Parameters
-    ----------
-    backend : str
-    increments : int or None
-        Increments a step, None for the default.
-    stated : mapping of str to str, or to list of str
-        Options by the names that `read_settings` takes, without the step.
-    step : float
-        Step of the run in s.
-    largest : callable
-        Tells the largest increment of the run in rad.
-
-    Returns
-    -------
-    Settings or None
-        None for a back end in floating point.
-    """
-    from strapgen.backends import BACKENDS
-    from strapgen.ir.fixed_settings import Settings
-    from strapgen.targets import FIXED
-
-    if BACKENDS[backend].target not in FIXED:
-        return None
-    rate = stated.get("max_rate_deg_s")
-    settings = (
-        read_settings(increments or 2, **stated, step=None if rate is None else repr(step)) or Settings()
-    )
-    if stated.get("word") is not None and BACKENDS[backend].word not in (None, settings.word):
-        raise InputError(
-            f"--word {settings.word} does not go with {backend}, whose words have {BACKENDS[backend].word} bits"
+        bits = whole("word", self.word)
+        allowance = {}
+        if self.drift_allowance is not None:
+            allowance["allowance"] = checks.number("drift-allowance", self.drift_allowance)
+        return Settings.of(
+            word=32 if bits is None else bits,
+            max_rate_deg_s=self.max_rate_deg_s,
+            step=self.step,
+            increments=increments,
+            largest_angle=self.max_angle_rad,
+            rounding="nearest" if self.rounding is None else self.rounding,
+            carry="none" if self.carry is None else self.carry,
+            **allowance,
+            ranges=_numbers(self.ranges or ()),
+            formats=dict(_pair("--fix", text) for text in self.formats or ()),
         )
-    return settings if rate is not None else settings.fitted(largest())
+
+    def at_step(self, seconds: float) -> FixedOptions:
+        """Return the options with the step of a run, which turns a largest rate into a largest increment."""
+        return replace(self, step=None if self.max_rate_deg_s is None else repr(seconds))
+
+    def check_backend(self, backend: str) -> None:
+        """Refuse what is stated for a back end in floating point."""
+        from strapgen.backends import BACKENDS
+        from strapgen.support import checks
+        from strapgen.targets import FIXED
+
+        checks.choice("backend", backend, BACKENDS)
+        if self.stated and BACKENDS[backend].target not in FIXED:
+            raise InputError(f"{next(iter(self.stated))} is for fixed-point back ends, not for {backend}")
+
+    def settings_for_run(
+        self, backend: str, increments: int | None, step: float, largest: Callable[[], float]
+    ) -> Settings | None:
+        """Return what a run in fixed point is generated for: what is stated, and else its own increments.
+
+        Parameters
+        ----------
+        backend : str
+        increments : int or None
+            Increments a step, None for the default.
+        step : float
+            Step of the run in s.
+        largest : callable
+            Tells the largest increment of the run in rad.
+
+        Returns
+        -------
+        Settings or None
+            None for a back end in floating point.
+
+        Raises
+        ------
+        InputError
+            If the back end's words have another length than the one stated.
+        """
+        from strapgen.backends import BACKENDS
+        from strapgen.ir.fixed_settings import Settings
+        from strapgen.targets import FIXED
+
+        if BACKENDS[backend].target not in FIXED:
+            return None
+        settings = self.at_step(step).settings(increments or 2) or Settings()
+        bits = BACKENDS[backend].word
+        if self.word is not None and bits not in (None, settings.word):
+            raise InputError(
+                f"--word {settings.word} does not go with {backend}, whose words have {bits} bits"
+            )
+        return settings if self.max_rate_deg_s is not None else settings.fitted(largest())
 
 
 def _numbers(texts: Iterable[str]) -> dict[str, Fraction]:

@@ -1,11 +1,10 @@
-"""Options and arguments that several commands share, and how data is printed."""
+"""Options and arguments that several commands share: the choice of an algorithm, and how texts are read."""
 
 from __future__ import annotations
 
-import json
-import sys
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -15,7 +14,6 @@ from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
     from strapgen.catalogue import Choice
-    from strapgen.catalogue.methods.tableau import Tableau
 
 Algorithm = Annotated[
     str,
@@ -26,77 +24,100 @@ Algorithm = Annotated[
 StepAlgorithm = Annotated[
     str, typer.Argument(help="dcm, euler or cayley-klein, or a Python file with an algorithm of your own.")
 ]
-Method = Annotated[
-    str | None,
-    typer.Option(
-        "--method", help="Integration method; strapgen list shows all.  [default: rk4]", show_default=False
-    ),
-]
-TableauFile = Annotated[
-    Path | None,
-    typer.Option(
-        "--tableau",
-        metavar="FILE",
-        help="A method of your own: a Butcher tableau in TOML.",
-        show_default=False,
-    ),
-]
-Previous = Annotated[
-    str | None,
-    typer.Option(
-        "--previous",
-        metavar="N",
-        help="Increments before the step that it takes too, 0 to 3.  [default: 0]",
-        show_default=False,
-    ),
-]
 Increments = Annotated[
     str | None,
     typer.Option(
-        "--increments", metavar="N", help="Angle increments a step, 1 to 8.  [default: 2]", show_default=False
+        "--increments",
+        metavar="N",
+        help="Angle increments in a step, 1 to 8.  [default: 2]",
+        show_default=False,
     ),
 ]
-Rates = Annotated[
-    bool,
-    typer.Option("--rates", help="The step takes the rate at the method's nodes, times the step length."),
-]
-Format = Annotated[str, typer.Option("--format", help="text or json.")]
 
 
-def chosen(
-    algorithm: str,
-    method: str | None,
-    tableau: Path | None,
-    increments: str | None,
-    previous: str | None,
-    rates: bool = False,
-    step: bool = True,
-) -> Choice:
-    """Return the kernel that options choose; with `step` it must be an attitude step."""
-    from strapgen import catalogue
-    from strapgen.catalogue.methods import tableaux
+@dataclass(frozen=True)
+class MethodOptions:
+    """Options that choose how an algorithm integrates, and what it takes."""
 
-    chosen_method: str | Tableau | None = method
-    if tableau is not None:
-        if method is not None:
-            raise InputError(f"--method {method} and --tableau {tableau} are both given; one is needed")
-        chosen_method = tableaux.read(tableau)
-    choose = catalogue.choose_step if step else catalogue.choose
-    count, before = whole("increments", increments), whole("previous", previous) or 0
-    with waiting(f"deriving {algorithm}"):  # a user's code may take its time
-        return choose(algorithm, chosen_method, count, rates, before)
+    method: Annotated[
+        str | None,
+        typer.Option(
+            "--method",
+            help="Integration method; strapgen list shows all.  [default: rk4]",
+            show_default=False,
+        ),
+    ] = None
+    tableau: Annotated[
+        Path | None,
+        typer.Option(
+            "--tableau",
+            metavar="FILE",
+            help="TOML file with a Butcher tableau, a method of your own.",
+            show_default=False,
+        ),
+    ] = None
+    increments: Increments = None
+    previous: Annotated[
+        str | None,
+        typer.Option(
+            "--previous",
+            metavar="N",
+            help="Increments from before the step that it also takes, 0 to 3.  [default: 0]",
+            show_default=False,
+        ),
+    ] = None
+    rates: Annotated[
+        bool,
+        typer.Option(
+            "--rates",
+            help="Let the step take the rate at the method's nodes, times the step length, not increments.",
+        ),
+    ] = False
+
+    def choose(self, algorithm: str, *, step: bool = True) -> Choice:
+        """Return the kernel that the options choose of an algorithm; with `step` it must be an attitude step."""
+        from strapgen import catalogue
+        from strapgen.catalogue.methods import tableaux
+
+        if self.tableau is not None and self.method is not None:
+            raise InputError(
+                f"--method {self.method} and --tableau {self.tableau} are both given; one is needed"
+            )
+        method = self.method if self.tableau is None else tableaux.read(self.tableau)
+        choose = catalogue.choose_step if step else catalogue.choose
+        count, before = whole("increments", self.increments), whole("previous", self.previous) or 0
+        with waiting(f"deriving {algorithm}"):  # a user's code may take its time
+            return choose(algorithm, method, count, self.rates, before)
 
 
-def check_format(value: str, *more: str) -> str:
-    """Check the value of --format: text, json, or one of `more`."""
-    return checks.choice("format", value, ["text", "json", *more])
-
-
-def print_json(data: Any) -> None:
-    """Print data as JSON: a list on one line, an object indented."""
-    sys.stdout.write(json.dumps(data, indent=None if isinstance(data, list) else 1) + "\n")
+#: The options of an attitude step, which takes increments.
+STEP_OPTIONS = ("method", "tableau", "increments", "previous")
 
 
 def whole(what: str, value: str | None) -> int | None:
     """Read an option that takes a whole number."""
     return None if value is None else checks.whole(what, value)
+
+
+def limit(what: str, value: str | None) -> float | None:
+    """Read an option that takes a number from 0 on."""
+    if value is None:
+        return None
+    number = float(checks.number(what, value))
+    if number < 0:
+        raise InputError(f"{what} is {value}; a number that is not below 0 is needed")
+    return number
+
+
+def listed(option: str, text: str, empty: str = "") -> list[str]:
+    """Return the values of a list with commas between, each once.
+
+    Raises
+    ------
+    InputError
+        If there is none: the option, and `empty`.
+    """
+    values = list(dict.fromkeys(value.strip() for value in text.split(",") if value.strip()))
+    if not values:
+        raise InputError(f"{option} {empty or f'is {text!r}; at least one value is needed'}")
+    return values

@@ -21,10 +21,9 @@ def track(items: Iterable[Item], title: str, total: int) -> Iterator[Item]:
     if not sys.stderr.isatty():
         yield from items
         return
-    from rich.console import Console
-    from rich.progress import track as rich_track
+    from rich import console, progress
 
-    yield from rich_track(items, title, total, console=Console(stderr=True), transient=True)
+    yield from progress.track(items, title, total, console=console.Console(stderr=True), transient=True)
 
 
 @contextmanager

@@ -6,37 +6,30 @@ from typing import Annotated
 
 import typer
 
-from strapgen.cli.options import (
-    Format,
-    Increments,
-    Method,
-    Previous,
-    TableauFile,
-    check_format,
-    chosen,
-    print_json,
-)
+from strapgen.cli.option_groups import Shown, grouped
+from strapgen.cli.options import STEP_OPTIONS, MethodOptions
+from strapgen.cli.output import Format, check_format, print_json
 
 
+@grouped
 def check(
     algorithm: Annotated[
-        str, typer.Argument(help="A Python file with an algorithm of your own; or dcm, euler, cayley-klein.")
+        str,
+        typer.Argument(help="A Python file with an algorithm of your own, or dcm, euler or cayley-klein."),
     ],
-    method: Method = None,
-    tableau: TableauFile = None,
-    increments: Increments = None,
-    previous: Previous = None,
+    *,
+    method: Annotated[MethodOptions, Shown(only=STEP_OPTIONS)],
     format: Format = "text",
 ) -> None:
     """Test an algorithm as the project tests its own, and show what holds; exit with 1 if something fails.
 
-    Identities are checked in arithmetic of 40 digits, the order on a ladder of steps, the back ends against exact
-    arithmetic. What stands behind a dash is measured, and yours to judge.
+    Identities are checked in arithmetic of 40 digits, the order on a ladder of steps, and the back ends against exact
+    arithmetic. What stands behind a dash is measured and is yours to judge.
 
     Example: strapgen check examples/modified_rodrigues.py
     """
     check_format(format)
-    choice = chosen(algorithm, method, tableau, increments, previous)
+    choice = method.choose(algorithm)
     from strapgen import pipeline
     from strapgen.experiments import conformance
     from strapgen.reports.conformance import finding_text

@@ -6,31 +6,36 @@ from typing import Annotated
 
 import typer
 
-from strapgen.cli.options import Format, check_format, print_json, whole
+from strapgen.cli.options import whole
+from strapgen.cli.output import Format, check_format, print_json
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 
 
 def coning(
     samples: Annotated[
-        str, typer.Option("--samples", metavar="N", help="Samples of the slow cycle, 1 to 8.")
+        str, typer.Option("--samples", metavar="N", help="Number of samples of the slow cycle, 1 to 8.")
     ],
     previous: Annotated[
         str,
-        typer.Option("--previous", metavar="N", help="Samples before it that are kept, 0 to 3."),
+        typer.Option(
+            "--previous",
+            metavar="N",
+            help="Number of samples from before the slow cycle that it also takes, 0 to 3.",
+        ),
     ] = "0",
     form: Annotated[
         str,
         typer.Option(
             "--form",
-            help="compressed: made for coning; uncompressed: for polynomial rates; combined: for both.",
+            help="Form of the correction: compressed for coning, uncompressed for polynomial rates, combined for both.",
         ),
     ] = "compressed",
     terms: Annotated[
         bool,
         typer.Option(
             "--terms",
-            help="List the terms of third and fourth order too, of the polynomial through up to six samples.",
+            help="Also list the terms of third and fourth order, of the polynomial through up to six samples.",
         ),
     ] = False,
     format: Format = "text",
@@ -39,31 +44,31 @@ def coning(
 
     A coefficient multiplies older sample x newer sample; the pairs are ordered by the newer sample, then by the older
     one, the newest pair last. The residual is the mean drift on coning in rad/s, computed minus true, to second order
-    in alpha, as SymPy reads it, in the symbols alpha (half-angle of the cone in rad), omega (its frequency in rad/s)
-    and T (time between samples in s).
+    in alpha. It is written as SymPy reads it, in the symbols alpha (half-angle of the cone in rad), omega (its
+    frequency in rad/s) and T (time between samples in s).
 
     Example: strapgen coning --samples 4 --form combined
     """
     check_format(format)
     from strapgen import catalogue
-    from strapgen.catalogue.methods import coning_coefficients as derivation
-    from strapgen.reports import coning as reports
+    from strapgen.catalogue.methods import coning_coefficients
+    from strapgen.reports.coning import coning_data, coning_text
 
     count = checks.count("samples", whole("samples", samples), largest=catalogue.MOST_INCREMENTS)
     before = checks.count(
         "previous", whole("previous", previous), smallest=0, largest=catalogue.MOST_PREVIOUS
     )
-    checks.choice("form", form, derivation.FORMS)
+    checks.choice("form", form, coning_coefficients.FORMS)
     if terms and count + before > _MOST_SAMPLES:
         raise InputError(
             f"terms of third and fourth order are listed for up to {_MOST_SAMPLES} samples; {count + before} are given"
         )
-    design = derivation.design(count, before, form)
-    data = reports.coning_data(design, terms)
+    design = coning_coefficients.design(count, before, form)
+    data = coning_data(design, terms)
     if format == "json":
         print_json(data)
     else:
-        typer.echo(reports.coning_text(design, data))
+        typer.echo(coning_text(design, data))
 
 
 #: Samples, those before the slow cycle included, for which terms of third and fourth order are listed.

@@ -2,76 +2,129 @@
 
 from __future__ import annotations
 
-import json
-from dataclasses import replace
-from pathlib import Path
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from strapgen.catalogue import MOTIONS
-from strapgen.cli.inputs import MotionSettings, pairs
-from strapgen.cli.options import Previous, StepAlgorithm, TableauFile, check_format, chosen
+from strapgen.cli.option_groups import Shown, grouped
+from strapgen.cli.options import STEP_OPTIONS, MethodOptions, StepAlgorithm, limit, listed
+from strapgen.cli.output import Output, as_json
 from strapgen.cli.progress import track
+from strapgen.cli.sample_source import MotionSettings, pairs
+from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
+    from strapgen.catalogue import Choice
     from strapgen.experiments.convergence import Convergence
+    from strapgen.simulation.motions import Motion
 
 _Text = str | None
 
 
-def converge(
-    algorithm: StepAlgorithm,
-    methods: Annotated[
+@dataclass(frozen=True)
+class SeveralMethods(MethodOptions):
+    """Options that choose methods to be shown side by side, each on as many increments as it needs if wished."""
+
+    method: Annotated[
         _Text,
         typer.Option(
             "--method", metavar="NAME,...", help="Integration methods.  [default: rk4]", show_default=False
         ),
-    ] = None,
-    tableau: TableauFile = None,
+    ] = None
     increments: Annotated[
         _Text,
         typer.Option(
             "--increments",
             metavar="N",
-            help="Angle increments a step, 1 to 8, or enough: what the method needs.  [default: 2]",
+            help="Angle increments in a step, 1 to 8, or enough for as many as the method needs.  [default: 2]",
             show_default=False,
         ),
-    ] = None,
-    previous: Previous = None,
+    ] = None
+
+    def choices(self, algorithm: str) -> list[Choice]:
+        """Return the algorithm with every method."""
+        names: list[_Text] = [None]
+        if self.method is not None:
+            names = [*listed("--method", self.method, "names no method")]
+        return [replace(self, method=name).choose(algorithm) for name in names]
+
+    def choose(self, algorithm: str, *, step: bool = True) -> Choice:
+        """Return the algorithm with one method; see `MethodOptions.choose`."""
+        if self.increments != "enough":
+            return super().choose(algorithm, step=step)
+        from strapgen import catalogue
+
+        choice = replace(self, increments=None).choose(algorithm, step=step)
+        if choice.method is None:
+            raise InputError(f"--increments enough does not go with {algorithm}; a number does")
+        return replace(choice, increments=catalogue.enough(choice.method))
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """Options of the runs, on one motion with a ladder of steps."""
+
+    motion: Annotated[
+        _Text,
+        typer.Option(
+            "--motion",
+            help="Motion to run on: constant, sinusoidal, coning or polynomial.  [default: coning]",
+            show_default=False,
+        ),
+    ] = None
+    settings: MotionSettings = None
+    steps: Annotated[
+        str,
+        typer.Option(
+            "--steps", metavar="S,...", help="Ladder of steps in s, each of them a divisor of the duration."
+        ),
+    ] = "1/2,1/4,1/8,1/16,1/32,1/64,1/128"
+    duration: Annotated[str, typer.Option("--duration", metavar="S", help="Duration in s.")] = "2"
+
+    def check(self) -> None:
+        """Check the name of the motion."""
+        from strapgen.catalogue import MOTIONS
+
+        if self.motion is not None:
+            checks.choice("motion", self.motion, MOTIONS)
+
+    def profile(self) -> tuple[Motion, str]:
+        """Return the motion, and the runs in words."""
+        from strapgen.simulation import motions
+
+        parameters = pairs(self.settings or [])
+        if self.motion is None and not self.settings:
+            parameters = motions.GENERAL
+        profile = motions.motion(self.motion or "coning", **parameters)
+        words = ", ".join(f"{key}={value}" for key, value in parameters.items())
+        return profile, f"{self.duration} s of {profile.name} motion, {words}"
+
+
+@grouped
+def converge(
+    algorithm: StepAlgorithm,
+    *,
+    methods: Annotated[SeveralMethods, Shown(only=STEP_OPTIONS)],
     backend: Annotated[
         str, typer.Option("--backend", help="Back end; exact (40 digits) shows any order. See strapgen list.")
     ] = "exact",
-    motion: Annotated[
-        _Text, typer.Option("--motion", help="Motion.  [default: coning]", show_default=False)
-    ] = None,
-    settings: MotionSettings = None,
-    steps: Annotated[
-        str, typer.Option("--steps", metavar="S,...", help="Ladder of steps in s, divisors of the duration.")
-    ] = "1/2,1/4,1/8,1/16,1/32,1/64,1/128",
-    duration: Annotated[str, typer.Option("--duration", metavar="S", help="Duration in s.")] = "2",
+    ladder: Ladder,
     fail_beyond: Annotated[
         _Text,
         typer.Option(
             "--fail-beyond",
             metavar="D",
-            help="Exit with 1 if an observed order is further than this from theory.",
+            help="Exit with 1 if an observed order is further than this from the predicted one.",
             show_default=False,
         ),
     ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", help="File for the output.  [default: the terminal]", show_default=False),
-    ] = None,
-    plot: Annotated[
-        Path | None, typer.Option("--plot", help="Image file for the plot.", show_default=False)
-    ] = None,
-    format: Annotated[str, typer.Option("--format", help="text, json or csv.")] = "text",
+    output: Output,
 ) -> None:
-    """Show the order of algorithms: their errors on a ladder of steps, and the slope beside the one of theory.
+    """Measure the order of an algorithm: its errors on a ladder of steps, and their slope beside the predicted order.
 
-    Without a motion it is coning of about 1 rad/s on a constant rate, which turns in every direction.
+    Without --motion the runs are on coning of about 1 rad/s and a constant rate, which turns in every direction.
 
     Example:
 
@@ -79,77 +132,52 @@ def converge(
       strapgen converge euler --method rk1,rk2,rk4,butcher6 --increments enough \\
         --plot out/orders.png
     """  # noqa: D301
-    check_format(format, "csv")
-    from strapgen import catalogue
+    output.check()
     from strapgen.backends import BACKENDS
-    from strapgen.support import checks
 
     checks.choice("backend", backend, BACKENDS)
-    limit = None if fail_beyond is None else float(checks.number("fail-beyond", fail_beyond))
-    if limit is not None and limit < 0:
-        raise InputError(f"fail-beyond is {fail_beyond}; a number that is not below 0 is needed")
-    if motion is not None:
-        checks.choice("motion", motion, MOTIONS)
-    given = pairs(settings or [])
-    if out is not None and plot is not None and out.resolve() == plot.resolve():
-        raise InputError(f"--out and --plot are both {out}; two files are needed")
-    names: list[_Text] = [None]
-    if methods is not None:
-        names = list(dict.fromkeys(name.strip() for name in methods.split(",") if name.strip()))
-        if not names:
-            raise InputError("--method names no method")
-    ladder = [step.strip() for step in steps.split(",") if step.strip()]
+    most = limit("fail-beyond", fail_beyond)
+    ladder.check()
+    choices = methods.choices(algorithm)
+    profile, words = ladder.profile()
+    steps = listed("--steps", ladder.steps)
 
-    def choose(name: _Text) -> catalogue.Choice:
-        if increments != "enough":
-            return chosen(algorithm, name, tableau, increments, previous)
-        one = chosen(algorithm, name, tableau, None, previous)
-        if one.method is None:
-            raise InputError(f"--increments enough does not go with {algorithm}; a number does")
-        return replace(one, increments=catalogue.enough(one.method))
-
-    choices = [choose(name) for name in names]
     import numpy as np
 
     from strapgen.experiments import convergence
-    from strapgen.reports.convergence import convergence_csv, convergence_text
-    from strapgen.simulation import motions
-    from strapgen.simulation.motions import motion as make_motion
-    from strapgen.support.files import write_files
 
-    if motion is None and not settings:
-        given = motions.GENERAL
-    profile = make_motion(motion or "coning", **given)
     with np.errstate(all="ignore"):  # a step that is too long for a method is part of the picture
-        runs = (convergence.converge(choice, profile, ladder, duration, backend) for choice in choices)
-        found = list(track(runs, "running", len(choices)))
-    words = ", ".join(f"{key}={value}" for key, value in given.items())
-    title = f"{duration} s of {profile.name} motion, {words}; {backend}"
-    if format == "json":
-        text = json.dumps([one.as_dict() for one in found])
-    elif format == "csv":
-        text = convergence_csv(found).rstrip("\n")
-    else:
-        text = convergence_text(found, title)
-    files: dict[str, str | bytes] = {}
-    if out is not None:
-        files[str(out)] = f"{text}\n"
-    if plot is not None:
-        from strapgen.reports import plots
-
-        files[str(plot)] = plots.convergence_image(found, title, plot)
-    write_files(Path(), files)
-    if out is None:
-        typer.echo(text)
-    far = [one for one in found if limit is not None and not _within(one, limit)]
+        runs = (convergence.converge(choice, profile, steps, ladder.duration, backend) for choice in choices)
+        orders = list(track(runs, "running", len(choices)))
+    _deliver(orders, f"{words}; {backend}", output)
+    far = [order.kernel for order in orders if most is not None and not _within(order, most)]
     if far:
-        names_far = ", ".join(one.kernel for one in far)
-        typer.echo(f"strapgen: the observed order is off by more than {fail_beyond}: {names_far}", err=True)
+        typer.echo(
+            f"strapgen: the observed order is off by more than {fail_beyond}: {', '.join(far)}", err=True
+        )
         raise typer.Exit(1)
 
 
-def _within(one: Convergence, limit: float) -> bool:
+def _deliver(orders: list[Convergence], title: str, output: Output) -> None:
+    from strapgen.reports.convergence import convergence_csv, convergence_text
+
+    image = None
+    if output.plot is not None:
+        from strapgen.reports import plots
+
+        image = plots.convergence_image(orders, title, output.plot)
+    if output.format == "json":
+        output.deliver(as_json([order.as_dict() for order in orders]), image)
+    elif output.format == "csv":
+        output.deliver(convergence_csv(orders), image)
+    else:
+        output.deliver(convergence_text(orders, title), image)
+
+
+def _within(order: Convergence, limit: float) -> bool:
     """Tell whether an observed order is near the one of theory; one that is hidden, or has no theory, is not."""
     return (
-        one.observed is not None and one.predicted is not None and abs(one.observed - one.predicted) <= limit
+        order.observed is not None
+        and order.predicted is not None
+        and abs(order.observed - order.predicted) <= limit
     )

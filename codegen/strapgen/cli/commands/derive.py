@@ -6,38 +6,29 @@ from typing import Annotated
 
 import typer
 
-from strapgen.cli.options import (
-    Algorithm,
-    Format,
-    Increments,
-    Method,
-    Previous,
-    Rates,
-    TableauFile,
-    check_format,
-    chosen,
-    print_json,
-)
+from strapgen.cli.option_groups import grouped
+from strapgen.cli.options import Algorithm, MethodOptions
+from strapgen.cli.output import Format, check_format, print_json
 from strapgen.support import checks
 
 
+@grouped
 def derive(
     algorithm: Algorithm,
-    method: Method = None,
-    tableau: TableauFile = None,
-    increments: Increments = None,
-    previous: Previous = None,
-    rates: Rates = False,
-    show: Annotated[str, typer.Option("--show", help="text, latex, program or operations.")] = "text",
+    *,
+    method: MethodOptions,
+    show: Annotated[
+        str, typer.Option("--show", help="What to show: text, latex, program or operations.")
+    ] = "text",
     format: Format = "text",
 ) -> None:
-    """Show a kernel: its formulas as text or LaTeX, the program lowered from them, or how much that computes.
+    """Show a kernel: its formulas as text or LaTeX, the program lowered from them, or its number of operations.
 
     Example: strapgen derive euler --method rk4 --increments 2 --show operations
     """
     check_format(format)
     checks.choice("show", show, ("text", "latex", "program", "operations"))
-    choice = chosen(algorithm, method, tableau, increments, previous, rates, step=False)
+    choice = method.choose(algorithm, step=False)
     from strapgen import pipeline
     from strapgen.library import generated_sources
     from strapgen.reports import formulas

@@ -3,37 +3,24 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from strapgen.cli.fixed_options import (
-    Allowance,
-    Carry,
-    Fixes,
-    MaxAngle,
-    MaxRate,
-    Ranges,
-    Rounding,
-    Step,
-    Word,
-    read_settings,
-)
-from strapgen.cli.options import (
-    Format,
-    Increments,
-    Method,
-    Previous,
-    Rates,
-    TableauFile,
-    check_format,
-    chosen,
-    print_json,
-)
+from strapgen.cli.fixed_options import FixedOptions
+from strapgen.cli.option_groups import grouped
+from strapgen.cli.options import MethodOptions
+from strapgen.cli.output import Format, check_format, print_json
 from strapgen.cli.progress import track
+from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 
+if TYPE_CHECKING:
+    from strapgen.catalogue import Choice
+    from strapgen.ir.sources import Sources
 
+
+@grouped
 def generate(
     algorithm: Annotated[
         str | None,
@@ -41,16 +28,13 @@ def generate(
             help="dcm, euler, cayley-klein, another kernel of strapgen list, or your own Python file."
         ),
     ] = None,
-    method: Method = None,
-    tableau: TableauFile = None,
-    increments: Increments = None,
-    previous: Previous = None,
-    rates: Rates = False,
+    *,
+    method: MethodOptions,
     target: Annotated[
         str | None,
         typer.Option(
             "--target",
-            help="numpy, c, c-float, c-fixed or fixed-model.  [default: numpy]",
+            help="Target of the code: numpy, c, c-float, c-fixed or fixed-model.  [default: numpy]",
             show_default=False,
         ),
     ] = None,
@@ -62,22 +46,18 @@ def generate(
     ] = None,
     all_: Annotated[bool, typer.Option("--all", help="Rebuild the whole standard catalogue.")] = False,
     check: Annotated[
-        bool, typer.Option("--check", help="With --all: write nothing, exit 1 with a diff if out of step.")
+        bool,
+        typer.Option(
+            "--check",
+            help="With --all: write nothing, and exit with 1 and a diff if the folder is out of step.",
+        ),
     ] = False,
-    word: Word = None,
-    max_rate_deg_s: MaxRate = None,
-    step: Step = None,
-    max_angle_rad: MaxAngle = None,
-    rounding: Rounding = None,
-    carry: Carry = None,
-    drift_allowance: Allowance = None,
-    ranges: Ranges = None,
-    fix: Fixes = None,
+    fixed: FixedOptions,
     format: Format = "text",
 ) -> None:
     """Generate source code for an algorithm, or for the standard catalogue.
 
-    Fixed point is made for a largest increment: state the largest rate and the step.
+    Fixed-point code is certified up to a largest increment: state the largest rate and the step.
 
     Example:
 
@@ -91,88 +71,99 @@ def generate(
     check_format(format)
     if check and not all_:
         raise InputError("--check goes with --all")
-    stated: dict[str, Any] = {
-        "word": word,
-        "max_rate_deg_s": max_rate_deg_s,
-        "step": step,
-        "max_angle_rad": max_angle_rad,
-        "rounding": rounding,
-        "carry": carry,
-        "drift_allowance": drift_allowance,
-        "ranges": ranges,
-        "formats": fix,
-    }
     if all_:
-        for name, value in (
-            ("an algorithm", algorithm),
-            ("--method", method),
-            ("--tableau", tableau),
-            ("--increments", increments),
-            ("--previous", previous),
-            ("--rates", rates or None),
-            ("--target", target),
-            ("a fixed-point option", next(filter(None, stated.values()), None)),
-        ):
-            if value is not None:
-                raise InputError(f"--all generates the whole catalogue; {name} does not go with it")
+        _check_alone(algorithm, method, target, fixed)
         _generate_all(out, check, format)
         return
     if algorithm is None:
         raise InputError("an algorithm is needed, or --all; strapgen list shows them")
-    from strapgen import pipeline
     from strapgen.library import generated_sources
-    from strapgen.support import checks
     from strapgen.support.files import write_files
     from strapgen.targets import FIXED, TARGETS
 
-    choice = chosen(algorithm, method, tableau, increments, previous, rates, step=False)
-    settings = read_settings(choice.increments_per_step, **stated)
+    choice = method.choose(algorithm, step=False)
+    settings = fixed.settings(choice.increments_per_step)
     target = checks.choice("target", "numpy" if target is None else target, TARGETS)
     if settings is not None and target not in FIXED:
         raise InputError(
             f"the options of fixed point go with --target {' or '.join(FIXED)}, not with {target}"
         )
-    if max_rate_deg_s or step or max_angle_rad:
-        names = {signal.name for signal in generated_sources.program(choice).inputs}
-        if not names & {"increments", "turns"}:
-            raise InputError(
-                f"kernel {choice.kernel} takes no increments; a largest rate or angle does not go with it"
-            )
+    _check_increments(choice, fixed)
     sources = generated_sources.sources(choice, target, settings)
-    fixed = sources.fixed
-    if carry not in (None, "none") and fixed is not None and not fixed.residuals:
+    if fixed.carry not in (None, "none") and sources.fixed is not None and not sources.fixed.residuals:
         raise InputError(
             f"kernel {choice.kernel} rounds no state that goes on to the next step; --carry keeps nothing"
         )
     written = write_files(out or Path(), sources.files)
-    operations = sources.operations
     if format == "json":
-        data = {
-            "kernel": sources.kernel,
-            "target": target,
-            "files": [str(path) for path in written],
-            "operations": {kind: operations[kind] for kind in ("add", "multiply", "divide", "sqrt")},
-            "temporaries": sources.temporaries,
-        }
-        if fixed is not None:
-            program = generated_sources.program(choice)
-            data |= pipeline.quantize(program, fixed.settings).as_data()
-        print_json(data)
+        print_json(_data(choice, sources, target, written))
+    else:
+        typer.echo(_text(sources, target, written))
+
+
+def _check_alone(
+    algorithm: str | None, method: MethodOptions, target: str | None, fixed: FixedOptions
+) -> None:
+    """Refuse what does not go with the whole catalogue."""
+    for name, value in (
+        ("an algorithm", algorithm),
+        ("--method", method.method),
+        ("--tableau", method.tableau),
+        ("--increments", method.increments),
+        ("--previous", method.previous),
+        ("--rates", method.rates or None),
+        ("--target", target),
+        ("a fixed-point option", fixed.stated or None),
+    ):
+        if value is not None:
+            raise InputError(f"--all generates the whole catalogue; {name} does not go with it")
+
+
+def _check_increments(choice: Choice, fixed: FixedOptions) -> None:
+    """Refuse a largest rate or angle for a kernel that takes neither."""
+    from strapgen.library import generated_sources
+
+    if not {*fixed.stated} & {"--max-rate-deg-s", "--step", "--max-angle-rad"}:
         return
-    counts = ", ".join(f"{number} {kind}" for kind, number in operations.items() if number) or "no operations"
-    typer.echo(f"{sources.kernel} for {target}: {counts}, {sources.temporaries} temporaries")
-    for path in written:
-        typer.echo(f"  {path}")
-    if fixed is not None:
-        for output in fixed.outputs:
-            bound, unit = max(output.errors), output.format.unit
-            places = float(bound / unit)
-            useless = 2 * bound >= max(abs(output.low), abs(output.high)) * unit
-            typer.echo(
-                f"  {output.signal.name}: {output.format}, error at most {float(bound):.4g}, "
-                f"{places:.4f} of the last place"
-                + (": of the size of the value, which certifies nothing" if useless else "")
-            )
+    names = {signal.name for signal in generated_sources.program(choice).inputs}
+    if not names & {"increments", "turns"}:
+        raise InputError(
+            f"kernel {choice.kernel} takes no increments; a largest rate or angle does not go with it"
+        )
+
+
+def _data(choice: Choice, sources: Sources, target: str, written: list[Path]) -> dict[str, Any]:
+    from strapgen import pipeline
+    from strapgen.library import generated_sources
+
+    operations = sources.operations
+    data = {
+        "kernel": sources.kernel,
+        "target": target,
+        "files": [str(path) for path in written],
+        "operations": {kind: operations[kind] for kind in ("add", "multiply", "divide", "sqrt")},
+        "temporaries": sources.temporaries,
+    }
+    if sources.fixed is None:
+        return data
+    program = generated_sources.program(choice)
+    return data | pipeline.quantize(program, sources.fixed.settings).as_data()
+
+
+def _text(sources: Sources, target: str, written: list[Path]) -> str:
+    """Return the operations and the files, in fixed point with the format and the error of every output."""
+    counts = [f"{number} {kind}" for kind, number in sources.operations.items() if number]
+    head = f"{', '.join(counts) or 'no operations'}, {sources.temporaries} temporaries"
+    lines = [f"{sources.kernel} for {target}: {head}", *(f"  {path}" for path in written)]
+    for output in sources.fixed.outputs if sources.fixed else ():
+        bound, unit = max(output.errors), output.format.unit
+        useless = 2 * bound >= max(abs(output.low), abs(output.high)) * unit
+        lines.append(
+            f"  {output.signal.name}: {output.format}, error at most {float(bound):.4g}, "
+            f"{float(bound / unit):.4f} of the last place"
+            + (": of the size of the value, which certifies nothing" if useless else "")
+        )
+    return "\n".join(lines)
 
 
 def _generate_all(out: Path | None, check: bool, format: str) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from strapgen.cli.options import Format, check_format, print_json
+from strapgen.cli.output import Format, check_format, print_json
 
 
 def list_names(format: Format = "text") -> None:
@@ -13,6 +13,21 @@ def list_names(format: Format = "text") -> None:
     Example: strapgen list
     """
     check_format(format)
+    parts = _parts()
+    if format == "json":
+        print_json(parts)
+        return
+    parts["methods"] = _with_one_line_for_taylor(parts["methods"])
+    parts["kernels"] = _with_one_line_for_updates(parts["kernels"])
+    width = max(len(name) for part in parts.values() for name in part)
+    for title, part in parts.items():
+        typer.echo(title)
+        for name, meaning in part.items():
+            typer.echo(f"  {name:<{width}}  {meaning}".rstrip())
+
+
+def _parts() -> dict[str, dict[str, str]]:
+    """Return all names with what they mean, by part of the list."""
     from strapgen import catalogue
     from strapgen.backends import BACKENDS
     from strapgen.catalogue.user import loading
@@ -24,7 +39,7 @@ def list_names(format: Format = "text") -> None:
         for name, point in loading.installed().items()
         if name not in catalogue.ALGORITHMS and name not in catalogue.KERNELS
     }
-    parts: dict[str, dict[str, str]] = {
+    return {
         "algorithms": {**catalogue.ALGORITHMS, **installed},
         "methods": catalogue.METHODS,
         "vectors": {
@@ -39,27 +54,30 @@ def list_names(format: Format = "text") -> None:
         "targets": {name: target.title for name, target in TARGETS.items()},
         "backends": {name: entry.title for name, entry in BACKENDS.items()},
     }
-    if format == "json":
-        print_json(parts)
-        return
-    series = [name for name in catalogue.METHODS if name.startswith("taylor")]
-    methods = {name: title for name, title in catalogue.METHODS.items() if name not in series}
-    methods[f"{series[0]} to {series[-1]}"] = "Taylor series of the transition, of any order to 20"
-    parts["methods"] = methods
+
+
+def _with_one_line_for_taylor(methods: dict[str, str]) -> dict[str, str]:
+    """Return the methods, the Taylor series of all orders on one line."""
+    series = [name for name in methods if name.startswith("taylor")]
+    others = {name: title for name, title in methods.items() if name not in series}
+    return others | {f"{series[0]} to {series[-1]}": "Taylor series of the transition, of any order to 20"}
+
+
+def _with_one_line_for_updates(kernels: dict[str, str]) -> dict[str, str]:
+    """Return the kernels, the updates of an algorithm by a rotation vector on one line for all orders."""
+    from strapgen import catalogue
+
     first, *_, last = catalogue.UPDATE_ORDERS
-    for algorithm, title in catalogue.ALGORITHMS.items():
-        orders = [f"{algorithm}-update-{order}" for order in catalogue.UPDATE_ORDERS]
-        parts["kernels"] = {
-            f"{name} to {last}" if name == orders[0] else name: (
-                f"{title}: update by a rotation vector, order {first} to {last}"
-                if name == orders[0]
-                else said
-            )
-            for name, said in parts["kernels"].items()
-            if name not in orders[1:]
-        }
-    width = max(len(name) for part in parts.values() for name in part)
-    for title, part in parts.items():
-        typer.echo(title)
-        for name, meaning in part.items():
-            typer.echo(f"  {name:<{width}}  {meaning}".rstrip())
+    lines = {}
+    updates = {
+        f"{algorithm}-update-{order}": (order, title)
+        for algorithm, title in catalogue.ALGORITHMS.items()
+        for order in catalogue.UPDATE_ORDERS
+    }
+    for name, title in kernels.items():
+        order, algorithm = updates.get(name, (None, ""))
+        if order is None:
+            lines[name] = title
+        elif order == first:
+            lines[f"{name} to {last}"] = f"{algorithm}: update by a rotation vector, order {first} to {last}"
+    return lines

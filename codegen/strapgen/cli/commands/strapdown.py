@@ -3,75 +3,99 @@
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from strapgen.cli.fixed_options import Carry, Fixes, Ranges, Rounding, Word, check_fixed, settings_for_run
-from strapgen.cli.options import check_format, whole
+from strapgen.cli.fixed_options import FixedOptions
+from strapgen.cli.option_groups import Shown, grouped
+from strapgen.cli.options import whole
+from strapgen.cli.output import Output
 from strapgen.support.exceptions import InputError
 
-_Text = str | None
+if TYPE_CHECKING:
+    from strapgen.simulation.courses import NavigationFrame
 
 
-def strapdown(
-    algorithm: Annotated[str, typer.Argument(help="dcm or euler.")],
-    increments: Annotated[
-        Path,
+@dataclass(frozen=True)
+class CourseOutput(Output):
+    """Where the course along a recording goes."""
+
+    format: Annotated[
+        str | None,
         typer.Option(
-            "--increments-csv",
-            metavar="FILE",
-            help="Recorded increments of the fast cycles: columns t, dx, dy, dz, dvx, dvy, dvz; s, rad, m/s.",
+            "--format",
+            help="Format of the output: text, json or csv.  [default: text; csv with --out]",
+            show_default=False,
         ),
-    ],
-    fast_cycles: Annotated[
-        str, typer.Option("--fast-cycles", metavar="N", help="Fast cycles in a slow cycle.")
-    ],
-    slow_cycles: Annotated[
-        str, typer.Option("--slow-cycles", metavar="N", help="Slow cycles in a navigation cycle.")
-    ] = "1",
-    sculling: Annotated[
-        str,
-        typer.Option(
-            "--sculling", help="Sculling integral: 1 with the rotation compensation in it, 2 without."
-        ),
-    ] = "2",
-    backend: Annotated[
-        str, typer.Option("--backend", help="numpy, c, c-float, c-q31, c-q15, fixed-model or exact.")
-    ] = "numpy",
+    ] = None
+
+
+@dataclass(frozen=True)
+class Start:
+    """Options of the attitude at the start, and of the frame in which the attitude is."""
+
     initial: Annotated[
         str,
-        typer.Option("--initial-deg", metavar="R,P,H", help="Roll, pitch, heading at the start in deg."),
-    ] = "0,0,0",
+        typer.Option("--initial-deg", metavar="R,P,H", help="Roll, pitch and heading at the start in deg."),
+    ] = "0,0,0"
     frame_rate: Annotated[
         str,
         typer.Option(
             "--frame-rate-deg-h",
             metavar="X,Y,Z",
-            help="Rate of the navigation frame in deg/h, navigation axes.",
+            help="Rate of the navigation frame in deg/h, in navigation axes.",
         ),
-    ] = "0,0,0",
-    word: Word = None,
-    rounding: Rounding = None,
-    carry: Carry = None,
-    ranges: Ranges = None,
-    fix: Fixes = None,
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", help="File for the output.  [default: the terminal]", show_default=False),
-    ] = None,
-    format: Annotated[
-        _Text,
+    ] = "0,0,0"
+
+    def frame(self) -> NavigationFrame:
+        """Return the navigation frame with the attitude at its start."""
+        import numpy as np
+
+        from strapgen.simulation.courses import NavigationFrame
+
+        begin = np.radians(_three("initial-deg", self.initial))
+        return NavigationFrame(begin, np.radians(_three("frame-rate-deg-h", self.frame_rate)) / 3600)
+
+
+@grouped
+def strapdown(
+    algorithm: Annotated[str, typer.Argument(help="dcm or euler.")],
+    *,
+    increments: Annotated[
+        Path,
         typer.Option(
-            "--format", help="text, json or csv.  [default: text; csv with --out]", show_default=False
+            "--increments-csv",
+            metavar="FILE",
+            help="Recorded increments of the fast cycles: columns t in s, dx, dy, dz in rad, and dvx, dvy, dvz in m/s.",
         ),
-    ] = None,
+    ],
+    fast_cycles: Annotated[
+        str, typer.Option("--fast-cycles", metavar="N", help="Number of fast cycles in a slow cycle.")
+    ],
+    slow_cycles: Annotated[
+        str, typer.Option("--slow-cycles", metavar="N", help="Number of slow cycles in a navigation cycle.")
+    ] = "1",
+    sculling: Annotated[
+        str,
+        typer.Option(
+            "--sculling",
+            help="Form of the sculling integral: 1 includes the rotation compensation, 2 does not.",
+        ),
+    ] = "2",
+    backend: Annotated[
+        str, typer.Option("--backend", help="numpy, c, c-float, c-q31, c-q15, fixed-model or exact.")
+    ] = "numpy",
+    start: Start,
+    fixed: Annotated[FixedOptions, Shown(only=("word", "rounding", "carry", "ranges", "formats"))],
+    output: Annotated[CourseOutput, Shown(only=("out", "format"))],
 ) -> None:
     """Run an algorithm in two speeds along recorded gyro and accelerometer increments.
 
-    Printed after every navigation cycle: attitude as roll, pitch, heading, and the integral of the specific force over
-    the cycle, in navigation axes. Formats of fixed point are chosen for the recording.
+    After every navigation cycle you see the attitude as roll, pitch and heading, and the integral of the specific force
+    over the cycle in navigation axes. Fixed-point formats are chosen for the recording.
 
     Example:
 
@@ -79,26 +103,19 @@ def strapdown(
       strapgen strapdown dcm --increments-csv examples/inertial_log.csv \\
         --fast-cycles 4 --slow-cycles 25 --backend c
     """  # noqa: D301
-    chosen = format or ("text" if out is None else "csv")
-    check_format(chosen, "csv")
+    output.check()
     import numpy as np
 
     from strapgen.reports import runs
     from strapgen.simulation import recording
-    from strapgen.simulation.courses import NavigationFrame, course
-    from strapgen.support.files import write_files
+    from strapgen.simulation.courses import course
 
-    words = {"word": word, "rounding": rounding, "carry": carry}
-    check_fixed(backend, words | {"range": ranges, "fix": fix})
+    fixed.check_backend(backend)
     data = recording.read_inertial(increments)
-    stated = words | {"ranges": ranges, "formats": fix}
-    settings = settings_for_run(backend, 1, stated, data.interval, lambda: data.largest)
-    begin, rate = (
-        np.radians(_three(name, text))
-        for name, text in (("initial-deg", initial), ("frame-rate-deg-h", frame_rate))
-    )
+    settings = fixed.settings_for_run(backend, 1, data.interval, lambda: data.largest)
+    frame = start.frame()
     with np.errstate(all="ignore"):  # numbers that overflow are refused, in one line
-        made = course(
+        covered = course(
             algorithm,
             data,
             fast_cycles=whole("fast-cycles", fast_cycles) or 0,
@@ -106,24 +123,20 @@ def strapdown(
             sculling=whole("sculling", sculling) or 0,
             backend=backend,
             settings=settings,
-            frame=NavigationFrame(begin, rate / 3600),
+            frame=frame,
         )
-    named: dict[str, Any] = {
+    facts = {
         "algorithm": f"{algorithm} in two speeds",
         "backend": backend,
         "source": str(increments),
     }
-    if chosen == "csv":
-        text = runs.course_csv(made)
-    elif chosen == "json":
-        text = json.dumps(runs.course_data(made, named))
+    format = output.format or ("text" if output.out is None else "csv")
+    if format == "csv":
+        output.deliver(runs.course_csv(covered))
+    elif format == "json":
+        output.deliver(json.dumps(runs.course_data(covered, facts)))
     else:
-        text = runs.course_text(made, named)
-    text = text.rstrip("\n")
-    if out is None:
-        typer.echo(text)
-    else:
-        write_files(Path(), {str(out): f"{text}\n"})
+        output.deliver(runs.course_text(covered, facts))
 
 
 def _three(name: str, text: str) -> list[float]:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from strapgen.cli.options import Format, check_format, print_json
+from strapgen.cli.output import Format, check_format, print_json
 from strapgen.support import checks
 
 
@@ -20,22 +20,23 @@ def tableau(
 ) -> None:
     """Show a Butcher tableau, and what its order conditions say when they are evaluated exactly.
 
-    A file is what ends in .toml or holds a path separator. Its keys are those of the files in
-    strapgen/catalogue/methods: name, source, order, nodes, matrix, weights, embedded_weights, tolerance.
+    What ends in .toml or holds a path separator is read as a file. Its keys are those of the files in
+    strapgen/catalogue/methods/butcher_tableaux: name, source, order, nodes, matrix, weights, embedded_weights,
+    tolerance.
 
     Example: strapgen tableau dormand-prince5
     """
     check_format(format)
     from strapgen.catalogue.methods import tableaux
-    from strapgen.reports import tableau as reports
+    from strapgen.reports.tableau import tableau_data, tableau_text
 
     if method.endswith(".toml") or any(separator in method for separator in (os.sep, os.altsep) if separator):
-        chosen = tableaux.read(method)
+        butcher = tableaux.read(method)
     else:
-        chosen = tableaux.TABLEAUX[checks.choice("method", method, tableaux.TABLEAUX)]
-        tableaux.verify(chosen)
-    data = reports.tableau_data(chosen)
+        butcher = tableaux.TABLEAUX[checks.choice("method", method, tableaux.TABLEAUX)]
+        tableaux.verify(butcher)
+    data = tableau_data(butcher)
     if format == "json":
         print_json(data)
     else:
-        typer.echo(reports.tableau_text(data))
+        typer.echo(tableau_text(data))

@@ -6,13 +6,16 @@ from typing import Annotated
 
 import typer
 
-from strapgen.cli.fixed_options import Carry, Rounding, read_settings
-from strapgen.cli.options import Format, check_format, print_json
+from strapgen.cli.fixed_options import FixedOptions
+from strapgen.cli.option_groups import Shown, grouped
+from strapgen.cli.output import Format, check_format, print_json
 from strapgen.cli.progress import track
 from strapgen.support.exceptions import InputError
 
 
+@grouped
 def tables(
+    *,
     backend: Annotated[
         str | None,
         typer.Option(
@@ -21,8 +24,7 @@ def tables(
             show_default=False,
         ),
     ] = None,
-    rounding: Rounding = None,
-    carry: Carry = None,
+    fixed: Annotated[FixedOptions, Shown(only=("rounding", "carry"))],
     predict: Annotated[
         bool,
         typer.Option(
@@ -38,9 +40,8 @@ def tables(
     """
     check_format(format)
     if predict:
-        for option, value in (("--backend", backend), ("--rounding", rounding), ("--carry", carry)):
-            if value is not None:
-                raise InputError(f"--predict and {option} do not go together")
+        for option in [*([] if backend is None else ["--backend"]), *fixed.stated]:
+            raise InputError(f"--predict and {option} do not go together")
         _predict(format)
         return
     from strapgen.backends import BACKENDS
@@ -50,7 +51,7 @@ def tables(
     from strapgen.targets import FIXED
 
     names = _runnable() if backend is None else (checks.choice("backend", backend, BACKENDS),)
-    settings = read_settings(2, rounding=rounding, carry=carry)
+    settings = fixed.settings(2)
     if settings is not None and not any(BACKENDS[name].target in FIXED for name in names):
         raise InputError(f"--rounding and --carry are for fixed-point back ends, not for {', '.join(names)}")
     cases = len(names) * len(ALGORITHMS) * len(ORDERS)
@@ -74,17 +75,17 @@ def _predict(format: str) -> None:
     from strapgen.reports.ratios import claims_text
 
     cases = len(TABLES) * len(ALGORITHMS) * len(ORDERS)
-    found = list(track(predicted_tables.predicted(), "predicting", cases))
+    entries = list(track(predicted_tables.predicted(), "predicting", cases))
     claims = ratios.claims()
     if format == "json":
         print_json(
             {
-                "entries": [entry.as_dict() for entry in found],
+                "entries": [entry.as_dict() for entry in entries],
                 "ratios": [claim.as_dict() for claim in claims],
             }
         )
         return
-    typer.echo(predicted_text(found))
+    typer.echo(predicted_text(entries))
     typer.echo(claims_text(claims))
 
 

@@ -7,32 +7,35 @@ from typing import Annotated
 
 import typer
 
-from strapgen.cli.fixed_options import Allowance, Carry, Fixes, Ranges, Rounding, Word, read_settings
-from strapgen.cli.options import Format, check_format, print_json, whole
+from strapgen.cli.fixed_options import FixedOptions
+from strapgen.cli.option_groups import Shown, grouped
+from strapgen.cli.options import whole
+from strapgen.cli.output import Format, check_format, print_json
 from strapgen.support.exceptions import InputError
 
 
+@grouped
 def two_speed(
     algorithm: Annotated[str, typer.Argument(help="dcm or euler.")],
+    *,
     sculling: Annotated[
         str,
         typer.Option(
-            "--sculling", help="Sculling integral: 1 with the rotation compensation in it, 2 without."
+            "--sculling",
+            help="Form of the sculling integral: 1 includes the rotation compensation, 2 does not.",
         ),
     ] = "2",
-    target: Annotated[str, typer.Option("--target", help="c, c-float or c-fixed.")] = "c",
+    target: Annotated[str, typer.Option("--target", help="Target of the code: c, c-float or c-fixed.")] = "c",
     out: Annotated[
         Path | None, typer.Option("--out", help="Folder to write to.  [default: here]", show_default=False)
     ] = None,
-    word: Word = None,
-    rounding: Rounding = None,
-    carry: Carry = None,
-    drift_allowance: Allowance = None,
-    ranges: Ranges = None,
-    fix: Fixes = None,
+    fixed: Annotated[
+        FixedOptions,
+        Shown(only=("word", "rounding", "carry", "drift_allowance", "ranges", "formats")),
+    ],
     format: Format = "text",
 ) -> None:
-    """Generate the C of an algorithm in two speeds: a function for every loop, and one for the whole.
+    """Generate the C code of an algorithm in two speeds: a function for every loop, and one for the whole.
 
     Example: strapgen two-speed dcm --target c --out firmware
     """
@@ -42,15 +45,7 @@ def two_speed(
     from strapgen.support.files import write_files
 
     form = whole("sculling", sculling) or 0
-    settings = read_settings(
-        1,
-        word=word,
-        rounding=rounding,
-        carry=carry,
-        drift_allowance=drift_allowance,
-        ranges=ranges,
-        formats=fix,
-    )
+    settings = fixed.settings(1)
     if target == "c-fixed":
         settings = settings or Settings()
     elif settings is not None:

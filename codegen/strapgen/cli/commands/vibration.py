@@ -3,61 +3,232 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import typer
 
-from strapgen.cli.options import Previous, Rates, TableauFile, check_format, chosen, print_json, whole
+from strapgen.cli.option_groups import Shown, grouped
+from strapgen.cli.options import MethodOptions, listed, whole
+from strapgen.cli.output import Output, as_json
+from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
-    from strapgen.reports.vibration import AssessedCase
-    from strapgen.vibration import Assessment
+    from strapgen.reports.vibration import AssessedCase, CaseRates
 
 _Text = str | None
 
-
-FrequencyHz = Annotated[
-    _Text, typer.Option("--frequency-hz", metavar="F", help="Frequency f in Hz.", show_default=False)
-]
-Step = Annotated[
-    _Text,
-    typer.Option(
-        "--step",
-        metavar="S",
-        help="Step T in s; of algorithms in two speeds the slow cycle.",
-        show_default=False,
-    ),
-]
-ThetaX = Annotated[
-    _Text,
-    typer.Option(
-        "--theta-x-rad", metavar="X", help="Amplitude of the angle about x in rad.", show_default=False
-    ),
-]
-ThetaY = Annotated[
-    _Text,
-    typer.Option(
-        "--theta-y-rad", metavar="Y", help="Amplitude of the angle about y in rad.", show_default=False
-    ),
-]
-Phase = Annotated[
-    _Text, typer.Option("--phase-rad", metavar="P", help="Phase of y before x in rad.", show_default=False)
-]
-AccelerationY = Annotated[
-    _Text,
-    typer.Option(
-        "--acceleration-y",
-        metavar="M_S2",
-        help="Amplitude of the acceleration along y in m/s^2: the sculling rates too.",
-        show_default=False,
-    ),
-]
+#: Lowest and highest frequency of a plot, by the sampling frequency.
+_PLOTTED = 1e-6, 100.0
+#: The fast loop and the slow loop together.
+_TWO_SPEED = "two-speed"
 
 
+@dataclass(frozen=True)
+class AssessedMethods(MethodOptions):
+    """Options that choose the methods to be assessed side by side, and on how many increments each is."""
+
+    method: Annotated[
+        _Text,
+        typer.Option(
+            "--method",
+            metavar="NAME,...",
+            help="Integration methods.  [default: that of the algorithm; rk4 for an attitude step]",
+            show_default=False,
+        ),
+    ] = None
+    increments: Annotated[
+        _Text,
+        typer.Option(
+            "--increments",
+            metavar="N,...",
+            help="Angle increments in a step; in two speeds the fast cycles in a step.  [default: 2]",
+            show_default=False,
+        ),
+    ] = None
+
+    def each(self) -> list[AssessedMethods]:
+        """Return the options with one method and one number of increments each."""
+        return [
+            replace(self, method=name, increments=count)
+            for name in _parts("--method", self.method)
+            for count in _parts("--increments", self.increments)
+        ]
+
+
+@dataclass(frozen=True)
+class VibrationSource:
+    """Options that say how the vehicle vibrates: at one frequency, or as a spectrum says."""
+
+    frequency: Annotated[
+        _Text, typer.Option("--frequency-hz", metavar="F", help="Frequency f in Hz.", show_default=False)
+    ] = None
+    step: Annotated[
+        _Text,
+        typer.Option(
+            "--step",
+            metavar="S",
+            help="Step T in s; for an algorithm in two speeds the slow cycle.",
+            show_default=False,
+        ),
+    ] = None
+    theta_x: Annotated[
+        _Text,
+        typer.Option(
+            "--theta-x-rad", metavar="X", help="Amplitude of the angle about x in rad.", show_default=False
+        ),
+    ] = None
+    theta_y: Annotated[
+        _Text,
+        typer.Option(
+            "--theta-y-rad", metavar="Y", help="Amplitude of the angle about y in rad.", show_default=False
+        ),
+    ] = None
+    phase: Annotated[
+        _Text,
+        typer.Option("--phase-rad", metavar="P", help="Phase in rad by which y leads x.", show_default=False),
+    ] = None
+    acceleration: Annotated[
+        _Text,
+        typer.Option(
+            "--acceleration-y",
+            metavar="M_S2",
+            help="Amplitude of the acceleration along y in m/s^2; it adds the sculling rates.",
+            show_default=False,
+        ),
+    ] = None
+    spectrum: Annotated[
+        Path | None,
+        typer.Option(
+            "--spectrum",
+            metavar="FILE",
+            help="CSV file of random vibration in place of one frequency: columns frequency_hz, density, angle_x_rad, "
+            "angle_x_phase_rad, ...",
+            show_default=False,
+        ),
+    ] = None
+
+    def check(self, output: VibrationOutput) -> None:
+        """Check that there is one frequency or a spectrum, with all that goes with it."""
+        if self.step is None:
+            raise InputError("--step in s is needed")
+        needed = {
+            "--frequency-hz": self.frequency,
+            "--theta-x-rad": self.theta_x,
+            "--phase-rad": self.phase,
+        }
+        if self.spectrum is not None:
+            amplitudes = {"--theta-y-rad": self.theta_y, "--acceleration-y": self.acceleration}
+            plot = {"--plot": output.plot, "--plot-hz": output.span}
+            for name, value in {**needed, **amplitudes, **plot}.items():
+                if value is not None:
+                    raise InputError(f"{name} goes with one frequency, not with --spectrum")
+            if output.format == "latex":
+                raise InputError(
+                    "--format latex writes closed forms of one frequency; with --spectrum text or json is allowed"
+                )
+            return
+        for name, value in needed.items():
+            if value is None:
+                raise InputError(f"{name} is needed, or a --spectrum")
+        if self.theta_y is None and self.acceleration is None:
+            raise InputError("--theta-y-rad is needed for the drift, or --acceleration-y for sculling")
+        if output.span is not None and output.plot is None:
+            raise InputError("--plot-hz goes with --plot")
+
+    @property
+    def amplitudes(self) -> dict[str, Any]:
+        """The vibration at one frequency, by the parameters of its assessment."""
+        return {
+            "theta_x": self.theta_x,
+            "theta_y": "0" if self.theta_y is None else self.theta_y,
+            "phase": self.phase,
+            "acceleration_y": "0" if self.acceleration is None else self.acceleration,
+        }
+
+    @property
+    def words(self) -> str:
+        """The amplitudes of the vibration at one frequency, for a reader."""
+        words = f"amplitudes {self.theta_x} rad about x"
+        words += "" if self.theta_y is None else f", {self.theta_y} rad about y"
+        words += "" if self.acceleration is None else f", {self.acceleration} m/s^2 along y"
+        return f"{words}, phase {self.phase} rad"
+
+    def rates(self, cases: list[AssessedCase]) -> tuple[list[CaseRates], str]:
+        """Return the mean rates of every case that the vibration moves, and what it is in words."""
+        from strapgen import vibration
+        from strapgen.reports.vibration import CaseRates
+
+        step = self.step or ""
+        if self.spectrum is None:
+            outcomes = []
+            for case in cases:
+                rates = case.assessment.rates(
+                    self.frequency or "", step, cycles=case.cycles, **self.amplitudes
+                )
+                outcomes.append(CaseRates(case, rates))
+            return outcomes, f"{self.frequency} Hz, {self.words}"
+        shaken = vibration.read_spectrum(self.spectrum)
+        outcomes = []
+        for case in cases:
+            if case.moved(set(shaken.transfers)):
+                random = vibration.random_rates(case.assessment, shaken, step, cycles=case.cycles)
+                outcomes.append(CaseRates(case, random.rates, random.quadrature))
+        if not outcomes:
+            raise InputError(
+                f"{self.spectrum} moves {', '.join(shaken.transfers)}; angles about x and y, or an angle and "
+                f"an acceleration across it, are needed for {cases[0].assessment.kernel}"
+            )
+        return (
+            outcomes,
+            f"spectrum {self.spectrum.name}, {shaken.edges[0]:g} to {shaken.edges[-1]:g} Hz",
+        )
+
+
+@dataclass(frozen=True)
+class VibrationOutput(Output):
+    """Where the mean rates go: text, JSON or LaTeX on the terminal, and an image over the frequency."""
+
+    plot: Annotated[
+        Path | None,
+        typer.Option("--plot", help="Image file for the errors over the frequency.", show_default=False),
+    ] = None
+    span: Annotated[
+        _Text,
+        typer.Option(
+            "--plot-hz",
+            metavar="LOW,HIGH",
+            help="Lowest and highest frequency of the plot in Hz.  [default: up to half the sampling frequency]",
+            show_default=False,
+        ),
+    ] = None
+    format: Annotated[_Text, typer.Option("--format", help="Format of the output: text, json or latex.")] = (
+        "text"
+    )
+    formats: ClassVar[tuple[str, ...]] = ("text", "json", "latex")
+
+    def frequencies(self, sampling: float, marked: float) -> tuple[float, float]:
+        """Return the ends of the plot in Hz, checked like the marked frequency against the sampling frequency."""
+        low, high = sampling / 200, sampling / 2
+        if self.span is not None:
+            ends = self.span.split(",")
+            if len(ends) != 2:
+                raise InputError(f"plot-hz is {self.span!r}; two frequencies, LOW,HIGH, are needed")
+            low, high = (float(checks.number("plot-hz", end, positive=True)) for end in ends)
+        lowest, highest = (times * sampling for times in _PLOTTED)
+        for option, end in (("plot-hz", low), ("plot-hz", high), ("frequency-hz", marked)):
+            if not lowest <= end <= highest < math.inf:
+                raise InputError(
+                    f"{option} is {end:g}; a plot takes {lowest:g} to {highest:g} Hz, "
+                    f"{_PLOTTED[0]:g} to {_PLOTTED[1]:g} times the sampling frequency"
+                )
+        return low, high
+
+
+@grouped
 def vibration(
     algorithm: Annotated[
         str,
@@ -66,52 +237,10 @@ def vibration(
             "sculling-fast-2, two-speed-fast-1, two-speed-fast-2), two-speed (both loops), or your own Python file."
         ),
     ],
-    methods: Annotated[
-        _Text,
-        typer.Option("--method", metavar="NAME,...", help="Methods.  [default: rk4]", show_default=False),
-    ] = None,
-    tableau: TableauFile = None,
-    increments: Annotated[
-        _Text,
-        typer.Option(
-            "--increments",
-            metavar="N,...",
-            help="Angle increments a step; in two speeds the fast cycles in a step.  [default: 2]",
-            show_default=False,
-        ),
-    ] = None,
-    previous: Previous = None,
-    rates: Rates = False,
-    frequency: FrequencyHz = None,
-    step: Step = None,
-    theta_x: ThetaX = None,
-    theta_y: ThetaY = None,
-    phase: Phase = None,
-    acceleration: AccelerationY = None,
-    spectrum: Annotated[
-        Path | None,
-        typer.Option(
-            "--spectrum",
-            metavar="FILE",
-            help="Random vibration in place of one frequency: a CSV of frequency_hz, density, angle_x_rad, "
-            "angle_x_phase_rad, ...",
-            show_default=False,
-        ),
-    ] = None,
-    plot: Annotated[
-        Path | None,
-        typer.Option("--plot", help="Image file for the errors against frequency.", show_default=False),
-    ] = None,
-    span: Annotated[
-        _Text,
-        typer.Option(
-            "--plot-hz",
-            metavar="LOW,HIGH",
-            help="Frequencies of the plot.  [default: up to half the sampling frequency]",
-            show_default=False,
-        ),
-    ] = None,
-    format: Annotated[str, typer.Option("--format", help="text, json or latex.")] = "text",
+    *,
+    methods: AssessedMethods,
+    source: VibrationSource,
+    output: Annotated[VibrationOutput, Shown(only=("plot", "span", "format"))],
 ) -> None:
     """Assess an algorithm under vibration: the mean drift about z that it computes, the true one, and its error.
 
@@ -119,8 +248,8 @@ def vibration(
     Closed forms to second order in the amplitudes are derived from the algorithm itself. Several methods, or numbers of
     increments, stand side by side.
 
-    Of a fast loop, continuous and computed are its part within a slow cycle T_m, without the term in T_m: the slow loop
-    adds that to both, so that the error is that of both loops.
+    For a fast loop, continuous and computed are its part within a slow cycle T_m, without the term in T_m: the slow
+    loop adds that to both, so that the error is that of both loops.
 
     Example:
 
@@ -128,223 +257,105 @@ def vibration(
       strapgen vibration euler --method coning-compressed --increments 4 --frequency-hz 10 \\
         --step 0.04 --theta-x-rad 0.01 --theta-y-rad 0.01 --phase-rad 1.5 --acceleration-y 5
     """  # noqa: D301
-    check_format(format, "latex")
-    _check_vibration(
-        {
-            "--frequency-hz": frequency,
-            "--theta-x-rad": theta_x,
-            "--theta-y-rad": theta_y,
-            "--phase-rad": phase,
-            "--acceleration-y": acceleration,
-        },
-        step,
-        spectrum,
-        plot,
-        span,
-        format,
-    )
-    from strapgen import vibration as assessing
-    from strapgen.reports import vibration as reports
-    from strapgen.support.files import write_files
+    output.check()
+    source.check(output)
+    cases = [case for method in methods.each() for case in _assessed(algorithm, method, source)]
+    outcomes, words = source.rates(cases)
+    image = None if output.plot is None else _image(cases, source, output, output.plot)
+    from strapgen.reports.vibration import vibration_data, vibration_latex, vibration_text
 
-    cases = [
-        case
-        for name in _listed("--method", methods)
-        for count in _listed("--increments", increments)
-        for case in _assessed(
-            algorithm,
-            (name, tableau, count, previous, rates),
-            drift=theta_y is not None,
-            sculling=acceleration is not None,
-            random=spectrum is not None,
-        )
-    ]
-    outcomes: list[reports.CaseRates] = []
-    amplitudes: dict[str, Any] = {}
-    if spectrum is None:
-        amplitudes = {
-            "theta_x": theta_x,
-            "theta_y": "0" if theta_y is None else theta_y,
-            "phase": phase,
-            "acceleration_y": "0" if acceleration is None else acceleration,
-        }
-        words = f"{frequency} Hz, amplitudes {theta_x} rad about x"
-        words += "" if theta_y is None else f", {theta_y} rad about y"
-        words += "" if acceleration is None else f", {acceleration} m/s^2 along y"
-        words += f", phase {phase} rad"
-        outcomes = [
-            reports.CaseRates(
-                case, case.assessment.rates(frequency or "", step or "", cycles=case.cycles, **amplitudes)
-            )
-            for case in cases
-        ]
+    if output.format == "json":
+        data = vibration_data(outcomes)
+        output.deliver(as_json(data[0] if len(data) == 1 else data), image)
+    elif output.format == "latex":
+        output.deliver(vibration_latex(cases), image)
     else:
-        shaken = assessing.read_spectrum(spectrum)
-        words = f"spectrum {spectrum.name}, {shaken.edges[0]:g} to {shaken.edges[-1]:g} Hz"
-        for case in cases:
-            if case.moved(set(shaken.transfers)):
-                random = assessing.random_rates(case.assessment, shaken, step or "", cycles=case.cycles)
-                outcomes.append(reports.CaseRates(case, random.rates, random.quadrature))
-        if not outcomes:
-            raise InputError(
-                f"{spectrum} moves {', '.join(shaken.transfers)}; angles about x and y, or an angle and "
-                f"an acceleration across it, are needed for {cases[0].assessment.kernel}"
-            )
-    if plot is not None:
-        write_files(Path(), {str(plot): _image(cases, amplitudes, step, frequency, span, words, plot)})
-    title = f"{words}; step {step} s"
-    if format == "json":
-        data = reports.vibration_data(outcomes)
-        print_json(data[0] if len(data) == 1 else data)
-    elif format == "latex":
-        typer.echo(reports.vibration_latex(cases))
-    else:
-        typer.echo(reports.vibration_text(outcomes, title))
+        output.deliver(vibration_text(outcomes, f"{words}; step {source.step} s"), image)
 
 
-def _check_vibration(
-    numbers: dict[str, _Text],
-    step: _Text,
-    spectrum: Path | None,
-    plot: Path | None,
-    span: _Text,
-    format: str,
-) -> None:
-    """Check that one frequency or a spectrum is given, with all that goes with it."""
-    if step is None:
-        raise InputError("--step in s is needed")
-    if spectrum is not None:
-        for name, value in {**numbers, "--plot": plot, "--plot-hz": span}.items():
-            if value is not None:
-                raise InputError(f"{name} goes with one frequency, not with --spectrum")
-        if format == "latex":
-            raise InputError(
-                "--format latex writes closed forms of one frequency; with --spectrum text or json is allowed"
-            )
-        return
-    for name in ("--frequency-hz", "--theta-x-rad", "--phase-rad"):
-        if numbers[name] is None:
-            raise InputError(f"{name} is needed, or a --spectrum")
-    if numbers["--theta-y-rad"] is None and numbers["--acceleration-y"] is None:
-        raise InputError("--theta-y-rad is needed for the drift, or --acceleration-y for sculling")
-    if span is not None and plot is None:
-        raise InputError("--plot-hz goes with --plot")
-
-
-def _listed(option: str, text: _Text) -> list[_Text]:
-    """Return the parts of a list, each once; nothing is given where there is none."""
+def _parts(option: str, text: _Text) -> list[_Text]:
+    """Return the values of a list; None stands for the default."""
     if text is None:
         return [None]
-    parts: list[_Text] = list(dict.fromkeys(part.strip() for part in text.split(",") if part.strip()))
-    if not parts:
-        raise InputError(f"{option} is {text!r}; a list with commas between is needed")
-    return parts
+    return [*listed(option, text, f"is {text!r}; a list with commas between is needed")]
 
 
-def _check_known(algorithm: str, names: tuple[str, ...], own: tuple[str, ...]) -> None:
+def _check_known(algorithm: str, names: tuple[str, ...], installed: tuple[str, ...]) -> None:
     """Check that an algorithm is one that can be assessed: a name, or a user's."""
     from strapgen import catalogue
 
-    if algorithm in (*names, *own) or algorithm.endswith(".py"):
+    if algorithm in (*names, *installed) or algorithm.endswith(".py"):
         return
     why = "has no rate under vibration" if algorithm in catalogue.RESERVED else "is not known"
     raise InputError(f"algorithm {algorithm!r} {why}; allowed: {', '.join(names)}, or your own Python file")
 
 
-def _assessed(
-    algorithm: str,
-    options: tuple[_Text, Path | None, _Text, _Text, bool],
-    *,
-    drift: bool,
-    sculling: bool,
-    random: bool,
-) -> list[AssessedCase]:
+def _assessed(algorithm: str, method: AssessedMethods, source: VibrationSource) -> list[AssessedCase]:
     """Return a case for each quantity of an algorithm that the options ask for."""
     from strapgen.catalogue.user import loading
     from strapgen.reports.vibration import AssessedCase
-    from strapgen.support import checks
     from strapgen.vibration import assessment, systems
 
     _check_known(algorithm, (*systems.NAMES, _TWO_SPEED), tuple(loading.installed()))
-    method, tableau, count, previous, rates = options
-    cycles = None
-    whole_algorithm = algorithm == _TWO_SPEED
-    if whole_algorithm or algorithm in systems.RECURSIONS:
-        if count is None:
-            loop = "is in two speeds" if whole_algorithm else "is a recursion"
-            raise InputError(f"{algorithm} {loop}: --increments must say how many of its cycles make a step")
-        cycles = checks.count("increments", whole("increments", count), largest=checks.MOST)
-        count = None
-    of: Callable[[str], Assessment]
-    if whole_algorithm:
-        assert cycles is not None
-        for option, value in (
-            ("--method", method),
-            ("--tableau", tableau),
-            ("--previous", previous),
-            ("--rates", rates or None),
-        ):
-            if value is not None:
-                raise InputError(f"{algorithm} takes no {option}")
-        can: tuple[str, ...] = ("drift", "sculling")
-        of, samples = assessment.two_speed, cycles
-    else:
-        choice = chosen(algorithm, method, tableau, count, previous, rates, step=False)
-        can = assessment.quantities(choice)
-        of, samples = partial(assessment.of, choice), cycles or choice.increments_per_step
-    if random:
-        wanted = list(can)
-    else:
-        wanted = [name for name, asked in (("drift", drift), ("sculling", sculling)) if asked and name in can]
-        if not wanted:
-            needed = {"drift": "--theta-y-rad", "sculling": "--acceleration-y"}[can[0]]
-            raise InputError(f"{algorithm} has {' and '.join(can)} rates alone; {needed} is needed")
-    return [AssessedCase(of(quantity), cycles, samples) for quantity in wanted]
+    if algorithm == _TWO_SPEED:
+        cycles = _cycles(algorithm, method, "is in two speeds")
+        _check_plain(algorithm, method)
+        quantities = _quantities(algorithm, ("drift", "sculling"), source)
+        return [AssessedCase(assessment.two_speed(quantity), cycles, cycles) for quantity in quantities]
+    fast = None
+    if algorithm in systems.RECURSIONS:
+        fast = _cycles(algorithm, method, "is a recursion")
+        method = replace(method, increments=None)
+    choice = method.choose(algorithm, step=False)
+    of = partial(assessment.of, choice)
+    quantities = _quantities(algorithm, assessment.quantities(choice), source)
+    samples = fast or choice.increments_per_step
+    return [AssessedCase(of(quantity), fast, samples) for quantity in quantities]
 
 
-#: Lowest and highest frequency of a plot, by the sampling frequency.
-_PLOTTED = 1e-6, 100.0
-#: The fast loop and the slow loop together.
-_TWO_SPEED = "two-speed"
+def _cycles(algorithm: str, method: MethodOptions, loop: str) -> int:
+    """Return the fast cycles in a step."""
+    if method.increments is None:
+        raise InputError(f"{algorithm} {loop}: --increments must say how many of its cycles make a step")
+    return checks.count("increments", whole("increments", method.increments), largest=checks.MOST)
 
 
-def _image(
-    cases: list[AssessedCase],
-    amplitudes: dict[str, Any],
-    step: _Text,
-    frequency: _Text,
-    span: _Text,
-    words: str,
-    path: Path,
-) -> bytes:
+def _check_plain(algorithm: str, method: MethodOptions) -> None:
+    """Refuse the options of a method for an algorithm that has its own."""
+    for option, value in (
+        ("--method", method.method),
+        ("--tableau", method.tableau),
+        ("--previous", method.previous),
+        ("--rates", method.rates or None),
+    ):
+        if value is not None:
+            raise InputError(f"{algorithm} takes no {option}")
+
+
+def _quantities(algorithm: str, possible: tuple[str, ...], source: VibrationSource) -> list[str]:
+    """Return the quantities to assess: those that the vibration at one frequency moves, or all that are possible."""
+    if source.spectrum is not None:
+        return list(possible)
+    moved = {"drift": source.theta_y is not None, "sculling": source.acceleration is not None}
+    quantities = [name for name, is_moved in moved.items() if is_moved and name in possible]
+    if not quantities:
+        needed = {"drift": "--theta-y-rad", "sculling": "--acceleration-y"}[possible[0]]
+        raise InputError(f"{algorithm} has {' and '.join(possible)} rates alone; {needed} is needed")
+    return quantities
+
+
+def _image(cases: list[AssessedCase], source: VibrationSource, output: VibrationOutput, path: Path) -> bytes:
     from strapgen.reports import plots
-    from strapgen.support import checks
     from strapgen.vibration import curves
 
-    length = float(checks.number("step", step or "", positive=True))
-    sampling = max(case.samples for case in cases) / length
-    low, high = sampling / 200, sampling / 2
-    if span is not None:
-        ends = span.split(",")
-        if len(ends) != 2:
-            raise InputError(f"plot-hz is {span!r}; two frequencies, LOW,HIGH, are needed")
-        low, high = (float(checks.number("plot-hz", end, positive=True)) for end in ends)
-    marked = float(checks.number("frequency-hz", frequency or ""))
-    lowest, highest = (times * sampling for times in _PLOTTED)
-    for option, end in (("plot-hz", low), ("plot-hz", high), ("frequency-hz", marked)):
-        if not lowest <= end <= highest < math.inf:
-            raise InputError(
-                f"{option} is {end:g}; a plot takes {lowest:g} to {highest:g} Hz, "
-                f"{_PLOTTED[0]:g} to {_PLOTTED[1]:g} times the sampling frequency"
-            )
-    hertz = curves.frequencies(low, high)
+    step = source.step or ""
+    sampling = max(case.samples for case in cases) / float(checks.number("step", step, positive=True))
+    marked = float(checks.number("frequency-hz", source.frequency or ""))
+    hertz = curves.frequencies(*output.frequencies(sampling, marked))
     drawn = [
-        (case.label, curves.curve(case.assessment, hertz, step or "", cycles=case.cycles, **amplitudes))
+        (case.label, curves.curve(case.assessment, hertz, step, cycles=case.cycles, **source.amplitudes))
         for case in cases
     ]
     return plots.vibration_image(
-        drawn,
-        f"Errors under vibration, step {step} s\n{words.partition(', ')[2]}",
-        path,
-        marked,
+        drawn, f"Errors under vibration, step {step} s\n{source.words}", path, marked
     )

@@ -1,0 +1,93 @@
+"""Groups of options: a dataclass declares them once, and a command takes them as one parameter."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from functools import wraps
+from inspect import Parameter, Signature
+from typing import Any, NamedTuple, TypeVar, get_type_hints
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+#: Typer passes every value by its name, so that one without a default may stand behind others.
+_KEYWORD = Parameter.KEYWORD_ONLY
+
+
+class Shown(NamedTuple):
+    """How a command shows a group; it stands in the parameter's annotation.
+
+    Parameters
+    ----------
+    only : tuple of str
+        Fields that the command has as options, in their order there; the others keep their defaults. Empty for all.
+    before : str
+        Field or parameter before which the help shows these; empty for the place of the parameter.
+    """
+
+    only: tuple[str, ...] = ()
+    before: str = ""
+
+
+def grouped(command: Command) -> Command:
+    """Let Typer see the fields of a command's groups as options of the command.
+
+    A group is a parameter whose type is a dataclass with fields annotated as Typer reads them. The command gets an
+    object of the dataclass in place of the single values.
+
+    Raises
+    ------
+    TypeError
+        If two options of a command have one name, or a field to be shown is not there.
+    """
+    hints = get_type_hints(command, include_extras=True)
+    groups: dict[str, tuple[type[Any], tuple[str, ...]]] = {}
+    options: dict[str, Parameter] = {}
+    for parameter in Signature.from_callable(command).parameters.values():
+        hint = hints[parameter.name]
+        kind = getattr(hint, "__origin__", hint)
+        shown = next((item for item in getattr(hint, "__metadata__", ()) if isinstance(item, Shown)), Shown())
+        if dataclasses.is_dataclass(kind) and isinstance(kind, type):
+            fields = _options(kind, shown.only)
+            groups[parameter.name] = kind, tuple(option.name for option in fields)
+        else:
+            fields = [parameter.replace(annotation=hint, kind=_KEYWORD)]
+        options = _insert(options, fields, shown.before)
+
+    @wraps(command)
+    def run(**values: Any) -> Any:
+        objects = {
+            name: kind(**{field: values.pop(field) for field in fields})
+            for name, (kind, fields) in groups.items()
+        }
+        return command(**values, **objects)
+
+    del run.__dict__["__wrapped__"]  # else the command's own signature would be read
+    run.__dict__["__signature__"] = Signature(list(options.values()))
+    run.__annotations__ = {option.name: option.annotation for option in options.values()}
+    return run  # type: ignore[return-value]
+
+
+def _options(group: type[Any], only: tuple[str, ...]) -> list[Parameter]:
+    """Return the fields of a group as parameters of a command."""
+    hints = get_type_hints(group, include_extras=True)
+    fields = {field.name: field for field in dataclasses.fields(group)}
+    if unknown := {*only} - {*fields}:
+        raise TypeError(f"{group.__name__} has no option {', '.join(sorted(unknown))}")
+    return [
+        Parameter(name, _KEYWORD, default=_default(fields[name]), annotation=hints[name])
+        for name in only or fields
+    ]
+
+
+def _default(field: dataclasses.Field[Any]) -> Any:
+    return Parameter.empty if field.default is dataclasses.MISSING else field.default
+
+
+def _insert(options: dict[str, Parameter], more: list[Parameter], before: str) -> dict[str, Parameter]:
+    """Return options with more of them behind all others, or before one of them."""
+    if twice := {*options} & {option.name for option in more}:
+        raise TypeError(f"two options of a command are named {', '.join(sorted(twice))}")
+    names = list(options)
+    place = names.index(before) if before else len(names)
+    items = list(options.items())
+    return dict([*items[:place], *((option.name, option) for option in more), *items[place:]])

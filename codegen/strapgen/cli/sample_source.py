@@ -1,0 +1,233 @@
+"""What several commands run algorithms on: a motion, recorded increments or recorded rates, through gyro pulses."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from strapgen.support.exceptions import InputError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from strapgen.simulation.motions import Motion
+    from strapgen.simulation.recording import Recording
+
+_Text = str | None
+
+MotionSettings = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", metavar="KEY=VALUE...", help="Parameters of the motion; strapgen list shows their names."
+    ),
+]
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Increments of a run, and the truth where it is known.
+
+    Parameters
+    ----------
+    increments : array, (N, K, 3)
+        In rad.
+    truth : array, (1 + N, 3, 3), or None
+    step : float
+        In s.
+    title : str
+        What they are, for a reader.
+    """
+
+    increments: NDArray[Any]
+    truth: NDArray[Any] | None
+    step: float
+    title: str
+
+
+@dataclass(frozen=True)
+class SampleSource:
+    """Options that say what a run takes its increments from."""
+
+    motion: Annotated[
+        _Text,
+        typer.Option(
+            "--motion",
+            help="Motion to run on: constant, sinusoidal, coning or polynomial.",
+            show_default=False,
+        ),
+    ] = None
+    settings: MotionSettings = None
+    step: Annotated[_Text, typer.Option("--step", metavar="S", help="Step in s.", show_default=False)] = None
+    duration: Annotated[
+        _Text, typer.Option("--duration", metavar="S", help="Duration in s.", show_default=False)
+    ] = None
+    increments_csv: Annotated[
+        Path | None,
+        typer.Option(
+            "--increments-csv",
+            help="Recorded increments in place of a motion: columns t in s, and dx, dy, dz in rad.",
+        ),
+    ] = None
+    rates_csv: Annotated[
+        Path | None,
+        typer.Option(
+            "--rates-csv",
+            help="Recorded rates in place of a motion: the first four columns are the time in s and three rates.",
+        ),
+    ] = None
+    rate_unit: Annotated[
+        _Text,
+        typer.Option(
+            "--rate-unit", help="Unit of the rates in --rates-csv: deg/s or rad/s.", show_default=False
+        ),
+    ] = None
+    resample_hz: Annotated[
+        _Text,
+        typer.Option(
+            "--resample-hz",
+            metavar="HZ",
+            help="Frequency in Hz of the even grid over which uneven recorded rates are integrated.",
+            show_default=False,
+        ),
+    ] = None
+    pulse_arcsec: Annotated[
+        _Text,
+        typer.Option(
+            "--pulse-arcsec",
+            metavar="ANGLE",
+            help="Angle of a gyro pulse in arc seconds; increments become whole pulses, and the rest is carried on.",
+            show_default=False,
+        ),
+    ] = None
+
+    def check(self) -> None:
+        """Check that there is one source of increments, with the options that go with it and no others."""
+        sources = {
+            "--motion": self.motion,
+            "--increments-csv": self.increments_csv,
+            "--rates-csv": self.rates_csv,
+        }
+        chosen = [name for name, value in sources.items() if value is not None]
+        if len(chosen) != 1:
+            raise InputError(f"one of {', '.join(sources)} is needed; {' and '.join(chosen) or 'none'} given")
+        times = {"--step": self.step, "--duration": self.duration}
+        if self.motion is None:
+            _refuse({"--set": self.settings, **times}, "--motion", chosen[0])
+        elif missing := [name for name, value in times.items() if value is None]:
+            raise InputError(f"--motion needs {missing[0]} in s")
+        if self.rates_csv is None:
+            rates = {"--rate-unit": self.rate_unit, "--resample-hz": self.resample_hz}
+            _refuse(rates, "--rates-csv", chosen[0])
+        elif self.rate_unit is None:
+            raise InputError("--rates-csv needs --rate-unit deg/s or rad/s")
+
+    @property
+    def file(self) -> Path:
+        """The file of recorded data."""
+        return self.increments_csv or self.rates_csv or Path()
+
+    @property
+    def pulse(self) -> float | None:
+        """The angle of a gyro pulse in rad."""
+        from strapgen.support import checks
+
+        if self.pulse_arcsec is None:
+            return None
+        return math.radians(float(checks.number("pulse-arcsec", self.pulse_arcsec, positive=True)) / 3600)
+
+    def profile(self) -> Motion:
+        """Return the motion with its parameters."""
+        from strapgen.simulation.motions import motion
+
+        return motion(self.motion or "", **pairs(self.settings or []))
+
+    def times(self) -> tuple[Fraction, Fraction]:
+        """Return the step and the duration of a run on a motion in s."""
+        from strapgen.support import checks
+
+        return (
+            checks.number("step", self.step or "", positive=True),
+            checks.number("duration", self.duration or "", positive=True),
+        )
+
+    def recording(self) -> Recording:
+        """Read the recorded data."""
+        from strapgen.simulation import recording
+
+        if self.increments_csv is not None:
+            return recording.read_increments(self.increments_csv)
+        return recording.read_rates(self.rates_csv or "", self.rate_unit or "", self.resample_hz)
+
+    def read(self, samples: int, previous: int = 0) -> Inputs:
+        """Return the increments that the options stand for.
+
+        Parameters
+        ----------
+        samples, previous : int
+            Increments of a step, and those before it that it takes too.
+
+        Returns
+        -------
+        Inputs
+
+        Raises
+        ------
+        InputError
+            If the motion or the file cannot be used, or does not fill a step.
+        """
+        from strapgen.backends.increments import pulses
+
+        pulse = self.pulse
+        read = self._recorded(samples, previous) if self.motion is None else self._computed(samples, previous)
+        if pulse is None:
+            return read
+        return Inputs(pulses(read.increments, pulse, previous), read.truth, read.step, read.title)
+
+    def _computed(self, samples: int, previous: int) -> Inputs:
+        import numpy as np
+
+        from strapgen.support import checks
+
+        profile = self.profile()
+        step, duration = self.times()
+        steps = checks.multiple("duration", duration, "step", step)
+        increments, length = profile.increments(step, steps, samples, previous), float(step)
+        truth = profile.attitude(np.arange(1 + steps) * length)
+        return Inputs(increments, truth, length, f"{self.motion} motion, {steps} steps of {self.step} s")
+
+    def _recorded(self, samples: int, previous: int) -> Inputs:
+        from strapgen.backends.increments import windows
+
+        data = self.recording()
+        steps = max(0, len(data.increments) - previous) // samples
+        if steps < 1:
+            raise InputError(
+                f"the recording holds {len(data.increments)} increments; a step needs {samples + previous}"
+            )
+        increments = windows(data.increments[: previous + steps * samples], samples, previous)
+        length = data.interval * samples
+        return Inputs(increments, None, length, f"{self.file.name}, {steps} steps of {length:.6g} s")
+
+
+def _refuse(options: dict[str, Any], owner: str, chosen: str) -> None:
+    for name, value in options.items():
+        if value is not None:
+            raise InputError(f"{name} goes with {owner}, not with {chosen}")
+
+
+def pairs(settings: list[str]) -> dict[str, str]:
+    """Read settings of the form key=value."""
+    values: dict[str, str] = {}
+    for setting in settings:
+        key, equals, value = setting.partition("=")
+        if not equals or not key:
+            raise InputError(f"--set {setting!r} is no setting; key=value is needed")
+        if key in values:
+            raise InputError(f"--set {key} is given twice")
+        values[key] = value
+    return values
