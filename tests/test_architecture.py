@@ -6,7 +6,7 @@ import ast
 import re
 import subprocess
 import sys
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -316,3 +316,90 @@ def test_no_class_name_stands_twice():
             if isinstance(node, ast.ClassDef):
                 where[node.name].append(place(path))
     assert not {name: places for name, places in where.items() if len(places) > 1}
+
+
+def functions(path: Path) -> Iterator[ast.FunctionDef]:
+    return (node for node in ast.walk(tree(path)) if isinstance(node, ast.FunctionDef))
+
+
+def body_lines(function: ast.FunctionDef) -> int:
+    """Return the lines of a function without its signature and its docstring."""
+    body = function.body[1:] if ast.get_docstring(function) is not None else function.body
+    return body[-1].end_lineno - body[0].lineno + 1 if body else 0
+
+
+def commands(path: Path) -> set[str]:
+    """Return the functions of a module that are commands: those whose parameters Typer reads."""
+    return (
+        {f.name for f in functions(path) if not f.name.startswith("_")} if "commands" in path.parts else set()
+    )
+
+
+def test_modules_fit_on_a_few_screens():
+    long = {place(path): n for path in FILES if (n := len(path.read_text().splitlines())) > MOST_LINES}
+    assert not long
+
+
+def test_functions_can_be_held_in_mind():
+    long = []
+    for path in FILES:
+        for function in functions(path):
+            most = MOST_COMMAND_BODY if function.name in commands(path) else MOST_BODY
+            if (lines := body_lines(function)) > most:
+                long.append(f"{place(path)}:{function.lineno} {function.name}: {lines} lines, {most} allowed")
+    assert not long, "\n".join(long)
+
+
+def test_signatures_are_short():
+    long = []
+    for path in FILES:
+        for function in functions(path):
+            arguments = function.args
+            count = len([*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs])
+            if count > MOST_PARAMETERS and function.name not in commands(path):
+                long.append(f"{place(path)}:{function.lineno} {function.name}: {count} parameters")
+    assert not long, "\n".join(long)
+
+
+def names_of_things(path: Path) -> Iterator[tuple[int, str]]:
+    """Yield the names that a file gives to variables, parameters and private fields, with their lines.
+
+    Public parameters and fields keep their names: those of functions and classes without an underscore.
+    """
+    public = {
+        id(argument)
+        for function in functions(path)
+        if not function.name.startswith("_") or function.name == "__init__"
+        for argument in (*function.args.posonlyargs, *function.args.args, *function.args.kwonlyargs)
+    }
+    for node in ast.walk(tree(path)):
+        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            yield node.lineno, node.id
+        elif isinstance(node, ast.arg) and id(node) not in public:
+            yield node.lineno, node.arg
+        elif (
+            isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store) and node.attr.startswith("_")
+        ):
+            yield node.lineno, node.attr.lstrip("_")
+        elif isinstance(node, ast.alias) and node.asname:
+            yield node.lineno, node.asname
+
+
+def test_names_say_what_things_are():
+    offenders = []
+    for path in FILES:
+        fields = {
+            id(statement.target)
+            for node in ast.walk(tree(path))
+            if isinstance(node, ast.ClassDef)
+            for statement in node.body
+            if isinstance(statement, ast.AnnAssign)
+        }
+        stored = {
+            (n.lineno, n.id) for n in ast.walk(tree(path)) if isinstance(n, ast.Name) and id(n) in fields
+        }
+        for line, name in names_of_things(path):
+            if name in BANNED_IDENTIFIERS and (line, name) not in stored:
+                offenders.append(f"{place(path)}:{line} {name}")
+    counts = Counter(offender.split()[1] for offender in offenders)
+    assert not offenders, f"{len(offenders)} names, {dict(counts)}:\n" + "\n".join(offenders)

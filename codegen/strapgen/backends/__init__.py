@@ -156,7 +156,7 @@ def backend(
     >>> backend(catalogue.choose("dcm", "rk2"), backend="c").name
     'c'
     """
-    stages.require("backend", algorithm, str, os.PathLike)
+    stages.require("backend", algorithm, str, os.PathLike, Choice)
     checks.choice("backend", backend, BACKENDS)
     choice = chosen_step(algorithm, method, increments, previous)
     if orthonormalization is not None:

@@ -1,4 +1,4 @@
-"""The gyro between motion and algorithm: pulse quantization, and increments that several steps share."""
+"""Gyro increments on their way from a motion to an algorithm: pulse quantization, and the increments of each step."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ from strapgen.library import two_speed_sources
 from strapgen.targets import FIXED
 from strapgen.targets.two_speed_c.emit import LOOPS, recursion, wiring
 
-#: Words of so many bits or more hold any double exactly, so that no fraction has to be carried on.
+#: From this word length on, a word resolves what a double does, and the gyro need not count pulses.
 _EXACT_BITS = 53
 
 
@@ -106,8 +106,8 @@ class Loops(ABC):
         values : array, (count, elements)
             Samples in SI units.
         summed : bool, optional
-            Whether the loops sum the samples: rounding then carries what is left over to the next sample, so that a
-            sum is off by at most one unit.
+            Whether the loops sum the samples. In fixed point each then takes over the rounding error of the one before,
+            as from a gyro that counts pulses, and a sum is off by at most one unit.
         """
         if name not in self._arguments:
             with np.errstate(over="ignore"):  # a number that overflows is refused after the run
@@ -192,7 +192,7 @@ class LoopsFromPython(Loops):
         return np.concatenate(attitudes), np.concatenate(changes)
 
     def _zero(self, cycles: Cycles) -> dict[str, Array]:
-        """Return zeros for all that is handed on from call to call."""
+        """Return zeros for every input that a call receives from the one before."""
         kind = cycles.samples["increment"].dtype
         return {signal.name: np.zeros((1, signal.size), kind) for signal in self.wires.memory}
 

@@ -40,7 +40,7 @@ class Backend(ABC):
     takes : str
         Name of the step's second input: "increments", or "turns" where a step takes rates at nodes times its length.
     increments, previous : int
-        Number of increments that belong to a step, and of those from before it that it takes in addition.
+        Number of increments of a step, and of increments from before the step that it takes in addition.
     samples : int
         Number of increments that a step takes in all.
     state_shape : tuple of int

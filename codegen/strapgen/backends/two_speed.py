@@ -192,7 +192,7 @@ class TwoSpeed:
 
 
 def _samples(increments: Any, velocity_increments: Any, cycle: int) -> tuple[Array, Array]:
-    """Return checked increments that fill whole navigation cycles of so many fast ones."""
+    """Check the increments, which fill whole navigation cycles of `cycle` fast cycles, and return them."""
     angles = checks.real_array("increments", increments, (3,), np.float64)
     velocities = checks.real_array("velocity_increments", velocity_increments, (3,), np.float64)
     if angles.ndim != 2 or len(angles) % cycle:

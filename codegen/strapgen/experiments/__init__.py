@@ -1,1 +1,1 @@
-"""What is measured with back ends: orders, tables, word lengths, agreement. Computed here, printed elsewhere."""
+"""Experiments measure with back ends: orders, tables, word lengths, agreement. `reports` prints their results."""

@@ -211,7 +211,7 @@ def _on_backend(
         except InputError:  # the state leaves the range of its numbers
             return None, 0.0
         distances = np.linalg.norm(run.computed - run.true, axis=(-2, -1)) / math.sqrt(2)
-        # Rounding adds up to a unit of the last place a step, in a state of a few elements.
+        # In a step, rounding adds up to one unit in the last place to each of the state's few elements.
         return float(distances.max()), 8 * stepper.unit * count
 
     return measure

@@ -35,7 +35,7 @@ class Table:
     number : int
         Its number.
     title : str
-        What is simulated.
+        Motion of the table in words.
     motion, settings : str, dict
         The motion and its parameters.
     mean : bool

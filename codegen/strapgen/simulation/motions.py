@@ -1,6 +1,6 @@
 """Motions with known attitude: exact increments for an algorithm, and the true attitude to compare with its result.
 
-The formulas are kernels of the catalogue, and run here as generated numpy code with the parameters of a motion.
+The formulas are kernels of the catalogue; the generated numpy code of the kernels evaluates them.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +18,6 @@ from strapgen.backends import evaluator
 from strapgen.backends.increments import windows
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
-
-if TYPE_CHECKING:
-    pass
 
 Array = NDArray[np.float64]
 
