@@ -847,7 +847,7 @@ def test_an_interrupt_stops_a_study_at_once(tmp_path):
         assert process.poll() is None
         process.send_signal(signal.SIGINT)
         try:
-            _, said = process.communicate(timeout=10)
+            _, said = process.communicate(timeout=60)  # of a busy machine; the cases take minutes
         finally:
             process.kill()
     assert process.returncode == 130

@@ -6,6 +6,7 @@ import json
 import re
 import shlex
 from fractions import Fraction
+from functools import cache
 from itertools import product
 
 import pytest
@@ -24,6 +25,7 @@ from strapgen.targets import FIXED, TARGETS
 KERNELS = [choice.kernel for choice in standard()]
 
 
+@cache
 def emitted(kernel, target):
     """Return the sources of a kernel, in fixed point with ranges for the inputs that have none."""
     program = programs()[kernel]
