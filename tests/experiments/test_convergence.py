@@ -57,7 +57,9 @@ def test_every_method_has_its_order_with_enough_increments(algorithm, method, co
     increments = catalogue.enough(method)
     steps = LADDER if order_of(method) > 4 else SHORT
     found = converge(choose(algorithm, method, increments), coning, steps, 1)
-    assert found.predicted == order_of(method)
+    # From three samples on a Taylor series is symmetric about the middle of the step, and odd orders gain one.
+    gained = method.startswith("taylor") and increments > 2 and order_of(method) % 2
+    assert found.predicted == order_of(method) + gained
     assert found.observed == pytest.approx(found.predicted, abs=WITHIN)
 
 
