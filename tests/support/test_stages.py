@@ -23,7 +23,7 @@ def arguments() -> dict[str, object]:
     sources = strapgen.generate(program, "numpy")
     return {
         "name": "euler",
-        "choice": strapgen.choose("euler-product"),
+        "choice": strapgen.choose("euler", "rk1", 1),
         "kernel": kernel,
         "program": program,
         "fixed": strapgen.quantize(program),
@@ -63,7 +63,7 @@ TAKEN = {
     "generate": {"program", "fixed"},
     "generate in fixed point": {"program", "fixed"},
     "build": {"sources"},
-    "backend": {"name"},
+    "backend": {"name", "choice"},
     "evaluator": {"name", "choice"},
     "simulate": {"backend"},
     "simulate along": {"motion"},
@@ -94,8 +94,8 @@ SAID = {
         "sources",
     ): "generate takes a Program or a FixedProgram, not Sources; strapgen.build takes them",
     ("lower", "choice"): "lower takes a Kernel, not a Choice; strapgen.derive(choice) makes one",
-    ("backend", "sources"): "backend takes a name or a path, not Sources; strapgen.build takes them",
-    ("backend", "motion"): "backend takes a name or a path, not a Motion; strapgen.simulate takes it",
+    ("backend", "sources"): "backend takes a name or a path or a Choice, not Sources; strapgen.build takes them",
+    ("backend", "motion"): "backend takes a name or a path or a Choice, not a Motion; strapgen.simulate takes it",
     ("evaluator", "program"): "evaluator takes a name or a Choice, not a Program; strapgen.generate takes it",
     ("build", "program"): "build takes Sources, not a Program; strapgen.generate(program, target) makes them",
     ("build", "kernel"): "build takes Sources, not a Kernel; "

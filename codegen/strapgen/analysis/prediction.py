@@ -93,9 +93,9 @@ def predict(
 
     Examples
     --------
-    >>> from strapgen.simulation.motions import motion
-    >>> found = predict(catalogue.choose("dcm", "rk1"), motion("constant", y_deg_s=10), "1/8", 180, 5)
-    >>> round(float(mpmath.degrees(found.drift[-1][1])), 3)
+    >>> from strapgen import choose, motion
+    >>> prediction = predict(choose("dcm", "rk1"), motion("constant", y_deg_s=10), "1/8", 180, 5)
+    >>> round(float(mpmath.degrees(prediction.drift[-1][1])), 3)
     0.286
     """
     rates = error_rate(choice, motion.name, terms)
