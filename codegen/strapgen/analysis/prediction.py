@@ -93,6 +93,7 @@ def predict(
 
     Examples
     --------
+    >>> from strapgen import catalogue
     >>> from strapgen.simulation.motions import motion
     >>> found = predict(catalogue.choose("dcm", "rk1"), motion("constant", y_deg_s=10), "1/8", 180, 5)
     >>> round(float(mpmath.degrees(found.drift[-1][1])), 3)
