@@ -94,8 +94,14 @@ SAID = {
         "sources",
     ): "generate takes a Program or a FixedProgram, not Sources; strapgen.build takes them",
     ("lower", "choice"): "lower takes a Kernel, not a Choice; strapgen.derive(choice) makes one",
-    ("backend", "sources"): "backend takes a name or a path or a Choice, not Sources; strapgen.build takes them",
-    ("backend", "motion"): "backend takes a name or a path or a Choice, not a Motion; strapgen.simulate takes it",
+    (
+        "backend",
+        "sources",
+    ): "backend takes a name or a path or a Choice, not Sources; strapgen.build takes them",
+    (
+        "backend",
+        "motion",
+    ): "backend takes a name or a path or a Choice, not a Motion; strapgen.simulate takes it",
     ("evaluator", "program"): "evaluator takes a name or a Choice, not a Program; strapgen.generate takes it",
     ("build", "program"): "build takes Sources, not a Program; strapgen.generate(program, target) makes them",
     ("build", "kernel"): "build takes Sources, not a Kernel; "
