@@ -1,4 +1,4 @@
-"""Units that a person reads."""
+"""Converts rad to the units that reports show."""
 
 from __future__ import annotations
 
