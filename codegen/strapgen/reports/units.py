@@ -1,4 +1,4 @@
-"""Converts rad to the units that reports show."""
+"""Units in which reports show mean rates to a reader, with the factors to them."""
 
 from __future__ import annotations
 
