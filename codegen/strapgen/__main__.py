@@ -1,4 +1,4 @@
-"""``python -m strapgen``."""
+"""``python -m strapgen`` runs the command line."""
 
 from strapgen.cli import main
 

@@ -1,4 +1,4 @@
-"""Comparison of predicted and simulated drift while the step is halved.
+"""Agreement runs an algorithm with smaller and smaller steps and sets its drift beside the predicted drift.
 
 Both are computed in many digits, so that rounding does not hide a difference.
 """

@@ -1,4 +1,4 @@
-"""The errors at a constant rate, in closed form, for one step and for any number of steps.
+"""Closed forms of the errors that an algorithm makes at a constant rate, in one step and in any number of steps.
 
 A step by the angle x rotates the plane across the axis by atan2(s, c) and stretches it by (s^2 + c^2)^(1/2), where s
 and c are the approximations of sin x and cos x by the method. All steps are equal and commute, so N steps lose N times

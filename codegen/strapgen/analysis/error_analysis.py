@@ -1,4 +1,4 @@
-"""The errors of one algorithm on one motion: of a step, of a run, in closed form where there is one, and the growth."""
+"""`analyse` derives everything that `strapgen series` shows: the errors of one algorithm on one motion."""
 
 from __future__ import annotations
 

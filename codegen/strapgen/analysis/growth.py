@@ -1,4 +1,4 @@
-"""The growth of the length of a state, or of the determinant of a matrix, in a step.
+"""The growth of a state in a step, as the change of its length or, for a matrix, of its determinant.
 
 `growth` derives its series, and `stability` the steps at a constant rate for which no state grows.
 """

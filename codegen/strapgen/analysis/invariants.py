@@ -1,4 +1,4 @@
-"""Errors in vector-invariant form: sums of vectors and cross products of the rate and its derivatives.
+"""Writes errors in vector-invariant form, as sums of vectors and cross products of the rate and its derivatives.
 
 The form is not unique, because any four vectors, and their products, are linearly dependent. The result is the first
 solution in the fixed order of terms of `Frame`.

@@ -1,4 +1,4 @@
-"""The rates of the catalogue's motions and their derivatives, as polynomials for the coefficients of series."""
+"""Returns the rates of the catalogue's motions and their derivatives, as polynomials for the coefficients of series."""
 
 from __future__ import annotations
 

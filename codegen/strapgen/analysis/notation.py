@@ -1,4 +1,4 @@
-"""Notation: how invariants and intervals of angles are written, in results as data and in reports."""
+"""Writes vector invariants and intervals of angles as text, for the data and the reports of an analysis."""
 
 from __future__ import annotations
 

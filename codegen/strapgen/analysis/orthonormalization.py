@@ -1,4 +1,4 @@
-"""The effect of orthonormalization on a small error: appendix B of the thesis for every scheme of the catalogue."""
+"""`effect` derives what an orthonormalization scheme does to a small error, as appendix B of the thesis does."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Overview of the catalogue: order, leading error terms, operations of a step, and error at equal work."""
+"""The overview compares algorithms by order, leading error terms, operations of a step and error at equal work."""
 
 from __future__ import annotations
 

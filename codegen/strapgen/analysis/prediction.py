@@ -1,4 +1,4 @@
-"""Errors of a run, predicted from the series of the error rate instead of a simulation."""
+"""Predicts the errors of a run from the series of the error rate, without a simulation."""
 
 from __future__ import annotations
 

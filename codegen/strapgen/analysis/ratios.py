@@ -1,4 +1,4 @@
-"""Comparison of two algorithms by the exact ratio of their errors, with its next term."""
+"""Compares two algorithms by the exact ratio of their leading errors, with the next term of the ratio."""
 
 from __future__ import annotations
 

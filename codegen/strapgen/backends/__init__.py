@@ -1,4 +1,4 @@
-"""Back ends by name."""
+"""Back ends run generated algorithms: `backend` and `build` return one, `evaluator` a kernel as a callable."""
 
 from __future__ import annotations
 

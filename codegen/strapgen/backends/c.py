@@ -1,4 +1,4 @@
-"""The C back ends: generated C in double and in float, called through cffi, with all loops in C."""
+"""The C back ends compile generated C in double or float and call it through cffi; all loops are in C."""
 
 from __future__ import annotations
 

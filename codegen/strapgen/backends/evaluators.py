@@ -1,4 +1,4 @@
-"""Evaluators: kernels as callables on arrays, one class for each kind of code."""
+"""Evaluators let Python call any kernel on arrays; each kind of generated code has a subclass of `Evaluator`."""
 
 from __future__ import annotations
 

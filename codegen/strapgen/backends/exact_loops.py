@@ -1,4 +1,4 @@
-"""The loops of an algorithm in two speeds in arithmetic of 40 digits."""
+"""Runs the loops of an algorithm in two speeds in arithmetic of 40 digits."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Gyro increments on their way from a motion to an algorithm: pulse quantization, and the increments of each step."""
+"""Prepares gyro increments for an algorithm: `pulses` quantizes them, `windows` cuts them into what each step takes."""
 
 from __future__ import annotations
 

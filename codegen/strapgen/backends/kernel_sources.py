@@ -1,4 +1,4 @@
-"""What back ends run: the generated text of a kernel or, where a back end interprets it, the program itself."""
+"""Returns what a back end runs: the generated text of a kernel or, for a back end that interprets it, its program."""
 
 from __future__ import annotations
 

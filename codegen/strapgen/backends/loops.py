@@ -1,4 +1,4 @@
-"""The loops of an algorithm in two speeds, called one by one from Python."""
+"""Runs the loops of an algorithm in two speeds from Python, one call for each cycle."""
 
 from __future__ import annotations
 

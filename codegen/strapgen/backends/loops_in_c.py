@@ -1,4 +1,4 @@
-"""The loops of an algorithm in two speeds in one generated C function."""
+"""Runs the loops of an algorithm in two speeds in one generated C function."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Generated numpy functions as callables."""
+"""The evaluator for generated numpy functions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The protocol of back ends: all that simulator, truth models and tests see of an algorithm that runs."""
+"""`Backend` is the protocol of a running algorithm: simulator, experiments and tests use nothing else of it."""
 
 from __future__ import annotations
 

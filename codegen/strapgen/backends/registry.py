@@ -1,4 +1,4 @@
-"""The table of back ends, and how their classes are loaded."""
+"""`BACKENDS` lists the back ends by name, and functions here load their classes when they are needed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""All that a back end is built from, as plain data: the sources of an attitude step and of the step's kernels."""
+"""`StepSources` holds as plain data all that a back end is built from: a step's sources and those of its kernels."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Deriving the kernel of a choice, and what is known of its method beforehand."""
+"""`derive` returns the kernel of a choice; other functions tell what is known of its method without deriving it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Kinematics of the attitude representations: the differential equation of each state.
+"""The kinematics of an attitude representation is the differential equation of its state.
 
 Every state obeys a linear equation dx/dt = f(x, g) with the generator g = scale * w, where w is the body rate. A step
 applied to the identity is the transition, and the product of state and transition is the same step applied to the

@@ -1,4 +1,4 @@
-"""The command line. Each command is a module; what a command needs is imported when it runs."""
+"""The command line: `main` runs the commands, each of which is a module that imports what it needs when it runs."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _drop_output() -> None:
-    """Let what is still to be written go nowhere, so that Python does not stumble over it at its end."""
+    """Discard output that is still buffered, so that Python raises no error when it flushes it at exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 

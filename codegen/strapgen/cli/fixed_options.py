@@ -1,4 +1,4 @@
-"""Options of fixed point that several commands share, and how they are read."""
+"""Options that set the word, the rounding and the ranges of fixed-point code, shared by several commands."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ if TYPE_CHECKING:
 
 _Text = str | None
 
-#: The options of a run, whose own increments or largest rate the formats are chosen for.
+#: The options of a run: its formats are chosen for its own increments, or for a largest rate that is stated.
 RUN_OPTIONS = ("word", "max_rate_deg_s", "rounding", "carry", "drift_allowance")
 
 
 @dataclass(frozen=True)
 class FixedOptions:
-    """Options that say what fixed point is like, and which numbers it must hold."""
+    """Options that set the word and the rounding of fixed-point code, and the largest numbers that it must hold."""
 
     word: Annotated[
         _Text,
         typer.Option(
             "--word",
             metavar="BITS",
-            help="Bits of a word: 16, 32 or 64 in C, 8 to 64 in the integer model.  [default: 32]",
+            help="Word length in bits: 16, 32 or 64 in C, 8 to 64 in the integer model.  [default: 32]",
             show_default=False,
         ),
     ] = None
@@ -40,14 +40,14 @@ class FixedOptions:
         typer.Option(
             "--max-rate-deg-s",
             metavar="RATE",
-            help="Largest body rate about an axis in deg/s; with the step it says what fixed-point formats must hold.",
+            help="Largest body rate about any axis in deg/s; the formats then hold the increments at this rate.",
             show_default=False,
         ),
     ] = None
     step: Annotated[
         _Text,
         typer.Option(
-            "--step", metavar="S", help="Step in s that goes with --max-rate-deg-s.", show_default=False
+            "--step", metavar="S", help="Step length in s; it goes with --max-rate-deg-s.", show_default=False
         ),
     ] = None
     max_angle_rad: Annotated[
@@ -55,7 +55,7 @@ class FixedOptions:
         typer.Option(
             "--max-angle-rad",
             metavar="RAD",
-            help="Largest element of an angle increment in rad, in place of a rate and a step.  [default: 1/8]",
+            help="Largest angle increment about any axis in rad, in place of a rate and a step.  [default: 1/8]",
             show_default=False,
         ),
     ] = None
@@ -71,8 +71,8 @@ class FixedOptions:
         _Text,
         typer.Option(
             "--carry",
-            help="Rounding errors fed back from step to step: none, state, or full, those of state and transition.  "
-            "[default: none]",
+            help="Error feedback, which adds the rounding errors of a step to the next one: none; state for those of "
+            "the state; full for those of the transition too.  [default: none]",
             show_default=False,
         ),
     ] = None
@@ -81,7 +81,7 @@ class FixedOptions:
         typer.Option(
             "--drift-allowance",
             metavar="A",
-            help="By how much an element of the state may exceed 1 in magnitude.  [default: 1/16]",
+            help="Amount by which the magnitude of a state element may exceed 1.  [default: 1/16]",
             show_default=False,
         ),
     ] = None
@@ -90,19 +90,21 @@ class FixedOptions:
         typer.Option(
             "--range",
             metavar="NAME=MAX",
-            help="Largest magnitude of an input whose range strapgen does not know, in the unit of the input.",
+            help="Largest magnitude of the input NAME in its unit, for an input whose range strapgen does not know.",
         ),
     ] = None
     formats: Annotated[
         list[str] | None,
         typer.Option(
-            "--fix", metavar="NAME=Qm.n", help="Format of an argument or a value that you choose yourself."
+            "--fix",
+            metavar="NAME=Qm.n",
+            help="Format of the argument or value NAME, if you choose it yourself.",
         ),
     ] = None
 
     @property
     def stated(self) -> dict[str, Any]:
-        """What the command line states, by option."""
+        """The options that the command line states, with their values."""
         options = {
             "--word": self.word,
             "--max-rate-deg-s": self.max_rate_deg_s,
@@ -117,7 +119,7 @@ class FixedOptions:
         return {option: value for option, value in options.items() if value not in (None, [])}
 
     def settings(self, increments: int) -> Settings | None:
-        """Return what fixed point is generated for, with so many increments a step; None if nothing is stated."""
+        """Return the settings of fixed point for so many increments in a step; None if no option is stated."""
         if not self.stated:
             return None
         from strapgen.ir.fixed_settings import Settings
@@ -141,11 +143,11 @@ class FixedOptions:
         )
 
     def at_step(self, seconds: float) -> FixedOptions:
-        """Return the options with the step of a run, which turns a largest rate into a largest increment."""
+        """Return the options with the step of a run, by which a largest rate becomes a largest increment."""
         return replace(self, step=None if self.max_rate_deg_s is None else repr(seconds))
 
     def check_backend(self, backend: str) -> None:
-        """Refuse what is stated for a back end in floating point."""
+        """Refuse options of fixed point for a back end in floating point."""
         from strapgen.backends import BACKENDS
         from strapgen.support import checks
         from strapgen.targets import FIXED
@@ -157,7 +159,7 @@ class FixedOptions:
     def settings_for_run(
         self, backend: str, increments: int | None, step: float, largest: Callable[[], float]
     ) -> Settings | None:
-        """Return what a run in fixed point is generated for: what is stated, and else its own increments.
+        """Return the settings of a run in fixed point: formats for the stated largest rate, or else for its increments.
 
         Parameters
         ----------
@@ -167,7 +169,7 @@ class FixedOptions:
         step : float
             Step of the run in s.
         largest : callable
-            Tells the largest increment of the run in rad.
+            Returns the largest increment of the run in rad.
 
         Returns
         -------

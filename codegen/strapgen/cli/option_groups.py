@@ -1,4 +1,4 @@
-"""Groups of options: a dataclass declares them once, and a command takes them as one parameter."""
+"""Groups of options: a dataclass declares options once, and each command that has them takes it as one parameter."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _KEYWORD = Parameter.KEYWORD_ONLY
 
 
 class Shown(NamedTuple):
-    """How a command shows a group; it stands in the parameter's annotation.
+    """Which options of a group a command has, and where its help shows them; it stands in the parameter's annotation.
 
     Parameters
     ----------

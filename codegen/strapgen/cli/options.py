@@ -1,4 +1,4 @@
-"""Options and arguments that several commands share: the choice of an algorithm, and how texts are read."""
+"""Options that choose an algorithm and its method, shared by several commands, and readers of option values."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ if TYPE_CHECKING:
 Algorithm = Annotated[
     str,
     typer.Argument(
-        help="dcm, euler, cayley-klein, another kernel of strapgen list, or your own Python file."
+        help="dcm, euler, cayley-klein, any other kernel that strapgen list shows, or a Python file of your own."
     ),
 ]
 StepAlgorithm = Annotated[
-    str, typer.Argument(help="dcm, euler or cayley-klein, or a Python file with an algorithm of your own.")
+    str, typer.Argument(help="dcm, euler or cayley-klein, or a Python file with your own algorithm.")
 ]
 Increments = Annotated[
     str | None,
     typer.Option(
         "--increments",
         metavar="N",
-        help="Angle increments in a step, 1 to 8.  [default: 2]",
+        help="Number of angle increments in a step, 1 to 8.  [default: 2]",
         show_default=False,
     ),
 ]
@@ -37,7 +37,7 @@ Increments = Annotated[
 
 @dataclass(frozen=True)
 class MethodOptions:
-    """Options that choose how an algorithm integrates, and what it takes."""
+    """Options that choose the integration method of an algorithm and the samples that a step takes."""
 
     method: Annotated[
         str | None,
@@ -52,7 +52,7 @@ class MethodOptions:
         typer.Option(
             "--tableau",
             metavar="FILE",
-            help="TOML file with a Butcher tableau, a method of your own.",
+            help="TOML file with the Butcher tableau of your own method, in place of --method.",
             show_default=False,
         ),
     ] = None
@@ -62,7 +62,7 @@ class MethodOptions:
         typer.Option(
             "--previous",
             metavar="N",
-            help="Increments from before the step that it also takes, 0 to 3.  [default: 0]",
+            help="Number of increments from before the step that it uses as well, 0 to 3.  [default: 0]",
             show_default=False,
         ),
     ] = None
@@ -70,7 +70,7 @@ class MethodOptions:
         bool,
         typer.Option(
             "--rates",
-            help="Let the step take the rate at the method's nodes, times the step length, not increments.",
+            help="Let the step take, in place of increments, body rates at the method's nodes, times the step length.",
         ),
     ] = False
 
@@ -110,12 +110,12 @@ def limit(what: str, value: str | None) -> float | None:
 
 
 def listed(option: str, text: str, empty: str = "") -> list[str]:
-    """Return the values of a list with commas between, each once.
+    """Return the values of a comma-separated list, each once.
 
     Raises
     ------
     InputError
-        If there is none: the option, and `empty`.
+        If there is none; the message is the option and `empty`.
     """
     values = list(dict.fromkeys(value.strip() for value in text.split(",") if value.strip()))
     if not values:

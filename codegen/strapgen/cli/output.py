@@ -1,4 +1,4 @@
-"""Where the output of a command goes: to the terminal, or into files that are written whole or not at all."""
+"""Options for the output of a command, which goes to the terminal or into files written whole or not at all."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Format = Annotated[str, typer.Option("--format", help="Format of the output: tex
 
 @dataclass(frozen=True)
 class Output:
-    """Options that say where the output goes, and as what."""
+    """Options that say where the output goes, and in which format."""
 
     out: Annotated[
         Path | None,

@@ -1,4 +1,4 @@
-"""Progress on stderr, where a person watches."""
+"""Progress display for long commands: it is shown on stderr, and only if that is a terminal."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from contextlib import contextmanager
 from typing import TypeVar
 
 Item = TypeVar("Item")
-#: Seconds after which something is said to take time, and from one word to the next.
+#: Seconds before the first message, and from one message to the next.
 _PATIENCE, _INTERVAL = 1.0, 1.0
-#: Takes a terminal back to the beginning of an empty line.
+#: Clears the line of a terminal and returns to its beginning.
 _WIPE = "\r\x1b[2K"
 
 
 def track(items: Iterable[Item], title: str, total: int) -> Iterator[Item]:
-    """Yield the items and show on a terminal's stderr how many have gone by."""
+    """Yield the items and show on stderr, if it is a terminal, how many are done."""
     if not sys.stderr.isatty():
         yield from items
         return
@@ -28,7 +28,7 @@ def track(items: Iterable[Item], title: str, total: int) -> Iterator[Item]:
 
 @contextmanager
 def waiting(title: str) -> Iterator[None]:
-    """Show on a terminal's stderr for how long one thing has taken, once it takes more than a moment."""
+    """Show on stderr, if it is a terminal, the seconds that a task has taken, once it takes more than one."""
     stream = sys.stderr
     if not stream.isatty():
         yield

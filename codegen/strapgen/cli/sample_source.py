@@ -1,4 +1,4 @@
-"""What several commands run algorithms on: a motion, recorded increments or recorded rates, through gyro pulses."""
+"""Options that say where the increments of a run come from: a motion, a recording of increments or one of rates."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Inputs:
     step : float
         In s.
     title : str
-        What they are, for a reader.
+        Where they come from, in words for a reader.
     """
 
     increments: NDArray[Any]
@@ -51,7 +51,7 @@ class Inputs:
 
 @dataclass(frozen=True)
 class SampleSource:
-    """Options that say what a run takes its increments from."""
+    """Options that say where a run takes its increments from."""
 
     motion: Annotated[
         _Text,
@@ -62,22 +62,24 @@ class SampleSource:
         ),
     ] = None
     settings: MotionSettings = None
-    step: Annotated[_Text, typer.Option("--step", metavar="S", help="Step in s.", show_default=False)] = None
+    step: Annotated[
+        _Text, typer.Option("--step", metavar="S", help="Step length in s.", show_default=False)
+    ] = None
     duration: Annotated[
-        _Text, typer.Option("--duration", metavar="S", help="Duration in s.", show_default=False)
+        _Text, typer.Option("--duration", metavar="S", help="Duration of the run in s.", show_default=False)
     ] = None
     increments_csv: Annotated[
         Path | None,
         typer.Option(
             "--increments-csv",
-            help="Recorded increments in place of a motion: columns t in s, and dx, dy, dz in rad.",
+            help="CSV file of increments, in place of a motion: columns t in s, and dx, dy, dz in rad.",
         ),
     ] = None
     rates_csv: Annotated[
         Path | None,
         typer.Option(
             "--rates-csv",
-            help="Recorded rates in place of a motion: the first four columns are the time in s and three rates.",
+            help="CSV file of rates, in place of a motion: the first four columns are the time in s and three rates.",
         ),
     ] = None
     rate_unit: Annotated[
@@ -91,7 +93,7 @@ class SampleSource:
         typer.Option(
             "--resample-hz",
             metavar="HZ",
-            help="Frequency in Hz of the even grid over which uneven recorded rates are integrated.",
+            help="Integrate unevenly timed rates over an even grid of this frequency in Hz.",
             show_default=False,
         ),
     ] = None
@@ -100,7 +102,7 @@ class SampleSource:
         typer.Option(
             "--pulse-arcsec",
             metavar="ANGLE",
-            help="Angle of a gyro pulse in arc seconds; increments become whole pulses, and the rest is carried on.",
+            help="Angle of a gyro pulse in arc seconds; increments become whole pulses, the rest goes into the next.",
             show_default=False,
         ),
     ] = None
@@ -164,12 +166,12 @@ class SampleSource:
         return recording.read_rates(self.rates_csv or "", self.rate_unit or "", self.resample_hz)
 
     def read(self, samples: int, previous: int = 0) -> Inputs:
-        """Return the increments that the options stand for.
+        """Return the increments that the options describe.
 
         Parameters
         ----------
         samples, previous : int
-            Increments of a step, and those before it that it takes too.
+            Increments of a step, and those from before it that it takes as well.
 
         Returns
         -------

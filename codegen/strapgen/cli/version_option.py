@@ -1,4 +1,4 @@
-"""Options of the program itself, before the name of a command: --version and --verbose."""
+"""The options --version and --verbose, which stand before the name of a command."""
 
 from __future__ import annotations
 
@@ -61,12 +61,17 @@ def options(
     show_version: Annotated[
         bool,
         typer.Option(
-            "--version", callback=_show, is_eager=True, help="Show all versions that shape the output."
+            "--version",
+            callback=_show,
+            is_eager=True,
+            help="Show the versions of strapgen and of what its output depends on.",
         ),
     ] = False,
     verbose: Annotated[
         bool,
-        typer.Option("--verbose", help="Show on stderr how long each stage takes, and what the cache holds."),
+        typer.Option(
+            "--verbose", help="Show on stderr how long each stage takes, and what comes from the cache."
+        ),
     ] = False,
 ) -> None:
     """Derive strapdown attitude algorithms, generate numpy and C code for them, and test it against truth.

@@ -1,4 +1,4 @@
-"""Back ends side by side: the same algorithm on the same increments, in lock-step, against a reference."""
+"""`compare` runs back ends over the same increments and shows how far each is from a reference."""
 
 from __future__ import annotations
 

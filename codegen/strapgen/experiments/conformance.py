@@ -1,4 +1,4 @@
-"""The standard behaviour of an attitude step: measurements that any algorithm has to pass."""
+"""`check` tests the behaviour that every attitude step must show, one `Finding` for each property."""
 
 from __future__ import annotations
 

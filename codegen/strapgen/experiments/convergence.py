@@ -1,4 +1,4 @@
-"""The observed order of an algorithm: its error on a ladder of steps, and the slope of that."""
+"""`converge` measures the order of an algorithm from its errors on a ladder of step lengths."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The tables of the thesis, predicted from series without a simulation."""
+"""Predicts the tables of the thesis from error series and sets them beside simulations."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The rate-table test of 1984: 70 deg/s about all three axes at once, steady and swinging, through 90 deg of pitch."""
+"""`stress` runs the rate-table test of 1984 at 70 deg/s about all three axes, through 90 deg of pitch."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The five tables of the thesis, computed again on every back end."""
+"""Computes the five tables of the thesis again, on every back end."""
 
 from __future__ import annotations
 

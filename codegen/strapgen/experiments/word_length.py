@@ -1,4 +1,4 @@
-"""The word-length study: how much rounding, quantization and truncation each add to the drift of an algorithm."""
+"""The word-length study measures how much rounding, quantization and truncation each add to the drift."""
 
 from __future__ import annotations
 

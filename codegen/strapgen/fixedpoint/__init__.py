@@ -1,4 +1,4 @@
-"""Fixed point: programs become integer code with proved ranges and certified error bounds."""
+"""`quantize` turns a program into integer code with proved ranges and certified error bounds."""
 
 from strapgen.ir.fixed_interface import Interface
 from strapgen.ir.fixed_settings import Settings

@@ -1,4 +1,4 @@
-"""How the rounding of one step adds up over a run.
+"""Bounds how the rounding errors of single steps add up over a run.
 
 The computed state obeys x' = x T + x d + r: T the exact transition, d the error of the computed one, r the rounding of
 the state. A step stretches an error by at most the norm of T. With error feedback, what is rounded off in one step is

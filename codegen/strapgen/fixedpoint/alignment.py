@@ -1,4 +1,4 @@
-"""Formats that let products meet at one place, so that sums need no shifts before they are rounded."""
+"""Chooses coarser formats that let the products of a sum be added without shifts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Angles as chains of exact quantities: atan2, and angles that are brought back by a whole turn."""
+"""Derives atan2, and angles that are reduced by whole turns, as chains of exact quantities."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Chains of exact quantities: what a function is made of, every link with a proved range."""
+"""`Chain` collects the exact quantities from which a function is computed, each with a proved range."""
 
 from __future__ import annotations
 

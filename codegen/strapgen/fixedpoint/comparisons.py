@@ -1,4 +1,4 @@
-"""What comes from comparisons, as integers: maxima, selections, values inside their ranges, nearest integers."""
+"""Writes results of comparisons as integers: maxima, selections, values limited to their range, nearest integers."""
 
 from __future__ import annotations
 

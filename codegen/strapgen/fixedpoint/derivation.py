@@ -1,4 +1,4 @@
-"""From a program to exact quantities: trees of operations become sums of products, functions become series.
+"""Turns a program into exact quantities: trees of operations become sums of products, functions become series.
 
 Ranges are proved on the way; an operation that fixed point does not have is refused.
 """

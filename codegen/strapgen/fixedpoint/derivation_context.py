@@ -1,4 +1,4 @@
-"""What a derivation of exact quantities has come to know: the quantities, their ranges and values on sample inputs."""
+"""`DerivationContext` holds the quantities derived so far from a program, with their ranges and sample values."""
 
 from __future__ import annotations
 

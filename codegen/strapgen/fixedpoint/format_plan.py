@@ -1,4 +1,4 @@
-"""Formats that are known before anything is lowered: those of the inputs, and of what a user or a result fixes."""
+"""Fixes the formats that follow from inputs, user and results alone, before any quantity becomes an integer."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Series of sine, cosine and arctangent, and a rational pi, with bounds of their errors."""
+"""Computes series of sine, cosine and arctangent, and a rational pi, with bounds of their errors."""
 
 from __future__ import annotations
 

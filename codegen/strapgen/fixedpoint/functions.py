@@ -1,4 +1,4 @@
-"""Sine, cosine, sin(x)/x and atan2 as sums of products, quotients and selections, with bounds of what is left out.
+"""Derives sine, cosine, sin(x)/x and atan2 as sums of products, quotients and selections, with bounds of their errors.
 
 Every function is derived from the computed value of its argument, taken as exact: then all comparisons are exact, the
 argument is reduced by identities, and a polynomial is cut where a word cannot tell any more. The derivative alone tells

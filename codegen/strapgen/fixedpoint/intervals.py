@@ -1,4 +1,4 @@
-"""Intervals with dyadic rational ends, rounded outward: every operation holds all results of its arguments."""
+"""`Interval` is exact interval arithmetic: ends are dyadic rationals, rounded outward to enclose every result."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Ranges and formats of the inputs, as the user states them."""
+"""Returns the range and the finest format of every input, from what the user states."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Operands of comparisons and quotients: integers that share their fraction bits."""
+"""Brings the operands of comparisons and quotients to integers with the same number of fraction bits."""
 
 from __future__ import annotations
 

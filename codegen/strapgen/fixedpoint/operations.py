@@ -1,4 +1,4 @@
-"""Operations that are no sums of products, as exact quantities: quotients, roots, maxima, selections and functions."""
+"""Derives the operations that are not sums of products: quotients, roots, maxima, selections and functions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sample inputs of a program: they hint where a range may be narrower than proved, and no proof rests on them."""
+"""Computes sample inputs of a program, which hint where a range may be narrower than proved; no proof rests on them."""
 
 from __future__ import annotations
 

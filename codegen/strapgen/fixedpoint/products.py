@@ -1,4 +1,4 @@
-"""Trees of operations as sums of products: every term is a multiple of at most two stored quantities."""
+"""Writes trees of operations as sums of products, each term a multiple of at most two stored quantities."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Exact quantities: what a fixed-point program stores, before anything is rounded.
+"""Exact quantities are the values that a fixed-point program stores, before anything is rounded.
 
 Every quantity is an exact sum of products of quantities before it, or one operation on them. A quantity that stays near
 a constant is stored as its distance from that constant, which is small and so has a finer scale: 1 - x is stored as

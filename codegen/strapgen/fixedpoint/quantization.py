@@ -1,4 +1,4 @@
-"""From exact quantities to integers: formats from ranges, one rounding a sum, an error bound for every value."""
+"""Turns exact quantities into integers: chooses formats from ranges, rounds each sum once, and bounds every error."""
 
 from __future__ import annotations
 

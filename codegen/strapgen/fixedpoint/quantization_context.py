@@ -1,4 +1,4 @@
-"""What a walk over exact quantities has come to know: the integers so far, with their ranges and error bounds."""
+"""`Quantization` holds the integers so far that stand for exact quantities, with their ranges and error bounds."""
 
 from __future__ import annotations
 

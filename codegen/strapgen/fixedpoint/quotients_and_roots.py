@@ -1,4 +1,4 @@
-"""Quotients and square roots as integers, rounded."""
+"""Writes quotients and square roots as rounded integers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Ranges of sums of products: by interval arithmetic, by expansion in the inputs, and by cutting the inputs' box."""
+"""Proves ranges of sums of products by interval arithmetic, by expansion in the inputs, and by splitting their box."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Truncated series: polynomials of bounded variables up to a degree, with a bound of all terms that are left out.
+"""Truncated series are polynomials of bounded variables up to a degree, with a bound of all terms left out.
 
 Coefficients are integers in units of 2^-192; the bound includes what their rounding loses.
 """

@@ -1,4 +1,4 @@
-"""Sine, cosine and sin(x)/x as chains of exact quantities."""
+"""Derives sine, cosine and sin(x)/x as chains of exact quantities."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sums of products as integers: exact products, aligned, added up and rounded once, with or without error feedback."""
+"""Writes sums of products as integers: products are aligned, added and rounded once, with error feedback or without."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Terms of sums as integers at one place, with bounds of their partial sums and of what shifts lose."""
+"""Aligns the terms of sums as integers of one scale, and bounds their partial sums and what shifts lose."""
 
 from __future__ import annotations
 

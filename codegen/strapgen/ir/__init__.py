@@ -1,1 +1,1 @@
-"""What the stages exchange: signals, programs, integer programs, sources. No SymPy."""
+"""The forms that the stages exchange: signals, programs, integer programs and sources. No module here uses SymPy."""

@@ -1,4 +1,4 @@
-"""The attitude step's kernels: product, orthonormalization and conversion to a direction cosine matrix."""
+"""What a back end needs of an attitude step beside the step: its other kernels, its identity and its orders."""
 
 from __future__ import annotations
 

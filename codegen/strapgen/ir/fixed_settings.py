@@ -1,4 +1,4 @@
-"""Settings of a fixed-point program: the user states them, and everything else is derived from them."""
+"""`Settings` are the settings of fixed point that a user states: word, largest increment, rounding, error feedback."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Fixed-point formats: their words and fraction bits, and the notation Qm.n."""
+"""`Format` is a fixed-point format: a word, its fraction bits, and the notation Qm.n."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Programs and generated sources by choice, from the cache; what is not there yet, `pipeline` compiles.
+"""Returns the program and the generated sources of a choice, from the cache or, if they are new, from `pipeline`.
 
 The key of an entry is the choice with the generator itself, its code and templates: after a change of either, entries
 are generated again, and what runs agrees with the derivation. A second use loads neither SymPy nor Jinja; another

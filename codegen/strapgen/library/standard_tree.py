@@ -1,4 +1,4 @@
-"""The standard catalogue as a tree of generated files: writing it, and comparing it with a folder."""
+"""Writes the standard catalogue as a tree of generated files, and compares it with a folder."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Generated sources of algorithms in two speeds: three loops, in fixed point with formats that match, and their C."""
+"""Generates the sources of an algorithm in two speeds: its three loops, with formats that match, and their C."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sums, products and polynomials as trees of nodes.
+"""Builds sums, products and polynomials as trees of nodes.
 
 Every module that writes arithmetic builds it here, so that signs, constants and equal coefficients are treated alike.
 """

@@ -1,4 +1,4 @@
-"""The gate: SymPy expressions become the nodes of a program.
+"""The gate turns SymPy expressions into the nodes of a program; SymPy goes no further.
 
 A sum ends with its constant, so that the constant is rounded once. Terms with the same coefficient are summed before
 they are multiplied by it, and negative terms are subtracted.

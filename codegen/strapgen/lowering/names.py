@@ -1,4 +1,4 @@
-"""Names of temporaries, which stand for no quantity of the algorithm: passes may drop, split or rescale them."""
+"""Makes and recognizes names of temporaries, which passes may drop, split or rescale."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Results as text, tables, JSON, CSV and pictures."""
+"""Reports write results as text, tables, JSON, CSV and pictures."""

@@ -1,4 +1,4 @@
-"""Predicted beside simulated drift, as text."""
+"""Reports predicted beside simulated drift as text."""
 
 from __future__ import annotations
 

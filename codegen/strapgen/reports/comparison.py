@@ -1,4 +1,4 @@
-"""Back ends side by side, as text, JSON and CSV."""
+"""Reports a comparison of back ends as text, JSON and CSV."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Findings about a step, as text."""
+"""Reports the findings of `check` about a step as text."""
 
 from __future__ import annotations
 

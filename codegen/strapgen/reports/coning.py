@@ -1,4 +1,4 @@
-"""Coning coefficients and the drift that they leave, as plain data and as text."""
+"""Reports coning coefficients, and the drift that remains with them, as plain data and as text."""
 
 from __future__ import annotations
 

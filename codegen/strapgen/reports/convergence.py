@@ -1,4 +1,4 @@
-"""Observed orders as text and CSV."""
+"""Reports observed orders as text and CSV."""
 
 from __future__ import annotations
 

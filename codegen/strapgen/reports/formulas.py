@@ -1,4 +1,4 @@
-"""Kernels in words: their formulas as text, LaTeX or plain data."""
+"""Writes the formulas of kernels and programs as text, LaTeX or plain data."""
 
 from __future__ import annotations
 

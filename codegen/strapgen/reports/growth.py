@@ -1,4 +1,4 @@
-"""Stability of steps, as text."""
+"""Reports the stability of steps as text."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""LaTeX that several reports write."""
+"""Functions that write LaTeX for several reports."""
 
 from __future__ import annotations
 

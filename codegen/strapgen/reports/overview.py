@@ -1,4 +1,4 @@
-"""The catalogue side by side, as text."""
+"""Reports the overview of the catalogue as text, with one row for each algorithm and method."""
 
 from __future__ import annotations
 

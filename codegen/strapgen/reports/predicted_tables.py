@@ -1,4 +1,4 @@
-"""The thesis's tables from the series, as text."""
+"""Reports the tables of the thesis, as the series predict them, as text."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The rate-table test as text."""
+"""Reports the rate-table test as text."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Ratios of errors as text and LaTeX."""
+"""Reports ratios of errors as text and LaTeX."""
 
 from __future__ import annotations
 

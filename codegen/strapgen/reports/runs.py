@@ -1,4 +1,4 @@
-"""Reports of runs and recordings: JSON data, comma-separated values, text."""
+"""Reports runs and recordings as JSON data, comma-separated values and text."""
 
 from __future__ import annotations
 

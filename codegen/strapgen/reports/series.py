@@ -1,4 +1,4 @@
-"""The error analysis of one algorithm on one motion, as text and LaTeX."""
+"""Reports the error analysis of one algorithm on one motion as text and LaTeX."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tables: columns that say how their cells are written, laid out as text, comma-separated values or Markdown."""
+"""Lays out tables from columns that say how their cells are written, as text, comma-separated values or Markdown."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Butcher tableaux and what their order conditions say, as plain data and as text."""
+"""Reports Butcher tableaux, and what their order conditions say, as plain data and as text."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The thesis's tables, simulated, as text."""
+"""Reports the simulated tables of the thesis as text."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Units that a person reads."""
+"""Units in which reports show mean rates to a reader, with the factors to them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Mean rates under vibration, as plain data, text and LaTeX."""
+"""Reports mean rates under vibration as plain data, text and LaTeX."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Word lengths and their drift, as text and CSV."""
+"""Reports the word-length study as text and CSV."""
 
 from __future__ import annotations
 

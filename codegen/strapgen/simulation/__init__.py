@@ -1,1 +1,1 @@
-"""Runs of back ends: on motions with known attitude, on recordings, along courses."""
+"""Runs back ends on motions with known attitude and on recordings."""

@@ -1,4 +1,4 @@
-"""Algorithms in two speeds along recorded gyro and accelerometer increments, cycle by cycle."""
+"""`course` runs an algorithm in two speeds along recorded gyro and accelerometer increments, cycle by cycle."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Attitudes of a run in so many digits that rounding cannot be seen, and the true attitudes beside them."""
+"""Computes the attitudes of a run in so many digits that rounding cannot be seen, with the true attitudes."""
 
 from __future__ import annotations
 

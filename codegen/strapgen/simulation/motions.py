@@ -1,4 +1,4 @@
-"""Motions with known attitude: exact increments for an algorithm, and the true attitude to compare with its result.
+"""A `Motion` has exact increments for an algorithm, and the true attitude to compare its result with.
 
 The formulas are kernels of the catalogue; the generated numpy code of the kernels evaluates them.
 """

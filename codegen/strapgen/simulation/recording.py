@@ -1,4 +1,4 @@
-"""Recorded gyro data: files of increments or rates are read, and propagated by an algorithm."""
+"""Reads recorded gyro data from files, as increments or rates, and runs an algorithm along it."""
 
 from __future__ import annotations
 

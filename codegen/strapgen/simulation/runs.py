@@ -1,4 +1,4 @@
-"""The simulator runs an algorithm on a motion and compares each attitude with the true one."""
+"""`simulate` runs an algorithm on a motion and compares each attitude with the true one."""
 
 from __future__ import annotations
 

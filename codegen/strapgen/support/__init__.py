@@ -1,1 +1,1 @@
-"""The ground: checks, errors, files. It knows nothing of algorithms."""
+"""Functions that all other folders use: checks, errors, files, cache and timing. They know nothing of algorithms."""

@@ -1,4 +1,4 @@
-"""Checks of the names, numbers and arrays that a caller passes in."""
+"""Checks the names, numbers and arrays that a caller passes in; a refusal is one line."""
 
 from __future__ import annotations
 

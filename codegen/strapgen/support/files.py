@@ -1,4 +1,4 @@
-"""Writing files: all of them or none, and never half of one."""
+"""Writes files all together or not at all, and never half of one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The folders of templates and generated sources, in the wheel or in the checkout."""
+"""Finds the folders of templates and generated sources, in the wheel or in the checkout."""
 
 from __future__ import annotations
 

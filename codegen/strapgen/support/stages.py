@@ -1,4 +1,4 @@
-"""Checks of the stages' arguments: one of another stage is refused with the call that is missing."""
+"""Checks the arguments of the stages: an argument of another stage is refused with the call that is missing."""
 
 from __future__ import annotations
 

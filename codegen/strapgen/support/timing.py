@@ -1,4 +1,4 @@
-"""Timing of the generator's stages, through the logger "strapgen" at level INFO; ``strapgen --verbose`` shows it.
+"""Logs how long the generator's stages take, to the logger "strapgen" at level INFO; ``strapgen --verbose`` shows it.
 
 Each record is one line, and has the fields ``stage``, ``what`` and ``seconds`` for programs that read the log.
 """

@@ -1,1 +1,1 @@
-"""Mathematics on exact expressions: kernels, rotations, series, polynomials. No optimisation."""
+"""Exact mathematics that other folders use: kernels, rotations, series, polynomials. Nothing here optimises code."""

@@ -1,4 +1,4 @@
-"""Expressions evaluated in any arithmetic: numbers, ring elements, intervals; and the functions that SymPy lacks."""
+"""Evaluates expressions in any arithmetic (numbers, ring elements, intervals), and defines functions SymPy lacks."""
 
 from __future__ import annotations
 

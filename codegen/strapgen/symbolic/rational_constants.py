@@ -1,4 +1,4 @@
-"""Irrational constants are rounded once, to so many digits that no target can tell the difference."""
+"""Rounds irrational constants to rational ones, once, with so many digits that no target can tell the difference."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Contracts in words: what headers and docstrings of generated code say about arguments, ranges and errors."""
+"""Writes in words what headers and docstrings of generated code promise about arguments, ranges and errors."""
 
 from __future__ import annotations
 

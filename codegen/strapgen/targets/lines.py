@@ -1,4 +1,4 @@
-"""Breaking the lines of generated text."""
+"""Breaks the lines of generated text."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Names in generated code: a kernel's names, changed where the language or the template already uses them.
+"""Changes a kernel's names in generated code where the language or the template already uses them.
 
 A program is first printed with marks in place of its names. Every identifier without a mark then belongs to the
 template, and the scope in which it stands shows the marks with which it can collide. So no list of a template's

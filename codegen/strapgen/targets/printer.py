@@ -1,4 +1,4 @@
-"""The printer of expressions that the printers of all targets extend."""
+"""The printer writes expressions as source text; the printers of all targets extend it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Renaming: the same program with other names for its function, signals and values."""
+"""`renamed` returns a program with other names for its function, signals and values."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rendering the templates of all targets, with the filters that they share."""
+"""Renders the templates of all targets, with the filters that they share."""
 
 from __future__ import annotations
 

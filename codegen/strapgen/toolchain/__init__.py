@@ -1,1 +1,1 @@
-"""The C compiler, through cffi."""
+"""Compiles generated C and loads it, through cffi."""

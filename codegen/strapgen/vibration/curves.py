@@ -1,4 +1,4 @@
-"""Mean rates as functions of frequency, at constant amplitudes."""
+"""Computes mean rates as functions of frequency, at constant amplitudes."""
 
 from __future__ import annotations
 

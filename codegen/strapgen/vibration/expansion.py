@@ -1,4 +1,4 @@
-"""Expansion of kernels to second order in small inputs, in exact numbers."""
+"""Expands kernels to second order in small inputs, in exact numbers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Adaptive integration over frequency, with an estimate of the error."""
+"""Integrates over frequency with adaptive steps, and estimates the error."""
 
 from __future__ import annotations
 

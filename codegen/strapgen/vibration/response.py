@@ -1,4 +1,4 @@
-"""The mean growth that a kernel computes under vibration, in closed form to second order in the amplitudes."""
+"""Derives in closed form the mean growth that a kernel computes under vibration, to second order in the amplitudes."""
 
 from __future__ import annotations
 

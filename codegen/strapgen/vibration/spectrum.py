@@ -1,4 +1,4 @@
-"""Random vibration: spectra from functions or files, and the mean rates that they cause, equations (68) to (83)."""
+"""Reads the spectra of random vibration and computes the mean rates that it causes, by equations (68) to (83)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The kernel under assessment as a recursion, with its states, samples of the vibration, and a watched sum."""
+"""Writes a kernel under assessment as a recursion, with its states, its samples of the vibration, and a watched sum."""
 
 from __future__ import annotations
 

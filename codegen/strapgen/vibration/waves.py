@@ -1,4 +1,4 @@
-"""Sums of time shifts of one oscillation, and their exact response through a linear recursion."""
+"""`Wave` is a sum of time shifts of one oscillation; its response through a linear recursion is exact."""
 
 from __future__ import annotations
 

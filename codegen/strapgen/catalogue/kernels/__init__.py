@@ -1,1 +1,1 @@
-"""Kernels: attitude steps, conversions, updates, loops of two speeds, motions."""
+"""Modules that derive the kernels of the catalogue: attitude steps, conversions, updates, loops and motions."""

@@ -1,4 +1,4 @@
-"""Attitude steps in transition form, from a kinematics, a method and samples of the rate."""
+"""Derives attitude steps in transition form from a kinematics, a method and samples of the rate."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Coning and sculling by recursion: the sums of a fast loop, and the rotation vector that follows from them."""
+"""Derives the fast and slow loops that compute coning, sculling and the rotation vector by recursion."""
 
 from __future__ import annotations
 

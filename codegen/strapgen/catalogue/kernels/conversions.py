@@ -1,4 +1,4 @@
-"""Conversions between direction cosine matrix, Euler parameters and Cayley-Klein parameters."""
+"""Derives conversions between direction cosine matrix, Euler parameters and Cayley-Klein parameters."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The error matrix of a computed attitude, and its parts: scale, skew and drift."""
+"""Derives the error matrix of a computed attitude, and its parts scale, skew and drift."""
 
 from __future__ import annotations
 

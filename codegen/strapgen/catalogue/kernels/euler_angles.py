@@ -1,4 +1,4 @@
-"""Conversions between direction cosine matrix and Euler angles: rotations by heading, then pitch, then roll."""
+"""Derives conversions between direction cosine matrix and Euler angles: rotations by heading, pitch, then roll."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Motions with a closed-form attitude: body rate, exact angle increments, true direction cosine matrix.
+"""Derives motions with a closed-form attitude: body rate, exact angle increments, true direction cosine matrix.
 
 Formulas whose textbook form is 0/0 somewhere are written with sin(x)/x, which has a value there.
 """

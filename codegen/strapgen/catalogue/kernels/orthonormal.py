@@ -1,4 +1,4 @@
-"""Orthonormalization restores the constraint that a computed attitude has lost to truncation and rounding."""
+"""Derives the orthonormalizations, which restore the constraint that a computed attitude loses to numerical errors."""
 
 from __future__ import annotations
 

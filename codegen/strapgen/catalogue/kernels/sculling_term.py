@@ -1,4 +1,4 @@
-"""The sculling term of a step, by duality with coning."""
+"""Derives the sculling term of a step from the coning term, to which it is dual."""
 
 from __future__ import annotations
 

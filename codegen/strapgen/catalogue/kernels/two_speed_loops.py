@@ -1,4 +1,4 @@
-"""The three loops of a strapdown algorithm in two speeds: the fast, the slow and the navigation loop."""
+"""Derives the three loops of a strapdown algorithm in two speeds: the fast, the slow and the navigation loop."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Attitude updates by the rotation vectors of the body and the navigation frame, exact or truncated."""
+"""Derives attitude updates by the rotation vectors of the body and of the navigation frame, exact or truncated."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""How to integrate: Butcher tableaux, Taylor, Magnus, Munthe-Kaas and coning methods."""
+"""Integration methods of attitude steps: Butcher tableaux, Taylor, Magnus, Munthe-Kaas and coning methods."""

@@ -1,4 +1,4 @@
-"""Exact reading of coefficients from text: fractions, decimals, and expressions with square roots.
+"""Reads the coefficients of tableaux exactly from text: fractions, decimals, and expressions with square roots.
 
 A rational number is a `Fraction`, any other a SymPy expression. SymPy is loaded with the first irrational number, so
 that rational tableaux can be read, and all tableaux listed, without it.

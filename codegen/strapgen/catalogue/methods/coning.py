@@ -1,4 +1,4 @@
-"""Attitude steps by coning coefficients, from increments and their cross products, and the dual for sculling."""
+"""Integrates a step by coning coefficients, from increments and their cross products, and derives the sculling dual."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Design of coning coefficients, which give the second-order term of the rotation vector from cross products.
+"""Designs coning coefficients, which give the second-order term of the rotation vector from cross products.
 
 The term is half the integral of (integral of the rate) x (rate). A design has a weight for the cross product of every
 two samples. Samples do not determine the term, and the forms of a design differ in the rates for which they are exact:

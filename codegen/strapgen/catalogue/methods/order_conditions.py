@@ -1,4 +1,4 @@
-"""Order conditions of Runge-Kutta methods, decided exactly.
+"""Finds the order of a Runge-Kutta method exactly, for general equations and for attitude kinematics.
 
 For general equations the conditions of order p belong to the rooted trees with p nodes: b' Phi(t) = 1/gamma(t), after
 Butcher.

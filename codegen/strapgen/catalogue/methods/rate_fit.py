@@ -1,4 +1,4 @@
-"""Rate extraction: fitting the samples of a step by a polynomial body rate."""
+"""Extracts the body rate from the samples of a step by fitting a polynomial to them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Samples of a step: angle increments, or body rates at nodes."""
+"""`Samples` gives a method the rate during a step, from angle increments or from body rates at nodes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Butcher tableaux as values."""
+"""`Tableau` is the value type of a Butcher tableau: exact coefficients with a name, a source and an order."""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Butcher tableaux of explicit Runge-Kutta methods, read from the files of `methods/` or of a user."""
+"""Reads Butcher tableaux of explicit Runge-Kutta methods from files, and verifies their order conditions.
+
+`TABLEAUX` are those of the folder `butcher_tableaux`; a user's file is read by `read`.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Admission: the checks that a user's kernel passes before any stage works on it. A refusal is one line."""
+"""Admission checks a user's kernel before any stage works on it, and refuses it with one line that says why."""
 
 from __future__ import annotations
 

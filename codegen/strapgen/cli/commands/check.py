@@ -1,4 +1,4 @@
-"""strapgen check."""
+"""The command ``strapgen check`` tests a step and exits with 1 if it fails."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from strapgen.cli.output import Format, check_format, print_json
 def check(
     algorithm: Annotated[
         str,
-        typer.Argument(help="A Python file with an algorithm of your own, or dcm, euler or cayley-klein."),
+        typer.Argument(help="A Python file with your own algorithm, or dcm, euler or cayley-klein."),
     ],
     *,
     method: Annotated[MethodOptions, Shown(only=STEP_OPTIONS)],
     format: Format = "text",
 ) -> None:
-    """Test an algorithm as the project tests its own, and show what holds; exit with 1 if something fails.
+    """Test an algorithm by the behaviour that every attitude step must show; exit with 1 if a test fails.
 
-    Identities are checked in arithmetic of 40 digits, the order on a ladder of steps, and the back ends against exact
-    arithmetic. What stands behind a dash is measured and is yours to judge.
+    Identities are checked in arithmetic of 40 digits, the order is measured on a ladder of step lengths, and every back
+    end is compared with exact arithmetic. A line that begins with a dash is a measurement that has no limit to pass.
 
     Example: strapgen check examples/modified_rodrigues.py
     """

@@ -1,4 +1,4 @@
-"""strapgen compare."""
+"""The command ``strapgen compare`` runs an algorithm on several back ends side by side."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def compare(
         str, typer.Option("--backends", metavar="NAME,...", help="Back ends to compare; see strapgen list.")
     ] = "numpy,c,c-float,c-q31,c-q15",
     reference: Annotated[
-        str, typer.Option("--reference", help="Back end to compare with; exact has 40 digits.")
+        str, typer.Option("--reference", help="Back end to compare with; exact computes with 40 digits.")
     ] = "numpy",
     source: SampleSource,
     fixed: Annotated[FixedOptions, Shown(only=RUN_OPTIONS)],
@@ -32,17 +32,18 @@ def compare(
         typer.Option(
             "--fail-above",
             metavar="RAD",
-            help="Exit with 1 if a back end is further than this angle in rad from the reference.",
+            help="Exit with 1 if a back end departs from the reference by more than this angle in rad.",
             show_default=False,
         ),
     ] = None,
     output: Annotated[Output, Shown(only=("out", "format"))],
 ) -> None:
-    """Run an algorithm on several back ends in lock-step and show how far each is from a reference.
+    """Run an algorithm on several back ends with the same increments, and show how far each is from a reference.
 
-    The table shows the angles from the reference in rad and in units of the last place, for fixed point beside the
-    certified bound; then the drift, the time of a step, its operations and the bytes of its object code. Fixed-point
-    formats are chosen for the increments of the run, or for --max-rate-deg-s if you give it.
+    For each back end the table shows the largest and the rms angle from the reference in rad, for fixed point the
+    certified bound, the largest angle in units in the last place, the drift, the time of a step, the bytes of its
+    object code and its operations. Fixed-point formats are chosen for the increments of the run, or for
+    --max-rate-deg-s if you give it.
 
     Example:
 
@@ -99,7 +100,7 @@ def _check_backends(names: list[str], reference: str) -> None:
 
 
 def _check_fixed(fixed: FixedOptions, backends: set[str]) -> None:
-    """Refuse what is stated of fixed point if no back end of the run can follow it."""
+    """Refuse options of fixed point that no back end of the run uses."""
     from strapgen.backends import BACKENDS
     from strapgen.targets import FIXED
 

@@ -1,4 +1,4 @@
-"""strapgen coning."""
+"""The command ``strapgen coning`` derives coning coefficients and their residual drift."""
 
 from __future__ import annotations
 
@@ -14,38 +14,38 @@ from strapgen.support.exceptions import InputError
 
 def coning(
     samples: Annotated[
-        str, typer.Option("--samples", metavar="N", help="Number of samples of the slow cycle, 1 to 8.")
+        str, typer.Option("--samples", metavar="N", help="Number of gyro samples in a slow cycle, 1 to 8.")
     ],
     previous: Annotated[
         str,
         typer.Option(
             "--previous",
             metavar="N",
-            help="Number of samples from before the slow cycle that it also takes, 0 to 3.",
+            help="Number of samples from before the slow cycle that are used as well, 0 to 3.",
         ),
     ] = "0",
     form: Annotated[
         str,
         typer.Option(
             "--form",
-            help="Form of the correction: compressed for coning, uncompressed for polynomial rates, combined for both.",
+            help="Form of the correction: compressed suits coning, uncompressed polynomial rates, combined both.",
         ),
     ] = "compressed",
     terms: Annotated[
         bool,
         typer.Option(
             "--terms",
-            help="Also list the terms of third and fourth order, of the polynomial through up to six samples.",
+            help="Also list the third- and fourth-order terms of the rotation vector, for up to six samples in all.",
         ),
     ] = False,
     format: Format = "text",
 ) -> None:
-    """Derive coning coefficients for any number of samples exactly, and the drift that they leave.
+    """Derive exact coning coefficients for a number of samples, and show the drift that remains with them.
 
-    A coefficient multiplies older sample x newer sample; the pairs are ordered by the newer sample, then by the older
-    one, the newest pair last. The residual is the mean drift on coning in rad/s, computed minus true, to second order
-    in alpha. It is written as SymPy reads it, in the symbols alpha (half-angle of the cone in rad), omega (its
-    frequency in rad/s) and T (time between samples in s).
+    A coefficient multiplies the cross product older sample x newer sample. The pairs are in the order of the newer
+    sample, then of the older one, so that the newest pair is last. The residual is the mean drift on coning in rad/s,
+    computed minus true, to second order in alpha. It is an expression that SymPy can read, in the symbols alpha
+    (half-angle of the cone in rad), omega (its frequency in rad/s) and T (time between samples in s).
 
     Example: strapgen coning --samples 4 --form combined
     """

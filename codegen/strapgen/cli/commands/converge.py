@@ -1,4 +1,4 @@
-"""strapgen converge."""
+"""The command ``strapgen converge`` measures the order of a step."""
 
 from __future__ import annotations
 
@@ -25,12 +25,15 @@ _Text = str | None
 
 @dataclass(frozen=True)
 class SeveralMethods(MethodOptions):
-    """Options that choose methods to be shown side by side, each on as many increments as it needs if wished."""
+    """Options that choose the methods to show side by side, and the number of increments of each."""
 
     method: Annotated[
         _Text,
         typer.Option(
-            "--method", metavar="NAME,...", help="Integration methods.  [default: rk4]", show_default=False
+            "--method",
+            metavar="NAME,...",
+            help="Integration methods to show side by side.  [default: rk4]",
+            show_default=False,
         ),
     ] = None
     increments: Annotated[
@@ -38,7 +41,7 @@ class SeveralMethods(MethodOptions):
         typer.Option(
             "--increments",
             metavar="N",
-            help="Angle increments in a step, 1 to 8, or enough for as many as the method needs.  [default: 2]",
+            help="Number of angle increments in a step, 1 to 8; or enough: as many as each method needs.  [default: 2]",
             show_default=False,
         ),
     ] = None
@@ -64,7 +67,7 @@ class SeveralMethods(MethodOptions):
 
 @dataclass(frozen=True)
 class Ladder:
-    """Options of the runs, on one motion with a ladder of steps."""
+    """Options of the motion, the ladder of steps and the duration of the runs."""
 
     motion: Annotated[
         _Text,
@@ -77,11 +80,9 @@ class Ladder:
     settings: MotionSettings = None
     steps: Annotated[
         str,
-        typer.Option(
-            "--steps", metavar="S,...", help="Ladder of steps in s, each of them a divisor of the duration."
-        ),
+        typer.Option("--steps", metavar="S,...", help="Step lengths in s; each must divide the duration."),
     ] = "1/2,1/4,1/8,1/16,1/32,1/64,1/128"
-    duration: Annotated[str, typer.Option("--duration", metavar="S", help="Duration in s.")] = "2"
+    duration: Annotated[str, typer.Option("--duration", metavar="S", help="Duration of each run in s.")] = "2"
 
     def check(self) -> None:
         """Check the name of the motion."""
@@ -91,7 +92,7 @@ class Ladder:
             checks.choice("motion", self.motion, MOTIONS)
 
     def profile(self) -> tuple[Motion, str]:
-        """Return the motion, and the runs in words."""
+        """Return the motion, and a description of the runs in words."""
         from strapgen.simulation import motions
 
         parameters = pairs(self.settings or [])
@@ -108,7 +109,10 @@ def converge(
     *,
     methods: Annotated[SeveralMethods, Shown(only=STEP_OPTIONS)],
     backend: Annotated[
-        str, typer.Option("--backend", help="Back end; exact (40 digits) shows any order. See strapgen list.")
+        str,
+        typer.Option(
+            "--backend", help="Back end; exact (40 digits) shows even high orders. See strapgen list."
+        ),
     ] = "exact",
     ladder: Ladder,
     fail_beyond: Annotated[
@@ -116,15 +120,16 @@ def converge(
         typer.Option(
             "--fail-beyond",
             metavar="D",
-            help="Exit with 1 if an observed order is further than this from the predicted one.",
+            help="Exit with 1 if an observed order differs from the predicted one by more than D.",
             show_default=False,
         ),
     ] = None,
     output: Output,
 ) -> None:
-    """Measure the order of an algorithm: its errors on a ladder of steps, and their slope beside the predicted order.
+    """Measure the order of an algorithm from its errors on a ladder of steps, and show it beside the predicted order.
 
-    Without --motion the runs are on coning of about 1 rad/s and a constant rate, which turns in every direction.
+    Without --motion the runs are on a coning motion of about 1 rad/s with a steady rate added, so that the body turns
+    about all axes.
 
     Example:
 
@@ -175,7 +180,7 @@ def _deliver(orders: list[Convergence], title: str, output: Output) -> None:
 
 
 def _within(order: Convergence, limit: float) -> bool:
-    """Tell whether an observed order is near the one of theory; one that is hidden, or has no theory, is not."""
+    """Tell whether the observed order is within the limit of the predicted one; False if either is missing."""
     return (
         order.observed is not None
         and order.predicted is not None

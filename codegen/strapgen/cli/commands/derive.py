@@ -1,4 +1,4 @@
-"""strapgen derive."""
+"""The command ``strapgen derive`` shows the formulas or the program of a kernel."""
 
 from __future__ import annotations
 
@@ -18,11 +18,12 @@ def derive(
     *,
     method: MethodOptions,
     show: Annotated[
-        str, typer.Option("--show", help="What to show: text, latex, program or operations.")
+        str,
+        typer.Option("--show", help="What to show: text or latex (the formulas), program, or operations."),
     ] = "text",
     format: Format = "text",
 ) -> None:
-    """Show a kernel: its formulas as text or LaTeX, the program lowered from them, or its number of operations.
+    """Derive a kernel and show its formulas, the program lowered from them, or its number of operations.
 
     Example: strapgen derive euler --method rk4 --increments 2 --show operations
     """

@@ -1,4 +1,4 @@
-"""strapgen generate."""
+"""The command ``strapgen generate`` writes the source code of a kernel or of the standard catalogue."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def generate(
     algorithm: Annotated[
         str | None,
         typer.Argument(
-            help="dcm, euler, cayley-klein, another kernel of strapgen list, or your own Python file."
+            help="dcm, euler, cayley-klein, any other kernel that strapgen list shows, or a Python file of your own."
         ),
     ] = None,
     *,
@@ -34,22 +34,22 @@ def generate(
         str | None,
         typer.Option(
             "--target",
-            help="Target of the code: numpy, c, c-float, c-fixed or fixed-model.  [default: numpy]",
+            help="Kind of code: numpy, c, c-float, c-fixed or fixed-model (Python on integers).  [default: numpy]",
             show_default=False,
         ),
     ] = None,
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", help="Folder to write to.  [default: here; generated/ with --all]", show_default=False
+            "--out", help="Folder for the files.  [default: here; generated/ with --all]", show_default=False
         ),
     ] = None,
-    all_: Annotated[bool, typer.Option("--all", help="Rebuild the whole standard catalogue.")] = False,
+    all_: Annotated[bool, typer.Option("--all", help="Generate the whole standard catalogue.")] = False,
     check: Annotated[
         bool,
         typer.Option(
             "--check",
-            help="With --all: write nothing, and exit with 1 and a diff if the folder is out of step.",
+            help="With --all: write nothing; print a diff and exit with 1 if the files in the folder differ.",
         ),
     ] = False,
     fixed: FixedOptions,
@@ -57,7 +57,8 @@ def generate(
 ) -> None:
     """Generate source code for an algorithm, or for the standard catalogue.
 
-    Fixed-point code is certified up to a largest increment: state the largest rate and the step.
+    For the targets c-fixed and fixed-model, state the largest body rate and the step length. The formats and the
+    error bounds then hold for all increments up to that rate.
 
     Example:
 
@@ -104,7 +105,7 @@ def generate(
 def _check_alone(
     algorithm: str | None, method: MethodOptions, target: str | None, fixed: FixedOptions
 ) -> None:
-    """Refuse what does not go with the whole catalogue."""
+    """Refuse options that do not go with --all."""
     for name, value in (
         ("an algorithm", algorithm),
         ("--method", method.method),

@@ -1,4 +1,4 @@
-"""strapgen list."""
+"""The command ``strapgen list`` shows all names."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from strapgen.cli.output import Format, check_format, print_json
 
 
 def list_names(format: Format = "text") -> None:
-    """List algorithms, methods, kernels, motions, targets and back ends.
+    """List all names that the other commands take, from algorithms and methods to motions and back ends.
 
     Example: strapgen list
     """
@@ -27,7 +27,7 @@ def list_names(format: Format = "text") -> None:
 
 
 def _parts() -> dict[str, dict[str, str]]:
-    """Return all names with what they mean, by part of the list."""
+    """Return all names with their meanings, by the heading under which they are listed."""
     from strapgen import catalogue
     from strapgen.backends import BACKENDS
     from strapgen.catalogue.user import loading
@@ -57,14 +57,14 @@ def _parts() -> dict[str, dict[str, str]]:
 
 
 def _with_one_line_for_taylor(methods: dict[str, str]) -> dict[str, str]:
-    """Return the methods, the Taylor series of all orders on one line."""
+    """Return the methods with the Taylor series of all orders on one line."""
     series = [name for name in methods if name.startswith("taylor")]
     others = {name: title for name, title in methods.items() if name not in series}
     return others | {f"{series[0]} to {series[-1]}": "Taylor series of the transition, of any order to 20"}
 
 
 def _with_one_line_for_updates(kernels: dict[str, str]) -> dict[str, str]:
-    """Return the kernels, the updates of an algorithm by a rotation vector on one line for all orders."""
+    """Return the kernels with the updates of an algorithm by a rotation vector, of all orders, on one line."""
     from strapgen import catalogue
 
     first, *_, last = catalogue.UPDATE_ORDERS

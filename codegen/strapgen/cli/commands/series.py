@@ -1,4 +1,4 @@
-"""strapgen series."""
+"""The command ``strapgen series`` derives truncation-error series."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ _Text = str | None
 
 @dataclass(frozen=True)
 class Versus:
-    """Options of the algorithm that another one is compared with."""
+    """Options of the second algorithm, with which the first one is compared."""
 
     versus: Annotated[
         _Text,
         typer.Option(
             "--versus",
             metavar="ALGORITHM",
-            help="Another algorithm, to see both and their exact ratio.",
+            help="Second algorithm: show the errors of both and their exact ratio.",
             show_default=False,
         ),
     ] = None
@@ -42,7 +42,7 @@ class Versus:
         typer.Option(
             "--versus-method",
             metavar="NAME",
-            help="Method of the other algorithm.  [default: the same]",
+            help="Method of the second algorithm.  [default: that of the first]",
             show_default=False,
         ),
     ] = None
@@ -51,13 +51,13 @@ class Versus:
         typer.Option(
             "--versus-increments",
             metavar="N",
-            help="Increments in a step of the other algorithm.  [default: as many]",
+            help="Number of increments in a step of the second algorithm.  [default: that of the first]",
             show_default=False,
         ),
     ] = None
 
     def choose(self, algorithm: str, method: MethodOptions) -> Choice:
-        """Return the other algorithm, which integrates like the first one where nothing else is stated."""
+        """Return the second algorithm; method and increments are those of the first one unless stated."""
         if self.versus_method is not None:
             method = replace(method, method=self.versus_method, tableau=None)
         if self.versus_increments is not None:
@@ -75,11 +75,13 @@ class DriftPlot:
         typer.Option(
             "--steps",
             metavar="S,...",
-            help="Steps of the plot in s.  [default: 1/8 to 1/64]",
+            help="Step lengths of the plot in s.  [default: 1/8 to 1/64]",
             show_default=False,
         ),
     ] = None
-    duration: Annotated[str, typer.Option("--duration", metavar="S", help="Duration of the plot in s.")] = "2"
+    duration: Annotated[
+        str, typer.Option("--duration", metavar="S", help="Duration of the simulated runs of the plot in s.")
+    ] = "2"
 
     def draw(self, choice: Choice, motion: str, count: int | None, path: Path) -> bytes:
         """Return the image of the drift on a motion of the catalogue."""
@@ -108,13 +110,13 @@ class DriftPlot:
 
 @dataclass(frozen=True)
 class SeriesOutput(Output):
-    """Where the series go."""
+    """Where the series go, and in which format."""
 
     plot: Annotated[
         Path | None,
         typer.Option(
             "--plot",
-            help="Image file for the predicted and the simulated drift, on the motion with the parameters --set.",
+            help="Image file for the predicted and the simulated drift on --motion with the parameters --set.",
             show_default=False,
         ),
     ] = None
@@ -138,7 +140,7 @@ def series(
     algorithm: Annotated[
         _Text,
         typer.Argument(
-            help="dcm, euler or cayley-klein, or a Python file with an algorithm of your own.",
+            help="dcm, euler or cayley-klein, or a Python file with your own algorithm.",
             show_default=False,
         ),
     ] = None,
@@ -148,13 +150,13 @@ def series(
         str,
         typer.Option(
             "--motion",
-            help="Motion that the series are for: general, constant, sinusoidal, coning or polynomial.",
+            help="Motion: general (any smooth rate), constant, sinusoidal, coning or polynomial.",
         ),
     ] = "general",
     terms: Annotated[
         str,
         typer.Option(
-            "--terms", metavar="N", help="Number of terms of drift, scale and skew that are not zero, 1 to 6."
+            "--terms", metavar="N", help="Number of nonzero terms to show of drift, scale and skew, 1 to 6."
         ),
     ] = "2",
     versus: Versus,
@@ -162,18 +164,19 @@ def series(
         bool,
         typer.Option(
             "--all",
-            help="Show the whole catalogue side by side, on as many increments as each method needs; with ALGORITHM or "
-            "--method NAME,... only these.",
+            help="Show the catalogue side by side, each method on as many increments as it needs; ALGORITHM or "
+            "--method NAME,... selects some of it.",
         ),
     ] = False,
     plot: DriftPlot,
     output: Annotated[SeriesOutput, Shown(only=("plot", "out", "format"))],
 ) -> None:
-    """Show what an algorithm loses: drift, scale and skew as exact power series in the step length h.
+    """Show the truncation error of an algorithm: drift, scale and skew as exact power series in the step length h.
 
-    Without --motion the series hold for every smooth rate w0 + w1 t + w2 t^2/2 + ...; they are in vector-invariant
-    form, where S(a, b) stands for a b' + b a'. For a motion of the catalogue they are in its own symbols, where t is
-    the time at the beginning of the step, with what adds up in a run; at a constant rate they are in closed form.
+    Without --motion the series hold for every smooth rate w0 + w1 t + w2 t^2/2 + ... and are sums of vectors and cross
+    products; S(a, b) stands for a b' + b a'. With --motion they are in the symbols of that motion, where t is the time
+    at the beginning of the step, and the drift of a whole run follows where it has a series; at a constant rate all
+    errors are also in closed form.
 
     Example: strapgen series euler --method rk4 --increments 2 --motion constant
 
@@ -214,7 +217,7 @@ def _check_plot(motion: str, versus: Versus, plot: DriftPlot, output: Output) ->
 
 
 def _overview(algorithm: _Text, method: MethodOptions, versus: Versus, output: Output) -> None:
-    """Deliver the catalogue side by side."""
+    """Deliver the table of all algorithms and methods side by side."""
     for option, value in {
         "--versus": versus.versus,
         "--plot": output.plot,

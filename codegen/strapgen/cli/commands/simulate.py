@@ -1,4 +1,4 @@
-"""strapgen simulate."""
+"""The command ``strapgen simulate`` runs one algorithm on a motion or a recording."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ _Text = str | None
 
 @dataclass(frozen=True)
 class Intervals:
-    """Options that say what happens every so many seconds of a run."""
+    """Options of the times from one orthonormalization, or one record, to the next."""
 
     orthonormalize: Annotated[
         _Text,
         typer.Option(
             "--orthonormalize",
             metavar="S",
-            help="Interval of orthonormalization in s.  [default: never]",
+            help="Time from one orthonormalization to the next in s.  [default: never]",
             show_default=False,
         ),
     ] = None
@@ -43,7 +43,7 @@ class Intervals:
         _Text,
         typer.Option(
             "--scheme",
-            help="Kernel that orthonormalizes; strapgen list shows them.  [default: the thesis's]",
+            help="Kernel that orthonormalizes; see strapgen list.  [default: the scheme of the thesis]",
             show_default=False,
         ),
     ] = None
@@ -52,7 +52,7 @@ class Intervals:
         typer.Option(
             "--record",
             metavar="S",
-            help="Interval of records in s, a divisor of the duration.  [default: every step]",
+            help="Time from one record to the next in s; it must divide the duration.  [default: every step]",
             show_default=False,
         ),
     ] = None
@@ -60,7 +60,7 @@ class Intervals:
 
 @dataclass(frozen=True)
 class RunOutput(Output):
-    """Where the course of a run goes; recorded data is printed as CSV."""
+    """Where the result of a run goes; without --format, the attitude along a recording is CSV."""
 
     plot: Annotated[
         Path | None, typer.Option("--plot", help="Image file for the plots.", show_default=False)
@@ -81,20 +81,25 @@ def simulate(
     *,
     method: Annotated[MethodOptions, Shown(only=STEP_OPTIONS)],
     backend: Annotated[
-        str, typer.Option("--backend", help="numpy, c, c-float, c-q31, c-q15, fixed-model or exact.")
+        str,
+        typer.Option("--backend", help="Back end: numpy, c, c-float, c-q31, c-q15, fixed-model or exact."),
     ] = "numpy",
     source: SampleSource,
     intervals: Annotated[Intervals, Shown(before="increments_csv")],
     fixed: Annotated[FixedOptions, Shown(only=RUN_OPTIONS)],
     output: RunOutput,
     matrices: Annotated[
-        bool, typer.Option("--matrices", help="Add all matrices to the JSON output."), Shown(before="format")
+        bool,
+        typer.Option("--matrices", help="Add the computed and the true matrices to the JSON output."),
+        Shown(before="format"),
     ] = False,
 ) -> None:
     """Run an algorithm on a motion with known attitude, or on recorded gyro data.
 
-    Recorded times that are not even are refused unless you give --resample-hz; then a straight line bridges intervals
-    of up to ten times the median.
+    With a motion you see the drift, scale and skew of the computed attitude; along a recording, the attitude itself.
+
+    Recorded times must be evenly spaced unless you give --resample-hz. The rate is then taken as linear from one sample
+    to the next, across intervals of up to ten times the median.
 
     Fixed-point formats are chosen for the increments of the run, or for --max-rate-deg-s if you give it.
 

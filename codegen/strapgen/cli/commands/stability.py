@@ -1,4 +1,4 @@
-"""strapgen stability."""
+"""The command ``strapgen stability`` shows at which constant rates a step contracts."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from strapgen.cli.output import Output, as_json
 
 @dataclass(frozen=True)
 class GrowthOutput(Output):
-    """Where the growth of the state goes: text or JSON on the terminal, and an image."""
+    """Where the growth of the state is shown: as text or JSON on the terminal, and in an image file."""
 
     format: Annotated[str | None, typer.Option("--format", help="Format of the output: text or json.")] = (
         "text"
@@ -31,16 +31,16 @@ def stability(
         typer.Option(
             "--method",
             metavar="NAME,...",
-            help="Integration methods.  [default: rk1,rk2,rk3,rk4; for your own algorithm its own]",
+            help="Integration methods.  [default: rk1,rk2,rk3,rk4; for a Python file, the method it chooses]",
             show_default=False,
         ),
     ] = None,
     output: Annotated[GrowthOutput, Shown(only=("plot", "format"))],
 ) -> None:
-    """Show at which constant rates a step lets the state grow, and at which it contracts.
+    """Show at which constant rates a step lets the state grow, and at which it does not.
 
-    You see the exact square of the factor by which a step of the angle x = |w| h stretches the state across the axis,
-    and the angles at which it is at most 1.
+    At a constant rate w a step of length h turns by the angle x = |w| h. It stretches the part of the state across the
+    axis by a factor, whose square is shown exactly, with the angles x at which the factor is at most 1.
 
     Example: strapgen stability dcm --method rk3,rk4,butcher5 --plot out/stability.png
     """

@@ -1,4 +1,4 @@
-"""strapgen strapdown."""
+"""The command ``strapgen strapdown`` runs an algorithm in two speeds along a recording."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class CourseOutput(Output):
-    """Where the course along a recording goes."""
+    """Where the attitude and the velocity changes along a recording go."""
 
     format: Annotated[
         str | None,
@@ -35,7 +35,7 @@ class CourseOutput(Output):
 
 @dataclass(frozen=True)
 class Start:
-    """Options of the attitude at the start, and of the frame in which the attitude is."""
+    """Options of the attitude at the start, and of the rate of the navigation frame."""
 
     initial: Annotated[
         str,
@@ -69,7 +69,7 @@ def strapdown(
         typer.Option(
             "--increments-csv",
             metavar="FILE",
-            help="Recorded increments of the fast cycles: columns t in s, dx, dy, dz in rad, and dvx, dvy, dvz in m/s.",
+            help="CSV file of fast cycles' increments: columns t in s, dx, dy, dz in rad, and dvx, dvy, dvz in m/s.",
         ),
     ],
     fast_cycles: Annotated[
@@ -82,11 +82,12 @@ def strapdown(
         str,
         typer.Option(
             "--sculling",
-            help="Form of the sculling integral: 1 includes the rotation compensation, 2 does not.",
+            help="Form of the sculling integral: 1 with the rotation compensation, 2 without.",
         ),
     ] = "2",
     backend: Annotated[
-        str, typer.Option("--backend", help="numpy, c, c-float, c-q31, c-q15, fixed-model or exact.")
+        str,
+        typer.Option("--backend", help="Back end: numpy, c, c-float, c-q31, c-q15, fixed-model or exact."),
     ] = "numpy",
     start: Start,
     fixed: Annotated[FixedOptions, Shown(only=("word", "rounding", "carry", "ranges", "formats"))],
@@ -94,8 +95,9 @@ def strapdown(
 ) -> None:
     """Run an algorithm in two speeds along recorded gyro and accelerometer increments.
 
-    After every navigation cycle you see the attitude as roll, pitch and heading, and the integral of the specific force
-    over the cycle in navigation axes. Fixed-point formats are chosen for the recording.
+    A fast loop sums coning and sculling; a slow loop updates the attitude once in a number of fast cycles. After every
+    navigation cycle you see the attitude as roll, pitch and heading, and the integral of the specific force over the
+    cycle in navigation axes. Fixed-point formats are chosen for the recording.
 
     Example:
 

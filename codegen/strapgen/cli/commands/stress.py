@@ -1,4 +1,4 @@
-"""strapgen stress."""
+"""The command ``strapgen stress`` runs the rate-table test."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def stress(
         typer.Option(
             "--algorithms",
             metavar="NAME,...",
-            help="Algorithms to turn: dcm, euler, cayley-klein, two-speed.  [default: all]",
+            help="Algorithms to run: dcm, euler, cayley-klein, two-speed.  [default: all]",
             show_default=False,
         ),
     ] = None,
@@ -30,21 +30,23 @@ def stress(
         typer.Option(
             "--backends",
             metavar="NAME,...",
-            help="Back ends.  [default: all but the slow ones, fixed-model and exact]",
+            help="Back ends to run them on.  [default: all but fixed-model and exact, which are slow]",
             show_default=False,
         ),
     ] = None,
-    duration: Annotated[str, typer.Option("--duration", metavar="S", help="Duration in s.")] = "3600",
+    duration: Annotated[
+        str, typer.Option("--duration", metavar="S", help="Duration of each run in s.")
+    ] = "3600",
     sample: Annotated[
         str, typer.Option("--sample", metavar="S", help="Time between gyro samples in s.")
     ] = "0.01",
     fixed: Annotated[FixedOptions, Shown(only=("rounding", "carry"))],
     format: Format = "text",
 ) -> None:
-    """Turn every algorithm on every back end at 70 deg/s about all three axes, steadily and to and fro.
+    """Run every algorithm on every back end at 70 deg/s about all three axes, in one direction and oscillating.
 
-    This is the rate-table test of 1984: the pitch passes 90 deg again and again. You see the largest drift of every
-    run; the state is orthonormalized every second.
+    This is the rate-table test of 1984, in which the pitch passes through 90 deg again and again. You see the largest
+    drift of every run. Attitude steps are orthonormalized every second; algorithms in two speeds are not.
 
     Example: strapgen stress --duration 20 --algorithms euler,two-speed --backends numpy,c
     """

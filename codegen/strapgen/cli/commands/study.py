@@ -1,4 +1,4 @@
-"""strapgen study."""
+"""The command ``strapgen study`` sweeps the settings of fixed point."""
 
 from __future__ import annotations
 
@@ -18,17 +18,19 @@ from strapgen.support.exceptions import InputError
 if TYPE_CHECKING:
     from strapgen.experiments.word_length import Outcome
 
-app = typer.Typer(help="Sweep settings and see what they do to the drift.", rich_markup_mode=None)
+app = typer.Typer(
+    help="Run an algorithm with many settings, and see how they change the drift.", rich_markup_mode=None
+)
 
 
 @app.callback()
 def _group() -> None:
-    """Sweep settings and see what they do to the drift."""
+    """Run an algorithm with many settings, and see how they change the drift."""
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """Options of what is combined: every value of a list with every one of the others."""
+    """Options with lists of values; a study runs every combination of them."""
 
     methods: Annotated[str, typer.Option("--methods", metavar="NAME,...", help="Integration methods.")] = (
         "rk4"
@@ -45,14 +47,16 @@ class Sweep:
         typer.Option(
             "--carries",
             metavar="NAME,...",
-            help="Rounding errors fed back from step to step: none, state, full.",
+            help="Error feedback from step to step: none, state, full.",
         ),
     ] = "none,state,full"
-    steps: Annotated[str, typer.Option("--steps", metavar="S,...", help="Steps in s.")] = "0.125"
+    steps: Annotated[str, typer.Option("--steps", metavar="S,...", help="Step lengths in s.")] = "0.125"
     pulses_arcsec: Annotated[
         str,
         typer.Option(
-            "--pulses-arcsec", metavar="ANGLE,...", help="Angles of gyro pulses in arc seconds, 0 for none."
+            "--pulses-arcsec",
+            metavar="ANGLE,...",
+            help="Angles of a gyro pulse in arc seconds; 0 for increments without pulses.",
         ),
     ] = "0"
 
@@ -89,13 +93,15 @@ def word_length(
             show_default=False,
         ),
     ] = None,
-    duration: Annotated[str, typer.Option("--duration", metavar="S", help="Duration in s.")] = "180",
+    duration: Annotated[
+        str, typer.Option("--duration", metavar="S", help="Duration of each run in s.")
+    ] = "180",
     jobs: Annotated[
         str | None,
         typer.Option(
             "--jobs",
             metavar="N",
-            help="Number of processes.  [default: one for each processor]",
+            help="Number of processes that run side by side.  [default: one for each processor]",
             show_default=False,
         ),
     ] = None,
@@ -103,9 +109,9 @@ def word_length(
 ) -> None:
     """Show the drift against word length, for every combination of word, rounding, carry, step, method and gyro pulse.
 
-    The integer model runs each one on a motion with known attitude. You see the drift from the truth, what the
-    arithmetic adds to it beside its certified bound, what rounded increments add, and what the method itself loses.
-    Finished runs stay in the cache, so that a study that was stopped goes on where it was.
+    The integer model runs each combination on a motion with known attitude. You see the drift from the truth and its
+    three parts: the rounding of the arithmetic, beside its certified bound; the rounding of the increments; and the
+    truncation error of the method. Finished runs stay in the cache, so that a study that you stop goes on from there.
 
     Example:
 

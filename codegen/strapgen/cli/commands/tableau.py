@@ -1,4 +1,4 @@
-"""strapgen tableau."""
+"""The command ``strapgen tableau`` shows a Butcher tableau with its order."""
 
 from __future__ import annotations
 
@@ -14,13 +14,16 @@ from strapgen.support import checks
 def tableau(
     method: Annotated[
         str,
-        typer.Argument(metavar="NAME|FILE", help="A method of strapgen list, or a TOML file with a tableau."),
+        typer.Argument(
+            metavar="NAME|FILE",
+            help="A Runge-Kutta method that strapgen list shows, or a TOML file with a tableau.",
+        ),
     ],
     format: Format = "text",
 ) -> None:
-    """Show a Butcher tableau, and what its order conditions say when they are evaluated exactly.
+    """Show a Butcher tableau, with its order on general equations and on attitude kinematics, checked exactly.
 
-    What ends in .toml or holds a path separator is read as a file. Its keys are those of the files in
+    An argument that ends in .toml or holds a path separator is read as a file. Its keys are those of the files in
     strapgen/catalogue/methods/butcher_tableaux: name, source, order, nodes, matrix, weights, embedded_weights,
     tolerance.
 

@@ -1,4 +1,4 @@
-"""strapgen tables."""
+"""The command ``strapgen tables`` computes the five tables of the thesis."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def tables(
         str | None,
         typer.Option(
             "--backend",
-            help="numpy, c, c-float, c-q31, c-q15 or fixed-model.  [default: all but the model]",
+            help="Back end; strapgen list shows all.  [default: all but fixed-model and exact, which are slow]",
             show_default=False,
         ),
     ] = None,
@@ -29,12 +29,12 @@ def tables(
         bool,
         typer.Option(
             "--predict",
-            help="Predict every figure from the truncation-error series, beside a simulation in numpy.",
+            help="Predict every figure from the truncation-error series, and show it beside a simulation in numpy.",
         ),
     ] = False,
     format: Format = "text",
 ) -> None:
-    """Run the five tables of the thesis and print them beside its figures.
+    """Compute the five tables of the thesis again and print the results beside its figures.
 
     Example: strapgen tables --backend c-q31 --carry full
     """

@@ -1,4 +1,4 @@
-"""strapgen two-speed."""
+"""The command ``strapgen two-speed`` writes the C code of an algorithm in two speeds."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ def two_speed(
         str,
         typer.Option(
             "--sculling",
-            help="Form of the sculling integral: 1 includes the rotation compensation, 2 does not.",
+            help="Form of the sculling integral: 1 with the rotation compensation, 2 without.",
         ),
     ] = "2",
-    target: Annotated[str, typer.Option("--target", help="Target of the code: c, c-float or c-fixed.")] = "c",
+    target: Annotated[str, typer.Option("--target", help="Kind of code: c, c-float or c-fixed.")] = "c",
     out: Annotated[
-        Path | None, typer.Option("--out", help="Folder to write to.  [default: here]", show_default=False)
+        Path | None, typer.Option("--out", help="Folder for the files.  [default: here]", show_default=False)
     ] = None,
     fixed: Annotated[
         FixedOptions,
@@ -35,7 +35,7 @@ def two_speed(
     ],
     format: Format = "text",
 ) -> None:
-    """Generate the C code of an algorithm in two speeds: a function for every loop, and one for the whole.
+    """Generate the C code of an algorithm in two speeds: a function for each loop, and one that runs them all.
 
     Example: strapgen two-speed dcm --target c --out firmware
     """

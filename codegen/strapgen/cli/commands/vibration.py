@@ -1,4 +1,4 @@
-"""strapgen vibration."""
+"""The command ``strapgen vibration`` assesses an algorithm under vibration."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ _TWO_SPEED = "two-speed"
 
 @dataclass(frozen=True)
 class AssessedMethods(MethodOptions):
-    """Options that choose the methods to be assessed side by side, and on how many increments each is."""
+    """Options that choose the methods to assess side by side, and the numbers of increments of each."""
 
     method: Annotated[
         _Text,
         typer.Option(
             "--method",
             metavar="NAME,...",
-            help="Integration methods.  [default: that of the algorithm; rk4 for an attitude step]",
+            help="Integration methods to show side by side.  [default: rk4 for an attitude step]",
             show_default=False,
         ),
     ] = None
@@ -45,7 +45,8 @@ class AssessedMethods(MethodOptions):
         typer.Option(
             "--increments",
             metavar="N,...",
-            help="Angle increments in a step; in two speeds the fast cycles in a step.  [default: 2]",
+            help="Numbers of angle increments in a step; of a fast loop and of two-speed, the fast cycles in a slow "
+            "cycle.  [default: 2 in a step]",
             show_default=False,
         ),
     ] = None
@@ -61,42 +62,47 @@ class AssessedMethods(MethodOptions):
 
 @dataclass(frozen=True)
 class VibrationSource:
-    """Options that say how the vehicle vibrates: at one frequency, or as a spectrum says."""
+    """Options of the vibration: at one frequency, or random with a spectrum from a file."""
 
     frequency: Annotated[
-        _Text, typer.Option("--frequency-hz", metavar="F", help="Frequency f in Hz.", show_default=False)
+        _Text,
+        typer.Option(
+            "--frequency-hz", metavar="F", help="Frequency f of the vibration in Hz.", show_default=False
+        ),
     ] = None
     step: Annotated[
         _Text,
         typer.Option(
             "--step",
             metavar="S",
-            help="Step T in s; for an algorithm in two speeds the slow cycle.",
+            help="Step length T in s; for a fast loop and two-speed, the length of the slow cycle.",
             show_default=False,
         ),
     ] = None
     theta_x: Annotated[
         _Text,
         typer.Option(
-            "--theta-x-rad", metavar="X", help="Amplitude of the angle about x in rad.", show_default=False
+            "--theta-x-rad", metavar="X", help="Amplitude X of the angle about x in rad.", show_default=False
         ),
     ] = None
     theta_y: Annotated[
         _Text,
         typer.Option(
-            "--theta-y-rad", metavar="Y", help="Amplitude of the angle about y in rad.", show_default=False
+            "--theta-y-rad", metavar="Y", help="Amplitude Y of the angle about y in rad.", show_default=False
         ),
     ] = None
     phase: Annotated[
         _Text,
-        typer.Option("--phase-rad", metavar="P", help="Phase in rad by which y leads x.", show_default=False),
+        typer.Option(
+            "--phase-rad", metavar="P", help="Phase P in rad by which y leads x.", show_default=False
+        ),
     ] = None
     acceleration: Annotated[
         _Text,
         typer.Option(
             "--acceleration-y",
             metavar="M_S2",
-            help="Amplitude of the acceleration along y in m/s^2; it adds the sculling rates.",
+            help="Amplitude of the acceleration along y in m/s^2, to assess sculling as well.",
             show_default=False,
         ),
     ] = None
@@ -105,7 +111,7 @@ class VibrationSource:
         typer.Option(
             "--spectrum",
             metavar="FILE",
-            help="CSV file of random vibration in place of one frequency: columns frequency_hz, density, angle_x_rad, "
+            help="CSV file of random vibration, in place of one frequency: columns frequency_hz, density, angle_x_rad, "
             "angle_x_phase_rad, ...",
             show_default=False,
         ),
@@ -190,11 +196,11 @@ class VibrationSource:
 
 @dataclass(frozen=True)
 class VibrationOutput(Output):
-    """Where the mean rates go: text, JSON or LaTeX on the terminal, and an image over the frequency."""
+    """Where the mean rates go: as text, JSON or LaTeX to the terminal, and over frequency into an image file."""
 
     plot: Annotated[
         Path | None,
-        typer.Option("--plot", help="Image file for the errors over the frequency.", show_default=False),
+        typer.Option("--plot", help="Image file for the errors over frequency.", show_default=False),
     ] = None
     span: Annotated[
         _Text,
@@ -242,14 +248,14 @@ def vibration(
     source: VibrationSource,
     output: Annotated[VibrationOutput, Shown(only=("plot", "span", "format"))],
 ) -> None:
-    """Assess an algorithm under vibration: the mean drift about z that it computes, the true one, and its error.
+    """Show the mean drift rate about z that an algorithm computes under vibration, the true one, and the error.
 
     The angles are X sin(2 pi f t) about x and Y sin(2 pi f t + P) about y; an acceleration along y has the phase P too.
-    Closed forms to second order in the amplitudes are derived from the algorithm itself. Several methods, or numbers of
-    increments, stand side by side.
+    The rates are closed forms to second order in the amplitudes, derived from the algorithm itself. Several methods, or
+    numbers of increments, are shown side by side.
 
-    For a fast loop, continuous and computed are its part within a slow cycle T_m, without the term in T_m: the slow
-    loop adds that to both, so that the error is that of both loops.
+    For a fast loop alone, the continuous and the computed rate leave out a term in the slow cycle T_m: the slow loop
+    adds that to both, so that the error is that of both loops.
 
     Example:
 

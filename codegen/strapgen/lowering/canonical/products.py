@@ -1,7 +1,4 @@
-"""The choice of scalar products to compute.
-
-The same polynomial can be short in some scalar products and long in others.
-"""
+"""`choose_products` rewrites polynomials in the scalar products in which they are shortest."""
 
 from __future__ import annotations
 

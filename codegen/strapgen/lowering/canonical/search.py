@@ -1,4 +1,4 @@
-"""Search for the basis in which a transition takes the fewest operations."""
+"""Searches for the basis in which a transition takes the fewest operations."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Vectors that are linear in a step's input vectors, and how they are computed with few operations."""
+"""Finds vectors that are linear in a step's input vectors, and computes them with few operations."""
 
 from __future__ import annotations
 

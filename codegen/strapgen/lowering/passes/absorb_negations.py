@@ -1,4 +1,4 @@
-"""The pass `absorb_negations`: signs become subtractions."""
+"""The pass `absorb_negations` turns negations into subtractions."""
 
 from __future__ import annotations
 

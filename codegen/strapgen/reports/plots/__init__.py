@@ -1,4 +1,4 @@
-"""Plots as image files, a module for what each shows; they need the extra `plot`."""
+"""Plots write results as image files, one module for each kind of result; they need the extra `plot`."""
 
 from strapgen.reports.plots.agreement import agreement_image as agreement_image
 from strapgen.reports.plots.convergence import convergence_image as convergence_image

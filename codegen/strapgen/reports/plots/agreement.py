@@ -1,4 +1,4 @@
-"""Predicted against simulated drift."""
+"""Plots predicted and simulated drift."""
 
 from __future__ import annotations
 

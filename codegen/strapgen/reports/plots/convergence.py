@@ -1,4 +1,4 @@
-"""Error against step, beside the slope of theory."""
+"""Plots the error of runs against the step, beside the slope that theory predicts."""
 
 from __future__ import annotations
 

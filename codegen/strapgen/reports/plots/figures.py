@@ -1,4 +1,4 @@
-"""What all plots share: matplotlib without a screen, kinds of image files, the look of axes, titles and legends."""
+"""What all plots share: matplotlib without a display, kinds of image files, and the look of axes and legends."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The errors of a run, and an attitude history, against time."""
+"""Plots the errors of a run, and an attitude history, against time."""
 
 from __future__ import annotations
 

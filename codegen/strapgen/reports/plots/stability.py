@@ -1,4 +1,4 @@
-"""The growth of a state in a step, and the steps at which it does not grow."""
+"""Plots the growth of a state in a step, and the steps at which it does not grow."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Errors under vibration against frequency."""
+"""Plots errors under vibration against frequency."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Drift against word length."""
+"""Plots drift against word length."""
 
 from __future__ import annotations
 

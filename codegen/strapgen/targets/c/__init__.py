@@ -1,1 +1,1 @@
-"""C99 in double and in float."""
+"""The target that prints C99 in double and in float."""

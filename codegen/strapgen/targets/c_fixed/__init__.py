@@ -1,1 +1,1 @@
-"""C99 on integers."""
+"""The target that prints fixed-point C99, on integers alone."""

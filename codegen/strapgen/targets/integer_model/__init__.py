@@ -1,1 +1,1 @@
-"""The integer model of the fixed-point C, in Python."""
+"""The target that prints the integer model of the fixed-point C in Python."""

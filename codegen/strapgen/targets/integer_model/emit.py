@@ -1,4 +1,4 @@
-"""The fixed-model target: a Python module on integers, the reference for the fixed-point C."""
+"""The fixed-model target prints a Python module on integers, which is the reference for the fixed-point C."""
 
 from __future__ import annotations
 

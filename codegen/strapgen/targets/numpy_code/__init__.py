@@ -1,1 +1,1 @@
-"""numpy code, vectorised over leading axes."""
+"""The target that prints numpy code, vectorised over leading axes."""

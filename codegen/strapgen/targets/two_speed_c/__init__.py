@@ -1,1 +1,1 @@
-"""The C of all loops of an algorithm in two speeds."""
+"""The target that prints the C of all loops of an algorithm in two speeds."""

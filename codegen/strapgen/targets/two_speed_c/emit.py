@@ -1,4 +1,4 @@
-"""C of an algorithm in two speeds: the functions of its three loops, and one that runs them in turn on one memory."""
+"""Prints C for an algorithm in two speeds: the functions of its three loops, and one that runs them in turn."""
 
 from __future__ import annotations
 
