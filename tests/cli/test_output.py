@@ -70,3 +70,17 @@ def test_a_command_says_what_it_wrote_and_prints_its_result_alone(tmp_path, monk
         main(shlex.split(f"simulate euler {RUN} --format csv"))
     said = capsys.readouterr()
     assert (said.out, said.err) == ((tmp_path / "out" / "attitude.csv").read_text(), "")
+
+
+def test_a_file_that_a_command_reads_is_not_written_over(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    log = "t,dx,dy,dz\n" + "".join(f"{k / 100},0,0,0.001\n" for k in range(1, 9))
+    Path("log.csv").write_text(log)
+    Path("link.csv").symlink_to("log.csv")
+    for out in ("--out log.csv", "--out ./log.csv", "--out link.csv", "--plot log.csv"):
+        with pytest.raises(SystemExit) as stop:
+            main(shlex.split(f"simulate euler --increments-csv log.csv {out}"))
+        said = capsys.readouterr()
+        assert (stop.value.code, said.out) == (2, "")
+        assert "is a file that the command reads; another one is needed" in said.err
+    assert Path("log.csv").read_text() == log

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
 import sys
 
 import numpy as np
@@ -155,3 +157,17 @@ def test_no_screen_is_needed(run, figures, monkeypatch):
     monkeypatch.setenv("MPLBACKEND", "tkagg")
     plots.run_image(run, "A title", "run.png")
     assert pyplot.get_backend().lower() == "agg"
+
+
+def test_a_screen_of_the_user_s_that_is_not_there_changes_nothing(tmp_path):
+    code = "from strapgen.reports.plots import figures; figures.pyplot(); import os; print(os.environ['MPLBACKEND'])"
+    environment = {**os.environ, "MPLBACKEND": "module://of_no_package"}
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True
+    )
+    assert done.stdout == "module://of_no_package\n"
+
+
+def test_kinds_of_files_that_take_a_typesetting_system_are_refused():
+    with pytest.raises(InputError, match=r"file type 'pgf' is not known; allowed: .*svg"):
+        drawing.require_kind("run.pgf")

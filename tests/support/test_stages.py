@@ -50,6 +50,12 @@ STAGES = {
     "simulate along": lambda value: strapgen.simulate(arguments()["backend"], value, 1, 1),
     "recording": lambda value: recording.propagate(value, None),
     "exact": lambda value: exact.propagate(value, np.zeros((1, 1, 3))),
+    "compare": lambda value: strapgen.compare(value, backends=["numpy"], increments=np.zeros((1, 1, 3))),
+    "converge": lambda value: strapgen.converge(strapgen.choose("euler"), value, ["1/2", "1/4"], 1),
+    "recording of": lambda value: recording.propagate(arguments()["backend"], value),
+    "settings of compare": lambda value: strapgen.compare(
+        "euler", backends=["numpy"], increments=np.zeros((1, 2, 3)), settings=value
+    ),
     "settings": lambda value: strapgen.quantize(arguments()["program"], value),
     "settings of generate": lambda value: strapgen.generate(arguments()["program"], "c-fixed", value),
     "target": lambda value: strapgen.generate(arguments()["program"], value),
@@ -69,6 +75,10 @@ TAKEN = {
     "simulate along": {"motion"},
     "recording": {"backend"},
     "exact": {"program"},
+    "compare": {"name", "choice"},
+    "converge": {"motion"},
+    "recording of": set(),
+    "settings of compare": {"settings", "none"},
     "settings": {"settings", "none"},
     "settings of generate": {"settings", "none"},
     "target": {"name"},

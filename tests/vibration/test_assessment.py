@@ -406,9 +406,7 @@ def test_what_is_no_choice_and_no_kernel(thing):
         (vibration.drift, "kernel"),
         (vibration.sculling, "kernel"),
     ):
-        with pytest.raises(
-            InputTypeError, match=f"{what} is .*; (what catalogue.choose returns|a Kernel) is"
-        ):
+        with pytest.raises(InputTypeError, match=f"{what} is .*; (what strapgen.choose returns|a Kernel) is"):
             assess(thing)
 
 

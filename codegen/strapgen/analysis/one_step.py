@@ -82,7 +82,7 @@ def step(choice: Choice) -> Step:
         If it is no attitude step, or `choice` is no `Choice`.
     """
     if not isinstance(choice, Choice):
-        raise InputTypeError(f"choice is {choice!r}; what catalogue.choose returns is needed")
+        raise InputTypeError(f"choice is {choice!r}; what strapgen.choose returns is needed")
     kernel = pipeline.derive(choice)
     if kernel.companions is None:
         raise InputError(f"kernel {kernel.name} is no attitude step")

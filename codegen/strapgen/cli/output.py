@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,12 +33,16 @@ class Output:
     ] = "text"
     formats: ClassVar[tuple[str, ...]] = ("text", "json", "csv")
 
-    def check(self) -> None:
-        """Check the format, and that the output and the plot have a file each."""
+    def check(self, *read: str | Path | None) -> None:
+        """Check the format, and that output and plot have files of their own, none of which the command reads."""
         if self.format is not None:
             checks.choice("format", self.format, self.formats)
         if self.out is not None and self.plot is not None and self.out.resolve() == self.plot.resolve():
             raise InputError(f"--out and --plot are both {self.out}; two files are needed")
+        files = {os.path.realpath(path) for path in read if path is not None and Path(path).is_file()}
+        for option, path in (("--out", self.out), ("--plot", self.plot)):
+            if path is not None and os.path.realpath(path) in files:
+                raise InputError(f"{option} {path} is a file that the command reads; another one is needed")
 
     def deliver(self, text: str, image: bytes | None = None) -> None:
         """Print the text, or write it and the image into their files, all or none; stderr says which were written."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -17,7 +18,7 @@ from strapgen.catalogue import Choice
 from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.ir.fixed_settings import Settings
 from strapgen.simulation.runs import attitude, drift_between, require_finite
-from strapgen.support import checks
+from strapgen.support import checks, stages
 from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.targets import FIXED
 from strapgen.toolchain import compiler
@@ -114,6 +115,7 @@ def compare(
     >>> [row.backend for row in rows], rows[0].max_abs_rad
     (['numpy', 'c'], 0.0)
     """
+    stages.require("compare", algorithm, str, os.PathLike, Choice)
     choice = chosen_step(algorithm, method, samples)
     for name in backends:
         checks.choice("backend", name, BACKENDS)
@@ -122,6 +124,8 @@ def compare(
         raise InputError("no back end is named; at least one is needed")
     if increments is None:
         raise InputTypeError("increments is None; an array (steps, samples, 3) in rad is needed")
+    if settings is not None and not isinstance(settings, Settings):
+        raise InputTypeError(f"settings is {stages.describe(settings)}; strapgen.Settings is needed")
     d = np.asarray(increments, np.float64)
     fixed = (settings or Settings()).for_increments(float(np.abs(d).max(initial=0.0)))
 

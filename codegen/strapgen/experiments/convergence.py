@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from itertools import pairwise
@@ -21,7 +21,7 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.simulation.exact_attitudes import exact_attitudes, step_of_increments
 from strapgen.simulation.motions import Motion
 from strapgen.simulation.runs import largest_increment, simulate
-from strapgen.support import checks
+from strapgen.support import checks, stages
 from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.targets import FIXED
 
@@ -159,8 +159,10 @@ def converge(
     """
     checks.choice("backend", backend, BACKENDS)
     kernel = step_of_increments(choice)
+    if not isinstance(motion, Motion):
+        raise InputTypeError(f"motion is {stages.describe(motion)}; strapgen.motion makes one")
     total = checks.number("duration", duration, positive=True)
-    if isinstance(steps, str):
+    if isinstance(steps, str) or not isinstance(steps, Iterable):
         raise InputTypeError(f"steps is {steps!r}; a sequence of step lengths is needed")
     lengths = sorted({checks.number("step", step, positive=True) for step in steps}, reverse=True)
     if len(lengths) < 2:

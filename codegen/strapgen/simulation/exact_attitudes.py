@@ -27,7 +27,7 @@ def step_of_increments(choice: Choice) -> Kernel:
         If the step takes no increments, or `choice` is no choice.
     """
     if not isinstance(choice, Choice):
-        raise InputTypeError(f"choice is {choice!r}; what catalogue.choose returns is needed")
+        raise InputTypeError(f"choice is {choice!r}; what strapgen.choose returns is needed")
     kernel = pipeline.derive(choice)
     if kernel.companions is None or kernel.inputs[1].name != "increments":
         raise InputError(f"kernel {kernel.name} takes no increments; a step that does is needed")

@@ -16,7 +16,7 @@ from strapgen.backends import Backend
 from strapgen.backends.increments import pulses, windows
 from strapgen.simulation.runs import require_finite
 from strapgen.support import checks, stages
-from strapgen.support.exceptions import InputError
+from strapgen.support.exceptions import InputError, InputTypeError
 
 Array = NDArray[np.float64]
 
@@ -354,6 +354,10 @@ def propagate(
     ((5, 4), 1)
     """
     stages.require("propagate", backend, Backend)
+    if not isinstance(recording, Recording):
+        raise InputTypeError(
+            f"recording is {stages.describe(recording)}; a Recording is needed (an array goes to Backend.propagate)"
+        )
     backend.need_increments()
     step = recording.interval * backend.increments
     steps, unused = divmod(max(0, len(recording.increments) - backend.previous), backend.increments)

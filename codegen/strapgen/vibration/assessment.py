@@ -226,7 +226,7 @@ def of(choice: Choice, quantity: str = "drift") -> Assessment:
     [-0.00264356, -0.00263046, 1.31029e-05]
     """
     if not isinstance(choice, Choice):
-        raise InputTypeError(f"choice is {choice!r}; what catalogue.choose returns is needed")
+        raise InputTypeError(f"choice is {choice!r}; what strapgen.choose returns is needed")
     checks.choice("quantity", quantity, ("drift", "sculling"))
     if choice.user_kernel is not None:  # whose file may change: not to be held for good
         return _of(choice, quantity)

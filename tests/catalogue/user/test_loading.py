@@ -270,6 +270,17 @@ WRONG = {
     ),
     "identity": ("(Fraction(0),) * 9", "(Fraction(0),) * 4", "identity has 4 elements, the state 9"),
     "previous": (",) * 9)", ",) * 9, 1)", "1 of its 1 increments are previous ones"),
+    "a number for an order": (",) * 9))", ",) * 9), order=4)", "its order is 4; strapgen.Order is needed"),
+    "a text for a truth value": (
+        ",) * 9)",
+        ",) * 9, 0, 'x')",
+        "isometry 'x' or previous 0 is no truth value",
+    ),
+    "no companions": (
+        "companions=Companions(",
+        "companions=dict(x=1) or Companions(",
+        "strapgen.Companions is needed",
+    ),
     "product": ("Companions(None,", 'Companions("dcm-product",', "a product and a transition go together"),
     "companion": (
         "(None, None, None,",

@@ -9,6 +9,7 @@ import sympy as sp
 
 from strapgen.catalogue.derivation import companion as derived_companion
 from strapgen.catalogue.names import RESERVED
+from strapgen.ir.attitude_step import Companions, Order
 from strapgen.ir.program import RESOLUTION
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
@@ -167,6 +168,14 @@ def _require_step(kernel: Kernel) -> None:
     if step is None:
         _refuse(kernel, "it has no companions; an attitude step needs them")
         return
+    if not isinstance(step, Companions):
+        _refuse(kernel, f"its companions are {step!r}; strapgen.Companions is needed")
+    if not isinstance(step.isometry, bool) or type(step.previous) is not int:
+        _refuse(
+            kernel, f"isometry {step.isometry!r} or previous {step.previous!r} is no truth value or no number"
+        )
+    if kernel.order is not None and not isinstance(kernel.order, Order):
+        _refuse(kernel, f"its order is {kernel.order!r}; strapgen.Order is needed")
     names = [signal.name for signal in kernel.inputs]
     samples: tuple[int, ...] = kernel.inputs[1].shape if len(kernel.inputs) == 2 else ()
     if names != ["state", "increments"] or len(samples) != 2 or samples[1] != 3:

@@ -53,7 +53,7 @@ def compare(
         --motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 \\
         --step 0.125 --duration 180
     """  # noqa: D301
-    output.check()
+    output.check(algorithm, method.tableau, source.increments_csv, source.rates_csv)
     choice = method.choose(algorithm)
     names = listed("--backends", backends, "names no back end")
     _check_backends(names, reference)

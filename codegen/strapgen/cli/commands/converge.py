@@ -137,7 +137,7 @@ def converge(
       strapgen converge euler --method rk1,rk2,rk4,butcher6 --increments enough \\
         --plot out/orders.png
     """  # noqa: D301
-    output.check()
+    output.check(algorithm, methods.tableau)
     from strapgen.backends import BACKENDS
 
     checks.choice("backend", backend, BACKENDS)

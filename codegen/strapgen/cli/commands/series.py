@@ -182,7 +182,7 @@ def series(
 
     Example: strapgen series dcm --method rk1 --motion constant --versus euler
     """
-    output.check()
+    output.check(algorithm, method.tableau)
     count = whole("terms", terms)
     if all_of_them:
         _overview(algorithm, method, versus, output)

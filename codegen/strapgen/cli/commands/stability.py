@@ -44,7 +44,7 @@ def stability(
 
     Example: strapgen stability dcm --method rk3,rk4,butcher5 --plot out/stability.png
     """
-    output.check()
+    output.check(algorithm)
     from strapgen import catalogue
     from strapgen.support import checks
 

@@ -105,7 +105,7 @@ def strapdown(
       strapgen strapdown dcm --increments-csv examples/inertial_log.csv \\
         --fast-cycles 4 --slow-cycles 25 --backend c
     """  # noqa: D301
-    output.check()
+    output.check(increments)
     import numpy as np
 
     from strapgen.reports import runs

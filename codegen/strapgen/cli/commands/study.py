@@ -119,7 +119,7 @@ def word_length(
       strapgen study word-length --words 12,16,20,24,32 \\
         --carries none,full --plot out/word-length.png
     """  # noqa: D301
-    output.check()
+    output.check(algorithm)
     from strapgen import catalogue
 
     checks.choice("algorithm", algorithm, catalogue.ALGORITHMS)

@@ -263,7 +263,7 @@ def vibration(
       strapgen vibration euler --method coning-compressed --increments 4 --frequency-hz 10 \\
         --step 0.04 --theta-x-rad 0.01 --theta-y-rad 0.01 --phase-rad 1.5 --acceleration-y 5
     """  # noqa: D301
-    output.check()
+    output.check(algorithm, methods.tableau, source.spectrum)
     source.check(output)
     cases = [case for method in methods.each() for case in _assessed(algorithm, method, source)]
     outcomes, words = source.rates(cases)

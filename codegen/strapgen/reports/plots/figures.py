@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -20,10 +21,17 @@ def pyplot() -> Any:
     MissingExtraError
         If matplotlib is not installed.
     """
+    before = os.environ.get("MPLBACKEND")
+    os.environ["MPLBACKEND"] = "agg"  # a backend of the user's that is not installed would stop the import
     try:
         import matplotlib
     except ImportError:
         raise MissingExtraError("plots need matplotlib: pip install 'strapgen[plot]'") from None
+    finally:
+        if before is None:
+            del os.environ["MPLBACKEND"]
+        else:
+            os.environ["MPLBACKEND"] = before
     matplotlib.use("Agg")
     import matplotlib.pyplot
 
@@ -44,7 +52,7 @@ def require_kind(path: str | Path) -> str:
     from matplotlib.backend_bases import FigureCanvasBase
 
     kind = Path(path).suffix.lstrip(".").lower()
-    allowed = sorted(FigureCanvasBase.get_supported_filetypes())
+    allowed = sorted({*FigureCanvasBase.get_supported_filetypes()} - {"pgf"})  # pgf takes a TeX system
     if kind not in allowed:
         raise InputError(f"plot {path}: file type {kind!r} is not known; allowed: {', '.join(allowed)}")
     return kind
