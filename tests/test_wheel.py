@@ -63,7 +63,7 @@ def test_the_source_archive_has_what_a_wheel_is_built_from(tmp_path):
         "pyproject.toml",
         "README.md",
     } <= names
-    assert {"templates/two_speed/source.c.j2", "generated/c/euler_rk4_2.c"} <= names
+    assert {"templates/two_speed_c/source.c.j2", "generated/c/euler_rk4_2.c"} <= names
 
 
 @pytest.fixture(scope="module")

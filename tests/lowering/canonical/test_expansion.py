@@ -25,7 +25,7 @@ EXPANDED = [
     *(("rk1", 8, 0), ("rk2", 2, 0), ("rk2", 3, 1), ("rk3", 3, 0), ("rk4", 1, 0), ("rk4", 2, 0)),
     *(("rk4", 1, 2), ("taylor4", 2, 0), ("butcher6", 1, 0), ("taylor6", 2, 0), ("taylor20", 1, 0)),
 ]
-STAGED = [("butcher6", 3, 0), ("butcher6", 2, 1), ("taylor4", 4, 0), ("dormand-prince5", 3, 0)]
+STAGED = [("butcher6", 3, 0), ("butcher6", 2, 1), ("butcher5", 4, 0), ("dormand-prince5", 3, 0)]
 
 
 def core(algorithm: str, method: str, count: int, previous: int) -> canonical.Core:
