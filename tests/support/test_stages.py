@@ -118,6 +118,7 @@ SAID = {
     "strapgen.generate(strapgen.lower(kernel), target) makes them",
     ("build", "backend"): "build takes Sources, not a Backend; strapgen.simulate takes it",
     ("simulate", "name"): "simulate takes a Backend, not 'euler'; strapgen.backend('euler') makes one",
+    ("simulate", "motion"): "simulate takes a Backend, not a Motion; strapgen.backend makes one",
     ("simulate", "sources"): "simulate takes a Backend, not Sources; strapgen.build(sources) makes one",
     (
         "simulate along",

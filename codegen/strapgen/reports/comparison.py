@@ -15,7 +15,7 @@ _COLUMNS = (
     Column("largest", spec=ANGLE),
     Column("rms", spec=ANGLE),
     Column("certified", spec=ANGLE),
-    Column("places", spec=".3g"),
+    Column("ulp", spec=".3g"),
     Column("drift", spec=".4g"),
     Column("ns/step", spec=".1f"),
     Column("bytes"),

@@ -72,7 +72,7 @@ def require(function: str, value: Any, *classes: type) -> None:
         return
     names = [cls.__name__ for cls in classes]
     needed = " or ".join(map(_with_article, names))
-    raise InputTypeError(f"{function} takes {needed}, not {describe(value)}; {_remedy(value, names[0])}")
+    raise InputTypeError(f"{function} takes {needed}, not {describe(value)}; {_remedy(function, value, names[0])}")
 
 
 def describe(value: Any) -> str:
@@ -94,7 +94,7 @@ def _stage_class(value: Any) -> str:
     return next((name for name in names if name in _MAKERS), names[0])
 
 
-def _remedy(value: Any, needed: str) -> str:
+def _remedy(function: str, value: Any, needed: str) -> str:
     """Return the call that makes a needed class from a value; if there is none, the function that takes the value."""
     reached = _stage_class(value)
     call = describe(value) if reached == "str" else reached.lower()
@@ -105,7 +105,9 @@ def _remedy(value: Any, needed: str) -> str:
         call = f"strapgen.{template.format(call)}"
         if reached == needed:
             return f"{call} makes {'them' if needed == 'Sources' else 'one'}"
-    return _TAKERS.get(_stage_class(value), _MAKERS[needed])
+    taker = _TAKERS.get(_stage_class(value), "")
+    # An argument of the same function, in another place: what makes the right one helps, not what takes this one.
+    return _MAKERS[needed] if not taker or taker.startswith(f"strapgen.{function} ") else taker
 
 
 def _with_article(name: str) -> str:

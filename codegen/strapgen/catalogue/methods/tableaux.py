@@ -144,7 +144,7 @@ def _check_keys(data: Mapping[str, Any]) -> None:
     order = data["order"]
     if not isinstance(order, int) or isinstance(order, bool) or not 1 <= order <= MOST_ORDER:
         raise InputError(
-            f"order is {str(order)[:40]}; a whole number from 1 to {MOST_ORDER} is needed, "
+            f"order is {repr(order)[:40]}; a whole number from 1 to {MOST_ORDER} is needed, "
             "beyond it there are too many conditions to check"
         )
 
