@@ -339,7 +339,7 @@ BAD = {
     "generate --all --check --out none": "none is no folder; --check needs the one to look at",
     "generate euler --target ''": "target '' is not known",
     "generate euler --out file": "file cannot be written",
-    "generate euler --out file/folder": "file/folder cannot be written: it is a file, or lies below one; a folder is needed",
+    "generate euler --out file/folder": "file/folder cannot be written: it is a file, or lies below one",
     "generate euler --out /proc/strapgen": "/proc/strapgen cannot be written",
     "generate --all --out file/folder": "file/folder cannot be written",
     # simulate: names

@@ -59,7 +59,9 @@ def write_files(folder: str | Path, files: Mapping[str, str | bytes]) -> list[Pa
                 file.write(content.encode() if isinstance(content, str) else content)
         _put_in_place(drafts)
     except (FileExistsError, NotADirectoryError):
-        raise InputError(f"{writing} cannot be written: it is a file, or lies below one; a folder is needed") from None
+        raise InputError(
+            f"{writing} cannot be written: it is a file, or lies below one; a folder is needed"
+        ) from None
     except OSError as error:
         raise InputError(f"{writing} cannot be written ({error.strerror})") from None
     finally:

@@ -72,7 +72,9 @@ def require(function: str, value: Any, *classes: type) -> None:
         return
     names = [cls.__name__ for cls in classes]
     needed = " or ".join(map(_with_article, names))
-    raise InputTypeError(f"{function} takes {needed}, not {describe(value)}; {_remedy(function, value, names[0])}")
+    raise InputTypeError(
+        f"{function} takes {needed}, not {describe(value)}; {_remedy(function, value, names[0])}"
+    )
 
 
 def describe(value: Any) -> str:
