@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 
 import strapgen
+from strapgen.symbolic import evaluation, rotations
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = Path(strapgen.__file__).parent
@@ -49,6 +50,16 @@ def test_every_name_is_there_whatever_was_imported_before():
     after = f"import {', '.join(f'strapgen.{module}' for module in modules)}, strapgen as s"
     kinds = in_a_new_process(f"{after}; print(*(n + ':' + type(getattr(s, n)).__name__ for n in s.__all__))")
     assert kinds.split() == [f"{name}:{type(getattr(strapgen, name)).__name__}" for name in strapgen.__all__]
+
+
+def test_the_algebra_of_kernels_is_whole():
+    algebra = strapgen.algebra
+    assert [name for name in algebra.__all__ if not hasattr(algebra, name)] == []
+    # Functions that admission allows in kernels of users, beside those of SymPy.
+    assert {"Direction", "Wrapped"} <= {*algebra.__all__}
+    modules = (rotations, evaluation)
+    public = {n for m in modules for n, v in vars(m).items() if getattr(v, "__module__", "") == m.__name__}
+    assert {name for name in public if not name.startswith("_")} <= {*algebra.__all__}
 
 
 def test_a_name_that_is_not_there():

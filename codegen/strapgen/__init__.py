@@ -73,14 +73,13 @@ if _typing.TYPE_CHECKING:
     from strapgen.support.exceptions import InputTypeError as InputTypeError
     from strapgen.support.exceptions import MissingExtraError as MissingExtraError
     from strapgen.support.exceptions import StrapgenError as StrapgenError
-    from strapgen.symbolic import rotations as _rotations
+    from strapgen.symbolic import algebra as algebra
     from strapgen.symbolic.kernel import Kernel as Kernel
     from strapgen.symbolic.kernel import KernelBuilder as KernelBuilder
     from strapgen.symbolic.kernel import Stage as Stage
     from strapgen.symbolic.kernel import resolution as resolution
     from strapgen.targets import TARGETS as TARGETS
 
-    algebra = _rotations
     gyro = _increments
     study = _word_length
 
@@ -179,7 +178,7 @@ _NAMES = {
 }
 #: Modules whose functions belong together, by the names that they have here.
 _NAMESPACES = {
-    "algebra": "symbolic.rotations",
+    "algebra": "symbolic.algebra",
     "exact": "backends.exact",
     "formulas": "reports.formulas",
     "gyro": "backends.increments",

@@ -57,22 +57,7 @@ _LOWER: dict[type, Callable[[Quantization, Quantity, Any], None]] = {
 
 
 def lowered(program: Program, settings: Settings) -> FixedProgram:
-    """Lower a program to integers.
-
-    Parameters
-    ----------
-    program : Program
-    settings : Settings
-
-    Returns
-    -------
-    FixedProgram
-
-    Raises
-    ------
-    InputError
-        If an input has no known range, a stated format does not hold its values, or the word is too short.
-    """
+    """Lower a program to integers; parameters and errors are those of `strapgen.fixedpoint.quantize`."""
     quantities, plan = _planned(program, settings)
     finest = _walked(program, settings, quantities, plan, {})
     coarser = aligning(finest.body, finest.values, plan.forced)
