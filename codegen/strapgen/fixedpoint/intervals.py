@@ -12,7 +12,7 @@ GRID = 160
 _ONE = 1 << GRID
 
 
-@dataclass(frozen=True)
+@dataclass(slots=True, unsafe_hash=True)
 class Interval:
     """All numbers from `low` to `high`, both counted in units of 2**-GRID.
 

@@ -146,7 +146,7 @@ def _maximum(context: DerivationContext, name: str, node: Operation, meaning: st
         mean: Terms = {}
         for expansion in expansions:
             mean = combined(mean, expansion or {}, Fraction(1, len(arguments)))
-        least = context.ranges.enclosure({m: c for m, c in mean.items() if c}, context.ranges.box)
+        least = context.ranges.enclosure([(m, c) for m, c in mean.items() if c], context.ranges.box)
         enclosure = Interval(max(enclosure.low, least.low), enclosure.high)
 
     def largest(values: Samples) -> NDArray[np.float64]:

@@ -120,7 +120,7 @@ def store(
     rest = {monomial: c for monomial, c in terms.items() if monomial}
     offset = Fraction(0)
     if constant and not whole and is_dyadic(constant):
-        spread = context.ranges.enclosure(rest).magnitude
+        spread = context.ranges.enclosure(rest.items()).magnitude
         if spread <= abs(constant) * _SMALL:
             offset = constant
     beside: Terms = {}
@@ -163,8 +163,8 @@ def _split(context: DerivationContext, terms: Terms) -> tuple[Terms, Terms]:
     }
     others = {monomial: c for monomial, c in terms.items() if monomial not in exact}
     if exact and others:
-        around = context.ranges.enclosure(exact).magnitude
-        if context.ranges.enclosure(others).magnitude <= around * _SMALL:
+        around = context.ranges.enclosure(exact.items()).magnitude
+        if context.ranges.enclosure(others.items()).magnitude <= around * _SMALL:
             return exact, others
     return {}, terms
 

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from fractions import Fraction
 
 from strapgen.fixedpoint.intervals import Interval
-from strapgen.fixedpoint.quantities import InputElement, Quantity, Sum, Terms, combined
+from strapgen.fixedpoint.quantities import InputElement, Monomial, Quantity, Sum, Terms, combined
 
 #: Degree up to which a quantity is expanded in the inputs for its range, and terms that this may take.
 _DEGREE, _MOST_TERMS = 2, 60
 #: Boxes that a cut of the inputs' box may take for one quantity.
 _MOST_BOXES = 128
+
+
+#: Products, each with its coefficient.
+SumOfTerms = Iterable[tuple[Monomial, Fraction]]
 
 
 class Ranges:
@@ -33,9 +37,9 @@ class Ranges:
     def of_sum(self, name: str, terms: Terms, seen: float) -> Interval:
         """Return the range of a sum and note its expansion by name; `seen` is its largest magnitude on samples."""
         self.expanded[name] = expansion = self.expansion(terms)
-        enclosure = self.enclosure(terms)
+        enclosure = self.enclosure(terms.items())
         if expansion is not None:
-            enclosure = enclosure.meet(self.enclosure(expansion, self.box))
+            enclosure = enclosure.meet(self.enclosure(expansion.items(), self.box))
         return self.cut(Sum(tuple(terms.items())), enclosure, seen)
 
     def expansion(self, terms: Terms) -> Terms | None:
@@ -60,24 +64,25 @@ class Ranges:
                 return None
         return total
 
-    def enclosure(self, terms: Terms, box: Mapping[str, Interval] | None = None) -> Interval:
+    def enclosure(self, terms: SumOfTerms, box: Mapping[str, Interval] | None = None) -> Interval:
         """Return the interval of a sum from the ranges of the quantities, or from intervals by name."""
-        total = Interval(0, 0)
-        for monomial, coefficient in terms.items():
+        low = high = 0
+        for monomial, coefficient in terms:
             ranges = [self.items[name].range if box is None else box[name] for name in monomial]
             if not ranges:
-                total += Interval.of(coefficient)
+                part = Interval.of(coefficient)
             elif len(ranges) == 1:
-                total += ranges[0].scale(coefficient)
+                part = ranges[0].scale(coefficient)
             elif monomial[0] == monomial[1]:
-                total += ranges[0].square().scale(coefficient)
+                part = ranges[0].square().scale(coefficient)
             else:
                 product = ranges[0] * ranges[1]
                 for one, other in (monomial, monomial[::-1]) if box is None else ():
                     square = self._with_square(one, other)
                     product = product if square is None else product.meet(square)
-                total += product.scale(coefficient)
-        return total
+                part = product.scale(coefficient)
+            low, high = low + part.low, high + part.high
+        return Interval(low, high)
 
     def _with_square(self, one: str, other: str) -> Interval | None:
         """Return the interval of a product whose first factor is a multiple of the second, by a square."""
@@ -104,9 +109,10 @@ class Ranges:
         names = [n for n in self.box if n in needed]
         if not names or 2 ** len(names) > _MOST_BOXES:  # not even a cut of every side in two
             return enclosure
+        steps = [q for name, q in self.items.items() if name in needed]
         while pending:
             box = pending.pop()
-            inside = self._on(box, definition, needed)
+            inside = self._on(box, definition, steps)
             if inside.magnitude <= goal:
                 proved = proved.join(inside)
                 continue
@@ -129,14 +135,13 @@ class Ranges:
                 needed |= {name for monomial, _ in quantity.definition.terms for name in monomial}
         return needed
 
-    def _on(self, box: Mapping[str, Interval], definition: Sum, needed: set[str]) -> Interval:
-        """Return the interval of a sum on a part of the inputs' box."""
+    def _on(self, box: Mapping[str, Interval], definition: Sum, steps: list[Quantity]) -> Interval:
+        """Return the interval of a sum on a part of the inputs' box; the steps lead to it."""
         known: dict[str, Interval] = {}
-        for name, quantity in self.items.items():
-            if name in needed:
-                known[name] = (
-                    self.enclosure(dict(quantity.definition.terms), known).meet(quantity.range)
-                    if isinstance(quantity.definition, Sum)
-                    else box[name]
-                )
-        return self.enclosure(dict(definition.terms), known)
+        for quantity in steps:
+            known[quantity.name] = (
+                self.enclosure(quantity.definition.terms, known).meet(quantity.range)
+                if isinstance(quantity.definition, Sum)
+                else box[quantity.name]
+            )
+        return self.enclosure(definition.terms, known)

@@ -40,6 +40,22 @@ class Operation:
     kind: str
     arguments: tuple[Node, ...]
 
+    # Trees are deep, share their branches and are looked up often: hash and size are worked out once.
+    def __hash__(self) -> int:
+        return self._hash
+
+    @cached_property
+    def _hash(self) -> int:
+        return hash((self.kind, self.arguments))
+
+    @cached_property
+    def size(self) -> int:
+        """Number of operations in the tree."""
+        return 1 + sum(node.size for node in self.arguments if isinstance(node, Operation))
+
+    def __reduce__(self) -> tuple[type[Operation], tuple[str, tuple[Node, ...]]]:
+        return Operation, (self.kind, self.arguments)  # the hash is that of one process
+
 
 Node = Constant | Reference | Operation
 

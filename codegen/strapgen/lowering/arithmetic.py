@@ -109,15 +109,18 @@ def horner(polynomial: Polynomial, node: Callable[[Any], Node]) -> Term:
     >>> operation_count(tree)
     4
     """
-    seen: dict[frozenset[Any], Term] = {}
+    seen: dict[frozenset[Any], list[Term]] = {}
 
     def written(p: Polynomial) -> Term:
-        key = frozenset(p.items())
-        if key not in seen:
-            seen[key] = with_constant(terms({m: c for m, c in p.items() if m}), p.get((), Fraction(0)))
-        return seen[key]
+        return with_constant(terms({m: c for m, c in p.items() if m}), p.get((), Fraction(0)))
 
     def terms(p: Polynomial) -> list[Term]:
+        key = frozenset(p.items())
+        if key not in seen:
+            seen[key] = shortest(p)
+        return seen[key]
+
+    def shortest(p: Polynomial) -> list[Term]:
         counts = Counter(name for monomial in p for name in set(monomial))
         most = max(counts.values(), default=0)
         powers = {m[0] for m in p if len(m) > 1 and len(set(m)) == 1}
@@ -151,6 +154,4 @@ def horner(polynomial: Polynomial, node: Callable[[Any], Node]) -> Term:
 
 def operation_count(node: Node) -> int:
     """Return the number of operations in a tree."""
-    if not isinstance(node, Operation):
-        return 0
-    return 1 + sum(map(operation_count, node.arguments))
+    return node.size if isinstance(node, Operation) else 0
