@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import sympy as sp
+from covering import covering
 
 from strapgen.analysis.accumulation import accumulate
 from strapgen.analysis.agreement import SETTINGS, agreement
 from strapgen.analysis.error_rate import error_rate
 from strapgen.analysis.motion_rates import TIME
 from strapgen.analysis.series import STEP
-from strapgen.catalogue import ALGORITHMS, MOTIONS, choose, choose_step
+from strapgen.catalogue import MOTIONS, choose, choose_step
 from strapgen.reports.agreement import agreement_text
 from strapgen.simulation.motions import motion
 from strapgen.support.exceptions import InputError
@@ -20,10 +21,8 @@ a, b, g = sp.symbols("a b g")
 
 
 @pytest.mark.parametrize(
-    "method", ["rk1", *(pytest.param(f"rk{order}", marks=pytest.mark.long) for order in (2, 3, 4))]
+    ("name", "algorithm", "method"), covering(MOTIONS, ["dcm", "euler"], ["rk1", "rk2", "rk3", "rk4"])
 )
-@pytest.mark.parametrize("algorithm", ALGORITHMS)
-@pytest.mark.parametrize("name", MOTIONS)
 def test_prediction_leaves_the_next_order(name, algorithm, method):
     """In 40 digits, as the step is halved: two powers of the error rate leave the third, or better."""
     found = agreement(choose(algorithm, method, 2), motion(name, **SETTINGS[name]), ["1/16", "1/32"], 0.5)
