@@ -43,11 +43,22 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     )
 
 
+def _is_of_cayley_klein(value: object) -> bool:
+    return str(getattr(value, "name", value)).startswith("cayley-klein")
+
+
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out Cayley-Klein parameters on the back ends that show nothing new of them."""
+    """Let Cayley-Klein parameters run with the long tests, and not on back ends that show nothing new of them.
+
+    Their kernels and programs are those of Euler parameters but for names, which tests/catalogue, tests/lowering and
+    tests/test_claims.py prove.
+    """
     left = []
     for item in items:
         values = getattr(getattr(item, "callspec", None), "params", {})
+        if any(map(_is_of_cayley_klein, values.values())):
+            item.add_marker(pytest.mark.long)
         if values.get("algorithm") == "cayley-klein" and values.get("backend_name", "c") not in CAYLEY_KLEIN:
             left.append(item)
     if left:

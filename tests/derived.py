@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import pickle
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
 from pathlib import Path
 
@@ -60,15 +60,30 @@ def programs() -> dict[str, Program]:
     return {choice.kernel: program(choice) for choice in catalogue.standard()}
 
 
+#: Functions of the catalogue that SymPy knows nothing of, in any precision.
+FUNCTIONS = {
+    "Direction": mpmath.atan2,
+    "Wrapped": lambda x: x - 2 * mpmath.pi * ((x > mpmath.pi) - (x < -mpmath.pi)),
+}
+
+
+@cache
+def _functions(kernel: Kernel) -> list[tuple[list[str], tuple[str, ...], Callable[..., list]]]:
+    """Return for every stage the names of its arguments, those of its elements, and its function."""
+    functions = []
+    for stage in (*kernel.stages, *kernel.outputs):
+        used = {symbol for expression in stage.expressions for symbol in expression.free_symbols}
+        arguments = sorted(used, key=str)
+        function = sp.lambdify(arguments, list(stage.expressions), [FUNCTIONS, "mpmath"])
+        functions.append((list(map(str, arguments)), stage.signal.elements, function))
+    return functions
+
+
 def precisely(kernel: Kernel, values: Mapping[str, mpmath.mpf]) -> dict[str, mpmath.mpf]:
     """Return all elements of a kernel, its inputs included, in the precision of mpmath."""
     known = dict(values)
-    for stage in (*kernel.stages, *kernel.outputs):
-        used = {s for expression in stage.expressions for s in expression.free_symbols}
-        names = [name for name in known if sp.Symbol(name, real=True) in used]
-        arguments = [sp.Symbol(name, real=True) for name in names]
-        found = sp.lambdify(arguments, list(stage.expressions), "mpmath")(*(known[name] for name in names))
-        known |= dict(zip(stage.signal.elements, map(mpmath.mpf, found), strict=True))
+    for arguments, elements, function in _functions(kernel):
+        known |= dict(zip(elements, map(mpmath.mpf, function(*map(known.get, arguments))), strict=True))
     return known
 
 

@@ -221,7 +221,7 @@ def test_steps_drift_as_the_closed_form_says(options, periods, phase):
     assert off[1][0] < off[0][0] / 3.5 + off[1][1]
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(
     st.sampled_from(
         [("euler", "rk4", 2), ("dcm", "coning-uncompressed", 3), ("euler", "butcher5", 2, False, 1)]
