@@ -263,6 +263,16 @@ def test_large_terms_that_cancel_are_refused():
         quantize(made, Settings(16))
 
 
+def test_a_word_whose_errors_go_beyond_the_range_of_a_result_is_too_short():
+    # Its range is [-1.8, 1]; truncation in words of 8 bits adds more than the format of that range holds.
+    body = {
+        "v_0": op("multiply", op("add", "x_1", "x_1"), op("add", "x_1", number(Fraction(1, 6)))),
+        "v_2": op("multiply", op("add", "x_1", "v_0"), op("subtract", "x_1", number(Fraction(22, 23)))),
+    }
+    with pytest.raises(InputError, match="words of 8 bits are too short for v_2"):
+        quantize(hand_made(body, "v_2"), Settings(8, rounding="truncation"))
+
+
 def test_interfaces_survive_json():
     fixed = quantize(program(EULER), Settings(16, carry="full"))
     data = json.loads(json.dumps(fixed.interface.as_dict()))

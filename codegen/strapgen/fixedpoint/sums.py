@@ -249,11 +249,19 @@ def _limited(context: Quantization, quantity: Quantity, value: Value) -> Value:
     inside = quantity.range + Interval.of(quantity.offset) if known is None else Interval.symmetric(known)
     limit = None if known is None else math.floor(known * Fraction(2) ** value.fraction)
     if limit is None or limit > context.largest(value.fraction):
+        if not _is_stated(context, quantity.name):  # chosen from the range, and errors go beyond it
+            raise context.too_short(quantity.name)
         raise InputError(
             f"format {Format(context.word, value.fraction)} of {quantity.name} does not hold its range "
             f"{inside.text()}{', less ' + str(quantity.offset) if quantity.offset else ''}"
         )
     return replace(value, low=max(value.low, -limit), high=min(value.high, limit), guarded=True)
+
+
+def _is_stated(context: Quantization, name: str) -> bool:
+    """Tell whether the user states the format of a quantity, or of an output or the transition that it belongs to."""
+    signals = {signal for signal, names in context.quantities.results.items() if name in names}
+    return bool({name, "state", *signals} & context.settings.formats.keys())
 
 
 def _known_limit(context: Quantization, name: str) -> Fraction | None:
