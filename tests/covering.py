@@ -16,9 +16,7 @@ def covering(*values: Iterable[Any]) -> list[Any]:
     each other, lists whose lengths have no common divisor are covered in many ways. The others are marked long.
     """
     lists = [list(several) for several in values]
-    chosen = {
-        tuple(number % len(several) for several in lists) for number in range(max(map(len, lists)))
-    }
+    chosen = {tuple(number % len(several) for several in lists) for number in range(max(map(len, lists)))}
     return [
         pytest.param(
             *(several[place] for several, place in zip(lists, places, strict=True)),

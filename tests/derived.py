@@ -30,6 +30,14 @@ FIXED_POINT = [
 ]
 
 
+def tells_more(choice: Choice) -> bool:
+    """Tell whether the code of a kernel differs from that of all others in more than names and coefficients.
+
+    Cayley-Klein parameters have the code of Euler parameters, and steps of lower order that of the fourth.
+    """
+    return not choice.name.startswith("cayley-klein") and choice.method in (None, "rk4")
+
+
 @cache
 def kernel(choice: Choice) -> Kernel:
     return catalogue.derive(choice)

@@ -30,7 +30,9 @@ def transition(algorithm: str, method: str, axes: str, increments: int = 2) -> s
     return sp.Matrix(*(state.shape if len(state.shape) == 2 else (4, 1)), result)
 
 
-def cosine_and_sine(algorithm: str, method: str, axes: str, increments: int) -> tuple[PolyElement, PolyElement]:
+def cosine_and_sine(
+    algorithm: str, method: str, axes: str, increments: int
+) -> tuple[PolyElement, PolyElement]:
     """Return length times cosine and sine of the angle that a step turns by; of half of it for "euler".
 
     The sine is that part of it which is about each of the axes.

@@ -380,7 +380,10 @@ def test_records_and_orthonormalization_are_counted_in_steps(make, even):
     np.testing.assert_array_equal(history.time, 10 + 0.75 * np.arange(5))
 
 
-@pytest.mark.parametrize(("increments", "unused"), [(1, 0), (5, 4), (7, 3), (8, 0)])
+@pytest.mark.parametrize(
+    ("increments", "unused"),
+    [(1, 0), (5, 4), pytest.param(7, 3, marks=pytest.mark.long)],
+)
 def test_increments_that_make_no_whole_step_are_told(increments, unused, even):
     backend = strapgen.backend("euler", "rk4", increments, "numpy")
     history = propagate(backend, even)
@@ -437,7 +440,10 @@ def test_units_have_their_factors():
 # Steps that keep increments
 
 
-@pytest.mark.parametrize(("count", "previous"), [(1, 1), (1, 3), (2, 2), (3, 1), (5, 3)])
+@pytest.mark.parametrize(
+    ("count", "previous"),
+    [(1, 1), (1, 3), (2, 2), pytest.param(5, 3, marks=pytest.mark.long)],
+)
 def test_the_first_increments_of_a_recording_are_those_before_the_first_step(count, previous, even):
     backend = strapgen.backend("euler", "rk4", count, "numpy", previous=previous)
     history = propagate(backend, even)

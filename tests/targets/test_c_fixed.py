@@ -37,8 +37,12 @@ ALL = (None, "rk1", "rk2", "rk3", "rk4")
 
 
 def choices_of(*methods) -> list[Choice]:
-    """Return the choices of these methods."""
-    return [choice for choice in CHOICES if choice.method in methods]
+    """Return the choices of these methods; of all methods, with Cayley-Klein parameters."""
+    return [
+        choice
+        for choice in CHOICES
+        if choice.method in methods and (methods == ALL or not choice.name.startswith("cayley-klein"))
+    ]
 
 
 @cache

@@ -40,7 +40,7 @@ class Operation:
     kind: str
     arguments: tuple[Node, ...]
 
-    # Trees are deep, share their branches and are looked up often: hash and size are worked out once.
+    # Trees are deep, share their branches and are looked up often: hash, size and text are worked out once.
     def __hash__(self) -> int:
         return self._hash
 
@@ -52,6 +52,13 @@ class Operation:
     def size(self) -> int:
         """Number of operations in the tree."""
         return 1 + sum(node.size for node in self.arguments if isinstance(node, Operation))
+
+    def __repr__(self) -> str:
+        return self._text
+
+    @cached_property
+    def _text(self) -> str:
+        return f"Operation(kind={self.kind!r}, arguments={self.arguments!r})"
 
     def __reduce__(self) -> tuple[type[Operation], tuple[str, tuple[Node, ...]]]:
         return Operation, (self.kind, self.arguments)  # the hash is that of one process

@@ -66,10 +66,11 @@ def test_a_file_is_an_algorithm(folder):
         ({"method": "rk2"}, "mrp-rk2-2", "mrp.py --method rk2"),
         ({"increments": 3}, "mrp-rk4-3", "mrp.py --increments 3"),
         ({"increments": 1, "previous": 2}, "mrp-rk4-1-previous2", "mrp.py --increments 1 --previous 2"),
-        (
+        pytest.param(
             {"method": "butcher6", "increments": 4, "previous": 1},
             "mrp-butcher6-4-previous1",
             "mrp.py --method butcher6 --increments 4 --previous 1",
+            marks=pytest.mark.long,
         ),
         ({"method": TABLEAUX["rk3"]}, "mrp-rk3-2", "mrp.py --method rk3"),
     ],

@@ -11,17 +11,16 @@ from strapgen.lowering.names import is_temporary
 from strapgen.lowering.passes import optimize
 
 STEPS = [Choice(a, m, n) for a in ALGORITHMS for m in STANDARD_METHODS for n in (1, 2, 3, 4, 5, None)]
+
+
+def is_quick(choice: Choice) -> bool:
+    return choice.increments == 2 or (choice.method, choice.increments) == ("rk4", None)
+
+
 #: Two increments, and steps of fourth order that take rates; all others with the long tests.
 EVERY = pytest.mark.parametrize(
     "choice",
-    [
-        pytest.param(
-            choice,
-            marks=() if choice.increments == 2 or (choice.method, choice.increments) == ("rk4", None) else pytest.mark.long,
-            id=choice.kernel,
-        )
-        for choice in STEPS
-    ],
+    [pytest.param(c, marks=() if is_quick(c) else pytest.mark.long, id=c.kernel) for c in STEPS],
 )
 
 

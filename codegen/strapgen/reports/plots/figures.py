@@ -10,6 +10,8 @@ from typing import Any
 
 from strapgen.support.exceptions import InputError, MissingExtraError
 
+#: Resolution of images of pixels, in dots per inch.
+RESOLUTION_DPI = 150
 COLOURS = ("#1f5f8b", "#b5562b", "#3d7a4f")
 
 
@@ -63,7 +65,7 @@ def image(figure: Any, path: str | Path) -> bytes:
     pyplot().close(figure)  # pyplot lets go of it, it can still be drawn
     kind = require_kind(path)
     content = io.BytesIO()
-    figure.savefig(content, format=kind, dpi=150)
+    figure.savefig(content, format=kind, dpi=RESOLUTION_DPI)
     return content.getvalue()
 
 
