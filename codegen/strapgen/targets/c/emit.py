@@ -49,10 +49,10 @@ _FUNCTIONS = {
     "sqrt": "sqrt{s}({})",
     "sin": "sin{s}({})",
     "cos": "cos{s}({})",
-    "sinc": "sinc_({})",
+    "sinc": "{n}_sinc_({})",
     "atan2": "atan2{s}({}, {})",
     "direction": "atan2{s}({}, {})",
-    "wrap": "wrap_({})",
+    "wrap": "{n}_wrap_({})",
     "maximum": "fmax{s}({}, {})",
     "at_least": "{} >= {}",
     "select": "({} ? {} : {})",
@@ -64,10 +64,10 @@ _HALF_TURNS = tuple(Fraction(k * 314159265358979323846264338327950288, 10**35) f
 
 
 class CPrinter(Printer):
-    """Prints nodes as C expressions of one floating-point type."""
+    """Prints nodes as C expressions of one floating-point type, for a file whose static names begin with `name`."""
 
-    def __init__(self, real: Real) -> None:
-        self.real = real
+    def __init__(self, real: Real, name: str = "") -> None:
+        self.real, self.name = real, name
         if real is FLOAT:
             self.resolution = Fraction(1, 1 << 23)
 
@@ -78,7 +78,7 @@ class CPrinter(Printer):
 
     def function(self, kind: str, arguments: list[str]) -> str:
         """Return a call."""
-        return _FUNCTIONS[kind].format(*arguments, s=self.real.suffix)
+        return _FUNCTIONS[kind].format(*arguments, s=self.real.suffix, n=self.name)
 
 
 def _nearest_single(value: Fraction) -> np.float32:
@@ -104,7 +104,7 @@ def emit(program: Program, target: str = "c") -> Sources:
         ``<name>_propagate`` too, the loop over runs and steps.
     """
     real = REALS[target]
-    name = external(f"{program.name}{real.infix}")
+    name = external(program.name, real.infix)
     # A scalar input has one name, which is that of its argument and of its element.
     scalars = [signal.name for signal in program.inputs if not signal.shape]
     _, files = printed(program, lambda named, _: _files(named, name, real), C, scalars)
@@ -123,7 +123,7 @@ def emit(program: Program, target: str = "c") -> Sources:
 
 def _files(program: Program, name: str, real: Real) -> dict[str, str]:
     """Return the header and the source of a program with its printed names."""
-    printer = CPrinter(real)
+    printer = CPrinter(real, name)
     nodes = [node for a in program.body for node in walk(a.value) if isinstance(node, Operation)]
     values = {
         "program": program,
