@@ -79,6 +79,7 @@ if _typing.TYPE_CHECKING:
     from strapgen.symbolic.kernel import Stage as Stage
     from strapgen.symbolic.kernel import resolution as resolution
     from strapgen.targets import TARGETS as TARGETS
+    from strapgen.targets import Target as Target
 
     gyro = _increments
     study = _word_length
@@ -174,7 +175,10 @@ _NAMES = {
         "Stage",
         "resolution",
     ),
-    "targets": ("TARGETS",),
+    "targets": (
+        "TARGETS",
+        "Target",
+    ),
 }
 #: Modules whose functions belong together, by the names that they have here.
 _NAMESPACES = {

@@ -1,4 +1,4 @@
-"""Many kernels in one module: every name of a file carries its kernel's, so that all files make one translation unit."""
+"""Many kernels in one module: names carry their kernel's, so that all files make one translation unit."""
 
 from __future__ import annotations
 

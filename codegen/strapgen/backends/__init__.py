@@ -17,7 +17,6 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
 from strapgen.support import checks, stages
 from strapgen.support.exceptions import InputError, InputTypeError
-from strapgen.targets import FIXED
 
 __all__ = [
     "BACKENDS",
@@ -53,9 +52,9 @@ def fitted(backend: str, settings: Settings | None) -> Settings | None:
         If the back end takes no settings, or none of this word.
     """
     entry = BACKENDS[checks.choice("backend", backend, BACKENDS)]
-    if entry.target not in FIXED:
+    if not entry.fixed:
         if settings is not None:
-            takers = ", ".join(name for name, other in BACKENDS.items() if other.target in FIXED)
+            takers = ", ".join(name for name, other in BACKENDS.items() if other.fixed)
             raise InputError(f"backend {backend} takes no fixed-point settings; these do: {takers}")
         return None
     if settings is not None and not isinstance(settings, Settings):

@@ -17,7 +17,6 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.simulation.motions import motion
 from strapgen.simulation.runs import Run, largest_increment, simulate
 from strapgen.support.exceptions import InputError
-from strapgen.targets import FIXED
 
 STEP = Fraction(1, 8)
 DURATION = Fraction(180)
@@ -196,7 +195,7 @@ def table_settings(table: Table, backend_name: str, settings: Settings | None) -
     settings : Settings or None
         Settings beside the largest increment.
     """
-    if BACKENDS[backend_name].target not in FIXED:
+    if not BACKENDS[backend_name].fixed:
         return None
     profile = motion(table.motion, **table.settings)
     return (settings or Settings()).for_increments(largest_increment(profile, STEP, DURATION, 2))

@@ -114,8 +114,8 @@ C = Language(_c_allows, _c_scopes)
 PYTHON = Language(_python_allows, _python_scopes)
 
 
-#: Most characters of a kernel's name in C. C99 tells external names apart by 31 characters, and those of one kernel, such
-#: as ``<name>_float`` and ``<name>_float_array``, differ by then.
+#: Most characters of a kernel's name in C. C99 tells external names apart by 31 characters, and those of one kernel,
+#: such as ``<name>_float`` and ``<name>_float_array``, differ by then.
 _MOST = 23
 #: What C writes in longer names of the catalogue, a word after the other until the name is short enough.
 _SHORT = {
@@ -128,7 +128,7 @@ _SHORT = {
 
 
 def external(name: str, ending: str = "") -> str:
-    """Return the name of a kernel's function in C: shortened if it is too long, changed if a library or a keyword has it.
+    """Return the name of a kernel's function in C: shortened if too long, changed if a library or a keyword has it.
 
     Parameters
     ----------

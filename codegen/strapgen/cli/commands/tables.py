@@ -48,11 +48,10 @@ def tables(
     from strapgen.experiments.thesis_tables import ALGORITHMS, ORDERS, TABLES, build_all, run_tables
     from strapgen.reports.thesis_tables import thesis_table_text
     from strapgen.support import checks
-    from strapgen.targets import FIXED
 
     names = _runnable() if backend is None else (checks.choice("backend", backend, BACKENDS),)
     settings = fixed.settings(2)
-    if settings is not None and not any(BACKENDS[name].target in FIXED for name in names):
+    if settings is not None and not any(BACKENDS[name].fixed for name in names):
         raise InputError(f"--rounding and --carry are for fixed-point back ends, not for {', '.join(names)}")
     cases = len(names) * len(ALGORITHMS) * len(ORDERS)
     for _ in track(build_all(names, settings), "building", cases):

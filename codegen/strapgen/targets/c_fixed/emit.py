@@ -68,7 +68,7 @@ def emit(fixed: FixedProgram, target: str) -> Sources:
     fixed : FixedProgram
         With a word of `WORDS`.
     target : str
-        "c-fixed".
+        Name of the target.
 
     Returns
     -------
@@ -79,7 +79,7 @@ def emit(fixed: FixedProgram, target: str) -> Sources:
     interface, name = fixed.interface, external(fixed.program.name, f"_q{fixed.word - 1}")
     arguments = (*interface.inputs, *interface.outputs)
     scalars = [argument.signal.name for argument in arguments if not argument.signal.shape]
-    _, files = printed(fixed, lambda named, _: _files(named, name), C, scalars)
+    _, files = printed(fixed, lambda named, _: _files(named, name, target), C, scalars)
     function = Function(
         name, *(tuple(a.signal for a in side) for side in (interface.inputs, interface.outputs))
     )
@@ -96,7 +96,7 @@ def emit(fixed: FixedProgram, target: str) -> Sources:
     )
 
 
-def _files(fixed: FixedProgram, name: str) -> dict[str, str]:
+def _files(fixed: FixedProgram, name: str, target: str) -> dict[str, str]:
     """Return the header and the source of a program with its printed names."""
     interface, word = fixed.interface, WORDS[fixed.word].within(name)
     printer = _Printer(fixed, word, name)
@@ -117,6 +117,7 @@ def _files(fixed: FixedProgram, name: str) -> dict[str, str]:
     definitions = [value.definition for value in fixed.body]
     values = {
         "fixed": fixed,
+        "target": target,
         "program": fixed.program,
         "interface": interface,
         "name": name,
