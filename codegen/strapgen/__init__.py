@@ -78,8 +78,8 @@ if _typing.TYPE_CHECKING:
     from strapgen.symbolic.kernel import KernelBuilder as KernelBuilder
     from strapgen.symbolic.kernel import Stage as Stage
     from strapgen.symbolic.kernel import resolution as resolution
-    from strapgen.targets import TARGETS as TARGETS
-    from strapgen.targets import Target as Target
+    from strapgen.targets.registry import TARGETS as TARGETS
+    from strapgen.targets.registry import Target as Target
 
     gyro = _increments
     study = _word_length
@@ -175,7 +175,7 @@ _NAMES = {
         "Stage",
         "resolution",
     ),
-    "targets": (
+    "targets.registry": (
         "TARGETS",
         "Target",
     ),
