@@ -80,6 +80,7 @@ if _typing.TYPE_CHECKING:
     from strapgen.symbolic.kernel import resolution as resolution
     from strapgen.targets.registry import TARGETS as TARGETS
     from strapgen.targets.registry import Target as Target
+    from strapgen.toolchain.compiler import compile_together as compile_together
 
     gyro = _increments
     study = _word_length
@@ -179,6 +180,7 @@ _NAMES = {
         "TARGETS",
         "Target",
     ),
+    "toolchain.compiler": ("compile_together",),
 }
 #: Modules whose functions belong together, by the names that they have here.
 _NAMESPACES = {

@@ -272,11 +272,15 @@ def _compile(many: Sequence[Sources], name: str, path: str, draft: Path) -> None
     for file, text in files.items():
         (draft / file).write_text(text)
     headers = [next(file for file in sources.files if file.endswith(".h")) for sources in many]
+    code = [file for file in files if file.endswith(".c")]
+    if len(many) > 1:  # their static names are different: one translation unit, in one call of the compiler
+        (draft / f"{name}_kernels.c").write_text("".join(f'#include "{file}"\n' for file in code))
+        code = [f"{name}_kernels.c"]
     request = {
         "name": name,
         "cdef": "\n".join(_declarations(files[header]) for header in headers),
         "header": "".join(f'#include "{header}"\n' for header in headers) + _UNOPTIMIZED,
-        "sources": [str(draft / file) for file in files if file.endswith(".c")],
+        "sources": [str(draft / file) for file in code],
         "flags": [*_flags, _VISIBILITY],
         "libraries": [] if sys.platform == "win32" else ["m"],
         "folder": str(draft),
