@@ -10,8 +10,8 @@ BENCH := .venv-bench/.ready
 .PHONY: help demo test test-long test-modules check bench generate clean
 
 help:
-	@echo "make demo      set up, then a short tour: a formula, its C, a table of the thesis on every back end"
-	@echo "make test      set up, with what tests need, run the test suite"
+	@echo "make demo      set up, then a short tour: formulas, their C, a table on every back end"
+	@echo "make test      set up, with what tests need; run the test suite"
 	@echo "make test-long the tests that take long: every word, rounding and residual on every kernel"
 	@echo "make test-modules  list anew which kernels the tests compile"
 	@echo "make check     generated code in step, ruff, mypy"
@@ -32,23 +32,22 @@ $(TOOLS): $(READY)
 	@touch $@
 
 demo: $(READY)
-	@echo
-	@echo "1. Derive every kernel of the catalogue, and generate it as numpy, C and fixed point"
+	@echo "1. Derive every kernel of the catalogue; generate numpy, C and fixed point"
 	$(BIN)/strapgen generate --all
 	@echo
 	@echo "2. One step as formulas: Euler parameters by Euler's method from two gyro samples"
-	$(BIN)/strapgen derive euler --method rk1 --show program | tail -n 10
+	$(BIN)/strapgen derive euler --method rk1 --show program
 	@echo
 	@echo "3. The same step in C, from generated/c/euler_rk1_2.c"
 	@sed -n '/^static inline void euler_rk1_2_one_/,/^}/p' generated/c/euler_rk1_2.c
 	@echo
-	@echo "4. Table 5 of the thesis: the steps run on every back end, C compiled in one call for each"
+	@echo "4. Table 5 of the thesis on every back end; c-q31 and c-q15 have 32- and 16-bit words"
 	$(BIN)/strapgen tables --table 5
-	@echo "The rest: source .venv/bin/activate, then"
-	@echo "  strapgen list       every algorithm, method, kernel, motion, target and back end"
-	@echo "  strapgen --help     every command; strapgen COMMAND --help shows an example"
-	@echo "  strapgen tables     all five tables"
-	@echo "README.md has a tour of five minutes, docs/ the theory, examples/ scripts to start from."
+	@echo "More: source .venv/bin/activate, then"
+	@echo "  strapgen list      all algorithms, methods, kernels, motions and back ends"
+	@echo "  strapgen --help    all commands, each with an example in its own --help"
+	@echo "  strapgen tables    all five tables"
+	@echo "README.md goes on with five minutes of examples; docs/ has the theory."
 
 test: $(TOOLS)
 	$(BIN)/python -m pytest -n auto --dist worksteal -m "not long"
