@@ -903,6 +903,12 @@ def test_round_off_of_table_5(strapgen_says):
     assert abs(drift("c-q31", "--carry full") - double) < 1e-7
 
 
+def test_one_table_by_its_number(strapgen_says):
+    said = strapgen_says("tables --table 5 --backend numpy")
+    assert said.startswith("Table 5: ") and said.count("Table ") == 1
+    assert said.strip() in strapgen_says("tables --backend numpy")
+
+
 def test_tables_text(strapgen_says):
     said = strapgen_says("tables --backend numpy")
     for table in TABLES:

@@ -10,7 +10,8 @@ from tolerances import roundoff
 
 import strapgen
 from strapgen.backends import BACKENDS
-from strapgen.experiments.thesis_tables import TABLES, agrees, entries, table_settings
+from strapgen.experiments import thesis_tables
+from strapgen.experiments.thesis_tables import TABLES, agrees, build_all, entries, table_settings
 
 # What an independent program computed from the thesis's equations, in double precision: orders 1, 2, 4.
 REPRODUCED = {
@@ -105,3 +106,15 @@ def test_the_contradiction_of_table_2_is_told(backend_name):
 )
 def test_agreement_in_the_printed_digits(value, printed, same):
     assert agrees(value, printed) is same
+
+
+def test_the_kernels_of_a_back_end_are_compiled_together(monkeypatch):
+    calls = []
+    monkeypatch.setattr(thesis_tables, "compile_together", lambda many: calls.append(list(many)))
+    kernels = [f"{algorithm}-rk{order}-2" for algorithm in ("dcm", "euler") for order in ORDERS]
+    assert list(build_all(("c", "c-q31"), tables=TABLES[4:])) == kernels * 2
+    beside = {"dcm-orthonormalize", "euler-normalize"}
+    for sources, target in zip(calls, ("c", "c-fixed"), strict=True):
+        assert {each.kernel for each in sources} == {*kernels, *beside}
+        assert {each.target for each in sources} == {target}
+        assert len({name for each in sources for name in each.files}) == 2 * 8  # no name twice: one module

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import shutil
 import sys
 import tomllib
@@ -230,6 +231,27 @@ def test_a_name_that_nobody_has(toy):
         InputError, match=r"^target 'fortran' is not known; allowed: numpy, .*, plain-python$"
     ):
         strapgen.generate(program(EULER), "fortran")
+
+
+def test_an_entry_point_that_names_no_module(site):
+    install(site, {"mine": "not a module"})
+    with pytest.raises(
+        InputError, match=r"^target mine \(not a module\): the entry point is no 'module:name'$"
+    ):
+        strapgen.generate(program(EULER), "mine")
+
+
+def test_nobody_compares_the_names_of_targets():
+    offenders = []
+    for path in Path(strapgen.__file__).parent.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            sides = [node.left, *node.comparators] if isinstance(node, ast.Compare) else []
+            if isinstance(node, ast.Call) and ast.unparse(node.func).endswith(".startswith"):
+                sides = [node.func.value, *node.args]  # type: ignore[attr-defined]
+            names = [ast.unparse(side).rpartition(".")[2] for side in sides]
+            if "target" in names and any(isinstance(side, ast.Constant) and side.value for side in sides):
+                offenders.append(f"{path.name}:{node.lineno}")
+    assert offenders == []
 
 
 def test_every_target_of_strapgen_has_its_properties():

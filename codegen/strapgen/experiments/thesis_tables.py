@@ -268,8 +268,8 @@ def build_all(
 ) -> Iterator[str]:
     """Generate the kernels of the tables, and compile those of a back end in one call of the compiler.
 
-    Where the tables' increments lead to different formats in fixed point, a kernel has several sources of one name, and a
-    back end as many calls.
+    Where the tables' increments lead to different formats in fixed point, a kernel has several sources of one name, and
+    a back end as many calls.
 
     Parameters
     ----------

@@ -210,6 +210,8 @@ def _label(point: EntryPoint) -> str:
 def _loaded(point: EntryPoint) -> tuple[Target, str]:
     """Return the target of an entry point and the hash of its package's files, as they are when it is imported."""
     label = f"target {_label(point)}"
+    if not point.pattern.match(point.value):
+        raise InputError(f"{label}: the entry point is no 'module:name'")
     code = digest([point.value, *packages.contents(point.module)])
     with packages.guarded(label, "define a Target", packages.belongs_to(point.module)):
         try:

@@ -47,7 +47,9 @@ def tables(
     """
     check_format(format)
     if predict:
-        for option in [o for o, v in (("--backend", backend), ("--table", table)) if v] + [*fixed.stated]:
+        for option in [o for o, v in (("--backend", backend), ("--table", table)) if v is not None] + [
+            *fixed.stated
+        ]:
             raise InputError(f"--predict and {option} do not go together")
         _predict(format)
         return
