@@ -106,11 +106,14 @@ static inline int cayley_klein_from_dcm_q31_one_(const int32_t state[9], int32_t
         : four_zz);
     const int_fast32_t factor_quotient_choice = (int_fast32_t)((column_s >= 0 ? 1
         : (-1)));
-    const int_fast32_t factor_quotient_root = cayley_klein_from_dcm_q31_sqrt_((uint64_t)(largest * INT32_C(268435456)));
-    const int_fast32_t factor_quotient = (int_fast32_t)(cayley_klein_from_dcm_q31_div_((int64_t)factor_quotient_choice * INT64_C(576460752303423488), factor_quotient_root));
+    const int_fast32_t factor_quotient_root =
+        cayley_klein_from_dcm_q31_sqrt_((uint64_t)(largest * INT32_C(268435456)));
+    const int_fast32_t factor_quotient =
+        (int_fast32_t)(cayley_klein_from_dcm_q31_div_((int64_t)factor_quotient_choice * INT64_C(576460752303423488), factor_quotient_root));
     /* makes the scalar part positive */
     const int_fast32_t factor = (int_fast32_t)((int64_t)factor_quotient);
-    const int_fast32_t column_s_word = (int_fast32_t)(cayley_klein_from_dcm_q31_shr_(column_s + 2, 2));
+    const int_fast32_t column_s_word =
+        (int_fast32_t)(cayley_klein_from_dcm_q31_shr_(column_s + 2, 2));
     /* Cayley-Klein parameters, body to reference, scalar first */
     const int64_t next_s_unchecked = cayley_klein_from_dcm_q31_shr_((int64_t)column_s_word * factor
         + INT32_C(268435456), 29);
@@ -118,21 +121,24 @@ static inline int cayley_klein_from_dcm_q31_one_(const int32_t state[9], int32_t
         || next_s_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_s = (int_fast32_t)next_s_unchecked;
-    const int_fast32_t column_x_word = (int_fast32_t)(cayley_klein_from_dcm_q31_shr_(column_x + 2, 2));
+    const int_fast32_t column_x_word =
+        (int_fast32_t)(cayley_klein_from_dcm_q31_shr_(column_x + 2, 2));
     const int64_t next_x_unchecked = cayley_klein_from_dcm_q31_shr_((int64_t)column_x_word * factor
         + INT32_C(268435456), 29);
     if (next_x_unchecked < (-INT32_C(1140850688))
         || next_x_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_x = (int_fast32_t)next_x_unchecked;
-    const int_fast32_t column_y_word = (int_fast32_t)(cayley_klein_from_dcm_q31_shr_(column_y + 2, 2));
+    const int_fast32_t column_y_word =
+        (int_fast32_t)(cayley_klein_from_dcm_q31_shr_(column_y + 2, 2));
     const int64_t next_y_unchecked = cayley_klein_from_dcm_q31_shr_((int64_t)column_y_word * factor
         + INT32_C(268435456), 29);
     if (next_y_unchecked < (-INT32_C(1140850688))
         || next_y_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_y = (int_fast32_t)next_y_unchecked;
-    const int_fast32_t column_z_word = (int_fast32_t)(cayley_klein_from_dcm_q31_shr_(column_z + 2, 2));
+    const int_fast32_t column_z_word =
+        (int_fast32_t)(cayley_klein_from_dcm_q31_shr_(column_z + 2, 2));
     const int64_t next_z_unchecked = cayley_klein_from_dcm_q31_shr_((int64_t)column_z_word * factor
         + INT32_C(268435456), 29);
     if (next_z_unchecked < (-INT32_C(1140850688))

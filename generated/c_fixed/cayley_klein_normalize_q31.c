@@ -55,22 +55,28 @@ static inline int cayley_klein_normalize_q31_one_(const int32_t state[4], int32_
         || cayley_klein_normalize_q31_out_(a_y, INT32_C(1140850688))
         || cayley_klein_normalize_q31_out_(a_z, INT32_C(1140850688)))
         return 1;
-    const int64_t inverse_norm_radicand = (int64_t)a_s * a_s + (int64_t)a_x * a_x + (int64_t)a_y * a_y
-        + (int64_t)a_z * a_z;
+    const int64_t inverse_norm_radicand =
+        (int64_t)a_s * a_s + (int64_t)a_x * a_x + (int64_t)a_y * a_y + (int64_t)a_z * a_z;
     if (inverse_norm_radicand < INT64_C(576460752303423488)
         || inverse_norm_radicand > INT64_C(2305843009213693952))
         return 2;
-    const int_fast32_t inverse_norm_root = cayley_klein_normalize_q31_sqrt_((uint64_t)(cayley_klein_normalize_q31_shr_(inverse_norm_radicand, 2)));
+    const int_fast32_t inverse_norm_root =
+        cayley_klein_normalize_q31_sqrt_((uint64_t)(cayley_klein_normalize_q31_shr_(inverse_norm_radicand, 2)));
     /* 1/|state| */
-    const int_fast32_t inverse_norm = (int_fast32_t)(cayley_klein_normalize_q31_div_(INT64_C(576460752303423488), inverse_norm_root));
+    const int_fast32_t inverse_norm =
+        (int_fast32_t)(cayley_klein_normalize_q31_div_(INT64_C(576460752303423488), inverse_norm_root));
     /* Cayley-Klein parameters, body to reference, scalar first, after the step */
-    const int_fast32_t next_s = (int_fast32_t)(cayley_klein_normalize_q31_shr_((int64_t)a_s * inverse_norm
+    const int_fast32_t next_s =
+        (int_fast32_t)(cayley_klein_normalize_q31_shr_((int64_t)a_s * inverse_norm
         + INT32_C(536870912), 30));
-    const int_fast32_t next_x = (int_fast32_t)(cayley_klein_normalize_q31_shr_((int64_t)a_x * inverse_norm
+    const int_fast32_t next_x =
+        (int_fast32_t)(cayley_klein_normalize_q31_shr_((int64_t)a_x * inverse_norm
         + INT32_C(536870912), 30));
-    const int_fast32_t next_y = (int_fast32_t)(cayley_klein_normalize_q31_shr_((int64_t)a_y * inverse_norm
+    const int_fast32_t next_y =
+        (int_fast32_t)(cayley_klein_normalize_q31_shr_((int64_t)a_y * inverse_norm
         + INT32_C(536870912), 30));
-    const int_fast32_t next_z = (int_fast32_t)(cayley_klein_normalize_q31_shr_((int64_t)a_z * inverse_norm
+    const int_fast32_t next_z =
+        (int_fast32_t)(cayley_klein_normalize_q31_shr_((int64_t)a_z * inverse_norm
         + INT32_C(536870912), 30));
     next[0] = (int32_t)next_s;
     next[1] = (int32_t)next_x;

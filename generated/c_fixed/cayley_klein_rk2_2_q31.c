@@ -59,10 +59,12 @@ static inline int cayley_klein_rk2_2_q31_one_(const int32_t state[4], const int3
     const int_fast32_t p_z = (int_fast32_t)((int64_t)sigma_z
         + cayley_klein_rk2_2_q31_shr_(-sigma_cross_d1_z + INT32_C(1073741824), 31));
     const int64_t d1_dot_d2 = (int64_t)d1_x * d2_x + (int64_t)d1_y * d2_y + (int64_t)d1_z * d2_z;
-    const int_fast32_t sigma_dot_sigma = (int_fast32_t)(cayley_klein_rk2_2_q31_shr_((int64_t)sigma_x * sigma_x
+    const int_fast32_t sigma_dot_sigma =
+        (int_fast32_t)(cayley_klein_rk2_2_q31_shr_((int64_t)sigma_x * sigma_x
         + (int64_t)sigma_y * sigma_y + (int64_t)sigma_z * sigma_z + INT32_C(1073741824), 31));
     /* its scalar part */
-    const int_fast32_t p_s = (int_fast32_t)(cayley_klein_rk2_2_q31_shr_((int64_t)sigma_dot_sigma * 3 * INT32_C(134217728)
+    const int_fast32_t p_s =
+        (int_fast32_t)(cayley_klein_rk2_2_q31_shr_((int64_t)sigma_dot_sigma * 3 * INT32_C(134217728)
         - d1_dot_d2 + INT32_C(536870912), 30));
     /* Cayley-Klein parameters, body to reference, scalar first, after the step */
     const int_fast32_t next_s = (int_fast32_t)((int64_t)a_s

@@ -52,24 +52,32 @@ static inline int cayley_klein_rk3_2_q31_one_(const int32_t state[4], const int3
     const int_fast32_t delta_x = (int_fast32_t)((int64_t)d1_x - (int64_t)d2_x);
     const int_fast32_t delta_y = (int_fast32_t)((int64_t)d1_y - (int64_t)d2_y);
     const int_fast32_t delta_z = (int_fast32_t)((int64_t)d1_z - (int64_t)d2_z);
-    const int_fast32_t delta_cross_sigma_x = (int_fast32_t)(cayley_klein_rk3_2_q31_shr_((int64_t)delta_y * sigma_z
+    const int_fast32_t delta_cross_sigma_x =
+        (int_fast32_t)(cayley_klein_rk3_2_q31_shr_((int64_t)delta_y * sigma_z
         - (int64_t)delta_z * sigma_y + INT32_C(536870912), 30));
-    const int_fast32_t delta_cross_sigma_y = (int_fast32_t)(cayley_klein_rk3_2_q31_shr_((int64_t)delta_z * sigma_x
+    const int_fast32_t delta_cross_sigma_y =
+        (int_fast32_t)(cayley_klein_rk3_2_q31_shr_((int64_t)delta_z * sigma_x
         - (int64_t)delta_x * sigma_z + INT32_C(536870912), 30));
-    const int_fast32_t delta_cross_sigma_z = (int_fast32_t)(cayley_klein_rk3_2_q31_shr_((int64_t)delta_x * sigma_y
+    const int_fast32_t delta_cross_sigma_z =
+        (int_fast32_t)(cayley_klein_rk3_2_q31_shr_((int64_t)delta_x * sigma_y
         - (int64_t)delta_y * sigma_x + INT32_C(536870912), 30));
-    const int_fast32_t delta_dot_delta = (int_fast32_t)(cayley_klein_rk3_2_q31_shr_((int64_t)delta_x * delta_x
+    const int_fast32_t delta_dot_delta =
+        (int_fast32_t)(cayley_klein_rk3_2_q31_shr_((int64_t)delta_x * delta_x
         + (int64_t)delta_y * delta_y + (int64_t)delta_z * delta_z + INT32_C(1073741824), 31));
-    const int_fast32_t sigma_dot_sigma = (int_fast32_t)(cayley_klein_rk3_2_q31_shr_((int64_t)sigma_x * sigma_x
+    const int_fast32_t sigma_dot_sigma =
+        (int_fast32_t)(cayley_klein_rk3_2_q31_shr_((int64_t)sigma_x * sigma_x
         + (int64_t)sigma_y * sigma_y + (int64_t)sigma_z * sigma_z + INT32_C(1073741824), 31));
     /* weight of sigma in p */
-    const int_fast32_t p_sigma = (int_fast32_t)(cayley_klein_rk3_2_q31_shr_(-(int64_t)delta_dot_delta * INT32_C(1431655765) * 2
+    const int_fast32_t p_sigma =
+        (int_fast32_t)(cayley_klein_rk3_2_q31_shr_(-(int64_t)delta_dot_delta * INT32_C(1431655765) * 2
         + cayley_klein_rk3_2_q31_shr_(-(int64_t)sigma_dot_sigma * INT32_C(1431655765), 1)
         + INT64_C(2147483648), 32));
-    const int_fast32_t sigma_dot_delta = (int_fast32_t)(cayley_klein_rk3_2_q31_shr_((int64_t)delta_x * sigma_x
+    const int_fast32_t sigma_dot_delta =
+        (int_fast32_t)(cayley_klein_rk3_2_q31_shr_((int64_t)delta_x * sigma_x
         + (int64_t)delta_y * sigma_y + (int64_t)delta_z * sigma_z + INT32_C(268435456), 29));
     /* weight of delta in p */
-    const int_fast32_t p_delta = (int_fast32_t)(cayley_klein_rk3_2_q31_shr_((int64_t)sigma_dot_delta * INT32_C(1431655765)
+    const int_fast32_t p_delta =
+        (int_fast32_t)(cayley_klein_rk3_2_q31_shr_((int64_t)sigma_dot_delta * INT32_C(1431655765)
         + INT32_C(1073741824), 31));
     /* the step applied to the identity: its vector part */
     const int_fast32_t p_x = (int_fast32_t)((int64_t)sigma_x
@@ -85,7 +93,8 @@ static inline int cayley_klein_rk3_2_q31_one_(const int32_t state[4], const int3
         + cayley_klein_rk3_2_q31_shr_((int64_t)delta_z * p_delta, 1)
         + (int64_t)delta_cross_sigma_z * INT32_C(1431655765) * 2 + INT64_C(17179869184), 35));
     /* its scalar part */
-    const int_fast32_t p_s = (int_fast32_t)(cayley_klein_rk3_2_q31_shr_(-(int64_t)delta_dot_delta * INT32_C(1431655765)
+    const int_fast32_t p_s =
+        (int_fast32_t)(cayley_klein_rk3_2_q31_shr_(-(int64_t)delta_dot_delta * INT32_C(1431655765)
         - (int64_t)sigma_dot_sigma * INT32_C(1073741824) + INT64_C(4294967296), 33));
     /* Cayley-Klein parameters, body to reference, scalar first, after the step */
     const int_fast32_t next_s = (int_fast32_t)((int64_t)a_s

@@ -48,19 +48,25 @@ static inline int cayley_klein_rk4_2_q31_one_(const int32_t state[4], const int3
     const int_fast32_t sigma_x = (int_fast32_t)((int64_t)d1_x + (int64_t)d2_x);
     const int_fast32_t sigma_y = (int_fast32_t)((int64_t)d1_y + (int64_t)d2_y);
     const int_fast32_t sigma_z = (int_fast32_t)((int64_t)d1_z + (int64_t)d2_z);
-    const int_fast32_t sigma_cross_d1_x = (int_fast32_t)(cayley_klein_rk4_2_q31_shr_((int64_t)d1_z * sigma_y
-        - (int64_t)d1_y * sigma_z + INT32_C(268435456), 29));
-    const int_fast32_t sigma_cross_d1_y = (int_fast32_t)(cayley_klein_rk4_2_q31_shr_((int64_t)d1_x * sigma_z
-        - (int64_t)d1_z * sigma_x + INT32_C(268435456), 29));
-    const int_fast32_t sigma_cross_d1_z = (int_fast32_t)(cayley_klein_rk4_2_q31_shr_((int64_t)d1_y * sigma_x
-        - (int64_t)d1_x * sigma_y + INT32_C(268435456), 29));
-    const int_fast32_t sigma_dot_sigma = (int_fast32_t)(cayley_klein_rk4_2_q31_shr_((int64_t)sigma_x * sigma_x
+    const int_fast32_t sigma_cross_d1_x =
+        (int_fast32_t)(cayley_klein_rk4_2_q31_shr_((int64_t)d1_z * sigma_y - (int64_t)d1_y * sigma_z
+        + INT32_C(268435456), 29));
+    const int_fast32_t sigma_cross_d1_y =
+        (int_fast32_t)(cayley_klein_rk4_2_q31_shr_((int64_t)d1_x * sigma_z - (int64_t)d1_z * sigma_x
+        + INT32_C(268435456), 29));
+    const int_fast32_t sigma_cross_d1_z =
+        (int_fast32_t)(cayley_klein_rk4_2_q31_shr_((int64_t)d1_y * sigma_x - (int64_t)d1_x * sigma_y
+        + INT32_C(268435456), 29));
+    const int_fast32_t sigma_dot_sigma =
+        (int_fast32_t)(cayley_klein_rk4_2_q31_shr_((int64_t)sigma_x * sigma_x
         + (int64_t)sigma_y * sigma_y + (int64_t)sigma_z * sigma_z + INT32_C(1073741824), 31));
     /* weight of sigma in p */
-    const int_fast32_t p_sigma = (int_fast32_t)(cayley_klein_rk4_2_q31_shr_(-(int64_t)sigma_dot_sigma * INT32_C(1431655765)
+    const int_fast32_t p_sigma =
+        (int_fast32_t)(cayley_klein_rk4_2_q31_shr_(-(int64_t)sigma_dot_sigma * INT32_C(1431655765)
         + INT32_C(1073741824), 31));
     /* weight of sigma_cross_d1 in p */
-    const int_fast32_t p_sigma_cross_d1 = (int_fast32_t)(cayley_klein_rk4_2_q31_shr_(-(int64_t)p_sigma * INT32_C(4194304)
+    const int_fast32_t p_sigma_cross_d1 =
+        (int_fast32_t)(cayley_klein_rk4_2_q31_shr_(-(int64_t)p_sigma * INT32_C(4194304)
         - INT64_C(384307168202282325) + INT32_C(134217728), 28));
     /* the step applied to the identity: its vector part */
     const int_fast32_t p_x = (int_fast32_t)((int64_t)sigma_x
@@ -74,10 +80,12 @@ static inline int cayley_klein_rk4_2_q31_one_(const int32_t state[4], const int3
         + (int64_t)p_sigma_cross_d1 * sigma_cross_d1_z * 4 + INT64_C(34359738368), 36));
     const int_fast32_t d1_dot_d2 = (int_fast32_t)(cayley_klein_rk4_2_q31_shr_((int64_t)d1_x * d2_x
         + (int64_t)d1_y * d2_y + (int64_t)d1_z * d2_z + INT32_C(268435456), 29));
-    const int_fast32_t p_s_factor = (int_fast32_t)(cayley_klein_rk4_2_q31_shr_((int64_t)d1_dot_d2 * INT32_C(1431655765)
+    const int_fast32_t p_s_factor =
+        (int_fast32_t)(cayley_klein_rk4_2_q31_shr_((int64_t)d1_dot_d2 * INT32_C(1431655765)
         - (int64_t)sigma_dot_sigma * INT32_C(1073741824) + INT64_C(17179869184), 35));
     /* its scalar part */
-    const int_fast32_t p_s = (int_fast32_t)(cayley_klein_rk4_2_q31_shr_(-(int64_t)sigma_dot_sigma * INT64_C(4294967296)
+    const int_fast32_t p_s =
+        (int_fast32_t)(cayley_klein_rk4_2_q31_shr_(-(int64_t)sigma_dot_sigma * INT64_C(4294967296)
         + (int64_t)p_s_factor * sigma_dot_sigma + INT64_C(17179869184), 35));
     /* Cayley-Klein parameters, body to reference, scalar first, after the step */
     const int_fast32_t next_s = (int_fast32_t)((int64_t)a_s

@@ -56,14 +56,15 @@ static inline int coning_fast_q31_one_(const int32_t angle_sum[3], const int32_t
     const int64_t arm_z = (int64_t)beta_z * INT64_C(4294967296)
         + coning_fast_q31_shr_((int64_t)past_z * INT32_C(1431655765), 4);
     /* sum of the angle increments since the slow cycle began, after the call */
-    const int_fast32_t next_beta_x = (int_fast32_t)((int64_t)beta_x + coning_fast_q31_shr_((int64_t)d_x
-        + 4, 3));
-    const int_fast32_t next_beta_y = (int_fast32_t)((int64_t)beta_y + coning_fast_q31_shr_((int64_t)d_y
-        + 4, 3));
-    const int_fast32_t next_beta_z = (int_fast32_t)((int64_t)beta_z + coning_fast_q31_shr_((int64_t)d_z
-        + 4, 3));
+    const int_fast32_t next_beta_x =
+        (int_fast32_t)((int64_t)beta_x + coning_fast_q31_shr_((int64_t)d_x + 4, 3));
+    const int_fast32_t next_beta_y =
+        (int_fast32_t)((int64_t)beta_y + coning_fast_q31_shr_((int64_t)d_y + 4, 3));
+    const int_fast32_t next_beta_z =
+        (int_fast32_t)((int64_t)beta_z + coning_fast_q31_shr_((int64_t)d_z + 4, 3));
     const int_fast32_t shared_1 = (int_fast32_t)((int64_t)d_z);
-    const int_fast32_t shared_2 = (int_fast32_t)(coning_fast_q31_shr_(arm_z + INT64_C(2147483648), 32));
+    const int_fast32_t shared_2 =
+        (int_fast32_t)(coning_fast_q31_shr_(arm_z + INT64_C(2147483648), 32));
     /* coning correction since the slow cycle began, after the call */
     const int64_t next_coning_x_unchecked = (int64_t)coning_x
         + coning_fast_q31_shr_((int64_t)arm_y * shared_1 - (int64_t)d_y * shared_2

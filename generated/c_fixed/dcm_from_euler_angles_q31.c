@@ -28,36 +28,47 @@ static inline int dcm_from_euler_angles_q31_one_(const int32_t angles[3], int32_
         || dcm_from_euler_angles_q31_out_(pitch, INT32_C(1686629857))
         || dcm_from_euler_angles_q31_out_(heading, INT32_C(1686629857)))
         return 1;
-    const int_fast32_t cos_heading_quarters = (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)heading * INT32_C(1367130551)
+    const int_fast32_t cos_heading_quarters =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)heading * INT32_C(1367130551)
         + INT64_C(576460752303423488), 60));
     const int_fast32_t cos_heading_rest = (int_fast32_t)((int64_t)heading * 4
         + dcm_from_euler_angles_q31_shr_(-(int64_t)cos_heading_quarters * INT32_C(560513589)
         + INT64_C(2147483648), 32) - (int64_t)cos_heading_quarters * INT32_C(1686629713) * 2);
-    const int_fast32_t cos_heading_turns = (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_quarters
-        + 2, 2));
+    const int_fast32_t cos_heading_turns =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_quarters + 2, 2));
     const int64_t cos_heading_quarter_turns = (int64_t)cos_heading_quarters
         - (int64_t)cos_heading_turns * 4;
-    const int_fast32_t cos_heading_square = (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_rest * cos_heading_rest
+    const int_fast32_t cos_heading_square =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_rest * cos_heading_rest
         + INT32_C(1073741824), 31));
-    const int_fast32_t cos_heading_series = (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_(-(int64_t)cos_heading_square * INT32_C(56412333), 1)
+    const int_fast32_t cos_heading_series =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_(-(int64_t)cos_heading_square * INT32_C(56412333), 1)
         + INT64_C(6662950945848033280) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_heading_series_2 = (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_square * cos_heading_series, 5)
+    const int_fast32_t cos_heading_series_2 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_square * cos_heading_series, 5)
         - INT64_C(7495819814078808064) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_heading_series_3 = (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_square * cos_heading_series_2, 5)
+    const int_fast32_t cos_heading_series_3 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_square * cos_heading_series_2, 5)
         + INT64_C(4919131752989213696) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_heading_series_4 = (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_square * cos_heading_series_3, 3)
+    const int_fast32_t cos_heading_series_4 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_square * cos_heading_series_3, 3)
         - INT64_C(6148914691236517216) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_heading_bend = (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_square * cos_heading_series_4
+    const int_fast32_t cos_heading_bend =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_square * cos_heading_series_4
         + INT32_C(536870912), 30));
     const int64_t cos_heading_sine = (int64_t)cos_heading_rest * INT64_C(4294967296)
         + dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_rest * cos_heading_bend, 2);
-    const int_fast32_t cos_heading_series_5 = (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_(-(int64_t)cos_heading_square * INT32_C(620535663), 4)
+    const int_fast32_t cos_heading_series_5 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_(-(int64_t)cos_heading_square * INT32_C(620535663), 4)
         + INT64_C(7495819814078775296) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_heading_series_6 = (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_square * cos_heading_series_5, 5)
+    const int_fast32_t cos_heading_series_6 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_square * cos_heading_series_5, 5)
         - INT64_C(6558842337318952960) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_heading_series_7 = (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_square * cos_heading_series_6, 4)
+    const int_fast32_t cos_heading_series_7 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_square * cos_heading_series_6, 4)
         + INT64_C(6148914691236517248) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_heading_bend_2 = (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_square * cos_heading_series_7
+    const int_fast32_t cos_heading_bend_2 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_square * cos_heading_series_7
         + INT32_C(536870912), 30));
     const int64_t cos_heading_cosine = -(int64_t)cos_heading_square * INT32_C(1073741824)
         + dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_square * cos_heading_bend_2, 5)
@@ -68,43 +79,57 @@ static inline int dcm_from_euler_angles_q31_one_(const int32_t angles[3], int32_
         : cos_heading_quarter_turns >= 0 ? cos_heading_cosine
         : cos_heading_quarter_turns >= (-1) ? dcm_from_euler_angles_q31_shr_(cos_heading_sine, 1)
         : cos_heading_opposite_2);
-    const int_fast32_t cos_heading = (int_fast32_t)(dcm_from_euler_angles_q31_shr_(cos_heading_quarter
+    const int_fast32_t cos_heading =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(cos_heading_quarter
         + INT64_C(2147483648), 32));
     const int64_t sin_heading_quarter = (cos_heading_quarter_turns >= 1 ? cos_heading_cosine
         : cos_heading_quarter_turns >= 0 ? dcm_from_euler_angles_q31_shr_(cos_heading_sine, 1)
         : cos_heading_quarter_turns >= (-1) ? cos_heading_opposite_2
         : dcm_from_euler_angles_q31_shr_(cos_heading_opposite, 1));
-    const int_fast32_t sin_heading = (int_fast32_t)(dcm_from_euler_angles_q31_shr_(sin_heading_quarter
+    const int_fast32_t sin_heading =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(sin_heading_quarter
         + INT64_C(2147483648), 32));
-    const int_fast32_t cos_pitch_quarters = (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)pitch * INT32_C(1367130551)
+    const int_fast32_t cos_pitch_quarters =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)pitch * INT32_C(1367130551)
         + INT64_C(576460752303423488), 60));
     const int_fast32_t cos_pitch_rest = (int_fast32_t)((int64_t)pitch * 4
         + dcm_from_euler_angles_q31_shr_(-(int64_t)cos_pitch_quarters * INT32_C(560513589)
         + INT64_C(2147483648), 32) - (int64_t)cos_pitch_quarters * INT32_C(1686629713) * 2);
-    const int_fast32_t cos_pitch_turns = (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_quarters
-        + 2, 2));
-    const int64_t cos_pitch_quarter_turns = (int64_t)cos_pitch_quarters - (int64_t)cos_pitch_turns * 4;
-    const int_fast32_t cos_pitch_square = (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_rest * cos_pitch_rest
+    const int_fast32_t cos_pitch_turns =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_quarters + 2, 2));
+    const int64_t cos_pitch_quarter_turns =
+        (int64_t)cos_pitch_quarters - (int64_t)cos_pitch_turns * 4;
+    const int_fast32_t cos_pitch_square =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_rest * cos_pitch_rest
         + INT32_C(1073741824), 31));
-    const int_fast32_t cos_pitch_series = (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_(-(int64_t)cos_pitch_square * INT32_C(56412333), 1)
+    const int_fast32_t cos_pitch_series =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_(-(int64_t)cos_pitch_square * INT32_C(56412333), 1)
         + INT64_C(6662950945848033280) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_pitch_series_2 = (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_square * cos_pitch_series, 5)
+    const int_fast32_t cos_pitch_series_2 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_square * cos_pitch_series, 5)
         - INT64_C(7495819814078808064) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_pitch_series_3 = (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_square * cos_pitch_series_2, 5)
+    const int_fast32_t cos_pitch_series_3 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_square * cos_pitch_series_2, 5)
         + INT64_C(4919131752989213696) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_pitch_series_4 = (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_square * cos_pitch_series_3, 3)
+    const int_fast32_t cos_pitch_series_4 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_square * cos_pitch_series_3, 3)
         - INT64_C(6148914691236517216) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_pitch_bend = (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_square * cos_pitch_series_4
+    const int_fast32_t cos_pitch_bend =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_square * cos_pitch_series_4
         + INT32_C(536870912), 30));
     const int64_t cos_pitch_sine = (int64_t)cos_pitch_rest * INT64_C(4294967296)
         + dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_rest * cos_pitch_bend, 2);
-    const int_fast32_t cos_pitch_series_5 = (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_(-(int64_t)cos_pitch_square * INT32_C(620535663), 4)
+    const int_fast32_t cos_pitch_series_5 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_(-(int64_t)cos_pitch_square * INT32_C(620535663), 4)
         + INT64_C(7495819814078775296) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_pitch_series_6 = (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_square * cos_pitch_series_5, 5)
+    const int_fast32_t cos_pitch_series_6 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_square * cos_pitch_series_5, 5)
         - INT64_C(6558842337318952960) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_pitch_series_7 = (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_square * cos_pitch_series_6, 4)
+    const int_fast32_t cos_pitch_series_7 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_square * cos_pitch_series_6, 4)
         + INT64_C(6148914691236517248) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_pitch_bend_2 = (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_square * cos_pitch_series_7
+    const int_fast32_t cos_pitch_bend_2 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_square * cos_pitch_series_7
         + INT32_C(536870912), 30));
     const int64_t cos_pitch_cosine = -(int64_t)cos_pitch_square * INT32_C(1073741824)
         + dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_square * cos_pitch_bend_2, 5)
@@ -123,35 +148,46 @@ static inline int dcm_from_euler_angles_q31_one_(const int32_t angles[3], int32_
         : dcm_from_euler_angles_q31_shr_(cos_pitch_opposite, 1));
     const int_fast32_t sin_pitch = (int_fast32_t)(dcm_from_euler_angles_q31_shr_(sin_pitch_quarter
         + INT64_C(2147483648), 32));
-    const int_fast32_t cos_roll_quarters = (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)roll * INT32_C(1367130551)
+    const int_fast32_t cos_roll_quarters =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)roll * INT32_C(1367130551)
         + INT64_C(576460752303423488), 60));
     const int_fast32_t cos_roll_rest = (int_fast32_t)((int64_t)roll * 4
         + dcm_from_euler_angles_q31_shr_(-(int64_t)cos_roll_quarters * INT32_C(560513589)
         + INT64_C(2147483648), 32) - (int64_t)cos_roll_quarters * INT32_C(1686629713) * 2);
-    const int_fast32_t cos_roll_turns = (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_quarters
-        + 2, 2));
+    const int_fast32_t cos_roll_turns =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_quarters + 2, 2));
     const int64_t cos_roll_quarter_turns = (int64_t)cos_roll_quarters - (int64_t)cos_roll_turns * 4;
-    const int_fast32_t cos_roll_square = (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_rest * cos_roll_rest
+    const int_fast32_t cos_roll_square =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_rest * cos_roll_rest
         + INT32_C(1073741824), 31));
-    const int_fast32_t cos_roll_series = (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_(-(int64_t)cos_roll_square * INT32_C(56412333), 1)
+    const int_fast32_t cos_roll_series =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_(-(int64_t)cos_roll_square * INT32_C(56412333), 1)
         + INT64_C(6662950945848033280) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_roll_series_2 = (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_square * cos_roll_series, 5)
+    const int_fast32_t cos_roll_series_2 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_square * cos_roll_series, 5)
         - INT64_C(7495819814078808064) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_roll_series_3 = (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_square * cos_roll_series_2, 5)
+    const int_fast32_t cos_roll_series_3 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_square * cos_roll_series_2, 5)
         + INT64_C(4919131752989213696) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_roll_series_4 = (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_square * cos_roll_series_3, 3)
+    const int_fast32_t cos_roll_series_4 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_square * cos_roll_series_3, 3)
         - INT64_C(6148914691236517216) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_roll_bend = (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_square * cos_roll_series_4
+    const int_fast32_t cos_roll_bend =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_square * cos_roll_series_4
         + INT32_C(536870912), 30));
     const int64_t cos_roll_sine = (int64_t)cos_roll_rest * INT64_C(4294967296)
         + dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_rest * cos_roll_bend, 2);
-    const int_fast32_t cos_roll_series_5 = (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_(-(int64_t)cos_roll_square * INT32_C(620535663), 4)
+    const int_fast32_t cos_roll_series_5 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_(-(int64_t)cos_roll_square * INT32_C(620535663), 4)
         + INT64_C(7495819814078775296) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_roll_series_6 = (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_square * cos_roll_series_5, 5)
+    const int_fast32_t cos_roll_series_6 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_square * cos_roll_series_5, 5)
         - INT64_C(6558842337318952960) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_roll_series_7 = (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_square * cos_roll_series_6, 4)
+    const int_fast32_t cos_roll_series_7 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_square * cos_roll_series_6, 4)
         + INT64_C(6148914691236517248) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_roll_bend_2 = (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_square * cos_roll_series_7
+    const int_fast32_t cos_roll_bend_2 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_square * cos_roll_series_7
         + INT32_C(536870912), 30));
     const int64_t cos_roll_cosine = -(int64_t)cos_roll_square * INT32_C(1073741824)
         + dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_square * cos_roll_bend_2, 5)
@@ -171,11 +207,14 @@ static inline int dcm_from_euler_angles_q31_one_(const int32_t angles[3], int32_
     const int_fast32_t sin_roll = (int_fast32_t)(dcm_from_euler_angles_q31_shr_(sin_roll_quarter
         + INT64_C(2147483648), 32));
     /* direction cosine matrix, body to reference */
-    const int_fast32_t C_11 = (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading * cos_pitch
+    const int_fast32_t C_11 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading * cos_pitch
         + INT32_C(536870912), 30));
-    const int_fast32_t shared_1 = (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading * sin_roll
+    const int_fast32_t shared_1 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading * sin_roll
         + INT32_C(536870912), 30));
-    const int_fast32_t shared_4 = (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_roll * sin_heading
+    const int_fast32_t shared_4 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_roll * sin_heading
         + INT32_C(536870912), 30));
     const int64_t C_12_unchecked = -(int64_t)shared_4
         + dcm_from_euler_angles_q31_shr_((int64_t)shared_1 * sin_pitch + INT32_C(536870912), 30);
@@ -183,9 +222,11 @@ static inline int dcm_from_euler_angles_q31_one_(const int32_t angles[3], int32_
         || C_12_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t C_12 = (int_fast32_t)C_12_unchecked;
-    const int_fast32_t shared_2 = (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)sin_heading * sin_roll
+    const int_fast32_t shared_2 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)sin_heading * sin_roll
         + INT32_C(536870912), 30));
-    const int_fast32_t shared_3 = (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading * cos_roll
+    const int_fast32_t shared_3 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading * cos_roll
         + INT32_C(536870912), 30));
     const int64_t C_13_unchecked = (int64_t)shared_2
         + dcm_from_euler_angles_q31_shr_((int64_t)shared_3 * sin_pitch + INT32_C(536870912), 30);
@@ -193,7 +234,8 @@ static inline int dcm_from_euler_angles_q31_one_(const int32_t angles[3], int32_
         || C_13_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t C_13 = (int_fast32_t)C_13_unchecked;
-    const int_fast32_t C_21 = (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch * sin_heading
+    const int_fast32_t C_21 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch * sin_heading
         + INT32_C(536870912), 30));
     const int64_t C_22_unchecked = (int64_t)shared_3
         + dcm_from_euler_angles_q31_shr_((int64_t)shared_2 * sin_pitch + INT32_C(536870912), 30);
@@ -208,9 +250,11 @@ static inline int dcm_from_euler_angles_q31_one_(const int32_t angles[3], int32_
         return 2;
     const int_fast32_t C_23 = (int_fast32_t)C_23_unchecked;
     const int_fast32_t C_31 = (int_fast32_t)(-(int64_t)sin_pitch);
-    const int_fast32_t C_32 = (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch * sin_roll
+    const int_fast32_t C_32 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch * sin_roll
         + INT32_C(536870912), 30));
-    const int_fast32_t C_33 = (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch * cos_roll
+    const int_fast32_t C_33 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch * cos_roll
         + INT32_C(536870912), 30));
     attitude[0] = (int32_t)C_11;
     attitude[1] = (int32_t)C_12;

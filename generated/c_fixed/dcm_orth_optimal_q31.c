@@ -79,51 +79,69 @@ static inline int dcm_orth_optimal_q31_one_(const int32_t computed[9], int32_t o
     const int_fast32_t gram_33 = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)C_13 * C_13
         + (int64_t)C_23 * C_23 + (int64_t)C_33 * C_33 + INT32_C(1073741824), 31));
     /* mean of the eigenvalues of C' C */
-    const int64_t mean = (int64_t)gram_11 * INT32_C(1431655765) + (int64_t)gram_22 * INT32_C(1431655765)
+    const int64_t mean =
+        (int64_t)gram_11 * INT32_C(1431655765) + (int64_t)gram_22 * INT32_C(1431655765)
         + (int64_t)gram_33 * INT32_C(1431655765);
     /* C' C less its mean */
-    const int_fast32_t deviator_11 = (int_fast32_t)((int64_t)gram_11 + dcm_orth_optimal_q31_shr_(-mean
+    const int_fast32_t deviator_11 =
+        (int_fast32_t)((int64_t)gram_11 + dcm_orth_optimal_q31_shr_(-mean
         + INT64_C(2147483648), 32));
-    const int_fast32_t deviator_22 = (int_fast32_t)((int64_t)gram_22 + dcm_orth_optimal_q31_shr_(-mean
+    const int_fast32_t deviator_22 =
+        (int_fast32_t)((int64_t)gram_22 + dcm_orth_optimal_q31_shr_(-mean
         + INT64_C(2147483648), 32));
-    const int_fast32_t deviator_33 = (int_fast32_t)((int64_t)gram_33 + dcm_orth_optimal_q31_shr_(-mean
+    const int_fast32_t deviator_33 =
+        (int_fast32_t)((int64_t)gram_33 + dcm_orth_optimal_q31_shr_(-mean
         + INT64_C(2147483648), 32));
-    const int_fast32_t shared_2 = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)gram_23 * gram_23
+    const int_fast32_t shared_2 =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)gram_23 * gram_23
         + INT32_C(1073741824), 31));
-    const int_fast32_t spread_product = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)deviator_11 * deviator_11
+    const int_fast32_t spread_product =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)deviator_11 * deviator_11
         + INT32_C(536870912), 30));
-    const int_fast32_t spread_product_2 = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)deviator_22 * deviator_22
+    const int_fast32_t spread_product_2 =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)deviator_22 * deviator_22
         + INT32_C(536870912), 30));
-    const int_fast32_t spread_product_3 = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)deviator_33 * deviator_33
+    const int_fast32_t spread_product_3 =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)deviator_33 * deviator_33
         + INT32_C(536870912), 30));
-    const int_fast32_t spread_product_4 = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)gram_12 * gram_12
+    const int_fast32_t spread_product_4 =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)gram_12 * gram_12
         + INT32_C(1073741824), 31));
-    const int_fast32_t spread_product_5 = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)gram_13 * gram_13
+    const int_fast32_t spread_product_5 =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)gram_13 * gram_13
         + INT32_C(1073741824), 31));
     /* mean square spread of the eigenvalues, halved */
-    const int_fast32_t spread = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)shared_2 * INT32_C(1431655765)
+    const int_fast32_t spread =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)shared_2 * INT32_C(1431655765)
         + dcm_orth_optimal_q31_shr_((int64_t)spread_product * INT32_C(1431655765), 2)
         + dcm_orth_optimal_q31_shr_((int64_t)spread_product_2 * INT32_C(1431655765), 2)
         + dcm_orth_optimal_q31_shr_((int64_t)spread_product_3 * INT32_C(1431655765), 2)
         + (int64_t)spread_product_4 * INT32_C(1431655765)
         + (int64_t)spread_product_5 * INT32_C(1431655765) + INT64_C(2147483648), 32));
-    const int_fast32_t half_determinant_factor = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)deviator_22 * deviator_33
+    const int_fast32_t half_determinant_factor =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)deviator_22 * deviator_33
         - (int64_t)shared_2 * INT64_C(2147483648) + INT64_C(2147483648), 32));
-    const int_fast32_t half_determinant_factor_2 = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)gram_13 * gram_23
+    const int_fast32_t half_determinant_factor_2 =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)gram_13 * gram_23
         - (int64_t)deviator_33 * gram_12 + INT64_C(2147483648), 32));
-    const int_fast32_t half_determinant_factor_3 = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)gram_12 * gram_23
+    const int_fast32_t half_determinant_factor_3 =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)gram_12 * gram_23
         - (int64_t)deviator_22 * gram_13 + INT64_C(2147483648), 32));
-    const int_fast32_t half_determinant = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)deviator_11 * half_determinant_factor
+    const int_fast32_t half_determinant =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)deviator_11 * half_determinant_factor
         + (int64_t)gram_12 * half_determinant_factor_2
         + (int64_t)gram_13 * half_determinant_factor_3 + INT64_C(2147483648), 32));
-    const int_fast32_t angle_angle_argument_radicand_largest_argument_factor = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)spread * spread
+    const int_fast32_t angle_angle_argument_radicand_largest_argument_factor =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)spread * spread
         + INT32_C(1073741824), 31));
-    const int64_t angle_angle_argument_radicand_largest_argument = dcm_orth_optimal_q31_shr_((int64_t)angle_angle_argument_radicand_largest_argument_factor * spread, 1)
+    const int64_t angle_angle_argument_radicand_largest_argument =
+        dcm_orth_optimal_q31_shr_((int64_t)angle_angle_argument_radicand_largest_argument_factor * spread, 1)
         - (int64_t)half_determinant * half_determinant * 2;
     int64_t angle_angle_argument_radicand_largest = 0;
     if (angle_angle_argument_radicand_largest_argument > angle_angle_argument_radicand_largest)
         angle_angle_argument_radicand_largest = angle_angle_argument_radicand_largest_argument;
-    const int_fast32_t angle_angle_argument_root = dcm_orth_optimal_q31_sqrt_((uint64_t)(dcm_orth_optimal_q31_shr_(angle_angle_argument_radicand_largest, 1)));
+    const int_fast32_t angle_angle_argument_root =
+        dcm_orth_optimal_q31_sqrt_((uint64_t)(dcm_orth_optimal_q31_shr_(angle_angle_argument_radicand_largest, 1)));
     const int_fast32_t angle_angle_taken = (int_fast32_t)(((int64_t)angle_angle_argument_root >= INT32_C(880607856) ? INT32_C(880607856)
         : (int64_t)angle_angle_argument_root));
     const int_fast32_t angle_angle_taken_2 = (int_fast32_t)(((int64_t)half_determinant >= INT32_C(1399979002) ? INT32_C(1399979002)
@@ -148,20 +166,28 @@ static inline int dcm_orth_optimal_q31_one_(const int32_t computed[9], int32_t o
         : (int64_t)angle_angle_smaller * 2));
     const int64_t angle_angle_denominator = (angle_angle_beyond >= 0 ? angle_angle_both
         : angle_angle_larger);
-    const int_fast32_t angle_angle_tangent = (int_fast32_t)(dcm_orth_optimal_q31_div_((int64_t)angle_angle_numerator * INT64_C(4294967296), angle_angle_denominator));
-    const int_fast32_t angle_angle_square = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)angle_angle_tangent * angle_angle_tangent
+    const int_fast32_t angle_angle_tangent =
+        (int_fast32_t)(dcm_orth_optimal_q31_div_((int64_t)angle_angle_numerator * INT64_C(4294967296), angle_angle_denominator));
+    const int_fast32_t angle_angle_square =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)angle_angle_tangent * angle_angle_tangent
         + INT32_C(1073741824), 31));
-    const int_fast32_t angle_angle_series = (int_fast32_t)(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_shr_((int64_t)angle_angle_square * INT32_C(735255871), 1)
+    const int_fast32_t angle_angle_series =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_shr_((int64_t)angle_angle_square * INT32_C(735255871), 1)
         - INT64_C(6065684321545150080) + INT64_C(2147483648), 32));
-    const int_fast32_t angle_angle_series_2 = (int_fast32_t)(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_shr_((int64_t)angle_angle_square * angle_angle_series, 2)
+    const int_fast32_t angle_angle_series_2 =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_shr_((int64_t)angle_angle_square * angle_angle_series, 2)
         + INT64_C(4054853067505913472) + INT32_C(1073741824), 31));
-    const int_fast32_t angle_angle_series_3 = (int_fast32_t)(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_shr_((int64_t)angle_angle_square * angle_angle_series_2, 2)
+    const int_fast32_t angle_angle_series_3 =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_shr_((int64_t)angle_angle_square * angle_angle_series_2, 2)
         - INT64_C(5267120772635892064) + INT64_C(2147483648), 32));
-    const int_fast32_t angle_angle_series_4 = (int_fast32_t)(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_shr_((int64_t)angle_angle_square * angle_angle_series_3, 1)
+    const int_fast32_t angle_angle_series_4 =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_shr_((int64_t)angle_angle_square * angle_angle_series_3, 1)
         + INT64_C(7378564090463267680) + INT64_C(2147483648), 32));
-    const int_fast32_t angle_angle_series_5 = (int_fast32_t)(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_shr_((int64_t)angle_angle_square * angle_angle_series_4, 2)
+    const int_fast32_t angle_angle_series_5 =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_shr_((int64_t)angle_angle_square * angle_angle_series_4, 2)
         - INT64_C(6148913518682917232) + INT64_C(2147483648), 32));
-    const int_fast32_t angle_angle_bend = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)angle_angle_square * angle_angle_series_5
+    const int_fast32_t angle_angle_bend =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)angle_angle_square * angle_angle_series_5
         - INT64_C(11967952160) + INT32_C(1073741824), 31));
     const int64_t angle_angle_arctangent = (int64_t)angle_angle_tangent * INT64_C(4294967296)
         + dcm_orth_optimal_q31_shr_((int64_t)angle_angle_tangent * angle_angle_bend, 2);
@@ -180,45 +206,60 @@ static inline int dcm_orth_optimal_q31_one_(const int32_t computed[9], int32_t o
     const int_fast32_t angle_angle = (int_fast32_t)(dcm_orth_optimal_q31_shr_(angle_angle_half
         + INT64_C(2147483648), 32));
     /* angle of the cubic */
-    const int_fast32_t angle = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)angle_angle * INT32_C(1431655765)
+    const int_fast32_t angle =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)angle_angle * INT32_C(1431655765)
         + INT64_C(2147483648), 32));
-    const int_fast32_t radius = dcm_orth_optimal_q31_sqrt_((uint64_t)((int64_t)spread * INT32_C(536870912)));
+    const int_fast32_t radius =
+        dcm_orth_optimal_q31_sqrt_((uint64_t)((int64_t)spread * INT32_C(536870912)));
     const int_fast32_t along_cosine_taken = (int_fast32_t)(((int64_t)angle >= INT32_C(562209904) ? INT32_C(562209904)
         : 0 >= (int64_t)angle ? 0
         : (int64_t)angle));
-    const int_fast32_t along_cosine_square = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)along_cosine_taken * along_cosine_taken
+    const int_fast32_t along_cosine_square =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)along_cosine_taken * along_cosine_taken
         + INT32_C(134217728), 28));
-    const int_fast32_t along_cosine_series = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)along_cosine_square * INT32_C(18804111)
+    const int_fast32_t along_cosine_series =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)along_cosine_square * INT32_C(18804111)
         - INT64_C(2665180378335019008) + INT32_C(1073741824), 31));
-    const int_fast32_t along_cosine_series_2 = (int_fast32_t)(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_shr_((int64_t)along_cosine_square * along_cosine_series, 4)
+    const int_fast32_t along_cosine_series_2 =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_shr_((int64_t)along_cosine_square * along_cosine_series, 4)
         + INT64_C(7495819814078775296) + INT64_C(2147483648), 32));
-    const int_fast32_t along_cosine_series_3 = (int_fast32_t)(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_shr_((int64_t)along_cosine_square * along_cosine_series_2, 4)
+    const int_fast32_t along_cosine_series_3 =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_shr_((int64_t)along_cosine_square * along_cosine_series_2, 4)
         - INT64_C(6558842337318952960) + INT64_C(2147483648), 32));
-    const int_fast32_t along_cosine_series_4 = (int_fast32_t)(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_shr_((int64_t)along_cosine_square * along_cosine_series_3, 3)
+    const int_fast32_t along_cosine_series_4 =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_shr_((int64_t)along_cosine_square * along_cosine_series_3, 3)
         + INT64_C(6148914691236517248) + INT64_C(2147483648), 32));
-    const int_fast32_t along_cosine_bend = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)along_cosine_square * along_cosine_series_4
+    const int_fast32_t along_cosine_bend =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)along_cosine_square * along_cosine_series_4
         + INT32_C(536870912), 30));
     const int_fast32_t along_cosine = (int_fast32_t)(INT32_C(1073741824)
         + dcm_orth_optimal_q31_shr_(-(int64_t)along_cosine_square * INT64_C(4294967296)
         + dcm_orth_optimal_q31_shr_((int64_t)along_cosine_square * along_cosine_bend, 2)
         + INT64_C(4294967296), 33));
     const int64_t along = (int64_t)along_cosine * radius;
-    const int_fast32_t across_sine_series = (int_fast32_t)(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_shr_((int64_t)along_cosine_square * INT32_C(1481185359), 5)
+    const int_fast32_t across_sine_series =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_shr_((int64_t)along_cosine_square * INT32_C(1481185359), 5)
         - INT64_C(7753252009628663808) + INT64_C(2147483648), 32));
-    const int_fast32_t across_sine_series_2 = (int_fast32_t)(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_shr_((int64_t)along_cosine_square * across_sine_series, 5)
+    const int_fast32_t across_sine_series_2 =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_shr_((int64_t)along_cosine_square * across_sine_series, 5)
         + INT64_C(6662950945848033280) + INT64_C(2147483648), 32));
-    const int_fast32_t across_sine_series_3 = (int_fast32_t)(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_shr_((int64_t)along_cosine_square * across_sine_series_2, 4)
+    const int_fast32_t across_sine_series_3 =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_shr_((int64_t)along_cosine_square * across_sine_series_2, 4)
         - INT64_C(7495819814078808064) + INT64_C(2147483648), 32));
-    const int_fast32_t across_sine_series_4 = (int_fast32_t)(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_shr_((int64_t)along_cosine_square * across_sine_series_3, 4)
+    const int_fast32_t across_sine_series_4 =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_shr_((int64_t)along_cosine_square * across_sine_series_3, 4)
         + INT64_C(4919131752989213696) + INT64_C(2147483648), 32));
-    const int_fast32_t across_sine_series_5 = (int_fast32_t)(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_shr_((int64_t)along_cosine_square * across_sine_series_4, 2)
+    const int_fast32_t across_sine_series_5 =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_shr_((int64_t)along_cosine_square * across_sine_series_4, 2)
         - INT64_C(6148914691236517216) + INT64_C(2147483648), 32));
-    const int_fast32_t across_sine_bend = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)along_cosine_square * across_sine_series_5
+    const int_fast32_t across_sine_bend =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)along_cosine_square * across_sine_series_5
         + INT32_C(536870912), 30));
     const int_fast32_t across_sine = (int_fast32_t)((int64_t)along_cosine_taken * 2
         + dcm_orth_optimal_q31_shr_((int64_t)along_cosine_taken * across_sine_bend
         + INT64_C(2147483648), 32));
-    const int_fast32_t across_product = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)across_sine * radius
+    const int_fast32_t across_product =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)across_sine * radius
         + INT32_C(536870912), 30));
     const int64_t across = (int64_t)across_product * INT32_C(1859775393);
     const int64_t stretch_1_radicand = along * 4 + dcm_orth_optimal_q31_shr_(mean, 2);
@@ -226,7 +267,8 @@ static inline int dcm_orth_optimal_q31_one_(const int32_t computed[9], int32_t o
         || stretch_1_radicand > INT64_C(1152921504606846976))
         return 2;
     /* singular value 1 of C */
-    const int_fast32_t stretch_1 = dcm_orth_optimal_q31_sqrt_((uint64_t)(dcm_orth_optimal_q31_shr_(stretch_1_radicand, 1)));
+    const int_fast32_t stretch_1 =
+        dcm_orth_optimal_q31_sqrt_((uint64_t)(dcm_orth_optimal_q31_shr_(stretch_1_radicand, 1)));
     const int64_t shared_10 = along * 2 + dcm_orth_optimal_q31_shr_(-mean, 2);
     const int64_t stretch_2_radicand = across + dcm_orth_optimal_q31_shr_(-shared_10, 1);
     if (stretch_2_radicand < INT64_C(144115188075855872)
@@ -244,150 +286,194 @@ static inline int dcm_orth_optimal_q31_one_(const int32_t computed[9], int32_t o
     /* invariants of (C' C)^(1/2) */
     const int_fast32_t invariant_1 = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)shared_1
         + (int64_t)stretch_3 + 1, 1));
-    const int_fast32_t shared_3 = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)stretch_1 * stretch_2
+    const int_fast32_t shared_3 =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)stretch_1 * stretch_2
         + INT32_C(268435456), 29));
-    const int64_t invariant_2 = (int64_t)shared_1 * stretch_3 + (int64_t)shared_3 * INT32_C(536870912);
+    const int64_t invariant_2 =
+        (int64_t)shared_1 * stretch_3 + (int64_t)shared_3 * INT32_C(536870912);
     const int64_t invariant_3 = (int64_t)shared_3 * stretch_3;
     /* i1 C' C + i3 I */
     const int_fast32_t denominator_11 = (int_fast32_t)(dcm_orth_optimal_q31_shr_(invariant_3
         + (int64_t)gram_11 * invariant_1 * 2 + INT64_C(2147483648), 32));
-    const int_fast32_t denominator_12 = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)gram_12 * invariant_1
+    const int_fast32_t denominator_12 =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)gram_12 * invariant_1
         + INT32_C(536870912), 30));
-    const int_fast32_t denominator_13 = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)gram_13 * invariant_1
+    const int_fast32_t denominator_13 =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)gram_13 * invariant_1
         + INT32_C(536870912), 30));
     const int_fast32_t denominator_22 = (int_fast32_t)(dcm_orth_optimal_q31_shr_(invariant_3
         + (int64_t)gram_22 * invariant_1 * 2 + INT64_C(2147483648), 32));
-    const int_fast32_t denominator_23 = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)gram_23 * invariant_1
+    const int_fast32_t denominator_23 =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)gram_23 * invariant_1
         + INT32_C(536870912), 30));
     const int_fast32_t denominator_33 = (int_fast32_t)(dcm_orth_optimal_q31_shr_(invariant_3
         + (int64_t)gram_33 * invariant_1 * 2 + INT64_C(2147483648), 32));
     /* adjugate of the denominator */
-    const int_fast32_t adjugate_11 = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)denominator_22 * denominator_33 * 4
+    const int_fast32_t adjugate_11 =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)denominator_22 * denominator_33 * 4
         - (int64_t)denominator_23 * denominator_23 + INT64_C(2147483648), 32));
-    const int_fast32_t adjugate_12 = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)denominator_13 * denominator_23
+    const int_fast32_t adjugate_12 =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)denominator_13 * denominator_23
         - (int64_t)denominator_12 * denominator_33 * 2 + INT64_C(2147483648), 32));
-    const int_fast32_t adjugate_13 = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)denominator_12 * denominator_23
+    const int_fast32_t adjugate_13 =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)denominator_12 * denominator_23
         - (int64_t)denominator_13 * denominator_22 * 2 + INT64_C(2147483648), 32));
-    const int_fast32_t adjugate_22 = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)denominator_11 * denominator_33 * 4
+    const int_fast32_t adjugate_22 =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)denominator_11 * denominator_33 * 4
         - (int64_t)denominator_13 * denominator_13 + INT64_C(2147483648), 32));
-    const int_fast32_t adjugate_23 = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)denominator_12 * denominator_13
+    const int_fast32_t adjugate_23 =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)denominator_12 * denominator_13
         - (int64_t)denominator_11 * denominator_23 * 2 + INT64_C(2147483648), 32));
-    const int_fast32_t adjugate_33 = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)denominator_11 * denominator_22 * 4
+    const int_fast32_t adjugate_33 =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)denominator_11 * denominator_22 * 4
         - (int64_t)denominator_12 * denominator_12 + INT64_C(2147483648), 32));
-    const int64_t inverse_determinant_denominator_unchecked = dcm_orth_optimal_q31_shr_((int64_t)adjugate_11 * denominator_11
+    const int64_t inverse_determinant_denominator_unchecked =
+        dcm_orth_optimal_q31_shr_((int64_t)adjugate_11 * denominator_11
         + dcm_orth_optimal_q31_shr_((int64_t)adjugate_12 * denominator_12, 1)
         + dcm_orth_optimal_q31_shr_((int64_t)adjugate_13 * denominator_13, 1)
         + INT32_C(16777216), 25);
     if (inverse_determinant_denominator_unchecked < INT32_C(268436410)
         || inverse_determinant_denominator_unchecked > INT32_C(1073740870))
         return 2;
-    const int_fast32_t inverse_determinant_denominator = (int_fast32_t)inverse_determinant_denominator_unchecked;
-    const int_fast32_t inverse_determinant = (int_fast32_t)(dcm_orth_optimal_q31_div_(INT64_C(288230376151711744), inverse_determinant_denominator));
+    const int_fast32_t inverse_determinant_denominator =
+        (int_fast32_t)inverse_determinant_denominator_unchecked;
+    const int_fast32_t inverse_determinant =
+        (int_fast32_t)(dcm_orth_optimal_q31_div_(INT64_C(288230376151711744), inverse_determinant_denominator));
     const int64_t shared_4 = (int64_t)adjugate_12 * gram_12;
     const int64_t shared_5 = (int64_t)adjugate_13 * gram_13;
-    const int_fast32_t shared_6 = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)gram_11 * INT32_C(536870912)
-        + invariant_2 + INT32_C(1073741824), 31));
+    const int_fast32_t shared_6 =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)gram_11 * INT32_C(536870912) + invariant_2
+        + INT32_C(1073741824), 31));
     /* inverse root of C' C, times the determinant */
-    const int_fast32_t root_11 = (int_fast32_t)(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_shr_(shared_4, 1)
+    const int_fast32_t root_11 =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_shr_(shared_4, 1)
         + dcm_orth_optimal_q31_shr_(shared_5, 1) + (int64_t)adjugate_11 * shared_6 * 2
         + INT64_C(2147483648), 32));
-    const int_fast32_t root_12 = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)adjugate_12 * shared_6 * 2
+    const int_fast32_t root_12 =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)adjugate_12 * shared_6 * 2
         + dcm_orth_optimal_q31_shr_((int64_t)adjugate_22 * gram_12, 1)
         + dcm_orth_optimal_q31_shr_((int64_t)adjugate_23 * gram_13, 1) + INT64_C(2147483648), 32));
-    const int_fast32_t root_13 = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)adjugate_13 * shared_6 * 2
+    const int_fast32_t root_13 =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)adjugate_13 * shared_6 * 2
         + dcm_orth_optimal_q31_shr_((int64_t)adjugate_23 * gram_12, 1)
         + dcm_orth_optimal_q31_shr_((int64_t)adjugate_33 * gram_13, 1) + INT64_C(2147483648), 32));
-    const int_fast32_t shared_7 = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)gram_22 * INT32_C(536870912)
-        + invariant_2 + INT32_C(1073741824), 31));
-    const int_fast32_t root_21 = (int_fast32_t)(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_shr_((int64_t)adjugate_11 * gram_12, 1)
+    const int_fast32_t shared_7 =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)gram_22 * INT32_C(536870912) + invariant_2
+        + INT32_C(1073741824), 31));
+    const int_fast32_t root_21 =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_shr_((int64_t)adjugate_11 * gram_12, 1)
         + (int64_t)adjugate_12 * shared_7 * 2
         + dcm_orth_optimal_q31_shr_((int64_t)adjugate_13 * gram_23, 1) + INT64_C(2147483648), 32));
     const int64_t shared_8 = (int64_t)adjugate_23 * gram_23;
-    const int_fast32_t root_22 = (int_fast32_t)(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_shr_(shared_4, 1)
+    const int_fast32_t root_22 =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_shr_(shared_4, 1)
         + dcm_orth_optimal_q31_shr_(shared_8, 1) + (int64_t)adjugate_22 * shared_7 * 2
         + INT64_C(2147483648), 32));
-    const int_fast32_t root_23 = (int_fast32_t)(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_shr_((int64_t)adjugate_13 * gram_12, 1)
+    const int_fast32_t root_23 =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_shr_((int64_t)adjugate_13 * gram_12, 1)
         + (int64_t)adjugate_23 * shared_7 * 2
         + dcm_orth_optimal_q31_shr_((int64_t)adjugate_33 * gram_23, 1) + INT64_C(2147483648), 32));
-    const int_fast32_t shared_9 = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)gram_33 * INT32_C(536870912)
-        + invariant_2 + INT32_C(1073741824), 31));
-    const int_fast32_t root_31 = (int_fast32_t)(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_shr_((int64_t)adjugate_11 * gram_13, 1)
+    const int_fast32_t shared_9 =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)gram_33 * INT32_C(536870912) + invariant_2
+        + INT32_C(1073741824), 31));
+    const int_fast32_t root_31 =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_shr_((int64_t)adjugate_11 * gram_13, 1)
         + dcm_orth_optimal_q31_shr_((int64_t)adjugate_12 * gram_23, 1)
         + (int64_t)adjugate_13 * shared_9 * 2 + INT64_C(2147483648), 32));
-    const int_fast32_t root_32 = (int_fast32_t)(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_shr_((int64_t)adjugate_12 * gram_13, 1)
+    const int_fast32_t root_32 =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_shr_((int64_t)adjugate_12 * gram_13, 1)
         + dcm_orth_optimal_q31_shr_((int64_t)adjugate_22 * gram_23, 1)
         + (int64_t)adjugate_23 * shared_9 * 2 + INT64_C(2147483648), 32));
-    const int_fast32_t root_33 = (int_fast32_t)(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_shr_(shared_5, 1)
+    const int_fast32_t root_33 =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_shr_(shared_5, 1)
         + dcm_orth_optimal_q31_shr_(shared_8, 1) + (int64_t)adjugate_33 * shared_9 * 2
         + INT64_C(2147483648), 32));
-    const int_fast32_t next_11_factor = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)C_11 * root_11
-        + (int64_t)C_12 * root_21 + (int64_t)C_13 * root_31 + INT64_C(2147483648), 32));
+    const int_fast32_t next_11_factor =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)C_11 * root_11 + (int64_t)C_12 * root_21
+        + (int64_t)C_13 * root_31 + INT64_C(2147483648), 32));
     /* direction cosine matrix, body to reference, orthonormalized */
-    const int64_t next_11_unchecked = dcm_orth_optimal_q31_shr_((int64_t)inverse_determinant * next_11_factor
+    const int64_t next_11_unchecked =
+        dcm_orth_optimal_q31_shr_((int64_t)inverse_determinant * next_11_factor
         + INT32_C(1048576), 21);
     if (next_11_unchecked < (-INT32_C(1140850688))
         || next_11_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_11 = (int_fast32_t)next_11_unchecked;
-    const int_fast32_t next_12_factor = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)C_11 * root_12
-        + (int64_t)C_12 * root_22 + (int64_t)C_13 * root_32 + INT64_C(2147483648), 32));
-    const int64_t next_12_unchecked = dcm_orth_optimal_q31_shr_((int64_t)inverse_determinant * next_12_factor
+    const int_fast32_t next_12_factor =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)C_11 * root_12 + (int64_t)C_12 * root_22
+        + (int64_t)C_13 * root_32 + INT64_C(2147483648), 32));
+    const int64_t next_12_unchecked =
+        dcm_orth_optimal_q31_shr_((int64_t)inverse_determinant * next_12_factor
         + INT32_C(1048576), 21);
     if (next_12_unchecked < (-INT32_C(1140850688))
         || next_12_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_12 = (int_fast32_t)next_12_unchecked;
-    const int_fast32_t next_13_factor = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)C_11 * root_13
-        + (int64_t)C_12 * root_23 + (int64_t)C_13 * root_33 + INT64_C(2147483648), 32));
-    const int64_t next_13_unchecked = dcm_orth_optimal_q31_shr_((int64_t)inverse_determinant * next_13_factor
+    const int_fast32_t next_13_factor =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)C_11 * root_13 + (int64_t)C_12 * root_23
+        + (int64_t)C_13 * root_33 + INT64_C(2147483648), 32));
+    const int64_t next_13_unchecked =
+        dcm_orth_optimal_q31_shr_((int64_t)inverse_determinant * next_13_factor
         + INT32_C(1048576), 21);
     if (next_13_unchecked < (-INT32_C(1140850688))
         || next_13_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_13 = (int_fast32_t)next_13_unchecked;
-    const int_fast32_t next_21_factor = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)C_21 * root_11
-        + (int64_t)C_22 * root_21 + (int64_t)C_23 * root_31 + INT64_C(2147483648), 32));
-    const int64_t next_21_unchecked = dcm_orth_optimal_q31_shr_((int64_t)inverse_determinant * next_21_factor
+    const int_fast32_t next_21_factor =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)C_21 * root_11 + (int64_t)C_22 * root_21
+        + (int64_t)C_23 * root_31 + INT64_C(2147483648), 32));
+    const int64_t next_21_unchecked =
+        dcm_orth_optimal_q31_shr_((int64_t)inverse_determinant * next_21_factor
         + INT32_C(1048576), 21);
     if (next_21_unchecked < (-INT32_C(1140850688))
         || next_21_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_21 = (int_fast32_t)next_21_unchecked;
-    const int_fast32_t next_22_factor = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)C_21 * root_12
-        + (int64_t)C_22 * root_22 + (int64_t)C_23 * root_32 + INT64_C(2147483648), 32));
-    const int64_t next_22_unchecked = dcm_orth_optimal_q31_shr_((int64_t)inverse_determinant * next_22_factor
+    const int_fast32_t next_22_factor =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)C_21 * root_12 + (int64_t)C_22 * root_22
+        + (int64_t)C_23 * root_32 + INT64_C(2147483648), 32));
+    const int64_t next_22_unchecked =
+        dcm_orth_optimal_q31_shr_((int64_t)inverse_determinant * next_22_factor
         + INT32_C(1048576), 21);
     if (next_22_unchecked < (-INT32_C(1140850688))
         || next_22_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_22 = (int_fast32_t)next_22_unchecked;
-    const int_fast32_t next_23_factor = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)C_21 * root_13
-        + (int64_t)C_22 * root_23 + (int64_t)C_23 * root_33 + INT64_C(2147483648), 32));
-    const int64_t next_23_unchecked = dcm_orth_optimal_q31_shr_((int64_t)inverse_determinant * next_23_factor
+    const int_fast32_t next_23_factor =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)C_21 * root_13 + (int64_t)C_22 * root_23
+        + (int64_t)C_23 * root_33 + INT64_C(2147483648), 32));
+    const int64_t next_23_unchecked =
+        dcm_orth_optimal_q31_shr_((int64_t)inverse_determinant * next_23_factor
         + INT32_C(1048576), 21);
     if (next_23_unchecked < (-INT32_C(1140850688))
         || next_23_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_23 = (int_fast32_t)next_23_unchecked;
-    const int_fast32_t next_31_factor = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)C_31 * root_11
-        + (int64_t)C_32 * root_21 + (int64_t)C_33 * root_31 + INT64_C(2147483648), 32));
-    const int64_t next_31_unchecked = dcm_orth_optimal_q31_shr_((int64_t)inverse_determinant * next_31_factor
+    const int_fast32_t next_31_factor =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)C_31 * root_11 + (int64_t)C_32 * root_21
+        + (int64_t)C_33 * root_31 + INT64_C(2147483648), 32));
+    const int64_t next_31_unchecked =
+        dcm_orth_optimal_q31_shr_((int64_t)inverse_determinant * next_31_factor
         + INT32_C(1048576), 21);
     if (next_31_unchecked < (-INT32_C(1140850688))
         || next_31_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_31 = (int_fast32_t)next_31_unchecked;
-    const int_fast32_t next_32_factor = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)C_31 * root_12
-        + (int64_t)C_32 * root_22 + (int64_t)C_33 * root_32 + INT64_C(2147483648), 32));
-    const int64_t next_32_unchecked = dcm_orth_optimal_q31_shr_((int64_t)inverse_determinant * next_32_factor
+    const int_fast32_t next_32_factor =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)C_31 * root_12 + (int64_t)C_32 * root_22
+        + (int64_t)C_33 * root_32 + INT64_C(2147483648), 32));
+    const int64_t next_32_unchecked =
+        dcm_orth_optimal_q31_shr_((int64_t)inverse_determinant * next_32_factor
         + INT32_C(1048576), 21);
     if (next_32_unchecked < (-INT32_C(1140850688))
         || next_32_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_32 = (int_fast32_t)next_32_unchecked;
-    const int_fast32_t next_33_factor = (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)C_31 * root_13
-        + (int64_t)C_32 * root_23 + (int64_t)C_33 * root_33 + INT64_C(2147483648), 32));
-    const int64_t next_33_unchecked = dcm_orth_optimal_q31_shr_((int64_t)inverse_determinant * next_33_factor
+    const int_fast32_t next_33_factor =
+        (int_fast32_t)(dcm_orth_optimal_q31_shr_((int64_t)C_31 * root_13 + (int64_t)C_32 * root_23
+        + (int64_t)C_33 * root_33 + INT64_C(2147483648), 32));
+    const int64_t next_33_unchecked =
+        dcm_orth_optimal_q31_shr_((int64_t)inverse_determinant * next_33_factor
         + INT32_C(1048576), 21);
     if (next_33_unchecked < (-INT32_C(1140850688))
         || next_33_unchecked > INT32_C(1140850688))

@@ -45,52 +45,67 @@ static inline int dcm_orth_second_order_q31_one_(const int32_t computed[9],
     const int_fast32_t excess_11 = (int_fast32_t)(-INT32_C(536870912)
         + dcm_orth_second_order_q31_shr_((int64_t)C_11 * C_11 + (int64_t)C_21 * C_21
         + (int64_t)C_31 * C_31 + INT32_C(1073741824), 31));
-    const int_fast32_t excess_12 = (int_fast32_t)(dcm_orth_second_order_q31_shr_((int64_t)C_11 * C_12
-        + (int64_t)C_21 * C_22 + (int64_t)C_31 * C_32 + INT32_C(1073741824), 31));
-    const int_fast32_t excess_13 = (int_fast32_t)(dcm_orth_second_order_q31_shr_((int64_t)C_11 * C_13
-        + (int64_t)C_21 * C_23 + (int64_t)C_31 * C_33 + INT32_C(1073741824), 31));
+    const int_fast32_t excess_12 =
+        (int_fast32_t)(dcm_orth_second_order_q31_shr_((int64_t)C_11 * C_12 + (int64_t)C_21 * C_22
+        + (int64_t)C_31 * C_32 + INT32_C(1073741824), 31));
+    const int_fast32_t excess_13 =
+        (int_fast32_t)(dcm_orth_second_order_q31_shr_((int64_t)C_11 * C_13 + (int64_t)C_21 * C_23
+        + (int64_t)C_31 * C_33 + INT32_C(1073741824), 31));
     const int_fast32_t excess_22 = (int_fast32_t)(-INT32_C(536870912)
         + dcm_orth_second_order_q31_shr_((int64_t)C_12 * C_12 + (int64_t)C_22 * C_22
         + (int64_t)C_32 * C_32 + INT32_C(1073741824), 31));
-    const int_fast32_t excess_23 = (int_fast32_t)(dcm_orth_second_order_q31_shr_((int64_t)C_12 * C_13
-        + (int64_t)C_22 * C_23 + (int64_t)C_32 * C_33 + INT32_C(1073741824), 31));
+    const int_fast32_t excess_23 =
+        (int_fast32_t)(dcm_orth_second_order_q31_shr_((int64_t)C_12 * C_13 + (int64_t)C_22 * C_23
+        + (int64_t)C_32 * C_33 + INT32_C(1073741824), 31));
     const int_fast32_t excess_33 = (int_fast32_t)(-INT32_C(536870912)
         + dcm_orth_second_order_q31_shr_((int64_t)C_13 * C_13 + (int64_t)C_23 * C_23
         + (int64_t)C_33 * C_33 + INT32_C(1073741824), 31));
     const int64_t shared_1 = (int64_t)excess_12 * excess_12;
     const int64_t shared_2 = (int64_t)excess_13 * excess_13;
     /* (C' C - I)^2 */
-    const int_fast32_t excess_squared_11 = (int_fast32_t)(dcm_orth_second_order_q31_shr_((int64_t)excess_11 * excess_11
-        + shared_1 + shared_2 + INT64_C(2147483648), 32));
-    const int_fast32_t excess_squared_12_factor = (int_fast32_t)(dcm_orth_second_order_q31_shr_((int64_t)excess_11
-        + (int64_t)excess_22 + 1, 1));
-    const int_fast32_t excess_squared_12 = (int_fast32_t)(dcm_orth_second_order_q31_shr_((int64_t)excess_12 * excess_squared_12_factor * 2
+    const int_fast32_t excess_squared_11 =
+        (int_fast32_t)(dcm_orth_second_order_q31_shr_((int64_t)excess_11 * excess_11 + shared_1
+        + shared_2 + INT64_C(2147483648), 32));
+    const int_fast32_t excess_squared_12_factor =
+        (int_fast32_t)(dcm_orth_second_order_q31_shr_((int64_t)excess_11 + (int64_t)excess_22
+        + 1, 1));
+    const int_fast32_t excess_squared_12 =
+        (int_fast32_t)(dcm_orth_second_order_q31_shr_((int64_t)excess_12 * excess_squared_12_factor * 2
         + (int64_t)excess_13 * excess_23 + INT64_C(2147483648), 32));
-    const int_fast32_t excess_squared_13_factor = (int_fast32_t)(dcm_orth_second_order_q31_shr_((int64_t)excess_11
-        + (int64_t)excess_33 + 1, 1));
-    const int_fast32_t excess_squared_13 = (int_fast32_t)(dcm_orth_second_order_q31_shr_((int64_t)excess_13 * excess_squared_13_factor * 2
+    const int_fast32_t excess_squared_13_factor =
+        (int_fast32_t)(dcm_orth_second_order_q31_shr_((int64_t)excess_11 + (int64_t)excess_33
+        + 1, 1));
+    const int_fast32_t excess_squared_13 =
+        (int_fast32_t)(dcm_orth_second_order_q31_shr_((int64_t)excess_13 * excess_squared_13_factor * 2
         + (int64_t)excess_12 * excess_23 + INT64_C(2147483648), 32));
     const int64_t shared_3 = (int64_t)excess_23 * excess_23;
-    const int_fast32_t excess_squared_22 = (int_fast32_t)(dcm_orth_second_order_q31_shr_((int64_t)excess_22 * excess_22
-        + shared_1 + shared_3 + INT64_C(2147483648), 32));
-    const int_fast32_t excess_squared_23_factor = (int_fast32_t)(dcm_orth_second_order_q31_shr_((int64_t)excess_22
-        + (int64_t)excess_33 + 1, 1));
-    const int_fast32_t excess_squared_23 = (int_fast32_t)(dcm_orth_second_order_q31_shr_((int64_t)excess_23 * excess_squared_23_factor * 2
+    const int_fast32_t excess_squared_22 =
+        (int_fast32_t)(dcm_orth_second_order_q31_shr_((int64_t)excess_22 * excess_22 + shared_1
+        + shared_3 + INT64_C(2147483648), 32));
+    const int_fast32_t excess_squared_23_factor =
+        (int_fast32_t)(dcm_orth_second_order_q31_shr_((int64_t)excess_22 + (int64_t)excess_33
+        + 1, 1));
+    const int_fast32_t excess_squared_23 =
+        (int_fast32_t)(dcm_orth_second_order_q31_shr_((int64_t)excess_23 * excess_squared_23_factor * 2
         + (int64_t)excess_12 * excess_13 + INT64_C(2147483648), 32));
-    const int_fast32_t excess_squared_33 = (int_fast32_t)(dcm_orth_second_order_q31_shr_((int64_t)excess_33 * excess_33
-        + shared_2 + shared_3 + INT64_C(2147483648), 32));
+    const int_fast32_t excess_squared_33 =
+        (int_fast32_t)(dcm_orth_second_order_q31_shr_((int64_t)excess_33 * excess_33 + shared_2
+        + shared_3 + INT64_C(2147483648), 32));
     /* inverse root of C' C to second order */
     const int_fast32_t root_11 = (int_fast32_t)(INT32_C(134217728)
         + dcm_orth_second_order_q31_shr_((int64_t)excess_squared_11 * 3 * 2 - (int64_t)excess_11
         + 4, 3));
-    const int_fast32_t root_12 = (int_fast32_t)(dcm_orth_second_order_q31_shr_((int64_t)excess_squared_12 * 3 * 2
+    const int_fast32_t root_12 =
+        (int_fast32_t)(dcm_orth_second_order_q31_shr_((int64_t)excess_squared_12 * 3 * 2
         - (int64_t)excess_12 + 4, 3));
-    const int_fast32_t root_13 = (int_fast32_t)(dcm_orth_second_order_q31_shr_((int64_t)excess_squared_13 * 3 * 2
+    const int_fast32_t root_13 =
+        (int_fast32_t)(dcm_orth_second_order_q31_shr_((int64_t)excess_squared_13 * 3 * 2
         - (int64_t)excess_13 + 4, 3));
     const int_fast32_t root_22 = (int_fast32_t)(INT32_C(134217728)
         + dcm_orth_second_order_q31_shr_((int64_t)excess_squared_22 * 3 * 2 - (int64_t)excess_22
         + 4, 3));
-    const int_fast32_t root_23 = (int_fast32_t)(dcm_orth_second_order_q31_shr_((int64_t)excess_squared_23 * 3 * 2
+    const int_fast32_t root_23 =
+        (int_fast32_t)(dcm_orth_second_order_q31_shr_((int64_t)excess_squared_23 * 3 * 2
         - (int64_t)excess_23 + 4, 3));
     const int_fast32_t root_33 = (int_fast32_t)(INT32_C(134217728)
         + dcm_orth_second_order_q31_shr_((int64_t)excess_squared_33 * 3 * 2 - (int64_t)excess_33

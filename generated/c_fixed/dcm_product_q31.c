@@ -60,56 +60,65 @@ static inline int dcm_product_q31_one_(const int32_t state[9], const int32_t tra
         || dcm_product_q31_out_(A_33, INT32_C(1140850688)))
         return 1;
     /* direction cosine matrix, body to reference, after the step */
-    const int64_t next_11_unchecked = dcm_product_q31_shr_((int64_t)A_11 * C_11 + (int64_t)A_21 * C_12
-        + (int64_t)A_31 * C_13 + INT32_C(536870912), 30);
+    const int64_t next_11_unchecked =
+        dcm_product_q31_shr_((int64_t)A_11 * C_11 + (int64_t)A_21 * C_12 + (int64_t)A_31 * C_13
+        + INT32_C(536870912), 30);
     if (next_11_unchecked < (-INT32_C(1140850688))
         || next_11_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_11 = (int_fast32_t)next_11_unchecked;
-    const int64_t next_12_unchecked = dcm_product_q31_shr_((int64_t)A_12 * C_11 + (int64_t)A_22 * C_12
-        + (int64_t)A_32 * C_13 + INT32_C(536870912), 30);
+    const int64_t next_12_unchecked =
+        dcm_product_q31_shr_((int64_t)A_12 * C_11 + (int64_t)A_22 * C_12 + (int64_t)A_32 * C_13
+        + INT32_C(536870912), 30);
     if (next_12_unchecked < (-INT32_C(1140850688))
         || next_12_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_12 = (int_fast32_t)next_12_unchecked;
-    const int64_t next_13_unchecked = dcm_product_q31_shr_((int64_t)A_13 * C_11 + (int64_t)A_23 * C_12
-        + (int64_t)A_33 * C_13 + INT32_C(536870912), 30);
+    const int64_t next_13_unchecked =
+        dcm_product_q31_shr_((int64_t)A_13 * C_11 + (int64_t)A_23 * C_12 + (int64_t)A_33 * C_13
+        + INT32_C(536870912), 30);
     if (next_13_unchecked < (-INT32_C(1140850688))
         || next_13_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_13 = (int_fast32_t)next_13_unchecked;
-    const int64_t next_21_unchecked = dcm_product_q31_shr_((int64_t)A_11 * C_21 + (int64_t)A_21 * C_22
-        + (int64_t)A_31 * C_23 + INT32_C(536870912), 30);
+    const int64_t next_21_unchecked =
+        dcm_product_q31_shr_((int64_t)A_11 * C_21 + (int64_t)A_21 * C_22 + (int64_t)A_31 * C_23
+        + INT32_C(536870912), 30);
     if (next_21_unchecked < (-INT32_C(1140850688))
         || next_21_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_21 = (int_fast32_t)next_21_unchecked;
-    const int64_t next_22_unchecked = dcm_product_q31_shr_((int64_t)A_12 * C_21 + (int64_t)A_22 * C_22
-        + (int64_t)A_32 * C_23 + INT32_C(536870912), 30);
+    const int64_t next_22_unchecked =
+        dcm_product_q31_shr_((int64_t)A_12 * C_21 + (int64_t)A_22 * C_22 + (int64_t)A_32 * C_23
+        + INT32_C(536870912), 30);
     if (next_22_unchecked < (-INT32_C(1140850688))
         || next_22_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_22 = (int_fast32_t)next_22_unchecked;
-    const int64_t next_23_unchecked = dcm_product_q31_shr_((int64_t)A_13 * C_21 + (int64_t)A_23 * C_22
-        + (int64_t)A_33 * C_23 + INT32_C(536870912), 30);
+    const int64_t next_23_unchecked =
+        dcm_product_q31_shr_((int64_t)A_13 * C_21 + (int64_t)A_23 * C_22 + (int64_t)A_33 * C_23
+        + INT32_C(536870912), 30);
     if (next_23_unchecked < (-INT32_C(1140850688))
         || next_23_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_23 = (int_fast32_t)next_23_unchecked;
-    const int64_t next_31_unchecked = dcm_product_q31_shr_((int64_t)A_11 * C_31 + (int64_t)A_21 * C_32
-        + (int64_t)A_31 * C_33 + INT32_C(536870912), 30);
+    const int64_t next_31_unchecked =
+        dcm_product_q31_shr_((int64_t)A_11 * C_31 + (int64_t)A_21 * C_32 + (int64_t)A_31 * C_33
+        + INT32_C(536870912), 30);
     if (next_31_unchecked < (-INT32_C(1140850688))
         || next_31_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_31 = (int_fast32_t)next_31_unchecked;
-    const int64_t next_32_unchecked = dcm_product_q31_shr_((int64_t)A_12 * C_31 + (int64_t)A_22 * C_32
-        + (int64_t)A_32 * C_33 + INT32_C(536870912), 30);
+    const int64_t next_32_unchecked =
+        dcm_product_q31_shr_((int64_t)A_12 * C_31 + (int64_t)A_22 * C_32 + (int64_t)A_32 * C_33
+        + INT32_C(536870912), 30);
     if (next_32_unchecked < (-INT32_C(1140850688))
         || next_32_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_32 = (int_fast32_t)next_32_unchecked;
-    const int64_t next_33_unchecked = dcm_product_q31_shr_((int64_t)A_13 * C_31 + (int64_t)A_23 * C_32
-        + (int64_t)A_33 * C_33 + INT32_C(536870912), 30);
+    const int64_t next_33_unchecked =
+        dcm_product_q31_shr_((int64_t)A_13 * C_31 + (int64_t)A_23 * C_32 + (int64_t)A_33 * C_33
+        + INT32_C(536870912), 30);
     if (next_33_unchecked < (-INT32_C(1140850688))
         || next_33_unchecked > INT32_C(1140850688))
         return 2;

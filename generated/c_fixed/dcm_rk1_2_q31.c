@@ -54,12 +54,12 @@ static inline int dcm_rk1_2_q31_one_(const int32_t state[9], const int32_t incre
         || dcm_rk1_2_q31_out_(d2_z, INT32_C(1073741824)))
         return 1;
     /* rate times the step, at node 0 */
-    const int_fast32_t turn_0_x = (int_fast32_t)(dcm_rk1_2_q31_shr_((int64_t)d1_x * 3 - (int64_t)d2_x
-        + 2, 2));
-    const int_fast32_t turn_0_y = (int_fast32_t)(dcm_rk1_2_q31_shr_((int64_t)d1_y * 3 - (int64_t)d2_y
-        + 2, 2));
-    const int_fast32_t turn_0_z = (int_fast32_t)(dcm_rk1_2_q31_shr_((int64_t)d1_z * 3 - (int64_t)d2_z
-        + 2, 2));
+    const int_fast32_t turn_0_x =
+        (int_fast32_t)(dcm_rk1_2_q31_shr_((int64_t)d1_x * 3 - (int64_t)d2_x + 2, 2));
+    const int_fast32_t turn_0_y =
+        (int_fast32_t)(dcm_rk1_2_q31_shr_((int64_t)d1_y * 3 - (int64_t)d2_y + 2, 2));
+    const int_fast32_t turn_0_z =
+        (int_fast32_t)(dcm_rk1_2_q31_shr_((int64_t)d1_z * 3 - (int64_t)d2_z + 2, 2));
     /* the step applied to the identity */
     const int_fast32_t A_12 = (int_fast32_t)(-(int64_t)turn_0_z);
     const int_fast32_t A_23 = (int_fast32_t)(-(int64_t)turn_0_x);

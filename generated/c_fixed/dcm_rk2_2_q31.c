@@ -76,13 +76,14 @@ static inline int dcm_rk2_2_q31_one_(const int32_t state[9], const int32_t incre
     const int64_t skew_y = sigma_y;
     const int64_t skew_z = sigma_z;
     /* left of turn_0_scaled in an outer product */
-    const int_fast32_t partner_left_x = (int_fast32_t)(dcm_rk2_2_q31_shr_(-(int64_t)turn_1_scaled_x * 9
-        + 4, 3));
-    const int_fast32_t partner_left_y = (int_fast32_t)(dcm_rk2_2_q31_shr_(-(int64_t)turn_1_scaled_y * 9
-        + 4, 3));
-    const int_fast32_t partner_left_z = (int_fast32_t)(dcm_rk2_2_q31_shr_(-(int64_t)turn_1_scaled_z * 9
-        + 4, 3));
-    const int_fast32_t turn_0_scaled_dot_turn_1_scaled = (int_fast32_t)(dcm_rk2_2_q31_shr_((int64_t)turn_0_scaled_x * turn_1_scaled_x
+    const int_fast32_t partner_left_x =
+        (int_fast32_t)(dcm_rk2_2_q31_shr_(-(int64_t)turn_1_scaled_x * 9 + 4, 3));
+    const int_fast32_t partner_left_y =
+        (int_fast32_t)(dcm_rk2_2_q31_shr_(-(int64_t)turn_1_scaled_y * 9 + 4, 3));
+    const int_fast32_t partner_left_z =
+        (int_fast32_t)(dcm_rk2_2_q31_shr_(-(int64_t)turn_1_scaled_z * 9 + 4, 3));
+    const int_fast32_t turn_0_scaled_dot_turn_1_scaled =
+        (int_fast32_t)(dcm_rk2_2_q31_shr_((int64_t)turn_0_scaled_x * turn_1_scaled_x
         + (int64_t)turn_0_scaled_y * turn_1_scaled_y + (int64_t)turn_0_scaled_z * turn_1_scaled_z
         + INT64_C(2147483648), 32));
     /* multiple of the unit matrix */
@@ -96,17 +97,23 @@ static inline int dcm_rk2_2_q31_one_(const int32_t state[9], const int32_t incre
     const int_fast32_t A_33 = (int_fast32_t)(INT32_C(1073741824)
         + dcm_rk2_2_q31_shr_(dcm_rk2_2_q31_shr_((int64_t)partner_left_z * turn_0_scaled_z, 1)
         + diagonal * INT32_C(268435456) + INT64_C(4294967296), 33));
-    const int_fast32_t A_12 = (int_fast32_t)(dcm_rk2_2_q31_shr_((int64_t)partner_left_x * turn_0_scaled_y
+    const int_fast32_t A_12 =
+        (int_fast32_t)(dcm_rk2_2_q31_shr_((int64_t)partner_left_x * turn_0_scaled_y
         - skew_z * INT64_C(2147483648) + INT64_C(8589934592), 34));
-    const int_fast32_t A_21 = (int_fast32_t)(dcm_rk2_2_q31_shr_((int64_t)partner_left_y * turn_0_scaled_x
+    const int_fast32_t A_21 =
+        (int_fast32_t)(dcm_rk2_2_q31_shr_((int64_t)partner_left_y * turn_0_scaled_x
         + skew_z * INT64_C(2147483648) + INT64_C(8589934592), 34));
-    const int_fast32_t A_23 = (int_fast32_t)(dcm_rk2_2_q31_shr_((int64_t)partner_left_y * turn_0_scaled_z
+    const int_fast32_t A_23 =
+        (int_fast32_t)(dcm_rk2_2_q31_shr_((int64_t)partner_left_y * turn_0_scaled_z
         - skew_x * INT64_C(2147483648) + INT64_C(8589934592), 34));
-    const int_fast32_t A_32 = (int_fast32_t)(dcm_rk2_2_q31_shr_((int64_t)partner_left_z * turn_0_scaled_y
+    const int_fast32_t A_32 =
+        (int_fast32_t)(dcm_rk2_2_q31_shr_((int64_t)partner_left_z * turn_0_scaled_y
         + skew_x * INT64_C(2147483648) + INT64_C(8589934592), 34));
-    const int_fast32_t A_31 = (int_fast32_t)(dcm_rk2_2_q31_shr_((int64_t)partner_left_z * turn_0_scaled_x
+    const int_fast32_t A_31 =
+        (int_fast32_t)(dcm_rk2_2_q31_shr_((int64_t)partner_left_z * turn_0_scaled_x
         - skew_y * INT64_C(2147483648) + INT64_C(8589934592), 34));
-    const int_fast32_t A_13 = (int_fast32_t)(dcm_rk2_2_q31_shr_((int64_t)partner_left_x * turn_0_scaled_z
+    const int_fast32_t A_13 =
+        (int_fast32_t)(dcm_rk2_2_q31_shr_((int64_t)partner_left_x * turn_0_scaled_z
         + skew_y * INT64_C(2147483648) + INT64_C(8589934592), 34));
     /* direction cosine matrix, body to reference, after the step */
     const int64_t next_11_unchecked = dcm_rk2_2_q31_shr_((int64_t)A_11 * C_11 + (int64_t)A_21 * C_12

@@ -61,21 +61,28 @@ static inline int dcm_rk3_2_q31_one_(const int32_t state[9], const int32_t incre
     const int_fast32_t delta_x = (int_fast32_t)((int64_t)d1_x - (int64_t)d2_x);
     const int_fast32_t delta_y = (int_fast32_t)((int64_t)d1_y - (int64_t)d2_y);
     const int_fast32_t delta_z = (int_fast32_t)((int64_t)d1_z - (int64_t)d2_z);
-    const int_fast32_t delta_cross_sigma_x = (int_fast32_t)(dcm_rk3_2_q31_shr_((int64_t)delta_y * sigma_z
-        - (int64_t)delta_z * sigma_y + INT32_C(536870912), 30));
-    const int_fast32_t delta_cross_sigma_y = (int_fast32_t)(dcm_rk3_2_q31_shr_((int64_t)delta_z * sigma_x
-        - (int64_t)delta_x * sigma_z + INT32_C(536870912), 30));
-    const int_fast32_t delta_cross_sigma_z = (int_fast32_t)(dcm_rk3_2_q31_shr_((int64_t)delta_x * sigma_y
-        - (int64_t)delta_y * sigma_x + INT32_C(536870912), 30));
-    const int_fast32_t sigma_dot_sigma = (int_fast32_t)(dcm_rk3_2_q31_shr_((int64_t)sigma_x * sigma_x
-        + (int64_t)sigma_y * sigma_y + (int64_t)sigma_z * sigma_z + INT32_C(1073741824), 31));
+    const int_fast32_t delta_cross_sigma_x =
+        (int_fast32_t)(dcm_rk3_2_q31_shr_((int64_t)delta_y * sigma_z - (int64_t)delta_z * sigma_y
+        + INT32_C(536870912), 30));
+    const int_fast32_t delta_cross_sigma_y =
+        (int_fast32_t)(dcm_rk3_2_q31_shr_((int64_t)delta_z * sigma_x - (int64_t)delta_x * sigma_z
+        + INT32_C(536870912), 30));
+    const int_fast32_t delta_cross_sigma_z =
+        (int_fast32_t)(dcm_rk3_2_q31_shr_((int64_t)delta_x * sigma_y - (int64_t)delta_y * sigma_x
+        + INT32_C(536870912), 30));
+    const int_fast32_t sigma_dot_sigma =
+        (int_fast32_t)(dcm_rk3_2_q31_shr_((int64_t)sigma_x * sigma_x + (int64_t)sigma_y * sigma_y
+        + (int64_t)sigma_z * sigma_z + INT32_C(1073741824), 31));
     /* weight of sigma in skew */
-    const int_fast32_t skew_sigma = (int_fast32_t)(dcm_rk3_2_q31_shr_(-(int64_t)sigma_dot_sigma * INT32_C(1431655765)
+    const int_fast32_t skew_sigma =
+        (int_fast32_t)(dcm_rk3_2_q31_shr_(-(int64_t)sigma_dot_sigma * INT32_C(1431655765)
         + INT32_C(1073741824), 31));
-    const int_fast32_t sigma_dot_delta = (int_fast32_t)(dcm_rk3_2_q31_shr_((int64_t)delta_x * sigma_x
-        + (int64_t)delta_y * sigma_y + (int64_t)delta_z * sigma_z + INT32_C(268435456), 29));
+    const int_fast32_t sigma_dot_delta =
+        (int_fast32_t)(dcm_rk3_2_q31_shr_((int64_t)delta_x * sigma_x + (int64_t)delta_y * sigma_y
+        + (int64_t)delta_z * sigma_z + INT32_C(268435456), 29));
     /* weight of delta in skew */
-    const int_fast32_t skew_delta = (int_fast32_t)(dcm_rk3_2_q31_shr_((int64_t)sigma_dot_delta * INT32_C(1431655765)
+    const int_fast32_t skew_delta =
+        (int_fast32_t)(dcm_rk3_2_q31_shr_((int64_t)sigma_dot_delta * INT32_C(1431655765)
         + INT32_C(1073741824), 31));
     const int64_t shared_1 = (int64_t)delta_cross_sigma_x * INT32_C(1431655765);
     /* vector of the skew part */
@@ -91,21 +98,25 @@ static inline int dcm_rk3_2_q31_one_(const int32_t state[9], const int32_t incre
         + dcm_rk3_2_q31_shr_((int64_t)sigma_z * skew_sigma, 3)
         + dcm_rk3_2_q31_shr_((int64_t)delta_z * skew_delta, 3) + dcm_rk3_2_q31_shr_(shared_3, 2);
     /* of sigma in outer products */
-    const int_fast32_t partner_sigma_x = (int_fast32_t)((int64_t)sigma_x + dcm_rk3_2_q31_shr_(shared_1
-        + INT64_C(2147483648), 32));
-    const int_fast32_t partner_sigma_y = (int_fast32_t)((int64_t)sigma_y + dcm_rk3_2_q31_shr_(shared_2
-        + INT64_C(2147483648), 32));
-    const int_fast32_t partner_sigma_z = (int_fast32_t)((int64_t)sigma_z + dcm_rk3_2_q31_shr_(shared_3
-        + INT64_C(2147483648), 32));
+    const int_fast32_t partner_sigma_x =
+        (int_fast32_t)((int64_t)sigma_x + dcm_rk3_2_q31_shr_(shared_1 + INT64_C(2147483648), 32));
+    const int_fast32_t partner_sigma_y =
+        (int_fast32_t)((int64_t)sigma_y + dcm_rk3_2_q31_shr_(shared_2 + INT64_C(2147483648), 32));
+    const int_fast32_t partner_sigma_z =
+        (int_fast32_t)((int64_t)sigma_z + dcm_rk3_2_q31_shr_(shared_3 + INT64_C(2147483648), 32));
     /* of delta in outer products */
-    const int_fast32_t partner_delta_x = (int_fast32_t)(dcm_rk3_2_q31_shr_((int64_t)delta_x * INT32_C(1431655765)
+    const int_fast32_t partner_delta_x =
+        (int_fast32_t)(dcm_rk3_2_q31_shr_((int64_t)delta_x * INT32_C(1431655765)
         + INT32_C(536870912), 30));
-    const int_fast32_t partner_delta_y = (int_fast32_t)(dcm_rk3_2_q31_shr_((int64_t)delta_y * INT32_C(1431655765)
+    const int_fast32_t partner_delta_y =
+        (int_fast32_t)(dcm_rk3_2_q31_shr_((int64_t)delta_y * INT32_C(1431655765)
         + INT32_C(536870912), 30));
-    const int_fast32_t partner_delta_z = (int_fast32_t)(dcm_rk3_2_q31_shr_((int64_t)delta_z * INT32_C(1431655765)
+    const int_fast32_t partner_delta_z =
+        (int_fast32_t)(dcm_rk3_2_q31_shr_((int64_t)delta_z * INT32_C(1431655765)
         + INT32_C(536870912), 30));
-    const int_fast32_t delta_dot_delta = (int_fast32_t)(dcm_rk3_2_q31_shr_((int64_t)delta_x * delta_x
-        + (int64_t)delta_y * delta_y + (int64_t)delta_z * delta_z + INT32_C(1073741824), 31));
+    const int_fast32_t delta_dot_delta =
+        (int_fast32_t)(dcm_rk3_2_q31_shr_((int64_t)delta_x * delta_x + (int64_t)delta_y * delta_y
+        + (int64_t)delta_z * delta_z + INT32_C(1073741824), 31));
     /* multiple of the unit matrix */
     const int64_t diagonal = -(int64_t)delta_dot_delta * INT32_C(1431655765)
         - (int64_t)sigma_dot_sigma * INT32_C(1073741824);

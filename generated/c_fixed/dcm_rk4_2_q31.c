@@ -63,13 +63,16 @@ static inline int dcm_rk4_2_q31_one_(const int32_t state[9], const int32_t incre
         - (int64_t)d1_z * sigma_x + INT32_C(268435456), 29));
     const int_fast32_t sigma_cross_d1_z = (int_fast32_t)(dcm_rk4_2_q31_shr_((int64_t)d1_y * sigma_x
         - (int64_t)d1_x * sigma_y + INT32_C(268435456), 29));
-    const int_fast32_t sigma_dot_sigma = (int_fast32_t)(dcm_rk4_2_q31_shr_((int64_t)sigma_x * sigma_x
-        + (int64_t)sigma_y * sigma_y + (int64_t)sigma_z * sigma_z + INT32_C(1073741824), 31));
+    const int_fast32_t sigma_dot_sigma =
+        (int_fast32_t)(dcm_rk4_2_q31_shr_((int64_t)sigma_x * sigma_x + (int64_t)sigma_y * sigma_y
+        + (int64_t)sigma_z * sigma_z + INT32_C(1073741824), 31));
     /* weight of sigma in skew */
-    const int_fast32_t skew_sigma = (int_fast32_t)(dcm_rk4_2_q31_shr_(-(int64_t)sigma_dot_sigma * INT32_C(1431655765)
+    const int_fast32_t skew_sigma =
+        (int_fast32_t)(dcm_rk4_2_q31_shr_(-(int64_t)sigma_dot_sigma * INT32_C(1431655765)
         + INT32_C(1073741824), 31));
     /* weight of sigma_cross_d1 in skew */
-    const int_fast32_t skew_sigma_cross_d1 = (int_fast32_t)(dcm_rk4_2_q31_shr_(-(int64_t)skew_sigma * INT32_C(33554432)
+    const int_fast32_t skew_sigma_cross_d1 =
+        (int_fast32_t)(dcm_rk4_2_q31_shr_(-(int64_t)skew_sigma * INT32_C(33554432)
         - INT64_C(768614336404564651) + INT32_C(268435456), 29));
     /* vector of the skew part */
     const int64_t skew_x = (int64_t)sigma_x * INT64_C(4294967296)
@@ -84,11 +87,13 @@ static inline int dcm_rk4_2_q31_one_(const int32_t state[9], const int32_t incre
     const int_fast32_t d1_dot_d1 = (int_fast32_t)(dcm_rk4_2_q31_shr_((int64_t)d1_x * d1_x
         + (int64_t)d1_y * d1_y + (int64_t)d1_z * d1_z + INT32_C(268435456), 29));
     /* weight of sigma in partner */
-    const int_fast32_t partner_sigma = (int_fast32_t)(dcm_rk4_2_q31_shr_((int64_t)sigma_dot_sigma * INT32_C(1073741824)
+    const int_fast32_t partner_sigma =
+        (int_fast32_t)(dcm_rk4_2_q31_shr_((int64_t)sigma_dot_sigma * INT32_C(1073741824)
         - (int64_t)d1_dot_d1 * INT32_C(1431655765) + INT32_C(1073741824), 31));
     const int_fast32_t d1_dot_sigma = (int_fast32_t)(dcm_rk4_2_q31_shr_((int64_t)d1_x * sigma_x
         + (int64_t)d1_y * sigma_y + (int64_t)d1_z * sigma_z + INT32_C(536870912), 30));
-    const int_fast32_t shared_1 = (int_fast32_t)(dcm_rk4_2_q31_shr_((int64_t)d1_dot_sigma * INT32_C(1431655765)
+    const int_fast32_t shared_1 =
+        (int_fast32_t)(dcm_rk4_2_q31_shr_((int64_t)d1_dot_sigma * INT32_C(1431655765)
         + INT32_C(1073741824), 31));
     /* weight of d1 in partner */
     const int_fast32_t partner_d1 = (int_fast32_t)((int64_t)shared_1 * 2
@@ -136,23 +141,32 @@ static inline int dcm_rk4_2_q31_one_(const int32_t state[9], const int32_t incre
     const int_fast32_t A_13 = (int_fast32_t)(dcm_rk4_2_q31_shr_(dcm_rk4_2_q31_shr_(symmetric_zx, 2)
         + skew_y + INT64_C(2147483648), 32));
     /* direction cosine matrix, body to reference, after the step */
-    const int_fast32_t next_11 = (int_fast32_t)((int64_t)C_11 + dcm_rk4_2_q31_shr_((int64_t)A_11 * C_11
+    const int_fast32_t next_11 =
+        (int_fast32_t)((int64_t)C_11 + dcm_rk4_2_q31_shr_((int64_t)A_11 * C_11
         + (int64_t)A_21 * C_12 + (int64_t)A_31 * C_13 + INT64_C(2147483648), 32));
-    const int_fast32_t next_12 = (int_fast32_t)((int64_t)C_12 + dcm_rk4_2_q31_shr_((int64_t)A_12 * C_11
+    const int_fast32_t next_12 =
+        (int_fast32_t)((int64_t)C_12 + dcm_rk4_2_q31_shr_((int64_t)A_12 * C_11
         + (int64_t)A_22 * C_12 + (int64_t)A_32 * C_13 + INT64_C(2147483648), 32));
-    const int_fast32_t next_13 = (int_fast32_t)((int64_t)C_13 + dcm_rk4_2_q31_shr_((int64_t)A_13 * C_11
+    const int_fast32_t next_13 =
+        (int_fast32_t)((int64_t)C_13 + dcm_rk4_2_q31_shr_((int64_t)A_13 * C_11
         + (int64_t)A_23 * C_12 + (int64_t)A_33 * C_13 + INT64_C(2147483648), 32));
-    const int_fast32_t next_21 = (int_fast32_t)((int64_t)C_21 + dcm_rk4_2_q31_shr_((int64_t)A_11 * C_21
+    const int_fast32_t next_21 =
+        (int_fast32_t)((int64_t)C_21 + dcm_rk4_2_q31_shr_((int64_t)A_11 * C_21
         + (int64_t)A_21 * C_22 + (int64_t)A_31 * C_23 + INT64_C(2147483648), 32));
-    const int_fast32_t next_22 = (int_fast32_t)((int64_t)C_22 + dcm_rk4_2_q31_shr_((int64_t)A_12 * C_21
+    const int_fast32_t next_22 =
+        (int_fast32_t)((int64_t)C_22 + dcm_rk4_2_q31_shr_((int64_t)A_12 * C_21
         + (int64_t)A_22 * C_22 + (int64_t)A_32 * C_23 + INT64_C(2147483648), 32));
-    const int_fast32_t next_23 = (int_fast32_t)((int64_t)C_23 + dcm_rk4_2_q31_shr_((int64_t)A_13 * C_21
+    const int_fast32_t next_23 =
+        (int_fast32_t)((int64_t)C_23 + dcm_rk4_2_q31_shr_((int64_t)A_13 * C_21
         + (int64_t)A_23 * C_22 + (int64_t)A_33 * C_23 + INT64_C(2147483648), 32));
-    const int_fast32_t next_31 = (int_fast32_t)((int64_t)C_31 + dcm_rk4_2_q31_shr_((int64_t)A_11 * C_31
+    const int_fast32_t next_31 =
+        (int_fast32_t)((int64_t)C_31 + dcm_rk4_2_q31_shr_((int64_t)A_11 * C_31
         + (int64_t)A_21 * C_32 + (int64_t)A_31 * C_33 + INT64_C(2147483648), 32));
-    const int_fast32_t next_32 = (int_fast32_t)((int64_t)C_32 + dcm_rk4_2_q31_shr_((int64_t)A_12 * C_31
+    const int_fast32_t next_32 =
+        (int_fast32_t)((int64_t)C_32 + dcm_rk4_2_q31_shr_((int64_t)A_12 * C_31
         + (int64_t)A_22 * C_32 + (int64_t)A_32 * C_33 + INT64_C(2147483648), 32));
-    const int_fast32_t next_33 = (int_fast32_t)((int64_t)C_33 + dcm_rk4_2_q31_shr_((int64_t)A_13 * C_31
+    const int_fast32_t next_33 =
+        (int_fast32_t)((int64_t)C_33 + dcm_rk4_2_q31_shr_((int64_t)A_13 * C_31
         + (int64_t)A_23 * C_32 + (int64_t)A_33 * C_33 + INT64_C(2147483648), 32));
     next[0] = (int32_t)next_11;
     next[1] = (int32_t)next_12;

@@ -60,13 +60,17 @@ static inline int dcm_update_q31_one_(const int32_t state[9], const int32_t rota
     const int_fast32_t factor_1_taken = (int_fast32_t)(((int64_t)factor_1_under_root >= INT32_C(1610612736) ? INT32_C(1610612736)
         : 0 >= (int64_t)factor_1_under_root ? 0
         : (int64_t)factor_1_under_root));
-    const int_fast32_t factor_1_series = (int_fast32_t)(dcm_update_q31_shr_(dcm_update_q31_shr_(-(int64_t)factor_1_taken * INT32_C(56412333), 1)
+    const int_fast32_t factor_1_series =
+        (int_fast32_t)(dcm_update_q31_shr_(dcm_update_q31_shr_(-(int64_t)factor_1_taken * INT32_C(56412333), 1)
         + INT64_C(6662950945848033280) + INT64_C(2147483648), 32));
-    const int_fast32_t factor_1_series_2 = (int_fast32_t)(dcm_update_q31_shr_(dcm_update_q31_shr_((int64_t)factor_1_taken * factor_1_series, 5)
+    const int_fast32_t factor_1_series_2 =
+        (int_fast32_t)(dcm_update_q31_shr_(dcm_update_q31_shr_((int64_t)factor_1_taken * factor_1_series, 5)
         - INT64_C(7495819814078808064) + INT64_C(2147483648), 32));
-    const int_fast32_t factor_1_series_3 = (int_fast32_t)(dcm_update_q31_shr_(dcm_update_q31_shr_((int64_t)factor_1_taken * factor_1_series_2, 5)
+    const int_fast32_t factor_1_series_3 =
+        (int_fast32_t)(dcm_update_q31_shr_(dcm_update_q31_shr_((int64_t)factor_1_taken * factor_1_series_2, 5)
         + INT64_C(4919131752989213696) + INT64_C(2147483648), 32));
-    const int_fast32_t factor_1_bend = (int_fast32_t)(dcm_update_q31_shr_((int64_t)factor_1_taken * factor_1_series_3
+    const int_fast32_t factor_1_bend =
+        (int_fast32_t)(dcm_update_q31_shr_((int64_t)factor_1_taken * factor_1_series_3
         + INT64_C(8589934592), 34));
     const int_fast32_t factor_1 = (int_fast32_t)(INT32_C(1073741824)
         + dcm_update_q31_shr_(-(int64_t)factor_1_taken * INT32_C(1431655765) * 2
@@ -84,15 +88,20 @@ static inline int dcm_update_q31_one_(const int32_t state[9], const int32_t rota
     const int_fast32_t shared_9_series = (int_fast32_t)(INT32_C(1481185360)
         + dcm_update_q31_shr_(-(int64_t)shared_9_taken * INT32_C(1805635485)
         + INT64_C(68719476736), 37));
-    const int_fast32_t shared_9_series_2 = (int_fast32_t)(dcm_update_q31_shr_(dcm_update_q31_shr_((int64_t)shared_9_taken * shared_9_series, 4)
+    const int_fast32_t shared_9_series_2 =
+        (int_fast32_t)(dcm_update_q31_shr_(dcm_update_q31_shr_((int64_t)shared_9_taken * shared_9_series, 4)
         - INT64_C(7753252009628663808) + INT64_C(2147483648), 32));
-    const int_fast32_t shared_9_series_3 = (int_fast32_t)(dcm_update_q31_shr_(dcm_update_q31_shr_((int64_t)shared_9_taken * shared_9_series_2, 4)
+    const int_fast32_t shared_9_series_3 =
+        (int_fast32_t)(dcm_update_q31_shr_(dcm_update_q31_shr_((int64_t)shared_9_taken * shared_9_series_2, 4)
         + INT64_C(6662950945848033280) + INT64_C(2147483648), 32));
-    const int_fast32_t shared_9_series_4 = (int_fast32_t)(dcm_update_q31_shr_(dcm_update_q31_shr_((int64_t)shared_9_taken * shared_9_series_3, 3)
+    const int_fast32_t shared_9_series_4 =
+        (int_fast32_t)(dcm_update_q31_shr_(dcm_update_q31_shr_((int64_t)shared_9_taken * shared_9_series_3, 3)
         - INT64_C(7495819814078808064) + INT64_C(2147483648), 32));
-    const int_fast32_t shared_9_series_5 = (int_fast32_t)(dcm_update_q31_shr_(dcm_update_q31_shr_((int64_t)shared_9_taken * shared_9_series_4, 3)
+    const int_fast32_t shared_9_series_5 =
+        (int_fast32_t)(dcm_update_q31_shr_(dcm_update_q31_shr_((int64_t)shared_9_taken * shared_9_series_4, 3)
         + INT64_C(4919131752989213696) + INT64_C(2147483648), 32));
-    const int_fast32_t shared_9_bend = (int_fast32_t)(dcm_update_q31_shr_((int64_t)shared_9_taken * shared_9_series_5
+    const int_fast32_t shared_9_bend =
+        (int_fast32_t)(dcm_update_q31_shr_((int64_t)shared_9_taken * shared_9_series_5
         + INT32_C(536870912), 30));
     const int_fast32_t shared_9 = (int_fast32_t)(INT32_C(1073741824)
         + dcm_update_q31_shr_(-(int64_t)shared_9_taken * INT32_C(1431655765) * 2
@@ -126,56 +135,65 @@ static inline int dcm_update_q31_one_(const int32_t state[9], const int32_t rota
     const int_fast32_t A_33 = (int_fast32_t)(INT32_C(1073741824) + dcm_update_q31_shr_(-shared_15
         - shared_7 + INT32_C(1073741824), 31));
     /* direction cosine matrix, body to reference, after the step */
-    const int64_t next_11_unchecked = dcm_update_q31_shr_((int64_t)A_11 * C_11 + (int64_t)A_21 * C_12
-        + (int64_t)A_31 * C_13 + INT32_C(536870912), 30);
+    const int64_t next_11_unchecked =
+        dcm_update_q31_shr_((int64_t)A_11 * C_11 + (int64_t)A_21 * C_12 + (int64_t)A_31 * C_13
+        + INT32_C(536870912), 30);
     if (next_11_unchecked < (-INT32_C(1140850688))
         || next_11_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_11 = (int_fast32_t)next_11_unchecked;
-    const int64_t next_12_unchecked = dcm_update_q31_shr_((int64_t)A_12 * C_11 + (int64_t)A_22 * C_12
-        + (int64_t)A_32 * C_13 + INT32_C(536870912), 30);
+    const int64_t next_12_unchecked =
+        dcm_update_q31_shr_((int64_t)A_12 * C_11 + (int64_t)A_22 * C_12 + (int64_t)A_32 * C_13
+        + INT32_C(536870912), 30);
     if (next_12_unchecked < (-INT32_C(1140850688))
         || next_12_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_12 = (int_fast32_t)next_12_unchecked;
-    const int64_t next_13_unchecked = dcm_update_q31_shr_((int64_t)A_13 * C_11 + (int64_t)A_23 * C_12
-        + (int64_t)A_33 * C_13 + INT32_C(536870912), 30);
+    const int64_t next_13_unchecked =
+        dcm_update_q31_shr_((int64_t)A_13 * C_11 + (int64_t)A_23 * C_12 + (int64_t)A_33 * C_13
+        + INT32_C(536870912), 30);
     if (next_13_unchecked < (-INT32_C(1140850688))
         || next_13_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_13 = (int_fast32_t)next_13_unchecked;
-    const int64_t next_21_unchecked = dcm_update_q31_shr_((int64_t)A_11 * C_21 + (int64_t)A_21 * C_22
-        + (int64_t)A_31 * C_23 + INT32_C(536870912), 30);
+    const int64_t next_21_unchecked =
+        dcm_update_q31_shr_((int64_t)A_11 * C_21 + (int64_t)A_21 * C_22 + (int64_t)A_31 * C_23
+        + INT32_C(536870912), 30);
     if (next_21_unchecked < (-INT32_C(1140850688))
         || next_21_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_21 = (int_fast32_t)next_21_unchecked;
-    const int64_t next_22_unchecked = dcm_update_q31_shr_((int64_t)A_12 * C_21 + (int64_t)A_22 * C_22
-        + (int64_t)A_32 * C_23 + INT32_C(536870912), 30);
+    const int64_t next_22_unchecked =
+        dcm_update_q31_shr_((int64_t)A_12 * C_21 + (int64_t)A_22 * C_22 + (int64_t)A_32 * C_23
+        + INT32_C(536870912), 30);
     if (next_22_unchecked < (-INT32_C(1140850688))
         || next_22_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_22 = (int_fast32_t)next_22_unchecked;
-    const int64_t next_23_unchecked = dcm_update_q31_shr_((int64_t)A_13 * C_21 + (int64_t)A_23 * C_22
-        + (int64_t)A_33 * C_23 + INT32_C(536870912), 30);
+    const int64_t next_23_unchecked =
+        dcm_update_q31_shr_((int64_t)A_13 * C_21 + (int64_t)A_23 * C_22 + (int64_t)A_33 * C_23
+        + INT32_C(536870912), 30);
     if (next_23_unchecked < (-INT32_C(1140850688))
         || next_23_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_23 = (int_fast32_t)next_23_unchecked;
-    const int64_t next_31_unchecked = dcm_update_q31_shr_((int64_t)A_11 * C_31 + (int64_t)A_21 * C_32
-        + (int64_t)A_31 * C_33 + INT32_C(536870912), 30);
+    const int64_t next_31_unchecked =
+        dcm_update_q31_shr_((int64_t)A_11 * C_31 + (int64_t)A_21 * C_32 + (int64_t)A_31 * C_33
+        + INT32_C(536870912), 30);
     if (next_31_unchecked < (-INT32_C(1140850688))
         || next_31_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_31 = (int_fast32_t)next_31_unchecked;
-    const int64_t next_32_unchecked = dcm_update_q31_shr_((int64_t)A_12 * C_31 + (int64_t)A_22 * C_32
-        + (int64_t)A_32 * C_33 + INT32_C(536870912), 30);
+    const int64_t next_32_unchecked =
+        dcm_update_q31_shr_((int64_t)A_12 * C_31 + (int64_t)A_22 * C_32 + (int64_t)A_32 * C_33
+        + INT32_C(536870912), 30);
     if (next_32_unchecked < (-INT32_C(1140850688))
         || next_32_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_32 = (int_fast32_t)next_32_unchecked;
-    const int64_t next_33_unchecked = dcm_update_q31_shr_((int64_t)A_13 * C_31 + (int64_t)A_23 * C_32
-        + (int64_t)A_33 * C_33 + INT32_C(536870912), 30);
+    const int64_t next_33_unchecked =
+        dcm_update_q31_shr_((int64_t)A_13 * C_31 + (int64_t)A_23 * C_32 + (int64_t)A_33 * C_33
+        + INT32_C(536870912), 30);
     if (next_33_unchecked < (-INT32_C(1140850688))
         || next_33_unchecked > INT32_C(1140850688))
         return 2;

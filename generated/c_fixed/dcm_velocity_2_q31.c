@@ -62,13 +62,16 @@ static inline int dcm_velocity_2_q31_one_(const int32_t state[9], const int32_t 
     const int_fast32_t shared_1 = (int_fast32_t)((int64_t)u_z);
     const int_fast32_t shared_2 = (int_fast32_t)((int64_t)beta_z);
     /* velocity increment, body axes at the start of the slow cycle */
-    const int_fast32_t w_x = (int_fast32_t)(dcm_velocity_2_q31_shr_((int64_t)eta_x * INT32_C(1073741824)
+    const int_fast32_t w_x =
+        (int_fast32_t)(dcm_velocity_2_q31_shr_((int64_t)eta_x * INT32_C(1073741824)
         + (int64_t)u_x * INT64_C(2147483648) + (int64_t)beta_y * shared_1 - (int64_t)shared_2 * u_y
         + INT64_C(2147483648), 32));
-    const int_fast32_t w_y = (int_fast32_t)(dcm_velocity_2_q31_shr_((int64_t)eta_y * INT32_C(1073741824)
+    const int_fast32_t w_y =
+        (int_fast32_t)(dcm_velocity_2_q31_shr_((int64_t)eta_y * INT32_C(1073741824)
         + (int64_t)u_y * INT64_C(2147483648) - (int64_t)beta_x * shared_1 + (int64_t)shared_2 * u_x
         + INT64_C(2147483648), 32));
-    const int_fast32_t w_z = (int_fast32_t)(dcm_velocity_2_q31_shr_((int64_t)eta_z * INT32_C(1073741824)
+    const int_fast32_t w_z =
+        (int_fast32_t)(dcm_velocity_2_q31_shr_((int64_t)eta_z * INT32_C(1073741824)
         + (int64_t)u_z * INT64_C(2147483648) + (int64_t)beta_x * u_y - (int64_t)beta_y * u_x
         + INT64_C(2147483648), 32));
     /* velocity increment of the slow cycle, navigation axes */

@@ -73,7 +73,8 @@ static inline int euler_angles_from_dcm_q31_one_(const int32_t state[9], const i
     /* square of the cosine of pitch */
     const int64_t cosine_squared = (int64_t)C_11 * C_11 + (int64_t)C_21 * C_21;
     const int_fast32_t next_pitch_argument = (int_fast32_t)(-(int64_t)C_31);
-    const int_fast32_t next_pitch_argument_root = euler_angles_from_dcm_q31_sqrt_((uint64_t)(euler_angles_from_dcm_q31_shr_(cosine_squared, 2)));
+    const int_fast32_t next_pitch_argument_root =
+        euler_angles_from_dcm_q31_sqrt_((uint64_t)(euler_angles_from_dcm_q31_shr_(cosine_squared, 2)));
     const int64_t next_pitch_distance = (int64_t)next_pitch_argument * next_pitch_argument
         + cosine_squared;
     if (next_pitch_distance < INT64_C(576460752303423488)
@@ -93,7 +94,8 @@ static inline int euler_angles_from_dcm_q31_one_(const int32_t state[9], const i
         next_pitch_larger = (int_fast32_t)((int64_t)next_pitch_height);
     if (1 > next_pitch_larger)
         next_pitch_larger = (int_fast32_t)(1);
-    const int64_t next_pitch_beyond = (int64_t)next_pitch_smaller * 16 - (int64_t)next_pitch_larger * 8
+    const int64_t next_pitch_beyond =
+        (int64_t)next_pitch_smaller * 16 - (int64_t)next_pitch_larger * 8
         + (int64_t)next_pitch_larger;
     const int64_t next_pitch_below = (int64_t)next_pitch_smaller - (int64_t)next_pitch_larger;
     const int64_t next_pitch_both = (int64_t)next_pitch_smaller + (int64_t)next_pitch_larger;
@@ -101,20 +103,28 @@ static inline int euler_angles_from_dcm_q31_one_(const int32_t state[9], const i
         : (int64_t)next_pitch_smaller));
     const int64_t next_pitch_denominator = (next_pitch_beyond >= 0 ? next_pitch_both
         : (int64_t)next_pitch_larger);
-    const int_fast32_t next_pitch_tangent = (int_fast32_t)(euler_angles_from_dcm_q31_div_((int64_t)next_pitch_numerator * INT64_C(4294967296), next_pitch_denominator));
-    const int_fast32_t next_pitch_square = (int_fast32_t)(euler_angles_from_dcm_q31_shr_((int64_t)next_pitch_tangent * next_pitch_tangent
+    const int_fast32_t next_pitch_tangent =
+        (int_fast32_t)(euler_angles_from_dcm_q31_div_((int64_t)next_pitch_numerator * INT64_C(4294967296), next_pitch_denominator));
+    const int_fast32_t next_pitch_square =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_((int64_t)next_pitch_tangent * next_pitch_tangent
         + INT32_C(1073741824), 31));
-    const int_fast32_t next_pitch_series = (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_pitch_square * INT32_C(735255871), 1)
+    const int_fast32_t next_pitch_series =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_pitch_square * INT32_C(735255871), 1)
         - INT64_C(6065684321545150080) + INT64_C(2147483648), 32));
-    const int_fast32_t next_pitch_series_2 = (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_pitch_square * next_pitch_series, 2)
+    const int_fast32_t next_pitch_series_2 =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_pitch_square * next_pitch_series, 2)
         + INT64_C(4054853067505913472) + INT32_C(1073741824), 31));
-    const int_fast32_t next_pitch_series_3 = (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_pitch_square * next_pitch_series_2, 2)
+    const int_fast32_t next_pitch_series_3 =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_pitch_square * next_pitch_series_2, 2)
         - INT64_C(5267120772635892064) + INT64_C(2147483648), 32));
-    const int_fast32_t next_pitch_series_4 = (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_pitch_square * next_pitch_series_3, 1)
+    const int_fast32_t next_pitch_series_4 =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_pitch_square * next_pitch_series_3, 1)
         + INT64_C(7378564090463267680) + INT64_C(2147483648), 32));
-    const int_fast32_t next_pitch_series_5 = (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_pitch_square * next_pitch_series_4, 2)
+    const int_fast32_t next_pitch_series_5 =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_pitch_square * next_pitch_series_4, 2)
         - INT64_C(6148913518682917232) + INT64_C(2147483648), 32));
-    const int_fast32_t next_pitch_bend = (int_fast32_t)(euler_angles_from_dcm_q31_shr_((int64_t)next_pitch_square * next_pitch_series_5
+    const int_fast32_t next_pitch_bend =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_((int64_t)next_pitch_square * next_pitch_series_5
         - INT64_C(11967952160) + INT32_C(1073741824), 31));
     const int64_t next_pitch_arctangent = (int64_t)next_pitch_tangent * INT64_C(4294967296)
         + euler_angles_from_dcm_q31_shr_((int64_t)next_pitch_tangent * next_pitch_bend, 2);
@@ -157,32 +167,44 @@ static inline int euler_angles_from_dcm_q31_one_(const int32_t state[9], const i
         : (int64_t)next_roll_case_angle_smaller));
     const int64_t next_roll_case_angle_denominator = (next_roll_case_angle_beyond >= 0 ? next_roll_case_angle_both
         : (int64_t)next_roll_case_angle_larger);
-    const int_fast32_t next_roll_case_angle_tangent = (int_fast32_t)(euler_angles_from_dcm_q31_div_((int64_t)next_roll_case_angle_numerator * INT64_C(4294967296), next_roll_case_angle_denominator));
-    const int_fast32_t next_roll_case_angle_square = (int_fast32_t)(euler_angles_from_dcm_q31_shr_((int64_t)next_roll_case_angle_tangent * next_roll_case_angle_tangent
+    const int_fast32_t next_roll_case_angle_tangent =
+        (int_fast32_t)(euler_angles_from_dcm_q31_div_((int64_t)next_roll_case_angle_numerator * INT64_C(4294967296), next_roll_case_angle_denominator));
+    const int_fast32_t next_roll_case_angle_square =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_((int64_t)next_roll_case_angle_tangent * next_roll_case_angle_tangent
         + INT32_C(1073741824), 31));
-    const int_fast32_t next_roll_case_angle_series = (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_roll_case_angle_square * INT32_C(735255871), 1)
+    const int_fast32_t next_roll_case_angle_series =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_roll_case_angle_square * INT32_C(735255871), 1)
         - INT64_C(6065684321545150080) + INT64_C(2147483648), 32));
-    const int_fast32_t next_roll_case_angle_series_2 = (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_roll_case_angle_square * next_roll_case_angle_series, 2)
+    const int_fast32_t next_roll_case_angle_series_2 =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_roll_case_angle_square * next_roll_case_angle_series, 2)
         + INT64_C(4054853067505913472) + INT32_C(1073741824), 31));
-    const int_fast32_t next_roll_case_angle_series_3 = (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_roll_case_angle_square * next_roll_case_angle_series_2, 2)
+    const int_fast32_t next_roll_case_angle_series_3 =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_roll_case_angle_square * next_roll_case_angle_series_2, 2)
         - INT64_C(5267120772635892064) + INT64_C(2147483648), 32));
-    const int_fast32_t next_roll_case_angle_series_4 = (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_roll_case_angle_square * next_roll_case_angle_series_3, 1)
+    const int_fast32_t next_roll_case_angle_series_4 =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_roll_case_angle_square * next_roll_case_angle_series_3, 1)
         + INT64_C(7378564090463267680) + INT64_C(2147483648), 32));
-    const int_fast32_t next_roll_case_angle_series_5 = (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_roll_case_angle_square * next_roll_case_angle_series_4, 2)
+    const int_fast32_t next_roll_case_angle_series_5 =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_roll_case_angle_square * next_roll_case_angle_series_4, 2)
         - INT64_C(6148913518682917232) + INT64_C(2147483648), 32));
-    const int_fast32_t next_roll_case_angle_bend = (int_fast32_t)(euler_angles_from_dcm_q31_shr_((int64_t)next_roll_case_angle_square * next_roll_case_angle_series_5
+    const int_fast32_t next_roll_case_angle_bend =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_((int64_t)next_roll_case_angle_square * next_roll_case_angle_series_5
         - INT64_C(11967952160) + INT32_C(1073741824), 31));
-    const int64_t next_roll_case_angle_arctangent = (int64_t)next_roll_case_angle_tangent * INT64_C(4294967296)
+    const int64_t next_roll_case_angle_arctangent =
+        (int64_t)next_roll_case_angle_tangent * INT64_C(4294967296)
         + euler_angles_from_dcm_q31_shr_((int64_t)next_roll_case_angle_tangent * next_roll_case_angle_bend, 2);
-    const int64_t next_roll_case_angle_angle = euler_angles_from_dcm_q31_shr_(next_roll_case_angle_arctangent, 2)
+    const int64_t next_roll_case_angle_angle =
+        euler_angles_from_dcm_q31_shr_(next_roll_case_angle_arctangent, 2)
         + INT64_C(3622009729038561420);
     const int64_t next_roll_case_angle_octant = (next_roll_case_angle_beyond >= 0 ? next_roll_case_angle_angle
         : euler_angles_from_dcm_q31_shr_(next_roll_case_angle_arctangent, 2));
-    const int64_t next_roll_case_angle_angle_2 = euler_angles_from_dcm_q31_shr_(-next_roll_case_angle_octant, 1)
+    const int64_t next_roll_case_angle_angle_2 =
+        euler_angles_from_dcm_q31_shr_(-next_roll_case_angle_octant, 1)
         + INT64_C(3622009729038561420);
     const int64_t next_roll_case_angle_quadrant = ((int64_t)next_roll_case_angle_width >= (int64_t)next_roll_case_angle_height ? next_roll_case_angle_octant
         : next_roll_case_angle_angle_2 * 2);
-    const int64_t next_roll_case_angle_angle_3 = euler_angles_from_dcm_q31_shr_(-next_roll_case_angle_quadrant, 2)
+    const int64_t next_roll_case_angle_angle_3 =
+        euler_angles_from_dcm_q31_shr_(-next_roll_case_angle_quadrant, 2)
         + INT64_C(3622009729038561420);
     const int64_t next_roll_case_angle_half = ((int64_t)C_33 >= 0 ? euler_angles_from_dcm_q31_shr_(next_roll_case_angle_quadrant, 1)
         : next_roll_case_angle_angle_3 * 2);
@@ -204,8 +226,8 @@ static inline int euler_angles_from_dcm_q31_one_(const int32_t state[9], const i
         : steep_cosine_case_2);
     const int_fast32_t steep_sine_word = (int_fast32_t)(euler_angles_from_dcm_q31_shr_(steep_sine
         + 1, 1));
-    const int_fast32_t steep_cosine_word = (int_fast32_t)(euler_angles_from_dcm_q31_shr_(steep_cosine
-        + 1, 1));
+    const int_fast32_t steep_cosine_word =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(steep_cosine + 1, 1));
     const int64_t apart_distance = (int64_t)steep_sine_word * steep_sine_word
         + (int64_t)steep_cosine_word * steep_cosine_word;
     if (apart_distance < INT64_C(144115190357557249)
@@ -240,20 +262,28 @@ static inline int euler_angles_from_dcm_q31_one_(const int32_t state[9], const i
         : (int64_t)apart_smaller));
     const int64_t apart_denominator = (apart_beyond >= 0 ? apart_both
         : (int64_t)apart_larger);
-    const int_fast32_t apart_tangent = (int_fast32_t)(euler_angles_from_dcm_q31_div_((int64_t)apart_numerator * INT64_C(4294967296), apart_denominator));
-    const int_fast32_t apart_square = (int_fast32_t)(euler_angles_from_dcm_q31_shr_((int64_t)apart_tangent * apart_tangent
+    const int_fast32_t apart_tangent =
+        (int_fast32_t)(euler_angles_from_dcm_q31_div_((int64_t)apart_numerator * INT64_C(4294967296), apart_denominator));
+    const int_fast32_t apart_square =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_((int64_t)apart_tangent * apart_tangent
         + INT32_C(1073741824), 31));
-    const int_fast32_t apart_series = (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)apart_square * INT32_C(735255871), 1)
+    const int_fast32_t apart_series =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)apart_square * INT32_C(735255871), 1)
         - INT64_C(6065684321545150080) + INT64_C(2147483648), 32));
-    const int_fast32_t apart_series_2 = (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)apart_square * apart_series, 2)
+    const int_fast32_t apart_series_2 =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)apart_square * apart_series, 2)
         + INT64_C(4054853067505913472) + INT32_C(1073741824), 31));
-    const int_fast32_t apart_series_3 = (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)apart_square * apart_series_2, 2)
+    const int_fast32_t apart_series_3 =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)apart_square * apart_series_2, 2)
         - INT64_C(5267120772635892064) + INT64_C(2147483648), 32));
-    const int_fast32_t apart_series_4 = (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)apart_square * apart_series_3, 1)
+    const int_fast32_t apart_series_4 =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)apart_square * apart_series_3, 1)
         + INT64_C(7378564090463267680) + INT64_C(2147483648), 32));
-    const int_fast32_t apart_series_5 = (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)apart_square * apart_series_4, 2)
+    const int_fast32_t apart_series_5 =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)apart_square * apart_series_4, 2)
         - INT64_C(6148913518682917232) + INT64_C(2147483648), 32));
-    const int_fast32_t apart_bend = (int_fast32_t)(euler_angles_from_dcm_q31_shr_((int64_t)apart_square * apart_series_5
+    const int_fast32_t apart_bend =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_((int64_t)apart_square * apart_series_5
         - INT64_C(11967952160) + INT32_C(1073741824), 31));
     const int64_t apart_arctangent = (int64_t)apart_tangent * INT64_C(4294967296)
         + euler_angles_from_dcm_q31_shr_((int64_t)apart_tangent * apart_bend, 2);
@@ -299,32 +329,44 @@ static inline int euler_angles_from_dcm_q31_one_(const int32_t state[9], const i
         : (int64_t)next_heading_case_angle_smaller));
     const int64_t next_heading_case_angle_denominator = (next_heading_case_angle_beyond >= 0 ? next_heading_case_angle_both
         : (int64_t)next_heading_case_angle_larger);
-    const int_fast32_t next_heading_case_angle_tangent = (int_fast32_t)(euler_angles_from_dcm_q31_div_((int64_t)next_heading_case_angle_numerator * INT64_C(4294967296), next_heading_case_angle_denominator));
-    const int_fast32_t next_heading_case_angle_square = (int_fast32_t)(euler_angles_from_dcm_q31_shr_((int64_t)next_heading_case_angle_tangent * next_heading_case_angle_tangent
+    const int_fast32_t next_heading_case_angle_tangent =
+        (int_fast32_t)(euler_angles_from_dcm_q31_div_((int64_t)next_heading_case_angle_numerator * INT64_C(4294967296), next_heading_case_angle_denominator));
+    const int_fast32_t next_heading_case_angle_square =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_((int64_t)next_heading_case_angle_tangent * next_heading_case_angle_tangent
         + INT32_C(1073741824), 31));
-    const int_fast32_t next_heading_case_angle_series = (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_heading_case_angle_square * INT32_C(735255871), 1)
+    const int_fast32_t next_heading_case_angle_series =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_heading_case_angle_square * INT32_C(735255871), 1)
         - INT64_C(6065684321545150080) + INT64_C(2147483648), 32));
-    const int_fast32_t next_heading_case_angle_series_2 = (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_heading_case_angle_square * next_heading_case_angle_series, 2)
+    const int_fast32_t next_heading_case_angle_series_2 =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_heading_case_angle_square * next_heading_case_angle_series, 2)
         + INT64_C(4054853067505913472) + INT32_C(1073741824), 31));
-    const int_fast32_t next_heading_case_angle_series_3 = (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_heading_case_angle_square * next_heading_case_angle_series_2, 2)
+    const int_fast32_t next_heading_case_angle_series_3 =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_heading_case_angle_square * next_heading_case_angle_series_2, 2)
         - INT64_C(5267120772635892064) + INT64_C(2147483648), 32));
-    const int_fast32_t next_heading_case_angle_series_4 = (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_heading_case_angle_square * next_heading_case_angle_series_3, 1)
+    const int_fast32_t next_heading_case_angle_series_4 =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_heading_case_angle_square * next_heading_case_angle_series_3, 1)
         + INT64_C(7378564090463267680) + INT64_C(2147483648), 32));
-    const int_fast32_t next_heading_case_angle_series_5 = (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_heading_case_angle_square * next_heading_case_angle_series_4, 2)
+    const int_fast32_t next_heading_case_angle_series_5 =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_heading_case_angle_square * next_heading_case_angle_series_4, 2)
         - INT64_C(6148913518682917232) + INT64_C(2147483648), 32));
-    const int_fast32_t next_heading_case_angle_bend = (int_fast32_t)(euler_angles_from_dcm_q31_shr_((int64_t)next_heading_case_angle_square * next_heading_case_angle_series_5
+    const int_fast32_t next_heading_case_angle_bend =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_((int64_t)next_heading_case_angle_square * next_heading_case_angle_series_5
         - INT64_C(11967952160) + INT32_C(1073741824), 31));
-    const int64_t next_heading_case_angle_arctangent = (int64_t)next_heading_case_angle_tangent * INT64_C(4294967296)
+    const int64_t next_heading_case_angle_arctangent =
+        (int64_t)next_heading_case_angle_tangent * INT64_C(4294967296)
         + euler_angles_from_dcm_q31_shr_((int64_t)next_heading_case_angle_tangent * next_heading_case_angle_bend, 2);
-    const int64_t next_heading_case_angle_angle = euler_angles_from_dcm_q31_shr_(next_heading_case_angle_arctangent, 2)
+    const int64_t next_heading_case_angle_angle =
+        euler_angles_from_dcm_q31_shr_(next_heading_case_angle_arctangent, 2)
         + INT64_C(3622009729038561420);
     const int64_t next_heading_case_angle_octant = (next_heading_case_angle_beyond >= 0 ? next_heading_case_angle_angle
         : euler_angles_from_dcm_q31_shr_(next_heading_case_angle_arctangent, 2));
-    const int64_t next_heading_case_angle_angle_2 = euler_angles_from_dcm_q31_shr_(-next_heading_case_angle_octant, 1)
+    const int64_t next_heading_case_angle_angle_2 =
+        euler_angles_from_dcm_q31_shr_(-next_heading_case_angle_octant, 1)
         + INT64_C(3622009729038561420);
     const int64_t next_heading_case_angle_quadrant = ((int64_t)next_heading_case_angle_width >= (int64_t)next_heading_case_angle_height ? next_heading_case_angle_octant
         : next_heading_case_angle_angle_2 * 2);
-    const int64_t next_heading_case_angle_angle_3 = euler_angles_from_dcm_q31_shr_(-next_heading_case_angle_quadrant, 2)
+    const int64_t next_heading_case_angle_angle_3 =
+        euler_angles_from_dcm_q31_shr_(-next_heading_case_angle_quadrant, 2)
         + INT64_C(3622009729038561420);
     const int64_t next_heading_case_angle_half = ((int64_t)C_11 >= 0 ? euler_angles_from_dcm_q31_shr_(next_heading_case_angle_quadrant, 1)
         : next_heading_case_angle_angle_3 * 2);
@@ -335,15 +377,18 @@ static inline int euler_angles_from_dcm_q31_one_(const int32_t state[9], const i
     const int64_t next_heading_case_principal_argument_choice_case = -next_roll;
     const int64_t next_heading_case_principal_argument_choice = (0 >= (int64_t)C_31 ? next_roll
         : next_heading_case_principal_argument_choice_case);
-    const int_fast32_t next_heading_case_principal_argument = (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_(apart, 1)
+    const int_fast32_t next_heading_case_principal_argument =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_(apart, 1)
         + euler_angles_from_dcm_q31_shr_(next_heading_case_principal_argument_choice, 1)
         + INT64_C(2147483648), 32));
     const int_fast32_t next_heading_case_principal_taken = (int_fast32_t)(((int64_t)next_heading_case_principal_argument >= INT32_C(1686629785) ? INT32_C(1686629785)
         : (-INT32_C(1686629785)) >= (int64_t)next_heading_case_principal_argument ? (-INT32_C(1686629785))
         : (int64_t)next_heading_case_principal_argument));
-    const int64_t next_heading_case_principal_turned = (int64_t)next_heading_case_principal_taken * INT32_C(1073741824)
+    const int64_t next_heading_case_principal_turned =
+        (int64_t)next_heading_case_principal_taken * INT32_C(1073741824)
         - INT64_C(1811004864519280711);
-    const int64_t next_heading_case_principal_turned_2 = (int64_t)next_heading_case_principal_taken * INT32_C(1073741824)
+    const int64_t next_heading_case_principal_turned_2 =
+        (int64_t)next_heading_case_principal_taken * INT32_C(1073741824)
         + INT64_C(1811004864519280711);
     const int64_t next_heading_case_principal_principal = ((int64_t)next_heading_case_principal_taken >= INT32_C(843314856) ? next_heading_case_principal_turned
         : (-INT32_C(843314856)) >= (int64_t)next_heading_case_principal_taken ? next_heading_case_principal_turned_2

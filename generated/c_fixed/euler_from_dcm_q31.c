@@ -106,8 +106,10 @@ static inline int euler_from_dcm_q31_one_(const int32_t state[9], int32_t conver
         : four_zz);
     const int_fast32_t factor_quotient_choice = (int_fast32_t)((column_s >= 0 ? 1
         : (-1)));
-    const int_fast32_t factor_quotient_root = euler_from_dcm_q31_sqrt_((uint64_t)(largest * INT32_C(268435456)));
-    const int_fast32_t factor_quotient = (int_fast32_t)(euler_from_dcm_q31_div_((int64_t)factor_quotient_choice * INT64_C(576460752303423488), factor_quotient_root));
+    const int_fast32_t factor_quotient_root =
+        euler_from_dcm_q31_sqrt_((uint64_t)(largest * INT32_C(268435456)));
+    const int_fast32_t factor_quotient =
+        (int_fast32_t)(euler_from_dcm_q31_div_((int64_t)factor_quotient_choice * INT64_C(576460752303423488), factor_quotient_root));
     /* makes the scalar part positive */
     const int_fast32_t factor = (int_fast32_t)((int64_t)factor_quotient);
     const int_fast32_t column_s_word = (int_fast32_t)(euler_from_dcm_q31_shr_(column_s + 2, 2));

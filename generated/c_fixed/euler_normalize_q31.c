@@ -55,14 +55,16 @@ static inline int euler_normalize_q31_one_(const int32_t state[4], int32_t next[
         || euler_normalize_q31_out_(e_z, INT32_C(1140850688))
         || euler_normalize_q31_out_(e_s, INT32_C(1140850688)))
         return 1;
-    const int64_t inverse_norm_radicand = (int64_t)e_s * e_s + (int64_t)e_x * e_x + (int64_t)e_y * e_y
-        + (int64_t)e_z * e_z;
+    const int64_t inverse_norm_radicand =
+        (int64_t)e_s * e_s + (int64_t)e_x * e_x + (int64_t)e_y * e_y + (int64_t)e_z * e_z;
     if (inverse_norm_radicand < INT64_C(576460752303423488)
         || inverse_norm_radicand > INT64_C(2305843009213693952))
         return 2;
-    const int_fast32_t inverse_norm_root = euler_normalize_q31_sqrt_((uint64_t)(euler_normalize_q31_shr_(inverse_norm_radicand, 2)));
+    const int_fast32_t inverse_norm_root =
+        euler_normalize_q31_sqrt_((uint64_t)(euler_normalize_q31_shr_(inverse_norm_radicand, 2)));
     /* 1/|state| */
-    const int_fast32_t inverse_norm = (int_fast32_t)(euler_normalize_q31_div_(INT64_C(576460752303423488), inverse_norm_root));
+    const int_fast32_t inverse_norm =
+        (int_fast32_t)(euler_normalize_q31_div_(INT64_C(576460752303423488), inverse_norm_root));
     /* Euler parameters, body to reference, scalar last, after the step */
     const int_fast32_t next_s = (int_fast32_t)(euler_normalize_q31_shr_((int64_t)e_s * inverse_norm
         + INT32_C(536870912), 30));

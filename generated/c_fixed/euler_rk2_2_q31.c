@@ -51,27 +51,36 @@ static inline int euler_rk2_2_q31_one_(const int32_t state[4], const int32_t inc
     const int64_t sigma_cross_d1_y = (int64_t)d1_x * sigma_z - (int64_t)d1_z * sigma_x;
     const int64_t sigma_cross_d1_z = (int64_t)d1_y * sigma_x - (int64_t)d1_x * sigma_y;
     /* the step applied to the identity: its vector part */
-    const int_fast32_t p_x = (int_fast32_t)((int64_t)sigma_x + euler_rk2_2_q31_shr_(-sigma_cross_d1_x
+    const int_fast32_t p_x =
+        (int_fast32_t)((int64_t)sigma_x + euler_rk2_2_q31_shr_(-sigma_cross_d1_x
         + INT32_C(1073741824), 31));
-    const int_fast32_t p_y = (int_fast32_t)((int64_t)sigma_y + euler_rk2_2_q31_shr_(-sigma_cross_d1_y
+    const int_fast32_t p_y =
+        (int_fast32_t)((int64_t)sigma_y + euler_rk2_2_q31_shr_(-sigma_cross_d1_y
         + INT32_C(1073741824), 31));
-    const int_fast32_t p_z = (int_fast32_t)((int64_t)sigma_z + euler_rk2_2_q31_shr_(-sigma_cross_d1_z
+    const int_fast32_t p_z =
+        (int_fast32_t)((int64_t)sigma_z + euler_rk2_2_q31_shr_(-sigma_cross_d1_z
         + INT32_C(1073741824), 31));
     const int64_t d1_dot_d2 = (int64_t)d1_x * d2_x + (int64_t)d1_y * d2_y + (int64_t)d1_z * d2_z;
-    const int_fast32_t sigma_dot_sigma = (int_fast32_t)(euler_rk2_2_q31_shr_((int64_t)sigma_x * sigma_x
-        + (int64_t)sigma_y * sigma_y + (int64_t)sigma_z * sigma_z + INT32_C(1073741824), 31));
+    const int_fast32_t sigma_dot_sigma =
+        (int_fast32_t)(euler_rk2_2_q31_shr_((int64_t)sigma_x * sigma_x + (int64_t)sigma_y * sigma_y
+        + (int64_t)sigma_z * sigma_z + INT32_C(1073741824), 31));
     /* its scalar part */
-    const int_fast32_t p_s = (int_fast32_t)(euler_rk2_2_q31_shr_((int64_t)sigma_dot_sigma * 3 * INT32_C(134217728)
+    const int_fast32_t p_s =
+        (int_fast32_t)(euler_rk2_2_q31_shr_((int64_t)sigma_dot_sigma * 3 * INT32_C(134217728)
         - d1_dot_d2 + INT32_C(536870912), 30));
     /* Euler parameters, body to reference, scalar last, after the step */
-    const int_fast32_t next_s = (int_fast32_t)((int64_t)e_s + euler_rk2_2_q31_shr_((int64_t)e_s * p_s
-        - (int64_t)e_x * p_x - (int64_t)e_y * p_y - (int64_t)e_z * p_z + INT64_C(4294967296), 33));
-    const int_fast32_t next_x = (int_fast32_t)((int64_t)e_x + euler_rk2_2_q31_shr_((int64_t)e_s * p_x
-        + (int64_t)e_x * p_s + (int64_t)e_y * p_z - (int64_t)e_z * p_y + INT64_C(4294967296), 33));
-    const int_fast32_t next_y = (int_fast32_t)((int64_t)e_y + euler_rk2_2_q31_shr_((int64_t)e_s * p_y
-        - (int64_t)e_x * p_z + (int64_t)e_y * p_s + (int64_t)e_z * p_x + INT64_C(4294967296), 33));
-    const int_fast32_t next_z = (int_fast32_t)((int64_t)e_z + euler_rk2_2_q31_shr_((int64_t)e_s * p_z
-        + (int64_t)e_x * p_y - (int64_t)e_y * p_x + (int64_t)e_z * p_s + INT64_C(4294967296), 33));
+    const int_fast32_t next_s =
+        (int_fast32_t)((int64_t)e_s + euler_rk2_2_q31_shr_((int64_t)e_s * p_s - (int64_t)e_x * p_x
+        - (int64_t)e_y * p_y - (int64_t)e_z * p_z + INT64_C(4294967296), 33));
+    const int_fast32_t next_x =
+        (int_fast32_t)((int64_t)e_x + euler_rk2_2_q31_shr_((int64_t)e_s * p_x + (int64_t)e_x * p_s
+        + (int64_t)e_y * p_z - (int64_t)e_z * p_y + INT64_C(4294967296), 33));
+    const int_fast32_t next_y =
+        (int_fast32_t)((int64_t)e_y + euler_rk2_2_q31_shr_((int64_t)e_s * p_y - (int64_t)e_x * p_z
+        + (int64_t)e_y * p_s + (int64_t)e_z * p_x + INT64_C(4294967296), 33));
+    const int_fast32_t next_z =
+        (int_fast32_t)((int64_t)e_z + euler_rk2_2_q31_shr_((int64_t)e_s * p_z + (int64_t)e_x * p_y
+        - (int64_t)e_y * p_x + (int64_t)e_z * p_s + INT64_C(4294967296), 33));
     next[0] = (int32_t)next_x;
     next[1] = (int32_t)next_y;
     next[2] = (int32_t)next_z;

@@ -47,19 +47,25 @@ static inline int euler_rk4_2_q31_one_(const int32_t state[4], const int32_t inc
     const int_fast32_t sigma_x = (int_fast32_t)((int64_t)d1_x + (int64_t)d2_x);
     const int_fast32_t sigma_y = (int_fast32_t)((int64_t)d1_y + (int64_t)d2_y);
     const int_fast32_t sigma_z = (int_fast32_t)((int64_t)d1_z + (int64_t)d2_z);
-    const int_fast32_t sigma_cross_d1_x = (int_fast32_t)(euler_rk4_2_q31_shr_((int64_t)d1_z * sigma_y
-        - (int64_t)d1_y * sigma_z + INT32_C(268435456), 29));
-    const int_fast32_t sigma_cross_d1_y = (int_fast32_t)(euler_rk4_2_q31_shr_((int64_t)d1_x * sigma_z
-        - (int64_t)d1_z * sigma_x + INT32_C(268435456), 29));
-    const int_fast32_t sigma_cross_d1_z = (int_fast32_t)(euler_rk4_2_q31_shr_((int64_t)d1_y * sigma_x
-        - (int64_t)d1_x * sigma_y + INT32_C(268435456), 29));
-    const int_fast32_t sigma_dot_sigma = (int_fast32_t)(euler_rk4_2_q31_shr_((int64_t)sigma_x * sigma_x
-        + (int64_t)sigma_y * sigma_y + (int64_t)sigma_z * sigma_z + INT32_C(1073741824), 31));
+    const int_fast32_t sigma_cross_d1_x =
+        (int_fast32_t)(euler_rk4_2_q31_shr_((int64_t)d1_z * sigma_y - (int64_t)d1_y * sigma_z
+        + INT32_C(268435456), 29));
+    const int_fast32_t sigma_cross_d1_y =
+        (int_fast32_t)(euler_rk4_2_q31_shr_((int64_t)d1_x * sigma_z - (int64_t)d1_z * sigma_x
+        + INT32_C(268435456), 29));
+    const int_fast32_t sigma_cross_d1_z =
+        (int_fast32_t)(euler_rk4_2_q31_shr_((int64_t)d1_y * sigma_x - (int64_t)d1_x * sigma_y
+        + INT32_C(268435456), 29));
+    const int_fast32_t sigma_dot_sigma =
+        (int_fast32_t)(euler_rk4_2_q31_shr_((int64_t)sigma_x * sigma_x + (int64_t)sigma_y * sigma_y
+        + (int64_t)sigma_z * sigma_z + INT32_C(1073741824), 31));
     /* weight of sigma in p */
-    const int_fast32_t p_sigma = (int_fast32_t)(euler_rk4_2_q31_shr_(-(int64_t)sigma_dot_sigma * INT32_C(1431655765)
+    const int_fast32_t p_sigma =
+        (int_fast32_t)(euler_rk4_2_q31_shr_(-(int64_t)sigma_dot_sigma * INT32_C(1431655765)
         + INT32_C(1073741824), 31));
     /* weight of sigma_cross_d1 in p */
-    const int_fast32_t p_sigma_cross_d1 = (int_fast32_t)(euler_rk4_2_q31_shr_(-(int64_t)p_sigma * INT32_C(4194304)
+    const int_fast32_t p_sigma_cross_d1 =
+        (int_fast32_t)(euler_rk4_2_q31_shr_(-(int64_t)p_sigma * INT32_C(4194304)
         - INT64_C(384307168202282325) + INT32_C(134217728), 28));
     /* the step applied to the identity: its vector part */
     const int_fast32_t p_x = (int_fast32_t)((int64_t)sigma_x
@@ -73,20 +79,26 @@ static inline int euler_rk4_2_q31_one_(const int32_t state[4], const int32_t inc
         + (int64_t)p_sigma_cross_d1 * sigma_cross_d1_z * 4 + INT64_C(34359738368), 36));
     const int_fast32_t d1_dot_d2 = (int_fast32_t)(euler_rk4_2_q31_shr_((int64_t)d1_x * d2_x
         + (int64_t)d1_y * d2_y + (int64_t)d1_z * d2_z + INT32_C(268435456), 29));
-    const int_fast32_t p_s_factor = (int_fast32_t)(euler_rk4_2_q31_shr_((int64_t)d1_dot_d2 * INT32_C(1431655765)
+    const int_fast32_t p_s_factor =
+        (int_fast32_t)(euler_rk4_2_q31_shr_((int64_t)d1_dot_d2 * INT32_C(1431655765)
         - (int64_t)sigma_dot_sigma * INT32_C(1073741824) + INT64_C(17179869184), 35));
     /* its scalar part */
-    const int_fast32_t p_s = (int_fast32_t)(euler_rk4_2_q31_shr_(-(int64_t)sigma_dot_sigma * INT64_C(4294967296)
+    const int_fast32_t p_s =
+        (int_fast32_t)(euler_rk4_2_q31_shr_(-(int64_t)sigma_dot_sigma * INT64_C(4294967296)
         + (int64_t)p_s_factor * sigma_dot_sigma + INT64_C(17179869184), 35));
     /* Euler parameters, body to reference, scalar last, after the step */
-    const int_fast32_t next_s = (int_fast32_t)((int64_t)e_s + euler_rk4_2_q31_shr_((int64_t)e_s * p_s
-        - (int64_t)e_x * p_x - (int64_t)e_y * p_y - (int64_t)e_z * p_z + INT64_C(4294967296), 33));
-    const int_fast32_t next_x = (int_fast32_t)((int64_t)e_x + euler_rk4_2_q31_shr_((int64_t)e_s * p_x
-        + (int64_t)e_x * p_s + (int64_t)e_y * p_z - (int64_t)e_z * p_y + INT64_C(4294967296), 33));
-    const int_fast32_t next_y = (int_fast32_t)((int64_t)e_y + euler_rk4_2_q31_shr_((int64_t)e_s * p_y
-        - (int64_t)e_x * p_z + (int64_t)e_y * p_s + (int64_t)e_z * p_x + INT64_C(4294967296), 33));
-    const int_fast32_t next_z = (int_fast32_t)((int64_t)e_z + euler_rk4_2_q31_shr_((int64_t)e_s * p_z
-        + (int64_t)e_x * p_y - (int64_t)e_y * p_x + (int64_t)e_z * p_s + INT64_C(4294967296), 33));
+    const int_fast32_t next_s =
+        (int_fast32_t)((int64_t)e_s + euler_rk4_2_q31_shr_((int64_t)e_s * p_s - (int64_t)e_x * p_x
+        - (int64_t)e_y * p_y - (int64_t)e_z * p_z + INT64_C(4294967296), 33));
+    const int_fast32_t next_x =
+        (int_fast32_t)((int64_t)e_x + euler_rk4_2_q31_shr_((int64_t)e_s * p_x + (int64_t)e_x * p_s
+        + (int64_t)e_y * p_z - (int64_t)e_z * p_y + INT64_C(4294967296), 33));
+    const int_fast32_t next_y =
+        (int_fast32_t)((int64_t)e_y + euler_rk4_2_q31_shr_((int64_t)e_s * p_y - (int64_t)e_x * p_z
+        + (int64_t)e_y * p_s + (int64_t)e_z * p_x + INT64_C(4294967296), 33));
+    const int_fast32_t next_z =
+        (int_fast32_t)((int64_t)e_z + euler_rk4_2_q31_shr_((int64_t)e_s * p_z + (int64_t)e_x * p_y
+        - (int64_t)e_y * p_x + (int64_t)e_z * p_s + INT64_C(4294967296), 33));
     next[0] = (int32_t)next_x;
     next[1] = (int32_t)next_y;
     next[2] = (int32_t)next_z;

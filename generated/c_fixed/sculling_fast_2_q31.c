@@ -63,12 +63,12 @@ static inline int sculling_fast_2_q31_one_(const int32_t angle_sum[3],
     const int_fast32_t next_beta_z = (int_fast32_t)((int64_t)beta_z
         + sculling_fast_2_q31_shr_((int64_t)d_z + 4, 3));
     /* sum of the velocity increments since the slow cycle began, after the call */
-    const int_fast32_t next_u_x = (int_fast32_t)((int64_t)u_x + sculling_fast_2_q31_shr_((int64_t)dv_x
-        + 4, 3));
-    const int_fast32_t next_u_y = (int_fast32_t)((int64_t)u_y + sculling_fast_2_q31_shr_((int64_t)dv_y
-        + 4, 3));
-    const int_fast32_t next_u_z = (int_fast32_t)((int64_t)u_z + sculling_fast_2_q31_shr_((int64_t)dv_z
-        + 4, 3));
+    const int_fast32_t next_u_x =
+        (int_fast32_t)((int64_t)u_x + sculling_fast_2_q31_shr_((int64_t)dv_x + 4, 3));
+    const int_fast32_t next_u_y =
+        (int_fast32_t)((int64_t)u_y + sculling_fast_2_q31_shr_((int64_t)dv_y + 4, 3));
+    const int_fast32_t next_u_z =
+        (int_fast32_t)((int64_t)u_z + sculling_fast_2_q31_shr_((int64_t)dv_z + 4, 3));
     /* sculling integral since the slow cycle began, after the call */
     const int_fast32_t next_eta_x = (int_fast32_t)((int64_t)eta_x
         + sculling_fast_2_q31_shr_((int64_t)beta_y * dv_z - (int64_t)beta_z * dv_y

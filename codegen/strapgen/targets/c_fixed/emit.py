@@ -197,10 +197,10 @@ class _Printer:
                 lines += self._sum(value, total, kind)
             case IntegerQuotient(numerator, denominator):
                 text = f"{self.name}_div_({self.scaled(numerator)}, {denominator})"
-                lines.append(f"const {kind} {name} = {self.cast(text, value)};")
+                lines.append(_declared(kind, name, self.cast(text, value)))
             case IntegerRoot(argument):
                 text = f"{self.name}_sqrt_(({self.word.magnitude})({self.scaled(argument)}))"
-                lines.append(f"const {kind} {name} = {text};")
+                lines.append(_declared(kind, name, text))
             case IntegerMaximum((first, *others)):
                 lines.append(f"{kind} {name} = {self.cast(self.scaled(first), value)};")
                 for other in others:
@@ -333,4 +333,9 @@ class _Printer:
 
 
 def _declared(kind: str, name: str, text: str) -> str:
-    return fill_expression(f"const {kind} {name} = {text};", " " * 8, 100)
+    """Return a declaration, its value on a line of its own where the first line would be too long."""
+    indent = " " * 8
+    statement = fill_expression(f"const {kind} {name} = {text};", indent, 100)
+    if len(statement.partition("\n")[0]) <= 96:
+        return statement
+    return f"const {kind} {name} =\n" + fill_expression(f"{indent}{text};", indent, 100)
