@@ -2,14 +2,16 @@
 
 PYTHON ?= python3
 BIN := .venv/bin
+# What the commands need, and what tests and checks need beside it.
 READY := .venv/.ready
+TOOLS := .venv/.ready-to-test
 BENCH := .venv-bench/.ready
 
 .PHONY: help demo test test-long test-modules check bench generate clean
 
 help:
-	@echo "make demo      set up, regenerate the code, build it, print the five tables on every back end"
-	@echo "make test      set up, run the test suite"
+	@echo "make demo      set up, then a short tour: formulas, their C, a table on every back end"
+	@echo "make test      set up, with what tests need; run the test suite"
 	@echo "make test-long the tests that take long: every word, rounding and residual on every kernel"
 	@echo "make test-modules  list anew which kernels the tests compile"
 	@echo "make check     generated code in step, ruff, mypy"
@@ -22,26 +24,44 @@ $(READY): pyproject.toml
 	  || { echo "strapgen needs Python 3.11 or newer; set PYTHON to one" >&2; exit 2; }
 	@$(PYTHON) -m venv .venv \
 	  || { echo "no virtual environment: on Debian, apt-get install python3-venv python3-dev gcc" >&2; exit 2; }
+	$(BIN)/python -m pip install --disable-pip-version-check --progress-bar on -e .
+	@touch $@
+
+$(TOOLS): $(READY)
 	$(BIN)/python -m pip install --disable-pip-version-check --progress-bar on -e '.[dev]'
 	@touch $@
 
 demo: $(READY)
+	@echo "1. Derive every kernel of the catalogue; generate numpy, C and fixed point"
 	$(BIN)/strapgen generate --all
-	$(BIN)/strapgen tables
+	@echo
+	@echo "2. One step as formulas: Euler parameters by Euler's method from two gyro samples"
+	$(BIN)/strapgen derive euler --method rk1 --show program
+	@echo
+	@echo "3. The same step in C, from generated/c/euler_rk1_2.c"
+	@sed -n '/^static inline void euler_rk1_2_one_/,/^}/p' generated/c/euler_rk1_2.c
+	@echo
+	@echo "4. Table 5 of the thesis on every back end; c-q31 and c-q15 have 32- and 16-bit words"
+	$(BIN)/strapgen tables --table 5
+	@echo "More: source .venv/bin/activate, then"
+	@echo "  strapgen list      all algorithms, methods, kernels, motions and back ends"
+	@echo "  strapgen --help    all commands, each with an example in its own --help"
+	@echo "  strapgen tables    all five tables"
+	@echo "README.md goes on with five minutes of examples; docs/ has the theory."
 
-test: $(READY)
+test: $(TOOLS)
 	$(BIN)/python -m pytest -n auto --dist worksteal -m "not long"
 
-test-long: $(READY)
+test-long: $(TOOLS)
 	$(BIN)/python -m pytest -n auto --dist worksteal -m long
 
 # With an empty cache, so that every module is built and noted.
-test-modules: $(READY)
+test-modules: $(TOOLS)
 	folder=$$(mktemp -d) && STRAPGEN_CACHE_DIR=$$folder/cache $(BIN)/python -m pytest -n auto --dist worksteal \
 	  -m "not long" --record-modules $$folder/modules \
 	  && sort -u $$folder/modules > tests/data/modules.jsonl && rm -r $$folder
 
-check: $(READY)
+check: $(TOOLS)
 	$(BIN)/strapgen generate --all --check
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .

@@ -18,7 +18,6 @@ import numpy as np
 import strapgen
 from strapgen.backends import BACKENDS, DEFAULT_BACKENDS
 from strapgen.catalogue import ALGORITHMS
-from strapgen.targets import FIXED
 
 #: Interpreters of single operations in Python are references and too slow for runs of this length.
 TIMED = DEFAULT_BACKENDS
@@ -63,7 +62,7 @@ def main() -> None:
         largest = float(np.abs(increments).max())
         settings = {
             # Residuals keep a long run without orthonormalization inside its range.
-            name: strapgen.Settings(carry="full").fitted(largest) if BACKENDS[name].target in FIXED else None
+            name: strapgen.Settings(carry="full").fitted(largest) if BACKENDS[name].fixed else None
             for name in TIMED
         }
         backends = {

@@ -19,7 +19,6 @@ from strapgen.backends import BACKENDS, Backend
 from strapgen.catalogue import ALGORITHMS
 from strapgen.ir.fixed_settings import Settings
 from strapgen.reports.plots import figures
-from strapgen.targets import FIXED
 from strapgen.toolchain import compiler
 
 #: The back ends. Short words have the code of long ones, C in float that of double, and the integer model gives the
@@ -145,7 +144,7 @@ def make(backend_name: str):
         **rest: object,
     ) -> Backend:
         settings = None
-        if BACKENDS[backend_name].target in FIXED:
+        if BACKENDS[backend_name].fixed:
             settings = Settings(carry=carry) if largest is None else Settings(carry=carry).fitted(largest)
         return strapgen.backend(algorithm, method, increments, backend_name, settings=settings, **rest)
 

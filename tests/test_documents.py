@@ -1,125 +1,308 @@
-"""README, API page and examples: what they show is what happens."""
+"""README, docs, CONTRIBUTING and examples: what they show is what happens."""
 
 from __future__ import annotations
 
 import doctest
+import json
+import os
 import re
 import runpy
 import shlex
+import shutil
 import subprocess
-from collections.abc import Iterable
+import sys
+from collections.abc import Iterable, Iterator
 from itertools import pairwise
 from pathlib import Path
 
 import pytest
+import typer.main
 
-from strapgen.cli import main
+from strapgen.catalogue.methods import tableaux
+from strapgen.cli import app, main
 
 ROOT = Path(__file__).resolve().parents[1]
+DOCS = {path.stem: path.read_text() for path in sorted((ROOT / "docs").glob("*.md"))}
 README = (ROOT / "README.md").read_text()
+CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text()
+#: A newcomer decides in so many lines of the README whether to read on.
+FIRST_SCREEN = 60
 
 
-@pytest.mark.parametrize(
-    "page", ["python-api", "canonical-form", "fixed-point", "series", "coning", "two-speed", "vibration"]
-)
-def test_page(page):
-    result = doctest.testfile(str(ROOT / "docs" / f"{page}.md"), module_relative=False)
-    assert result.attempted >= 10
-    assert result.failed == 0
+def shown_commands(text: str) -> list[str]:
+    """Return the commands that stand in lines of their own, continued lines joined."""
+    joined = re.sub(r"\\+\n\s*", "", text)
+    return re.findall(r"^ +(?:Example: )?(strapgen [a-z].*)$", joined, re.MULTILINE)
 
 
-def test_readme_snippet():
-    (code,) = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
-    exec(code, {})
+def blocks(text: str, kind: str) -> list[str]:
+    """Return the fenced blocks of a kind, without the fences."""
+    return re.findall(rf"^```{kind}\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL)
 
 
-def commands() -> list[str]:
-    return re.findall(r"^    (strapgen .*)$", README, flags=re.MULTILINE)
+def run(command: str, capsys: pytest.CaptureFixture[str]) -> str:
+    """Run a command that must succeed, and return what it prints."""
+    with pytest.raises(SystemExit) as stop:
+        main(shlex.split(command)[1:])
+    printed = capsys.readouterr()
+    assert stop.value.code == 0, printed.err
+    return printed.out
 
 
-def test_readme_shows_every_command():
-    shown = {shlex.split(command)[1] for command in commands()}
-    assert shown == {
-        "list",
-        "tableau",
-        "derive",
-        "generate",
-        "simulate",
-        "compare",
-        "converge",
-        "check",
-        "coning",
-        "two-speed",
-        "strapdown",
-        "vibration",
-        "study",
-        "series",
-        "stability",
-        "stress",
+def git(*arguments: str) -> list[str]:
+    """Return the lines that git prints; the test is skipped where there is no git, or no checkout."""
+    try:
+        done = subprocess.run(["git", "-C", ROOT, *arguments], capture_output=True, text=True, check=True)
+    except (FileNotFoundError, subprocess.CalledProcessError):
+        pytest.skip("no git, or no checkout")
+    return done.stdout.splitlines()
+
+
+def files_of(folder: Path) -> set[str]:
+    """Return the files of a folder, without those of git itself."""
+    return {
+        str(path.relative_to(folder))
+        for path in folder.rglob("*")
+        if path.is_file() and ".git" not in path.parts
     }
-    assert "`strapgen tables`" in README
 
 
 def not_ignored(paths: Iterable[str]) -> list[str]:
     """Return which paths of a checkout would be new files that git does not ignore."""
-    git = ["git", "-C", str(ROOT)]
     names = sorted(paths)
-    try:
-        known = subprocess.run([*git, "ls-files", *names], capture_output=True, text=True, check=True)
-    except (FileNotFoundError, subprocess.CalledProcessError):
-        pytest.skip("no git, or no checkout")
-    asked = "\n".join(names)
-    ignored = subprocess.run([*git, "check-ignore", "--stdin"], input=asked, capture_output=True, text=True)
-    return sorted({*names} - {*known.stdout.splitlines(), *ignored.stdout.splitlines()})
+    known = git("ls-files", *names)
+    ignored = subprocess.run(
+        ["git", "-C", ROOT, "check-ignore", "--stdin"], input="\n".join(names), capture_output=True, text=True
+    )
+    return sorted({*names} - {*known, *ignored.stdout.splitlines()})
 
 
-def shown_commands() -> list[str]:
-    """Return every command of README, docs, examples and help texts, each on one line."""
-    pages = [ROOT / "README.md", *(ROOT / "docs").glob("*.md"), *(ROOT / "examples").glob("*.py")]
-    pages += (ROOT / "codegen" / "strapgen" / "cli").rglob("*.py")
-    texts = (re.sub(r"\\+\n\s*", "", page.read_text()) for page in pages)
-    return [
-        line
-        for text in texts
-        for line in re.findall(r"^ +(?:Example: )?(strapgen [a-z].*)$", text, re.MULTILINE)
-    ]
+# README
+
+#: Runs the README's Python and its commands in the folder where it starts; one process, so that SymPy is loaded once.
+DRIVER = """
+import contextlib, io, json, shlex, sys
+import strapgen
+from strapgen.cli import main
+
+def captured(function, *arguments):
+    out, err, status = io.StringIO(), io.StringIO(), 0
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        try:
+            function(*arguments)
+        except SystemExit as stop:
+            status = stop.code
+    return {"status": status, "out": out.getvalue(), "err": err.getvalue()}
+
+task = json.load(sys.stdin)
+done = {command: captured(main, shlex.split(command)[1:]) for command in task["commands"]}
+done["python"] = captured(exec, task["python"], {})
+json.dump({"package": strapgen.__file__, "done": done}, sys.stdout)
+"""
 
 
-def test_no_command_writes_into_the_checkout_what_git_does_not_ignore():
-    written = {}
-    for command in shown_commands():
-        words = shlex.split(command)
-        for option, value in pairwise(words):
-            if option in ("--out", "--plot"):
-                written[f"{value}/file.c" if words[1] in ("generate", "two-speed") else value] = command
-        assert words[1] not in ("generate", "two-speed") or {"--out", "--all"} & {*words}, command
-    assert len(written) >= 9
-    assert [written[path] for path in not_ignored(written)] == []
+@pytest.fixture(scope="module")
+def new_clone(tmp_path_factory: pytest.TempPathFactory) -> tuple[set[str], dict[str, dict[str, str | int]]]:
+    """Run the README's Python and commands in a new copy of the project's files.
+
+    Returns the files that they wrote, and the status and the output of each.
+    """
+    clone = tmp_path_factory.mktemp("clone") / "strapgen"
+    names = git("ls-files", "--cached", "--others", "--exclude-standard")
+    # Python's bytecode comes along, to spare compiling it again: it is used where it is that of the source alone.
+    bytecode = [str(path.relative_to(ROOT)) for path in (ROOT / "codegen").rglob("*.pyc")]
+    for name in [*names, *bytecode]:
+        if (ROOT / name).is_file():
+            (clone / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(ROOT / name, clone / name)
+    before = files_of(clone)
+    (code,) = blocks(README, "python")
+    done = subprocess.run(
+        [sys.executable, "-c", DRIVER],
+        input=json.dumps({"commands": shown_commands(README), "python": code}),
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=clone,
+        env=os.environ | {"PYTHONPATH": str(clone / "codegen")},
+    )
+    answer = json.loads(done.stdout)
+    assert Path(answer["package"]).is_relative_to(clone)
+    return files_of(clone) - before, answer["done"]
 
 
-#: Commands that take seconds: many kernels, or many terms.
-LONG = (
-    "strapgen stress ",
-    "strapgen series euler --method rk4 --motion coning",
-    "strapgen series euler --all",
+def test_the_commands_of_the_readme_run_in_a_new_clone(new_clone):
+    written, done = new_clone
+    assert len(done) >= 8
+    assert {command: answer["err"] for command, answer in done.items() if answer["status"] != 0} == {}
+    assert {"out/attitude.csv", "out/course.csv"} <= written
+    assert not_ignored(written) == []
+
+
+def missing(excerpt: str, text: str) -> list[str]:
+    """Return which parts of an excerpt, between lines of three dots, do not stand in a text in this order."""
+    place, lost = 0, []
+    for part in re.split(r"^\.\.\.\n", excerpt, flags=re.MULTILINE):
+        start = text.find(part, place)
+        if start < 0:
+            lost.append(part)
+        else:
+            place = start + len(part)
+    return lost
+
+
+def test_the_formulas_and_the_c_of_the_readme_are_what_its_python_prints(new_clone):
+    _, done = new_clone
+    first_screen = "\n".join(README.splitlines()[:FIRST_SCREEN])
+    (formulas,), (code,) = blocks(first_screen, "text"), blocks(first_screen, "c")
+    assert 10 <= sum(line != "..." for line in code.splitlines()) <= 15
+    printed = str(done["python"]["out"])
+    assert missing(formulas, printed) + missing(code, printed) == []
+
+
+def test_an_excerpt_that_differs_is_seen():
+    assert missing("a\nb\n...\nd\n", "a\nb\nc\nd\n") == []
+    assert missing("a\nc\n", "a\nb\nc\n") == ["a\nc\n"]
+    assert missing("c\n...\na\n", "a\nb\nc\n") == ["a\n"]
+
+
+def test_the_readme_is_short_and_begins_with_what_matters():
+    lines = README.splitlines()
+    assert len(lines) <= 120
+    assert len(shown_commands(README)) <= 15
+    first_screen = "\n".join(lines[:FIRST_SCREEN])
+    assert len(re.findall(r"^!\[", first_screen, flags=re.MULTILINE)) == 1
+    assert len(blocks(first_screen, "python")[0].splitlines()) <= 12
+
+
+# Links
+
+
+def anchors(text: str) -> set[str]:
+    """Return the anchors that GitHub gives to the headings of a page."""
+    prose = re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL)
+    titles = re.findall(r"^#+ (.*)$", prose, flags=re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-") for title in titles}
+
+
+def test_every_link_leads_somewhere():
+    broken = []
+    for page in (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").glob("*.md")):
+        for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text()):
+            name, _, anchor = target.partition("#")
+            path = page.parent / name if name else page
+            if not path.exists() or (anchor and anchor not in anchors(path.read_text())):
+                broken.append(f"{page.relative_to(ROOT)}: {target}")
+    assert broken == []
+
+
+def test_the_index_names_every_page():
+    linked = set(re.findall(r"\]\(([\w-]+)\.md\)", DOCS["README"]))
+    assert linked == {*DOCS} - {"README"}
+
+
+def test_the_glossary_is_sorted_and_other_pages_refer_to_it():
+    terms = re.findall(r"^### (.*)\n(\S.*)$", DOCS["glossary"], flags=re.MULTILINE)
+    assert len(terms) == DOCS["glossary"].count("\n### ") >= 40
+    names = [re.sub(r"[^a-z ]", " ", name.lower()) for name, _ in terms]
+    assert names == sorted(names)
+    linked = "".join(text for name, text in DOCS.items() if name != "glossary").count("(glossary.md#")
+    assert linked >= 15
+
+
+# The pages
+
+#: Pages that take seconds: many kernels, or the integer model.
+LONG_PAGES = ("canonical-form", "coning", "fixed-point", "series", "two-speed", "vibration")
+
+
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param(page, marks=pytest.mark.long if page in LONG_PAGES else ())
+        for page, text in DOCS.items()
+        if ">>> " in text
+    ],
 )
+def test_the_python_of_a_page(page, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    result = doctest.testfile(str(ROOT / "docs" / f"{page}.md"), module_relative=False)
+    assert result.attempted >= 3
+    assert result.failed == 0
+
+
+#: Commands that take a third of a second or more: many kernels, many terms, a compiler, or long runs.
+LONG_COMMANDS = (
+    "strapgen check ",
+    "strapgen compare ",
+    "strapgen converge euler --method rk1,rk2,rk4,butcher6",
+    "strapgen derive dcm --method butcher6",
+    "strapgen generate dcm ",
+    "strapgen generate euler --method rk4 --",
+    "strapgen rate-table ",
+    "strapgen series euler ",
+    "strapgen simulate ",
+    "strapgen stability ",
+    "strapgen strapdown dcm ",
+    "strapgen study ",
+    "strapgen tables",
+    "strapgen two-speed dcm --target c-fixed",
+    "strapgen two-speed euler ",
+    "strapgen vibration ",
+)
+#: Pages whose commands need a file that the page shows, and a command that another test runs.
+OWN_FILES = ("own-algorithms",)
+TABLES = "strapgen tables"
+
+
+def page_commands() -> Iterator[str]:
+    """Yield every command of the pages once, but those that the README has too."""
+    seen = {TABLES, *shown_commands(README)}
+    for page, text in DOCS.items():
+        for command in shown_commands(text):
+            if command not in seen and page not in OWN_FILES:
+                seen.add(command)
+                yield command
+
+
+@pytest.fixture
+def workplace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return an empty folder to work in, with the examples and a folder for pictures."""
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    (tmp_path / "docs").mkdir()
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
 
 
 @pytest.mark.parametrize(
     "command",
     [
-        pytest.param(command, marks=pytest.mark.long if command.startswith(LONG) else ())
-        for command in commands()
+        pytest.param(command, marks=pytest.mark.long if command.startswith(LONG_COMMANDS) else (), id=command)
+        for command in page_commands()
     ],
 )
-def test_readme_command(command, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "examples").symlink_to(ROOT / "examples")
-    with pytest.raises(SystemExit) as stop:
-        main(shlex.split(command)[1:])
-    assert stop.value.code == 0, capsys.readouterr().err
-    (tmp_path / "examples").unlink()
-    assert not_ignored(str(p.relative_to(tmp_path)) for p in tmp_path.rglob("*") if p.is_file()) == []
+def test_a_command_of_a_page(command, workplace, capsys):
+    run(command, capsys)
+
+
+def test_the_page_on_the_command_line_shows_every_command():
+    shown = {shlex.split(command)[1] for command in shown_commands(DOCS["command-line"])}
+    commands = typer.main.get_command(app).commands.items()
+    assert shown == {name for name, command in commands if not command.hidden}
+
+
+def test_no_command_writes_into_the_checkout_what_git_does_not_ignore():
+    pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").glob("*.md")]
+    pages += [*(ROOT / "examples").glob("*.py"), *(ROOT / "codegen" / "strapgen" / "cli").rglob("*.py")]
+    written = {}
+    for command in (command for page in pages for command in shown_commands(page.read_text())):
+        words = shlex.split(command)
+        for option, value in pairwise(words):
+            if option in ("--out", "--plot") and value != "-":
+                written[f"{value}/file.c" if words[1] in ("generate", "two-speed") else value] = command
+        assert words[1] not in ("generate", "two-speed") or {"--out", "--all"} & {*words}, command
+    assert len(written) >= 9
+    assert [written[path] for path in not_ignored(written)] == []
 
 
 def cells(line: str) -> list[str]:
@@ -127,11 +310,9 @@ def cells(line: str) -> list[str]:
 
 
 @pytest.mark.long
-def test_readme_tables_are_the_command_s(capsys):
-    with pytest.raises(SystemExit):
-        main(["tables"])
-    printed = capsys.readouterr().out.strip().splitlines()
-    (block,) = re.findall(r"```\n(Table 1.*?)```", README, flags=re.DOTALL)
+def test_the_tables_of_the_thesis_are_those_of_the_command(capsys):
+    printed = run(TABLES, capsys).strip().splitlines()
+    (block,) = re.findall(r"```\n(Table 1.*?)```", DOCS["thesis-tables"], flags=re.DOTALL)
     shown = block.strip().splitlines()
     assert len(shown) == len(printed)
     for ours, theirs in zip(cells("\n".join(shown)), cells("\n".join(printed)), strict=True):
@@ -145,51 +326,70 @@ def test_readme_tables_are_the_command_s(capsys):
         assert float(ours) == pytest.approx(value, rel=1e-3 if value > 1e-3 else 0.5)
 
 
-def test_the_commands_of_the_page_on_vibration(tmp_path, monkeypatch, capsys):
-    page = (ROOT / "docs" / "vibration.md").read_text()
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "examples").symlink_to(ROOT / "examples")
-    shown = re.findall(r"^    (strapgen .*)$", page, flags=re.MULTILINE)
-    assert len(shown) == 4
-    for command in shown:
-        with pytest.raises(SystemExit) as stop:
-            main(shlex.split(command)[1:])
-        assert stop.value.code == 0, capsys.readouterr().err
-
-
-def test_the_page_on_own_algorithms(tmp_path, monkeypatch, capsys):
-    """Its tableau and its algorithm are what it says, and its commands run."""
-    page = (ROOT / "docs" / "own-algorithms.md").read_text()
+@pytest.fixture
+def shown_files(workplace: Path) -> Path:
+    """Return a folder with the tableau and the algorithm of the page on those of one's own."""
     for kind, name in (("toml", "heun3.toml"), ("python", "two_sample.py")):
-        (block,) = re.findall(rf"```{kind}\n(.*?)```", page, flags=re.DOTALL)
-        (tmp_path / name).write_text(block)
-    monkeypatch.chdir(tmp_path)
-    shown = re.findall(r"^    (strapgen (?!: ).*)$", page, flags=re.MULTILINE)
-    commands = [command for command in shown if not command.startswith("strapgen:")]
-    assert {shlex.split(command)[1] for command in commands} == {
-        "tableau",
-        "generate",
-        "converge",
-        "check",
-        "compare",
-    }
-    for command in commands:
-        with pytest.raises(SystemExit) as stop:
-            main(shlex.split(command)[1:])
-        assert stop.value.code == 0, capsys.readouterr().err
-    (failure,) = re.findall(r"^    strapgen: heun3.toml: (.*)$", page, flags=re.MULTILINE)
-    broken = (tmp_path / "heun3.toml").read_text().replace('"1/4", "0", "3/4"', '"0", "0", "1"')
-    (tmp_path / "heun3.toml").write_text(broken)
-    capsys.readouterr()
+        (block,) = blocks(DOCS["own-algorithms"], kind)
+        (workplace / name).write_text(block)
+    return workplace
+
+
+def test_the_tableau_of_a_user_is_checked_as_the_page_says(shown_files, capsys):
+    run("strapgen tableau heun3.toml", capsys)
+    (failure,) = re.findall(r"^    strapgen: heun3.toml: (.*)$", DOCS["own-algorithms"], flags=re.MULTILINE)
+    broken = (shown_files / "heun3.toml").read_text().replace('"1/4", "0", "3/4"', '"0", "0", "1"')
+    (shown_files / "heun3.toml").write_text(broken)
     with pytest.raises(SystemExit) as stop:
         main(["tableau", "heun3.toml"])
     assert (stop.value.code, capsys.readouterr().err) == (2, f"strapgen: heun3.toml: {failure}\n")
 
 
+def test_the_algorithm_of_a_user_is_generated_as_the_page_says(shown_files, capsys):
+    assert "two_sample.c" in run("strapgen generate two_sample.py --target c --out firmware", capsys)
+    assert "strapgen generate two_sample.py --target c --out firmware" in shown_commands(
+        DOCS["own-algorithms"]
+    )
+
+
+@pytest.mark.long
+def test_the_commands_on_own_algorithms(shown_files, capsys):
+    commands = shown_commands(DOCS["own-algorithms"])
+    shown = {"tableau", "generate", "converge", "check", "compare"}
+    assert {shlex.split(command)[1] for command in commands} == shown
+    for command in commands:
+        run(command, capsys)
+
+
+# How to add something
+
+
+def test_the_tableau_to_add_satisfies_its_order_conditions(tmp_path):
+    (block,) = blocks(CONTRIBUTING, "toml")
+    (tmp_path / "heun3.toml").write_text(block)
+    assert tableaux.read(tmp_path / "heun3.toml").order == 3
+
+
+def test_the_kernel_and_the_command_to_add_run(capsys):
+    kernel, command = blocks(CONTRIBUTING, "python")
+    exec(compile(kernel, "inverse.py", "exec"), added := {})
+    inverse = added["euler_inverse"]()
+    assert f'"{inverse.name}": Recipe("{inverse.title}", "inverse", "euler_inverse"),' in CONTRIBUTING
+    values = inverse.expand(dict(zip(inverse.inputs[0].elements, (1, 5, 7, 5), strict=True)))
+    assert [*values["inverse"]] == [-1, -5, -7, 5]
+    exec(compile(command, "cost.py", "exec"), added := {})
+    added["cost"]("euler")
+    assert capsys.readouterr().out == "euler-rk4-2: 38 multiply, 30 add\n"
+
+
+#: Scripts that compile or derive many kernels.
+LONG_EXAMPLES = ("word_length_study", "coning_drift", "recorded_gyro", "compare_orders")
+
+
 @pytest.mark.parametrize(
     "path",
     [
-        pytest.param(path, marks=pytest.mark.long if path.stem == "word_length_study" else (), id=path.stem)
+        pytest.param(path, marks=pytest.mark.long if path.stem in LONG_EXAMPLES else (), id=path.stem)
         for path in sorted((ROOT / "examples").glob("*.py"))
     ],
 )

@@ -81,8 +81,8 @@ def test_compiling_is_the_stages_in_order():
     choice = choose("euler", "rk2", 1)
     program = strapgen.lower(strapgen.derive("euler", "rk2", 1))
     for target in targets.TARGETS:
-        word = strapgen.Settings(16) if target in targets.FIXED else None
-        code = strapgen.quantize(program, word) if target in targets.FIXED else program
+        word = strapgen.Settings(16) if targets.TARGETS[target].fixed else None
+        code = strapgen.quantize(program, word) if targets.TARGETS[target].fixed else program
         assert pipeline.compile(choice, target, word) == strapgen.generate(code, target)
 
 

@@ -78,7 +78,9 @@ if _typing.TYPE_CHECKING:
     from strapgen.symbolic.kernel import KernelBuilder as KernelBuilder
     from strapgen.symbolic.kernel import Stage as Stage
     from strapgen.symbolic.kernel import resolution as resolution
-    from strapgen.targets import TARGETS as TARGETS
+    from strapgen.targets.registry import TARGETS as TARGETS
+    from strapgen.targets.registry import Target as Target
+    from strapgen.toolchain.compiler import compile_together as compile_together
 
     gyro = _increments
     study = _word_length
@@ -174,7 +176,11 @@ _NAMES = {
         "Stage",
         "resolution",
     ),
-    "targets": ("TARGETS",),
+    "targets.registry": (
+        "TARGETS",
+        "Target",
+    ),
+    "toolchain.compiler": ("compile_together",),
 }
 #: Modules whose functions belong together, by the names that they have here.
 _NAMESPACES = {

@@ -41,7 +41,7 @@ def compile(
     """Compile a choice for a target; `lowered` returns its program, for instance from a cache."""
     _require_target(target, settings)
     program = lowered(choice)
-    if target in targets.FIXED:
+    if targets.TARGETS[target].fixed:
         return generate(quantize(program, settings), target)
     return generate(program, target)
 
@@ -147,7 +147,7 @@ def generate(program: Program | FixedProgram, target: str, settings: Settings | 
     ----------
     program : Program or FixedProgram
     target : str
-        "numpy", "c", "c-float", "c-fixed" or "fixed-model".
+        A key of `strapgen.TARGETS`: one that ``strapgen list`` shows, of an installed package too.
     settings : Settings, optional
         Word, ranges and rounding for a `Program` and a fixed-point target.
 
@@ -163,7 +163,7 @@ def generate(program: Program | FixedProgram, target: str, settings: Settings | 
     """
     stages.require("generate", program, Program, FixedProgram)
     _require_target(target, settings)
-    if isinstance(program, Program) and target in targets.FIXED:
+    if isinstance(program, Program) and targets.TARGETS[target].fixed:
         program = quantize(program, settings)
     elif isinstance(program, FixedProgram) and settings is not None:
         kernel = program.program.kernel

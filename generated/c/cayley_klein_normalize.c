@@ -7,7 +7,7 @@
 #include <math.h>
 
 /* The algorithm. Static, so that the loop below can take it in. */
-static inline void one_(const double state[4], double next[4])
+static inline void cayley_klein_normalize_one_(const double state[4], double next[4])
 {
     const double a_s = state[0];
     const double a_x = state[1];
@@ -28,11 +28,11 @@ static inline void one_(const double state[4], double next[4])
 
 void cayley_klein_normalize(const double state[4], double next[4])
 {
-    one_(state, next);
+    cayley_klein_normalize_one_(state, next);
 }
 
 void cayley_klein_normalize_array(size_t count, const double *state, double *next)
 {
     for (size_t k = 0; k < count; ++k)
-        one_(state + 4 * k, next + 4 * k);
+        cayley_klein_normalize_one_(state + 4 * k, next + 4 * k);
 }

@@ -5,7 +5,7 @@
 #include "coning_fast.h"
 
 /* The algorithm. Static, so that the loop below can take it in. */
-static inline void one_(const double angle_sum[3], const double coning[3],
+static inline void coning_fast_one_(const double angle_sum[3], const double coning[3],
     const double previous_increment[3], const double increment[3], double next_angle_sum[3],
     double next_coning[3], double next_previous_increment[3])
 {
@@ -50,7 +50,7 @@ void coning_fast(const double angle_sum[3], const double coning[3],
     const double previous_increment[3], const double increment[3], double next_angle_sum[3],
     double next_coning[3], double next_previous_increment[3])
 {
-    one_(angle_sum, coning, previous_increment, increment, next_angle_sum, next_coning,
+    coning_fast_one_(angle_sum, coning, previous_increment, increment, next_angle_sum, next_coning,
         next_previous_increment);
 }
 
@@ -59,6 +59,7 @@ void coning_fast_array(size_t count, const double *angle_sum, const double *coni
     double *next_coning, double *next_previous_increment)
 {
     for (size_t k = 0; k < count; ++k)
-        one_(angle_sum + 3 * k, coning + 3 * k, previous_increment + 3 * k, increment + 3 * k,
-            next_angle_sum + 3 * k, next_coning + 3 * k, next_previous_increment + 3 * k);
+        coning_fast_one_(angle_sum + 3 * k, coning + 3 * k, previous_increment + 3 * k,
+            increment + 3 * k, next_angle_sum + 3 * k, next_coning + 3 * k,
+            next_previous_increment + 3 * k);
 }

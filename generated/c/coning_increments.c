@@ -7,17 +7,17 @@
 #include <math.h>
 
 /* sin(x)/x, 1 at 0. */
-static double sinc_(double x)
+static double coning_increments_sinc_(double x)
 {
     return x >= 0.0 && x <= 0.0 ? 1.0 : sin(x) / x;
 }
 
 /* The algorithm. Static, so that the loop below can take it in. */
-static inline void one_(double middle, double width, double a, double b, double g,
+static inline void coning_increments_one_(double middle, double width, double a, double b, double g,
     double increment[3])
 {
     const double shared_1 = b * middle;
-    const double shared_2 = a * width * sinc_(0.5 * (b * width));
+    const double shared_2 = a * width * coning_increments_sinc_(0.5 * (b * width));
     /* angle increment over the interval, body axes */
     const double increment_x = shared_2 * sin(shared_1);
     const double increment_y = g * width;
@@ -30,12 +30,12 @@ static inline void one_(double middle, double width, double a, double b, double 
 void coning_increments(double middle, double width, double a, double b, double g,
     double increment[3])
 {
-    one_(middle, width, a, b, g, increment);
+    coning_increments_one_(middle, width, a, b, g, increment);
 }
 
 void coning_increments_array(size_t count, const double *middle, const double *width,
     const double *a, const double *b, const double *g, double *increment)
 {
     for (size_t k = 0; k < count; ++k)
-        one_(middle[k], width[k], a[k], b[k], g[k], increment + 3 * k);
+        coning_increments_one_(middle[k], width[k], a[k], b[k], g[k], increment + 3 * k);
 }

@@ -7,13 +7,13 @@
 #include <math.h>
 
 /* sin(x)/x, 1 at 0. */
-static double sinc_(double x)
+static double coning_truth_sinc_(double x)
 {
     return x >= 0.0 && x <= 0.0 ? 1.0 : sin(x) / x;
 }
 
 /* The algorithm. Static, so that the loop below can take it in. */
-static inline void one_(double time, double a, double b, double g, double rate[3],
+static inline void coning_truth_one_(double time, double a, double b, double g, double rate[3],
     double attitude[9])
 {
     const double shared_1 = b * time;
@@ -30,10 +30,10 @@ static inline void one_(double time, double a, double b, double g, double rate[3
     const double shared_21 = shared_6 * shared_7;
     const double shared_9 = shared_21 * shared_6;
     const double shared_10 = sqrt(shared_8 + shared_9);
-    const double shared_11 = time * sinc_(shared_10);
+    const double shared_11 = time * coning_truth_sinc_(shared_10);
     const double shared_12 = shared_11 * shared_6;
     const double shared_13 = shared_12 * shared_2;
-    const double factor_1 = sinc_(0.5 * shared_10);
+    const double factor_1 = coning_truth_sinc_(0.5 * shared_10);
     const double shared_14 = 0.5 * (factor_1 * factor_1);
     const double shared_15 = shared_14 * shared_9;
     const double shared_16 = shared_14 * shared_8 - 1.0;
@@ -67,12 +67,12 @@ static inline void one_(double time, double a, double b, double g, double rate[3
 
 void coning_truth(double time, double a, double b, double g, double rate[3], double attitude[9])
 {
-    one_(time, a, b, g, rate, attitude);
+    coning_truth_one_(time, a, b, g, rate, attitude);
 }
 
 void coning_truth_array(size_t count, const double *time, const double *a, const double *b,
     const double *g, double *rate, double *attitude)
 {
     for (size_t k = 0; k < count; ++k)
-        one_(time[k], a[k], b[k], g[k], rate + 3 * k, attitude + 9 * k);
+        coning_truth_one_(time[k], a[k], b[k], g[k], rate + 3 * k, attitude + 9 * k);
 }

@@ -5,8 +5,8 @@
 #include "constant_increments.h"
 
 /* The algorithm. Static, so that the loop below can take it in. */
-static inline void one_(double middle, double width, double x, double y, double z,
-    double increment[3])
+static inline void constant_increments_one_(double middle, double width, double x, double y,
+    double z, double increment[3])
 {
     (void)middle;
     /* angle increment over the interval, body axes */
@@ -21,12 +21,12 @@ static inline void one_(double middle, double width, double x, double y, double 
 void constant_increments(double middle, double width, double x, double y, double z,
     double increment[3])
 {
-    one_(middle, width, x, y, z, increment);
+    constant_increments_one_(middle, width, x, y, z, increment);
 }
 
 void constant_increments_array(size_t count, const double *middle, const double *width,
     const double *x, const double *y, const double *z, double *increment)
 {
     for (size_t k = 0; k < count; ++k)
-        one_(middle[k], width[k], x[k], y[k], z[k], increment + 3 * k);
+        constant_increments_one_(middle[k], width[k], x[k], y[k], z[k], increment + 3 * k);
 }

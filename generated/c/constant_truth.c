@@ -7,13 +7,13 @@
 #include <math.h>
 
 /* sin(x)/x, 1 at 0. */
-static double sinc_(double x)
+static double constant_truth_sinc_(double x)
 {
     return x >= 0.0 && x <= 0.0 ? 1.0 : sin(x) / x;
 }
 
 /* The algorithm. Static, so that the loop below can take it in. */
-static inline void one_(double time, double x, double y, double z, double rate[3],
+static inline void constant_truth_one_(double time, double x, double y, double z, double rate[3],
     double attitude[9])
 {
     const double shared_1 = time * time;
@@ -21,13 +21,13 @@ static inline void one_(double time, double x, double y, double z, double rate[3
     const double shared_3 = shared_1 * (x * x);
     const double shared_4 = shared_1 * (z * z);
     const double shared_5 = sqrt(shared_2 + shared_3 + shared_4);
-    const double factor_1 = sinc_(0.5 * shared_5);
+    const double factor_1 = constant_truth_sinc_(0.5 * shared_5);
     const double shared_6 = 0.5 * (factor_1 * factor_1);
     const double shared_7 = shared_2 * shared_6;
     const double shared_8 = shared_4 * shared_6 - 1.0;
     /* direction cosine matrix, body to reference */
     const double C_11 = -(shared_7 + shared_8);
-    const double shared_9 = time * sinc_(shared_5);
+    const double shared_9 = time * constant_truth_sinc_(shared_5);
     const double shared_10 = shared_9 * z;
     const double shared_18 = shared_1 * shared_6;
     const double shared_11 = shared_18 * x;
@@ -61,12 +61,12 @@ static inline void one_(double time, double x, double y, double z, double rate[3
 
 void constant_truth(double time, double x, double y, double z, double rate[3], double attitude[9])
 {
-    one_(time, x, y, z, rate, attitude);
+    constant_truth_one_(time, x, y, z, rate, attitude);
 }
 
 void constant_truth_array(size_t count, const double *time, const double *x, const double *y,
     const double *z, double *rate, double *attitude)
 {
     for (size_t k = 0; k < count; ++k)
-        one_(time[k], x[k], y[k], z[k], rate + 3 * k, attitude + 9 * k);
+        constant_truth_one_(time[k], x[k], y[k], z[k], rate + 3 * k, attitude + 9 * k);
 }

@@ -5,7 +5,7 @@
 #include "dcm_from_euler.h"
 
 /* The algorithm. Static, so that the loop below can take it in. */
-static inline void one_(const double state[4], double attitude[9])
+static inline void dcm_from_euler_one_(const double state[4], double attitude[9])
 {
     const double e_x = state[0];
     const double e_y = state[1];
@@ -48,11 +48,11 @@ static inline void one_(const double state[4], double attitude[9])
 
 void dcm_from_euler(const double state[4], double attitude[9])
 {
-    one_(state, attitude);
+    dcm_from_euler_one_(state, attitude);
 }
 
 void dcm_from_euler_array(size_t count, const double *state, double *attitude)
 {
     for (size_t k = 0; k < count; ++k)
-        one_(state + 4 * k, attitude + 9 * k);
+        dcm_from_euler_one_(state + 4 * k, attitude + 9 * k);
 }

@@ -7,7 +7,7 @@
 #include <math.h>
 
 /* The algorithm. Static, so that the loop below can take it in. */
-static inline void one_(const double computed[9], double orthonormalized[9])
+static inline void dcm_orthonormalize_one_(const double computed[9], double orthonormalized[9])
 {
     const double C_11 = computed[0];
     const double C_12 = computed[1];
@@ -62,11 +62,11 @@ static inline void one_(const double computed[9], double orthonormalized[9])
 
 void dcm_orthonormalize(const double computed[9], double orthonormalized[9])
 {
-    one_(computed, orthonormalized);
+    dcm_orthonormalize_one_(computed, orthonormalized);
 }
 
 void dcm_orthonormalize_array(size_t count, const double *computed, double *orthonormalized)
 {
     for (size_t k = 0; k < count; ++k)
-        one_(computed + 9 * k, orthonormalized + 9 * k);
+        dcm_orthonormalize_one_(computed + 9 * k, orthonormalized + 9 * k);
 }

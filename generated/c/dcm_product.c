@@ -5,7 +5,8 @@
 #include "dcm_product.h"
 
 /* The algorithm. Static, so that the loop below can take it in. */
-static inline void one_(const double state[9], const double transition[9], double next[9])
+static inline void dcm_product_one_(const double state[9], const double transition[9],
+    double next[9])
 {
     const double C_11 = state[0];
     const double C_12 = state[1];
@@ -48,11 +49,11 @@ static inline void one_(const double state[9], const double transition[9], doubl
 
 void dcm_product(const double state[9], const double transition[9], double next[9])
 {
-    one_(state, transition, next);
+    dcm_product_one_(state, transition, next);
 }
 
 void dcm_product_array(size_t count, const double *state, const double *transition, double *next)
 {
     for (size_t k = 0; k < count; ++k)
-        one_(state + 9 * k, transition + 9 * k, next + 9 * k);
+        dcm_product_one_(state + 9 * k, transition + 9 * k, next + 9 * k);
 }

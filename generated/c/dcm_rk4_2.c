@@ -9,7 +9,7 @@
 #endif
 
 /* The algorithm. Static, so that the loop below can take it in. */
-static inline void one_(const double state[9], const double increments[6], double next[9])
+static inline void dcm_rk4_2_one_(const double state[9], const double increments[6], double next[9])
 {
     const double C_11 = state[0];
     const double C_12 = state[1];
@@ -98,28 +98,28 @@ static inline void one_(const double state[9], const double increments[6], doubl
 
 void dcm_rk4_2(const double state[9], const double increments[6], double next[9])
 {
-    one_(state, increments, next);
+    dcm_rk4_2_one_(state, increments, next);
 }
 
 void dcm_rk4_2_array(size_t count, const double *state, const double *increments, double *next)
 {
     for (size_t k = 0; k < count; ++k)
-        one_(state + 9 * k, increments + 6 * k, next + 9 * k);
+        dcm_rk4_2_one_(state + 9 * k, increments + 6 * k, next + 9 * k);
 }
 
 /* One step of many runs, every element in an array of its own: restrict promises the compiler that it may take
  * several runs at once.
  */
-static void batch_(size_t runs, const double *restrict state_0, const double *restrict state_1,
-    const double *restrict state_2, const double *restrict state_3, const double *restrict state_4,
-    const double *restrict state_5, const double *restrict state_6, const double *restrict state_7,
-    const double *restrict state_8, const double *restrict increments_0,
-    const double *restrict increments_1, const double *restrict increments_2,
-    const double *restrict increments_3, const double *restrict increments_4,
-    const double *restrict increments_5, double *restrict next_0, double *restrict next_1,
-    double *restrict next_2, double *restrict next_3, double *restrict next_4,
-    double *restrict next_5, double *restrict next_6, double *restrict next_7,
-    double *restrict next_8)
+static void dcm_rk4_2_batch_(size_t runs, const double *restrict state_0,
+    const double *restrict state_1, const double *restrict state_2, const double *restrict state_3,
+    const double *restrict state_4, const double *restrict state_5, const double *restrict state_6,
+    const double *restrict state_7, const double *restrict state_8,
+    const double *restrict increments_0, const double *restrict increments_1,
+    const double *restrict increments_2, const double *restrict increments_3,
+    const double *restrict increments_4, const double *restrict increments_5,
+    double *restrict next_0, double *restrict next_1, double *restrict next_2,
+    double *restrict next_3, double *restrict next_4, double *restrict next_5,
+    double *restrict next_6, double *restrict next_7, double *restrict next_8)
 {
     for (size_t k = 0; k < runs; ++k) {
         const double C_11 = state_0[k];
@@ -211,7 +211,7 @@ static void batch_(size_t runs, const double *restrict state_0, const double *re
 
 void dcm_rk4_2_batch(size_t runs, const double *state, const double *increments, double *next)
 {
-    batch_(runs, state + 0 * runs, state + 1 * runs, state + 2 * runs, state + 3 * runs,
+    dcm_rk4_2_batch_(runs, state + 0 * runs, state + 1 * runs, state + 2 * runs, state + 3 * runs,
         state + 4 * runs, state + 5 * runs, state + 6 * runs, state + 7 * runs,
         state + 8 * runs, increments + 0 * runs, increments + 1 * runs, increments + 2 * runs,
         increments + 3 * runs, increments + 4 * runs, increments + 5 * runs, next + 0 * runs,
@@ -219,14 +219,15 @@ void dcm_rk4_2_batch(size_t runs, const double *state, const double *increments,
         next + 6 * runs, next + 7 * runs, next + 8 * runs);
 }
 
-enum { BLOCK_ = 16 };
+enum { DCM_RK4_2_BLOCK = 16 };
 
-/* The part of `count` steps, at most BLOCK_, that does not wait for the state. Arrays are ordered by element,
+/* The part of `count` steps, at most DCM_RK4_2_BLOCK, that does not wait for the state. Arrays are ordered by element,
  * so that the compiler can take several steps at once.
  */
-static void prepare_(size_t count, const double *increments, double prepared[9][BLOCK_])
+static void dcm_rk4_2_ahead_(size_t count, const double *increments,
+    double prepared[9][DCM_RK4_2_BLOCK])
 {
-    double increments_by_element[6][BLOCK_];
+    double increments_by_element[6][DCM_RK4_2_BLOCK];
     for (size_t k = 0; k < count; ++k)
         for (size_t j = 0; j < 6; ++j)
             increments_by_element[j][k] = increments[6 * k + j];
@@ -300,8 +301,8 @@ static void prepare_(size_t count, const double *increments, double prepared[9][
 }
 
 /* The rest of step k of a block. */
-static inline void finish_(const double state[9], double prepared[9][BLOCK_], size_t k,
-    double next[9])
+static inline void dcm_rk4_2_rest_(const double state[9], double prepared[9][DCM_RK4_2_BLOCK],
+    size_t k, double next[9])
 {
     const double C_11 = state[0];
     const double C_12 = state[1];
@@ -345,14 +346,14 @@ static inline void finish_(const double state[9], double prepared[9][BLOCK_], si
 /* Steps `first` to `last` - 1 of a block, recorded one by one unless `record` is null. The state is a copy, so that it
  * stays in registers from step to step.
  */
-static void advance_(size_t first, size_t last, double prepared[9][BLOCK_],
+static void dcm_rk4_2_steps_(size_t first, size_t last, double prepared[9][DCM_RK4_2_BLOCK],
     double state[9], double *record)
 {
     double own[9];
     for (size_t j = 0; j < 9; ++j)
         own[j] = state[j];
     for (size_t k = first; k < last; ++k) {
-        finish_(own, prepared, k, own);
+        dcm_rk4_2_rest_(own, prepared, k, own);
         if (record)
             for (size_t j = 0; j < 9; ++j)
                 *record++ = own[j];
@@ -373,9 +374,9 @@ int dcm_rk4_2_propagate(size_t runs, size_t steps, size_t record_every, size_t o
         for (size_t j = 0; j < 9; ++j)
             state[j] = *history++ = *initial++;
         for (size_t step = 0; step < steps;) {
-            double prepared[9][BLOCK_];
-            const size_t count = steps - step < BLOCK_ ? steps - step : (size_t)BLOCK_;
-            prepare_(count, increments, prepared);
+            double prepared[9][DCM_RK4_2_BLOCK];
+            const size_t count = steps - step < DCM_RK4_2_BLOCK ? steps - step : (size_t)DCM_RK4_2_BLOCK;
+            dcm_rk4_2_ahead_(count, increments, prepared);
             increments += 6 * count;
             step += count;
             for (size_t k = 0; k < count;) {
@@ -384,7 +385,7 @@ int dcm_rk4_2_propagate(size_t runs, size_t steps, size_t record_every, size_t o
                     ahead = until_orthonormalize;
                 if (record_every > 1 && until_record < ahead)
                     ahead = until_record;
-                advance_(k, k + ahead, prepared, state, record_every > 1 ? 0 : history);
+                dcm_rk4_2_steps_(k, k + ahead, prepared, state, record_every > 1 ? 0 : history);
                 k += ahead;
                 if (record_every == 1)
                     history += 9 * ahead;

@@ -7,13 +7,14 @@
 #include <math.h>
 
 /* sin(x)/x, 1 at 0. */
-static double sinc_(double x)
+static double dcm_update_sinc_(double x)
 {
     return x >= 0.0 && x <= 0.0 ? 1.0 : sin(x) / x;
 }
 
 /* The algorithm. Static, so that the loop below can take it in. */
-static inline void one_(const double state[9], const double rotation_vector[3], double next[9])
+static inline void dcm_update_one_(const double state[9], const double rotation_vector[3],
+    double next[9])
 {
     const double C_11 = state[0];
     const double C_12 = state[1];
@@ -33,13 +34,13 @@ static inline void one_(const double state[9], const double rotation_vector[3], 
     /* square of the angle */
     const double angle_squared = shared_1 + shared_2 + shared_3;
     const double shared_4 = sqrt(angle_squared);
-    const double factor_1 = sinc_(0.5 * shared_4);
+    const double factor_1 = dcm_update_sinc_(0.5 * shared_4);
     const double shared_18 = 0.5 * (factor_1 * factor_1);
     const double shared_7 = shared_2 * shared_18;
     const double shared_8 = shared_3 * shared_18 - 1.0;
     /* the step applied to the identity */
     const double A_11 = -(shared_7 + shared_8);
-    const double shared_9 = sinc_(shared_4);
+    const double shared_9 = dcm_update_sinc_(shared_4);
     const double shared_10 = phi_z * shared_9;
     const double shared_11 = phi_x * shared_18;
     const double shared_12 = phi_y * shared_11;
@@ -80,12 +81,12 @@ static inline void one_(const double state[9], const double rotation_vector[3], 
 
 void dcm_update(const double state[9], const double rotation_vector[3], double next[9])
 {
-    one_(state, rotation_vector, next);
+    dcm_update_one_(state, rotation_vector, next);
 }
 
 void dcm_update_array(size_t count, const double *state, const double *rotation_vector,
     double *next)
 {
     for (size_t k = 0; k < count; ++k)
-        one_(state + 9 * k, rotation_vector + 3 * k, next + 9 * k);
+        dcm_update_one_(state + 9 * k, rotation_vector + 3 * k, next + 9 * k);
 }

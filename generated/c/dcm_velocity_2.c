@@ -5,7 +5,7 @@
 #include "dcm_velocity_2.h"
 
 /* The algorithm. Static, so that the loop below can take it in. */
-static inline void one_(const double state[9], const double velocity_sum[3],
+static inline void dcm_velocity_2_one_(const double state[9], const double velocity_sum[3],
     const double sculling[3], const double angle_sum[3], double transformed[3])
 {
     const double C_11 = state[0];
@@ -44,13 +44,13 @@ static inline void one_(const double state[9], const double velocity_sum[3],
 void dcm_velocity_2(const double state[9], const double velocity_sum[3], const double sculling[3],
     const double angle_sum[3], double transformed[3])
 {
-    one_(state, velocity_sum, sculling, angle_sum, transformed);
+    dcm_velocity_2_one_(state, velocity_sum, sculling, angle_sum, transformed);
 }
 
 void dcm_velocity_2_array(size_t count, const double *state, const double *velocity_sum,
     const double *sculling, const double *angle_sum, double *transformed)
 {
     for (size_t k = 0; k < count; ++k)
-        one_(state + 9 * k, velocity_sum + 3 * k, sculling + 3 * k, angle_sum + 3 * k,
-            transformed + 3 * k);
+        dcm_velocity_2_one_(state + 9 * k, velocity_sum + 3 * k, sculling + 3 * k,
+            angle_sum + 3 * k, transformed + 3 * k);
 }

@@ -7,13 +7,14 @@
 #include <math.h>
 
 /* An angle of up to a turn and a half, brought to -pi to pi by a whole turn. */
-static double wrap_(double x)
+static double euler_angles_from_dcm_wrap_(double x)
 {
     return x > 3.141592653589793 ? x - 6.283185307179586 : x < -3.141592653589793 ? x + 6.283185307179586 : x;
 }
 
 /* The algorithm. Static, so that the loop below can take it in. */
-static inline void one_(const double state[9], const double previous[3], double next[3])
+static inline void euler_angles_from_dcm_one_(const double state[9], const double previous[3],
+    double next[3])
 {
     const double C_11 = state[0];
     const double C_12 = state[1];
@@ -37,7 +38,7 @@ static inline void one_(const double state[9], const double previous[3], double 
     /* the angle between or together */
     const double apart = atan2(steep_sine, steep_cosine);
     /* heading */
-    const double next_heading = (cosine_squared >= 0.25 ? atan2(C_21, C_11) : wrap_(apart
+    const double next_heading = (cosine_squared >= 0.25 ? atan2(C_21, C_11) : euler_angles_from_dcm_wrap_(apart
         + (0.0 >= C_31 ? next_roll : -next_roll)));
     next[0] = next_roll;
     next[1] = next_pitch;
@@ -46,12 +47,12 @@ static inline void one_(const double state[9], const double previous[3], double 
 
 void euler_angles_from_dcm(const double state[9], const double previous[3], double next[3])
 {
-    one_(state, previous, next);
+    euler_angles_from_dcm_one_(state, previous, next);
 }
 
 void euler_angles_from_dcm_array(size_t count, const double *state, const double *previous,
     double *next)
 {
     for (size_t k = 0; k < count; ++k)
-        one_(state + 9 * k, previous + 3 * k, next + 3 * k);
+        euler_angles_from_dcm_one_(state + 9 * k, previous + 3 * k, next + 3 * k);
 }

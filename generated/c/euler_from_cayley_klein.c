@@ -5,7 +5,7 @@
 #include "euler_from_cayley_klein.h"
 
 /* The algorithm. Static, so that the loop below can take it in. */
-static inline void one_(const double state[4], double converted[4])
+static inline void euler_from_cayley_klein_one_(const double state[4], double converted[4])
 {
     const double a_s = state[0];
     const double a_x = state[1];
@@ -19,11 +19,11 @@ static inline void one_(const double state[4], double converted[4])
 
 void euler_from_cayley_klein(const double state[4], double converted[4])
 {
-    one_(state, converted);
+    euler_from_cayley_klein_one_(state, converted);
 }
 
 void euler_from_cayley_klein_array(size_t count, const double *state, double *converted)
 {
     for (size_t k = 0; k < count; ++k)
-        one_(state + 4 * k, converted + 4 * k);
+        euler_from_cayley_klein_one_(state + 4 * k, converted + 4 * k);
 }

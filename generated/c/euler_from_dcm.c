@@ -7,7 +7,7 @@
 #include <math.h>
 
 /* The algorithm. Static, so that the loop below can take it in. */
-static inline void one_(const double state[9], double converted[4])
+static inline void euler_from_dcm_one_(const double state[9], double converted[4])
 {
     const double C_11 = state[0];
     const double C_12 = state[1];
@@ -54,11 +54,11 @@ static inline void one_(const double state[9], double converted[4])
 
 void euler_from_dcm(const double state[9], double converted[4])
 {
-    one_(state, converted);
+    euler_from_dcm_one_(state, converted);
 }
 
 void euler_from_dcm_array(size_t count, const double *state, double *converted)
 {
     for (size_t k = 0; k < count; ++k)
-        one_(state + 9 * k, converted + 4 * k);
+        euler_from_dcm_one_(state + 9 * k, converted + 4 * k);
 }

@@ -7,7 +7,8 @@
 #include <math.h>
 
 /* The algorithm. Static, so that the loop below can take it in. */
-static inline void one_(const double state[9], const double previous[4], double converted[4])
+static inline void euler_from_dcm_sheppard_one_(const double state[9], const double previous[4],
+    double converted[4])
 {
     const double C_11 = state[0];
     const double C_12 = state[1];
@@ -60,12 +61,12 @@ static inline void one_(const double state[9], const double previous[4], double 
 
 void euler_from_dcm_sheppard(const double state[9], const double previous[4], double converted[4])
 {
-    one_(state, previous, converted);
+    euler_from_dcm_sheppard_one_(state, previous, converted);
 }
 
 void euler_from_dcm_sheppard_array(size_t count, const double *state, const double *previous,
     double *converted)
 {
     for (size_t k = 0; k < count; ++k)
-        one_(state + 9 * k, previous + 4 * k, converted + 4 * k);
+        euler_from_dcm_sheppard_one_(state + 9 * k, previous + 4 * k, converted + 4 * k);
 }

@@ -5,7 +5,8 @@
 #include "euler_product.h"
 
 /* The algorithm. Static, so that the loop below can take it in. */
-static inline void one_(const double state[4], const double transition[4], double next[4])
+static inline void euler_product_one_(const double state[4], const double transition[4],
+    double next[4])
 {
     const double e_x = state[0];
     const double e_y = state[1];
@@ -28,11 +29,11 @@ static inline void one_(const double state[4], const double transition[4], doubl
 
 void euler_product(const double state[4], const double transition[4], double next[4])
 {
-    one_(state, transition, next);
+    euler_product_one_(state, transition, next);
 }
 
 void euler_product_array(size_t count, const double *state, const double *transition, double *next)
 {
     for (size_t k = 0; k < count; ++k)
-        one_(state + 4 * k, transition + 4 * k, next + 4 * k);
+        euler_product_one_(state + 4 * k, transition + 4 * k, next + 4 * k);
 }

@@ -9,7 +9,8 @@
 #endif
 
 /* The algorithm. Static, so that the loop below can take it in. */
-static inline void one_(const double state[4], const double increments[6], double next[4])
+static inline void euler_rk4_2_one_(const double state[4], const double increments[6],
+    double next[4])
 {
     const double e_x = state[0];
     const double e_y = state[1];
@@ -54,20 +55,20 @@ static inline void one_(const double state[4], const double increments[6], doubl
 
 void euler_rk4_2(const double state[4], const double increments[6], double next[4])
 {
-    one_(state, increments, next);
+    euler_rk4_2_one_(state, increments, next);
 }
 
 void euler_rk4_2_array(size_t count, const double *state, const double *increments, double *next)
 {
     for (size_t k = 0; k < count; ++k)
-        one_(state + 4 * k, increments + 6 * k, next + 4 * k);
+        euler_rk4_2_one_(state + 4 * k, increments + 6 * k, next + 4 * k);
 }
 
 /* One step of many runs, every element in an array of its own: restrict promises the compiler that it may take
  * several runs at once.
  */
-static void batch_(size_t runs, const double *restrict state_0, const double *restrict state_1,
-    const double *restrict state_2, const double *restrict state_3,
+static void euler_rk4_2_batch_(size_t runs, const double *restrict state_0,
+    const double *restrict state_1, const double *restrict state_2, const double *restrict state_3,
     const double *restrict increments_0, const double *restrict increments_1,
     const double *restrict increments_2, const double *restrict increments_3,
     const double *restrict increments_4, const double *restrict increments_5,
@@ -119,20 +120,21 @@ static void batch_(size_t runs, const double *restrict state_0, const double *re
 
 void euler_rk4_2_batch(size_t runs, const double *state, const double *increments, double *next)
 {
-    batch_(runs, state + 0 * runs, state + 1 * runs, state + 2 * runs, state + 3 * runs,
+    euler_rk4_2_batch_(runs, state + 0 * runs, state + 1 * runs, state + 2 * runs, state + 3 * runs,
         increments + 0 * runs, increments + 1 * runs, increments + 2 * runs,
         increments + 3 * runs, increments + 4 * runs, increments + 5 * runs, next + 0 * runs,
         next + 1 * runs, next + 2 * runs, next + 3 * runs);
 }
 
-enum { BLOCK_ = 16 };
+enum { EULER_RK4_2_BLOCK = 16 };
 
-/* The part of `count` steps, at most BLOCK_, that does not wait for the state. Arrays are ordered by element,
+/* The part of `count` steps, at most EULER_RK4_2_BLOCK, that does not wait for the state. Arrays are ordered by element,
  * so that the compiler can take several steps at once.
  */
-static void prepare_(size_t count, const double *increments, double prepared[4][BLOCK_])
+static void euler_rk4_2_ahead_(size_t count, const double *increments,
+    double prepared[4][EULER_RK4_2_BLOCK])
 {
-    double increments_by_element[6][BLOCK_];
+    double increments_by_element[6][EULER_RK4_2_BLOCK];
     for (size_t k = 0; k < count; ++k)
         for (size_t j = 0; j < 6; ++j)
             increments_by_element[j][k] = increments[6 * k + j];
@@ -171,8 +173,8 @@ static void prepare_(size_t count, const double *increments, double prepared[4][
 }
 
 /* The rest of step k of a block. */
-static inline void finish_(const double state[4], double prepared[4][BLOCK_], size_t k,
-    double next[4])
+static inline void euler_rk4_2_rest_(const double state[4], double prepared[4][EULER_RK4_2_BLOCK],
+    size_t k, double next[4])
 {
     const double e_x = state[0];
     const double e_y = state[1];
@@ -196,14 +198,14 @@ static inline void finish_(const double state[4], double prepared[4][BLOCK_], si
 /* Steps `first` to `last` - 1 of a block, recorded one by one unless `record` is null. The state is a copy, so that it
  * stays in registers from step to step.
  */
-static void advance_(size_t first, size_t last, double prepared[4][BLOCK_],
+static void euler_rk4_2_steps_(size_t first, size_t last, double prepared[4][EULER_RK4_2_BLOCK],
     double state[4], double *record)
 {
     double own[4];
     for (size_t j = 0; j < 4; ++j)
         own[j] = state[j];
     for (size_t k = first; k < last; ++k) {
-        finish_(own, prepared, k, own);
+        euler_rk4_2_rest_(own, prepared, k, own);
         if (record)
             for (size_t j = 0; j < 4; ++j)
                 *record++ = own[j];
@@ -224,9 +226,9 @@ int euler_rk4_2_propagate(size_t runs, size_t steps, size_t record_every, size_t
         for (size_t j = 0; j < 4; ++j)
             state[j] = *history++ = *initial++;
         for (size_t step = 0; step < steps;) {
-            double prepared[4][BLOCK_];
-            const size_t count = steps - step < BLOCK_ ? steps - step : (size_t)BLOCK_;
-            prepare_(count, increments, prepared);
+            double prepared[4][EULER_RK4_2_BLOCK];
+            const size_t count = steps - step < EULER_RK4_2_BLOCK ? steps - step : (size_t)EULER_RK4_2_BLOCK;
+            euler_rk4_2_ahead_(count, increments, prepared);
             increments += 6 * count;
             step += count;
             for (size_t k = 0; k < count;) {
@@ -235,7 +237,7 @@ int euler_rk4_2_propagate(size_t runs, size_t steps, size_t record_every, size_t
                     ahead = until_orthonormalize;
                 if (record_every > 1 && until_record < ahead)
                     ahead = until_record;
-                advance_(k, k + ahead, prepared, state, record_every > 1 ? 0 : history);
+                euler_rk4_2_steps_(k, k + ahead, prepared, state, record_every > 1 ? 0 : history);
                 k += ahead;
                 if (record_every == 1)
                     history += 4 * ahead;

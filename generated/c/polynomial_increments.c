@@ -5,8 +5,8 @@
 #include "polynomial_increments.h"
 
 /* The algorithm. Static, so that the loop below can take it in. */
-static inline void one_(double middle, double width, double a0, double a1, double a2, double a3,
-    double a4, double increment[3])
+static inline void polynomial_increments_one_(double middle, double width, double a0, double a1,
+    double a2, double a3, double a4, double increment[3])
 {
     const double shared_3 = width * width;
     const double shared_1 = shared_3 * width;
@@ -24,7 +24,7 @@ static inline void one_(double middle, double width, double a0, double a1, doubl
 void polynomial_increments(double middle, double width, double a0, double a1, double a2, double a3,
     double a4, double increment[3])
 {
-    one_(middle, width, a0, a1, a2, a3, a4, increment);
+    polynomial_increments_one_(middle, width, a0, a1, a2, a3, a4, increment);
 }
 
 void polynomial_increments_array(size_t count, const double *middle, const double *width,
@@ -32,5 +32,6 @@ void polynomial_increments_array(size_t count, const double *middle, const doubl
     double *increment)
 {
     for (size_t k = 0; k < count; ++k)
-        one_(middle[k], width[k], a0[k], a1[k], a2[k], a3[k], a4[k], increment + 3 * k);
+        polynomial_increments_one_(middle[k], width[k], a0[k], a1[k], a2[k], a3[k], a4[k],
+            increment + 3 * k);
 }

@@ -5,7 +5,7 @@
 #include "sculling_fast_2.h"
 
 /* The algorithm. Static, so that the loop below can take it in. */
-static inline void one_(const double angle_sum[3], const double velocity_sum[3],
+static inline void sculling_fast_2_one_(const double angle_sum[3], const double velocity_sum[3],
     const double sculling[3], const double increment[3], const double velocity_increment[3],
     double next_angle_sum[3], double next_velocity_sum[3], double next_sculling[3])
 {
@@ -51,8 +51,8 @@ void sculling_fast_2(const double angle_sum[3], const double velocity_sum[3],
     const double sculling[3], const double increment[3], const double velocity_increment[3],
     double next_angle_sum[3], double next_velocity_sum[3], double next_sculling[3])
 {
-    one_(angle_sum, velocity_sum, sculling, increment, velocity_increment, next_angle_sum,
-        next_velocity_sum, next_sculling);
+    sculling_fast_2_one_(angle_sum, velocity_sum, sculling, increment, velocity_increment,
+        next_angle_sum, next_velocity_sum, next_sculling);
 }
 
 void sculling_fast_2_array(size_t count, const double *angle_sum, const double *velocity_sum,
@@ -60,7 +60,7 @@ void sculling_fast_2_array(size_t count, const double *angle_sum, const double *
     double *next_angle_sum, double *next_velocity_sum, double *next_sculling)
 {
     for (size_t k = 0; k < count; ++k)
-        one_(angle_sum + 3 * k, velocity_sum + 3 * k, sculling + 3 * k, increment + 3 * k,
-            velocity_increment + 3 * k, next_angle_sum + 3 * k, next_velocity_sum + 3 * k,
-            next_sculling + 3 * k);
+        sculling_fast_2_one_(angle_sum + 3 * k, velocity_sum + 3 * k, sculling + 3 * k,
+            increment + 3 * k, velocity_increment + 3 * k, next_angle_sum + 3 * k,
+            next_velocity_sum + 3 * k, next_sculling + 3 * k);
 }

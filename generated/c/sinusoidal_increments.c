@@ -7,16 +7,17 @@
 #include <math.h>
 
 /* sin(x)/x, 1 at 0. */
-static double sinc_(double x)
+static double sinusoidal_increments_sinc_(double x)
 {
     return x >= 0.0 && x <= 0.0 ? 1.0 : sin(x) / x;
 }
 
 /* The algorithm. Static, so that the loop below can take it in. */
-static inline void one_(double middle, double width, double a, double b, double increment[3])
+static inline void sinusoidal_increments_one_(double middle, double width, double a, double b,
+    double increment[3])
 {
     /* angle increment over the interval, body axes */
-    const double increment_y = a * width * cos(b * middle) * sinc_(0.5 * (b * width));
+    const double increment_y = a * width * cos(b * middle) * sinusoidal_increments_sinc_(0.5 * (b * width));
     increment[0] = 0.0;
     increment[1] = increment_y;
     increment[2] = 0.0;
@@ -24,12 +25,12 @@ static inline void one_(double middle, double width, double a, double b, double 
 
 void sinusoidal_increments(double middle, double width, double a, double b, double increment[3])
 {
-    one_(middle, width, a, b, increment);
+    sinusoidal_increments_one_(middle, width, a, b, increment);
 }
 
 void sinusoidal_increments_array(size_t count, const double *middle, const double *width,
     const double *a, const double *b, double *increment)
 {
     for (size_t k = 0; k < count; ++k)
-        one_(middle[k], width[k], a[k], b[k], increment + 3 * k);
+        sinusoidal_increments_one_(middle[k], width[k], a[k], b[k], increment + 3 * k);
 }

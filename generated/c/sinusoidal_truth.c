@@ -7,18 +7,19 @@
 #include <math.h>
 
 /* sin(x)/x, 1 at 0. */
-static double sinc_(double x)
+static double sinusoidal_truth_sinc_(double x)
 {
     return x >= 0.0 && x <= 0.0 ? 1.0 : sin(x) / x;
 }
 
 /* The algorithm. Static, so that the loop below can take it in. */
-static inline void one_(double time, double a, double b, double rate[3], double attitude[9])
+static inline void sinusoidal_truth_one_(double time, double a, double b, double rate[3],
+    double attitude[9])
 {
     const double shared_1 = b * time;
     /* body rate, body axes */
     const double rate_y = a * cos(shared_1);
-    const double shared_2 = a * time * sinc_(shared_1);
+    const double shared_2 = a * time * sinusoidal_truth_sinc_(shared_1);
     const double shared_3 = cos(shared_2);
     /* direction cosine matrix, body to reference */
     const double C_11 = shared_3;
@@ -42,12 +43,12 @@ static inline void one_(double time, double a, double b, double rate[3], double 
 
 void sinusoidal_truth(double time, double a, double b, double rate[3], double attitude[9])
 {
-    one_(time, a, b, rate, attitude);
+    sinusoidal_truth_one_(time, a, b, rate, attitude);
 }
 
 void sinusoidal_truth_array(size_t count, const double *time, const double *a, const double *b,
     double *rate, double *attitude)
 {
     for (size_t k = 0; k < count; ++k)
-        one_(time[k], a[k], b[k], rate + 3 * k, attitude + 9 * k);
+        sinusoidal_truth_one_(time[k], a[k], b[k], rate + 3 * k, attitude + 9 * k);
 }

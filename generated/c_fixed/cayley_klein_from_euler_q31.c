@@ -5,22 +5,22 @@
 #include "cayley_klein_from_euler_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int outside_(int_fast32_t x, int_fast32_t limit)
+static inline int cayley_klein_from_euler_q31_out_(int_fast32_t x, int_fast32_t limit)
 {
     return (uint64_t)x + (uint64_t)limit > 2 * (uint64_t)limit;
 }
 
 /* The algorithm. Static, so that the loops below can take it in. */
-static inline int one_(const int32_t state[4], int32_t converted[4])
+static inline int cayley_klein_from_euler_q31_one_(const int32_t state[4], int32_t converted[4])
 {
     const int_fast32_t e_x = state[0];
     const int_fast32_t e_y = state[1];
     const int_fast32_t e_z = state[2];
     const int_fast32_t e_s = state[3];
-    if (outside_(e_x, INT32_C(1140850688))
-        || outside_(e_y, INT32_C(1140850688))
-        || outside_(e_z, INT32_C(1140850688))
-        || outside_(e_s, INT32_C(1140850688)))
+    if (cayley_klein_from_euler_q31_out_(e_x, INT32_C(1140850688))
+        || cayley_klein_from_euler_q31_out_(e_y, INT32_C(1140850688))
+        || cayley_klein_from_euler_q31_out_(e_z, INT32_C(1140850688))
+        || cayley_klein_from_euler_q31_out_(e_s, INT32_C(1140850688)))
         return 1;
     const int_fast32_t next_s = (int_fast32_t)((int64_t)e_s);
     const int_fast32_t next_x = (int_fast32_t)((int64_t)e_x);
@@ -35,7 +35,7 @@ static inline int one_(const int32_t state[4], int32_t converted[4])
 
 int cayley_klein_from_euler_q31(const int32_t state[4], int32_t converted[4])
 {
-    return one_(state, converted);
+    return cayley_klein_from_euler_q31_one_(state, converted);
 }
 
 size_t cayley_klein_from_euler_q31_array(size_t count, int *status, const int32_t *state,
@@ -43,7 +43,7 @@ size_t cayley_klein_from_euler_q31_array(size_t count, int *status, const int32_
 {
     *status = 0;
     for (size_t k = 0; k < count; ++k) {
-        *status = one_(state + 4 * k, converted + 4 * k);
+        *status = cayley_klein_from_euler_q31_one_(state + 4 * k, converted + 4 * k);
         if (*status)
             return k;
     }

@@ -6,7 +6,7 @@
 #include "cayley_klein_rk4_2_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int outside_(int_fast32_t x, int_fast32_t limit)
+static inline int cayley_klein_rk4_2_q31_out_(int_fast32_t x, int_fast32_t limit)
 {
     return (uint64_t)x + (uint64_t)limit > 2 * (uint64_t)limit;
 }
@@ -14,13 +14,14 @@ static inline int outside_(int_fast32_t x, int_fast32_t limit)
 /* x / 2^n, rounded down. The right shift of a negative number is left to the compiler by the standard; this is not, and
  * compilers make one arithmetic shift of it.
  */
-static inline int64_t shifted_(int64_t x, int n)
+static inline int64_t cayley_klein_rk4_2_q31_shr_(int64_t x, int n)
 {
     return x < 0 ? ~(~x >> n) : x >> n;
 }
 
 /* The algorithm. Static, so that the loops below can take it in. */
-static inline int one_(const int32_t state[4], const int32_t increments[6], int32_t next[4])
+static inline int cayley_klein_rk4_2_q31_one_(const int32_t state[4], const int32_t increments[6],
+    int32_t next[4])
 {
     const int_fast32_t a_s = state[0];
     const int_fast32_t a_x = state[1];
@@ -32,61 +33,73 @@ static inline int one_(const int32_t state[4], const int32_t increments[6], int3
     const int_fast32_t d2_x = increments[3];
     const int_fast32_t d2_y = increments[4];
     const int_fast32_t d2_z = increments[5];
-    if (outside_(a_s, INT32_C(1140850688))
-        || outside_(a_x, INT32_C(1140850688))
-        || outside_(a_y, INT32_C(1140850688))
-        || outside_(a_z, INT32_C(1140850688))
-        || outside_(d1_x, INT32_C(536870912))
-        || outside_(d1_y, INT32_C(536870912))
-        || outside_(d1_z, INT32_C(536870912))
-        || outside_(d2_x, INT32_C(536870912))
-        || outside_(d2_y, INT32_C(536870912))
-        || outside_(d2_z, INT32_C(536870912)))
+    if (cayley_klein_rk4_2_q31_out_(a_s, INT32_C(1140850688))
+        || cayley_klein_rk4_2_q31_out_(a_x, INT32_C(1140850688))
+        || cayley_klein_rk4_2_q31_out_(a_y, INT32_C(1140850688))
+        || cayley_klein_rk4_2_q31_out_(a_z, INT32_C(1140850688))
+        || cayley_klein_rk4_2_q31_out_(d1_x, INT32_C(536870912))
+        || cayley_klein_rk4_2_q31_out_(d1_y, INT32_C(536870912))
+        || cayley_klein_rk4_2_q31_out_(d1_z, INT32_C(536870912))
+        || cayley_klein_rk4_2_q31_out_(d2_x, INT32_C(536870912))
+        || cayley_klein_rk4_2_q31_out_(d2_y, INT32_C(536870912))
+        || cayley_klein_rk4_2_q31_out_(d2_z, INT32_C(536870912)))
         return 1;
     /* the angle increment of the whole step */
     const int_fast32_t sigma_x = (int_fast32_t)((int64_t)d1_x + (int64_t)d2_x);
     const int_fast32_t sigma_y = (int_fast32_t)((int64_t)d1_y + (int64_t)d2_y);
     const int_fast32_t sigma_z = (int_fast32_t)((int64_t)d1_z + (int64_t)d2_z);
-    const int_fast32_t sigma_cross_d1_x = (int_fast32_t)(shifted_((int64_t)d1_z * sigma_y
-        - (int64_t)d1_y * sigma_z + INT32_C(268435456), 29));
-    const int_fast32_t sigma_cross_d1_y = (int_fast32_t)(shifted_((int64_t)d1_x * sigma_z
-        - (int64_t)d1_z * sigma_x + INT32_C(268435456), 29));
-    const int_fast32_t sigma_cross_d1_z = (int_fast32_t)(shifted_((int64_t)d1_y * sigma_x
-        - (int64_t)d1_x * sigma_y + INT32_C(268435456), 29));
-    const int_fast32_t sigma_dot_sigma = (int_fast32_t)(shifted_((int64_t)sigma_x * sigma_x
+    const int_fast32_t sigma_cross_d1_x =
+        (int_fast32_t)(cayley_klein_rk4_2_q31_shr_((int64_t)d1_z * sigma_y - (int64_t)d1_y * sigma_z
+        + INT32_C(268435456), 29));
+    const int_fast32_t sigma_cross_d1_y =
+        (int_fast32_t)(cayley_klein_rk4_2_q31_shr_((int64_t)d1_x * sigma_z - (int64_t)d1_z * sigma_x
+        + INT32_C(268435456), 29));
+    const int_fast32_t sigma_cross_d1_z =
+        (int_fast32_t)(cayley_klein_rk4_2_q31_shr_((int64_t)d1_y * sigma_x - (int64_t)d1_x * sigma_y
+        + INT32_C(268435456), 29));
+    const int_fast32_t sigma_dot_sigma =
+        (int_fast32_t)(cayley_klein_rk4_2_q31_shr_((int64_t)sigma_x * sigma_x
         + (int64_t)sigma_y * sigma_y + (int64_t)sigma_z * sigma_z + INT32_C(1073741824), 31));
     /* weight of sigma in p */
-    const int_fast32_t p_sigma = (int_fast32_t)(shifted_(-(int64_t)sigma_dot_sigma * INT32_C(1431655765)
+    const int_fast32_t p_sigma =
+        (int_fast32_t)(cayley_klein_rk4_2_q31_shr_(-(int64_t)sigma_dot_sigma * INT32_C(1431655765)
         + INT32_C(1073741824), 31));
     /* weight of sigma_cross_d1 in p */
-    const int_fast32_t p_sigma_cross_d1 = (int_fast32_t)(shifted_(-(int64_t)p_sigma * INT32_C(4194304)
+    const int_fast32_t p_sigma_cross_d1 =
+        (int_fast32_t)(cayley_klein_rk4_2_q31_shr_(-(int64_t)p_sigma * INT32_C(4194304)
         - INT64_C(384307168202282325) + INT32_C(134217728), 28));
     /* the step applied to the identity: its vector part */
     const int_fast32_t p_x = (int_fast32_t)((int64_t)sigma_x
-        + shifted_(shifted_((int64_t)p_sigma * sigma_x, 1)
+        + cayley_klein_rk4_2_q31_shr_(cayley_klein_rk4_2_q31_shr_((int64_t)p_sigma * sigma_x, 1)
         + (int64_t)p_sigma_cross_d1 * sigma_cross_d1_x * 4 + INT64_C(34359738368), 36));
     const int_fast32_t p_y = (int_fast32_t)((int64_t)sigma_y
-        + shifted_(shifted_((int64_t)p_sigma * sigma_y, 1)
+        + cayley_klein_rk4_2_q31_shr_(cayley_klein_rk4_2_q31_shr_((int64_t)p_sigma * sigma_y, 1)
         + (int64_t)p_sigma_cross_d1 * sigma_cross_d1_y * 4 + INT64_C(34359738368), 36));
     const int_fast32_t p_z = (int_fast32_t)((int64_t)sigma_z
-        + shifted_(shifted_((int64_t)p_sigma * sigma_z, 1)
+        + cayley_klein_rk4_2_q31_shr_(cayley_klein_rk4_2_q31_shr_((int64_t)p_sigma * sigma_z, 1)
         + (int64_t)p_sigma_cross_d1 * sigma_cross_d1_z * 4 + INT64_C(34359738368), 36));
-    const int_fast32_t d1_dot_d2 = (int_fast32_t)(shifted_((int64_t)d1_x * d2_x + (int64_t)d1_y * d2_y
-        + (int64_t)d1_z * d2_z + INT32_C(268435456), 29));
-    const int_fast32_t p_s_factor = (int_fast32_t)(shifted_((int64_t)d1_dot_d2 * INT32_C(1431655765)
+    const int_fast32_t d1_dot_d2 = (int_fast32_t)(cayley_klein_rk4_2_q31_shr_((int64_t)d1_x * d2_x
+        + (int64_t)d1_y * d2_y + (int64_t)d1_z * d2_z + INT32_C(268435456), 29));
+    const int_fast32_t p_s_factor =
+        (int_fast32_t)(cayley_klein_rk4_2_q31_shr_((int64_t)d1_dot_d2 * INT32_C(1431655765)
         - (int64_t)sigma_dot_sigma * INT32_C(1073741824) + INT64_C(17179869184), 35));
     /* its scalar part */
-    const int_fast32_t p_s = (int_fast32_t)(shifted_(-(int64_t)sigma_dot_sigma * INT64_C(4294967296)
+    const int_fast32_t p_s =
+        (int_fast32_t)(cayley_klein_rk4_2_q31_shr_(-(int64_t)sigma_dot_sigma * INT64_C(4294967296)
         + (int64_t)p_s_factor * sigma_dot_sigma + INT64_C(17179869184), 35));
     /* Cayley-Klein parameters, body to reference, scalar first, after the step */
-    const int_fast32_t next_s = (int_fast32_t)((int64_t)a_s + shifted_((int64_t)a_s * p_s
-        - (int64_t)a_x * p_x - (int64_t)a_y * p_y - (int64_t)a_z * p_z + INT64_C(4294967296), 33));
-    const int_fast32_t next_x = (int_fast32_t)((int64_t)a_x + shifted_((int64_t)a_s * p_x
-        + (int64_t)a_x * p_s + (int64_t)a_y * p_z - (int64_t)a_z * p_y + INT64_C(4294967296), 33));
-    const int_fast32_t next_y = (int_fast32_t)((int64_t)a_y + shifted_((int64_t)a_s * p_y
-        - (int64_t)a_x * p_z + (int64_t)a_y * p_s + (int64_t)a_z * p_x + INT64_C(4294967296), 33));
-    const int_fast32_t next_z = (int_fast32_t)((int64_t)a_z + shifted_((int64_t)a_s * p_z
-        + (int64_t)a_x * p_y - (int64_t)a_y * p_x + (int64_t)a_z * p_s + INT64_C(4294967296), 33));
+    const int_fast32_t next_s = (int_fast32_t)((int64_t)a_s
+        + cayley_klein_rk4_2_q31_shr_((int64_t)a_s * p_s - (int64_t)a_x * p_x - (int64_t)a_y * p_y
+        - (int64_t)a_z * p_z + INT64_C(4294967296), 33));
+    const int_fast32_t next_x = (int_fast32_t)((int64_t)a_x
+        + cayley_klein_rk4_2_q31_shr_((int64_t)a_s * p_x + (int64_t)a_x * p_s + (int64_t)a_y * p_z
+        - (int64_t)a_z * p_y + INT64_C(4294967296), 33));
+    const int_fast32_t next_y = (int_fast32_t)((int64_t)a_y
+        + cayley_klein_rk4_2_q31_shr_((int64_t)a_s * p_y - (int64_t)a_x * p_z + (int64_t)a_y * p_s
+        + (int64_t)a_z * p_x + INT64_C(4294967296), 33));
+    const int_fast32_t next_z = (int_fast32_t)((int64_t)a_z
+        + cayley_klein_rk4_2_q31_shr_((int64_t)a_s * p_z + (int64_t)a_x * p_y - (int64_t)a_y * p_x
+        + (int64_t)a_z * p_s + INT64_C(4294967296), 33));
     next[0] = (int32_t)next_s;
     next[1] = (int32_t)next_x;
     next[2] = (int32_t)next_y;
@@ -96,7 +109,7 @@ static inline int one_(const int32_t state[4], const int32_t increments[6], int3
 
 int cayley_klein_rk4_2_q31(const int32_t state[4], const int32_t increments[6], int32_t next[4])
 {
-    return one_(state, increments, next);
+    return cayley_klein_rk4_2_q31_one_(state, increments, next);
 }
 
 size_t cayley_klein_rk4_2_q31_array(size_t count, int *status, const int32_t *state,
@@ -104,7 +117,7 @@ size_t cayley_klein_rk4_2_q31_array(size_t count, int *status, const int32_t *st
 {
     *status = 0;
     for (size_t k = 0; k < count; ++k) {
-        *status = one_(state + 4 * k, increments + 6 * k, next + 4 * k);
+        *status = cayley_klein_rk4_2_q31_one_(state + 4 * k, increments + 6 * k, next + 4 * k);
         if (*status)
             return k;
     }
@@ -123,7 +136,7 @@ int cayley_klein_rk4_2_q31_propagate(size_t runs, size_t steps, size_t record_ev
         for (size_t j = 0; j < 4; ++j)
             state[j] = *history++ = *initial++;
         for (size_t step = 0; step < steps; ++step, increments += 6) {
-            int status = one_(state, increments, state);
+            int status = cayley_klein_rk4_2_q31_one_(state, increments, state);
             if (!status && orthonormalize_every && !--until_orthonormalize) {
                 if (orthonormalize(state, state))
                     status = 3;

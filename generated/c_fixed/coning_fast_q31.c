@@ -5,7 +5,7 @@
 #include "coning_fast_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int outside_(int_fast32_t x, int_fast32_t limit)
+static inline int coning_fast_q31_out_(int_fast32_t x, int_fast32_t limit)
 {
     return (uint64_t)x + (uint64_t)limit > 2 * (uint64_t)limit;
 }
@@ -13,13 +13,13 @@ static inline int outside_(int_fast32_t x, int_fast32_t limit)
 /* x / 2^n, rounded down. The right shift of a negative number is left to the compiler by the standard; this is not, and
  * compilers make one arithmetic shift of it.
  */
-static inline int64_t shifted_(int64_t x, int n)
+static inline int64_t coning_fast_q31_shr_(int64_t x, int n)
 {
     return x < 0 ? ~(~x >> n) : x >> n;
 }
 
 /* The algorithm. Static, so that the loops below can take it in. */
-static inline int one_(const int32_t angle_sum[3], const int32_t coning[3],
+static inline int coning_fast_q31_one_(const int32_t angle_sum[3], const int32_t coning[3],
     const int32_t previous_increment[3], const int32_t increment[3], int32_t next_angle_sum[3],
     int32_t next_coning[3], int32_t next_previous_increment[3])
 {
@@ -35,47 +35,54 @@ static inline int one_(const int32_t angle_sum[3], const int32_t coning[3],
     const int_fast32_t d_x = increment[0];
     const int_fast32_t d_y = increment[1];
     const int_fast32_t d_z = increment[2];
-    if (outside_(beta_x, INT32_C(1073741824))
-        || outside_(beta_y, INT32_C(1073741824))
-        || outside_(beta_z, INT32_C(1073741824))
-        || outside_(coning_x, INT32_C(1073741824))
-        || outside_(coning_y, INT32_C(1073741824))
-        || outside_(coning_z, INT32_C(1073741824))
-        || outside_(past_x, INT32_C(1073741824))
-        || outside_(past_y, INT32_C(1073741824))
-        || outside_(past_z, INT32_C(1073741824))
-        || outside_(d_x, INT32_C(1073741824))
-        || outside_(d_y, INT32_C(1073741824))
-        || outside_(d_z, INT32_C(1073741824)))
+    if (coning_fast_q31_out_(beta_x, INT32_C(1073741824))
+        || coning_fast_q31_out_(beta_y, INT32_C(1073741824))
+        || coning_fast_q31_out_(beta_z, INT32_C(1073741824))
+        || coning_fast_q31_out_(coning_x, INT32_C(1073741824))
+        || coning_fast_q31_out_(coning_y, INT32_C(1073741824))
+        || coning_fast_q31_out_(coning_z, INT32_C(1073741824))
+        || coning_fast_q31_out_(past_x, INT32_C(1073741824))
+        || coning_fast_q31_out_(past_y, INT32_C(1073741824))
+        || coning_fast_q31_out_(past_z, INT32_C(1073741824))
+        || coning_fast_q31_out_(d_x, INT32_C(1073741824))
+        || coning_fast_q31_out_(d_y, INT32_C(1073741824))
+        || coning_fast_q31_out_(d_z, INT32_C(1073741824)))
         return 1;
     /* angle at the middle of the cycle, for coning */
     const int_fast32_t arm_x = (int_fast32_t)((int64_t)beta_x
-        + shifted_((int64_t)past_x * INT32_C(1431655765) + INT64_C(34359738368), 36));
+        + coning_fast_q31_shr_((int64_t)past_x * INT32_C(1431655765) + INT64_C(34359738368), 36));
     const int_fast32_t arm_y = (int_fast32_t)((int64_t)beta_y
-        + shifted_((int64_t)past_y * INT32_C(1431655765) + INT64_C(34359738368), 36));
+        + coning_fast_q31_shr_((int64_t)past_y * INT32_C(1431655765) + INT64_C(34359738368), 36));
     const int64_t arm_z = (int64_t)beta_z * INT64_C(4294967296)
-        + shifted_((int64_t)past_z * INT32_C(1431655765), 4);
+        + coning_fast_q31_shr_((int64_t)past_z * INT32_C(1431655765), 4);
     /* sum of the angle increments since the slow cycle began, after the call */
-    const int_fast32_t next_beta_x = (int_fast32_t)((int64_t)beta_x + shifted_((int64_t)d_x + 4, 3));
-    const int_fast32_t next_beta_y = (int_fast32_t)((int64_t)beta_y + shifted_((int64_t)d_y + 4, 3));
-    const int_fast32_t next_beta_z = (int_fast32_t)((int64_t)beta_z + shifted_((int64_t)d_z + 4, 3));
+    const int_fast32_t next_beta_x =
+        (int_fast32_t)((int64_t)beta_x + coning_fast_q31_shr_((int64_t)d_x + 4, 3));
+    const int_fast32_t next_beta_y =
+        (int_fast32_t)((int64_t)beta_y + coning_fast_q31_shr_((int64_t)d_y + 4, 3));
+    const int_fast32_t next_beta_z =
+        (int_fast32_t)((int64_t)beta_z + coning_fast_q31_shr_((int64_t)d_z + 4, 3));
     const int_fast32_t shared_1 = (int_fast32_t)((int64_t)d_z);
-    const int_fast32_t shared_2 = (int_fast32_t)(shifted_(arm_z + INT64_C(2147483648), 32));
+    const int_fast32_t shared_2 =
+        (int_fast32_t)(coning_fast_q31_shr_(arm_z + INT64_C(2147483648), 32));
     /* coning correction since the slow cycle began, after the call */
-    const int64_t next_coning_x_unchecked = (int64_t)coning_x + shifted_((int64_t)arm_y * shared_1
-        - (int64_t)d_y * shared_2 + INT32_C(1073741824), 31);
+    const int64_t next_coning_x_unchecked = (int64_t)coning_x
+        + coning_fast_q31_shr_((int64_t)arm_y * shared_1 - (int64_t)d_y * shared_2
+        + INT32_C(1073741824), 31);
     if (next_coning_x_unchecked < (-INT32_C(1073741824))
         || next_coning_x_unchecked > INT32_C(1073741824))
         return 2;
     const int_fast32_t next_coning_x = (int_fast32_t)next_coning_x_unchecked;
-    const int64_t next_coning_y_unchecked = (int64_t)coning_y + shifted_(-(int64_t)arm_x * shared_1
-        + (int64_t)d_x * shared_2 + INT32_C(1073741824), 31);
+    const int64_t next_coning_y_unchecked = (int64_t)coning_y
+        + coning_fast_q31_shr_(-(int64_t)arm_x * shared_1 + (int64_t)d_x * shared_2
+        + INT32_C(1073741824), 31);
     if (next_coning_y_unchecked < (-INT32_C(1073741824))
         || next_coning_y_unchecked > INT32_C(1073741824))
         return 2;
     const int_fast32_t next_coning_y = (int_fast32_t)next_coning_y_unchecked;
-    const int64_t next_coning_z_unchecked = (int64_t)coning_z + shifted_((int64_t)arm_x * d_y
-        - (int64_t)arm_y * d_x + INT32_C(1073741824), 31);
+    const int64_t next_coning_z_unchecked = (int64_t)coning_z
+        + coning_fast_q31_shr_((int64_t)arm_x * d_y - (int64_t)arm_y * d_x
+        + INT32_C(1073741824), 31);
     if (next_coning_z_unchecked < (-INT32_C(1073741824))
         || next_coning_z_unchecked > INT32_C(1073741824))
         return 2;
@@ -99,7 +106,8 @@ int coning_fast_q31(const int32_t angle_sum[3], const int32_t coning[3],
     const int32_t previous_increment[3], const int32_t increment[3], int32_t next_angle_sum[3],
     int32_t next_coning[3], int32_t next_previous_increment[3])
 {
-    return one_(angle_sum, coning, previous_increment, increment, next_angle_sum, next_coning, next_previous_increment);
+    return coning_fast_q31_one_(angle_sum, coning, previous_increment, increment, next_angle_sum,
+        next_coning, next_previous_increment);
 }
 
 size_t coning_fast_q31_array(size_t count, int *status, const int32_t *angle_sum,
@@ -108,9 +116,9 @@ size_t coning_fast_q31_array(size_t count, int *status, const int32_t *angle_sum
 {
     *status = 0;
     for (size_t k = 0; k < count; ++k) {
-        *status = one_(angle_sum + 3 * k, coning + 3 * k, previous_increment + 3 * k,
-            increment + 3 * k, next_angle_sum + 3 * k, next_coning + 3 * k,
-            next_previous_increment + 3 * k);
+        *status = coning_fast_q31_one_(angle_sum + 3 * k, coning + 3 * k,
+            previous_increment + 3 * k, increment + 3 * k, next_angle_sum + 3 * k,
+            next_coning + 3 * k, next_previous_increment + 3 * k);
         if (*status)
             return k;
     }

@@ -5,7 +5,7 @@
 #include "dcm_from_cayley_klein_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int outside_(int_fast32_t x, int_fast32_t limit)
+static inline int dcm_from_cayley_klein_q31_out_(int_fast32_t x, int_fast32_t limit)
 {
     return (uint64_t)x + (uint64_t)limit > 2 * (uint64_t)limit;
 }
@@ -13,22 +13,22 @@ static inline int outside_(int_fast32_t x, int_fast32_t limit)
 /* x / 2^n, rounded down. The right shift of a negative number is left to the compiler by the standard; this is not, and
  * compilers make one arithmetic shift of it.
  */
-static inline int64_t shifted_(int64_t x, int n)
+static inline int64_t dcm_from_cayley_klein_q31_shr_(int64_t x, int n)
 {
     return x < 0 ? ~(~x >> n) : x >> n;
 }
 
 /* The algorithm. Static, so that the loops below can take it in. */
-static inline int one_(const int32_t state[4], int32_t attitude[9])
+static inline int dcm_from_cayley_klein_q31_one_(const int32_t state[4], int32_t attitude[9])
 {
     const int_fast32_t a_s = state[0];
     const int_fast32_t a_x = state[1];
     const int_fast32_t a_y = state[2];
     const int_fast32_t a_z = state[3];
-    if (outside_(a_s, INT32_C(1140850688))
-        || outside_(a_x, INT32_C(1140850688))
-        || outside_(a_y, INT32_C(1140850688))
-        || outside_(a_z, INT32_C(1140850688)))
+    if (dcm_from_cayley_klein_q31_out_(a_s, INT32_C(1140850688))
+        || dcm_from_cayley_klein_q31_out_(a_x, INT32_C(1140850688))
+        || dcm_from_cayley_klein_q31_out_(a_y, INT32_C(1140850688))
+        || dcm_from_cayley_klein_q31_out_(a_z, INT32_C(1140850688)))
         return 1;
     const int64_t shared_1 = (int64_t)a_x * a_x;
     const int64_t shared_2 = (int64_t)a_y * a_y;
@@ -37,7 +37,8 @@ static inline int one_(const int32_t state[4], int32_t attitude[9])
     const int64_t shared_6 = shared_4 - shared_5;
     const int64_t shared_13 = shared_1 - shared_2;
     /* direction cosine matrix, body to reference */
-    const int64_t C_11_unchecked = shifted_(shared_13 + shared_6 + INT32_C(536870912), 30);
+    const int64_t C_11_unchecked = dcm_from_cayley_klein_q31_shr_(shared_13 + shared_6
+        + INT32_C(536870912), 30);
     if (C_11_unchecked < (-INT32_C(1140850688))
         || C_11_unchecked > INT32_C(1140850688))
         return 2;
@@ -46,47 +47,54 @@ static inline int one_(const int32_t state[4], int32_t attitude[9])
     const int64_t shared_8 = (int64_t)a_z * shared_7;
     const int_fast32_t shared_11 = (int_fast32_t)((int64_t)a_x);
     const int64_t shared_10 = (int64_t)a_y * shared_11;
-    const int64_t C_12_unchecked = shifted_(shared_10 - shared_8 + INT32_C(268435456), 29);
+    const int64_t C_12_unchecked = dcm_from_cayley_klein_q31_shr_(shared_10 - shared_8
+        + INT32_C(268435456), 29);
     if (C_12_unchecked < (-INT32_C(1140850688))
         || C_12_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t C_12 = (int_fast32_t)C_12_unchecked;
     const int64_t shared_9 = (int64_t)a_y * shared_7;
     const int64_t shared_14 = (int64_t)a_z * shared_11;
-    const int64_t C_13_unchecked = shifted_(shared_9 + shared_14 + INT32_C(268435456), 29);
+    const int64_t C_13_unchecked = dcm_from_cayley_klein_q31_shr_(shared_9 + shared_14
+        + INT32_C(268435456), 29);
     if (C_13_unchecked < (-INT32_C(1140850688))
         || C_13_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t C_13 = (int_fast32_t)C_13_unchecked;
-    const int64_t C_21_unchecked = shifted_(shared_8 + shared_10 + INT32_C(268435456), 29);
+    const int64_t C_21_unchecked = dcm_from_cayley_klein_q31_shr_(shared_8 + shared_10
+        + INT32_C(268435456), 29);
     if (C_21_unchecked < (-INT32_C(1140850688))
         || C_21_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t C_21 = (int_fast32_t)C_21_unchecked;
-    const int64_t C_22_unchecked = shifted_(shared_6 - shared_13 + INT32_C(536870912), 30);
+    const int64_t C_22_unchecked = dcm_from_cayley_klein_q31_shr_(shared_6 - shared_13
+        + INT32_C(536870912), 30);
     if (C_22_unchecked < (-INT32_C(1140850688))
         || C_22_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t C_22 = (int_fast32_t)C_22_unchecked;
     const int64_t shared_12 = (int64_t)a_x * shared_7;
     const int64_t shared_3 = (int64_t)a_y * a_z;
-    const int64_t C_23_unchecked = shifted_(shared_3 - shared_12 + INT32_C(268435456), 29);
+    const int64_t C_23_unchecked = dcm_from_cayley_klein_q31_shr_(shared_3 - shared_12
+        + INT32_C(268435456), 29);
     if (C_23_unchecked < (-INT32_C(1140850688))
         || C_23_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t C_23 = (int_fast32_t)C_23_unchecked;
-    const int64_t C_31_unchecked = shifted_(shared_14 - shared_9 + INT32_C(268435456), 29);
+    const int64_t C_31_unchecked = dcm_from_cayley_klein_q31_shr_(shared_14 - shared_9
+        + INT32_C(268435456), 29);
     if (C_31_unchecked < (-INT32_C(1140850688))
         || C_31_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t C_31 = (int_fast32_t)C_31_unchecked;
-    const int64_t C_32_unchecked = shifted_(shared_12 + shared_3 + INT32_C(268435456), 29);
+    const int64_t C_32_unchecked = dcm_from_cayley_klein_q31_shr_(shared_12 + shared_3
+        + INT32_C(268435456), 29);
     if (C_32_unchecked < (-INT32_C(1140850688))
         || C_32_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t C_32 = (int_fast32_t)C_32_unchecked;
-    const int64_t C_33_unchecked = shifted_(shared_4 - shared_1 - shared_2 + shared_5
-        + INT32_C(536870912), 30);
+    const int64_t C_33_unchecked = dcm_from_cayley_klein_q31_shr_(shared_4 - shared_1 - shared_2
+        + shared_5 + INT32_C(536870912), 30);
     if (C_33_unchecked < (-INT32_C(1140850688))
         || C_33_unchecked > INT32_C(1140850688))
         return 2;
@@ -105,7 +113,7 @@ static inline int one_(const int32_t state[4], int32_t attitude[9])
 
 int dcm_from_cayley_klein_q31(const int32_t state[4], int32_t attitude[9])
 {
-    return one_(state, attitude);
+    return dcm_from_cayley_klein_q31_one_(state, attitude);
 }
 
 size_t dcm_from_cayley_klein_q31_array(size_t count, int *status, const int32_t *state,
@@ -113,7 +121,7 @@ size_t dcm_from_cayley_klein_q31_array(size_t count, int *status, const int32_t 
 {
     *status = 0;
     for (size_t k = 0; k < count; ++k) {
-        *status = one_(state + 4 * k, attitude + 9 * k);
+        *status = dcm_from_cayley_klein_q31_one_(state + 4 * k, attitude + 9 * k);
         if (*status)
             return k;
     }

@@ -5,7 +5,7 @@
 #include "dcm_from_euler_angles_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int outside_(int_fast32_t x, int_fast32_t limit)
+static inline int dcm_from_euler_angles_q31_out_(int_fast32_t x, int_fast32_t limit)
 {
     return (uint64_t)x + (uint64_t)limit > 2 * (uint64_t)limit;
 }
@@ -13,198 +13,248 @@ static inline int outside_(int_fast32_t x, int_fast32_t limit)
 /* x / 2^n, rounded down. The right shift of a negative number is left to the compiler by the standard; this is not, and
  * compilers make one arithmetic shift of it.
  */
-static inline int64_t shifted_(int64_t x, int n)
+static inline int64_t dcm_from_euler_angles_q31_shr_(int64_t x, int n)
 {
     return x < 0 ? ~(~x >> n) : x >> n;
 }
 
 /* The algorithm. Static, so that the loops below can take it in. */
-static inline int one_(const int32_t angles[3], int32_t attitude[9])
+static inline int dcm_from_euler_angles_q31_one_(const int32_t angles[3], int32_t attitude[9])
 {
     const int_fast32_t roll = angles[0];
     const int_fast32_t pitch = angles[1];
     const int_fast32_t heading = angles[2];
-    if (outside_(roll, INT32_C(1686629857))
-        || outside_(pitch, INT32_C(1686629857))
-        || outside_(heading, INT32_C(1686629857)))
+    if (dcm_from_euler_angles_q31_out_(roll, INT32_C(1686629857))
+        || dcm_from_euler_angles_q31_out_(pitch, INT32_C(1686629857))
+        || dcm_from_euler_angles_q31_out_(heading, INT32_C(1686629857)))
         return 1;
-    const int_fast32_t cos_heading_quarters = (int_fast32_t)(shifted_((int64_t)heading * INT32_C(1367130551)
+    const int_fast32_t cos_heading_quarters =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)heading * INT32_C(1367130551)
         + INT64_C(576460752303423488), 60));
     const int_fast32_t cos_heading_rest = (int_fast32_t)((int64_t)heading * 4
-        + shifted_(-(int64_t)cos_heading_quarters * INT32_C(560513589) + INT64_C(2147483648), 32)
-        - (int64_t)cos_heading_quarters * INT32_C(1686629713) * 2);
-    const int_fast32_t cos_heading_turns = (int_fast32_t)(shifted_((int64_t)cos_heading_quarters
-        + 2, 2));
+        + dcm_from_euler_angles_q31_shr_(-(int64_t)cos_heading_quarters * INT32_C(560513589)
+        + INT64_C(2147483648), 32) - (int64_t)cos_heading_quarters * INT32_C(1686629713) * 2);
+    const int_fast32_t cos_heading_turns =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_quarters + 2, 2));
     const int64_t cos_heading_quarter_turns = (int64_t)cos_heading_quarters
         - (int64_t)cos_heading_turns * 4;
-    const int_fast32_t cos_heading_square = (int_fast32_t)(shifted_((int64_t)cos_heading_rest * cos_heading_rest
+    const int_fast32_t cos_heading_square =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_rest * cos_heading_rest
         + INT32_C(1073741824), 31));
-    const int_fast32_t cos_heading_series = (int_fast32_t)(shifted_(shifted_(-(int64_t)cos_heading_square * INT32_C(56412333), 1)
+    const int_fast32_t cos_heading_series =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_(-(int64_t)cos_heading_square * INT32_C(56412333), 1)
         + INT64_C(6662950945848033280) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_heading_series_2 = (int_fast32_t)(shifted_(shifted_((int64_t)cos_heading_square * cos_heading_series, 5)
+    const int_fast32_t cos_heading_series_2 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_square * cos_heading_series, 5)
         - INT64_C(7495819814078808064) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_heading_series_3 = (int_fast32_t)(shifted_(shifted_((int64_t)cos_heading_square * cos_heading_series_2, 5)
+    const int_fast32_t cos_heading_series_3 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_square * cos_heading_series_2, 5)
         + INT64_C(4919131752989213696) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_heading_series_4 = (int_fast32_t)(shifted_(shifted_((int64_t)cos_heading_square * cos_heading_series_3, 3)
+    const int_fast32_t cos_heading_series_4 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_square * cos_heading_series_3, 3)
         - INT64_C(6148914691236517216) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_heading_bend = (int_fast32_t)(shifted_((int64_t)cos_heading_square * cos_heading_series_4
+    const int_fast32_t cos_heading_bend =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_square * cos_heading_series_4
         + INT32_C(536870912), 30));
     const int64_t cos_heading_sine = (int64_t)cos_heading_rest * INT64_C(4294967296)
-        + shifted_((int64_t)cos_heading_rest * cos_heading_bend, 2);
-    const int_fast32_t cos_heading_series_5 = (int_fast32_t)(shifted_(shifted_(-(int64_t)cos_heading_square * INT32_C(620535663), 4)
+        + dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_rest * cos_heading_bend, 2);
+    const int_fast32_t cos_heading_series_5 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_(-(int64_t)cos_heading_square * INT32_C(620535663), 4)
         + INT64_C(7495819814078775296) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_heading_series_6 = (int_fast32_t)(shifted_(shifted_((int64_t)cos_heading_square * cos_heading_series_5, 5)
+    const int_fast32_t cos_heading_series_6 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_square * cos_heading_series_5, 5)
         - INT64_C(6558842337318952960) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_heading_series_7 = (int_fast32_t)(shifted_(shifted_((int64_t)cos_heading_square * cos_heading_series_6, 4)
+    const int_fast32_t cos_heading_series_7 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_square * cos_heading_series_6, 4)
         + INT64_C(6148914691236517248) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_heading_bend_2 = (int_fast32_t)(shifted_((int64_t)cos_heading_square * cos_heading_series_7
+    const int_fast32_t cos_heading_bend_2 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_square * cos_heading_series_7
         + INT32_C(536870912), 30));
     const int64_t cos_heading_cosine = -(int64_t)cos_heading_square * INT32_C(1073741824)
-        + shifted_((int64_t)cos_heading_square * cos_heading_bend_2, 5)
+        + dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_square * cos_heading_bend_2, 5)
         + INT64_C(4611686018427387904);
     const int64_t cos_heading_opposite = -cos_heading_sine;
     const int64_t cos_heading_opposite_2 = -cos_heading_cosine;
-    const int64_t cos_heading_quarter = (cos_heading_quarter_turns >= 1 ? shifted_(cos_heading_opposite, 1)
+    const int64_t cos_heading_quarter = (cos_heading_quarter_turns >= 1 ? dcm_from_euler_angles_q31_shr_(cos_heading_opposite, 1)
         : cos_heading_quarter_turns >= 0 ? cos_heading_cosine
-        : cos_heading_quarter_turns >= (-1) ? shifted_(cos_heading_sine, 1)
+        : cos_heading_quarter_turns >= (-1) ? dcm_from_euler_angles_q31_shr_(cos_heading_sine, 1)
         : cos_heading_opposite_2);
-    const int_fast32_t cos_heading = (int_fast32_t)(shifted_(cos_heading_quarter
+    const int_fast32_t cos_heading =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(cos_heading_quarter
         + INT64_C(2147483648), 32));
     const int64_t sin_heading_quarter = (cos_heading_quarter_turns >= 1 ? cos_heading_cosine
-        : cos_heading_quarter_turns >= 0 ? shifted_(cos_heading_sine, 1)
+        : cos_heading_quarter_turns >= 0 ? dcm_from_euler_angles_q31_shr_(cos_heading_sine, 1)
         : cos_heading_quarter_turns >= (-1) ? cos_heading_opposite_2
-        : shifted_(cos_heading_opposite, 1));
-    const int_fast32_t sin_heading = (int_fast32_t)(shifted_(sin_heading_quarter
+        : dcm_from_euler_angles_q31_shr_(cos_heading_opposite, 1));
+    const int_fast32_t sin_heading =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(sin_heading_quarter
         + INT64_C(2147483648), 32));
-    const int_fast32_t cos_pitch_quarters = (int_fast32_t)(shifted_((int64_t)pitch * INT32_C(1367130551)
+    const int_fast32_t cos_pitch_quarters =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)pitch * INT32_C(1367130551)
         + INT64_C(576460752303423488), 60));
     const int_fast32_t cos_pitch_rest = (int_fast32_t)((int64_t)pitch * 4
-        + shifted_(-(int64_t)cos_pitch_quarters * INT32_C(560513589) + INT64_C(2147483648), 32)
-        - (int64_t)cos_pitch_quarters * INT32_C(1686629713) * 2);
-    const int_fast32_t cos_pitch_turns = (int_fast32_t)(shifted_((int64_t)cos_pitch_quarters + 2, 2));
-    const int64_t cos_pitch_quarter_turns = (int64_t)cos_pitch_quarters - (int64_t)cos_pitch_turns * 4;
-    const int_fast32_t cos_pitch_square = (int_fast32_t)(shifted_((int64_t)cos_pitch_rest * cos_pitch_rest
+        + dcm_from_euler_angles_q31_shr_(-(int64_t)cos_pitch_quarters * INT32_C(560513589)
+        + INT64_C(2147483648), 32) - (int64_t)cos_pitch_quarters * INT32_C(1686629713) * 2);
+    const int_fast32_t cos_pitch_turns =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_quarters + 2, 2));
+    const int64_t cos_pitch_quarter_turns =
+        (int64_t)cos_pitch_quarters - (int64_t)cos_pitch_turns * 4;
+    const int_fast32_t cos_pitch_square =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_rest * cos_pitch_rest
         + INT32_C(1073741824), 31));
-    const int_fast32_t cos_pitch_series = (int_fast32_t)(shifted_(shifted_(-(int64_t)cos_pitch_square * INT32_C(56412333), 1)
+    const int_fast32_t cos_pitch_series =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_(-(int64_t)cos_pitch_square * INT32_C(56412333), 1)
         + INT64_C(6662950945848033280) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_pitch_series_2 = (int_fast32_t)(shifted_(shifted_((int64_t)cos_pitch_square * cos_pitch_series, 5)
+    const int_fast32_t cos_pitch_series_2 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_square * cos_pitch_series, 5)
         - INT64_C(7495819814078808064) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_pitch_series_3 = (int_fast32_t)(shifted_(shifted_((int64_t)cos_pitch_square * cos_pitch_series_2, 5)
+    const int_fast32_t cos_pitch_series_3 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_square * cos_pitch_series_2, 5)
         + INT64_C(4919131752989213696) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_pitch_series_4 = (int_fast32_t)(shifted_(shifted_((int64_t)cos_pitch_square * cos_pitch_series_3, 3)
+    const int_fast32_t cos_pitch_series_4 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_square * cos_pitch_series_3, 3)
         - INT64_C(6148914691236517216) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_pitch_bend = (int_fast32_t)(shifted_((int64_t)cos_pitch_square * cos_pitch_series_4
+    const int_fast32_t cos_pitch_bend =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_square * cos_pitch_series_4
         + INT32_C(536870912), 30));
     const int64_t cos_pitch_sine = (int64_t)cos_pitch_rest * INT64_C(4294967296)
-        + shifted_((int64_t)cos_pitch_rest * cos_pitch_bend, 2);
-    const int_fast32_t cos_pitch_series_5 = (int_fast32_t)(shifted_(shifted_(-(int64_t)cos_pitch_square * INT32_C(620535663), 4)
+        + dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_rest * cos_pitch_bend, 2);
+    const int_fast32_t cos_pitch_series_5 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_(-(int64_t)cos_pitch_square * INT32_C(620535663), 4)
         + INT64_C(7495819814078775296) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_pitch_series_6 = (int_fast32_t)(shifted_(shifted_((int64_t)cos_pitch_square * cos_pitch_series_5, 5)
+    const int_fast32_t cos_pitch_series_6 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_square * cos_pitch_series_5, 5)
         - INT64_C(6558842337318952960) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_pitch_series_7 = (int_fast32_t)(shifted_(shifted_((int64_t)cos_pitch_square * cos_pitch_series_6, 4)
+    const int_fast32_t cos_pitch_series_7 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_square * cos_pitch_series_6, 4)
         + INT64_C(6148914691236517248) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_pitch_bend_2 = (int_fast32_t)(shifted_((int64_t)cos_pitch_square * cos_pitch_series_7
+    const int_fast32_t cos_pitch_bend_2 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_square * cos_pitch_series_7
         + INT32_C(536870912), 30));
     const int64_t cos_pitch_cosine = -(int64_t)cos_pitch_square * INT32_C(1073741824)
-        + shifted_((int64_t)cos_pitch_square * cos_pitch_bend_2, 5) + INT64_C(4611686018427387904);
+        + dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_square * cos_pitch_bend_2, 5)
+        + INT64_C(4611686018427387904);
     const int64_t cos_pitch_opposite = -cos_pitch_sine;
     const int64_t cos_pitch_opposite_2 = -cos_pitch_cosine;
-    const int64_t cos_pitch_quarter = (cos_pitch_quarter_turns >= 1 ? shifted_(cos_pitch_opposite, 1)
+    const int64_t cos_pitch_quarter = (cos_pitch_quarter_turns >= 1 ? dcm_from_euler_angles_q31_shr_(cos_pitch_opposite, 1)
         : cos_pitch_quarter_turns >= 0 ? cos_pitch_cosine
-        : cos_pitch_quarter_turns >= (-1) ? shifted_(cos_pitch_sine, 1)
+        : cos_pitch_quarter_turns >= (-1) ? dcm_from_euler_angles_q31_shr_(cos_pitch_sine, 1)
         : cos_pitch_opposite_2);
-    const int_fast32_t cos_pitch = (int_fast32_t)(shifted_(cos_pitch_quarter
+    const int_fast32_t cos_pitch = (int_fast32_t)(dcm_from_euler_angles_q31_shr_(cos_pitch_quarter
         + INT64_C(2147483648), 32));
     const int64_t sin_pitch_quarter = (cos_pitch_quarter_turns >= 1 ? cos_pitch_cosine
-        : cos_pitch_quarter_turns >= 0 ? shifted_(cos_pitch_sine, 1)
+        : cos_pitch_quarter_turns >= 0 ? dcm_from_euler_angles_q31_shr_(cos_pitch_sine, 1)
         : cos_pitch_quarter_turns >= (-1) ? cos_pitch_opposite_2
-        : shifted_(cos_pitch_opposite, 1));
-    const int_fast32_t sin_pitch = (int_fast32_t)(shifted_(sin_pitch_quarter
+        : dcm_from_euler_angles_q31_shr_(cos_pitch_opposite, 1));
+    const int_fast32_t sin_pitch = (int_fast32_t)(dcm_from_euler_angles_q31_shr_(sin_pitch_quarter
         + INT64_C(2147483648), 32));
-    const int_fast32_t cos_roll_quarters = (int_fast32_t)(shifted_((int64_t)roll * INT32_C(1367130551)
+    const int_fast32_t cos_roll_quarters =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)roll * INT32_C(1367130551)
         + INT64_C(576460752303423488), 60));
     const int_fast32_t cos_roll_rest = (int_fast32_t)((int64_t)roll * 4
-        + shifted_(-(int64_t)cos_roll_quarters * INT32_C(560513589) + INT64_C(2147483648), 32)
-        - (int64_t)cos_roll_quarters * INT32_C(1686629713) * 2);
-    const int_fast32_t cos_roll_turns = (int_fast32_t)(shifted_((int64_t)cos_roll_quarters + 2, 2));
+        + dcm_from_euler_angles_q31_shr_(-(int64_t)cos_roll_quarters * INT32_C(560513589)
+        + INT64_C(2147483648), 32) - (int64_t)cos_roll_quarters * INT32_C(1686629713) * 2);
+    const int_fast32_t cos_roll_turns =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_quarters + 2, 2));
     const int64_t cos_roll_quarter_turns = (int64_t)cos_roll_quarters - (int64_t)cos_roll_turns * 4;
-    const int_fast32_t cos_roll_square = (int_fast32_t)(shifted_((int64_t)cos_roll_rest * cos_roll_rest
+    const int_fast32_t cos_roll_square =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_rest * cos_roll_rest
         + INT32_C(1073741824), 31));
-    const int_fast32_t cos_roll_series = (int_fast32_t)(shifted_(shifted_(-(int64_t)cos_roll_square * INT32_C(56412333), 1)
+    const int_fast32_t cos_roll_series =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_(-(int64_t)cos_roll_square * INT32_C(56412333), 1)
         + INT64_C(6662950945848033280) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_roll_series_2 = (int_fast32_t)(shifted_(shifted_((int64_t)cos_roll_square * cos_roll_series, 5)
+    const int_fast32_t cos_roll_series_2 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_square * cos_roll_series, 5)
         - INT64_C(7495819814078808064) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_roll_series_3 = (int_fast32_t)(shifted_(shifted_((int64_t)cos_roll_square * cos_roll_series_2, 5)
+    const int_fast32_t cos_roll_series_3 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_square * cos_roll_series_2, 5)
         + INT64_C(4919131752989213696) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_roll_series_4 = (int_fast32_t)(shifted_(shifted_((int64_t)cos_roll_square * cos_roll_series_3, 3)
+    const int_fast32_t cos_roll_series_4 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_square * cos_roll_series_3, 3)
         - INT64_C(6148914691236517216) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_roll_bend = (int_fast32_t)(shifted_((int64_t)cos_roll_square * cos_roll_series_4
+    const int_fast32_t cos_roll_bend =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_square * cos_roll_series_4
         + INT32_C(536870912), 30));
     const int64_t cos_roll_sine = (int64_t)cos_roll_rest * INT64_C(4294967296)
-        + shifted_((int64_t)cos_roll_rest * cos_roll_bend, 2);
-    const int_fast32_t cos_roll_series_5 = (int_fast32_t)(shifted_(shifted_(-(int64_t)cos_roll_square * INT32_C(620535663), 4)
+        + dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_rest * cos_roll_bend, 2);
+    const int_fast32_t cos_roll_series_5 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_(-(int64_t)cos_roll_square * INT32_C(620535663), 4)
         + INT64_C(7495819814078775296) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_roll_series_6 = (int_fast32_t)(shifted_(shifted_((int64_t)cos_roll_square * cos_roll_series_5, 5)
+    const int_fast32_t cos_roll_series_6 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_square * cos_roll_series_5, 5)
         - INT64_C(6558842337318952960) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_roll_series_7 = (int_fast32_t)(shifted_(shifted_((int64_t)cos_roll_square * cos_roll_series_6, 4)
+    const int_fast32_t cos_roll_series_7 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_square * cos_roll_series_6, 4)
         + INT64_C(6148914691236517248) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_roll_bend_2 = (int_fast32_t)(shifted_((int64_t)cos_roll_square * cos_roll_series_7
+    const int_fast32_t cos_roll_bend_2 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_square * cos_roll_series_7
         + INT32_C(536870912), 30));
     const int64_t cos_roll_cosine = -(int64_t)cos_roll_square * INT32_C(1073741824)
-        + shifted_((int64_t)cos_roll_square * cos_roll_bend_2, 5) + INT64_C(4611686018427387904);
+        + dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_square * cos_roll_bend_2, 5)
+        + INT64_C(4611686018427387904);
     const int64_t cos_roll_opposite = -cos_roll_sine;
     const int64_t cos_roll_opposite_2 = -cos_roll_cosine;
-    const int64_t cos_roll_quarter = (cos_roll_quarter_turns >= 1 ? shifted_(cos_roll_opposite, 1)
+    const int64_t cos_roll_quarter = (cos_roll_quarter_turns >= 1 ? dcm_from_euler_angles_q31_shr_(cos_roll_opposite, 1)
         : cos_roll_quarter_turns >= 0 ? cos_roll_cosine
-        : cos_roll_quarter_turns >= (-1) ? shifted_(cos_roll_sine, 1)
+        : cos_roll_quarter_turns >= (-1) ? dcm_from_euler_angles_q31_shr_(cos_roll_sine, 1)
         : cos_roll_opposite_2);
-    const int_fast32_t cos_roll = (int_fast32_t)(shifted_(cos_roll_quarter + INT64_C(2147483648), 32));
+    const int_fast32_t cos_roll = (int_fast32_t)(dcm_from_euler_angles_q31_shr_(cos_roll_quarter
+        + INT64_C(2147483648), 32));
     const int64_t sin_roll_quarter = (cos_roll_quarter_turns >= 1 ? cos_roll_cosine
-        : cos_roll_quarter_turns >= 0 ? shifted_(cos_roll_sine, 1)
+        : cos_roll_quarter_turns >= 0 ? dcm_from_euler_angles_q31_shr_(cos_roll_sine, 1)
         : cos_roll_quarter_turns >= (-1) ? cos_roll_opposite_2
-        : shifted_(cos_roll_opposite, 1));
-    const int_fast32_t sin_roll = (int_fast32_t)(shifted_(sin_roll_quarter + INT64_C(2147483648), 32));
+        : dcm_from_euler_angles_q31_shr_(cos_roll_opposite, 1));
+    const int_fast32_t sin_roll = (int_fast32_t)(dcm_from_euler_angles_q31_shr_(sin_roll_quarter
+        + INT64_C(2147483648), 32));
     /* direction cosine matrix, body to reference */
-    const int_fast32_t C_11 = (int_fast32_t)(shifted_((int64_t)cos_heading * cos_pitch
+    const int_fast32_t C_11 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading * cos_pitch
         + INT32_C(536870912), 30));
-    const int_fast32_t shared_1 = (int_fast32_t)(shifted_((int64_t)cos_heading * sin_roll
+    const int_fast32_t shared_1 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading * sin_roll
         + INT32_C(536870912), 30));
-    const int_fast32_t shared_4 = (int_fast32_t)(shifted_((int64_t)cos_roll * sin_heading
+    const int_fast32_t shared_4 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_roll * sin_heading
         + INT32_C(536870912), 30));
-    const int64_t C_12_unchecked = -(int64_t)shared_4 + shifted_((int64_t)shared_1 * sin_pitch
-        + INT32_C(536870912), 30);
+    const int64_t C_12_unchecked = -(int64_t)shared_4
+        + dcm_from_euler_angles_q31_shr_((int64_t)shared_1 * sin_pitch + INT32_C(536870912), 30);
     if (C_12_unchecked < (-INT32_C(1140850688))
         || C_12_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t C_12 = (int_fast32_t)C_12_unchecked;
-    const int_fast32_t shared_2 = (int_fast32_t)(shifted_((int64_t)sin_heading * sin_roll
+    const int_fast32_t shared_2 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)sin_heading * sin_roll
         + INT32_C(536870912), 30));
-    const int_fast32_t shared_3 = (int_fast32_t)(shifted_((int64_t)cos_heading * cos_roll
+    const int_fast32_t shared_3 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading * cos_roll
         + INT32_C(536870912), 30));
-    const int64_t C_13_unchecked = (int64_t)shared_2 + shifted_((int64_t)shared_3 * sin_pitch
-        + INT32_C(536870912), 30);
+    const int64_t C_13_unchecked = (int64_t)shared_2
+        + dcm_from_euler_angles_q31_shr_((int64_t)shared_3 * sin_pitch + INT32_C(536870912), 30);
     if (C_13_unchecked < (-INT32_C(1140850688))
         || C_13_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t C_13 = (int_fast32_t)C_13_unchecked;
-    const int_fast32_t C_21 = (int_fast32_t)(shifted_((int64_t)cos_pitch * sin_heading
+    const int_fast32_t C_21 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch * sin_heading
         + INT32_C(536870912), 30));
-    const int64_t C_22_unchecked = (int64_t)shared_3 + shifted_((int64_t)shared_2 * sin_pitch
-        + INT32_C(536870912), 30);
+    const int64_t C_22_unchecked = (int64_t)shared_3
+        + dcm_from_euler_angles_q31_shr_((int64_t)shared_2 * sin_pitch + INT32_C(536870912), 30);
     if (C_22_unchecked < (-INT32_C(1140850688))
         || C_22_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t C_22 = (int_fast32_t)C_22_unchecked;
-    const int64_t C_23_unchecked = -(int64_t)shared_1 + shifted_((int64_t)shared_4 * sin_pitch
-        + INT32_C(536870912), 30);
+    const int64_t C_23_unchecked = -(int64_t)shared_1
+        + dcm_from_euler_angles_q31_shr_((int64_t)shared_4 * sin_pitch + INT32_C(536870912), 30);
     if (C_23_unchecked < (-INT32_C(1140850688))
         || C_23_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t C_23 = (int_fast32_t)C_23_unchecked;
     const int_fast32_t C_31 = (int_fast32_t)(-(int64_t)sin_pitch);
-    const int_fast32_t C_32 = (int_fast32_t)(shifted_((int64_t)cos_pitch * sin_roll
+    const int_fast32_t C_32 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch * sin_roll
         + INT32_C(536870912), 30));
-    const int_fast32_t C_33 = (int_fast32_t)(shifted_((int64_t)cos_pitch * cos_roll
+    const int_fast32_t C_33 =
+        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch * cos_roll
         + INT32_C(536870912), 30));
     attitude[0] = (int32_t)C_11;
     attitude[1] = (int32_t)C_12;
@@ -220,7 +270,7 @@ static inline int one_(const int32_t angles[3], int32_t attitude[9])
 
 int dcm_from_euler_angles_q31(const int32_t angles[3], int32_t attitude[9])
 {
-    return one_(angles, attitude);
+    return dcm_from_euler_angles_q31_one_(angles, attitude);
 }
 
 size_t dcm_from_euler_angles_q31_array(size_t count, int *status, const int32_t *angles,
@@ -228,7 +278,7 @@ size_t dcm_from_euler_angles_q31_array(size_t count, int *status, const int32_t 
 {
     *status = 0;
     for (size_t k = 0; k < count; ++k) {
-        *status = one_(angles + 3 * k, attitude + 9 * k);
+        *status = dcm_from_euler_angles_q31_one_(angles + 3 * k, attitude + 9 * k);
         if (*status)
             return k;
     }

@@ -5,7 +5,7 @@
 #include "dcm_orthonormalize_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int outside_(int_fast32_t x, int_fast32_t limit)
+static inline int dcm_orthonormalize_q31_out_(int_fast32_t x, int_fast32_t limit)
 {
     return (uint64_t)x + (uint64_t)limit > 2 * (uint64_t)limit;
 }
@@ -13,13 +13,13 @@ static inline int outside_(int_fast32_t x, int_fast32_t limit)
 /* x / 2^n, rounded down. The right shift of a negative number is left to the compiler by the standard; this is not, and
  * compilers make one arithmetic shift of it.
  */
-static inline int64_t shifted_(int64_t x, int n)
+static inline int64_t dcm_orthonormalize_q31_shr_(int64_t x, int n)
 {
     return x < 0 ? ~(~x >> n) : x >> n;
 }
 
 /* numerator / denominator of their magnitudes, to the nearest; the sign comes last. */
-static int64_t quotient_(int64_t numerator, int64_t denominator)
+static int64_t dcm_orthonormalize_q31_div_(int64_t numerator, int64_t denominator)
 {
     const int64_t top = numerator < 0 ? -numerator : numerator;
     const int64_t below = denominator < 0 ? -denominator : denominator;
@@ -28,7 +28,7 @@ static int64_t quotient_(int64_t numerator, int64_t denominator)
 }
 
 /* Square root bit by bit, to the nearest. */
-static int_fast32_t root_(uint64_t square)
+static int_fast32_t dcm_orthonormalize_q31_sqrt_(uint64_t square)
 {
     uint64_t root = 0, bit = (uint64_t)1 << 62;
     while (bit) {
@@ -44,7 +44,7 @@ static int_fast32_t root_(uint64_t square)
 }
 
 /* The algorithm. Static, so that the loops below can take it in. */
-static inline int one_(const int32_t computed[9], int32_t orthonormalized[9])
+static inline int dcm_orthonormalize_q31_one_(const int32_t computed[9], int32_t orthonormalized[9])
 {
     const int_fast32_t C_11 = computed[0];
     const int_fast32_t C_12 = computed[1];
@@ -55,112 +55,133 @@ static inline int one_(const int32_t computed[9], int32_t orthonormalized[9])
     const int_fast32_t C_31 = computed[6];
     const int_fast32_t C_32 = computed[7];
     const int_fast32_t C_33 = computed[8];
-    if (outside_(C_11, INT32_C(1140850688))
-        || outside_(C_12, INT32_C(1140850688))
-        || outside_(C_13, INT32_C(1140850688))
-        || outside_(C_21, INT32_C(1140850688))
-        || outside_(C_22, INT32_C(1140850688))
-        || outside_(C_23, INT32_C(1140850688))
-        || outside_(C_31, INT32_C(1140850688))
-        || outside_(C_32, INT32_C(1140850688))
-        || outside_(C_33, INT32_C(1140850688)))
+    if (dcm_orthonormalize_q31_out_(C_11, INT32_C(1140850688))
+        || dcm_orthonormalize_q31_out_(C_12, INT32_C(1140850688))
+        || dcm_orthonormalize_q31_out_(C_13, INT32_C(1140850688))
+        || dcm_orthonormalize_q31_out_(C_21, INT32_C(1140850688))
+        || dcm_orthonormalize_q31_out_(C_22, INT32_C(1140850688))
+        || dcm_orthonormalize_q31_out_(C_23, INT32_C(1140850688))
+        || dcm_orthonormalize_q31_out_(C_31, INT32_C(1140850688))
+        || dcm_orthonormalize_q31_out_(C_32, INT32_C(1140850688))
+        || dcm_orthonormalize_q31_out_(C_33, INT32_C(1140850688)))
         return 1;
     /* row 1 and its dual, added */
-    const int_fast32_t row_1_x = (int_fast32_t)(shifted_((int64_t)C_11 * INT32_C(1073741824)
+    const int_fast32_t row_1_x =
+        (int_fast32_t)(dcm_orthonormalize_q31_shr_((int64_t)C_11 * INT32_C(1073741824)
         + (int64_t)C_22 * C_33 - (int64_t)C_23 * C_32 + INT32_C(1073741824), 31));
-    const int_fast32_t row_1_y = (int_fast32_t)(shifted_((int64_t)C_12 * INT32_C(1073741824)
+    const int_fast32_t row_1_y =
+        (int_fast32_t)(dcm_orthonormalize_q31_shr_((int64_t)C_12 * INT32_C(1073741824)
         - (int64_t)C_21 * C_33 + (int64_t)C_23 * C_31 + INT32_C(1073741824), 31));
-    const int_fast32_t row_1_z = (int_fast32_t)(shifted_((int64_t)C_13 * INT32_C(1073741824)
+    const int_fast32_t row_1_z =
+        (int_fast32_t)(dcm_orthonormalize_q31_shr_((int64_t)C_13 * INT32_C(1073741824)
         + (int64_t)C_21 * C_32 - (int64_t)C_22 * C_31 + INT32_C(1073741824), 31));
-    const int64_t inverse_length_1_radicand = shifted_((int64_t)row_1_x * row_1_x, 1)
-        + shifted_((int64_t)row_1_y * row_1_y, 1) + shifted_((int64_t)row_1_z * row_1_z, 1);
+    const int64_t inverse_length_1_radicand =
+        dcm_orthonormalize_q31_shr_((int64_t)row_1_x * row_1_x, 1)
+        + dcm_orthonormalize_q31_shr_((int64_t)row_1_y * row_1_y, 1)
+        + dcm_orthonormalize_q31_shr_((int64_t)row_1_z * row_1_z, 1);
     if (inverse_length_1_radicand < INT64_C(288230378825580548)
         || inverse_length_1_radicand > INT64_C(1152921501932978172))
         return 2;
-    const int_fast32_t inverse_length_1_root = root_((uint64_t)(inverse_length_1_radicand * 2));
+    const int_fast32_t inverse_length_1_root =
+        dcm_orthonormalize_q31_sqrt_((uint64_t)(inverse_length_1_radicand * 2));
     /* 1/|row 1| */
-    const int_fast32_t inverse_length_1 = (int_fast32_t)(quotient_(INT64_C(1152921504606846976), inverse_length_1_root));
+    const int_fast32_t inverse_length_1 =
+        (int_fast32_t)(dcm_orthonormalize_q31_div_(INT64_C(1152921504606846976), inverse_length_1_root));
     /* row 2 and its dual, added */
-    const int_fast32_t row_2_x = (int_fast32_t)(shifted_((int64_t)C_21 * INT32_C(1073741824)
+    const int_fast32_t row_2_x =
+        (int_fast32_t)(dcm_orthonormalize_q31_shr_((int64_t)C_21 * INT32_C(1073741824)
         - (int64_t)C_12 * C_33 + (int64_t)C_13 * C_32 + INT32_C(1073741824), 31));
-    const int_fast32_t row_2_y = (int_fast32_t)(shifted_((int64_t)C_22 * INT32_C(1073741824)
+    const int_fast32_t row_2_y =
+        (int_fast32_t)(dcm_orthonormalize_q31_shr_((int64_t)C_22 * INT32_C(1073741824)
         + (int64_t)C_11 * C_33 - (int64_t)C_13 * C_31 + INT32_C(1073741824), 31));
-    const int_fast32_t row_2_z = (int_fast32_t)(shifted_((int64_t)C_23 * INT32_C(1073741824)
+    const int_fast32_t row_2_z =
+        (int_fast32_t)(dcm_orthonormalize_q31_shr_((int64_t)C_23 * INT32_C(1073741824)
         - (int64_t)C_11 * C_32 + (int64_t)C_12 * C_31 + INT32_C(1073741824), 31));
-    const int64_t inverse_length_2_radicand = shifted_((int64_t)row_2_x * row_2_x, 1)
-        + shifted_((int64_t)row_2_y * row_2_y, 1) + shifted_((int64_t)row_2_z * row_2_z, 1);
+    const int64_t inverse_length_2_radicand =
+        dcm_orthonormalize_q31_shr_((int64_t)row_2_x * row_2_x, 1)
+        + dcm_orthonormalize_q31_shr_((int64_t)row_2_y * row_2_y, 1)
+        + dcm_orthonormalize_q31_shr_((int64_t)row_2_z * row_2_z, 1);
     if (inverse_length_2_radicand < INT64_C(288230378825580548)
         || inverse_length_2_radicand > INT64_C(1152921501932978172))
         return 2;
-    const int_fast32_t inverse_length_2_root = root_((uint64_t)(inverse_length_2_radicand * 2));
+    const int_fast32_t inverse_length_2_root =
+        dcm_orthonormalize_q31_sqrt_((uint64_t)(inverse_length_2_radicand * 2));
     /* 1/|row 2| */
-    const int_fast32_t inverse_length_2 = (int_fast32_t)(quotient_(INT64_C(1152921504606846976), inverse_length_2_root));
+    const int_fast32_t inverse_length_2 =
+        (int_fast32_t)(dcm_orthonormalize_q31_div_(INT64_C(1152921504606846976), inverse_length_2_root));
     /* row 3 and its dual, added */
-    const int_fast32_t row_3_x = (int_fast32_t)(shifted_((int64_t)C_31 * INT32_C(1073741824)
+    const int_fast32_t row_3_x =
+        (int_fast32_t)(dcm_orthonormalize_q31_shr_((int64_t)C_31 * INT32_C(1073741824)
         + (int64_t)C_12 * C_23 - (int64_t)C_13 * C_22 + INT32_C(1073741824), 31));
-    const int_fast32_t row_3_y = (int_fast32_t)(shifted_((int64_t)C_32 * INT32_C(1073741824)
+    const int_fast32_t row_3_y =
+        (int_fast32_t)(dcm_orthonormalize_q31_shr_((int64_t)C_32 * INT32_C(1073741824)
         - (int64_t)C_11 * C_23 + (int64_t)C_13 * C_21 + INT32_C(1073741824), 31));
-    const int_fast32_t row_3_z = (int_fast32_t)(shifted_((int64_t)C_33 * INT32_C(1073741824)
+    const int_fast32_t row_3_z =
+        (int_fast32_t)(dcm_orthonormalize_q31_shr_((int64_t)C_33 * INT32_C(1073741824)
         + (int64_t)C_11 * C_22 - (int64_t)C_12 * C_21 + INT32_C(1073741824), 31));
-    const int64_t inverse_length_3_radicand = shifted_((int64_t)row_3_x * row_3_x, 1)
-        + shifted_((int64_t)row_3_y * row_3_y, 1) + shifted_((int64_t)row_3_z * row_3_z, 1);
+    const int64_t inverse_length_3_radicand =
+        dcm_orthonormalize_q31_shr_((int64_t)row_3_x * row_3_x, 1)
+        + dcm_orthonormalize_q31_shr_((int64_t)row_3_y * row_3_y, 1)
+        + dcm_orthonormalize_q31_shr_((int64_t)row_3_z * row_3_z, 1);
     if (inverse_length_3_radicand < INT64_C(288230378825580548)
         || inverse_length_3_radicand > INT64_C(1152921501932978172))
         return 2;
-    const int_fast32_t inverse_length_3_root = root_((uint64_t)(inverse_length_3_radicand * 2));
+    const int_fast32_t inverse_length_3_root =
+        dcm_orthonormalize_q31_sqrt_((uint64_t)(inverse_length_3_radicand * 2));
     /* 1/|row 3| */
-    const int_fast32_t inverse_length_3 = (int_fast32_t)(quotient_(INT64_C(1152921504606846976), inverse_length_3_root));
+    const int_fast32_t inverse_length_3 =
+        (int_fast32_t)(dcm_orthonormalize_q31_div_(INT64_C(1152921504606846976), inverse_length_3_root));
     /* direction cosine matrix, body to reference, orthonormalized */
-    const int64_t next_11_unchecked = shifted_((int64_t)inverse_length_1 * row_1_x
-        + INT32_C(536870912), 30);
+    const int64_t next_11_unchecked =
+        dcm_orthonormalize_q31_shr_((int64_t)inverse_length_1 * row_1_x + INT32_C(536870912), 30);
     if (next_11_unchecked < (-INT32_C(1140850688))
         || next_11_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_11 = (int_fast32_t)next_11_unchecked;
-    const int64_t next_12_unchecked = shifted_((int64_t)inverse_length_1 * row_1_y
-        + INT32_C(536870912), 30);
+    const int64_t next_12_unchecked =
+        dcm_orthonormalize_q31_shr_((int64_t)inverse_length_1 * row_1_y + INT32_C(536870912), 30);
     if (next_12_unchecked < (-INT32_C(1140850688))
         || next_12_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_12 = (int_fast32_t)next_12_unchecked;
-    const int64_t next_13_unchecked = shifted_((int64_t)inverse_length_1 * row_1_z
-        + INT32_C(536870912), 30);
+    const int64_t next_13_unchecked =
+        dcm_orthonormalize_q31_shr_((int64_t)inverse_length_1 * row_1_z + INT32_C(536870912), 30);
     if (next_13_unchecked < (-INT32_C(1140850688))
         || next_13_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_13 = (int_fast32_t)next_13_unchecked;
-    const int64_t next_21_unchecked = shifted_((int64_t)inverse_length_2 * row_2_x
-        + INT32_C(536870912), 30);
+    const int64_t next_21_unchecked =
+        dcm_orthonormalize_q31_shr_((int64_t)inverse_length_2 * row_2_x + INT32_C(536870912), 30);
     if (next_21_unchecked < (-INT32_C(1140850688))
         || next_21_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_21 = (int_fast32_t)next_21_unchecked;
-    const int64_t next_22_unchecked = shifted_((int64_t)inverse_length_2 * row_2_y
-        + INT32_C(536870912), 30);
+    const int64_t next_22_unchecked =
+        dcm_orthonormalize_q31_shr_((int64_t)inverse_length_2 * row_2_y + INT32_C(536870912), 30);
     if (next_22_unchecked < (-INT32_C(1140850688))
         || next_22_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_22 = (int_fast32_t)next_22_unchecked;
-    const int64_t next_23_unchecked = shifted_((int64_t)inverse_length_2 * row_2_z
-        + INT32_C(536870912), 30);
+    const int64_t next_23_unchecked =
+        dcm_orthonormalize_q31_shr_((int64_t)inverse_length_2 * row_2_z + INT32_C(536870912), 30);
     if (next_23_unchecked < (-INT32_C(1140850688))
         || next_23_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_23 = (int_fast32_t)next_23_unchecked;
-    const int64_t next_31_unchecked = shifted_((int64_t)inverse_length_3 * row_3_x
-        + INT32_C(536870912), 30);
+    const int64_t next_31_unchecked =
+        dcm_orthonormalize_q31_shr_((int64_t)inverse_length_3 * row_3_x + INT32_C(536870912), 30);
     if (next_31_unchecked < (-INT32_C(1140850688))
         || next_31_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_31 = (int_fast32_t)next_31_unchecked;
-    const int64_t next_32_unchecked = shifted_((int64_t)inverse_length_3 * row_3_y
-        + INT32_C(536870912), 30);
+    const int64_t next_32_unchecked =
+        dcm_orthonormalize_q31_shr_((int64_t)inverse_length_3 * row_3_y + INT32_C(536870912), 30);
     if (next_32_unchecked < (-INT32_C(1140850688))
         || next_32_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_32 = (int_fast32_t)next_32_unchecked;
-    const int64_t next_33_unchecked = shifted_((int64_t)inverse_length_3 * row_3_z
-        + INT32_C(536870912), 30);
+    const int64_t next_33_unchecked =
+        dcm_orthonormalize_q31_shr_((int64_t)inverse_length_3 * row_3_z + INT32_C(536870912), 30);
     if (next_33_unchecked < (-INT32_C(1140850688))
         || next_33_unchecked > INT32_C(1140850688))
         return 2;
@@ -179,7 +200,7 @@ static inline int one_(const int32_t computed[9], int32_t orthonormalized[9])
 
 int dcm_orthonormalize_q31(const int32_t computed[9], int32_t orthonormalized[9])
 {
-    return one_(computed, orthonormalized);
+    return dcm_orthonormalize_q31_one_(computed, orthonormalized);
 }
 
 size_t dcm_orthonormalize_q31_array(size_t count, int *status, const int32_t *computed,
@@ -187,7 +208,7 @@ size_t dcm_orthonormalize_q31_array(size_t count, int *status, const int32_t *co
 {
     *status = 0;
     for (size_t k = 0; k < count; ++k) {
-        *status = one_(computed + 9 * k, orthonormalized + 9 * k);
+        *status = dcm_orthonormalize_q31_one_(computed + 9 * k, orthonormalized + 9 * k);
         if (*status)
             return k;
     }

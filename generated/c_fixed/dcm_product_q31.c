@@ -5,7 +5,7 @@
 #include "dcm_product_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int outside_(int_fast32_t x, int_fast32_t limit)
+static inline int dcm_product_q31_out_(int_fast32_t x, int_fast32_t limit)
 {
     return (uint64_t)x + (uint64_t)limit > 2 * (uint64_t)limit;
 }
@@ -13,13 +13,14 @@ static inline int outside_(int_fast32_t x, int_fast32_t limit)
 /* x / 2^n, rounded down. The right shift of a negative number is left to the compiler by the standard; this is not, and
  * compilers make one arithmetic shift of it.
  */
-static inline int64_t shifted_(int64_t x, int n)
+static inline int64_t dcm_product_q31_shr_(int64_t x, int n)
 {
     return x < 0 ? ~(~x >> n) : x >> n;
 }
 
 /* The algorithm. Static, so that the loops below can take it in. */
-static inline int one_(const int32_t state[9], const int32_t transition[9], int32_t next[9])
+static inline int dcm_product_q31_one_(const int32_t state[9], const int32_t transition[9],
+    int32_t next[9])
 {
     const int_fast32_t C_11 = state[0];
     const int_fast32_t C_12 = state[1];
@@ -39,76 +40,85 @@ static inline int one_(const int32_t state[9], const int32_t transition[9], int3
     const int_fast32_t A_31 = transition[6];
     const int_fast32_t A_32 = transition[7];
     const int_fast32_t A_33 = transition[8];
-    if (outside_(C_11, INT32_C(1140850688))
-        || outside_(C_12, INT32_C(1140850688))
-        || outside_(C_13, INT32_C(1140850688))
-        || outside_(C_21, INT32_C(1140850688))
-        || outside_(C_22, INT32_C(1140850688))
-        || outside_(C_23, INT32_C(1140850688))
-        || outside_(C_31, INT32_C(1140850688))
-        || outside_(C_32, INT32_C(1140850688))
-        || outside_(C_33, INT32_C(1140850688))
-        || outside_(A_11, INT32_C(1140850688))
-        || outside_(A_12, INT32_C(1140850688))
-        || outside_(A_13, INT32_C(1140850688))
-        || outside_(A_21, INT32_C(1140850688))
-        || outside_(A_22, INT32_C(1140850688))
-        || outside_(A_23, INT32_C(1140850688))
-        || outside_(A_31, INT32_C(1140850688))
-        || outside_(A_32, INT32_C(1140850688))
-        || outside_(A_33, INT32_C(1140850688)))
+    if (dcm_product_q31_out_(C_11, INT32_C(1140850688))
+        || dcm_product_q31_out_(C_12, INT32_C(1140850688))
+        || dcm_product_q31_out_(C_13, INT32_C(1140850688))
+        || dcm_product_q31_out_(C_21, INT32_C(1140850688))
+        || dcm_product_q31_out_(C_22, INT32_C(1140850688))
+        || dcm_product_q31_out_(C_23, INT32_C(1140850688))
+        || dcm_product_q31_out_(C_31, INT32_C(1140850688))
+        || dcm_product_q31_out_(C_32, INT32_C(1140850688))
+        || dcm_product_q31_out_(C_33, INT32_C(1140850688))
+        || dcm_product_q31_out_(A_11, INT32_C(1140850688))
+        || dcm_product_q31_out_(A_12, INT32_C(1140850688))
+        || dcm_product_q31_out_(A_13, INT32_C(1140850688))
+        || dcm_product_q31_out_(A_21, INT32_C(1140850688))
+        || dcm_product_q31_out_(A_22, INT32_C(1140850688))
+        || dcm_product_q31_out_(A_23, INT32_C(1140850688))
+        || dcm_product_q31_out_(A_31, INT32_C(1140850688))
+        || dcm_product_q31_out_(A_32, INT32_C(1140850688))
+        || dcm_product_q31_out_(A_33, INT32_C(1140850688)))
         return 1;
     /* direction cosine matrix, body to reference, after the step */
-    const int64_t next_11_unchecked = shifted_((int64_t)A_11 * C_11 + (int64_t)A_21 * C_12
-        + (int64_t)A_31 * C_13 + INT32_C(536870912), 30);
+    const int64_t next_11_unchecked =
+        dcm_product_q31_shr_((int64_t)A_11 * C_11 + (int64_t)A_21 * C_12 + (int64_t)A_31 * C_13
+        + INT32_C(536870912), 30);
     if (next_11_unchecked < (-INT32_C(1140850688))
         || next_11_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_11 = (int_fast32_t)next_11_unchecked;
-    const int64_t next_12_unchecked = shifted_((int64_t)A_12 * C_11 + (int64_t)A_22 * C_12
-        + (int64_t)A_32 * C_13 + INT32_C(536870912), 30);
+    const int64_t next_12_unchecked =
+        dcm_product_q31_shr_((int64_t)A_12 * C_11 + (int64_t)A_22 * C_12 + (int64_t)A_32 * C_13
+        + INT32_C(536870912), 30);
     if (next_12_unchecked < (-INT32_C(1140850688))
         || next_12_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_12 = (int_fast32_t)next_12_unchecked;
-    const int64_t next_13_unchecked = shifted_((int64_t)A_13 * C_11 + (int64_t)A_23 * C_12
-        + (int64_t)A_33 * C_13 + INT32_C(536870912), 30);
+    const int64_t next_13_unchecked =
+        dcm_product_q31_shr_((int64_t)A_13 * C_11 + (int64_t)A_23 * C_12 + (int64_t)A_33 * C_13
+        + INT32_C(536870912), 30);
     if (next_13_unchecked < (-INT32_C(1140850688))
         || next_13_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_13 = (int_fast32_t)next_13_unchecked;
-    const int64_t next_21_unchecked = shifted_((int64_t)A_11 * C_21 + (int64_t)A_21 * C_22
-        + (int64_t)A_31 * C_23 + INT32_C(536870912), 30);
+    const int64_t next_21_unchecked =
+        dcm_product_q31_shr_((int64_t)A_11 * C_21 + (int64_t)A_21 * C_22 + (int64_t)A_31 * C_23
+        + INT32_C(536870912), 30);
     if (next_21_unchecked < (-INT32_C(1140850688))
         || next_21_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_21 = (int_fast32_t)next_21_unchecked;
-    const int64_t next_22_unchecked = shifted_((int64_t)A_12 * C_21 + (int64_t)A_22 * C_22
-        + (int64_t)A_32 * C_23 + INT32_C(536870912), 30);
+    const int64_t next_22_unchecked =
+        dcm_product_q31_shr_((int64_t)A_12 * C_21 + (int64_t)A_22 * C_22 + (int64_t)A_32 * C_23
+        + INT32_C(536870912), 30);
     if (next_22_unchecked < (-INT32_C(1140850688))
         || next_22_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_22 = (int_fast32_t)next_22_unchecked;
-    const int64_t next_23_unchecked = shifted_((int64_t)A_13 * C_21 + (int64_t)A_23 * C_22
-        + (int64_t)A_33 * C_23 + INT32_C(536870912), 30);
+    const int64_t next_23_unchecked =
+        dcm_product_q31_shr_((int64_t)A_13 * C_21 + (int64_t)A_23 * C_22 + (int64_t)A_33 * C_23
+        + INT32_C(536870912), 30);
     if (next_23_unchecked < (-INT32_C(1140850688))
         || next_23_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_23 = (int_fast32_t)next_23_unchecked;
-    const int64_t next_31_unchecked = shifted_((int64_t)A_11 * C_31 + (int64_t)A_21 * C_32
-        + (int64_t)A_31 * C_33 + INT32_C(536870912), 30);
+    const int64_t next_31_unchecked =
+        dcm_product_q31_shr_((int64_t)A_11 * C_31 + (int64_t)A_21 * C_32 + (int64_t)A_31 * C_33
+        + INT32_C(536870912), 30);
     if (next_31_unchecked < (-INT32_C(1140850688))
         || next_31_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_31 = (int_fast32_t)next_31_unchecked;
-    const int64_t next_32_unchecked = shifted_((int64_t)A_12 * C_31 + (int64_t)A_22 * C_32
-        + (int64_t)A_32 * C_33 + INT32_C(536870912), 30);
+    const int64_t next_32_unchecked =
+        dcm_product_q31_shr_((int64_t)A_12 * C_31 + (int64_t)A_22 * C_32 + (int64_t)A_32 * C_33
+        + INT32_C(536870912), 30);
     if (next_32_unchecked < (-INT32_C(1140850688))
         || next_32_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_32 = (int_fast32_t)next_32_unchecked;
-    const int64_t next_33_unchecked = shifted_((int64_t)A_13 * C_31 + (int64_t)A_23 * C_32
-        + (int64_t)A_33 * C_33 + INT32_C(536870912), 30);
+    const int64_t next_33_unchecked =
+        dcm_product_q31_shr_((int64_t)A_13 * C_31 + (int64_t)A_23 * C_32 + (int64_t)A_33 * C_33
+        + INT32_C(536870912), 30);
     if (next_33_unchecked < (-INT32_C(1140850688))
         || next_33_unchecked > INT32_C(1140850688))
         return 2;
@@ -127,7 +137,7 @@ static inline int one_(const int32_t state[9], const int32_t transition[9], int3
 
 int dcm_product_q31(const int32_t state[9], const int32_t transition[9], int32_t next[9])
 {
-    return one_(state, transition, next);
+    return dcm_product_q31_one_(state, transition, next);
 }
 
 size_t dcm_product_q31_array(size_t count, int *status, const int32_t *state,
@@ -135,7 +145,7 @@ size_t dcm_product_q31_array(size_t count, int *status, const int32_t *state,
 {
     *status = 0;
     for (size_t k = 0; k < count; ++k) {
-        *status = one_(state + 9 * k, transition + 9 * k, next + 9 * k);
+        *status = dcm_product_q31_one_(state + 9 * k, transition + 9 * k, next + 9 * k);
         if (*status)
             return k;
     }

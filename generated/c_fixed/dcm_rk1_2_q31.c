@@ -5,7 +5,7 @@
 #include "dcm_rk1_2_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int outside_(int_fast32_t x, int_fast32_t limit)
+static inline int dcm_rk1_2_q31_out_(int_fast32_t x, int_fast32_t limit)
 {
     return (uint64_t)x + (uint64_t)limit > 2 * (uint64_t)limit;
 }
@@ -13,13 +13,14 @@ static inline int outside_(int_fast32_t x, int_fast32_t limit)
 /* x / 2^n, rounded down. The right shift of a negative number is left to the compiler by the standard; this is not, and
  * compilers make one arithmetic shift of it.
  */
-static inline int64_t shifted_(int64_t x, int n)
+static inline int64_t dcm_rk1_2_q31_shr_(int64_t x, int n)
 {
     return x < 0 ? ~(~x >> n) : x >> n;
 }
 
 /* The algorithm. Static, so that the loops below can take it in. */
-static inline int one_(const int32_t state[9], const int32_t increments[6], int32_t next[9])
+static inline int dcm_rk1_2_q31_one_(const int32_t state[9], const int32_t increments[6],
+    int32_t next[9])
 {
     const int_fast32_t C_11 = state[0];
     const int_fast32_t C_12 = state[1];
@@ -36,80 +37,83 @@ static inline int one_(const int32_t state[9], const int32_t increments[6], int3
     const int_fast32_t d2_x = increments[3];
     const int_fast32_t d2_y = increments[4];
     const int_fast32_t d2_z = increments[5];
-    if (outside_(C_11, INT32_C(1140850688))
-        || outside_(C_12, INT32_C(1140850688))
-        || outside_(C_13, INT32_C(1140850688))
-        || outside_(C_21, INT32_C(1140850688))
-        || outside_(C_22, INT32_C(1140850688))
-        || outside_(C_23, INT32_C(1140850688))
-        || outside_(C_31, INT32_C(1140850688))
-        || outside_(C_32, INT32_C(1140850688))
-        || outside_(C_33, INT32_C(1140850688))
-        || outside_(d1_x, INT32_C(1073741824))
-        || outside_(d1_y, INT32_C(1073741824))
-        || outside_(d1_z, INT32_C(1073741824))
-        || outside_(d2_x, INT32_C(1073741824))
-        || outside_(d2_y, INT32_C(1073741824))
-        || outside_(d2_z, INT32_C(1073741824)))
+    if (dcm_rk1_2_q31_out_(C_11, INT32_C(1140850688))
+        || dcm_rk1_2_q31_out_(C_12, INT32_C(1140850688))
+        || dcm_rk1_2_q31_out_(C_13, INT32_C(1140850688))
+        || dcm_rk1_2_q31_out_(C_21, INT32_C(1140850688))
+        || dcm_rk1_2_q31_out_(C_22, INT32_C(1140850688))
+        || dcm_rk1_2_q31_out_(C_23, INT32_C(1140850688))
+        || dcm_rk1_2_q31_out_(C_31, INT32_C(1140850688))
+        || dcm_rk1_2_q31_out_(C_32, INT32_C(1140850688))
+        || dcm_rk1_2_q31_out_(C_33, INT32_C(1140850688))
+        || dcm_rk1_2_q31_out_(d1_x, INT32_C(1073741824))
+        || dcm_rk1_2_q31_out_(d1_y, INT32_C(1073741824))
+        || dcm_rk1_2_q31_out_(d1_z, INT32_C(1073741824))
+        || dcm_rk1_2_q31_out_(d2_x, INT32_C(1073741824))
+        || dcm_rk1_2_q31_out_(d2_y, INT32_C(1073741824))
+        || dcm_rk1_2_q31_out_(d2_z, INT32_C(1073741824)))
         return 1;
     /* rate times the step, at node 0 */
-    const int_fast32_t turn_0_x = (int_fast32_t)(shifted_((int64_t)d1_x * 3 - (int64_t)d2_x + 2, 2));
-    const int_fast32_t turn_0_y = (int_fast32_t)(shifted_((int64_t)d1_y * 3 - (int64_t)d2_y + 2, 2));
-    const int_fast32_t turn_0_z = (int_fast32_t)(shifted_((int64_t)d1_z * 3 - (int64_t)d2_z + 2, 2));
+    const int_fast32_t turn_0_x =
+        (int_fast32_t)(dcm_rk1_2_q31_shr_((int64_t)d1_x * 3 - (int64_t)d2_x + 2, 2));
+    const int_fast32_t turn_0_y =
+        (int_fast32_t)(dcm_rk1_2_q31_shr_((int64_t)d1_y * 3 - (int64_t)d2_y + 2, 2));
+    const int_fast32_t turn_0_z =
+        (int_fast32_t)(dcm_rk1_2_q31_shr_((int64_t)d1_z * 3 - (int64_t)d2_z + 2, 2));
     /* the step applied to the identity */
     const int_fast32_t A_12 = (int_fast32_t)(-(int64_t)turn_0_z);
     const int_fast32_t A_23 = (int_fast32_t)(-(int64_t)turn_0_x);
     const int_fast32_t A_31 = (int_fast32_t)(-(int64_t)turn_0_y);
     /* direction cosine matrix, body to reference, after the step */
-    const int64_t next_11_unchecked = (int64_t)C_11 + shifted_((int64_t)A_31 * C_13
+    const int64_t next_11_unchecked = (int64_t)C_11 + dcm_rk1_2_q31_shr_((int64_t)A_31 * C_13
         + (int64_t)C_12 * turn_0_z + INT32_C(1073741824), 31);
     if (next_11_unchecked < (-INT32_C(1140850688))
         || next_11_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_11 = (int_fast32_t)next_11_unchecked;
-    const int64_t next_12_unchecked = (int64_t)C_12 + shifted_((int64_t)A_12 * C_11
+    const int64_t next_12_unchecked = (int64_t)C_12 + dcm_rk1_2_q31_shr_((int64_t)A_12 * C_11
         + (int64_t)C_13 * turn_0_x + INT32_C(1073741824), 31);
     if (next_12_unchecked < (-INT32_C(1140850688))
         || next_12_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_12 = (int_fast32_t)next_12_unchecked;
-    const int64_t next_13_unchecked = (int64_t)C_13 + shifted_((int64_t)A_23 * C_12
+    const int64_t next_13_unchecked = (int64_t)C_13 + dcm_rk1_2_q31_shr_((int64_t)A_23 * C_12
         + (int64_t)C_11 * turn_0_y + INT32_C(1073741824), 31);
     if (next_13_unchecked < (-INT32_C(1140850688))
         || next_13_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_13 = (int_fast32_t)next_13_unchecked;
-    const int64_t next_21_unchecked = (int64_t)C_21 + shifted_((int64_t)A_31 * C_23
+    const int64_t next_21_unchecked = (int64_t)C_21 + dcm_rk1_2_q31_shr_((int64_t)A_31 * C_23
         + (int64_t)C_22 * turn_0_z + INT32_C(1073741824), 31);
     if (next_21_unchecked < (-INT32_C(1140850688))
         || next_21_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_21 = (int_fast32_t)next_21_unchecked;
-    const int64_t next_22_unchecked = (int64_t)C_22 + shifted_((int64_t)A_12 * C_21
+    const int64_t next_22_unchecked = (int64_t)C_22 + dcm_rk1_2_q31_shr_((int64_t)A_12 * C_21
         + (int64_t)C_23 * turn_0_x + INT32_C(1073741824), 31);
     if (next_22_unchecked < (-INT32_C(1140850688))
         || next_22_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_22 = (int_fast32_t)next_22_unchecked;
-    const int64_t next_23_unchecked = (int64_t)C_23 + shifted_((int64_t)A_23 * C_22
+    const int64_t next_23_unchecked = (int64_t)C_23 + dcm_rk1_2_q31_shr_((int64_t)A_23 * C_22
         + (int64_t)C_21 * turn_0_y + INT32_C(1073741824), 31);
     if (next_23_unchecked < (-INT32_C(1140850688))
         || next_23_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_23 = (int_fast32_t)next_23_unchecked;
-    const int64_t next_31_unchecked = (int64_t)C_31 + shifted_((int64_t)A_31 * C_33
+    const int64_t next_31_unchecked = (int64_t)C_31 + dcm_rk1_2_q31_shr_((int64_t)A_31 * C_33
         + (int64_t)C_32 * turn_0_z + INT32_C(1073741824), 31);
     if (next_31_unchecked < (-INT32_C(1140850688))
         || next_31_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_31 = (int_fast32_t)next_31_unchecked;
-    const int64_t next_32_unchecked = (int64_t)C_32 + shifted_((int64_t)A_12 * C_31
+    const int64_t next_32_unchecked = (int64_t)C_32 + dcm_rk1_2_q31_shr_((int64_t)A_12 * C_31
         + (int64_t)C_33 * turn_0_x + INT32_C(1073741824), 31);
     if (next_32_unchecked < (-INT32_C(1140850688))
         || next_32_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_32 = (int_fast32_t)next_32_unchecked;
-    const int64_t next_33_unchecked = (int64_t)C_33 + shifted_((int64_t)A_23 * C_32
+    const int64_t next_33_unchecked = (int64_t)C_33 + dcm_rk1_2_q31_shr_((int64_t)A_23 * C_32
         + (int64_t)C_31 * turn_0_y + INT32_C(1073741824), 31);
     if (next_33_unchecked < (-INT32_C(1140850688))
         || next_33_unchecked > INT32_C(1140850688))
@@ -129,7 +133,7 @@ static inline int one_(const int32_t state[9], const int32_t increments[6], int3
 
 int dcm_rk1_2_q31(const int32_t state[9], const int32_t increments[6], int32_t next[9])
 {
-    return one_(state, increments, next);
+    return dcm_rk1_2_q31_one_(state, increments, next);
 }
 
 size_t dcm_rk1_2_q31_array(size_t count, int *status, const int32_t *state,
@@ -137,7 +141,7 @@ size_t dcm_rk1_2_q31_array(size_t count, int *status, const int32_t *state,
 {
     *status = 0;
     for (size_t k = 0; k < count; ++k) {
-        *status = one_(state + 9 * k, increments + 6 * k, next + 9 * k);
+        *status = dcm_rk1_2_q31_one_(state + 9 * k, increments + 6 * k, next + 9 * k);
         if (*status)
             return k;
     }
@@ -156,7 +160,7 @@ int dcm_rk1_2_q31_propagate(size_t runs, size_t steps, size_t record_every, size
         for (size_t j = 0; j < 9; ++j)
             state[j] = *history++ = *initial++;
         for (size_t step = 0; step < steps; ++step, increments += 6) {
-            int status = one_(state, increments, state);
+            int status = dcm_rk1_2_q31_one_(state, increments, state);
             if (!status && orthonormalize_every && !--until_orthonormalize) {
                 if (orthonormalize(state, state))
                     status = 3;

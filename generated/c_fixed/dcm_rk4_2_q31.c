@@ -5,7 +5,7 @@
 #include "dcm_rk4_2_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int outside_(int_fast32_t x, int_fast32_t limit)
+static inline int dcm_rk4_2_q31_out_(int_fast32_t x, int_fast32_t limit)
 {
     return (uint64_t)x + (uint64_t)limit > 2 * (uint64_t)limit;
 }
@@ -13,13 +13,14 @@ static inline int outside_(int_fast32_t x, int_fast32_t limit)
 /* x / 2^n, rounded down. The right shift of a negative number is left to the compiler by the standard; this is not, and
  * compilers make one arithmetic shift of it.
  */
-static inline int64_t shifted_(int64_t x, int n)
+static inline int64_t dcm_rk4_2_q31_shr_(int64_t x, int n)
 {
     return x < 0 ? ~(~x >> n) : x >> n;
 }
 
 /* The algorithm. Static, so that the loops below can take it in. */
-static inline int one_(const int32_t state[9], const int32_t increments[6], int32_t next[9])
+static inline int dcm_rk4_2_q31_one_(const int32_t state[9], const int32_t increments[6],
+    int32_t next[9])
 {
     const int_fast32_t C_11 = state[0];
     const int_fast32_t C_12 = state[1];
@@ -36,121 +37,136 @@ static inline int one_(const int32_t state[9], const int32_t increments[6], int3
     const int_fast32_t d2_x = increments[3];
     const int_fast32_t d2_y = increments[4];
     const int_fast32_t d2_z = increments[5];
-    if (outside_(C_11, INT32_C(1140850688))
-        || outside_(C_12, INT32_C(1140850688))
-        || outside_(C_13, INT32_C(1140850688))
-        || outside_(C_21, INT32_C(1140850688))
-        || outside_(C_22, INT32_C(1140850688))
-        || outside_(C_23, INT32_C(1140850688))
-        || outside_(C_31, INT32_C(1140850688))
-        || outside_(C_32, INT32_C(1140850688))
-        || outside_(C_33, INT32_C(1140850688))
-        || outside_(d1_x, INT32_C(536870912))
-        || outside_(d1_y, INT32_C(536870912))
-        || outside_(d1_z, INT32_C(536870912))
-        || outside_(d2_x, INT32_C(536870912))
-        || outside_(d2_y, INT32_C(536870912))
-        || outside_(d2_z, INT32_C(536870912)))
+    if (dcm_rk4_2_q31_out_(C_11, INT32_C(1140850688))
+        || dcm_rk4_2_q31_out_(C_12, INT32_C(1140850688))
+        || dcm_rk4_2_q31_out_(C_13, INT32_C(1140850688))
+        || dcm_rk4_2_q31_out_(C_21, INT32_C(1140850688))
+        || dcm_rk4_2_q31_out_(C_22, INT32_C(1140850688))
+        || dcm_rk4_2_q31_out_(C_23, INT32_C(1140850688))
+        || dcm_rk4_2_q31_out_(C_31, INT32_C(1140850688))
+        || dcm_rk4_2_q31_out_(C_32, INT32_C(1140850688))
+        || dcm_rk4_2_q31_out_(C_33, INT32_C(1140850688))
+        || dcm_rk4_2_q31_out_(d1_x, INT32_C(536870912))
+        || dcm_rk4_2_q31_out_(d1_y, INT32_C(536870912))
+        || dcm_rk4_2_q31_out_(d1_z, INT32_C(536870912))
+        || dcm_rk4_2_q31_out_(d2_x, INT32_C(536870912))
+        || dcm_rk4_2_q31_out_(d2_y, INT32_C(536870912))
+        || dcm_rk4_2_q31_out_(d2_z, INT32_C(536870912)))
         return 1;
     /* the angle increment of the whole step */
     const int_fast32_t sigma_x = (int_fast32_t)((int64_t)d1_x + (int64_t)d2_x);
     const int_fast32_t sigma_y = (int_fast32_t)((int64_t)d1_y + (int64_t)d2_y);
     const int_fast32_t sigma_z = (int_fast32_t)((int64_t)d1_z + (int64_t)d2_z);
-    const int_fast32_t sigma_cross_d1_x = (int_fast32_t)(shifted_((int64_t)d1_z * sigma_y
+    const int_fast32_t sigma_cross_d1_x = (int_fast32_t)(dcm_rk4_2_q31_shr_((int64_t)d1_z * sigma_y
         - (int64_t)d1_y * sigma_z + INT32_C(268435456), 29));
-    const int_fast32_t sigma_cross_d1_y = (int_fast32_t)(shifted_((int64_t)d1_x * sigma_z
+    const int_fast32_t sigma_cross_d1_y = (int_fast32_t)(dcm_rk4_2_q31_shr_((int64_t)d1_x * sigma_z
         - (int64_t)d1_z * sigma_x + INT32_C(268435456), 29));
-    const int_fast32_t sigma_cross_d1_z = (int_fast32_t)(shifted_((int64_t)d1_y * sigma_x
+    const int_fast32_t sigma_cross_d1_z = (int_fast32_t)(dcm_rk4_2_q31_shr_((int64_t)d1_y * sigma_x
         - (int64_t)d1_x * sigma_y + INT32_C(268435456), 29));
-    const int_fast32_t sigma_dot_sigma = (int_fast32_t)(shifted_((int64_t)sigma_x * sigma_x
-        + (int64_t)sigma_y * sigma_y + (int64_t)sigma_z * sigma_z + INT32_C(1073741824), 31));
+    const int_fast32_t sigma_dot_sigma =
+        (int_fast32_t)(dcm_rk4_2_q31_shr_((int64_t)sigma_x * sigma_x + (int64_t)sigma_y * sigma_y
+        + (int64_t)sigma_z * sigma_z + INT32_C(1073741824), 31));
     /* weight of sigma in skew */
-    const int_fast32_t skew_sigma = (int_fast32_t)(shifted_(-(int64_t)sigma_dot_sigma * INT32_C(1431655765)
+    const int_fast32_t skew_sigma =
+        (int_fast32_t)(dcm_rk4_2_q31_shr_(-(int64_t)sigma_dot_sigma * INT32_C(1431655765)
         + INT32_C(1073741824), 31));
     /* weight of sigma_cross_d1 in skew */
-    const int_fast32_t skew_sigma_cross_d1 = (int_fast32_t)(shifted_(-(int64_t)skew_sigma * INT32_C(33554432)
+    const int_fast32_t skew_sigma_cross_d1 =
+        (int_fast32_t)(dcm_rk4_2_q31_shr_(-(int64_t)skew_sigma * INT32_C(33554432)
         - INT64_C(768614336404564651) + INT32_C(268435456), 29));
     /* vector of the skew part */
     const int64_t skew_x = (int64_t)sigma_x * INT64_C(4294967296)
-        + shifted_((int64_t)sigma_x * skew_sigma, 3)
-        + shifted_((int64_t)sigma_cross_d1_x * skew_sigma_cross_d1, 2);
+        + dcm_rk4_2_q31_shr_((int64_t)sigma_x * skew_sigma, 3)
+        + dcm_rk4_2_q31_shr_((int64_t)sigma_cross_d1_x * skew_sigma_cross_d1, 2);
     const int64_t skew_y = (int64_t)sigma_y * INT64_C(4294967296)
-        + shifted_((int64_t)sigma_y * skew_sigma, 3)
-        + shifted_((int64_t)sigma_cross_d1_y * skew_sigma_cross_d1, 2);
+        + dcm_rk4_2_q31_shr_((int64_t)sigma_y * skew_sigma, 3)
+        + dcm_rk4_2_q31_shr_((int64_t)sigma_cross_d1_y * skew_sigma_cross_d1, 2);
     const int64_t skew_z = (int64_t)sigma_z * INT64_C(4294967296)
-        + shifted_((int64_t)sigma_z * skew_sigma, 3)
-        + shifted_((int64_t)sigma_cross_d1_z * skew_sigma_cross_d1, 2);
-    const int_fast32_t d1_dot_d1 = (int_fast32_t)(shifted_((int64_t)d1_x * d1_x + (int64_t)d1_y * d1_y
-        + (int64_t)d1_z * d1_z + INT32_C(268435456), 29));
+        + dcm_rk4_2_q31_shr_((int64_t)sigma_z * skew_sigma, 3)
+        + dcm_rk4_2_q31_shr_((int64_t)sigma_cross_d1_z * skew_sigma_cross_d1, 2);
+    const int_fast32_t d1_dot_d1 = (int_fast32_t)(dcm_rk4_2_q31_shr_((int64_t)d1_x * d1_x
+        + (int64_t)d1_y * d1_y + (int64_t)d1_z * d1_z + INT32_C(268435456), 29));
     /* weight of sigma in partner */
-    const int_fast32_t partner_sigma = (int_fast32_t)(shifted_((int64_t)sigma_dot_sigma * INT32_C(1073741824)
+    const int_fast32_t partner_sigma =
+        (int_fast32_t)(dcm_rk4_2_q31_shr_((int64_t)sigma_dot_sigma * INT32_C(1073741824)
         - (int64_t)d1_dot_d1 * INT32_C(1431655765) + INT32_C(1073741824), 31));
-    const int_fast32_t d1_dot_sigma = (int_fast32_t)(shifted_((int64_t)d1_x * sigma_x
+    const int_fast32_t d1_dot_sigma = (int_fast32_t)(dcm_rk4_2_q31_shr_((int64_t)d1_x * sigma_x
         + (int64_t)d1_y * sigma_y + (int64_t)d1_z * sigma_z + INT32_C(536870912), 30));
-    const int_fast32_t shared_1 = (int_fast32_t)(shifted_((int64_t)d1_dot_sigma * INT32_C(1431655765)
+    const int_fast32_t shared_1 =
+        (int_fast32_t)(dcm_rk4_2_q31_shr_((int64_t)d1_dot_sigma * INT32_C(1431655765)
         + INT32_C(1073741824), 31));
     /* weight of d1 in partner */
     const int_fast32_t partner_d1 = (int_fast32_t)((int64_t)shared_1 * 2
-        + shifted_(-(int64_t)sigma_dot_sigma * INT32_C(1431655765) + INT32_C(536870912), 30));
+        + dcm_rk4_2_q31_shr_(-(int64_t)sigma_dot_sigma * INT32_C(1431655765)
+        + INT32_C(536870912), 30));
     /* of sigma in outer products */
     const int_fast32_t partner_x = (int_fast32_t)((int64_t)sigma_x
-        + shifted_((int64_t)partner_sigma * sigma_x + (int64_t)d1_x * partner_d1 * 2
+        + dcm_rk4_2_q31_shr_((int64_t)partner_sigma * sigma_x + (int64_t)d1_x * partner_d1 * 2
         - (int64_t)sigma_cross_d1_x * INT32_C(1431655765) * 2 + INT64_C(8589934592), 34));
     const int_fast32_t partner_y = (int_fast32_t)((int64_t)sigma_y
-        + shifted_((int64_t)partner_sigma * sigma_y + (int64_t)d1_y * partner_d1 * 2
+        + dcm_rk4_2_q31_shr_((int64_t)partner_sigma * sigma_y + (int64_t)d1_y * partner_d1 * 2
         - (int64_t)sigma_cross_d1_y * INT32_C(1431655765) * 2 + INT64_C(8589934592), 34));
     const int_fast32_t partner_z = (int_fast32_t)((int64_t)sigma_z
-        + shifted_((int64_t)partner_sigma * sigma_z + (int64_t)d1_z * partner_d1 * 2
+        + dcm_rk4_2_q31_shr_((int64_t)partner_sigma * sigma_z + (int64_t)d1_z * partner_d1 * 2
         - (int64_t)sigma_cross_d1_z * INT32_C(1431655765) * 2 + INT64_C(8589934592), 34));
     const int_fast32_t diagonal_factor = (int_fast32_t)((int64_t)shared_1 * 2
-        + shifted_(-(int64_t)sigma_dot_sigma + 1, 1));
+        + dcm_rk4_2_q31_shr_(-(int64_t)sigma_dot_sigma + 1, 1));
     /* multiple of the unit matrix */
     const int64_t diagonal = -(int64_t)sigma_dot_sigma * INT64_C(4294967296)
-        + shifted_((int64_t)diagonal_factor * sigma_dot_sigma, 2)
-        + shifted_(-(int64_t)d1_dot_sigma * shared_1, 2);
+        + dcm_rk4_2_q31_shr_((int64_t)diagonal_factor * sigma_dot_sigma, 2)
+        + dcm_rk4_2_q31_shr_(-(int64_t)d1_dot_sigma * shared_1, 2);
     /* half of u y' + y u' on the diagonal */
     const int64_t half_xx = (int64_t)partner_x * sigma_x;
-    const int_fast32_t A_11 = (int_fast32_t)(shifted_(half_xx + shifted_(diagonal, 1)
-        + INT64_C(4294967296), 33));
+    const int_fast32_t A_11 = (int_fast32_t)(dcm_rk4_2_q31_shr_(half_xx
+        + dcm_rk4_2_q31_shr_(diagonal, 1) + INT64_C(4294967296), 33));
     const int64_t half_yy = (int64_t)partner_y * sigma_y;
-    const int_fast32_t A_22 = (int_fast32_t)(shifted_(half_yy + shifted_(diagonal, 1)
-        + INT64_C(4294967296), 33));
+    const int_fast32_t A_22 = (int_fast32_t)(dcm_rk4_2_q31_shr_(half_yy
+        + dcm_rk4_2_q31_shr_(diagonal, 1) + INT64_C(4294967296), 33));
     const int64_t half_zz = (int64_t)partner_z * sigma_z;
-    const int_fast32_t A_33 = (int_fast32_t)(shifted_(half_zz + shifted_(diagonal, 1)
-        + INT64_C(4294967296), 33));
+    const int_fast32_t A_33 = (int_fast32_t)(dcm_rk4_2_q31_shr_(half_zz
+        + dcm_rk4_2_q31_shr_(diagonal, 1) + INT64_C(4294967296), 33));
     const int64_t symmetric_xy = (int64_t)partner_y * sigma_x + (int64_t)partner_x * sigma_y;
-    const int_fast32_t A_12 = (int_fast32_t)(shifted_(shifted_(symmetric_xy, 2) - skew_z
-        + INT64_C(2147483648), 32));
-    const int_fast32_t A_21 = (int_fast32_t)(shifted_(shifted_(symmetric_xy, 2) + skew_z
-        + INT64_C(2147483648), 32));
+    const int_fast32_t A_12 = (int_fast32_t)(dcm_rk4_2_q31_shr_(dcm_rk4_2_q31_shr_(symmetric_xy, 2)
+        - skew_z + INT64_C(2147483648), 32));
+    const int_fast32_t A_21 = (int_fast32_t)(dcm_rk4_2_q31_shr_(dcm_rk4_2_q31_shr_(symmetric_xy, 2)
+        + skew_z + INT64_C(2147483648), 32));
     const int64_t symmetric_yz = (int64_t)partner_z * sigma_y + (int64_t)partner_y * sigma_z;
-    const int_fast32_t A_23 = (int_fast32_t)(shifted_(shifted_(symmetric_yz, 2) - skew_x
-        + INT64_C(2147483648), 32));
-    const int_fast32_t A_32 = (int_fast32_t)(shifted_(shifted_(symmetric_yz, 2) + skew_x
-        + INT64_C(2147483648), 32));
+    const int_fast32_t A_23 = (int_fast32_t)(dcm_rk4_2_q31_shr_(dcm_rk4_2_q31_shr_(symmetric_yz, 2)
+        - skew_x + INT64_C(2147483648), 32));
+    const int_fast32_t A_32 = (int_fast32_t)(dcm_rk4_2_q31_shr_(dcm_rk4_2_q31_shr_(symmetric_yz, 2)
+        + skew_x + INT64_C(2147483648), 32));
     const int64_t symmetric_zx = (int64_t)partner_x * sigma_z + (int64_t)partner_z * sigma_x;
-    const int_fast32_t A_31 = (int_fast32_t)(shifted_(shifted_(symmetric_zx, 2) - skew_y
-        + INT64_C(2147483648), 32));
-    const int_fast32_t A_13 = (int_fast32_t)(shifted_(shifted_(symmetric_zx, 2) + skew_y
-        + INT64_C(2147483648), 32));
+    const int_fast32_t A_31 = (int_fast32_t)(dcm_rk4_2_q31_shr_(dcm_rk4_2_q31_shr_(symmetric_zx, 2)
+        - skew_y + INT64_C(2147483648), 32));
+    const int_fast32_t A_13 = (int_fast32_t)(dcm_rk4_2_q31_shr_(dcm_rk4_2_q31_shr_(symmetric_zx, 2)
+        + skew_y + INT64_C(2147483648), 32));
     /* direction cosine matrix, body to reference, after the step */
-    const int_fast32_t next_11 = (int_fast32_t)((int64_t)C_11 + shifted_((int64_t)A_11 * C_11
+    const int_fast32_t next_11 =
+        (int_fast32_t)((int64_t)C_11 + dcm_rk4_2_q31_shr_((int64_t)A_11 * C_11
         + (int64_t)A_21 * C_12 + (int64_t)A_31 * C_13 + INT64_C(2147483648), 32));
-    const int_fast32_t next_12 = (int_fast32_t)((int64_t)C_12 + shifted_((int64_t)A_12 * C_11
+    const int_fast32_t next_12 =
+        (int_fast32_t)((int64_t)C_12 + dcm_rk4_2_q31_shr_((int64_t)A_12 * C_11
         + (int64_t)A_22 * C_12 + (int64_t)A_32 * C_13 + INT64_C(2147483648), 32));
-    const int_fast32_t next_13 = (int_fast32_t)((int64_t)C_13 + shifted_((int64_t)A_13 * C_11
+    const int_fast32_t next_13 =
+        (int_fast32_t)((int64_t)C_13 + dcm_rk4_2_q31_shr_((int64_t)A_13 * C_11
         + (int64_t)A_23 * C_12 + (int64_t)A_33 * C_13 + INT64_C(2147483648), 32));
-    const int_fast32_t next_21 = (int_fast32_t)((int64_t)C_21 + shifted_((int64_t)A_11 * C_21
+    const int_fast32_t next_21 =
+        (int_fast32_t)((int64_t)C_21 + dcm_rk4_2_q31_shr_((int64_t)A_11 * C_21
         + (int64_t)A_21 * C_22 + (int64_t)A_31 * C_23 + INT64_C(2147483648), 32));
-    const int_fast32_t next_22 = (int_fast32_t)((int64_t)C_22 + shifted_((int64_t)A_12 * C_21
+    const int_fast32_t next_22 =
+        (int_fast32_t)((int64_t)C_22 + dcm_rk4_2_q31_shr_((int64_t)A_12 * C_21
         + (int64_t)A_22 * C_22 + (int64_t)A_32 * C_23 + INT64_C(2147483648), 32));
-    const int_fast32_t next_23 = (int_fast32_t)((int64_t)C_23 + shifted_((int64_t)A_13 * C_21
+    const int_fast32_t next_23 =
+        (int_fast32_t)((int64_t)C_23 + dcm_rk4_2_q31_shr_((int64_t)A_13 * C_21
         + (int64_t)A_23 * C_22 + (int64_t)A_33 * C_23 + INT64_C(2147483648), 32));
-    const int_fast32_t next_31 = (int_fast32_t)((int64_t)C_31 + shifted_((int64_t)A_11 * C_31
+    const int_fast32_t next_31 =
+        (int_fast32_t)((int64_t)C_31 + dcm_rk4_2_q31_shr_((int64_t)A_11 * C_31
         + (int64_t)A_21 * C_32 + (int64_t)A_31 * C_33 + INT64_C(2147483648), 32));
-    const int_fast32_t next_32 = (int_fast32_t)((int64_t)C_32 + shifted_((int64_t)A_12 * C_31
+    const int_fast32_t next_32 =
+        (int_fast32_t)((int64_t)C_32 + dcm_rk4_2_q31_shr_((int64_t)A_12 * C_31
         + (int64_t)A_22 * C_32 + (int64_t)A_32 * C_33 + INT64_C(2147483648), 32));
-    const int_fast32_t next_33 = (int_fast32_t)((int64_t)C_33 + shifted_((int64_t)A_13 * C_31
+    const int_fast32_t next_33 =
+        (int_fast32_t)((int64_t)C_33 + dcm_rk4_2_q31_shr_((int64_t)A_13 * C_31
         + (int64_t)A_23 * C_32 + (int64_t)A_33 * C_33 + INT64_C(2147483648), 32));
     next[0] = (int32_t)next_11;
     next[1] = (int32_t)next_12;
@@ -166,7 +182,7 @@ static inline int one_(const int32_t state[9], const int32_t increments[6], int3
 
 int dcm_rk4_2_q31(const int32_t state[9], const int32_t increments[6], int32_t next[9])
 {
-    return one_(state, increments, next);
+    return dcm_rk4_2_q31_one_(state, increments, next);
 }
 
 size_t dcm_rk4_2_q31_array(size_t count, int *status, const int32_t *state,
@@ -174,7 +190,7 @@ size_t dcm_rk4_2_q31_array(size_t count, int *status, const int32_t *state,
 {
     *status = 0;
     for (size_t k = 0; k < count; ++k) {
-        *status = one_(state + 9 * k, increments + 6 * k, next + 9 * k);
+        *status = dcm_rk4_2_q31_one_(state + 9 * k, increments + 6 * k, next + 9 * k);
         if (*status)
             return k;
     }
@@ -193,7 +209,7 @@ int dcm_rk4_2_q31_propagate(size_t runs, size_t steps, size_t record_every, size
         for (size_t j = 0; j < 9; ++j)
             state[j] = *history++ = *initial++;
         for (size_t step = 0; step < steps; ++step, increments += 6) {
-            int status = one_(state, increments, state);
+            int status = dcm_rk4_2_q31_one_(state, increments, state);
             if (!status && orthonormalize_every && !--until_orthonormalize) {
                 if (orthonormalize(state, state))
                     status = 3;

@@ -5,7 +5,7 @@
 #include "dcm_update_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int outside_(int_fast32_t x, int_fast32_t limit)
+static inline int dcm_update_q31_out_(int_fast32_t x, int_fast32_t limit)
 {
     return (uint64_t)x + (uint64_t)limit > 2 * (uint64_t)limit;
 }
@@ -13,13 +13,14 @@ static inline int outside_(int_fast32_t x, int_fast32_t limit)
 /* x / 2^n, rounded down. The right shift of a negative number is left to the compiler by the standard; this is not, and
  * compilers make one arithmetic shift of it.
  */
-static inline int64_t shifted_(int64_t x, int n)
+static inline int64_t dcm_update_q31_shr_(int64_t x, int n)
 {
     return x < 0 ? ~(~x >> n) : x >> n;
 }
 
 /* The algorithm. Static, so that the loops below can take it in. */
-static inline int one_(const int32_t state[9], const int32_t rotation_vector[3], int32_t next[9])
+static inline int dcm_update_q31_one_(const int32_t state[9], const int32_t rotation_vector[3],
+    int32_t next[9])
 {
     const int_fast32_t C_11 = state[0];
     const int_fast32_t C_12 = state[1];
@@ -33,146 +34,166 @@ static inline int one_(const int32_t state[9], const int32_t rotation_vector[3],
     const int_fast32_t phi_x = rotation_vector[0];
     const int_fast32_t phi_y = rotation_vector[1];
     const int_fast32_t phi_z = rotation_vector[2];
-    if (outside_(C_11, INT32_C(1140850688))
-        || outside_(C_12, INT32_C(1140850688))
-        || outside_(C_13, INT32_C(1140850688))
-        || outside_(C_21, INT32_C(1140850688))
-        || outside_(C_22, INT32_C(1140850688))
-        || outside_(C_23, INT32_C(1140850688))
-        || outside_(C_31, INT32_C(1140850688))
-        || outside_(C_32, INT32_C(1140850688))
-        || outside_(C_33, INT32_C(1140850688))
-        || outside_(phi_x, INT32_C(1073741824))
-        || outside_(phi_y, INT32_C(1073741824))
-        || outside_(phi_z, INT32_C(1073741824)))
+    if (dcm_update_q31_out_(C_11, INT32_C(1140850688))
+        || dcm_update_q31_out_(C_12, INT32_C(1140850688))
+        || dcm_update_q31_out_(C_13, INT32_C(1140850688))
+        || dcm_update_q31_out_(C_21, INT32_C(1140850688))
+        || dcm_update_q31_out_(C_22, INT32_C(1140850688))
+        || dcm_update_q31_out_(C_23, INT32_C(1140850688))
+        || dcm_update_q31_out_(C_31, INT32_C(1140850688))
+        || dcm_update_q31_out_(C_32, INT32_C(1140850688))
+        || dcm_update_q31_out_(C_33, INT32_C(1140850688))
+        || dcm_update_q31_out_(phi_x, INT32_C(1073741824))
+        || dcm_update_q31_out_(phi_y, INT32_C(1073741824))
+        || dcm_update_q31_out_(phi_z, INT32_C(1073741824)))
         return 1;
-    const int_fast32_t shared_1 = (int_fast32_t)(shifted_((int64_t)phi_x * phi_x
+    const int_fast32_t shared_1 = (int_fast32_t)(dcm_update_q31_shr_((int64_t)phi_x * phi_x
         + INT32_C(536870912), 30));
-    const int_fast32_t shared_2 = (int_fast32_t)(shifted_((int64_t)phi_y * phi_y
+    const int_fast32_t shared_2 = (int_fast32_t)(dcm_update_q31_shr_((int64_t)phi_y * phi_y
         + INT32_C(536870912), 30));
-    const int_fast32_t shared_3 = (int_fast32_t)(shifted_((int64_t)phi_z * phi_z
+    const int_fast32_t shared_3 = (int_fast32_t)(dcm_update_q31_shr_((int64_t)phi_z * phi_z
         + INT32_C(536870912), 30));
     /* square of the angle */
-    const int_fast32_t angle_squared = (int_fast32_t)(shifted_((int64_t)shared_1 + (int64_t)shared_2
-        + (int64_t)shared_3 + 1, 1));
+    const int_fast32_t angle_squared = (int_fast32_t)(dcm_update_q31_shr_((int64_t)shared_1
+        + (int64_t)shared_2 + (int64_t)shared_3 + 1, 1));
     const int_fast32_t factor_1_under_root = (int_fast32_t)((int64_t)angle_squared);
     const int_fast32_t factor_1_taken = (int_fast32_t)(((int64_t)factor_1_under_root >= INT32_C(1610612736) ? INT32_C(1610612736)
         : 0 >= (int64_t)factor_1_under_root ? 0
         : (int64_t)factor_1_under_root));
-    const int_fast32_t factor_1_series = (int_fast32_t)(shifted_(shifted_(-(int64_t)factor_1_taken * INT32_C(56412333), 1)
+    const int_fast32_t factor_1_series =
+        (int_fast32_t)(dcm_update_q31_shr_(dcm_update_q31_shr_(-(int64_t)factor_1_taken * INT32_C(56412333), 1)
         + INT64_C(6662950945848033280) + INT64_C(2147483648), 32));
-    const int_fast32_t factor_1_series_2 = (int_fast32_t)(shifted_(shifted_((int64_t)factor_1_taken * factor_1_series, 5)
+    const int_fast32_t factor_1_series_2 =
+        (int_fast32_t)(dcm_update_q31_shr_(dcm_update_q31_shr_((int64_t)factor_1_taken * factor_1_series, 5)
         - INT64_C(7495819814078808064) + INT64_C(2147483648), 32));
-    const int_fast32_t factor_1_series_3 = (int_fast32_t)(shifted_(shifted_((int64_t)factor_1_taken * factor_1_series_2, 5)
+    const int_fast32_t factor_1_series_3 =
+        (int_fast32_t)(dcm_update_q31_shr_(dcm_update_q31_shr_((int64_t)factor_1_taken * factor_1_series_2, 5)
         + INT64_C(4919131752989213696) + INT64_C(2147483648), 32));
-    const int_fast32_t factor_1_bend = (int_fast32_t)(shifted_((int64_t)factor_1_taken * factor_1_series_3
+    const int_fast32_t factor_1_bend =
+        (int_fast32_t)(dcm_update_q31_shr_((int64_t)factor_1_taken * factor_1_series_3
         + INT64_C(8589934592), 34));
     const int_fast32_t factor_1 = (int_fast32_t)(INT32_C(1073741824)
-        + shifted_(-(int64_t)factor_1_taken * INT32_C(1431655765) * 2
+        + dcm_update_q31_shr_(-(int64_t)factor_1_taken * INT32_C(1431655765) * 2
         + (int64_t)factor_1_taken * factor_1_bend + INT64_C(17179869184), 35));
-    const int_fast32_t shared_18 = (int_fast32_t)(shifted_((int64_t)factor_1 * factor_1
+    const int_fast32_t shared_18 = (int_fast32_t)(dcm_update_q31_shr_((int64_t)factor_1 * factor_1
         + INT32_C(536870912), 30));
     const int64_t shared_7 = (int64_t)shared_18 * shared_2;
     const int64_t shared_8 = (int64_t)shared_18 * shared_3;
     /* the step applied to the identity */
-    const int_fast32_t A_11 = (int_fast32_t)(INT32_C(1073741824) + shifted_(-shared_7 - shared_8
-        + INT32_C(1073741824), 31));
+    const int_fast32_t A_11 = (int_fast32_t)(INT32_C(1073741824) + dcm_update_q31_shr_(-shared_7
+        - shared_8 + INT32_C(1073741824), 31));
     const int_fast32_t shared_9_taken = (int_fast32_t)(((int64_t)angle_squared >= INT32_C(1610612736) ? INT32_C(1610612736)
         : 0 >= (int64_t)angle_squared ? 0
         : (int64_t)angle_squared));
     const int_fast32_t shared_9_series = (int_fast32_t)(INT32_C(1481185360)
-        + shifted_(-(int64_t)shared_9_taken * INT32_C(1805635485) + INT64_C(68719476736), 37));
-    const int_fast32_t shared_9_series_2 = (int_fast32_t)(shifted_(shifted_((int64_t)shared_9_taken * shared_9_series, 4)
+        + dcm_update_q31_shr_(-(int64_t)shared_9_taken * INT32_C(1805635485)
+        + INT64_C(68719476736), 37));
+    const int_fast32_t shared_9_series_2 =
+        (int_fast32_t)(dcm_update_q31_shr_(dcm_update_q31_shr_((int64_t)shared_9_taken * shared_9_series, 4)
         - INT64_C(7753252009628663808) + INT64_C(2147483648), 32));
-    const int_fast32_t shared_9_series_3 = (int_fast32_t)(shifted_(shifted_((int64_t)shared_9_taken * shared_9_series_2, 4)
+    const int_fast32_t shared_9_series_3 =
+        (int_fast32_t)(dcm_update_q31_shr_(dcm_update_q31_shr_((int64_t)shared_9_taken * shared_9_series_2, 4)
         + INT64_C(6662950945848033280) + INT64_C(2147483648), 32));
-    const int_fast32_t shared_9_series_4 = (int_fast32_t)(shifted_(shifted_((int64_t)shared_9_taken * shared_9_series_3, 3)
+    const int_fast32_t shared_9_series_4 =
+        (int_fast32_t)(dcm_update_q31_shr_(dcm_update_q31_shr_((int64_t)shared_9_taken * shared_9_series_3, 3)
         - INT64_C(7495819814078808064) + INT64_C(2147483648), 32));
-    const int_fast32_t shared_9_series_5 = (int_fast32_t)(shifted_(shifted_((int64_t)shared_9_taken * shared_9_series_4, 3)
+    const int_fast32_t shared_9_series_5 =
+        (int_fast32_t)(dcm_update_q31_shr_(dcm_update_q31_shr_((int64_t)shared_9_taken * shared_9_series_4, 3)
         + INT64_C(4919131752989213696) + INT64_C(2147483648), 32));
-    const int_fast32_t shared_9_bend = (int_fast32_t)(shifted_((int64_t)shared_9_taken * shared_9_series_5
+    const int_fast32_t shared_9_bend =
+        (int_fast32_t)(dcm_update_q31_shr_((int64_t)shared_9_taken * shared_9_series_5
         + INT32_C(536870912), 30));
     const int_fast32_t shared_9 = (int_fast32_t)(INT32_C(1073741824)
-        + shifted_(-(int64_t)shared_9_taken * INT32_C(1431655765) * 2
-        + shifted_((int64_t)shared_9_taken * shared_9_bend, 2) + INT64_C(4294967296), 33));
+        + dcm_update_q31_shr_(-(int64_t)shared_9_taken * INT32_C(1431655765) * 2
+        + dcm_update_q31_shr_((int64_t)shared_9_taken * shared_9_bend, 2)
+        + INT64_C(4294967296), 33));
     const int64_t shared_10 = (int64_t)phi_z * shared_9;
-    const int_fast32_t shared_11 = (int_fast32_t)(shifted_((int64_t)phi_x * shared_18
+    const int_fast32_t shared_11 = (int_fast32_t)(dcm_update_q31_shr_((int64_t)phi_x * shared_18
         + INT32_C(536870912), 30));
     const int64_t shared_12 = (int64_t)phi_y * shared_11;
-    const int_fast32_t A_12 = (int_fast32_t)(shifted_(shared_12 - shared_10 * 2
+    const int_fast32_t A_12 = (int_fast32_t)(dcm_update_q31_shr_(shared_12 - shared_10 * 2
         + INT32_C(1073741824), 31));
     const int64_t shared_13 = (int64_t)phi_y * shared_9;
     const int64_t shared_14 = (int64_t)phi_z * shared_11;
-    const int_fast32_t A_13 = (int_fast32_t)(shifted_(shared_13 * 2 + shared_14
+    const int_fast32_t A_13 = (int_fast32_t)(dcm_update_q31_shr_(shared_13 * 2 + shared_14
         + INT32_C(1073741824), 31));
-    const int_fast32_t A_21 = (int_fast32_t)(shifted_(shared_10 * 2 + shared_12
+    const int_fast32_t A_21 = (int_fast32_t)(dcm_update_q31_shr_(shared_10 * 2 + shared_12
         + INT32_C(1073741824), 31));
     const int64_t shared_15 = (int64_t)shared_1 * shared_18;
-    const int_fast32_t A_22 = (int_fast32_t)(INT32_C(1073741824) + shifted_(-shared_15 - shared_8
-        + INT32_C(1073741824), 31));
+    const int_fast32_t A_22 = (int_fast32_t)(INT32_C(1073741824) + dcm_update_q31_shr_(-shared_15
+        - shared_8 + INT32_C(1073741824), 31));
     const int64_t shared_16 = (int64_t)phi_x * shared_9;
-    const int_fast32_t shared_17 = (int_fast32_t)(shifted_((int64_t)phi_y * phi_z
+    const int_fast32_t shared_17 = (int_fast32_t)(dcm_update_q31_shr_((int64_t)phi_y * phi_z
         + INT32_C(536870912), 30));
     const int64_t shared_5 = (int64_t)shared_17 * shared_18;
-    const int_fast32_t A_23 = (int_fast32_t)(shifted_(shared_5 - shared_16 * 2
+    const int_fast32_t A_23 = (int_fast32_t)(dcm_update_q31_shr_(shared_5 - shared_16 * 2
         + INT32_C(1073741824), 31));
-    const int_fast32_t A_31 = (int_fast32_t)(shifted_(shared_14 - shared_13 * 2
+    const int_fast32_t A_31 = (int_fast32_t)(dcm_update_q31_shr_(shared_14 - shared_13 * 2
         + INT32_C(1073741824), 31));
-    const int_fast32_t A_32 = (int_fast32_t)(shifted_(shared_16 * 2 + shared_5
+    const int_fast32_t A_32 = (int_fast32_t)(dcm_update_q31_shr_(shared_16 * 2 + shared_5
         + INT32_C(1073741824), 31));
-    const int_fast32_t A_33 = (int_fast32_t)(INT32_C(1073741824) + shifted_(-shared_15 - shared_7
-        + INT32_C(1073741824), 31));
+    const int_fast32_t A_33 = (int_fast32_t)(INT32_C(1073741824) + dcm_update_q31_shr_(-shared_15
+        - shared_7 + INT32_C(1073741824), 31));
     /* direction cosine matrix, body to reference, after the step */
-    const int64_t next_11_unchecked = shifted_((int64_t)A_11 * C_11 + (int64_t)A_21 * C_12
-        + (int64_t)A_31 * C_13 + INT32_C(536870912), 30);
+    const int64_t next_11_unchecked =
+        dcm_update_q31_shr_((int64_t)A_11 * C_11 + (int64_t)A_21 * C_12 + (int64_t)A_31 * C_13
+        + INT32_C(536870912), 30);
     if (next_11_unchecked < (-INT32_C(1140850688))
         || next_11_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_11 = (int_fast32_t)next_11_unchecked;
-    const int64_t next_12_unchecked = shifted_((int64_t)A_12 * C_11 + (int64_t)A_22 * C_12
-        + (int64_t)A_32 * C_13 + INT32_C(536870912), 30);
+    const int64_t next_12_unchecked =
+        dcm_update_q31_shr_((int64_t)A_12 * C_11 + (int64_t)A_22 * C_12 + (int64_t)A_32 * C_13
+        + INT32_C(536870912), 30);
     if (next_12_unchecked < (-INT32_C(1140850688))
         || next_12_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_12 = (int_fast32_t)next_12_unchecked;
-    const int64_t next_13_unchecked = shifted_((int64_t)A_13 * C_11 + (int64_t)A_23 * C_12
-        + (int64_t)A_33 * C_13 + INT32_C(536870912), 30);
+    const int64_t next_13_unchecked =
+        dcm_update_q31_shr_((int64_t)A_13 * C_11 + (int64_t)A_23 * C_12 + (int64_t)A_33 * C_13
+        + INT32_C(536870912), 30);
     if (next_13_unchecked < (-INT32_C(1140850688))
         || next_13_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_13 = (int_fast32_t)next_13_unchecked;
-    const int64_t next_21_unchecked = shifted_((int64_t)A_11 * C_21 + (int64_t)A_21 * C_22
-        + (int64_t)A_31 * C_23 + INT32_C(536870912), 30);
+    const int64_t next_21_unchecked =
+        dcm_update_q31_shr_((int64_t)A_11 * C_21 + (int64_t)A_21 * C_22 + (int64_t)A_31 * C_23
+        + INT32_C(536870912), 30);
     if (next_21_unchecked < (-INT32_C(1140850688))
         || next_21_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_21 = (int_fast32_t)next_21_unchecked;
-    const int64_t next_22_unchecked = shifted_((int64_t)A_12 * C_21 + (int64_t)A_22 * C_22
-        + (int64_t)A_32 * C_23 + INT32_C(536870912), 30);
+    const int64_t next_22_unchecked =
+        dcm_update_q31_shr_((int64_t)A_12 * C_21 + (int64_t)A_22 * C_22 + (int64_t)A_32 * C_23
+        + INT32_C(536870912), 30);
     if (next_22_unchecked < (-INT32_C(1140850688))
         || next_22_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_22 = (int_fast32_t)next_22_unchecked;
-    const int64_t next_23_unchecked = shifted_((int64_t)A_13 * C_21 + (int64_t)A_23 * C_22
-        + (int64_t)A_33 * C_23 + INT32_C(536870912), 30);
+    const int64_t next_23_unchecked =
+        dcm_update_q31_shr_((int64_t)A_13 * C_21 + (int64_t)A_23 * C_22 + (int64_t)A_33 * C_23
+        + INT32_C(536870912), 30);
     if (next_23_unchecked < (-INT32_C(1140850688))
         || next_23_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_23 = (int_fast32_t)next_23_unchecked;
-    const int64_t next_31_unchecked = shifted_((int64_t)A_11 * C_31 + (int64_t)A_21 * C_32
-        + (int64_t)A_31 * C_33 + INT32_C(536870912), 30);
+    const int64_t next_31_unchecked =
+        dcm_update_q31_shr_((int64_t)A_11 * C_31 + (int64_t)A_21 * C_32 + (int64_t)A_31 * C_33
+        + INT32_C(536870912), 30);
     if (next_31_unchecked < (-INT32_C(1140850688))
         || next_31_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_31 = (int_fast32_t)next_31_unchecked;
-    const int64_t next_32_unchecked = shifted_((int64_t)A_12 * C_31 + (int64_t)A_22 * C_32
-        + (int64_t)A_32 * C_33 + INT32_C(536870912), 30);
+    const int64_t next_32_unchecked =
+        dcm_update_q31_shr_((int64_t)A_12 * C_31 + (int64_t)A_22 * C_32 + (int64_t)A_32 * C_33
+        + INT32_C(536870912), 30);
     if (next_32_unchecked < (-INT32_C(1140850688))
         || next_32_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_32 = (int_fast32_t)next_32_unchecked;
-    const int64_t next_33_unchecked = shifted_((int64_t)A_13 * C_31 + (int64_t)A_23 * C_32
-        + (int64_t)A_33 * C_33 + INT32_C(536870912), 30);
+    const int64_t next_33_unchecked =
+        dcm_update_q31_shr_((int64_t)A_13 * C_31 + (int64_t)A_23 * C_32 + (int64_t)A_33 * C_33
+        + INT32_C(536870912), 30);
     if (next_33_unchecked < (-INT32_C(1140850688))
         || next_33_unchecked > INT32_C(1140850688))
         return 2;
@@ -191,7 +212,7 @@ static inline int one_(const int32_t state[9], const int32_t rotation_vector[3],
 
 int dcm_update_q31(const int32_t state[9], const int32_t rotation_vector[3], int32_t next[9])
 {
-    return one_(state, rotation_vector, next);
+    return dcm_update_q31_one_(state, rotation_vector, next);
 }
 
 size_t dcm_update_q31_array(size_t count, int *status, const int32_t *state,
@@ -199,7 +220,7 @@ size_t dcm_update_q31_array(size_t count, int *status, const int32_t *state,
 {
     *status = 0;
     for (size_t k = 0; k < count; ++k) {
-        *status = one_(state + 9 * k, rotation_vector + 3 * k, next + 9 * k);
+        *status = dcm_update_q31_one_(state + 9 * k, rotation_vector + 3 * k, next + 9 * k);
         if (*status)
             return k;
     }

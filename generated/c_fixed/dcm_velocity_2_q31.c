@@ -5,7 +5,7 @@
 #include "dcm_velocity_2_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int outside_(int_fast32_t x, int_fast32_t limit)
+static inline int dcm_velocity_2_q31_out_(int_fast32_t x, int_fast32_t limit)
 {
     return (uint64_t)x + (uint64_t)limit > 2 * (uint64_t)limit;
 }
@@ -13,13 +13,13 @@ static inline int outside_(int_fast32_t x, int_fast32_t limit)
 /* x / 2^n, rounded down. The right shift of a negative number is left to the compiler by the standard; this is not, and
  * compilers make one arithmetic shift of it.
  */
-static inline int64_t shifted_(int64_t x, int n)
+static inline int64_t dcm_velocity_2_q31_shr_(int64_t x, int n)
 {
     return x < 0 ? ~(~x >> n) : x >> n;
 }
 
 /* The algorithm. Static, so that the loops below can take it in. */
-static inline int one_(const int32_t state[9], const int32_t velocity_sum[3],
+static inline int dcm_velocity_2_q31_one_(const int32_t state[9], const int32_t velocity_sum[3],
     const int32_t sculling[3], const int32_t angle_sum[3], int32_t transformed[3])
 {
     const int_fast32_t C_11 = state[0];
@@ -40,44 +40,47 @@ static inline int one_(const int32_t state[9], const int32_t velocity_sum[3],
     const int_fast32_t beta_x = angle_sum[0];
     const int_fast32_t beta_y = angle_sum[1];
     const int_fast32_t beta_z = angle_sum[2];
-    if (outside_(C_11, INT32_C(1140850688))
-        || outside_(C_12, INT32_C(1140850688))
-        || outside_(C_13, INT32_C(1140850688))
-        || outside_(C_21, INT32_C(1140850688))
-        || outside_(C_22, INT32_C(1140850688))
-        || outside_(C_23, INT32_C(1140850688))
-        || outside_(C_31, INT32_C(1140850688))
-        || outside_(C_32, INT32_C(1140850688))
-        || outside_(C_33, INT32_C(1140850688))
-        || outside_(u_x, INT32_C(1073741824))
-        || outside_(u_y, INT32_C(1073741824))
-        || outside_(u_z, INT32_C(1073741824))
-        || outside_(eta_x, INT32_C(1073741824))
-        || outside_(eta_y, INT32_C(1073741824))
-        || outside_(eta_z, INT32_C(1073741824))
-        || outside_(beta_x, INT32_C(1073741824))
-        || outside_(beta_y, INT32_C(1073741824))
-        || outside_(beta_z, INT32_C(1073741824)))
+    if (dcm_velocity_2_q31_out_(C_11, INT32_C(1140850688))
+        || dcm_velocity_2_q31_out_(C_12, INT32_C(1140850688))
+        || dcm_velocity_2_q31_out_(C_13, INT32_C(1140850688))
+        || dcm_velocity_2_q31_out_(C_21, INT32_C(1140850688))
+        || dcm_velocity_2_q31_out_(C_22, INT32_C(1140850688))
+        || dcm_velocity_2_q31_out_(C_23, INT32_C(1140850688))
+        || dcm_velocity_2_q31_out_(C_31, INT32_C(1140850688))
+        || dcm_velocity_2_q31_out_(C_32, INT32_C(1140850688))
+        || dcm_velocity_2_q31_out_(C_33, INT32_C(1140850688))
+        || dcm_velocity_2_q31_out_(u_x, INT32_C(1073741824))
+        || dcm_velocity_2_q31_out_(u_y, INT32_C(1073741824))
+        || dcm_velocity_2_q31_out_(u_z, INT32_C(1073741824))
+        || dcm_velocity_2_q31_out_(eta_x, INT32_C(1073741824))
+        || dcm_velocity_2_q31_out_(eta_y, INT32_C(1073741824))
+        || dcm_velocity_2_q31_out_(eta_z, INT32_C(1073741824))
+        || dcm_velocity_2_q31_out_(beta_x, INT32_C(1073741824))
+        || dcm_velocity_2_q31_out_(beta_y, INT32_C(1073741824))
+        || dcm_velocity_2_q31_out_(beta_z, INT32_C(1073741824)))
         return 1;
     const int_fast32_t shared_1 = (int_fast32_t)((int64_t)u_z);
     const int_fast32_t shared_2 = (int_fast32_t)((int64_t)beta_z);
     /* velocity increment, body axes at the start of the slow cycle */
-    const int_fast32_t w_x = (int_fast32_t)(shifted_((int64_t)eta_x * INT32_C(1073741824)
+    const int_fast32_t w_x =
+        (int_fast32_t)(dcm_velocity_2_q31_shr_((int64_t)eta_x * INT32_C(1073741824)
         + (int64_t)u_x * INT64_C(2147483648) + (int64_t)beta_y * shared_1 - (int64_t)shared_2 * u_y
         + INT64_C(2147483648), 32));
-    const int_fast32_t w_y = (int_fast32_t)(shifted_((int64_t)eta_y * INT32_C(1073741824)
+    const int_fast32_t w_y =
+        (int_fast32_t)(dcm_velocity_2_q31_shr_((int64_t)eta_y * INT32_C(1073741824)
         + (int64_t)u_y * INT64_C(2147483648) - (int64_t)beta_x * shared_1 + (int64_t)shared_2 * u_x
         + INT64_C(2147483648), 32));
-    const int_fast32_t w_z = (int_fast32_t)(shifted_((int64_t)eta_z * INT32_C(1073741824)
+    const int_fast32_t w_z =
+        (int_fast32_t)(dcm_velocity_2_q31_shr_((int64_t)eta_z * INT32_C(1073741824)
         + (int64_t)u_z * INT64_C(2147483648) + (int64_t)beta_x * u_y - (int64_t)beta_y * u_x
         + INT64_C(2147483648), 32));
     /* velocity increment of the slow cycle, navigation axes */
-    const int_fast32_t v_x = (int_fast32_t)(shifted_((int64_t)C_11 * w_x + (int64_t)C_12 * w_y
-        + (int64_t)C_13 * w_z + INT32_C(1073741824), 31));
-    const int_fast32_t v_y = (int_fast32_t)(shifted_((int64_t)C_21 * w_x + (int64_t)C_22 * w_y
-        + (int64_t)C_23 * w_z + INT32_C(1073741824), 31));
-    const int_fast32_t v_z = (int_fast32_t)(shifted_((int64_t)C_31 * w_x + (int64_t)C_32 * w_y
-        + (int64_t)C_33 * w_z + INT32_C(1073741824), 31));
+    const int_fast32_t v_x = (int_fast32_t)(dcm_velocity_2_q31_shr_((int64_t)C_11 * w_x
+        + (int64_t)C_12 * w_y + (int64_t)C_13 * w_z + INT32_C(1073741824), 31));
+    const int_fast32_t v_y = (int_fast32_t)(dcm_velocity_2_q31_shr_((int64_t)C_21 * w_x
+        + (int64_t)C_22 * w_y + (int64_t)C_23 * w_z + INT32_C(1073741824), 31));
+    const int_fast32_t v_z = (int_fast32_t)(dcm_velocity_2_q31_shr_((int64_t)C_31 * w_x
+        + (int64_t)C_32 * w_y + (int64_t)C_33 * w_z + INT32_C(1073741824), 31));
     transformed[0] = (int32_t)v_x;
     transformed[1] = (int32_t)v_y;
     transformed[2] = (int32_t)v_z;
@@ -87,7 +90,7 @@ static inline int one_(const int32_t state[9], const int32_t velocity_sum[3],
 int dcm_velocity_2_q31(const int32_t state[9], const int32_t velocity_sum[3],
     const int32_t sculling[3], const int32_t angle_sum[3], int32_t transformed[3])
 {
-    return one_(state, velocity_sum, sculling, angle_sum, transformed);
+    return dcm_velocity_2_q31_one_(state, velocity_sum, sculling, angle_sum, transformed);
 }
 
 size_t dcm_velocity_2_q31_array(size_t count, int *status, const int32_t *state,
@@ -96,8 +99,8 @@ size_t dcm_velocity_2_q31_array(size_t count, int *status, const int32_t *state,
 {
     *status = 0;
     for (size_t k = 0; k < count; ++k) {
-        *status = one_(state + 9 * k, velocity_sum + 3 * k, sculling + 3 * k, angle_sum + 3 * k,
-            transformed + 3 * k);
+        *status = dcm_velocity_2_q31_one_(state + 9 * k, velocity_sum + 3 * k, sculling + 3 * k,
+            angle_sum + 3 * k, transformed + 3 * k);
         if (*status)
             return k;
     }

@@ -5,7 +5,7 @@
 #include "error_matrix_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int outside_(int_fast32_t x, int_fast32_t limit)
+static inline int error_matrix_q31_out_(int_fast32_t x, int_fast32_t limit)
 {
     return (uint64_t)x + (uint64_t)limit > 2 * (uint64_t)limit;
 }
@@ -13,14 +13,14 @@ static inline int outside_(int_fast32_t x, int_fast32_t limit)
 /* x / 2^n, rounded down. The right shift of a negative number is left to the compiler by the standard; this is not, and
  * compilers make one arithmetic shift of it.
  */
-static inline int64_t shifted_(int64_t x, int n)
+static inline int64_t error_matrix_q31_shr_(int64_t x, int n)
 {
     return x < 0 ? ~(~x >> n) : x >> n;
 }
 
 /* The algorithm. Static, so that the loops below can take it in. */
-static inline int one_(const int32_t computed[9], const int32_t truth[9], int32_t error[9],
-    int32_t scale[3], int32_t skew[3], int32_t drift[3])
+static inline int error_matrix_q31_one_(const int32_t computed[9], const int32_t truth[9],
+    int32_t error[9], int32_t scale[3], int32_t skew[3], int32_t drift[3])
 {
     const int_fast32_t C_11 = computed[0];
     const int_fast32_t C_12 = computed[1];
@@ -40,44 +40,47 @@ static inline int one_(const int32_t computed[9], const int32_t truth[9], int32_
     const int_fast32_t T_31 = truth[6];
     const int_fast32_t T_32 = truth[7];
     const int_fast32_t T_33 = truth[8];
-    if (outside_(C_11, INT32_C(1140850688))
-        || outside_(C_12, INT32_C(1140850688))
-        || outside_(C_13, INT32_C(1140850688))
-        || outside_(C_21, INT32_C(1140850688))
-        || outside_(C_22, INT32_C(1140850688))
-        || outside_(C_23, INT32_C(1140850688))
-        || outside_(C_31, INT32_C(1140850688))
-        || outside_(C_32, INT32_C(1140850688))
-        || outside_(C_33, INT32_C(1140850688))
-        || outside_(T_11, INT32_C(1140850688))
-        || outside_(T_12, INT32_C(1140850688))
-        || outside_(T_13, INT32_C(1140850688))
-        || outside_(T_21, INT32_C(1140850688))
-        || outside_(T_22, INT32_C(1140850688))
-        || outside_(T_23, INT32_C(1140850688))
-        || outside_(T_31, INT32_C(1140850688))
-        || outside_(T_32, INT32_C(1140850688))
-        || outside_(T_33, INT32_C(1140850688)))
+    if (error_matrix_q31_out_(C_11, INT32_C(1140850688))
+        || error_matrix_q31_out_(C_12, INT32_C(1140850688))
+        || error_matrix_q31_out_(C_13, INT32_C(1140850688))
+        || error_matrix_q31_out_(C_21, INT32_C(1140850688))
+        || error_matrix_q31_out_(C_22, INT32_C(1140850688))
+        || error_matrix_q31_out_(C_23, INT32_C(1140850688))
+        || error_matrix_q31_out_(C_31, INT32_C(1140850688))
+        || error_matrix_q31_out_(C_32, INT32_C(1140850688))
+        || error_matrix_q31_out_(C_33, INT32_C(1140850688))
+        || error_matrix_q31_out_(T_11, INT32_C(1140850688))
+        || error_matrix_q31_out_(T_12, INT32_C(1140850688))
+        || error_matrix_q31_out_(T_13, INT32_C(1140850688))
+        || error_matrix_q31_out_(T_21, INT32_C(1140850688))
+        || error_matrix_q31_out_(T_22, INT32_C(1140850688))
+        || error_matrix_q31_out_(T_23, INT32_C(1140850688))
+        || error_matrix_q31_out_(T_31, INT32_C(1140850688))
+        || error_matrix_q31_out_(T_32, INT32_C(1140850688))
+        || error_matrix_q31_out_(T_33, INT32_C(1140850688)))
         return 1;
     /* error matrix, reference axes */
-    const int_fast32_t E_11 = (int_fast32_t)(-INT32_C(268435456) + shifted_((int64_t)C_11 * T_11
-        + (int64_t)C_12 * T_12 + (int64_t)C_13 * T_13 + INT64_C(2147483648), 32));
-    const int_fast32_t E_12 = (int_fast32_t)(shifted_((int64_t)C_11 * T_21 + (int64_t)C_12 * T_22
-        + (int64_t)C_13 * T_23 + INT64_C(2147483648), 32));
-    const int_fast32_t E_13 = (int_fast32_t)(shifted_((int64_t)C_11 * T_31 + (int64_t)C_12 * T_32
-        + (int64_t)C_13 * T_33 + INT64_C(2147483648), 32));
-    const int_fast32_t E_21 = (int_fast32_t)(shifted_((int64_t)C_21 * T_11 + (int64_t)C_22 * T_12
-        + (int64_t)C_23 * T_13 + INT64_C(2147483648), 32));
-    const int_fast32_t E_22 = (int_fast32_t)(-INT32_C(268435456) + shifted_((int64_t)C_21 * T_21
-        + (int64_t)C_22 * T_22 + (int64_t)C_23 * T_23 + INT64_C(2147483648), 32));
-    const int_fast32_t E_23 = (int_fast32_t)(shifted_((int64_t)C_21 * T_31 + (int64_t)C_22 * T_32
-        + (int64_t)C_23 * T_33 + INT64_C(2147483648), 32));
-    const int_fast32_t E_31 = (int_fast32_t)(shifted_((int64_t)C_31 * T_11 + (int64_t)C_32 * T_12
-        + (int64_t)C_33 * T_13 + INT64_C(2147483648), 32));
-    const int_fast32_t E_32 = (int_fast32_t)(shifted_((int64_t)C_31 * T_21 + (int64_t)C_32 * T_22
-        + (int64_t)C_33 * T_23 + INT64_C(2147483648), 32));
-    const int_fast32_t E_33 = (int_fast32_t)(-INT32_C(268435456) + shifted_((int64_t)C_31 * T_31
-        + (int64_t)C_32 * T_32 + (int64_t)C_33 * T_33 + INT64_C(2147483648), 32));
+    const int_fast32_t E_11 = (int_fast32_t)(-INT32_C(268435456)
+        + error_matrix_q31_shr_((int64_t)C_11 * T_11 + (int64_t)C_12 * T_12 + (int64_t)C_13 * T_13
+        + INT64_C(2147483648), 32));
+    const int_fast32_t E_12 = (int_fast32_t)(error_matrix_q31_shr_((int64_t)C_11 * T_21
+        + (int64_t)C_12 * T_22 + (int64_t)C_13 * T_23 + INT64_C(2147483648), 32));
+    const int_fast32_t E_13 = (int_fast32_t)(error_matrix_q31_shr_((int64_t)C_11 * T_31
+        + (int64_t)C_12 * T_32 + (int64_t)C_13 * T_33 + INT64_C(2147483648), 32));
+    const int_fast32_t E_21 = (int_fast32_t)(error_matrix_q31_shr_((int64_t)C_21 * T_11
+        + (int64_t)C_22 * T_12 + (int64_t)C_23 * T_13 + INT64_C(2147483648), 32));
+    const int_fast32_t E_22 = (int_fast32_t)(-INT32_C(268435456)
+        + error_matrix_q31_shr_((int64_t)C_21 * T_21 + (int64_t)C_22 * T_22 + (int64_t)C_23 * T_23
+        + INT64_C(2147483648), 32));
+    const int_fast32_t E_23 = (int_fast32_t)(error_matrix_q31_shr_((int64_t)C_21 * T_31
+        + (int64_t)C_22 * T_32 + (int64_t)C_23 * T_33 + INT64_C(2147483648), 32));
+    const int_fast32_t E_31 = (int_fast32_t)(error_matrix_q31_shr_((int64_t)C_31 * T_11
+        + (int64_t)C_32 * T_12 + (int64_t)C_33 * T_13 + INT64_C(2147483648), 32));
+    const int_fast32_t E_32 = (int_fast32_t)(error_matrix_q31_shr_((int64_t)C_31 * T_21
+        + (int64_t)C_32 * T_22 + (int64_t)C_33 * T_23 + INT64_C(2147483648), 32));
+    const int_fast32_t E_33 = (int_fast32_t)(-INT32_C(268435456)
+        + error_matrix_q31_shr_((int64_t)C_31 * T_31 + (int64_t)C_32 * T_32 + (int64_t)C_33 * T_33
+        + INT64_C(2147483648), 32));
     const int64_t shared_1 = (int64_t)E_23;
     const int64_t shared_2 = (int64_t)E_32;
     /* skew errors, reference axes */
@@ -116,7 +119,7 @@ static inline int one_(const int32_t computed[9], const int32_t truth[9], int32_
 int error_matrix_q31(const int32_t computed[9], const int32_t truth[9], int32_t error[9],
     int32_t scale[3], int32_t skew[3], int32_t drift[3])
 {
-    return one_(computed, truth, error, scale, skew, drift);
+    return error_matrix_q31_one_(computed, truth, error, scale, skew, drift);
 }
 
 size_t error_matrix_q31_array(size_t count, int *status, const int32_t *computed,
@@ -124,8 +127,8 @@ size_t error_matrix_q31_array(size_t count, int *status, const int32_t *computed
 {
     *status = 0;
     for (size_t k = 0; k < count; ++k) {
-        *status = one_(computed + 9 * k, truth + 9 * k, error + 9 * k, scale + 3 * k, skew + 3 * k,
-            drift + 3 * k);
+        *status = error_matrix_q31_one_(computed + 9 * k, truth + 9 * k, error + 9 * k,
+            scale + 3 * k, skew + 3 * k, drift + 3 * k);
         if (*status)
             return k;
     }

@@ -5,7 +5,7 @@
 #include "euler_angles_from_dcm_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int outside_(int_fast32_t x, int_fast32_t limit)
+static inline int euler_angles_from_dcm_q31_out_(int_fast32_t x, int_fast32_t limit)
 {
     return (uint64_t)x + (uint64_t)limit > 2 * (uint64_t)limit;
 }
@@ -13,13 +13,13 @@ static inline int outside_(int_fast32_t x, int_fast32_t limit)
 /* x / 2^n, rounded down. The right shift of a negative number is left to the compiler by the standard; this is not, and
  * compilers make one arithmetic shift of it.
  */
-static inline int64_t shifted_(int64_t x, int n)
+static inline int64_t euler_angles_from_dcm_q31_shr_(int64_t x, int n)
 {
     return x < 0 ? ~(~x >> n) : x >> n;
 }
 
 /* numerator / denominator of their magnitudes, to the nearest; the sign comes last. */
-static int64_t quotient_(int64_t numerator, int64_t denominator)
+static int64_t euler_angles_from_dcm_q31_div_(int64_t numerator, int64_t denominator)
 {
     const int64_t top = numerator < 0 ? -numerator : numerator;
     const int64_t below = denominator < 0 ? -denominator : denominator;
@@ -28,7 +28,7 @@ static int64_t quotient_(int64_t numerator, int64_t denominator)
 }
 
 /* Square root bit by bit, to the nearest. */
-static int_fast32_t root_(uint64_t square)
+static int_fast32_t euler_angles_from_dcm_q31_sqrt_(uint64_t square)
 {
     uint64_t root = 0, bit = (uint64_t)1 << 62;
     while (bit) {
@@ -44,7 +44,8 @@ static int_fast32_t root_(uint64_t square)
 }
 
 /* The algorithm. Static, so that the loops below can take it in. */
-static inline int one_(const int32_t state[9], const int32_t previous[3], int32_t next[3])
+static inline int euler_angles_from_dcm_q31_one_(const int32_t state[9], const int32_t previous[3],
+    int32_t next[3])
 {
     const int_fast32_t C_11 = state[0];
     const int_fast32_t C_12 = state[1];
@@ -56,23 +57,24 @@ static inline int one_(const int32_t state[9], const int32_t previous[3], int32_
     const int_fast32_t C_32 = state[7];
     const int_fast32_t C_33 = state[8];
     const int_fast32_t last_roll = previous[0];
-    if (outside_(C_11, INT32_C(1140850688))
-        || outside_(C_12, INT32_C(1140850688))
-        || outside_(C_13, INT32_C(1140850688))
-        || outside_(C_21, INT32_C(1140850688))
-        || outside_(C_22, INT32_C(1140850688))
-        || outside_(C_23, INT32_C(1140850688))
-        || outside_(C_31, INT32_C(1140850688))
-        || outside_(C_32, INT32_C(1140850688))
-        || outside_(C_33, INT32_C(1140850688))
-        || outside_(last_roll, INT32_C(1686629857))
-        || outside_(previous[1], INT32_C(1686629857))
-        || outside_(previous[2], INT32_C(1686629857)))
+    if (euler_angles_from_dcm_q31_out_(C_11, INT32_C(1140850688))
+        || euler_angles_from_dcm_q31_out_(C_12, INT32_C(1140850688))
+        || euler_angles_from_dcm_q31_out_(C_13, INT32_C(1140850688))
+        || euler_angles_from_dcm_q31_out_(C_21, INT32_C(1140850688))
+        || euler_angles_from_dcm_q31_out_(C_22, INT32_C(1140850688))
+        || euler_angles_from_dcm_q31_out_(C_23, INT32_C(1140850688))
+        || euler_angles_from_dcm_q31_out_(C_31, INT32_C(1140850688))
+        || euler_angles_from_dcm_q31_out_(C_32, INT32_C(1140850688))
+        || euler_angles_from_dcm_q31_out_(C_33, INT32_C(1140850688))
+        || euler_angles_from_dcm_q31_out_(last_roll, INT32_C(1686629857))
+        || euler_angles_from_dcm_q31_out_(previous[1], INT32_C(1686629857))
+        || euler_angles_from_dcm_q31_out_(previous[2], INT32_C(1686629857)))
         return 1;
     /* square of the cosine of pitch */
     const int64_t cosine_squared = (int64_t)C_11 * C_11 + (int64_t)C_21 * C_21;
     const int_fast32_t next_pitch_argument = (int_fast32_t)(-(int64_t)C_31);
-    const int_fast32_t next_pitch_argument_root = root_((uint64_t)(shifted_(cosine_squared, 2)));
+    const int_fast32_t next_pitch_argument_root =
+        euler_angles_from_dcm_q31_sqrt_((uint64_t)(euler_angles_from_dcm_q31_shr_(cosine_squared, 2)));
     const int64_t next_pitch_distance = (int64_t)next_pitch_argument * next_pitch_argument
         + cosine_squared;
     if (next_pitch_distance < INT64_C(576460752303423488)
@@ -92,7 +94,8 @@ static inline int one_(const int32_t state[9], const int32_t previous[3], int32_
         next_pitch_larger = (int_fast32_t)((int64_t)next_pitch_height);
     if (1 > next_pitch_larger)
         next_pitch_larger = (int_fast32_t)(1);
-    const int64_t next_pitch_beyond = (int64_t)next_pitch_smaller * 16 - (int64_t)next_pitch_larger * 8
+    const int64_t next_pitch_beyond =
+        (int64_t)next_pitch_smaller * 16 - (int64_t)next_pitch_larger * 8
         + (int64_t)next_pitch_larger;
     const int64_t next_pitch_below = (int64_t)next_pitch_smaller - (int64_t)next_pitch_larger;
     const int64_t next_pitch_both = (int64_t)next_pitch_smaller + (int64_t)next_pitch_larger;
@@ -100,34 +103,45 @@ static inline int one_(const int32_t state[9], const int32_t previous[3], int32_
         : (int64_t)next_pitch_smaller));
     const int64_t next_pitch_denominator = (next_pitch_beyond >= 0 ? next_pitch_both
         : (int64_t)next_pitch_larger);
-    const int_fast32_t next_pitch_tangent = (int_fast32_t)(quotient_((int64_t)next_pitch_numerator * INT64_C(4294967296), next_pitch_denominator));
-    const int_fast32_t next_pitch_square = (int_fast32_t)(shifted_((int64_t)next_pitch_tangent * next_pitch_tangent
+    const int_fast32_t next_pitch_tangent =
+        (int_fast32_t)(euler_angles_from_dcm_q31_div_((int64_t)next_pitch_numerator * INT64_C(4294967296), next_pitch_denominator));
+    const int_fast32_t next_pitch_square =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_((int64_t)next_pitch_tangent * next_pitch_tangent
         + INT32_C(1073741824), 31));
-    const int_fast32_t next_pitch_series = (int_fast32_t)(shifted_(shifted_((int64_t)next_pitch_square * INT32_C(735255871), 1)
+    const int_fast32_t next_pitch_series =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_pitch_square * INT32_C(735255871), 1)
         - INT64_C(6065684321545150080) + INT64_C(2147483648), 32));
-    const int_fast32_t next_pitch_series_2 = (int_fast32_t)(shifted_(shifted_((int64_t)next_pitch_square * next_pitch_series, 2)
+    const int_fast32_t next_pitch_series_2 =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_pitch_square * next_pitch_series, 2)
         + INT64_C(4054853067505913472) + INT32_C(1073741824), 31));
-    const int_fast32_t next_pitch_series_3 = (int_fast32_t)(shifted_(shifted_((int64_t)next_pitch_square * next_pitch_series_2, 2)
+    const int_fast32_t next_pitch_series_3 =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_pitch_square * next_pitch_series_2, 2)
         - INT64_C(5267120772635892064) + INT64_C(2147483648), 32));
-    const int_fast32_t next_pitch_series_4 = (int_fast32_t)(shifted_(shifted_((int64_t)next_pitch_square * next_pitch_series_3, 1)
+    const int_fast32_t next_pitch_series_4 =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_pitch_square * next_pitch_series_3, 1)
         + INT64_C(7378564090463267680) + INT64_C(2147483648), 32));
-    const int_fast32_t next_pitch_series_5 = (int_fast32_t)(shifted_(shifted_((int64_t)next_pitch_square * next_pitch_series_4, 2)
+    const int_fast32_t next_pitch_series_5 =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_pitch_square * next_pitch_series_4, 2)
         - INT64_C(6148913518682917232) + INT64_C(2147483648), 32));
-    const int_fast32_t next_pitch_bend = (int_fast32_t)(shifted_((int64_t)next_pitch_square * next_pitch_series_5
+    const int_fast32_t next_pitch_bend =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_((int64_t)next_pitch_square * next_pitch_series_5
         - INT64_C(11967952160) + INT32_C(1073741824), 31));
     const int64_t next_pitch_arctangent = (int64_t)next_pitch_tangent * INT64_C(4294967296)
-        + shifted_((int64_t)next_pitch_tangent * next_pitch_bend, 2);
-    const int64_t next_pitch_angle = shifted_(next_pitch_arctangent, 2) + INT64_C(3622009729038561420);
+        + euler_angles_from_dcm_q31_shr_((int64_t)next_pitch_tangent * next_pitch_bend, 2);
+    const int64_t next_pitch_angle = euler_angles_from_dcm_q31_shr_(next_pitch_arctangent, 2)
+        + INT64_C(3622009729038561420);
     const int64_t next_pitch_octant = (next_pitch_beyond >= 0 ? next_pitch_angle
-        : shifted_(next_pitch_arctangent, 2));
-    const int64_t next_pitch_angle_2 = shifted_(-next_pitch_octant, 1) + INT64_C(3622009729038561420);
+        : euler_angles_from_dcm_q31_shr_(next_pitch_arctangent, 2));
+    const int64_t next_pitch_angle_2 = euler_angles_from_dcm_q31_shr_(-next_pitch_octant, 1)
+        + INT64_C(3622009729038561420);
     const int64_t next_pitch_quadrant = ((int64_t)next_pitch_taken_2 * 2 >= (int64_t)next_pitch_height ? next_pitch_octant
         : next_pitch_angle_2 * 2);
     const int64_t next_pitch_angle_3 = -next_pitch_quadrant;
     const int64_t next_pitch_side = ((int64_t)next_pitch_taken >= 0 ? next_pitch_quadrant
         : next_pitch_angle_3);
     /* pitch */
-    const int_fast32_t next_pitch = (int_fast32_t)(shifted_(next_pitch_side + INT64_C(4294967296), 33));
+    const int_fast32_t next_pitch = (int_fast32_t)(euler_angles_from_dcm_q31_shr_(next_pitch_side
+        + INT64_C(4294967296), 33));
     const int64_t next_roll_case_angle_negative = -(int64_t)C_32;
     int_fast32_t next_roll_case_angle_height = (int_fast32_t)((int64_t)C_32);
     if (next_roll_case_angle_negative > next_roll_case_angle_height)
@@ -153,34 +167,46 @@ static inline int one_(const int32_t state[9], const int32_t previous[3], int32_
         : (int64_t)next_roll_case_angle_smaller));
     const int64_t next_roll_case_angle_denominator = (next_roll_case_angle_beyond >= 0 ? next_roll_case_angle_both
         : (int64_t)next_roll_case_angle_larger);
-    const int_fast32_t next_roll_case_angle_tangent = (int_fast32_t)(quotient_((int64_t)next_roll_case_angle_numerator * INT64_C(4294967296), next_roll_case_angle_denominator));
-    const int_fast32_t next_roll_case_angle_square = (int_fast32_t)(shifted_((int64_t)next_roll_case_angle_tangent * next_roll_case_angle_tangent
+    const int_fast32_t next_roll_case_angle_tangent =
+        (int_fast32_t)(euler_angles_from_dcm_q31_div_((int64_t)next_roll_case_angle_numerator * INT64_C(4294967296), next_roll_case_angle_denominator));
+    const int_fast32_t next_roll_case_angle_square =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_((int64_t)next_roll_case_angle_tangent * next_roll_case_angle_tangent
         + INT32_C(1073741824), 31));
-    const int_fast32_t next_roll_case_angle_series = (int_fast32_t)(shifted_(shifted_((int64_t)next_roll_case_angle_square * INT32_C(735255871), 1)
+    const int_fast32_t next_roll_case_angle_series =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_roll_case_angle_square * INT32_C(735255871), 1)
         - INT64_C(6065684321545150080) + INT64_C(2147483648), 32));
-    const int_fast32_t next_roll_case_angle_series_2 = (int_fast32_t)(shifted_(shifted_((int64_t)next_roll_case_angle_square * next_roll_case_angle_series, 2)
+    const int_fast32_t next_roll_case_angle_series_2 =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_roll_case_angle_square * next_roll_case_angle_series, 2)
         + INT64_C(4054853067505913472) + INT32_C(1073741824), 31));
-    const int_fast32_t next_roll_case_angle_series_3 = (int_fast32_t)(shifted_(shifted_((int64_t)next_roll_case_angle_square * next_roll_case_angle_series_2, 2)
+    const int_fast32_t next_roll_case_angle_series_3 =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_roll_case_angle_square * next_roll_case_angle_series_2, 2)
         - INT64_C(5267120772635892064) + INT64_C(2147483648), 32));
-    const int_fast32_t next_roll_case_angle_series_4 = (int_fast32_t)(shifted_(shifted_((int64_t)next_roll_case_angle_square * next_roll_case_angle_series_3, 1)
+    const int_fast32_t next_roll_case_angle_series_4 =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_roll_case_angle_square * next_roll_case_angle_series_3, 1)
         + INT64_C(7378564090463267680) + INT64_C(2147483648), 32));
-    const int_fast32_t next_roll_case_angle_series_5 = (int_fast32_t)(shifted_(shifted_((int64_t)next_roll_case_angle_square * next_roll_case_angle_series_4, 2)
+    const int_fast32_t next_roll_case_angle_series_5 =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_roll_case_angle_square * next_roll_case_angle_series_4, 2)
         - INT64_C(6148913518682917232) + INT64_C(2147483648), 32));
-    const int_fast32_t next_roll_case_angle_bend = (int_fast32_t)(shifted_((int64_t)next_roll_case_angle_square * next_roll_case_angle_series_5
+    const int_fast32_t next_roll_case_angle_bend =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_((int64_t)next_roll_case_angle_square * next_roll_case_angle_series_5
         - INT64_C(11967952160) + INT32_C(1073741824), 31));
-    const int64_t next_roll_case_angle_arctangent = (int64_t)next_roll_case_angle_tangent * INT64_C(4294967296)
-        + shifted_((int64_t)next_roll_case_angle_tangent * next_roll_case_angle_bend, 2);
-    const int64_t next_roll_case_angle_angle = shifted_(next_roll_case_angle_arctangent, 2)
+    const int64_t next_roll_case_angle_arctangent =
+        (int64_t)next_roll_case_angle_tangent * INT64_C(4294967296)
+        + euler_angles_from_dcm_q31_shr_((int64_t)next_roll_case_angle_tangent * next_roll_case_angle_bend, 2);
+    const int64_t next_roll_case_angle_angle =
+        euler_angles_from_dcm_q31_shr_(next_roll_case_angle_arctangent, 2)
         + INT64_C(3622009729038561420);
     const int64_t next_roll_case_angle_octant = (next_roll_case_angle_beyond >= 0 ? next_roll_case_angle_angle
-        : shifted_(next_roll_case_angle_arctangent, 2));
-    const int64_t next_roll_case_angle_angle_2 = shifted_(-next_roll_case_angle_octant, 1)
+        : euler_angles_from_dcm_q31_shr_(next_roll_case_angle_arctangent, 2));
+    const int64_t next_roll_case_angle_angle_2 =
+        euler_angles_from_dcm_q31_shr_(-next_roll_case_angle_octant, 1)
         + INT64_C(3622009729038561420);
     const int64_t next_roll_case_angle_quadrant = ((int64_t)next_roll_case_angle_width >= (int64_t)next_roll_case_angle_height ? next_roll_case_angle_octant
         : next_roll_case_angle_angle_2 * 2);
-    const int64_t next_roll_case_angle_angle_3 = shifted_(-next_roll_case_angle_quadrant, 2)
+    const int64_t next_roll_case_angle_angle_3 =
+        euler_angles_from_dcm_q31_shr_(-next_roll_case_angle_quadrant, 2)
         + INT64_C(3622009729038561420);
-    const int64_t next_roll_case_angle_half = ((int64_t)C_33 >= 0 ? shifted_(next_roll_case_angle_quadrant, 1)
+    const int64_t next_roll_case_angle_half = ((int64_t)C_33 >= 0 ? euler_angles_from_dcm_q31_shr_(next_roll_case_angle_quadrant, 1)
         : next_roll_case_angle_angle_3 * 2);
     const int64_t next_roll_case_angle_angle_4 = -next_roll_case_angle_half;
     const int64_t next_roll_case_angle_side = ((int64_t)C_32 >= 0 ? next_roll_case_angle_half
@@ -198,8 +224,10 @@ static inline int one_(const int32_t state[9], const int32_t previous[3], int32_
     const int64_t steep_cosine_case_2 = (int64_t)C_22 - (int64_t)C_13;
     const int64_t steep_cosine = (0 >= (int64_t)C_31 ? steep_cosine_case
         : steep_cosine_case_2);
-    const int_fast32_t steep_sine_word = (int_fast32_t)(shifted_(steep_sine + 1, 1));
-    const int_fast32_t steep_cosine_word = (int_fast32_t)(shifted_(steep_cosine + 1, 1));
+    const int_fast32_t steep_sine_word = (int_fast32_t)(euler_angles_from_dcm_q31_shr_(steep_sine
+        + 1, 1));
+    const int_fast32_t steep_cosine_word =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(steep_cosine + 1, 1));
     const int64_t apart_distance = (int64_t)steep_sine_word * steep_sine_word
         + (int64_t)steep_cosine_word * steep_cosine_word;
     if (apart_distance < INT64_C(144115190357557249)
@@ -234,31 +262,42 @@ static inline int one_(const int32_t state[9], const int32_t previous[3], int32_
         : (int64_t)apart_smaller));
     const int64_t apart_denominator = (apart_beyond >= 0 ? apart_both
         : (int64_t)apart_larger);
-    const int_fast32_t apart_tangent = (int_fast32_t)(quotient_((int64_t)apart_numerator * INT64_C(4294967296), apart_denominator));
-    const int_fast32_t apart_square = (int_fast32_t)(shifted_((int64_t)apart_tangent * apart_tangent
+    const int_fast32_t apart_tangent =
+        (int_fast32_t)(euler_angles_from_dcm_q31_div_((int64_t)apart_numerator * INT64_C(4294967296), apart_denominator));
+    const int_fast32_t apart_square =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_((int64_t)apart_tangent * apart_tangent
         + INT32_C(1073741824), 31));
-    const int_fast32_t apart_series = (int_fast32_t)(shifted_(shifted_((int64_t)apart_square * INT32_C(735255871), 1)
+    const int_fast32_t apart_series =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)apart_square * INT32_C(735255871), 1)
         - INT64_C(6065684321545150080) + INT64_C(2147483648), 32));
-    const int_fast32_t apart_series_2 = (int_fast32_t)(shifted_(shifted_((int64_t)apart_square * apart_series, 2)
+    const int_fast32_t apart_series_2 =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)apart_square * apart_series, 2)
         + INT64_C(4054853067505913472) + INT32_C(1073741824), 31));
-    const int_fast32_t apart_series_3 = (int_fast32_t)(shifted_(shifted_((int64_t)apart_square * apart_series_2, 2)
+    const int_fast32_t apart_series_3 =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)apart_square * apart_series_2, 2)
         - INT64_C(5267120772635892064) + INT64_C(2147483648), 32));
-    const int_fast32_t apart_series_4 = (int_fast32_t)(shifted_(shifted_((int64_t)apart_square * apart_series_3, 1)
+    const int_fast32_t apart_series_4 =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)apart_square * apart_series_3, 1)
         + INT64_C(7378564090463267680) + INT64_C(2147483648), 32));
-    const int_fast32_t apart_series_5 = (int_fast32_t)(shifted_(shifted_((int64_t)apart_square * apart_series_4, 2)
+    const int_fast32_t apart_series_5 =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)apart_square * apart_series_4, 2)
         - INT64_C(6148913518682917232) + INT64_C(2147483648), 32));
-    const int_fast32_t apart_bend = (int_fast32_t)(shifted_((int64_t)apart_square * apart_series_5
+    const int_fast32_t apart_bend =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_((int64_t)apart_square * apart_series_5
         - INT64_C(11967952160) + INT32_C(1073741824), 31));
     const int64_t apart_arctangent = (int64_t)apart_tangent * INT64_C(4294967296)
-        + shifted_((int64_t)apart_tangent * apart_bend, 2);
-    const int64_t apart_angle = shifted_(apart_arctangent, 2) + INT64_C(3622009729038561420);
+        + euler_angles_from_dcm_q31_shr_((int64_t)apart_tangent * apart_bend, 2);
+    const int64_t apart_angle = euler_angles_from_dcm_q31_shr_(apart_arctangent, 2)
+        + INT64_C(3622009729038561420);
     const int64_t apart_octant = (apart_beyond >= 0 ? apart_angle
-        : shifted_(apart_arctangent, 2));
-    const int64_t apart_angle_2 = shifted_(-apart_octant, 1) + INT64_C(3622009729038561420);
+        : euler_angles_from_dcm_q31_shr_(apart_arctangent, 2));
+    const int64_t apart_angle_2 = euler_angles_from_dcm_q31_shr_(-apart_octant, 1)
+        + INT64_C(3622009729038561420);
     const int64_t apart_quadrant = ((int64_t)apart_width >= (int64_t)apart_height ? apart_octant
         : apart_angle_2 * 2);
-    const int64_t apart_angle_3 = shifted_(-apart_quadrant, 2) + INT64_C(3622009729038561420);
-    const int64_t apart_half = ((int64_t)apart_taken_2 >= 0 ? shifted_(apart_quadrant, 1)
+    const int64_t apart_angle_3 = euler_angles_from_dcm_q31_shr_(-apart_quadrant, 2)
+        + INT64_C(3622009729038561420);
+    const int64_t apart_half = ((int64_t)apart_taken_2 >= 0 ? euler_angles_from_dcm_q31_shr_(apart_quadrant, 1)
         : apart_angle_3 * 2);
     const int64_t apart_angle_4 = -apart_half;
     const int64_t apart_side = ((int64_t)apart_taken >= 0 ? apart_half
@@ -290,34 +329,46 @@ static inline int one_(const int32_t state[9], const int32_t previous[3], int32_
         : (int64_t)next_heading_case_angle_smaller));
     const int64_t next_heading_case_angle_denominator = (next_heading_case_angle_beyond >= 0 ? next_heading_case_angle_both
         : (int64_t)next_heading_case_angle_larger);
-    const int_fast32_t next_heading_case_angle_tangent = (int_fast32_t)(quotient_((int64_t)next_heading_case_angle_numerator * INT64_C(4294967296), next_heading_case_angle_denominator));
-    const int_fast32_t next_heading_case_angle_square = (int_fast32_t)(shifted_((int64_t)next_heading_case_angle_tangent * next_heading_case_angle_tangent
+    const int_fast32_t next_heading_case_angle_tangent =
+        (int_fast32_t)(euler_angles_from_dcm_q31_div_((int64_t)next_heading_case_angle_numerator * INT64_C(4294967296), next_heading_case_angle_denominator));
+    const int_fast32_t next_heading_case_angle_square =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_((int64_t)next_heading_case_angle_tangent * next_heading_case_angle_tangent
         + INT32_C(1073741824), 31));
-    const int_fast32_t next_heading_case_angle_series = (int_fast32_t)(shifted_(shifted_((int64_t)next_heading_case_angle_square * INT32_C(735255871), 1)
+    const int_fast32_t next_heading_case_angle_series =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_heading_case_angle_square * INT32_C(735255871), 1)
         - INT64_C(6065684321545150080) + INT64_C(2147483648), 32));
-    const int_fast32_t next_heading_case_angle_series_2 = (int_fast32_t)(shifted_(shifted_((int64_t)next_heading_case_angle_square * next_heading_case_angle_series, 2)
+    const int_fast32_t next_heading_case_angle_series_2 =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_heading_case_angle_square * next_heading_case_angle_series, 2)
         + INT64_C(4054853067505913472) + INT32_C(1073741824), 31));
-    const int_fast32_t next_heading_case_angle_series_3 = (int_fast32_t)(shifted_(shifted_((int64_t)next_heading_case_angle_square * next_heading_case_angle_series_2, 2)
+    const int_fast32_t next_heading_case_angle_series_3 =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_heading_case_angle_square * next_heading_case_angle_series_2, 2)
         - INT64_C(5267120772635892064) + INT64_C(2147483648), 32));
-    const int_fast32_t next_heading_case_angle_series_4 = (int_fast32_t)(shifted_(shifted_((int64_t)next_heading_case_angle_square * next_heading_case_angle_series_3, 1)
+    const int_fast32_t next_heading_case_angle_series_4 =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_heading_case_angle_square * next_heading_case_angle_series_3, 1)
         + INT64_C(7378564090463267680) + INT64_C(2147483648), 32));
-    const int_fast32_t next_heading_case_angle_series_5 = (int_fast32_t)(shifted_(shifted_((int64_t)next_heading_case_angle_square * next_heading_case_angle_series_4, 2)
+    const int_fast32_t next_heading_case_angle_series_5 =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_((int64_t)next_heading_case_angle_square * next_heading_case_angle_series_4, 2)
         - INT64_C(6148913518682917232) + INT64_C(2147483648), 32));
-    const int_fast32_t next_heading_case_angle_bend = (int_fast32_t)(shifted_((int64_t)next_heading_case_angle_square * next_heading_case_angle_series_5
+    const int_fast32_t next_heading_case_angle_bend =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_((int64_t)next_heading_case_angle_square * next_heading_case_angle_series_5
         - INT64_C(11967952160) + INT32_C(1073741824), 31));
-    const int64_t next_heading_case_angle_arctangent = (int64_t)next_heading_case_angle_tangent * INT64_C(4294967296)
-        + shifted_((int64_t)next_heading_case_angle_tangent * next_heading_case_angle_bend, 2);
-    const int64_t next_heading_case_angle_angle = shifted_(next_heading_case_angle_arctangent, 2)
+    const int64_t next_heading_case_angle_arctangent =
+        (int64_t)next_heading_case_angle_tangent * INT64_C(4294967296)
+        + euler_angles_from_dcm_q31_shr_((int64_t)next_heading_case_angle_tangent * next_heading_case_angle_bend, 2);
+    const int64_t next_heading_case_angle_angle =
+        euler_angles_from_dcm_q31_shr_(next_heading_case_angle_arctangent, 2)
         + INT64_C(3622009729038561420);
     const int64_t next_heading_case_angle_octant = (next_heading_case_angle_beyond >= 0 ? next_heading_case_angle_angle
-        : shifted_(next_heading_case_angle_arctangent, 2));
-    const int64_t next_heading_case_angle_angle_2 = shifted_(-next_heading_case_angle_octant, 1)
+        : euler_angles_from_dcm_q31_shr_(next_heading_case_angle_arctangent, 2));
+    const int64_t next_heading_case_angle_angle_2 =
+        euler_angles_from_dcm_q31_shr_(-next_heading_case_angle_octant, 1)
         + INT64_C(3622009729038561420);
     const int64_t next_heading_case_angle_quadrant = ((int64_t)next_heading_case_angle_width >= (int64_t)next_heading_case_angle_height ? next_heading_case_angle_octant
         : next_heading_case_angle_angle_2 * 2);
-    const int64_t next_heading_case_angle_angle_3 = shifted_(-next_heading_case_angle_quadrant, 2)
+    const int64_t next_heading_case_angle_angle_3 =
+        euler_angles_from_dcm_q31_shr_(-next_heading_case_angle_quadrant, 2)
         + INT64_C(3622009729038561420);
-    const int64_t next_heading_case_angle_half = ((int64_t)C_11 >= 0 ? shifted_(next_heading_case_angle_quadrant, 1)
+    const int64_t next_heading_case_angle_half = ((int64_t)C_11 >= 0 ? euler_angles_from_dcm_q31_shr_(next_heading_case_angle_quadrant, 1)
         : next_heading_case_angle_angle_3 * 2);
     const int64_t next_heading_case_angle_angle_4 = -next_heading_case_angle_half;
     const int64_t next_heading_case_angle_side = ((int64_t)C_21 >= 0 ? next_heading_case_angle_half
@@ -326,14 +377,18 @@ static inline int one_(const int32_t state[9], const int32_t previous[3], int32_
     const int64_t next_heading_case_principal_argument_choice_case = -next_roll;
     const int64_t next_heading_case_principal_argument_choice = (0 >= (int64_t)C_31 ? next_roll
         : next_heading_case_principal_argument_choice_case);
-    const int_fast32_t next_heading_case_principal_argument = (int_fast32_t)(shifted_(shifted_(apart, 1)
-        + shifted_(next_heading_case_principal_argument_choice, 1) + INT64_C(2147483648), 32));
+    const int_fast32_t next_heading_case_principal_argument =
+        (int_fast32_t)(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_shr_(apart, 1)
+        + euler_angles_from_dcm_q31_shr_(next_heading_case_principal_argument_choice, 1)
+        + INT64_C(2147483648), 32));
     const int_fast32_t next_heading_case_principal_taken = (int_fast32_t)(((int64_t)next_heading_case_principal_argument >= INT32_C(1686629785) ? INT32_C(1686629785)
         : (-INT32_C(1686629785)) >= (int64_t)next_heading_case_principal_argument ? (-INT32_C(1686629785))
         : (int64_t)next_heading_case_principal_argument));
-    const int64_t next_heading_case_principal_turned = (int64_t)next_heading_case_principal_taken * INT32_C(1073741824)
+    const int64_t next_heading_case_principal_turned =
+        (int64_t)next_heading_case_principal_taken * INT32_C(1073741824)
         - INT64_C(1811004864519280711);
-    const int64_t next_heading_case_principal_turned_2 = (int64_t)next_heading_case_principal_taken * INT32_C(1073741824)
+    const int64_t next_heading_case_principal_turned_2 =
+        (int64_t)next_heading_case_principal_taken * INT32_C(1073741824)
         + INT64_C(1811004864519280711);
     const int64_t next_heading_case_principal_principal = ((int64_t)next_heading_case_principal_taken >= INT32_C(843314856) ? next_heading_case_principal_turned
         : (-INT32_C(843314856)) >= (int64_t)next_heading_case_principal_taken ? next_heading_case_principal_turned_2
@@ -342,8 +397,10 @@ static inline int one_(const int32_t state[9], const int32_t previous[3], int32_
     /* heading */
     const int64_t next_heading = (cosine_squared >= INT64_C(288230376151711744) ? next_heading_case_angle
         : next_heading_case_principal * 8);
-    const int_fast32_t found_roll = (int_fast32_t)(shifted_(next_roll + INT64_C(2147483648), 32));
-    const int_fast32_t found_heading = (int_fast32_t)(shifted_(next_heading + INT64_C(2147483648), 32));
+    const int_fast32_t found_roll = (int_fast32_t)(euler_angles_from_dcm_q31_shr_(next_roll
+        + INT64_C(2147483648), 32));
+    const int_fast32_t found_heading = (int_fast32_t)(euler_angles_from_dcm_q31_shr_(next_heading
+        + INT64_C(2147483648), 32));
     next[0] = (int32_t)found_roll;
     next[1] = (int32_t)next_pitch;
     next[2] = (int32_t)found_heading;
@@ -352,7 +409,7 @@ static inline int one_(const int32_t state[9], const int32_t previous[3], int32_
 
 int euler_angles_from_dcm_q31(const int32_t state[9], const int32_t previous[3], int32_t next[3])
 {
-    return one_(state, previous, next);
+    return euler_angles_from_dcm_q31_one_(state, previous, next);
 }
 
 size_t euler_angles_from_dcm_q31_array(size_t count, int *status, const int32_t *state,
@@ -360,7 +417,7 @@ size_t euler_angles_from_dcm_q31_array(size_t count, int *status, const int32_t 
 {
     *status = 0;
     for (size_t k = 0; k < count; ++k) {
-        *status = one_(state + 9 * k, previous + 3 * k, next + 3 * k);
+        *status = euler_angles_from_dcm_q31_one_(state + 9 * k, previous + 3 * k, next + 3 * k);
         if (*status)
             return k;
     }

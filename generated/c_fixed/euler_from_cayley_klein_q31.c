@@ -5,22 +5,22 @@
 #include "euler_from_cayley_klein_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int outside_(int_fast32_t x, int_fast32_t limit)
+static inline int euler_from_cayley_klein_q31_out_(int_fast32_t x, int_fast32_t limit)
 {
     return (uint64_t)x + (uint64_t)limit > 2 * (uint64_t)limit;
 }
 
 /* The algorithm. Static, so that the loops below can take it in. */
-static inline int one_(const int32_t state[4], int32_t converted[4])
+static inline int euler_from_cayley_klein_q31_one_(const int32_t state[4], int32_t converted[4])
 {
     const int_fast32_t a_s = state[0];
     const int_fast32_t a_x = state[1];
     const int_fast32_t a_y = state[2];
     const int_fast32_t a_z = state[3];
-    if (outside_(a_s, INT32_C(1140850688))
-        || outside_(a_x, INT32_C(1140850688))
-        || outside_(a_y, INT32_C(1140850688))
-        || outside_(a_z, INT32_C(1140850688)))
+    if (euler_from_cayley_klein_q31_out_(a_s, INT32_C(1140850688))
+        || euler_from_cayley_klein_q31_out_(a_x, INT32_C(1140850688))
+        || euler_from_cayley_klein_q31_out_(a_y, INT32_C(1140850688))
+        || euler_from_cayley_klein_q31_out_(a_z, INT32_C(1140850688)))
         return 1;
     const int_fast32_t next_x = (int_fast32_t)((int64_t)a_x);
     const int_fast32_t next_y = (int_fast32_t)((int64_t)a_y);
@@ -35,7 +35,7 @@ static inline int one_(const int32_t state[4], int32_t converted[4])
 
 int euler_from_cayley_klein_q31(const int32_t state[4], int32_t converted[4])
 {
-    return one_(state, converted);
+    return euler_from_cayley_klein_q31_one_(state, converted);
 }
 
 size_t euler_from_cayley_klein_q31_array(size_t count, int *status, const int32_t *state,
@@ -43,7 +43,7 @@ size_t euler_from_cayley_klein_q31_array(size_t count, int *status, const int32_
 {
     *status = 0;
     for (size_t k = 0; k < count; ++k) {
-        *status = one_(state + 4 * k, converted + 4 * k);
+        *status = euler_from_cayley_klein_q31_one_(state + 4 * k, converted + 4 * k);
         if (*status)
             return k;
     }

@@ -5,7 +5,7 @@
 #include "euler_from_dcm_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int outside_(int_fast32_t x, int_fast32_t limit)
+static inline int euler_from_dcm_q31_out_(int_fast32_t x, int_fast32_t limit)
 {
     return (uint64_t)x + (uint64_t)limit > 2 * (uint64_t)limit;
 }
@@ -13,13 +13,13 @@ static inline int outside_(int_fast32_t x, int_fast32_t limit)
 /* x / 2^n, rounded down. The right shift of a negative number is left to the compiler by the standard; this is not, and
  * compilers make one arithmetic shift of it.
  */
-static inline int64_t shifted_(int64_t x, int n)
+static inline int64_t euler_from_dcm_q31_shr_(int64_t x, int n)
 {
     return x < 0 ? ~(~x >> n) : x >> n;
 }
 
 /* numerator / denominator of their magnitudes, to the nearest; the sign comes last. */
-static int64_t quotient_(int64_t numerator, int64_t denominator)
+static int64_t euler_from_dcm_q31_div_(int64_t numerator, int64_t denominator)
 {
     const int64_t top = numerator < 0 ? -numerator : numerator;
     const int64_t below = denominator < 0 ? -denominator : denominator;
@@ -28,7 +28,7 @@ static int64_t quotient_(int64_t numerator, int64_t denominator)
 }
 
 /* Square root bit by bit, to the nearest. */
-static int_fast32_t root_(uint64_t square)
+static int_fast32_t euler_from_dcm_q31_sqrt_(uint64_t square)
 {
     uint64_t root = 0, bit = (uint64_t)1 << 62;
     while (bit) {
@@ -44,7 +44,7 @@ static int_fast32_t root_(uint64_t square)
 }
 
 /* The algorithm. Static, so that the loops below can take it in. */
-static inline int one_(const int32_t state[9], int32_t converted[4])
+static inline int euler_from_dcm_q31_one_(const int32_t state[9], int32_t converted[4])
 {
     const int_fast32_t C_11 = state[0];
     const int_fast32_t C_12 = state[1];
@@ -55,15 +55,15 @@ static inline int one_(const int32_t state[9], int32_t converted[4])
     const int_fast32_t C_31 = state[6];
     const int_fast32_t C_32 = state[7];
     const int_fast32_t C_33 = state[8];
-    if (outside_(C_11, INT32_C(1140850688))
-        || outside_(C_12, INT32_C(1140850688))
-        || outside_(C_13, INT32_C(1140850688))
-        || outside_(C_21, INT32_C(1140850688))
-        || outside_(C_22, INT32_C(1140850688))
-        || outside_(C_23, INT32_C(1140850688))
-        || outside_(C_31, INT32_C(1140850688))
-        || outside_(C_32, INT32_C(1140850688))
-        || outside_(C_33, INT32_C(1140850688)))
+    if (euler_from_dcm_q31_out_(C_11, INT32_C(1140850688))
+        || euler_from_dcm_q31_out_(C_12, INT32_C(1140850688))
+        || euler_from_dcm_q31_out_(C_13, INT32_C(1140850688))
+        || euler_from_dcm_q31_out_(C_21, INT32_C(1140850688))
+        || euler_from_dcm_q31_out_(C_22, INT32_C(1140850688))
+        || euler_from_dcm_q31_out_(C_23, INT32_C(1140850688))
+        || euler_from_dcm_q31_out_(C_31, INT32_C(1140850688))
+        || euler_from_dcm_q31_out_(C_32, INT32_C(1140850688))
+        || euler_from_dcm_q31_out_(C_33, INT32_C(1140850688)))
         return 1;
     /* trace of C */
     const int64_t trace = (int64_t)C_11 + (int64_t)C_22 + (int64_t)C_33;
@@ -106,31 +106,37 @@ static inline int one_(const int32_t state[9], int32_t converted[4])
         : four_zz);
     const int_fast32_t factor_quotient_choice = (int_fast32_t)((column_s >= 0 ? 1
         : (-1)));
-    const int_fast32_t factor_quotient_root = root_((uint64_t)(largest * INT32_C(268435456)));
-    const int_fast32_t factor_quotient = (int_fast32_t)(quotient_((int64_t)factor_quotient_choice * INT64_C(576460752303423488), factor_quotient_root));
+    const int_fast32_t factor_quotient_root =
+        euler_from_dcm_q31_sqrt_((uint64_t)(largest * INT32_C(268435456)));
+    const int_fast32_t factor_quotient =
+        (int_fast32_t)(euler_from_dcm_q31_div_((int64_t)factor_quotient_choice * INT64_C(576460752303423488), factor_quotient_root));
     /* makes the scalar part positive */
     const int_fast32_t factor = (int_fast32_t)((int64_t)factor_quotient);
-    const int_fast32_t column_s_word = (int_fast32_t)(shifted_(column_s + 2, 2));
+    const int_fast32_t column_s_word = (int_fast32_t)(euler_from_dcm_q31_shr_(column_s + 2, 2));
     /* Euler parameters, body to reference, scalar last */
-    const int64_t next_s_unchecked = shifted_((int64_t)column_s_word * factor + INT32_C(268435456), 29);
+    const int64_t next_s_unchecked = euler_from_dcm_q31_shr_((int64_t)column_s_word * factor
+        + INT32_C(268435456), 29);
     if (next_s_unchecked < (-INT32_C(1140850688))
         || next_s_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_s = (int_fast32_t)next_s_unchecked;
-    const int_fast32_t column_x_word = (int_fast32_t)(shifted_(column_x + 2, 2));
-    const int64_t next_x_unchecked = shifted_((int64_t)column_x_word * factor + INT32_C(268435456), 29);
+    const int_fast32_t column_x_word = (int_fast32_t)(euler_from_dcm_q31_shr_(column_x + 2, 2));
+    const int64_t next_x_unchecked = euler_from_dcm_q31_shr_((int64_t)column_x_word * factor
+        + INT32_C(268435456), 29);
     if (next_x_unchecked < (-INT32_C(1140850688))
         || next_x_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_x = (int_fast32_t)next_x_unchecked;
-    const int_fast32_t column_y_word = (int_fast32_t)(shifted_(column_y + 2, 2));
-    const int64_t next_y_unchecked = shifted_((int64_t)column_y_word * factor + INT32_C(268435456), 29);
+    const int_fast32_t column_y_word = (int_fast32_t)(euler_from_dcm_q31_shr_(column_y + 2, 2));
+    const int64_t next_y_unchecked = euler_from_dcm_q31_shr_((int64_t)column_y_word * factor
+        + INT32_C(268435456), 29);
     if (next_y_unchecked < (-INT32_C(1140850688))
         || next_y_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_y = (int_fast32_t)next_y_unchecked;
-    const int_fast32_t column_z_word = (int_fast32_t)(shifted_(column_z + 2, 2));
-    const int64_t next_z_unchecked = shifted_((int64_t)column_z_word * factor + INT32_C(268435456), 29);
+    const int_fast32_t column_z_word = (int_fast32_t)(euler_from_dcm_q31_shr_(column_z + 2, 2));
+    const int64_t next_z_unchecked = euler_from_dcm_q31_shr_((int64_t)column_z_word * factor
+        + INT32_C(268435456), 29);
     if (next_z_unchecked < (-INT32_C(1140850688))
         || next_z_unchecked > INT32_C(1140850688))
         return 2;
@@ -144,14 +150,14 @@ static inline int one_(const int32_t state[9], int32_t converted[4])
 
 int euler_from_dcm_q31(const int32_t state[9], int32_t converted[4])
 {
-    return one_(state, converted);
+    return euler_from_dcm_q31_one_(state, converted);
 }
 
 size_t euler_from_dcm_q31_array(size_t count, int *status, const int32_t *state, int32_t *converted)
 {
     *status = 0;
     for (size_t k = 0; k < count; ++k) {
-        *status = one_(state + 9 * k, converted + 4 * k);
+        *status = euler_from_dcm_q31_one_(state + 9 * k, converted + 4 * k);
         if (*status)
             return k;
     }

@@ -5,7 +5,7 @@
 #include "euler_normalize_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int outside_(int_fast32_t x, int_fast32_t limit)
+static inline int euler_normalize_q31_out_(int_fast32_t x, int_fast32_t limit)
 {
     return (uint64_t)x + (uint64_t)limit > 2 * (uint64_t)limit;
 }
@@ -13,13 +13,13 @@ static inline int outside_(int_fast32_t x, int_fast32_t limit)
 /* x / 2^n, rounded down. The right shift of a negative number is left to the compiler by the standard; this is not, and
  * compilers make one arithmetic shift of it.
  */
-static inline int64_t shifted_(int64_t x, int n)
+static inline int64_t euler_normalize_q31_shr_(int64_t x, int n)
 {
     return x < 0 ? ~(~x >> n) : x >> n;
 }
 
 /* numerator / denominator of their magnitudes, to the nearest; the sign comes last. */
-static int64_t quotient_(int64_t numerator, int64_t denominator)
+static int64_t euler_normalize_q31_div_(int64_t numerator, int64_t denominator)
 {
     const int64_t top = numerator < 0 ? -numerator : numerator;
     const int64_t below = denominator < 0 ? -denominator : denominator;
@@ -28,7 +28,7 @@ static int64_t quotient_(int64_t numerator, int64_t denominator)
 }
 
 /* Square root bit by bit, to the nearest. */
-static int_fast32_t root_(uint64_t square)
+static int_fast32_t euler_normalize_q31_sqrt_(uint64_t square)
 {
     uint64_t root = 0, bit = (uint64_t)1 << 62;
     while (bit) {
@@ -44,33 +44,35 @@ static int_fast32_t root_(uint64_t square)
 }
 
 /* The algorithm. Static, so that the loops below can take it in. */
-static inline int one_(const int32_t state[4], int32_t next[4])
+static inline int euler_normalize_q31_one_(const int32_t state[4], int32_t next[4])
 {
     const int_fast32_t e_x = state[0];
     const int_fast32_t e_y = state[1];
     const int_fast32_t e_z = state[2];
     const int_fast32_t e_s = state[3];
-    if (outside_(e_x, INT32_C(1140850688))
-        || outside_(e_y, INT32_C(1140850688))
-        || outside_(e_z, INT32_C(1140850688))
-        || outside_(e_s, INT32_C(1140850688)))
+    if (euler_normalize_q31_out_(e_x, INT32_C(1140850688))
+        || euler_normalize_q31_out_(e_y, INT32_C(1140850688))
+        || euler_normalize_q31_out_(e_z, INT32_C(1140850688))
+        || euler_normalize_q31_out_(e_s, INT32_C(1140850688)))
         return 1;
-    const int64_t inverse_norm_radicand = (int64_t)e_s * e_s + (int64_t)e_x * e_x + (int64_t)e_y * e_y
-        + (int64_t)e_z * e_z;
+    const int64_t inverse_norm_radicand =
+        (int64_t)e_s * e_s + (int64_t)e_x * e_x + (int64_t)e_y * e_y + (int64_t)e_z * e_z;
     if (inverse_norm_radicand < INT64_C(576460752303423488)
         || inverse_norm_radicand > INT64_C(2305843009213693952))
         return 2;
-    const int_fast32_t inverse_norm_root = root_((uint64_t)(shifted_(inverse_norm_radicand, 2)));
+    const int_fast32_t inverse_norm_root =
+        euler_normalize_q31_sqrt_((uint64_t)(euler_normalize_q31_shr_(inverse_norm_radicand, 2)));
     /* 1/|state| */
-    const int_fast32_t inverse_norm = (int_fast32_t)(quotient_(INT64_C(576460752303423488), inverse_norm_root));
+    const int_fast32_t inverse_norm =
+        (int_fast32_t)(euler_normalize_q31_div_(INT64_C(576460752303423488), inverse_norm_root));
     /* Euler parameters, body to reference, scalar last, after the step */
-    const int_fast32_t next_s = (int_fast32_t)(shifted_((int64_t)e_s * inverse_norm
+    const int_fast32_t next_s = (int_fast32_t)(euler_normalize_q31_shr_((int64_t)e_s * inverse_norm
         + INT32_C(536870912), 30));
-    const int_fast32_t next_x = (int_fast32_t)(shifted_((int64_t)e_x * inverse_norm
+    const int_fast32_t next_x = (int_fast32_t)(euler_normalize_q31_shr_((int64_t)e_x * inverse_norm
         + INT32_C(536870912), 30));
-    const int_fast32_t next_y = (int_fast32_t)(shifted_((int64_t)e_y * inverse_norm
+    const int_fast32_t next_y = (int_fast32_t)(euler_normalize_q31_shr_((int64_t)e_y * inverse_norm
         + INT32_C(536870912), 30));
-    const int_fast32_t next_z = (int_fast32_t)(shifted_((int64_t)e_z * inverse_norm
+    const int_fast32_t next_z = (int_fast32_t)(euler_normalize_q31_shr_((int64_t)e_z * inverse_norm
         + INT32_C(536870912), 30));
     next[0] = (int32_t)next_x;
     next[1] = (int32_t)next_y;
@@ -81,14 +83,14 @@ static inline int one_(const int32_t state[4], int32_t next[4])
 
 int euler_normalize_q31(const int32_t state[4], int32_t next[4])
 {
-    return one_(state, next);
+    return euler_normalize_q31_one_(state, next);
 }
 
 size_t euler_normalize_q31_array(size_t count, int *status, const int32_t *state, int32_t *next)
 {
     *status = 0;
     for (size_t k = 0; k < count; ++k) {
-        *status = one_(state + 4 * k, next + 4 * k);
+        *status = euler_normalize_q31_one_(state + 4 * k, next + 4 * k);
         if (*status)
             return k;
     }

@@ -5,7 +5,7 @@
 #include "euler_product_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int outside_(int_fast32_t x, int_fast32_t limit)
+static inline int euler_product_q31_out_(int_fast32_t x, int_fast32_t limit)
 {
     return (uint64_t)x + (uint64_t)limit > 2 * (uint64_t)limit;
 }
@@ -13,13 +13,14 @@ static inline int outside_(int_fast32_t x, int_fast32_t limit)
 /* x / 2^n, rounded down. The right shift of a negative number is left to the compiler by the standard; this is not, and
  * compilers make one arithmetic shift of it.
  */
-static inline int64_t shifted_(int64_t x, int n)
+static inline int64_t euler_product_q31_shr_(int64_t x, int n)
 {
     return x < 0 ? ~(~x >> n) : x >> n;
 }
 
 /* The algorithm. Static, so that the loops below can take it in. */
-static inline int one_(const int32_t state[4], const int32_t transition[4], int32_t next[4])
+static inline int euler_product_q31_one_(const int32_t state[4], const int32_t transition[4],
+    int32_t next[4])
 {
     const int_fast32_t e_x = state[0];
     const int_fast32_t e_y = state[1];
@@ -29,35 +30,35 @@ static inline int one_(const int32_t state[4], const int32_t transition[4], int3
     const int_fast32_t p_y = transition[1];
     const int_fast32_t p_z = transition[2];
     const int_fast32_t p_s = transition[3];
-    if (outside_(e_x, INT32_C(1140850688))
-        || outside_(e_y, INT32_C(1140850688))
-        || outside_(e_z, INT32_C(1140850688))
-        || outside_(e_s, INT32_C(1140850688))
-        || outside_(p_x, INT32_C(1140850688))
-        || outside_(p_y, INT32_C(1140850688))
-        || outside_(p_z, INT32_C(1140850688))
-        || outside_(p_s, INT32_C(1140850688)))
+    if (euler_product_q31_out_(e_x, INT32_C(1140850688))
+        || euler_product_q31_out_(e_y, INT32_C(1140850688))
+        || euler_product_q31_out_(e_z, INT32_C(1140850688))
+        || euler_product_q31_out_(e_s, INT32_C(1140850688))
+        || euler_product_q31_out_(p_x, INT32_C(1140850688))
+        || euler_product_q31_out_(p_y, INT32_C(1140850688))
+        || euler_product_q31_out_(p_z, INT32_C(1140850688))
+        || euler_product_q31_out_(p_s, INT32_C(1140850688)))
         return 1;
     /* Euler parameters, body to reference, scalar last, after the step */
-    const int64_t next_s_unchecked = shifted_((int64_t)e_s * p_s - (int64_t)e_x * p_x
+    const int64_t next_s_unchecked = euler_product_q31_shr_((int64_t)e_s * p_s - (int64_t)e_x * p_x
         - (int64_t)e_y * p_y - (int64_t)e_z * p_z + INT32_C(536870912), 30);
     if (next_s_unchecked < (-INT32_C(1140850688))
         || next_s_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_s = (int_fast32_t)next_s_unchecked;
-    const int64_t next_x_unchecked = shifted_((int64_t)e_s * p_x + (int64_t)e_x * p_s
+    const int64_t next_x_unchecked = euler_product_q31_shr_((int64_t)e_s * p_x + (int64_t)e_x * p_s
         + (int64_t)e_y * p_z - (int64_t)e_z * p_y + INT32_C(536870912), 30);
     if (next_x_unchecked < (-INT32_C(1140850688))
         || next_x_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_x = (int_fast32_t)next_x_unchecked;
-    const int64_t next_y_unchecked = shifted_((int64_t)e_s * p_y - (int64_t)e_x * p_z
+    const int64_t next_y_unchecked = euler_product_q31_shr_((int64_t)e_s * p_y - (int64_t)e_x * p_z
         + (int64_t)e_y * p_s + (int64_t)e_z * p_x + INT32_C(536870912), 30);
     if (next_y_unchecked < (-INT32_C(1140850688))
         || next_y_unchecked > INT32_C(1140850688))
         return 2;
     const int_fast32_t next_y = (int_fast32_t)next_y_unchecked;
-    const int64_t next_z_unchecked = shifted_((int64_t)e_s * p_z + (int64_t)e_x * p_y
+    const int64_t next_z_unchecked = euler_product_q31_shr_((int64_t)e_s * p_z + (int64_t)e_x * p_y
         - (int64_t)e_y * p_x + (int64_t)e_z * p_s + INT32_C(536870912), 30);
     if (next_z_unchecked < (-INT32_C(1140850688))
         || next_z_unchecked > INT32_C(1140850688))
@@ -72,7 +73,7 @@ static inline int one_(const int32_t state[4], const int32_t transition[4], int3
 
 int euler_product_q31(const int32_t state[4], const int32_t transition[4], int32_t next[4])
 {
-    return one_(state, transition, next);
+    return euler_product_q31_one_(state, transition, next);
 }
 
 size_t euler_product_q31_array(size_t count, int *status, const int32_t *state,
@@ -80,7 +81,7 @@ size_t euler_product_q31_array(size_t count, int *status, const int32_t *state,
 {
     *status = 0;
     for (size_t k = 0; k < count; ++k) {
-        *status = one_(state + 4 * k, transition + 4 * k, next + 4 * k);
+        *status = euler_product_q31_one_(state + 4 * k, transition + 4 * k, next + 4 * k);
         if (*status)
             return k;
     }

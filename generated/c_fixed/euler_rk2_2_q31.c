@@ -5,7 +5,7 @@
 #include "euler_rk2_2_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int outside_(int_fast32_t x, int_fast32_t limit)
+static inline int euler_rk2_2_q31_out_(int_fast32_t x, int_fast32_t limit)
 {
     return (uint64_t)x + (uint64_t)limit > 2 * (uint64_t)limit;
 }
@@ -13,13 +13,14 @@ static inline int outside_(int_fast32_t x, int_fast32_t limit)
 /* x / 2^n, rounded down. The right shift of a negative number is left to the compiler by the standard; this is not, and
  * compilers make one arithmetic shift of it.
  */
-static inline int64_t shifted_(int64_t x, int n)
+static inline int64_t euler_rk2_2_q31_shr_(int64_t x, int n)
 {
     return x < 0 ? ~(~x >> n) : x >> n;
 }
 
 /* The algorithm. Static, so that the loops below can take it in. */
-static inline int one_(const int32_t state[4], const int32_t increments[6], int32_t next[4])
+static inline int euler_rk2_2_q31_one_(const int32_t state[4], const int32_t increments[6],
+    int32_t next[4])
 {
     const int_fast32_t e_x = state[0];
     const int_fast32_t e_y = state[1];
@@ -31,16 +32,16 @@ static inline int one_(const int32_t state[4], const int32_t increments[6], int3
     const int_fast32_t d2_x = increments[3];
     const int_fast32_t d2_y = increments[4];
     const int_fast32_t d2_z = increments[5];
-    if (outside_(e_x, INT32_C(1140850688))
-        || outside_(e_y, INT32_C(1140850688))
-        || outside_(e_z, INT32_C(1140850688))
-        || outside_(e_s, INT32_C(1140850688))
-        || outside_(d1_x, INT32_C(536870912))
-        || outside_(d1_y, INT32_C(536870912))
-        || outside_(d1_z, INT32_C(536870912))
-        || outside_(d2_x, INT32_C(536870912))
-        || outside_(d2_y, INT32_C(536870912))
-        || outside_(d2_z, INT32_C(536870912)))
+    if (euler_rk2_2_q31_out_(e_x, INT32_C(1140850688))
+        || euler_rk2_2_q31_out_(e_y, INT32_C(1140850688))
+        || euler_rk2_2_q31_out_(e_z, INT32_C(1140850688))
+        || euler_rk2_2_q31_out_(e_s, INT32_C(1140850688))
+        || euler_rk2_2_q31_out_(d1_x, INT32_C(536870912))
+        || euler_rk2_2_q31_out_(d1_y, INT32_C(536870912))
+        || euler_rk2_2_q31_out_(d1_z, INT32_C(536870912))
+        || euler_rk2_2_q31_out_(d2_x, INT32_C(536870912))
+        || euler_rk2_2_q31_out_(d2_y, INT32_C(536870912))
+        || euler_rk2_2_q31_out_(d2_z, INT32_C(536870912)))
         return 1;
     /* the angle increment of the whole step */
     const int_fast32_t sigma_x = (int_fast32_t)((int64_t)d1_x + (int64_t)d2_x);
@@ -50,27 +51,36 @@ static inline int one_(const int32_t state[4], const int32_t increments[6], int3
     const int64_t sigma_cross_d1_y = (int64_t)d1_x * sigma_z - (int64_t)d1_z * sigma_x;
     const int64_t sigma_cross_d1_z = (int64_t)d1_y * sigma_x - (int64_t)d1_x * sigma_y;
     /* the step applied to the identity: its vector part */
-    const int_fast32_t p_x = (int_fast32_t)((int64_t)sigma_x + shifted_(-sigma_cross_d1_x
+    const int_fast32_t p_x =
+        (int_fast32_t)((int64_t)sigma_x + euler_rk2_2_q31_shr_(-sigma_cross_d1_x
         + INT32_C(1073741824), 31));
-    const int_fast32_t p_y = (int_fast32_t)((int64_t)sigma_y + shifted_(-sigma_cross_d1_y
+    const int_fast32_t p_y =
+        (int_fast32_t)((int64_t)sigma_y + euler_rk2_2_q31_shr_(-sigma_cross_d1_y
         + INT32_C(1073741824), 31));
-    const int_fast32_t p_z = (int_fast32_t)((int64_t)sigma_z + shifted_(-sigma_cross_d1_z
+    const int_fast32_t p_z =
+        (int_fast32_t)((int64_t)sigma_z + euler_rk2_2_q31_shr_(-sigma_cross_d1_z
         + INT32_C(1073741824), 31));
     const int64_t d1_dot_d2 = (int64_t)d1_x * d2_x + (int64_t)d1_y * d2_y + (int64_t)d1_z * d2_z;
-    const int_fast32_t sigma_dot_sigma = (int_fast32_t)(shifted_((int64_t)sigma_x * sigma_x
-        + (int64_t)sigma_y * sigma_y + (int64_t)sigma_z * sigma_z + INT32_C(1073741824), 31));
+    const int_fast32_t sigma_dot_sigma =
+        (int_fast32_t)(euler_rk2_2_q31_shr_((int64_t)sigma_x * sigma_x + (int64_t)sigma_y * sigma_y
+        + (int64_t)sigma_z * sigma_z + INT32_C(1073741824), 31));
     /* its scalar part */
-    const int_fast32_t p_s = (int_fast32_t)(shifted_((int64_t)sigma_dot_sigma * 3 * INT32_C(134217728)
+    const int_fast32_t p_s =
+        (int_fast32_t)(euler_rk2_2_q31_shr_((int64_t)sigma_dot_sigma * 3 * INT32_C(134217728)
         - d1_dot_d2 + INT32_C(536870912), 30));
     /* Euler parameters, body to reference, scalar last, after the step */
-    const int_fast32_t next_s = (int_fast32_t)((int64_t)e_s + shifted_((int64_t)e_s * p_s
-        - (int64_t)e_x * p_x - (int64_t)e_y * p_y - (int64_t)e_z * p_z + INT64_C(4294967296), 33));
-    const int_fast32_t next_x = (int_fast32_t)((int64_t)e_x + shifted_((int64_t)e_s * p_x
-        + (int64_t)e_x * p_s + (int64_t)e_y * p_z - (int64_t)e_z * p_y + INT64_C(4294967296), 33));
-    const int_fast32_t next_y = (int_fast32_t)((int64_t)e_y + shifted_((int64_t)e_s * p_y
-        - (int64_t)e_x * p_z + (int64_t)e_y * p_s + (int64_t)e_z * p_x + INT64_C(4294967296), 33));
-    const int_fast32_t next_z = (int_fast32_t)((int64_t)e_z + shifted_((int64_t)e_s * p_z
-        + (int64_t)e_x * p_y - (int64_t)e_y * p_x + (int64_t)e_z * p_s + INT64_C(4294967296), 33));
+    const int_fast32_t next_s =
+        (int_fast32_t)((int64_t)e_s + euler_rk2_2_q31_shr_((int64_t)e_s * p_s - (int64_t)e_x * p_x
+        - (int64_t)e_y * p_y - (int64_t)e_z * p_z + INT64_C(4294967296), 33));
+    const int_fast32_t next_x =
+        (int_fast32_t)((int64_t)e_x + euler_rk2_2_q31_shr_((int64_t)e_s * p_x + (int64_t)e_x * p_s
+        + (int64_t)e_y * p_z - (int64_t)e_z * p_y + INT64_C(4294967296), 33));
+    const int_fast32_t next_y =
+        (int_fast32_t)((int64_t)e_y + euler_rk2_2_q31_shr_((int64_t)e_s * p_y - (int64_t)e_x * p_z
+        + (int64_t)e_y * p_s + (int64_t)e_z * p_x + INT64_C(4294967296), 33));
+    const int_fast32_t next_z =
+        (int_fast32_t)((int64_t)e_z + euler_rk2_2_q31_shr_((int64_t)e_s * p_z + (int64_t)e_x * p_y
+        - (int64_t)e_y * p_x + (int64_t)e_z * p_s + INT64_C(4294967296), 33));
     next[0] = (int32_t)next_x;
     next[1] = (int32_t)next_y;
     next[2] = (int32_t)next_z;
@@ -80,7 +90,7 @@ static inline int one_(const int32_t state[4], const int32_t increments[6], int3
 
 int euler_rk2_2_q31(const int32_t state[4], const int32_t increments[6], int32_t next[4])
 {
-    return one_(state, increments, next);
+    return euler_rk2_2_q31_one_(state, increments, next);
 }
 
 size_t euler_rk2_2_q31_array(size_t count, int *status, const int32_t *state,
@@ -88,7 +98,7 @@ size_t euler_rk2_2_q31_array(size_t count, int *status, const int32_t *state,
 {
     *status = 0;
     for (size_t k = 0; k < count; ++k) {
-        *status = one_(state + 4 * k, increments + 6 * k, next + 4 * k);
+        *status = euler_rk2_2_q31_one_(state + 4 * k, increments + 6 * k, next + 4 * k);
         if (*status)
             return k;
     }
@@ -107,7 +117,7 @@ int euler_rk2_2_q31_propagate(size_t runs, size_t steps, size_t record_every, si
         for (size_t j = 0; j < 4; ++j)
             state[j] = *history++ = *initial++;
         for (size_t step = 0; step < steps; ++step, increments += 6) {
-            int status = one_(state, increments, state);
+            int status = euler_rk2_2_q31_one_(state, increments, state);
             if (!status && orthonormalize_every && !--until_orthonormalize) {
                 if (orthonormalize(state, state))
                     status = 3;

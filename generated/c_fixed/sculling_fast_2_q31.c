@@ -5,7 +5,7 @@
 #include "sculling_fast_2_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int outside_(int_fast32_t x, int_fast32_t limit)
+static inline int sculling_fast_2_q31_out_(int_fast32_t x, int_fast32_t limit)
 {
     return (uint64_t)x + (uint64_t)limit > 2 * (uint64_t)limit;
 }
@@ -13,15 +13,16 @@ static inline int outside_(int_fast32_t x, int_fast32_t limit)
 /* x / 2^n, rounded down. The right shift of a negative number is left to the compiler by the standard; this is not, and
  * compilers make one arithmetic shift of it.
  */
-static inline int64_t shifted_(int64_t x, int n)
+static inline int64_t sculling_fast_2_q31_shr_(int64_t x, int n)
 {
     return x < 0 ? ~(~x >> n) : x >> n;
 }
 
 /* The algorithm. Static, so that the loops below can take it in. */
-static inline int one_(const int32_t angle_sum[3], const int32_t velocity_sum[3],
-    const int32_t sculling[3], const int32_t increment[3], const int32_t velocity_increment[3],
-    int32_t next_angle_sum[3], int32_t next_velocity_sum[3], int32_t next_sculling[3])
+static inline int sculling_fast_2_q31_one_(const int32_t angle_sum[3],
+    const int32_t velocity_sum[3], const int32_t sculling[3], const int32_t increment[3],
+    const int32_t velocity_increment[3], int32_t next_angle_sum[3], int32_t next_velocity_sum[3],
+    int32_t next_sculling[3])
 {
     const int_fast32_t beta_x = angle_sum[0];
     const int_fast32_t beta_y = angle_sum[1];
@@ -38,40 +39,46 @@ static inline int one_(const int32_t angle_sum[3], const int32_t velocity_sum[3]
     const int_fast32_t dv_x = velocity_increment[0];
     const int_fast32_t dv_y = velocity_increment[1];
     const int_fast32_t dv_z = velocity_increment[2];
-    if (outside_(beta_x, INT32_C(1073741824))
-        || outside_(beta_y, INT32_C(1073741824))
-        || outside_(beta_z, INT32_C(1073741824))
-        || outside_(u_x, INT32_C(1073741824))
-        || outside_(u_y, INT32_C(1073741824))
-        || outside_(u_z, INT32_C(1073741824))
-        || outside_(eta_x, INT32_C(1073741824))
-        || outside_(eta_y, INT32_C(1073741824))
-        || outside_(eta_z, INT32_C(1073741824))
-        || outside_(d_x, INT32_C(1073741824))
-        || outside_(d_y, INT32_C(1073741824))
-        || outside_(d_z, INT32_C(1073741824))
-        || outside_(dv_x, INT32_C(1073741824))
-        || outside_(dv_y, INT32_C(1073741824))
-        || outside_(dv_z, INT32_C(1073741824)))
+    if (sculling_fast_2_q31_out_(beta_x, INT32_C(1073741824))
+        || sculling_fast_2_q31_out_(beta_y, INT32_C(1073741824))
+        || sculling_fast_2_q31_out_(beta_z, INT32_C(1073741824))
+        || sculling_fast_2_q31_out_(u_x, INT32_C(1073741824))
+        || sculling_fast_2_q31_out_(u_y, INT32_C(1073741824))
+        || sculling_fast_2_q31_out_(u_z, INT32_C(1073741824))
+        || sculling_fast_2_q31_out_(eta_x, INT32_C(1073741824))
+        || sculling_fast_2_q31_out_(eta_y, INT32_C(1073741824))
+        || sculling_fast_2_q31_out_(eta_z, INT32_C(1073741824))
+        || sculling_fast_2_q31_out_(d_x, INT32_C(1073741824))
+        || sculling_fast_2_q31_out_(d_y, INT32_C(1073741824))
+        || sculling_fast_2_q31_out_(d_z, INT32_C(1073741824))
+        || sculling_fast_2_q31_out_(dv_x, INT32_C(1073741824))
+        || sculling_fast_2_q31_out_(dv_y, INT32_C(1073741824))
+        || sculling_fast_2_q31_out_(dv_z, INT32_C(1073741824)))
         return 1;
     /* sum of the angle increments since the slow cycle began, after the call */
-    const int_fast32_t next_beta_x = (int_fast32_t)((int64_t)beta_x + shifted_((int64_t)d_x + 4, 3));
-    const int_fast32_t next_beta_y = (int_fast32_t)((int64_t)beta_y + shifted_((int64_t)d_y + 4, 3));
-    const int_fast32_t next_beta_z = (int_fast32_t)((int64_t)beta_z + shifted_((int64_t)d_z + 4, 3));
+    const int_fast32_t next_beta_x = (int_fast32_t)((int64_t)beta_x
+        + sculling_fast_2_q31_shr_((int64_t)d_x + 4, 3));
+    const int_fast32_t next_beta_y = (int_fast32_t)((int64_t)beta_y
+        + sculling_fast_2_q31_shr_((int64_t)d_y + 4, 3));
+    const int_fast32_t next_beta_z = (int_fast32_t)((int64_t)beta_z
+        + sculling_fast_2_q31_shr_((int64_t)d_z + 4, 3));
     /* sum of the velocity increments since the slow cycle began, after the call */
-    const int_fast32_t next_u_x = (int_fast32_t)((int64_t)u_x + shifted_((int64_t)dv_x + 4, 3));
-    const int_fast32_t next_u_y = (int_fast32_t)((int64_t)u_y + shifted_((int64_t)dv_y + 4, 3));
-    const int_fast32_t next_u_z = (int_fast32_t)((int64_t)u_z + shifted_((int64_t)dv_z + 4, 3));
+    const int_fast32_t next_u_x =
+        (int_fast32_t)((int64_t)u_x + sculling_fast_2_q31_shr_((int64_t)dv_x + 4, 3));
+    const int_fast32_t next_u_y =
+        (int_fast32_t)((int64_t)u_y + sculling_fast_2_q31_shr_((int64_t)dv_y + 4, 3));
+    const int_fast32_t next_u_z =
+        (int_fast32_t)((int64_t)u_z + sculling_fast_2_q31_shr_((int64_t)dv_z + 4, 3));
     /* sculling integral since the slow cycle began, after the call */
-    const int_fast32_t next_eta_x = (int_fast32_t)((int64_t)eta_x + shifted_((int64_t)beta_y * dv_z
-        - (int64_t)beta_z * dv_y - (int64_t)d_y * u_z + (int64_t)d_z * u_y
-        + INT64_C(4294967296), 33));
-    const int_fast32_t next_eta_y = (int_fast32_t)((int64_t)eta_y + shifted_((int64_t)beta_z * dv_x
-        - (int64_t)beta_x * dv_z + (int64_t)d_x * u_z - (int64_t)d_z * u_x
-        + INT64_C(4294967296), 33));
-    const int_fast32_t next_eta_z = (int_fast32_t)((int64_t)eta_z + shifted_((int64_t)beta_x * dv_y
-        - (int64_t)beta_y * dv_x - (int64_t)d_x * u_y + (int64_t)d_y * u_x
-        + INT64_C(4294967296), 33));
+    const int_fast32_t next_eta_x = (int_fast32_t)((int64_t)eta_x
+        + sculling_fast_2_q31_shr_((int64_t)beta_y * dv_z - (int64_t)beta_z * dv_y
+        - (int64_t)d_y * u_z + (int64_t)d_z * u_y + INT64_C(4294967296), 33));
+    const int_fast32_t next_eta_y = (int_fast32_t)((int64_t)eta_y
+        + sculling_fast_2_q31_shr_((int64_t)beta_z * dv_x - (int64_t)beta_x * dv_z
+        + (int64_t)d_x * u_z - (int64_t)d_z * u_x + INT64_C(4294967296), 33));
+    const int_fast32_t next_eta_z = (int_fast32_t)((int64_t)eta_z
+        + sculling_fast_2_q31_shr_((int64_t)beta_x * dv_y - (int64_t)beta_y * dv_x
+        - (int64_t)d_x * u_y + (int64_t)d_y * u_x + INT64_C(4294967296), 33));
     next_angle_sum[0] = (int32_t)next_beta_x;
     next_angle_sum[1] = (int32_t)next_beta_y;
     next_angle_sum[2] = (int32_t)next_beta_z;
@@ -88,7 +95,8 @@ int sculling_fast_2_q31(const int32_t angle_sum[3], const int32_t velocity_sum[3
     const int32_t sculling[3], const int32_t increment[3], const int32_t velocity_increment[3],
     int32_t next_angle_sum[3], int32_t next_velocity_sum[3], int32_t next_sculling[3])
 {
-    return one_(angle_sum, velocity_sum, sculling, increment, velocity_increment, next_angle_sum, next_velocity_sum, next_sculling);
+    return sculling_fast_2_q31_one_(angle_sum, velocity_sum, sculling, increment,
+        velocity_increment, next_angle_sum, next_velocity_sum, next_sculling);
 }
 
 size_t sculling_fast_2_q31_array(size_t count, int *status, const int32_t *angle_sum,
@@ -98,9 +106,9 @@ size_t sculling_fast_2_q31_array(size_t count, int *status, const int32_t *angle
 {
     *status = 0;
     for (size_t k = 0; k < count; ++k) {
-        *status = one_(angle_sum + 3 * k, velocity_sum + 3 * k, sculling + 3 * k, increment + 3 * k,
-            velocity_increment + 3 * k, next_angle_sum + 3 * k, next_velocity_sum + 3 * k,
-            next_sculling + 3 * k);
+        *status = sculling_fast_2_q31_one_(angle_sum + 3 * k, velocity_sum + 3 * k,
+            sculling + 3 * k, increment + 3 * k, velocity_increment + 3 * k,
+            next_angle_sum + 3 * k, next_velocity_sum + 3 * k, next_sculling + 3 * k);
         if (*status)
             return k;
     }

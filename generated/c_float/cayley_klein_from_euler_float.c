@@ -5,7 +5,7 @@
 #include "cayley_klein_from_euler_float.h"
 
 /* The algorithm. Static, so that the loop below can take it in. */
-static inline void one_(const float state[4], float converted[4])
+static inline void cayley_klein_from_euler_float_one_(const float state[4], float converted[4])
 {
     const float e_x = state[0];
     const float e_y = state[1];
@@ -19,11 +19,11 @@ static inline void one_(const float state[4], float converted[4])
 
 void cayley_klein_from_euler_float(const float state[4], float converted[4])
 {
-    one_(state, converted);
+    cayley_klein_from_euler_float_one_(state, converted);
 }
 
 void cayley_klein_from_euler_float_array(size_t count, const float *state, float *converted)
 {
     for (size_t k = 0; k < count; ++k)
-        one_(state + 4 * k, converted + 4 * k);
+        cayley_klein_from_euler_float_one_(state + 4 * k, converted + 4 * k);
 }

@@ -5,7 +5,7 @@
 #include "coning_fast_float.h"
 
 /* The algorithm. Static, so that the loop below can take it in. */
-static inline void one_(const float angle_sum[3], const float coning[3],
+static inline void coning_fast_float_one_(const float angle_sum[3], const float coning[3],
     const float previous_increment[3], const float increment[3], float next_angle_sum[3],
     float next_coning[3], float next_previous_increment[3])
 {
@@ -50,8 +50,8 @@ void coning_fast_float(const float angle_sum[3], const float coning[3],
     const float previous_increment[3], const float increment[3], float next_angle_sum[3],
     float next_coning[3], float next_previous_increment[3])
 {
-    one_(angle_sum, coning, previous_increment, increment, next_angle_sum, next_coning,
-        next_previous_increment);
+    coning_fast_float_one_(angle_sum, coning, previous_increment, increment, next_angle_sum,
+        next_coning, next_previous_increment);
 }
 
 void coning_fast_float_array(size_t count, const float *angle_sum, const float *coning,
@@ -59,6 +59,7 @@ void coning_fast_float_array(size_t count, const float *angle_sum, const float *
     float *next_coning, float *next_previous_increment)
 {
     for (size_t k = 0; k < count; ++k)
-        one_(angle_sum + 3 * k, coning + 3 * k, previous_increment + 3 * k, increment + 3 * k,
-            next_angle_sum + 3 * k, next_coning + 3 * k, next_previous_increment + 3 * k);
+        coning_fast_float_one_(angle_sum + 3 * k, coning + 3 * k, previous_increment + 3 * k,
+            increment + 3 * k, next_angle_sum + 3 * k, next_coning + 3 * k,
+            next_previous_increment + 3 * k);
 }

@@ -7,16 +7,17 @@
 #include <math.h>
 
 /* sin(x)/x, 1 at 0. */
-static float sinc_(float x)
+static float coning_increments_float_sinc_(float x)
 {
     return x >= 0.0f && x <= 0.0f ? 1.0f : sinf(x) / x;
 }
 
 /* The algorithm. Static, so that the loop below can take it in. */
-static inline void one_(float middle, float width, float a, float b, float g, float increment[3])
+static inline void coning_increments_float_one_(float middle, float width, float a, float b,
+    float g, float increment[3])
 {
     const float shared_1 = b * middle;
-    const float shared_2 = a * width * sinc_(0.5f * (b * width));
+    const float shared_2 = a * width * coning_increments_float_sinc_(0.5f * (b * width));
     /* angle increment over the interval, body axes */
     const float increment_x = shared_2 * sinf(shared_1);
     const float increment_y = g * width;
@@ -29,12 +30,12 @@ static inline void one_(float middle, float width, float a, float b, float g, fl
 void coning_increments_float(float middle, float width, float a, float b, float g,
     float increment[3])
 {
-    one_(middle, width, a, b, g, increment);
+    coning_increments_float_one_(middle, width, a, b, g, increment);
 }
 
 void coning_increments_float_array(size_t count, const float *middle, const float *width,
     const float *a, const float *b, const float *g, float *increment)
 {
     for (size_t k = 0; k < count; ++k)
-        one_(middle[k], width[k], a[k], b[k], g[k], increment + 3 * k);
+        coning_increments_float_one_(middle[k], width[k], a[k], b[k], g[k], increment + 3 * k);
 }

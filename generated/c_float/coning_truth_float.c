@@ -7,13 +7,14 @@
 #include <math.h>
 
 /* sin(x)/x, 1 at 0. */
-static float sinc_(float x)
+static float coning_truth_float_sinc_(float x)
 {
     return x >= 0.0f && x <= 0.0f ? 1.0f : sinf(x) / x;
 }
 
 /* The algorithm. Static, so that the loop below can take it in. */
-static inline void one_(float time, float a, float b, float g, float rate[3], float attitude[9])
+static inline void coning_truth_float_one_(float time, float a, float b, float g, float rate[3],
+    float attitude[9])
 {
     const float shared_1 = b * time;
     const float shared_2 = sinf(shared_1);
@@ -29,10 +30,10 @@ static inline void one_(float time, float a, float b, float g, float rate[3], fl
     const float shared_21 = shared_6 * shared_7;
     const float shared_9 = shared_21 * shared_6;
     const float shared_10 = sqrtf(shared_8 + shared_9);
-    const float shared_11 = time * sinc_(shared_10);
+    const float shared_11 = time * coning_truth_float_sinc_(shared_10);
     const float shared_12 = shared_11 * shared_6;
     const float shared_13 = shared_12 * shared_2;
-    const float factor_1 = sinc_(0.5f * shared_10);
+    const float factor_1 = coning_truth_float_sinc_(0.5f * shared_10);
     const float shared_14 = 0.5f * (factor_1 * factor_1);
     const float shared_15 = shared_14 * shared_9;
     const float shared_16 = shared_14 * shared_8 - 1.0f;
@@ -66,12 +67,12 @@ static inline void one_(float time, float a, float b, float g, float rate[3], fl
 
 void coning_truth_float(float time, float a, float b, float g, float rate[3], float attitude[9])
 {
-    one_(time, a, b, g, rate, attitude);
+    coning_truth_float_one_(time, a, b, g, rate, attitude);
 }
 
 void coning_truth_float_array(size_t count, const float *time, const float *a, const float *b,
     const float *g, float *rate, float *attitude)
 {
     for (size_t k = 0; k < count; ++k)
-        one_(time[k], a[k], b[k], g[k], rate + 3 * k, attitude + 9 * k);
+        coning_truth_float_one_(time[k], a[k], b[k], g[k], rate + 3 * k, attitude + 9 * k);
 }

@@ -7,26 +7,27 @@
 #include <math.h>
 
 /* sin(x)/x, 1 at 0. */
-static float sinc_(float x)
+static float constant_truth_float_sinc_(float x)
 {
     return x >= 0.0f && x <= 0.0f ? 1.0f : sinf(x) / x;
 }
 
 /* The algorithm. Static, so that the loop below can take it in. */
-static inline void one_(float time, float x, float y, float z, float rate[3], float attitude[9])
+static inline void constant_truth_float_one_(float time, float x, float y, float z, float rate[3],
+    float attitude[9])
 {
     const float shared_1 = time * time;
     const float shared_2 = shared_1 * (y * y);
     const float shared_3 = shared_1 * (x * x);
     const float shared_4 = shared_1 * (z * z);
     const float shared_5 = sqrtf(shared_2 + shared_3 + shared_4);
-    const float factor_1 = sinc_(0.5f * shared_5);
+    const float factor_1 = constant_truth_float_sinc_(0.5f * shared_5);
     const float shared_6 = 0.5f * (factor_1 * factor_1);
     const float shared_7 = shared_2 * shared_6;
     const float shared_8 = shared_4 * shared_6 - 1.0f;
     /* direction cosine matrix, body to reference */
     const float C_11 = -(shared_7 + shared_8);
-    const float shared_9 = time * sinc_(shared_5);
+    const float shared_9 = time * constant_truth_float_sinc_(shared_5);
     const float shared_10 = shared_9 * z;
     const float shared_18 = shared_1 * shared_6;
     const float shared_11 = shared_18 * x;
@@ -60,12 +61,12 @@ static inline void one_(float time, float x, float y, float z, float rate[3], fl
 
 void constant_truth_float(float time, float x, float y, float z, float rate[3], float attitude[9])
 {
-    one_(time, x, y, z, rate, attitude);
+    constant_truth_float_one_(time, x, y, z, rate, attitude);
 }
 
 void constant_truth_float_array(size_t count, const float *time, const float *x, const float *y,
     const float *z, float *rate, float *attitude)
 {
     for (size_t k = 0; k < count; ++k)
-        one_(time[k], x[k], y[k], z[k], rate + 3 * k, attitude + 9 * k);
+        constant_truth_float_one_(time[k], x[k], y[k], z[k], rate + 3 * k, attitude + 9 * k);
 }

@@ -5,7 +5,8 @@
 #include "dcm_product_float.h"
 
 /* The algorithm. Static, so that the loop below can take it in. */
-static inline void one_(const float state[9], const float transition[9], float next[9])
+static inline void dcm_product_float_one_(const float state[9], const float transition[9],
+    float next[9])
 {
     const float C_11 = state[0];
     const float C_12 = state[1];
@@ -48,11 +49,11 @@ static inline void one_(const float state[9], const float transition[9], float n
 
 void dcm_product_float(const float state[9], const float transition[9], float next[9])
 {
-    one_(state, transition, next);
+    dcm_product_float_one_(state, transition, next);
 }
 
 void dcm_product_float_array(size_t count, const float *state, const float *transition, float *next)
 {
     for (size_t k = 0; k < count; ++k)
-        one_(state + 9 * k, transition + 9 * k, next + 9 * k);
+        dcm_product_float_one_(state + 9 * k, transition + 9 * k, next + 9 * k);
 }

@@ -9,7 +9,8 @@
 #endif
 
 /* The algorithm. Static, so that the loop below can take it in. */
-static inline void one_(const float state[9], const float increments[6], float next[9])
+static inline void dcm_rk1_2_float_one_(const float state[9], const float increments[6],
+    float next[9])
 {
     const float C_11 = state[0];
     const float C_12 = state[1];
@@ -57,27 +58,27 @@ static inline void one_(const float state[9], const float increments[6], float n
 
 void dcm_rk1_2_float(const float state[9], const float increments[6], float next[9])
 {
-    one_(state, increments, next);
+    dcm_rk1_2_float_one_(state, increments, next);
 }
 
 void dcm_rk1_2_float_array(size_t count, const float *state, const float *increments, float *next)
 {
     for (size_t k = 0; k < count; ++k)
-        one_(state + 9 * k, increments + 6 * k, next + 9 * k);
+        dcm_rk1_2_float_one_(state + 9 * k, increments + 6 * k, next + 9 * k);
 }
 
 /* One step of many runs, every element in an array of its own: restrict promises the compiler that it may take
  * several runs at once.
  */
-static void batch_(size_t runs, const float *restrict state_0, const float *restrict state_1,
-    const float *restrict state_2, const float *restrict state_3, const float *restrict state_4,
-    const float *restrict state_5, const float *restrict state_6, const float *restrict state_7,
-    const float *restrict state_8, const float *restrict increments_0,
-    const float *restrict increments_1, const float *restrict increments_2,
-    const float *restrict increments_3, const float *restrict increments_4,
-    const float *restrict increments_5, float *restrict next_0, float *restrict next_1,
-    float *restrict next_2, float *restrict next_3, float *restrict next_4, float *restrict next_5,
-    float *restrict next_6, float *restrict next_7, float *restrict next_8)
+static void dcm_rk1_2_float_batch_(size_t runs, const float *restrict state_0,
+    const float *restrict state_1, const float *restrict state_2, const float *restrict state_3,
+    const float *restrict state_4, const float *restrict state_5, const float *restrict state_6,
+    const float *restrict state_7, const float *restrict state_8,
+    const float *restrict increments_0, const float *restrict increments_1,
+    const float *restrict increments_2, const float *restrict increments_3,
+    const float *restrict increments_4, const float *restrict increments_5, float *restrict next_0,
+    float *restrict next_1, float *restrict next_2, float *restrict next_3, float *restrict next_4,
+    float *restrict next_5, float *restrict next_6, float *restrict next_7, float *restrict next_8)
 {
     for (size_t k = 0; k < runs; ++k) {
         const float C_11 = state_0[k];
@@ -127,22 +128,24 @@ static void batch_(size_t runs, const float *restrict state_0, const float *rest
 
 void dcm_rk1_2_float_batch(size_t runs, const float *state, const float *increments, float *next)
 {
-    batch_(runs, state + 0 * runs, state + 1 * runs, state + 2 * runs, state + 3 * runs,
-        state + 4 * runs, state + 5 * runs, state + 6 * runs, state + 7 * runs,
-        state + 8 * runs, increments + 0 * runs, increments + 1 * runs, increments + 2 * runs,
-        increments + 3 * runs, increments + 4 * runs, increments + 5 * runs, next + 0 * runs,
-        next + 1 * runs, next + 2 * runs, next + 3 * runs, next + 4 * runs, next + 5 * runs,
-        next + 6 * runs, next + 7 * runs, next + 8 * runs);
+    dcm_rk1_2_float_batch_(runs, state + 0 * runs, state + 1 * runs, state + 2 * runs,
+        state + 3 * runs, state + 4 * runs, state + 5 * runs, state + 6 * runs,
+        state + 7 * runs, state + 8 * runs, increments + 0 * runs, increments + 1 * runs,
+        increments + 2 * runs, increments + 3 * runs, increments + 4 * runs,
+        increments + 5 * runs, next + 0 * runs, next + 1 * runs, next + 2 * runs,
+        next + 3 * runs, next + 4 * runs, next + 5 * runs, next + 6 * runs, next + 7 * runs,
+        next + 8 * runs);
 }
 
-enum { BLOCK_ = 16 };
+enum { DCM_RK1_2_FLOAT_BLOCK = 16 };
 
-/* The part of `count` steps, at most BLOCK_, that does not wait for the state. Arrays are ordered by element,
+/* The part of `count` steps, at most DCM_RK1_2_FLOAT_BLOCK, that does not wait for the state. Arrays are ordered by element,
  * so that the compiler can take several steps at once.
  */
-static void prepare_(size_t count, const float *increments, float prepared[6][BLOCK_])
+static void dcm_rk1_2_float_ahead_(size_t count, const float *increments,
+    float prepared[6][DCM_RK1_2_FLOAT_BLOCK])
 {
-    float increments_by_element[6][BLOCK_];
+    float increments_by_element[6][DCM_RK1_2_FLOAT_BLOCK];
     for (size_t k = 0; k < count; ++k)
         for (size_t j = 0; j < 6; ++j)
             increments_by_element[j][k] = increments[6 * k + j];
@@ -171,8 +174,8 @@ static void prepare_(size_t count, const float *increments, float prepared[6][BL
 }
 
 /* The rest of step k of a block. */
-static inline void finish_(const float state[9], float prepared[6][BLOCK_], size_t k,
-    float next[9])
+static inline void dcm_rk1_2_float_rest_(const float state[9],
+    float prepared[6][DCM_RK1_2_FLOAT_BLOCK], size_t k, float next[9])
 {
     const float C_11 = state[0];
     const float C_12 = state[1];
@@ -213,14 +216,14 @@ static inline void finish_(const float state[9], float prepared[6][BLOCK_], size
 /* Steps `first` to `last` - 1 of a block, recorded one by one unless `record` is null. The state is a copy, so that it
  * stays in registers from step to step.
  */
-static void advance_(size_t first, size_t last, float prepared[6][BLOCK_],
-    float state[9], float *record)
+static void dcm_rk1_2_float_steps_(size_t first, size_t last,
+    float prepared[6][DCM_RK1_2_FLOAT_BLOCK], float state[9], float *record)
 {
     float own[9];
     for (size_t j = 0; j < 9; ++j)
         own[j] = state[j];
     for (size_t k = first; k < last; ++k) {
-        finish_(own, prepared, k, own);
+        dcm_rk1_2_float_rest_(own, prepared, k, own);
         if (record)
             for (size_t j = 0; j < 9; ++j)
                 *record++ = own[j];
@@ -241,9 +244,9 @@ int dcm_rk1_2_float_propagate(size_t runs, size_t steps, size_t record_every, si
         for (size_t j = 0; j < 9; ++j)
             state[j] = *history++ = *initial++;
         for (size_t step = 0; step < steps;) {
-            float prepared[6][BLOCK_];
-            const size_t count = steps - step < BLOCK_ ? steps - step : (size_t)BLOCK_;
-            prepare_(count, increments, prepared);
+            float prepared[6][DCM_RK1_2_FLOAT_BLOCK];
+            const size_t count = steps - step < DCM_RK1_2_FLOAT_BLOCK ? steps - step : (size_t)DCM_RK1_2_FLOAT_BLOCK;
+            dcm_rk1_2_float_ahead_(count, increments, prepared);
             increments += 6 * count;
             step += count;
             for (size_t k = 0; k < count;) {
@@ -252,7 +255,8 @@ int dcm_rk1_2_float_propagate(size_t runs, size_t steps, size_t record_every, si
                     ahead = until_orthonormalize;
                 if (record_every > 1 && until_record < ahead)
                     ahead = until_record;
-                advance_(k, k + ahead, prepared, state, record_every > 1 ? 0 : history);
+                dcm_rk1_2_float_steps_(k, k + ahead, prepared, state,
+                    record_every > 1 ? 0 : history);
                 k += ahead;
                 if (record_every == 1)
                     history += 9 * ahead;

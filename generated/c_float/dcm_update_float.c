@@ -7,13 +7,14 @@
 #include <math.h>
 
 /* sin(x)/x, 1 at 0. */
-static float sinc_(float x)
+static float dcm_update_float_sinc_(float x)
 {
     return x >= 0.0f && x <= 0.0f ? 1.0f : sinf(x) / x;
 }
 
 /* The algorithm. Static, so that the loop below can take it in. */
-static inline void one_(const float state[9], const float rotation_vector[3], float next[9])
+static inline void dcm_update_float_one_(const float state[9], const float rotation_vector[3],
+    float next[9])
 {
     const float C_11 = state[0];
     const float C_12 = state[1];
@@ -33,13 +34,13 @@ static inline void one_(const float state[9], const float rotation_vector[3], fl
     /* square of the angle */
     const float angle_squared = shared_1 + shared_2 + shared_3;
     const float shared_4 = sqrtf(angle_squared);
-    const float factor_1 = sinc_(0.5f * shared_4);
+    const float factor_1 = dcm_update_float_sinc_(0.5f * shared_4);
     const float shared_18 = 0.5f * (factor_1 * factor_1);
     const float shared_7 = shared_2 * shared_18;
     const float shared_8 = shared_3 * shared_18 - 1.0f;
     /* the step applied to the identity */
     const float A_11 = -(shared_7 + shared_8);
-    const float shared_9 = sinc_(shared_4);
+    const float shared_9 = dcm_update_float_sinc_(shared_4);
     const float shared_10 = phi_z * shared_9;
     const float shared_11 = phi_x * shared_18;
     const float shared_12 = phi_y * shared_11;
@@ -80,12 +81,12 @@ static inline void one_(const float state[9], const float rotation_vector[3], fl
 
 void dcm_update_float(const float state[9], const float rotation_vector[3], float next[9])
 {
-    one_(state, rotation_vector, next);
+    dcm_update_float_one_(state, rotation_vector, next);
 }
 
 void dcm_update_float_array(size_t count, const float *state, const float *rotation_vector,
     float *next)
 {
     for (size_t k = 0; k < count; ++k)
-        one_(state + 9 * k, rotation_vector + 3 * k, next + 9 * k);
+        dcm_update_float_one_(state + 9 * k, rotation_vector + 3 * k, next + 9 * k);
 }

@@ -5,8 +5,8 @@
 #include "dcm_velocity_2_float.h"
 
 /* The algorithm. Static, so that the loop below can take it in. */
-static inline void one_(const float state[9], const float velocity_sum[3], const float sculling[3],
-    const float angle_sum[3], float transformed[3])
+static inline void dcm_velocity_2_float_one_(const float state[9], const float velocity_sum[3],
+    const float sculling[3], const float angle_sum[3], float transformed[3])
 {
     const float C_11 = state[0];
     const float C_12 = state[1];
@@ -44,13 +44,13 @@ static inline void one_(const float state[9], const float velocity_sum[3], const
 void dcm_velocity_2_float(const float state[9], const float velocity_sum[3],
     const float sculling[3], const float angle_sum[3], float transformed[3])
 {
-    one_(state, velocity_sum, sculling, angle_sum, transformed);
+    dcm_velocity_2_float_one_(state, velocity_sum, sculling, angle_sum, transformed);
 }
 
 void dcm_velocity_2_float_array(size_t count, const float *state, const float *velocity_sum,
     const float *sculling, const float *angle_sum, float *transformed)
 {
     for (size_t k = 0; k < count; ++k)
-        one_(state + 9 * k, velocity_sum + 3 * k, sculling + 3 * k, angle_sum + 3 * k,
-            transformed + 3 * k);
+        dcm_velocity_2_float_one_(state + 9 * k, velocity_sum + 3 * k, sculling + 3 * k,
+            angle_sum + 3 * k, transformed + 3 * k);
 }

@@ -7,13 +7,14 @@
 #include <math.h>
 
 /* An angle of up to a turn and a half, brought to -pi to pi by a whole turn. */
-static float wrap_(float x)
+static float euler_angles_from_dcm_float_wrap_(float x)
 {
     return x > 3.1415927f ? x - 6.2831855f : x < -3.1415927f ? x + 6.2831855f : x;
 }
 
 /* The algorithm. Static, so that the loop below can take it in. */
-static inline void one_(const float state[9], const float previous[3], float next[3])
+static inline void euler_angles_from_dcm_float_one_(const float state[9], const float previous[3],
+    float next[3])
 {
     const float C_11 = state[0];
     const float C_12 = state[1];
@@ -37,7 +38,7 @@ static inline void one_(const float state[9], const float previous[3], float nex
     /* the angle between or together */
     const float apart = atan2f(steep_sine, steep_cosine);
     /* heading */
-    const float next_heading = (cosine_squared >= 0.25f ? atan2f(C_21, C_11) : wrap_(apart
+    const float next_heading = (cosine_squared >= 0.25f ? atan2f(C_21, C_11) : euler_angles_from_dcm_float_wrap_(apart
         + (0.0f >= C_31 ? next_roll : -next_roll)));
     next[0] = next_roll;
     next[1] = next_pitch;
@@ -46,12 +47,12 @@ static inline void one_(const float state[9], const float previous[3], float nex
 
 void euler_angles_from_dcm_float(const float state[9], const float previous[3], float next[3])
 {
-    one_(state, previous, next);
+    euler_angles_from_dcm_float_one_(state, previous, next);
 }
 
 void euler_angles_from_dcm_float_array(size_t count, const float *state, const float *previous,
     float *next)
 {
     for (size_t k = 0; k < count; ++k)
-        one_(state + 9 * k, previous + 3 * k, next + 3 * k);
+        euler_angles_from_dcm_float_one_(state + 9 * k, previous + 3 * k, next + 3 * k);
 }

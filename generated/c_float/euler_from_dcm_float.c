@@ -7,7 +7,7 @@
 #include <math.h>
 
 /* The algorithm. Static, so that the loop below can take it in. */
-static inline void one_(const float state[9], float converted[4])
+static inline void euler_from_dcm_float_one_(const float state[9], float converted[4])
 {
     const float C_11 = state[0];
     const float C_12 = state[1];
@@ -54,11 +54,11 @@ static inline void one_(const float state[9], float converted[4])
 
 void euler_from_dcm_float(const float state[9], float converted[4])
 {
-    one_(state, converted);
+    euler_from_dcm_float_one_(state, converted);
 }
 
 void euler_from_dcm_float_array(size_t count, const float *state, float *converted)
 {
     for (size_t k = 0; k < count; ++k)
-        one_(state + 9 * k, converted + 4 * k);
+        euler_from_dcm_float_one_(state + 9 * k, converted + 4 * k);
 }

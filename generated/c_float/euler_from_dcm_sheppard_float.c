@@ -7,7 +7,8 @@
 #include <math.h>
 
 /* The algorithm. Static, so that the loop below can take it in. */
-static inline void one_(const float state[9], const float previous[4], float converted[4])
+static inline void euler_from_dcm_sheppard_float_one_(const float state[9], const float previous[4],
+    float converted[4])
 {
     const float C_11 = state[0];
     const float C_12 = state[1];
@@ -61,12 +62,12 @@ static inline void one_(const float state[9], const float previous[4], float con
 void euler_from_dcm_sheppard_float(const float state[9], const float previous[4],
     float converted[4])
 {
-    one_(state, previous, converted);
+    euler_from_dcm_sheppard_float_one_(state, previous, converted);
 }
 
 void euler_from_dcm_sheppard_float_array(size_t count, const float *state, const float *previous,
     float *converted)
 {
     for (size_t k = 0; k < count; ++k)
-        one_(state + 9 * k, previous + 4 * k, converted + 4 * k);
+        euler_from_dcm_sheppard_float_one_(state + 9 * k, previous + 4 * k, converted + 4 * k);
 }

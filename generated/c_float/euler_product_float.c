@@ -5,7 +5,8 @@
 #include "euler_product_float.h"
 
 /* The algorithm. Static, so that the loop below can take it in. */
-static inline void one_(const float state[4], const float transition[4], float next[4])
+static inline void euler_product_float_one_(const float state[4], const float transition[4],
+    float next[4])
 {
     const float e_x = state[0];
     const float e_y = state[1];
@@ -28,12 +29,12 @@ static inline void one_(const float state[4], const float transition[4], float n
 
 void euler_product_float(const float state[4], const float transition[4], float next[4])
 {
-    one_(state, transition, next);
+    euler_product_float_one_(state, transition, next);
 }
 
 void euler_product_float_array(size_t count, const float *state, const float *transition,
     float *next)
 {
     for (size_t k = 0; k < count; ++k)
-        one_(state + 4 * k, transition + 4 * k, next + 4 * k);
+        euler_product_float_one_(state + 4 * k, transition + 4 * k, next + 4 * k);
 }

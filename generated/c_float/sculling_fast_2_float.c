@@ -5,7 +5,7 @@
 #include "sculling_fast_2_float.h"
 
 /* The algorithm. Static, so that the loop below can take it in. */
-static inline void one_(const float angle_sum[3], const float velocity_sum[3],
+static inline void sculling_fast_2_float_one_(const float angle_sum[3], const float velocity_sum[3],
     const float sculling[3], const float increment[3], const float velocity_increment[3],
     float next_angle_sum[3], float next_velocity_sum[3], float next_sculling[3])
 {
@@ -51,8 +51,8 @@ void sculling_fast_2_float(const float angle_sum[3], const float velocity_sum[3]
     const float sculling[3], const float increment[3], const float velocity_increment[3],
     float next_angle_sum[3], float next_velocity_sum[3], float next_sculling[3])
 {
-    one_(angle_sum, velocity_sum, sculling, increment, velocity_increment, next_angle_sum,
-        next_velocity_sum, next_sculling);
+    sculling_fast_2_float_one_(angle_sum, velocity_sum, sculling, increment, velocity_increment,
+        next_angle_sum, next_velocity_sum, next_sculling);
 }
 
 void sculling_fast_2_float_array(size_t count, const float *angle_sum, const float *velocity_sum,
@@ -60,7 +60,7 @@ void sculling_fast_2_float_array(size_t count, const float *angle_sum, const flo
     float *next_angle_sum, float *next_velocity_sum, float *next_sculling)
 {
     for (size_t k = 0; k < count; ++k)
-        one_(angle_sum + 3 * k, velocity_sum + 3 * k, sculling + 3 * k, increment + 3 * k,
-            velocity_increment + 3 * k, next_angle_sum + 3 * k, next_velocity_sum + 3 * k,
-            next_sculling + 3 * k);
+        sculling_fast_2_float_one_(angle_sum + 3 * k, velocity_sum + 3 * k, sculling + 3 * k,
+            increment + 3 * k, velocity_increment + 3 * k, next_angle_sum + 3 * k,
+            next_velocity_sum + 3 * k, next_sculling + 3 * k);
 }

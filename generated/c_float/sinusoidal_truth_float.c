@@ -7,18 +7,19 @@
 #include <math.h>
 
 /* sin(x)/x, 1 at 0. */
-static float sinc_(float x)
+static float sinusoidal_truth_float_sinc_(float x)
 {
     return x >= 0.0f && x <= 0.0f ? 1.0f : sinf(x) / x;
 }
 
 /* The algorithm. Static, so that the loop below can take it in. */
-static inline void one_(float time, float a, float b, float rate[3], float attitude[9])
+static inline void sinusoidal_truth_float_one_(float time, float a, float b, float rate[3],
+    float attitude[9])
 {
     const float shared_1 = b * time;
     /* body rate, body axes */
     const float rate_y = a * cosf(shared_1);
-    const float shared_2 = a * time * sinc_(shared_1);
+    const float shared_2 = a * time * sinusoidal_truth_float_sinc_(shared_1);
     const float shared_3 = cosf(shared_2);
     /* direction cosine matrix, body to reference */
     const float C_11 = shared_3;
@@ -42,12 +43,12 @@ static inline void one_(float time, float a, float b, float rate[3], float attit
 
 void sinusoidal_truth_float(float time, float a, float b, float rate[3], float attitude[9])
 {
-    one_(time, a, b, rate, attitude);
+    sinusoidal_truth_float_one_(time, a, b, rate, attitude);
 }
 
 void sinusoidal_truth_float_array(size_t count, const float *time, const float *a, const float *b,
     float *rate, float *attitude)
 {
     for (size_t k = 0; k < count; ++k)
-        one_(time[k], a[k], b[k], rate + 3 * k, attitude + 9 * k);
+        sinusoidal_truth_float_one_(time[k], a[k], b[k], rate + 3 * k, attitude + 9 * k);
 }

@@ -20,7 +20,6 @@ from strapgen.backends.two_speed import TwoSpeed
 from strapgen.ir.fixed_settings import Settings
 from strapgen.library.two_speed_sources import ALGORITHMS, SCULLING, loops, sources
 from strapgen.support.exceptions import InputError, InputTypeError
-from strapgen.targets import FIXED
 from strapgen.toolchain import compiler
 
 FORMS = [(a, s) for a in ALGORITHMS for s in SCULLING]
@@ -29,7 +28,7 @@ STRICT = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Werror"
 
 @cache
 def made(algorithm: str, sculling: int, backend: str, carry: str = "none") -> TwoSpeed:
-    settings = Settings(carry=carry) if BACKENDS[backend].target in FIXED else None
+    settings = Settings(carry=carry) if BACKENDS[backend].fixed else None
     return TwoSpeed(algorithm, sculling, backend, settings)
 
 
@@ -61,7 +60,7 @@ def test_coning_is_that_of_the_source_in_every_slow_cycle(algorithm, backend_nam
     drift = (turned[:-1].inv() * turned[1:]).as_rotvec()[:, 2] / SLOW
     # In floating point what an attitude near 1 is rounded to; in fixed point its certified bound.
     allowed = 2e-5 if backend_name == "c-float" else 1e-10
-    if BACKENDS[backend_name].target in FIXED:
+    if BACKENDS[backend_name].fixed:
         coning, attitude = runner.loops[0].fixed.outputs[1], runner.loops[1].fixed.outputs[0]
         allowed = 8 * float(attitude.errors[0] + 10 * coning.errors[0]) / SLOW
     assert np.abs(drift + 2.720926166e-3).max() <= allowed
@@ -394,7 +393,7 @@ def test_what_is_handed_on_has_the_range_of_what_it_was(name, partner):
 def test_a_refusal_names_the_loop(backend_name):
     if BACKENDS[backend_name].many_digits:  # its numbers have no largest one
         return
-    if BACKENDS[backend_name].target not in FIXED:
+    if not BACKENDS[backend_name].fixed:
         with pytest.raises(InputError, match="does not stay finite"):
             made("dcm", 2, backend_name).run(
                 np.full((4, 3), 1e200), np.full((4, 3), 1e200), fast_cycles=2, slow_cycles=2

@@ -95,6 +95,7 @@ BAD = {
     "stability euler --method ,": "--method names no method",
     "stability euler --plot a.xyz": "file type 'xyz' is not known",
     "tables --predict --backend c": "--predict and --backend do not go together",
+    "tables --predict --table 1": "--predict and --table do not go together",
     # Commands and options
     "integrate": "No such command 'integrate'",
     "list --formatt json": "No such option: --formatt",
@@ -439,6 +440,8 @@ BAD = {
     f"simulate euler {CONSTANT} --plot file/run.png": "file cannot be written",
     f"simulate euler {EVEN} --rate-unit deg/s --plot run": "file type '' is not known",
     # tables
+    "tables --table 6": "table is 6; a whole number from 1 to 5 is needed",
+    "tables --table five": "table is 'five'; a whole number is needed",
     "tables --backend fortran": "backend 'fortran' is not known; allowed: numpy, c, c-float",
     "tables --format csv": "format 'csv' is not known; allowed: text, json",
 }

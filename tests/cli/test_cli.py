@@ -32,7 +32,7 @@ from strapgen.simulation.courses import NavigationFrame, course
 from strapgen.simulation.motions import motion as make_motion
 from strapgen.simulation.recording import read_inertial
 from strapgen.simulation.runs import largest_increment
-from strapgen.targets import FIXED, TARGETS
+from strapgen.targets import TARGETS
 
 pytestmark = pytest.mark.filterwarnings("error")
 
@@ -446,10 +446,10 @@ def test_generate_json(target, strapgen_says, tmp_path):
     assert (data["kernel"], data["target"]) == ("cayley-klein-rk3-4", target)
     assert list(data["operations"]) == ["add", "multiply", "divide", "sqrt"]
     program = pipeline.lower(pipeline.derive("cayley-klein", "rk3", 4))
-    counted = pipeline.quantize(program) if target in FIXED else program
+    counted = pipeline.quantize(program) if TARGETS[target].fixed else program
     assert data["operations"].items() <= counted.operations.items()
     assert data["temporaries"] == counted.temporaries
-    assert set(data) >= {"formats", "ranges", "error_bound"} if target in FIXED else len(data) == 5
+    assert set(data) >= {"formats", "ranges", "error_bound"} if TARGETS[target].fixed else len(data) == 5
     sources = pipeline.generate(program, target)
     assert data["files"] == [str(Path("out") / name) for name in sources.files]
     assert {path.name: path.read_text() for path in (tmp_path / "out").iterdir()} == sources.files
@@ -901,6 +901,12 @@ def test_round_off_of_table_5(strapgen_says):
     double = drift("numpy")
     assert abs(drift("c-q31") - double) < 2e-6
     assert abs(drift("c-q31", "--carry full") - double) < 1e-7
+
+
+def test_one_table_by_its_number(strapgen_says):
+    said = strapgen_says("tables --table 5 --backend numpy")
+    assert said.startswith("Table 5: ") and said.count("Table ") == 1
+    assert said.strip() in strapgen_says("tables --backend numpy")
 
 
 def test_tables_text(strapgen_says):

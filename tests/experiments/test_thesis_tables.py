@@ -10,8 +10,8 @@ from tolerances import roundoff
 
 import strapgen
 from strapgen.backends import BACKENDS
-from strapgen.experiments.thesis_tables import TABLES, agrees, entries, table_settings
-from strapgen.targets import FIXED
+from strapgen.experiments import thesis_tables
+from strapgen.experiments.thesis_tables import TABLES, agrees, build_all, entries, table_settings
 
 # What an independent program computed from the thesis's equations, in double precision: orders 1, 2, 4.
 REPRODUCED = {
@@ -54,7 +54,7 @@ def certify(table, rows, backend_name):
 @pytest.mark.parametrize("table", TABLES, ids=lambda table: f"table-{table.number}")
 def test_tables(table, backend_name, make):
     rows = list(entries(table, backend_name))
-    if BACKENDS[backend_name].target in FIXED:
+    if BACKENDS[backend_name].fixed:
         certify(table, rows, backend_name)
         return
     assert [(row.algorithm, row.order) for row in rows] == [(a, o) for a in ("dcm", "euler") for o in ORDERS]
@@ -79,7 +79,7 @@ def test_the_contradiction_of_table_2_is_told(backend_name):
     noted = [row for row in entries(TABLES[1], backend_name) if "2.391" in (row.note or "")]
     assert [(row.algorithm, row.order) for row in noted] == [("dcm", 1)]
     assert "2.391" in noted[0].note
-    if BACKENDS[backend_name].target in FIXED:
+    if BACKENDS[backend_name].fixed:
         assert "not in this format" in noted[0].note, "the matrix grows to more than twice its size"
         return
     assert noted[0].note.count("2.391") == 2, "the run without orthonormalization gives the printed figure"
@@ -106,3 +106,15 @@ def test_the_contradiction_of_table_2_is_told(backend_name):
 )
 def test_agreement_in_the_printed_digits(value, printed, same):
     assert agrees(value, printed) is same
+
+
+def test_the_kernels_of_a_back_end_are_compiled_together(monkeypatch):
+    calls = []
+    monkeypatch.setattr(thesis_tables, "compile_together", lambda many: calls.append(list(many)))
+    kernels = [f"{algorithm}-rk{order}-2" for algorithm in ("dcm", "euler") for order in ORDERS]
+    assert list(build_all(("c", "c-q31"), tables=TABLES[4:])) == kernels * 2
+    beside = {"dcm-orthonormalize", "euler-normalize"}
+    for sources, target in zip(calls, ("c", "c-fixed"), strict=True):
+        assert {each.kernel for each in sources} == {*kernels, *beside}
+        assert {each.target for each in sources} == {target}
+        assert len({name for each in sources for name in each.files}) == 2 * 8  # no name twice: one module

@@ -18,6 +18,7 @@ from strapgen.cli import main
 from strapgen.fixedpoint import can_lower
 from strapgen.library import standard_tree
 from strapgen.support import resources
+from strapgen.targets.names import external
 
 CHECK = ["generate", "--all", "--check", "--out"]
 
@@ -59,11 +60,14 @@ def test_tree_holds_every_kernel_for_every_target():
         choice.kernel for choice in catalogue.standard()
     ]
     wanted = {"README.md", *(f"numpy/{name}.py" for name in names)}
-    wanted |= {f"c/{name}.{ending}" for name in names for ending in "ch"}
-    wanted |= {f"c_float/{name}_float.{ending}" for name in names for ending in "ch"}
     lowered = [program.name for program in programs().values() if can_lower(program)]
     assert lowered == [choice.kernel.replace("-", "_") for choice in FIXED_POINT]
-    wanted |= {f"c_fixed/{name}_q31.{ending}" for name in lowered for ending in "ch"}
+    for folder, infix, there in (
+        ("c", "", names),
+        ("c_float", "_float", names),
+        ("c_fixed", "_q31", lowered),
+    ):
+        wanted |= {f"{folder}/{external(name, infix)}.{ending}" for name in there for ending in "ch"}
     assert files().keys() == wanted
     for algorithm in catalogue.ALGORITHMS:
         stem = algorithm.replace("-", "_")

@@ -133,7 +133,7 @@ def printed_names() -> list[str]:
     found: set[str] = set()
     for target in targets.TARGETS:
         texts = strapgen.generate(
-            REFERENCE, target, FIXED if target in targets.FIXED else None
+            REFERENCE, target, FIXED if targets.TARGETS[target].fixed else None
         ).files.values()
         language = names.PYTHON if target in ("numpy", "fixed-model") else names.C
         found = found.union(*language.scopes(texts))
@@ -395,7 +395,7 @@ def test_names_that_would_become_the_same_are_kept_apart():
 def test_the_interface_keeps_the_names_of_the_kernel():
     called = HARMLESS._replace(elements=(*"kqjp", "i", "count", "out", "batch", "x", "status", *"abcdef"))
     for target in targets.TARGETS:
-        settings_ = FIXED if target in targets.FIXED else None
+        settings_ = FIXED if targets.TARGETS[target].fixed else None
         sources = strapgen.generate(strapgen.lower(step(called)), target, settings_)
         inputs = sources.interface()["function"]["inputs"]
         assert [signal["elements"] for signal in inputs] == [("i", "count", "out"), ("batch", "x", "status")]

@@ -163,13 +163,13 @@ def finite_trees(number: Any, wanted: int) -> list[Node]:
 
 
 @pytest.mark.parametrize(
-    ("real", "number"), [(emit.DOUBLE, np.float64), (emit.FLOAT, np.float32)], ids=["c", "c-float"]
+    ("target", "real", "number"), [("c", emit.DOUBLE, np.float64), ("c-float", emit.FLOAT, np.float32)]
 )
-def test_compiled_text_has_the_value_of_the_tree(real, number, tmp_path):
+def test_compiled_text_has_the_value_of_the_tree(target, real, number, tmp_path):
     if shutil.which("gcc") is None:
         pytest.skip("gcc is not on this machine")
     chosen = finite_trees(number, 200)
-    sources = emit.emit(program(*chosen), real.target)
+    sources = emit.emit(program(*chosen), target)
     for name, text in sources.files.items():
         (tmp_path / name).write_text(text)
     source = next(tmp_path.glob("*.c"))
@@ -189,7 +189,7 @@ def test_compiled_text_has_the_value_of_the_tree(real, number, tmp_path):
 def test_emitted_numpy_module_has_the_values_of_the_trees():
     """Long expressions are broken over lines; that must not change them."""
     chosen = finite_trees(np.float64, 200)
-    (text,) = emit_numpy(program(*chosen)).files.values()
+    (text,) = emit_numpy(program(*chosen), "numpy").files.values()
     scope: dict[str, Any] = {}
     exec(text, scope)
     wanted = np.array([run(tree, np.float64) for tree in chosen])

@@ -17,7 +17,6 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
 from strapgen.support import checks, stages
 from strapgen.support.exceptions import InputError, InputTypeError
-from strapgen.targets import FIXED
 
 __all__ = [
     "BACKENDS",
@@ -30,6 +29,7 @@ __all__ = [
     "evaluator",
     "fitted",
     "of_sources",
+    "sources_to_build",
 ]
 
 
@@ -53,9 +53,9 @@ def fitted(backend: str, settings: Settings | None) -> Settings | None:
         If the back end takes no settings, or none of this word.
     """
     entry = BACKENDS[checks.choice("backend", backend, BACKENDS)]
-    if entry.target not in FIXED:
+    if not entry.fixed:
         if settings is not None:
-            takers = ", ".join(name for name, other in BACKENDS.items() if other.target in FIXED)
+            takers = ", ".join(name for name, other in BACKENDS.items() if other.fixed)
             raise InputError(f"backend {backend} takes no fixed-point settings; these do: {takers}")
         return None
     if settings is not None and not isinstance(settings, Settings):
@@ -163,6 +163,24 @@ def backend(
         checks.choice("orthonormalization", orthonormalization, choice.orthonormalizations)
     step = sources_of_choice(choice, BACKENDS[backend].target, fitted(backend, settings))
     return backend_class(step.target)(StepSources(step, choice, orthonormalization))
+
+
+def sources_to_build(choice: Choice, backend: str, settings: Settings | None = None) -> list[Sources]:
+    """Return what a back end of an attitude step builds: the step, and the kernel that orthonormalizes its state.
+
+    `strapgen.compile_together` compiles those of many steps in one call of the compiler.
+
+    Parameters
+    ----------
+    choice : Choice
+        What `strapgen.choose_step` returned.
+    backend, settings
+        As for `backend`.
+    """
+    entry = BACKENDS[checks.choice("backend", backend, BACKENDS)]
+    step = StepSources(sources_of_choice(choice, entry.target, fitted(backend, settings)), choice)
+    beside = step.step_kernels.orthonormalize
+    return [step.step, *([] if beside is None else [step.sources(beside, entry.target)])]
 
 
 def chosen_step(

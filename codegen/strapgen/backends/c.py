@@ -10,17 +10,24 @@ from strapgen.backends.evaluators import Array, Evaluator
 from strapgen.backends.protocol import Backend
 from strapgen.backends.step_sources import StepSources
 from strapgen.ir.sources import Sources
+from strapgen.targets import BUILT_IN
 from strapgen.toolchain import compiler
 
-#: Name of the C type of a target's numbers, and the same type in numpy.
-REAL_TYPES = {"c": ("double", np.float64), "c-float": ("float", np.float32)}
+#: The types of C in numpy.
+_TYPES = {"double": np.float64, "float": np.float32}
+
+
+def real_type(target: str) -> tuple[str, Any]:
+    """Return the name of the C type of a target's numbers, and the same type in numpy."""
+    name = BUILT_IN[target].number
+    return name, _TYPES[name]
 
 
 class CEvaluator(Evaluator):
     """A generated C function."""
 
     def __init__(self, sources: Sources) -> None:
-        self.real, dtype = REAL_TYPES[sources.target]
+        self.real, dtype = real_type(sources.target)
         super().__init__(sources, dtype)
         self.module = compiler.load(sources)
         self._array = getattr(self.module.lib, f"{sources.function.name}_array")

@@ -18,7 +18,7 @@ from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
 from strapgen.library import two_speed_sources
-from strapgen.targets import FIXED
+from strapgen.targets import BUILT_IN
 from strapgen.targets.two_speed_c.emit import LOOPS, recursion, wiring
 
 #: From this word length on, a word resolves what a double does, and the gyro need not count pulses.
@@ -91,7 +91,7 @@ class Loops(ABC):
     @classmethod
     def generated(cls, algorithm: str, sculling: int, target: str, settings: Settings | None) -> LoopSources:
         """Return the sources that the class runs; parameters are those of `library.two_speed_sources.loops`."""
-        if target in FIXED:
+        if target in BUILT_IN and BUILT_IN[target].fixed:
             return LoopSources(two_speed_sources.loops(algorithm, sculling, target, settings))
         names = two_speed_sources.kernels(algorithm, sculling)
         return LoopSources(tuple(sources_of_choice(Choice(name), target) for name in names))

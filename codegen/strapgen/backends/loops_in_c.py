@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from strapgen.backends.c import REAL_TYPES
+from strapgen.backends.c import real_type
 from strapgen.backends.evaluators import Array, Evaluator
 from strapgen.backends.loops import Cycles, Loops, LoopsFromPython, LoopSources
 from strapgen.ir.fixed_settings import Settings
@@ -26,7 +26,7 @@ class LoopsInC(Loops):
             raise InputTypeError("the loops have no C of the whole; LoopsInC.generated returns it")
         fixed = sources.loops[0].fixed
         if fixed is None:
-            self._type, real = REAL_TYPES[sources.whole.target]
+            self._type, real = real_type(sources.whole.target)
             self.dtype = np.dtype(real)
             self._kind = self.dtype
         else:

@@ -14,6 +14,7 @@ from strapgen.backends.step_sources import StepSources
 from strapgen.ir.sources import Sources
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
+from strapgen.targets.registry import NUMPY
 
 
 class Backend(ABC):
@@ -87,7 +88,7 @@ class Backend(ABC):
 
     def _kernels(self) -> list[tuple[str | None, str]]:
         """Return the kernels that it may need beside the step, each with its target."""
-        return [(self._orthonormalization, self.sources.target), (self.attitude, "numpy")]
+        return [(self._orthonormalization, self.sources.target), (self.attitude, NUMPY)]
 
     @abstractmethod
     def beside(self, kernel: str) -> Evaluator:
@@ -118,7 +119,7 @@ class Backend(ABC):
         states = np.asarray(states, np.float64)
         if self.attitude is None:
             return np.array(states)
-        result: Array = NumpyEvaluator(self._parts.sources(self.attitude, "numpy"))(states)
+        result: Array = NumpyEvaluator(self._parts.sources(self.attitude, NUMPY))(states)
         return result
 
     def rounding_bound(self, steps: int, rounded_inputs: bool = False) -> float | None:

@@ -6,6 +6,9 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from strapgen.support.exceptions import InputError
+from strapgen.targets import BUILT_IN
+
 if TYPE_CHECKING:
     from strapgen.backends.evaluators import Evaluator
     from strapgen.backends.loops import Loops
@@ -43,6 +46,11 @@ class Entry(NamedTuple):
     word: int | None = None
     slow: bool = False
     many_digits: bool = False
+
+    @property
+    def fixed(self) -> bool:
+        """Whether it computes in fixed point, and so takes settings."""
+        return self.target in BUILT_IN and BUILT_IN[self.target].fixed
 
 
 _C = ("c.CEvaluator", "c.CBackend", "loops_in_c.LoopsInC")
@@ -83,7 +91,11 @@ DEFAULT_BACKENDS = tuple(name for name, entry in BACKENDS.items() if not entry.s
 
 
 def _of_target(target: str) -> Entry:
-    return next(entry for entry in BACKENDS.values() if entry.target == target)
+    for entry in BACKENDS.values():
+        if entry.target == target:
+            return entry
+    runnable = ", ".join(dict.fromkeys(e.target for e in BACKENDS.values() if e.target in BUILT_IN))
+    raise InputError(f"no back end runs code for target {target}; those for these targets run: {runnable}")
 
 
 def _class(place: str) -> Any:

@@ -150,10 +150,9 @@ class FixedOptions:
         """Refuse options of fixed point for a back end in floating point."""
         from strapgen.backends import BACKENDS
         from strapgen.support import checks
-        from strapgen.targets import FIXED
 
         checks.choice("backend", backend, BACKENDS)
-        if self.stated and BACKENDS[backend].target not in FIXED:
+        if self.stated and not BACKENDS[backend].fixed:
             raise InputError(f"{next(iter(self.stated))} is for fixed-point back ends, not for {backend}")
 
     def settings_for_run(
@@ -183,9 +182,8 @@ class FixedOptions:
         """
         from strapgen.backends import BACKENDS
         from strapgen.ir.fixed_settings import Settings
-        from strapgen.targets import FIXED
 
-        if BACKENDS[backend].target not in FIXED:
+        if not BACKENDS[backend].fixed:
             return None
         settings = self.at_step(step).settings(increments or 2) or Settings()
         bits = BACKENDS[backend].word

@@ -20,7 +20,6 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.simulation.runs import attitude, drift_between, require_finite
 from strapgen.support import checks, stages
 from strapgen.support.exceptions import InputError, InputTypeError
-from strapgen.targets import FIXED
 from strapgen.toolchain import compiler
 
 Array = NDArray[np.float64]
@@ -130,9 +129,7 @@ def compare(
     fixed = (settings or Settings()).for_increments(float(np.abs(d).max(initial=0.0)))
 
     def load(name: str) -> Backend:
-        return attitude_backend(
-            choice, backend=name, settings=fixed if BACKENDS[name].target in FIXED else None
-        )
+        return attitude_backend(choice, backend=name, settings=fixed if BACKENDS[name].fixed else None)
 
     standard = load(reference)
     states: Array = standard.propagate(d).astype(np.float64)

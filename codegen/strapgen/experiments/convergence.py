@@ -23,7 +23,6 @@ from strapgen.simulation.motions import Motion
 from strapgen.simulation.runs import largest_increment, simulate
 from strapgen.support import checks, stages
 from strapgen.support.exceptions import InputError, InputTypeError
-from strapgen.targets import FIXED
 
 #: Number of steps that the slope is fitted to: the finest of those whose error is truncation.
 FITTED = 3
@@ -223,7 +222,7 @@ def _on_backend(
 
     def measure(length: Fraction, count: int) -> tuple[float | None, float]:
         chosen = None
-        if BACKENDS[backend].target in FIXED:
+        if BACKENDS[backend].fixed:
             largest = largest_increment(motion, length, total, samples, previous=previous)
             chosen = (settings or Settings()).fitted(largest)
         stepper = attitude_backend(choice, backend=backend, settings=chosen)

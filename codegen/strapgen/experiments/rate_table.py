@@ -22,7 +22,6 @@ from strapgen.library import two_speed_sources
 from strapgen.simulation.runs import attitude, drift_between
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
-from strapgen.targets import FIXED
 
 Array = NDArray[np.float64]
 
@@ -185,10 +184,8 @@ def cases(algorithms: Sequence[str], backends: Sequence[str]) -> Iterator[Case]:
 
 def _row(case: Case, samples: Array, every: int, true: Array, settings: Settings | None) -> Row:
     motion, algorithm, method, count, backend = case
-    if BACKENDS[backend].target in FIXED:
-        settings = (settings or Settings()).fitted(float(np.abs(samples).max()))
-    else:
-        settings = None
+    largest = float(np.abs(samples).max())
+    settings = (settings or Settings()).fitted(largest) if BACKENDS[backend].fixed else None
     if algorithm == TWO_SPEED:
         name, run = f"{method} {TWO_SPEED}", _in_two_speeds(method, backend, settings, samples, every)
     else:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from decimal import Decimal
 from fractions import Fraction
@@ -11,13 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from strapgen.backends import BACKENDS, Backend, backend
+from strapgen.backends import BACKENDS, Backend, backend, sources_to_build
 from strapgen.backends import DEFAULT_BACKENDS as DEFAULT_BACKENDS
+from strapgen.catalogue import choose_step
 from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.sources import Sources
 from strapgen.simulation.motions import motion
 from strapgen.simulation.runs import Run, largest_increment, simulate
 from strapgen.support.exceptions import InputError
-from strapgen.targets import FIXED
+from strapgen.toolchain.compiler import compile_together
 
 STEP = Fraction(1, 8)
 DURATION = Fraction(180)
@@ -196,7 +198,7 @@ def table_settings(table: Table, backend_name: str, settings: Settings | None) -
     settings : Settings or None
         Settings beside the largest increment.
     """
-    if BACKENDS[backend_name].target not in FIXED:
+    if not BACKENDS[backend_name].fixed:
         return None
     profile = motion(table.motion, **table.settings)
     return (settings or Settings()).for_increments(largest_increment(profile, STEP, DURATION, 2))
@@ -260,46 +262,57 @@ def entries(table: Table, backend_name: str, settings: Settings | None = None) -
 
 
 def build_all(
-    backends: tuple[str, ...] = DEFAULT_BACKENDS, settings: Settings | None = None
+    backends: tuple[str, ...] = DEFAULT_BACKENDS,
+    settings: Settings | None = None,
+    tables: Sequence[Table] = TABLES,
 ) -> Iterator[str]:
-    """Generate and compile the kernels of the tables, one algorithm after the other.
+    """Generate the kernels of the tables, and compile those of a back end in one call of the compiler.
+
+    Where the tables' increments lead to different formats in fixed point, a kernel has several sources of one name, and
+    a back end as many calls.
 
     Parameters
     ----------
     backends : tuple of str, optional
     settings : Settings, optional
         As for `entries`.
+    tables : sequence of Table, optional
 
     Yields
     ------
     str
-        Name of each kernel after it is compiled.
+        Name of each kernel when it is generated.
     """
     for name in backends:
-        angles = {table_settings(table, name, settings): table for table in TABLES}
+        sources: list[Sources] = []
+        angles = {table_settings(table, name, settings): table for table in tables}
         for algorithm in ALGORITHMS:
             for order in ORDERS:
+                choice = choose_step(algorithm, f"rk{order}", 2)
                 for chosen in angles:
-                    stepper = backend(algorithm, f"rk{order}", 2, name, settings=chosen)
-                    stepper.orthonormalize(stepper.identity)
-                yield stepper.kernel
+                    sources += sources_to_build(choice, name, chosen)
+                yield choice.kernel
+        compile_together(sources)
 
 
 def run_tables(
-    backends: tuple[str, ...] = DEFAULT_BACKENDS, settings: Settings | None = None
+    backends: tuple[str, ...] = DEFAULT_BACKENDS,
+    settings: Settings | None = None,
+    tables: Sequence[Table] = TABLES,
 ) -> Iterator[TableEntry]:
-    """Run all tables on several back ends, table by table.
+    """Run tables on several back ends, table by table.
 
     Parameters
     ----------
     backends : tuple of str, optional
     settings : Settings, optional
         As for `entries`.
+    tables : sequence of Table, optional
 
     Yields
     ------
     TableEntry
     """
-    for table in TABLES:
+    for table in tables:
         for name in backends:
             yield from entries(table, name, settings)

@@ -11,7 +11,7 @@ import json
 import pickle
 from pathlib import Path
 
-from strapgen import pipeline
+from strapgen import pipeline, targets
 from strapgen.catalogue import Choice
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.program import Program
@@ -79,7 +79,9 @@ def sources(choice: Choice, target: str, settings: Settings | None = None) -> So
         (draft / "interface.json").write_text(json.dumps(compiled.interface()))
 
     stated = json.dumps(settings.as_dict(), sort_keys=True) if settings else ""
-    key = cache.digest([cache.generator_digest(), choice.identity, target, stated])
+    targets.require(target, settings)
+    code = targets.registry.identity(target)
+    key = cache.digest([cache.generator_digest(), choice.identity, target, code, stated])
     folder = cache.entry("sources", key, fill, f"sources of {choice.kernel} for {target}")
     interface = json.loads((folder / "interface.json").read_text())
     return Sources.restore(interface, {name: (folder / name).read_text() for name in interface["files"]})

@@ -13,7 +13,7 @@ from strapgen.ir.sources import Sources
 from strapgen.library import generated_sources
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
-from strapgen.targets import FIXED
+from strapgen.targets import BUILT_IN, TARGETS
 from strapgen.targets.contract import options
 from strapgen.targets.two_speed_c.emit import whole
 
@@ -129,7 +129,7 @@ def loops(
     """
     names = kernels(algorithm, sculling)
     targets.require(target, settings)
-    if target not in FIXED:
+    if not TARGETS[target].fixed:
         fast, slow, navigation = (generated_sources.sources(Choice(name), target) for name in names)
         return fast, slow, navigation
     settings = _without_largest_angle(settings or Settings())
@@ -213,8 +213,8 @@ def sources(
     >>> list(sources("dcm").files)[:2]
     ['dcm_two_speed_2.h', 'dcm_two_speed_2.c']
     """
-    checks.choice("target", target, ("c", "c-float", "c-fixed"))
-    if target in FIXED:
+    checks.choice("target", target, [name for name, entry in BUILT_IN.items() if entry.compiled])
+    if BUILT_IN[target].fixed:
         settings = _without_largest_angle(settings or Settings())
     parts = loops(algorithm, sculling, target, settings)
     command = f"strapgen two-speed {algorithm} --sculling {sculling} --target {target}"

@@ -16,7 +16,6 @@ from strapgen.library import two_speed_sources
 from strapgen.simulation.recording import InertialRecording
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
-from strapgen.targets import FIXED
 
 Array = NDArray[np.float64]
 
@@ -133,7 +132,7 @@ def course(
         )
     used = cycles * of_cycle
     angles, velocities = recording.increments[:used], recording.velocity_increments[:used]
-    if BACKENDS[backend].target in FIXED:
+    if BACKENDS[backend].fixed:
         settings = settings or Settings()
         needed = two_speed_sources.ranges(
             float(np.abs(angles).max()), float(np.abs(velocities).max()), fast_cycles, slow_cycles

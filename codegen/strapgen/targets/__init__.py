@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from importlib import import_module
-from typing import NamedTuple
 
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.integer_program import FixedProgram
@@ -12,37 +10,25 @@ from strapgen.ir.program import Program
 from strapgen.ir.sources import Function, Sources
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
+from strapgen.targets import registry
+from strapgen.targets.registry import BUILT_IN, TARGETS, Target, titles
 
-__all__ = ["FIXED", "TARGETS", "Function", "Sources", "Target", "emit", "require"]
+__all__ = [
+    "BUILT_IN",
+    "TARGETS",
+    "Function",
+    "Sources",
+    "Target",
+    "emit",
+    "fixed_targets",
+    "require",
+    "titles",
+]
 
 
-class Target(NamedTuple):
-    """A target: its title, the folder here whose ``emit(program, target)`` prints it, and the program that it takes.
-
-    `words` are the lengths of word that it supports, in bits; None stands for any.
-    """
-
-    title: str
-    module: str
-    program: type[Program | FixedProgram] = Program
-    words: tuple[int, ...] | None = None
-
-
-#: Targets by name.
-TARGETS = {
-    "numpy": Target("numpy, vectorised over leading axes", "numpy_code"),
-    "c": Target("C99 in double", "c"),
-    "c-float": Target("C99 in float", "c"),
-    "c-fixed": Target(
-        "C99 in fixed point: integers alone, error bounds certified", "c_fixed", FixedProgram, (16, 32, 64)
-    ),
-    "fixed-model": Target(
-        "Python on integers, bit for bit what the fixed-point C computes", "integer_model", FixedProgram
-    ),
-}
-
-#: Targets of fixed point, which take a quantized program: its settings are word, ranges, rounding.
-FIXED = tuple(name for name, target in TARGETS.items() if target.program is FixedProgram)
+def fixed_targets() -> tuple[str, ...]:
+    """Return the names of strapgen's targets of fixed point, which take a quantized program, and settings."""
+    return tuple(name for name, target in BUILT_IN.items() if target.fixed)
 
 
 def require(target: str, settings: Settings | None = None) -> None:
@@ -51,13 +37,14 @@ def require(target: str, settings: Settings | None = None) -> None:
     Raises
     ------
     InputError
-        If the target is unknown, takes no settings, or does not have their word.
+        If the target is unknown or cannot be used, takes no settings, or does not have their word.
     """
-    checks.choice("target", target, TARGETS)
-    if target in FIXED:
-        _require_word(target, (settings or Settings()).word)
+    entry = _entry(target)
+    if entry.fixed:
+        _require_word(entry, (settings or Settings()).word)
     elif settings is not None:
-        raise InputError(f"target {target} takes no fixed-point settings; these do: {', '.join(FIXED)}")
+        takers = ", ".join(fixed_targets())
+        raise InputError(f"target {target} takes no fixed-point settings; these do: {takers}")
 
 
 def emit(program: Program | FixedProgram, target: str) -> Sources:
@@ -66,7 +53,7 @@ def emit(program: Program | FixedProgram, target: str) -> Sources:
     Parameters
     ----------
     program : Program or FixedProgram
-        A `FixedProgram` for the targets of `FIXED`, a `Program` for all others.
+        A `FixedProgram` for the targets of fixed point, a `Program` for all others.
     target : str
         A key of `TARGETS`.
 
@@ -77,22 +64,27 @@ def emit(program: Program | FixedProgram, target: str) -> Sources:
     Raises
     ------
     InputError
-        If the target is unknown, takes the other kind of program, or does not have its word.
+        If the target is unknown, takes the other kind of program, or does not have its word; or if it is an entry
+        point's, and its code fails.
     """
-    entry = TARGETS[checks.choice("target", target, TARGETS)]
+    entry = _entry(target)
     if not isinstance(program, entry.program):
-        if target in FIXED:
+        if entry.fixed:
             raise InputError(f"target {target} takes quantized programs alone; strapgen.quantize makes them")
-        raise InputError(f"target {target} does not take fixed-point programs; these do: {', '.join(FIXED)}")
+        takers = ", ".join(fixed_targets())
+        raise InputError(f"target {target} does not take fixed-point programs; these do: {takers}")
     if isinstance(program, FixedProgram):
-        _require_word(target, program.word)
-    sources: Sources = import_module(f"{__name__}.{entry.module}.emit").emit(program, target)
+        _require_word(entry, program.word)
     plain = program.program if isinstance(program, FixedProgram) else program
-    return replace(sources, own=plain.own)
+    return replace(registry.run(target, program), own=plain.own)
 
 
-def _require_word(target: str, word: int) -> None:
-    words = TARGETS[target].words
-    if words is not None and word not in words:
-        allowed = ", ".join(map(str, words))
+def _entry(name: str) -> Target:
+    """Return a target by name; those of entry points are looked for where strapgen has none of the name."""
+    return BUILT_IN[name] if name in BUILT_IN else TARGETS[checks.choice("target", name, TARGETS)]
+
+
+def _require_word(entry: Target, word: int) -> None:
+    if entry.words is not None and word not in entry.words:
+        allowed = ", ".join(map(str, entry.words))
         raise InputError(f"word is {word}; in C it is {allowed} bits; the integer model takes any")

@@ -114,14 +114,38 @@ C = Language(_c_allows, _c_scopes)
 PYTHON = Language(_python_allows, _python_scopes)
 
 
-def external(name: str) -> str:
-    """Return the name of a kernel's function in C, changed if a library, a header or a keyword has it.
+#: Most characters of a kernel's name in C. C99 tells external names apart by 31 characters, and those of one kernel,
+#: such as ``<name>_float`` and ``<name>_float_array``, differ by then.
+_MOST = 23
+#: What C writes in longer names of the catalogue, a word after the other until the name is short enough.
+_SHORT = {
+    "orthonormalize": "orth",
+    "normalize": "norm",
+    "navigation": "nav",
+    "continuous": "cont",
+    "cayley_klein": "ck",
+}
+
+
+def external(name: str, ending: str = "") -> str:
+    """Return the name of a kernel's function in C: shortened if too long, changed if a library or a keyword has it.
+
+    Parameters
+    ----------
+    name : str
+        Name of the kernel, with underscores.
+    ending : str, optional
+        What the target puts behind it.
 
     Examples
     --------
-    >>> external("euler_rk4_2"), external("hypot")
-    ('euler_rk4_2', 'hypot_Kernel')
+    >>> external("euler_rk4_2"), external("hypot"), external("dcm_orthonormalize_optimal", "_float")
+    ('euler_rk4_2', 'hypot_Kernel', 'dcm_orth_optimal_float')
     """
+    for word, short in _SHORT.items():
+        if len(name) > _MOST:
+            name = re.sub(rf"(?<![a-z]){word}(?![a-z])", short, name)
+    name += ending
     free = _c_allows(name) and name not in LIBRARY and not name.endswith("_t")
     return name if free else f"{name}_Kernel"  # a capital letter stands in no other kernel's name
 

@@ -1,8 +1,9 @@
-"""Renders the templates of all targets, with the filters that they share."""
+"""Renders the templates of targets, with the filters that they share."""
 
 from __future__ import annotations
 
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import jinja2
@@ -14,15 +15,27 @@ from strapgen.targets.lines import fill, fill_arguments
 
 
 @cache
-def _environment() -> jinja2.Environment:
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(resources.folder("templates")),
+def environment(folder: Path | None = None) -> jinja2.Environment:
+    """Return the environment of templates.
+
+    Parameters
+    ----------
+    folder : Path, optional
+        Folder of the templates; by default `templates/`. A package that brings a target has one of its own.
+
+    Returns
+    -------
+    jinja2.Environment
+        With the filters that the templates of all targets share; an undefined name is an error.
+    """
+    shared = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(folder or resources.folder("templates")),
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    environment.filters.update(
+    shared.filters.update(
         fill=fill,
         arguments=fill_arguments,
         range=range_text,
@@ -34,9 +47,9 @@ def _environment() -> jinja2.Environment:
         residuals_text=contract.residuals_text,
         guards_text=contract.guards_text,
     )
-    return environment
+    return shared
 
 
 def render(template: str, **values: Any) -> str:
     """Return a template of `templates/` filled with values."""
-    return _environment().get_template(template).render(**values)
+    return environment().get_template(template).render(**values)

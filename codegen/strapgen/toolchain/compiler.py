@@ -29,8 +29,9 @@ from typing import Any
 
 from strapgen.ir.sources import Sources
 from strapgen.support import cache
-from strapgen.support.exceptions import CompilerError
+from strapgen.support.exceptions import CompilerError, InputError
 from strapgen.support.timing import timed
+from strapgen.targets import TARGETS
 
 #: Flags in addition to those of Python. Without contraction to fused multiply-add every machine computes the same bits.
 #: Without notes for debuggers, which Python's flags switch on, compiling takes a tenth less time.
@@ -70,7 +71,7 @@ def load(sources: Sources) -> Any:
     key = cache.digest([sources.target, *sources.files, *sources.files.values()])
     if key not in _loaded:
         with timed("build", f"{sources.kernel} for {sources.target}"):
-            _loaded[key] = _compiled(sources) if sources.target.startswith("c") else _import_text(sources)
+            _loaded[key] = _module(sources)
     return _loaded[key]
 
 
@@ -89,7 +90,7 @@ def compile_together(many: Iterable[Sources]) -> None:
     """
     missing: dict[str, Sources] = {}
     for sources in many:
-        if sources.target.startswith("c"):
+        if _language(sources) == "C":
             key = _key([sources])
             if _shared(key) is None and cache.lookup("builds", key) is None:
                 missing[key] = sources
@@ -127,6 +128,24 @@ def _shared(key: str) -> Path | None:
     module = json.loads((place / "module.json").read_text())
     folder = cache.lookup("builds", module["build"])
     return folder and folder / _library(module["name"])
+
+
+def _language(sources: Sources) -> str:
+    """Return the language of sources; "" for those of a back end that runs the program itself."""
+    return TARGETS[sources.target].language if sources.target in TARGETS else ""
+
+
+def _module(sources: Sources) -> Any:
+    """Compile or import sources by their language."""
+    language = _language(sources)
+    if language == "C":
+        return _compiled(sources)
+    if language == "Python":
+        return _import_text(sources)
+    raise InputError(
+        f"sources of {sources.kernel} for {sources.target} are {language or 'of no stated language'}; "
+        "C can be compiled, and Python imported"
+    )
 
 
 def _import_text(sources: Sources) -> ModuleType:
@@ -253,11 +272,15 @@ def _compile(many: Sequence[Sources], name: str, path: str, draft: Path) -> None
     for file, text in files.items():
         (draft / file).write_text(text)
     headers = [next(file for file in sources.files if file.endswith(".h")) for sources in many]
+    code = [file for file in files if file.endswith(".c")]
+    if len(many) > 1:  # their static names are different: one translation unit, in one call of the compiler
+        (draft / f"{name}_kernels.c").write_text("".join(f'#include "{file}"\n' for file in code))
+        code = [f"{name}_kernels.c"]
     request = {
         "name": name,
         "cdef": "\n".join(_declarations(files[header]) for header in headers),
         "header": "".join(f'#include "{header}"\n' for header in headers) + _UNOPTIMIZED,
-        "sources": [str(draft / file) for file in files if file.endswith(".c")],
+        "sources": [str(draft / file) for file in code],
         "flags": [*_flags, _VISIBILITY],
         "libraries": [] if sys.platform == "win32" else ["m"],
         "folder": str(draft),

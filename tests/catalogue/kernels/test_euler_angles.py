@@ -12,7 +12,6 @@ from scipy.spatial.transform import Rotation
 import strapgen
 from strapgen import derive
 from strapgen.backends import BACKENDS, Evaluator
-from strapgen.targets import FIXED
 
 EPS = 2.0**-52
 TURN = 2 * np.pi
@@ -150,9 +149,7 @@ def test_nothing_jumps_on_the_way_to_vertical_pitch(roll, heading, sign, backend
     matrices[-1, :, 0] = [0, 0, -sign]
     matrices[-1, 2] = [-sign, 0, 0]
     unit = (
-        float(of.interface.inputs[0].format.unit)
-        if BACKENDS[backend_name].target in FIXED
-        else np.finfo(of.dtype).eps
+        float(of.interface.inputs[0].format.unit) if BACKENDS[backend_name].fixed else np.finfo(of.dtype).eps
     )
     before, last, last_pitch = np.array([roll, pitches[0], heading]), None, 0.0
     for matrix, pitch in zip(matrices, pitches, strict=True):

@@ -15,7 +15,6 @@ from strapgen.backends import BACKENDS
 from strapgen.catalogue.kinematics import KINEMATICS
 from strapgen.ir.fixed_settings import Settings
 from strapgen.symbolic import rotations
-from strapgen.targets import FIXED
 
 ORDERS = [1, 2, 3, 4, 5, 7, pytest.param(12, marks=pytest.mark.long)]
 PRECISE = mpmath.mp.clone()
@@ -140,7 +139,7 @@ def test_the_exact_form_needs_no_switch(algorithm, backend_name):
     # its place, and the bound is certified.
     update = strapgen.evaluator(f"{algorithm}-update", backend_name)
     phi = np.concatenate([size * DIRECTIONS for size in SIZES])
-    check_exact(update, algorithm, phi, BACKENDS[backend_name].target in FIXED)
+    check_exact(update, algorithm, phi, BACKENDS[backend_name].fixed)
 
 
 #: Up to half a turn, on the spot and beyond, to a whole one and beyond.

@@ -27,7 +27,6 @@ from strapgen.catalogue.methods.coning import method, sample_terms
 from strapgen.catalogue.methods.coning_coefficients import FORMS, design
 from strapgen.ir.fixed_settings import Settings
 from strapgen.symbolic.rotations import cross_elements
-from strapgen.targets import FIXED
 
 #: Every number of samples, and of those kept.
 ALL = [(n, p) for n in range(1, MOST_INCREMENTS + 1) for p in range(MOST_PREVIOUS + 1)]
@@ -342,7 +341,7 @@ KERNELS = [
 def test_vectors_of_a_step_on_every_back_end(backend_name, name, method, count, previous, rng):
     choice = choose(name, method, count, previous=previous)
     settings = None
-    if BACKENDS[backend_name].target in FIXED:
+    if BACKENDS[backend_name].fixed:
         settings = Settings(ranges={"velocity_increments": Fraction(1, 8)} if name == "sculling" else {})
     run = evaluator(choice, backend_name, settings)
     made = lowered(choice)
@@ -495,7 +494,7 @@ def test_six_samples_leave_less():
 def test_a_cone_of_one_degree_on_every_back_end(backend_name):
     alpha, omega = math.radians(1), 20 * math.pi
     profile = strapgen.motion("coning", **{f"{k}_rad_s": v for k, v in cone(alpha, omega).items()})
-    settings = Settings(largest_angle=Fraction(1, 64)) if BACKENDS[backend_name].target in FIXED else None
+    settings = Settings(largest_angle=Fraction(1, 64)) if BACKENDS[backend_name].fixed else None
     ready = strapgen.backend("euler", "coning-compressed", 4, backend_name, settings=settings)
     reference = strapgen.backend("euler", "coning-compressed", 4)
     increments = profile.increments(Fraction(1, 25), 25, 4)

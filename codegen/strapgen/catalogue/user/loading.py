@@ -10,8 +10,6 @@ import contextlib
 import inspect
 import os
 import shlex
-import sys
-import traceback
 from collections.abc import Iterator
 from dataclasses import replace
 from importlib.metadata import EntryPoint, entry_points
@@ -19,8 +17,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from strapgen.catalogue.user import isolation, kernel_cache
-from strapgen.support import cache, checks
-from strapgen.support.exceptions import InputError, StrapgenError
+from strapgen.support import cache, checks, packages
+from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
     from strapgen.symbolic.kernel import Kernel
@@ -29,6 +27,8 @@ if TYPE_CHECKING:
 GROUP = "strapgen.algorithms"
 #: Name of the function in a file.
 FUNCTION = "algorithm"
+#: What a user's code must do.
+DUTY = "return a Kernel"
 #: Parameters that the function may have: a `Tableau`, and numbers of increments.
 OPTIONS = ("method", "increments", "previous")
 
@@ -74,7 +74,10 @@ def _of_file(name: str, options: dict[str, Any], texts: list[str]) -> Kernel:
         raise InputError(f"algorithm {name} cannot be read ({error.strerror})") from None
 
     def derive() -> tuple[Kernel, isolation.Record]:
-        with _isolated(path.parent) as record, _guarded(name):
+        with (
+            _isolated(path.parent) as record,
+            packages.guarded(name, DUTY, lambda file: file.name == path.name),
+        ):
             # Two files may have one name: each module gets a name of its own.
             module = isolation.load_source(
                 path, f"strapgen_user_{path.stem}_{cache.digest([str(path)])}", record
@@ -93,7 +96,8 @@ def _of_entry_point(name: str, options: dict[str, Any], texts: list[str]) -> Ker
     point = installed()[name]
 
     def derive() -> tuple[Kernel, isolation.Record]:
-        with _isolated(None, (point.module.partition(".")[0],)) as record, _guarded(name):
+        anew = (point.module.partition(".")[0],)
+        with _isolated(None, anew) as record, packages.guarded(name, DUTY, packages.belongs_to(point.module)):
             kernel = _called(name, point.load(), options)
         return kernel, record
 
@@ -151,22 +155,3 @@ def _require(name: str, kernel: Any) -> None:
 
 def _allowed(takes: list[str]) -> str:
     return f"it takes {', '.join(takes)}" if takes else "it takes no options"
-
-
-@contextlib.contextmanager
-def _guarded(name: str) -> Iterator[None]:
-    """Run a user's code: a failure becomes one line with its place, and what the code prints goes to stderr."""
-    try:
-        with contextlib.redirect_stdout(sys.stderr):
-            yield
-    except SystemExit:
-        raise InputError(f"{name} ends the program with sys.exit; it must return a Kernel") from None
-    except StrapgenError:
-        raise
-    except Exception as error:
-        frames = traceback.extract_tb(error.__traceback__)
-        lines = [frame.lineno for frame in frames if Path(frame.filename).name == Path(name).name]
-        line = error.lineno if isinstance(error, SyntaxError) else lines[-1] if lines else None
-        where = "" if line is None else f", line {line}"
-        said = error.msg if isinstance(error, SyntaxError) else " ".join(str(error).split())
-        raise InputError(f"{name}{where}: {type(error).__name__}: {said}") from error

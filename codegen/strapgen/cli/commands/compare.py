@@ -102,9 +102,8 @@ def _check_backends(names: list[str], reference: str) -> None:
 def _check_fixed(fixed: FixedOptions, backends: set[str]) -> None:
     """Refuse options of fixed point that no back end of the run uses."""
     from strapgen.backends import BACKENDS
-    from strapgen.targets import FIXED
 
-    if not any(BACKENDS[name].target in FIXED for name in backends):
+    if not any(BACKENDS[name].fixed for name in backends):
         for option in fixed.stated:
             raise InputError(f"{option} is for fixed-point back ends, and none is named")
     if fixed.word is not None and "fixed-model" not in backends:

@@ -80,14 +80,14 @@ def generate(
         raise InputError("an algorithm is needed, or --all; strapgen list shows them")
     from strapgen.library import generated_sources
     from strapgen.support.files import write_files
-    from strapgen.targets import FIXED, TARGETS
+    from strapgen.targets import TARGETS, fixed_targets
 
     choice = method.choose(algorithm, step=False)
     settings = fixed.settings(choice.increments_per_step)
     target = checks.choice("target", "numpy" if target is None else target, TARGETS)
-    if settings is not None and target not in FIXED:
+    if settings is not None and not TARGETS[target].fixed:
         raise InputError(
-            f"the options of fixed point go with --target {' or '.join(FIXED)}, not with {target}"
+            f"the options of fixed point go with --target {' or '.join(fixed_targets())}, not with {target}"
         )
     _check_increments(choice, fixed)
     sources = generated_sources.sources(choice, target, settings)

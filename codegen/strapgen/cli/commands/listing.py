@@ -32,7 +32,7 @@ def _parts() -> dict[str, dict[str, str]]:
     from strapgen.backends import BACKENDS
     from strapgen.catalogue.user import loading
     from strapgen.simulation.motions import keys
-    from strapgen.targets import TARGETS
+    from strapgen.targets import titles
 
     installed = {
         name: f"from {point.value}"
@@ -51,7 +51,7 @@ def _parts() -> dict[str, dict[str, str]]:
             name: ", ".join(" or ".join(choices) for choices in keys(name).values())
             for name in catalogue.MOTIONS
         },
-        "targets": {name: target.title for name, target in TARGETS.items()},
+        "targets": titles(),
         "backends": {name: entry.title for name, entry in BACKENDS.items()},
     }
 

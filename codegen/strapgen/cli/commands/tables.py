@@ -8,6 +8,7 @@ import typer
 
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
+from strapgen.cli.options import whole
 from strapgen.cli.output import Format, check_format, print_json
 from strapgen.cli.progress import track
 from strapgen.support.exceptions import InputError
@@ -24,6 +25,12 @@ def tables(
             show_default=False,
         ),
     ] = None,
+    table: Annotated[
+        str | None,
+        typer.Option(
+            "--table", help="Number of the only table to compute.  [default: all five]", show_default=False
+        ),
+    ] = None,
     fixed: Annotated[FixedOptions, Shown(only=("rounding", "carry"))],
     predict: Annotated[
         bool,
@@ -34,13 +41,15 @@ def tables(
     ] = False,
     format: Format = "text",
 ) -> None:
-    """Compute the five tables of the thesis again and print the results beside its figures.
+    """Compute the five tables of the thesis again, or one of them, and print the results beside its figures.
 
     Example: strapgen tables --backend c-q31 --carry full
     """
     check_format(format)
     if predict:
-        for option in [*([] if backend is None else ["--backend"]), *fixed.stated]:
+        for option in [o for o, v in (("--backend", backend), ("--table", table)) if v is not None] + [
+            *fixed.stated
+        ]:
             raise InputError(f"--predict and {option} do not go together")
         _predict(format)
         return
@@ -48,22 +57,23 @@ def tables(
     from strapgen.experiments.thesis_tables import ALGORITHMS, ORDERS, TABLES, build_all, run_tables
     from strapgen.reports.thesis_tables import thesis_table_text
     from strapgen.support import checks
-    from strapgen.targets import FIXED
 
     names = _runnable() if backend is None else (checks.choice("backend", backend, BACKENDS),)
     settings = fixed.settings(2)
-    if settings is not None and not any(BACKENDS[name].target in FIXED for name in names):
+    if settings is not None and not any(BACKENDS[name].fixed for name in names):
         raise InputError(f"--rounding and --carry are for fixed-point back ends, not for {', '.join(names)}")
+    number = None if table is None else checks.count("table", whole("table", table), largest=len(TABLES))
+    chosen = [each for each in TABLES if number in (None, each.number)]
     cases = len(names) * len(ALGORITHMS) * len(ORDERS)
-    for _ in track(build_all(names, settings), "building", cases):
+    for _ in track(build_all(names, settings, chosen), "building", cases):
         pass
-    entries = list(track(run_tables(names, settings), "simulating", cases * len(TABLES)))
+    entries = list(track(run_tables(names, settings, chosen), "simulating", cases * len(chosen)))
     if format == "json":
         print_json([entry.as_dict() for entry in entries])
         return
-    for table in TABLES:
-        here = [entry for entry in entries if entry.table == table.number]
-        typer.echo(f"{thesis_table_text(table, here)}\n")
+    for each in chosen:
+        here = [entry for entry in entries if entry.table == each.number]
+        typer.echo(f"{thesis_table_text(each, here)}\n")
 
 
 def _predict(format: str) -> None:

@@ -43,10 +43,11 @@ def two_speed(
     from strapgen.ir.fixed_settings import Settings
     from strapgen.library import two_speed_sources
     from strapgen.support.files import write_files
+    from strapgen.targets import fixed_targets
 
     form = whole("sculling", sculling) or 0
     settings = fixed.settings(1)
-    if target == "c-fixed":
+    if target in fixed_targets():
         settings = settings or Settings()
     elif settings is not None:
         raise InputError(f"the options of fixed point go with --target c-fixed, not with {target}")

@@ -13,6 +13,7 @@ from strapgen.ir.sources import Function, Sources
 from strapgen.targets.lines import fill_expression
 from strapgen.targets.names import C, external, printed
 from strapgen.targets.printer import Printer
+from strapgen.targets.registry import TARGETS
 from strapgen.targets.rendering import render
 
 
@@ -22,8 +23,6 @@ class Real:
 
     Parameters
     ----------
-    target : str
-        Name of the target.
     name : str
         Name of the type.
     suffix : str
@@ -34,25 +33,30 @@ class Real:
         Size of a number.
     """
 
-    target: str
     name: str
     suffix: str
     infix: str
     bytes: int
 
 
-DOUBLE = Real("c", "double", "", "", 8)
-FLOAT = Real("c-float", "float", "f", "_float", 4)
-REALS = {real.target: real for real in (DOUBLE, FLOAT)}
+DOUBLE = Real("double", "", "", 8)
+FLOAT = Real("float", "f", "_float", 4)
+_REALS = {real.name: real for real in (DOUBLE, FLOAT)}
+
+
+def real_of(target: str) -> Real:
+    """Return the type of a target's numbers."""
+    return _REALS[TARGETS[target].number]
+
 
 _FUNCTIONS = {
     "sqrt": "sqrt{s}({})",
     "sin": "sin{s}({})",
     "cos": "cos{s}({})",
-    "sinc": "sinc_({})",
+    "sinc": "{n}_sinc_({})",
     "atan2": "atan2{s}({}, {})",
     "direction": "atan2{s}({}, {})",
-    "wrap": "wrap_({})",
+    "wrap": "{n}_wrap_({})",
     "maximum": "fmax{s}({}, {})",
     "at_least": "{} >= {}",
     "select": "({} ? {} : {})",
@@ -64,10 +68,10 @@ _HALF_TURNS = tuple(Fraction(k * 314159265358979323846264338327950288, 10**35) f
 
 
 class CPrinter(Printer):
-    """Prints nodes as C expressions of one floating-point type."""
+    """Prints nodes as C expressions of one floating-point type, for a file whose static names begin with `name`."""
 
-    def __init__(self, real: Real) -> None:
-        self.real = real
+    def __init__(self, real: Real, name: str = "") -> None:
+        self.real, self.name = real, name
         if real is FLOAT:
             self.resolution = Fraction(1, 1 << 23)
 
@@ -78,7 +82,7 @@ class CPrinter(Printer):
 
     def function(self, kind: str, arguments: list[str]) -> str:
         """Return a call."""
-        return _FUNCTIONS[kind].format(*arguments, s=self.real.suffix)
+        return _FUNCTIONS[kind].format(*arguments, s=self.real.suffix, n=self.name)
 
 
 def _nearest_single(value: Fraction) -> np.float32:
@@ -88,14 +92,14 @@ def _nearest_single(value: Fraction) -> np.float32:
     return min(candidates, key=lambda c: (abs(Fraction(float(c)) - value), int(c.view(np.uint32)) & 1))
 
 
-def emit(program: Program, target: str = "c") -> Sources:
+def emit(program: Program, target: str) -> Sources:
     """Generate a C header and source for a program.
 
     Parameters
     ----------
     program : Program
-    target : str, optional
-        A key of `REALS`.
+    target : str
+        A target whose numbers are those of a `Real`.
 
     Returns
     -------
@@ -103,15 +107,15 @@ def emit(program: Program, target: str = "c") -> Sources:
         Two files. The function ``<name>`` works on one sample, ``<name>_array`` on many; a step has
         ``<name>_propagate`` too, the loop over runs and steps.
     """
-    real = REALS[target]
-    name = external(f"{program.name}{real.infix}")
+    real = real_of(target)
+    name = external(program.name, real.infix)
     # A scalar input has one name, which is that of its argument and of its element.
     scalars = [signal.name for signal in program.inputs if not signal.shape]
-    _, files = printed(program, lambda named, _: _files(named, name, real), C, scalars)
+    _, files = printed(program, lambda named, _: _files(named, name, target), C, scalars)
     function = Function(name, program.inputs, tuple(result.signal for result in program.outputs))
     return Sources(
         program.kernel,
-        real.target,
+        target,
         files,
         function,
         program.operations,
@@ -121,15 +125,16 @@ def emit(program: Program, target: str = "c") -> Sources:
     )
 
 
-def _files(program: Program, name: str, real: Real) -> dict[str, str]:
+def _files(program: Program, name: str, target: str) -> dict[str, str]:
     """Return the header and the source of a program with its printed names."""
-    printer = CPrinter(real)
+    real = real_of(target)
+    printer = CPrinter(real, name)
     nodes = [node for a in program.body for node in walk(a.value) if isinstance(node, Operation)]
     values = {
         "program": program,
         "name": name,
         "guard": f"{name}_h".upper(),
-        "command": f"strapgen generate {program.arguments} --target {real.target}",
+        "command": f"strapgen generate {program.arguments} --target {target}",
         "real": real,
         "state": program.inputs[0],
         "samples": program.inputs[-1],

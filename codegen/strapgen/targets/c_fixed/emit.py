@@ -5,7 +5,7 @@ The code has no undefined or implementation-defined behaviour, and returns an er
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from strapgen.ir.integer_program import (
     FixedProgram,
@@ -37,7 +37,8 @@ class Word:
     fast : str
         Type of a word in a calculation: the fastest of the processor that is long enough.
     wide, magnitude : str
-        Types of a product, and of the magnitude of a product.
+        Types of a product, and of the magnitude of a product. C has none for words of 64 bits: a file defines them
+        under names of its own.
     """
 
     bits: int
@@ -47,11 +48,15 @@ class Word:
     wide: str
     magnitude: str
 
+    def within(self, name: str) -> Word:
+        """Return the types as the file of a function calls them."""
+        return replace(self, wide=self.wide.format(name), magnitude=self.magnitude.format(name))
+
 
 WORDS = {
     16: Word(16, "int16_t", "uint16_t", "int", "int32_t", "uint32_t"),
     32: Word(32, "int32_t", "uint32_t", "int_fast32_t", "int64_t", "uint64_t"),
-    64: Word(64, "int64_t", "uint64_t", "int64_t", "wide_", "magnitude_"),
+    64: Word(64, "int64_t", "uint64_t", "int64_t", "{}_wide_", "{}_magnitude_"),
 }
 
 
@@ -63,7 +68,7 @@ def emit(fixed: FixedProgram, target: str) -> Sources:
     fixed : FixedProgram
         With a word of `WORDS`.
     target : str
-        "c-fixed".
+        Name of the target.
 
     Returns
     -------
@@ -71,10 +76,10 @@ def emit(fixed: FixedProgram, target: str) -> Sources:
         Two files. The function ``<name>`` works on one sample, ``<name>_array`` on many; a step has
         ``<name>_propagate`` too, the loop over runs and steps.
     """
-    interface, name = fixed.interface, external(fixed.name)
+    interface, name = fixed.interface, external(fixed.program.name, f"_q{fixed.word - 1}")
     arguments = (*interface.inputs, *interface.outputs)
     scalars = [argument.signal.name for argument in arguments if not argument.signal.shape]
-    _, files = printed(fixed, lambda named, _: _files(named, name), C, scalars)
+    _, files = printed(fixed, lambda named, _: _files(named, name, target), C, scalars)
     function = Function(
         name, *(tuple(a.signal for a in side) for side in (interface.inputs, interface.outputs))
     )
@@ -91,10 +96,10 @@ def emit(fixed: FixedProgram, target: str) -> Sources:
     )
 
 
-def _files(fixed: FixedProgram, name: str) -> dict[str, str]:
+def _files(fixed: FixedProgram, name: str, target: str) -> dict[str, str]:
     """Return the header and the source of a program with its printed names."""
-    interface, word = fixed.interface, WORDS[fixed.word]
-    printer = _Printer(fixed, word)
+    interface, word = fixed.interface, WORDS[fixed.word].within(name)
+    printer = _Printer(fixed, word, name)
     signals = [(a.signal, "const ") for a in interface.inputs] + [(a.signal, "") for a in interface.outputs]
     feedback_words = len(interface.residuals)
     pieces = [f"{constant}{word.type} {s.name}[{s.size}]" for s, constant in signals]
@@ -112,6 +117,7 @@ def _files(fixed: FixedProgram, name: str) -> dict[str, str]:
     definitions = [value.definition for value in fixed.body]
     values = {
         "fixed": fixed,
+        "target": target,
         "program": fixed.program,
         "interface": interface,
         "name": name,
@@ -143,8 +149,8 @@ def _files(fixed: FixedProgram, name: str) -> dict[str, str]:
 class _Printer:
     """Prints the values of a fixed-point program as C statements."""
 
-    def __init__(self, fixed: FixedProgram, word: Word) -> None:
-        self.fixed, self.word = fixed, word
+    def __init__(self, fixed: FixedProgram, word: Word, name: str) -> None:
+        self.fixed, self.word, self.name = fixed, word, name
         self.uses_shift = False
         self.wide_names = {value.name for value in fixed.body if value.wide}
         self.places = {feedback.name: k for k, feedback in enumerate(fixed.interface.residuals)}
@@ -170,7 +176,7 @@ class _Printer:
                 if element in used:
                     loads.append(f"const {kind} {element} = {source};")
                     source = element
-                checks.append(f"outside_({source}, {limit})")
+                checks.append(f"{self.name}_out_({source}, {limit})")
         body = [line for value in self.fixed.body for line in self.statements(value)]
         stores = [
             f"{self.memory(argument.signal.name)}[{number}] = ({self.word.type}){name};"
@@ -190,11 +196,11 @@ class _Printer:
             case IntegerSum() as total:
                 lines += self._sum(value, total, kind)
             case IntegerQuotient(numerator, denominator):
-                text = f"quotient_({self.scaled(numerator)}, {denominator})"
-                lines.append(f"const {kind} {name} = {self.cast(text, value)};")
+                text = f"{self.name}_div_({self.scaled(numerator)}, {denominator})"
+                lines.append(_declared(kind, name, self.cast(text, value)))
             case IntegerRoot(argument):
-                text = f"root_(({self.word.magnitude})({self.scaled(argument)}))"
-                lines.append(f"const {kind} {name} = {text};")
+                text = f"{self.name}_sqrt_(({self.word.magnitude})({self.scaled(argument)}))"
+                lines.append(_declared(kind, name, text))
             case IntegerMaximum((first, *others)):
                 lines.append(f"{kind} {name} = {self.cast(self.scaled(first), value)};")
                 for other in others:
@@ -298,7 +304,7 @@ class _Printer:
 
     def _shifted(self, text: str, shift: int) -> str:
         self.uses_shift = True
-        return f"shifted_({text}, {-shift})"
+        return f"{self.name}_shr_({text}, {-shift})"
 
     def scaled(self, scaled: Scaled) -> str:
         """Return a scaled value as an expression of a wide number."""
@@ -327,4 +333,9 @@ class _Printer:
 
 
 def _declared(kind: str, name: str, text: str) -> str:
-    return fill_expression(f"const {kind} {name} = {text};", " " * 8, 100)
+    """Return a declaration, its value on a line of its own where the first line would be too long."""
+    indent = " " * 8
+    statement = fill_expression(f"const {kind} {name} = {text};", indent, 100)
+    if len(statement.partition("\n")[0]) <= 96:
+        return statement
+    return f"const {kind} {name} =\n" + fill_expression(f"{indent}{text};", indent, 100)

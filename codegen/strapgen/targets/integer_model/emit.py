@@ -28,7 +28,7 @@ def emit(fixed: FixedProgram, target: str) -> Sources:
     ----------
     fixed : FixedProgram
     target : str
-        "fixed-model".
+        Name of the target.
 
     Returns
     -------
@@ -36,7 +36,7 @@ def emit(fixed: FixedProgram, target: str) -> Sources:
         One file. The function ``<name>`` takes and returns integers, or arrays of them.
     """
     interface = fixed.interface
-    named, files = printed(fixed, _files, PYTHON)
+    named, files = printed(fixed, lambda part, other: _files(part, other, target), PYTHON)
     function = Function(
         named.name,
         tuple(argument.signal for argument in interface.inputs),
@@ -55,12 +55,13 @@ def emit(fixed: FixedProgram, target: str) -> Sources:
     )
 
 
-def _files(fixed: FixedProgram, other: Mapping[str, str]) -> dict[str, str]:
+def _files(fixed: FixedProgram, other: Mapping[str, str], target: str) -> dict[str, str]:
     """Return the module of a program with its printed names; messages show the names of `other`."""
     interface = fixed.interface
     text = render(
         "integer_model/module.py.j2",
         fixed=fixed,
+        target=target,
         program=fixed.program,
         interface=interface,
         other=other,

@@ -37,13 +37,13 @@ class NumpyPrinter(Printer):
         return _FUNCTIONS[kind].format(*arguments)
 
 
-def emit(program: Program, target: str = "numpy") -> Sources:
+def emit(program: Program, target: str) -> Sources:
     """Generate a numpy module for a program.
 
     Parameters
     ----------
     program : Program
-    target : str, optional
+    target : str
         Name of the target.
 
     Returns

@@ -10,7 +10,7 @@ from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Function, Sources
-from strapgen.targets.c.emit import REALS
+from strapgen.targets.c.emit import real_of
 from strapgen.targets.c_fixed.emit import WORDS
 from strapgen.targets.rendering import render
 
@@ -129,7 +129,7 @@ class _Numbers(NamedTuple):
 def _numbers(loop: Sources) -> _Numbers:
     """Return the numbers of a loop; a word of 0 bits stands for floating point."""
     if loop.fixed is None:
-        real = REALS[loop.target]
+        real = real_of(loop.target)
         return _Numbers(real.infix, real.name)
     word = WORDS[loop.fixed.settings.word]
     return _Numbers(f"_q{word.bits - 1}", word.type, word.residual, word.bits)

@@ -14,8 +14,8 @@
  * No heap, no global state, no floating point, reentrant. In one call every input is read before any
  * output is written: an output may be the same memory as an input. Matrices are stored by rows.
  */
-#ifndef DCM_ORTHONORMALIZE_FIRST_ORDER_Q31_H
-#define DCM_ORTHONORMALIZE_FIRST_ORDER_Q31_H
+#ifndef DCM_ORTH_FIRST_ORDER_Q31_H
+#define DCM_ORTH_FIRST_ORDER_Q31_H
 
 #include <stddef.h>
 #include <stdint.h>
@@ -34,14 +34,14 @@ extern "C" {
  * 2 if it is too far from a proper one, so that something leaves its limits: next_11, next_12,
  *   next_13, next_21, next_22, next_23, next_31, next_32, next_33 from -1.0625 to 1.0625.
  */
-int dcm_orthonormalize_first_order_q31(const int32_t computed[9], int32_t orthonormalized[9]);
+int dcm_orth_first_order_q31(const int32_t computed[9], int32_t orthonormalized[9]);
 
 /* `count` calls on arrays of samples, one after the other, up to the first that is refused: every array holds `count`
  * times what one call takes.
  * An output may be the same memory as an input whose samples have the same size; otherwise they must not overlap.
  * Returns how many calls were done, and in `status` what the last one returned.
  */
-size_t dcm_orthonormalize_first_order_q31_array(size_t count, int *status, const int32_t *computed,
+size_t dcm_orth_first_order_q31_array(size_t count, int *status, const int32_t *computed,
     int32_t *orthonormalized);
 
 #ifdef __cplusplus

@@ -11,8 +11,8 @@
  * No heap, no global state, reentrant. In one call every input is read before any output is written: an
  * output may be the same memory as an input. Matrices are stored by rows.
  */
-#ifndef DCM_ORTHONORMALIZE_SECOND_ORDER_FLOAT_H
-#define DCM_ORTHONORMALIZE_SECOND_ORDER_FLOAT_H
+#ifndef DCM_ORTH_SECOND_ORDER_FLOAT_H
+#define DCM_ORTH_SECOND_ORDER_FLOAT_H
 
 #include <stddef.h>
 
@@ -26,13 +26,12 @@ extern "C" {
  * out  orthonormalized[9]: direction cosine matrix, body to reference, orthonormalized; unit 1;
  *      next_11, ..., next_33.
  */
-void dcm_orthonormalize_second_order_float(const float computed[9], float orthonormalized[9]);
+void dcm_orth_second_order_float(const float computed[9], float orthonormalized[9]);
 
 /* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
  * whose samples have the same size; otherwise they must not overlap.
  */
-void dcm_orthonormalize_second_order_float_array(size_t count, const float *computed,
-    float *orthonormalized);
+void dcm_orth_second_order_float_array(size_t count, const float *computed, float *orthonormalized);
 
 #ifdef __cplusplus
 }
