@@ -5,13 +5,14 @@ BIN := .venv/bin
 READY := .venv/.ready
 BENCH := .venv-bench/.ready
 
-.PHONY: help demo test test-long test-modules check bench generate clean
+.PHONY: help demo test test-long test-modules mutants check bench generate clean
 
 help:
 	@echo "make demo      set up, regenerate the code, build it, print the five tables on every back end"
 	@echo "make test      set up, run the test suite"
 	@echo "make test-long the tests that take long: every word, rounding and residual on every kernel"
 	@echo "make test-modules  list anew which kernels the tests compile"
+	@echo "make mutants   put 80 faults into copies of the code, one at a time, and see that the tests notice them; half an hour"
 	@echo "make check     generated code in step, ruff, mypy"
 	@echo "make bench     measure against other code generators, and the back ends; about a quarter of an hour"
 	@echo "make generate  rebuild generated/"
@@ -41,6 +42,10 @@ test-modules: $(READY)
 	  -m "not long" --record-modules $$folder/modules \
 	  && sort -u $$folder/modules > tests/data/modules.jsonl && rm -r $$folder
 
+# It goes on where it was stopped: the outcomes are in .mutants/. More with MUTANTS="--only rotations --list", see --help.
+mutants: $(READY)
+	$(BIN)/python tests/mutants.py $(MUTANTS)
+
 check: $(READY)
 	$(BIN)/strapgen generate --all --check
 	$(BIN)/ruff check .
@@ -67,5 +72,5 @@ generate: $(READY)
 	$(BIN)/strapgen generate --all
 
 clean:
-	rm -rf .venv .venv-bench .mypy_cache .ruff_cache .pytest_cache .hypothesis build dist
+	rm -rf .venv .venv-bench .mypy_cache .ruff_cache .pytest_cache .hypothesis .mutants build dist
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,4 +1,4 @@
-"""Runs chosen tests in a chosen order and tells the first that fails: a plugin of pytest, with a file in STRAPGEN_CHOSEN.
+"""Runs chosen tests in a chosen order and tells the first that fails: a plugin of pytest; STRAPGEN_CHOSEN is its file.
 
 The file holds the names of the tests that come first and of those that are left out, and says whether all others
 follow. What happens goes to files beside it, so that it is known of a process that is stopped too.
@@ -20,7 +20,9 @@ def ordered(names: list[str], choice: dict[str, Any]) -> list[str]:
     """Return the names that are run, in their order."""
     present, first = set(names), set(choice["first"])
     left_out = set(choice["without"])
-    others = [name for name in names if name not in first and name not in left_out] if choice["others"] else []
+    others = (
+        [name for name in names if name not in first and name not in left_out] if choice["others"] else []
+    )
     return [name for name in choice["first"] if name in present] + others
 
 

@@ -1,15 +1,16 @@
 """Shows that the tests protect the code: puts faults into copies of the checkout, one at a time, and runs the tests.
 
-Two lists of 40 faults: the first is written down in tests/data/mutants.toml, and the tests have to notice all of it; the
-second is drawn at random, and they have to notice 36. Every run begins with the tests that execute the changed line and
-ends at the first that fails; only a fault that these let pass meets all other tests. Outcomes are kept in `.mutants/`,
-under a hash of the sources and tests, so that a run that was stopped goes on where it was. Exit status 1 says that too
-many faults passed, or that the time did not do.
+Two lists of 40 faults: the first is written down in tests/data/mutants.toml, and the tests have to notice all of it;
+the second is drawn at random, and they have to notice 36. Every run begins with the tests that execute the changed
+line and ends at the first that fails; only a fault that these let pass meets all other tests. Outcomes are kept in
+`.mutants/`, under a hash of the sources and tests, so that a run that was stopped goes on where it was. Exit status 1
+says that too many faults passed, or that the time did not do.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import hashlib
 import json
 import os
@@ -91,7 +92,10 @@ def seeded() -> list[tuple[Site, str]]:
 
 def faults(part: str, seed: int) -> list[Fault]:
     """Return the faults of a list, "seeded" or "random"."""
-    sites = [site for site, _ in seeded()] if part == "seeded" else mutation_operators.drawn(ROOT, DRAWN, seed)
+    if part == "seeded":
+        sites = [site for site, _ in seeded()]
+    else:
+        sites = mutation_operators.drawn(mutation_operators.sites(ROOT), ROOT, DRAWN, seed)
     listed = []
     for site in sites:
         source = (ROOT / site.file).read_text()
@@ -155,7 +159,11 @@ def _distance(file: str, test: Test) -> int:
     path = Path(file)
     if path.suffix == ".toml":
         return 0 if path.stem in test.name else 1 if test.name.startswith("tests/catalogue/methods") else 2
-    place = Path("tests", *path.parts[2:]) if path.parts[0] == "codegen" else Path("tests/targets", path.parts[1], "x")
+    place = (
+        Path("tests", *path.parts[2:])
+        if path.parts[0] == "codegen"
+        else Path("tests/targets", path.parts[1], "x")
+    )
     stem = place.parts[2] if path.parts[0] == "templates" else path.stem
     if test.file in (place.with_name(f"test_{stem}.py").as_posix(), f"tests/targets/test_{stem}.py", file):
         return 0
@@ -230,7 +238,8 @@ class Runner:
                     self.stopped.set()
                 return None
             finally:
-                _end(process)
+                if process.poll() is None:
+                    _end(process)
                 with self._lock:
                     self._processes.discard(process)
 
@@ -239,7 +248,8 @@ class Runner:
         self.stopped.set()
         with self._lock:
             for process in self._processes:
-                _end(process)
+                if process.poll() is None:
+                    _end(process)
         shutil.rmtree(self.folder, ignore_errors=True)
 
 
@@ -249,10 +259,8 @@ def _limit_memory() -> None:
 
 def _end(process: subprocess.Popen[bytes]) -> None:
     """End a process and all that it started."""
-    try:
+    with contextlib.suppress(ProcessLookupError):
         os.killpg(process.pid, signal.SIGKILL)
-    except ProcessLookupError:
-        pass
     process.wait()
 
 
@@ -405,7 +413,10 @@ def run_all(
             result = Outcome(fault.key, outcome, by, round(time.monotonic() - begin, 1))
             with lock, file.open("a") as stream:
                 stream.write(json.dumps(asdict(result)) + "\n")
-                print(f"{count - len(pending)}/{count} {outcome} {result.seconds} s {fault.key} {by}", flush=True)
+                print(
+                    f"{count - len(pending)}/{count} {outcome} {result.seconds} s {fault.key} {by}",
+                    flush=True,
+                )
 
     with ThreadPoolExecutor(workers) as pool:
         try:
@@ -422,7 +433,9 @@ def run_all(
 def outcomes(state: Path) -> dict[str, Outcome]:
     """Return what is known by now."""
     file = state / "outcomes.jsonl"
-    lines: list[dict[str, Any]] = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
+    lines: list[dict[str, Any]] = (
+        [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
+    )
     return {line["key"]: Outcome(**line) for line in lines}
 
 
@@ -434,8 +447,9 @@ def table(listed: Sequence[Fault], known: dict[str, Outcome]) -> str:
         place = f"{fault.site.file.removeprefix('codegen/strapgen/')}:{fault.line}"
         rows.append((fault.part, place, fault.site.kind, result.outcome, f"{result.seconds:.1f}", result.by))
     heads = ("list", "place", "kind", "outcome", "s", "by")
-    widths = [max(len(row[k]) for row in (heads, *rows)) for k in range(5)]
-    return "\n".join("  ".join((*(t.ljust(w) for t, w in zip(row, widths, strict=False)), row[5])).rstrip() for row in (heads, *rows))
+    widths = [max(len(row[k]) for row in (heads, *rows)) for k in range(len(heads))]
+    padded = ([text.ljust(width) for text, width in zip(row, widths, strict=True)] for row in (heads, *rows))
+    return "\n".join("  ".join(row).rstrip() for row in padded)
 
 
 def summary(listed: Sequence[Fault], known: dict[str, Outcome]) -> tuple[list[str], bool]:
@@ -480,7 +494,12 @@ def main() -> int:
     ]
     print(f"{len(listed)} faults; the random ones are drawn with seed {options.seed}", flush=True)
     if options.list:
-        print("\n".join(f"{f.part} {f.site.file}:{f.line} {f.site.kind}\n  - {f.before}\n  + {f.after}" for f in listed))
+        print(
+            "\n".join(
+                f"{f.part} {f.site.file}:{f.line} {f.site.kind}\n  - {f.before}\n  + {f.after}"
+                for f in listed
+            )
+        )
         return 0
     state = state_folder(options.tests)
     if options.restart:

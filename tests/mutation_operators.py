@@ -82,9 +82,7 @@ class _Finder(ast.NodeVisitor):
     def _place(self, line: int, column: int) -> int:
         """Return a place in the text; `ast` counts columns in bytes."""
         text = self._lines[line - 1]
-        return self._starts[line - 1] + (
-            column if text.isascii() else len(text.encode()[:column].decode())
-        )
+        return self._starts[line - 1] + (column if text.isascii() else len(text.encode()[:column].decode()))
 
     def _span(self, node: ast.expr) -> tuple[int, int]:
         return (
@@ -144,7 +142,9 @@ class _Finder(ast.NodeVisitor):
         self.generic_visit(node)
 
     def visit_IfExp(self, node: ast.IfExp) -> None:
-        if not any(isinstance(n, ast.Constant | ast.JoinedStr) and _is_text(n) for n in (node.body, node.orelse)):
+        if not any(
+            isinstance(n, ast.Constant | ast.JoinedStr) and _is_text(n) for n in (node.body, node.orelse)
+        ):
             self._negate(node.test)
             self.generic_visit(node)
 
@@ -209,7 +209,9 @@ class _Finder(ast.NodeVisitor):
             self._instead(node.func, "max" if name == "min" else "min", "min-max")
         elif len(node.args) > 1 and name not in _SYMMETRIC:
             first, second = node.args[:2]
-            plain = not any(isinstance(a, ast.Starred | ast.GeneratorExp) or _is_text(a) for a in (first, second))
+            plain = not any(
+                isinstance(a, ast.Starred | ast.GeneratorExp) or _is_text(a) for a in (first, second)
+            )
             if plain and self._text(first) != self._text(second):
                 (start, end), (begin, stop) = self._span(first), self._span(second)
                 swapped = self._text(second) + self.source[end:begin] + self._text(first)
@@ -298,14 +300,24 @@ def sites(root: Path) -> dict[str, list[Site]]:
     return by_folder
 
 
-def drawn(root: Path, count: int, seed: int) -> list[Site]:
-    """Return faults drawn at random: from every folder in proportion to its number of faults, one at least, and of
-    every kind alike.
+def drawn(by_folder: dict[str, list[Site]], root: Path, count: int, seed: int) -> list[Site]:
+    """Return faults drawn at random: from every folder in proportion to its number, one at least, of all kinds alike.
+
+    Parameters
+    ----------
+    by_folder : dict of str to list of Site
+        What `sites` returns.
+    root : Path
+        Where their files are.
+    count, seed : int
     """
     random_numbers = random.Random(seed)
-    by_folder = sites(root)
     shares = _shares({folder: len(choices) for folder, choices in by_folder.items()}, count)
-    return [site for folder, share in shares.items() for site in _mixed(by_folder[folder], share, random_numbers, root)]
+    return [
+        site
+        for folder, share in shares.items()
+        for site in _mixed(by_folder[folder], share, random_numbers, root)
+    ]
 
 
 def _mixed(choices: Sequence[Site], count: int, random_numbers: random.Random, root: Path) -> Iterator[Site]:
