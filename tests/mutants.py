@@ -14,7 +14,6 @@ import contextlib
 import hashlib
 import json
 import os
-import resource
 import shutil
 import signal
 import subprocess
@@ -43,8 +42,8 @@ HANGS_S, TIMES_LONGER = 240, 5
 FIRST_TESTS, FIRST_FILES, FIRST_S = 400, 12, 30
 #: The second session stays below the number of tests from which on a library is compiled beforehand.
 SECOND_TESTS = 900
-#: Memory of a process in bytes, so that a fault that allocates without end stops.
-MEMORY = 8 << 30
+#: Memory of a process in bytes at which a fault that allocates without end is stopped.
+MEMORY = 6 << 30
 _HASHED = ("codegen", "templates", "tests", "generated", "pyproject.toml")
 
 
@@ -226,22 +225,26 @@ class Runner:
                 stdout=(place.with_suffix(".log")).open("wb"),
                 stderr=subprocess.STDOUT,
                 start_new_session=True,
-                preexec_fn=_limit_memory,
             )
             with self._lock:
                 self._processes.add(process)
-            left = self.end - time.monotonic()
             try:
-                return process.wait(max(0.0, min(limit, left)))
-            except subprocess.TimeoutExpired:
-                if left < limit:
-                    self.stopped.set()
-                return None
+                return self._wait(process, time.monotonic() + limit)
             finally:
                 if process.poll() is None:
                     _end(process)
                 with self._lock:
                     self._processes.discard(process)
+
+    def _wait(self, process: subprocess.Popen[bytes], limit: float) -> int | None:
+        """Return the exit status of a session; None if it takes too long or too much memory."""
+        while time.monotonic() < limit and _resident(process.pid) < MEMORY:
+            if time.monotonic() > self.end:
+                self.stopped.set()
+                break
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                return process.wait(0.5)
+        return None
 
     def stop(self) -> None:
         """End all sessions and remove the copies."""
@@ -253,8 +256,13 @@ class Runner:
         shutil.rmtree(self.folder, ignore_errors=True)
 
 
-def _limit_memory() -> None:
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+def _resident(process: int) -> int:
+    """Return the memory in bytes that a process holds; 0 where the system does not tell."""
+    try:
+        pages = int(Path(f"/proc/{process}/statm").read_text().split()[1])
+    except (OSError, IndexError):
+        return 0
+    return pages * os.sysconf("SC_PAGE_SIZE")
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
@@ -338,7 +346,7 @@ def _dated(path: Path, number: int) -> None:
 def verdict(status: int | None, failed: str, running: str) -> str | None:
     """Return by what a session noticed the fault; None if it did not."""
     if status is None:
-        return f"time, in {running or 'the collection'}"
+        return f"time or memory, in {running or 'the collection'}"
     if status in (0, 5):  # 5: none of the tests exists any more
         return None
     if status < 0:

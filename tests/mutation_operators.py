@@ -47,7 +47,7 @@ _MESSAGES = {"progress", "warn", "stage", "describe", "combination_meaning"}
 
 
 #: Numbers below are tolerances and widths of margins, in which half as much again changes nothing.
-_LARGEST_TOLERANCE = 1e-6
+_LARGEST_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True, order=True)

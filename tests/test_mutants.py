@@ -175,7 +175,7 @@ def test_chosen_tests_come_in_their_order_and_others_after_them():
         (0, None),
         (5, None),
         (1, "t::failed"),
-        (None, "time, in t::running"),
+        (None, "time or memory, in t::running"),
         (-11, "signal 11, in t::running"),
     ],
 )
