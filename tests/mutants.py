@@ -180,9 +180,10 @@ def first_of(tests: Iterable[Test]) -> list[Test]:
     chosen_files: set[str] = set()
     seconds = 0.0
     for test in (*early, *late):
-        if len(session) == FIRST_TESTS or seconds + test.seconds > FIRST_S:
+        if len(session) == FIRST_TESTS:
             break
-        if test.file in chosen_files or len(chosen_files) < FIRST_FILES:
+        in_time = seconds + test.seconds <= FIRST_S
+        if in_time and (test.file in chosen_files or len(chosen_files) < FIRST_FILES):
             chosen_files.add(test.file)
             session.append(test)
             seconds += test.seconds

@@ -155,7 +155,7 @@ def test_the_first_session_has_two_cases_of_every_function_before_more(tests):
     assert names[:3] == ["test_x[0]", "test_x[1]", "test_far"]
     assert names[-2:] == ["test_x[2]", "test_x[3]"]
     long = mutants.Test("tests/b/test_f.py::test_long", 2.0 * mutants.FIRST_S, frozenset())
-    assert mutants.first_of([long]) == []
+    assert mutants.first_of([long, *tests]) == mutants.first_of(tests)
 
 
 def test_chosen_tests_come_in_their_order_and_others_after_them():
