@@ -39,11 +39,14 @@ SEED, DRAWN, LEAST_CAUGHT = 1969, 40, 36
 #: A session that takes longer hangs, in s; one of all tests may take as many times what they take without a fault more.
 HANGS_S, TIMES_LONGER = 240, 5
 #: The first session of a fault: most tests, most files that are collected, and most seconds without the fault.
-FIRST_TESTS, FIRST_FILES, FIRST_S = 400, 12, 30
-#: The second session stays below the number of tests from which on a library is compiled beforehand.
-SECOND_TESTS = 900
+FIRST_TESTS, FIRST_FILES, FIRST_S = 150, 12, 15
+#: The second session begins with the tests that execute most; it stays below the number of tests from which on a library
+#: is compiled beforehand.
+WIDEST, SECOND_TESTS = 4, 900
 #: Memory of a process in bytes at which a fault that allocates without end is stopped.
 MEMORY = 6 << 30
+#: What the cache has of compiled modules, each under a hash of all that goes into it: no fault changes what it stands for.
+_COMPILED = ("builds", "shared")
 _HASHED = ("codegen", "templates", "tests", "generated", "pyproject.toml")
 
 
@@ -190,6 +193,12 @@ def first_of(tests: Iterable[Test]) -> list[Test]:
     return session
 
 
+def second_of(tests: Sequence[Test]) -> list[Test]:
+    """Return a long session, which begins with the tests that execute most: what these compare, many lines change."""
+    widest = sorted(tests, key=lambda test: -len(test.blocks))[:WIDEST]
+    return list(dict.fromkeys([*widest, *tests]))[:SECOND_TESTS]
+
+
 # The runs
 
 
@@ -214,9 +223,10 @@ class Runner:
     def session(self, place: Path, words: Sequence[str], limit: float, **environment: str) -> int | None:
         """Run pytest in a copy, with a cache of its own but for compiled modules; None if it takes too long."""
         with tempfile.TemporaryDirectory(prefix="cache-", dir=self.folder) as cache:
-            compiled = self.state.parent / "compiled"  # each under a hash of its whole content
-            compiled.mkdir(parents=True, exist_ok=True)
-            (Path(cache) / "builds").symlink_to(compiled)
+            for kind in _COMPILED:
+                compiled = self.state.parent / kind
+                compiled.mkdir(parents=True, exist_ok=True)
+                (Path(cache) / kind).symlink_to(compiled)
             process = subprocess.Popen(
                 [sys.executable, "-m", "pytest", "-q", "-m", "not long", "-p", "no:cacheprovider", *words],
                 cwd=place,
@@ -363,7 +373,7 @@ def run_fault(
     executing = tests_of(fault.site.file, fault.line, source, tests, numbers)
     first = first_of(executing)
     names = {test.name for test in first}
-    second = [test for test in executing if test.name not in names][:SECOND_TESTS]
+    second = second_of([test for test in executing if test.name not in names])
     suite = sum(test.seconds for test in tests)
     sessions: list[tuple[list[Test], bool, float]] = [(first, False, HANGS_S)]
     if not first_only:
