@@ -84,6 +84,8 @@ class _Loader(importlib.machinery.SourceFileLoader):
         super().exec_module(module)
         if module.__name__ == "strapgen.support.cache":
             _note_entries(module)
+        elif module.__name__ == "strapgen.library.generated_sources":
+            _note_programs(module)
 
 
 @_real_lru_cache
@@ -155,33 +157,54 @@ def _lru_cache(maxsize: Any = 128, typed: bool = False) -> Any:
     return decorate
 
 
+def _notes(kind: str, key: str) -> Path:
+    """Return the file that says what filled an entry of the cache on disk."""
+    return Path(os.environ["STRAPGEN_EXECUTION_MAP"]) / "entries" / f"{kind}-{key}.json"
+
+
+@_real_lru_cache(maxsize=None)
+def _known(file: Path) -> frozenset[int]:
+    return frozenset(json.loads(file.read_text()))
+
+
 def _note_entries(cache: ModuleType) -> None:
     """Note the blocks that fill an entry of the cache on disk, and count them wherever it is looked up."""
     entry, lookup = cache.entry, cache.lookup
-    notes = Path(os.environ["STRAPGEN_EXECUTION_MAP"]) / "entries"
-
-    @_real_lru_cache(maxsize=None)
-    def known(file: Path) -> frozenset[int]:
-        return frozenset(json.loads(file.read_text()))
 
     def looked_up(kind: str, key: str) -> Path | None:
         place = lookup(kind, key)
-        if place is not None and (file := notes / f"{kind}-{key}.json").exists():
-            _count(known(file))
+        if place is not None and (file := _notes(kind, key)).exists():
+            _count(_known(file))
         return place
 
     def entered(kind: str, key: str, fill: Callable[[Path], None], *rest: Any, **options: Any) -> Path:
         def work(folder: Path) -> None:
             with _noted() as executed:
                 fill(folder)
-            notes.mkdir(parents=True, exist_ok=True)
-            draft = notes / f"{kind}-{key}.{os.getpid()}"
+            file = _notes(kind, key)
+            file.parent.mkdir(parents=True, exist_ok=True)
+            draft = file.with_suffix(f".{os.getpid()}")
             draft.write_text(json.dumps(sorted(executed)))
-            draft.rename(notes / f"{kind}-{key}.json")
+            draft.rename(file)
 
         return entry(kind, key, work, *rest, **options)
 
     cache.entry, cache.lookup = entered, looked_up
+
+
+def _note_programs(sources: ModuleType) -> None:
+    """Count what filled the entry of a program where a process has it in memory."""
+    program, cache = sources.program, sources.cache
+
+    @functools.wraps(program)
+    def called(choice: Any) -> Any:
+        result = program(choice)
+        file = _notes("programs", cache.digest([cache.generator_digest(), choice.identity]))
+        if file.exists():
+            _count(_known(file))
+        return result
+
+    sources.program = called
 
 
 # The plugin

@@ -40,12 +40,12 @@ SEED, DRAWN, LEAST_CAUGHT = 1969, 40, 36
 HANGS_S, TIMES_LONGER = 240, 5
 #: The first session of a fault: most tests, most files that are collected, and most seconds without the fault.
 FIRST_TESTS, FIRST_FILES, FIRST_S = 150, 12, 15
-#: The second session begins with the tests that execute most; it stays below the number of tests from which on a library
-#: is compiled beforehand.
-WIDEST, SECOND_TESTS = 4, 900
+#: The second session begins with the files whose tests execute most; it stays below the number of tests from which on
+#: a library is compiled beforehand.
+WIDE_FILES, SECOND_TESTS = 3, 900
 #: Memory of a process in bytes at which a fault that allocates without end is stopped.
 MEMORY = 6 << 30
-#: What the cache has of compiled modules, each under a hash of all that goes into it: no fault changes what it stands for.
+#: What the cache has of compiled modules, each under a hash of all that goes into it: no fault changes its meaning.
 _COMPILED = ("builds", "shared")
 _HASHED = ("codegen", "templates", "tests", "generated", "pyproject.toml")
 
@@ -194,9 +194,11 @@ def first_of(tests: Iterable[Test]) -> list[Test]:
 
 
 def second_of(tests: Sequence[Test]) -> list[Test]:
-    """Return a long session, which begins with the tests that execute most: what these compare, many lines change."""
-    widest = sorted(tests, key=lambda test: -len(test.blocks))[:WIDEST]
-    return list(dict.fromkeys([*widest, *tests]))[:SECOND_TESTS]
+    """Return a long session; it begins with the files whose tests execute most, since a change of much shows there."""
+    widest = sorted(tests, key=lambda test: -len(test.blocks))
+    wide_files = list(dict.fromkeys(test.file for test in widest))[:WIDE_FILES]
+    wide = [test for file in wide_files for test in tests if test.file == file]
+    return list(dict.fromkeys([*first_of(wide), *tests]))[:SECOND_TESTS]
 
 
 # The runs
