@@ -159,8 +159,8 @@ def test_the_first_session_has_two_cases_of_every_function_before_more(tests):
 
 
 def test_the_second_session_begins_with_the_files_whose_tests_execute_most(tests):
-    wide = mutants.Test("tests/w.py::test_all", 9.0, frozenset(range(50)))
-    narrow = mutants.Test("tests/w.py::test_one", 9.0, frozenset())
+    wide = mutants.Test("tests/w.py::test_all", 1.0, frozenset(range(50)))
+    narrow = mutants.Test("tests/w.py::test_one", 1.0, frozenset())
     session = mutants.second_of([*tests, narrow, wide])
     assert session[:2] == [narrow, wide]
     assert set(session) == {*tests, narrow, wide}
