@@ -7,7 +7,7 @@ Left alone is what decides nothing in numbers: annotations, decorators, messages
 from __future__ import annotations
 
 import ast
-import random
+import hashlib
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -206,7 +206,8 @@ class _Finder(ast.NodeVisitor):
         if name in _MESSAGES or name.endswith(("Error", "Warning")):
             return
         if name in ("min", "max"):
-            self._instead(node.func, "max" if name == "min" else "min", "min-max")
+            end = self._span(node.func)[1]
+            self._put(end - len(name), end, "max" if name == "min" else "min", "min-max")
         elif len(node.args) > 1 and name not in _SYMMETRIC:
             first, second = node.args[:2]
             plain = not any(
@@ -303,6 +304,9 @@ def sites(root: Path) -> dict[str, list[Site]]:
 def drawn(by_folder: dict[str, list[Site]], root: Path, count: int, seed: int) -> list[Site]:
     """Return faults drawn at random: from every folder in proportion to its number, one at least, of all kinds alike.
 
+    The lot of a fault is a hash of the seed and of its own text, so that a change of the sources leaves the draw
+    elsewhere as it is.
+
     Parameters
     ----------
     by_folder : dict of str to list of Site
@@ -311,32 +315,42 @@ def drawn(by_folder: dict[str, list[Site]], root: Path, count: int, seed: int) -
         Where their files are.
     count, seed : int
     """
-    random_numbers = random.Random(seed)
     shares = _shares({folder: len(choices) for folder, choices in by_folder.items()}, count)
-    return [
-        site
-        for folder, share in shares.items()
-        for site in _mixed(by_folder[folder], share, random_numbers, root)
-    ]
+    return [site for folder, share in shares.items() for site in _mixed(by_folder[folder], share, seed, root)]
 
 
-def _mixed(choices: Sequence[Site], count: int, random_numbers: random.Random, root: Path) -> Iterator[Site]:
+def _mixed(choices: Sequence[Site], count: int, seed: int, root: Path) -> Iterator[Site]:
     """Yield some faults, of one kind after the other, no two of them in one place."""
+    texts = {file: (root / file).read_text() for file in {site.file for site in choices}}
+
+    def lot(site: Site) -> bytes:
+        text = texts[site.file]
+        around = (
+            text[text.rfind("\n", 0, site.start) + 1 : site.start],
+            text[site.start : site.end],
+            site.text,
+        )
+        return _hash(seed, site.file, site.kind, *around)
+
     by_kind: dict[str, list[Site]] = {}
-    for site in random_numbers.sample(choices, len(choices)):
+    for site in sorted(choices, key=lot, reverse=True):
         by_kind.setdefault(site.kind, []).append(site)
-    kinds = random_numbers.sample(sorted(by_kind), len(by_kind))
+    kinds = sorted(by_kind, key=lambda kind: _hash(seed, choices[0].file, kind))
     places: set[tuple[str, int]] = set()
     while len(places) < count:
         kinds = [kind for kind in kinds if by_kind[kind]]
         for kind in kinds:
             site = by_kind[kind].pop()
             new = (site.file, site.start) not in places
-            if new and (site.file.endswith(".j2") or compiles(site.applied((root / site.file).read_text()))):
+            if new and (site.file.endswith(".j2") or compiles(site.applied(texts[site.file]))):
                 places.add((site.file, site.start))
                 yield site
             if len(places) == count:
                 return
+
+
+def _hash(*parts: object) -> bytes:
+    return hashlib.sha256("\0".join(map(str, parts)).encode()).digest()
 
 
 def _shares(sizes: dict[str, int], count: int) -> dict[str, int]:
