@@ -113,7 +113,7 @@ def faults(part: str, seed: int) -> list[Fault]:
 
 
 @dataclass(frozen=True)
-class Test:
+class MappedTest:
     """A test as the map knows it."""
 
     name: str
@@ -129,7 +129,9 @@ class Test:
         return self.name.partition("[")[0]
 
 
-def tests_of(file: str, line: int, source: str, tests: Sequence[Test], numbers: dict[str, int]) -> list[Test]:
+def executing_tests(
+    file: str, line: int, source: str, tests: Sequence[MappedTest], numbers: dict[str, int]
+) -> list[MappedTest]:
     """Return the tests that execute a line, those first that are likeliest to notice a fault in it.
 
     What runs when a module is imported, or stands in a table, counts as executed by all tests that use the module or
@@ -156,7 +158,7 @@ def tests_of(file: str, line: int, source: str, tests: Sequence[Test], numbers: 
     return sorted(executing, key=lambda test: (_distance(file, test), test.seconds > 1, len(test.blocks)))
 
 
-def _distance(file: str, test: Test) -> int:
+def _distance(file: str, test: MappedTest) -> int:
     """Return how far a test stands from the mirror image of a file: 0 for its own tests, 1 for its folder, 2 beyond."""
     path = Path(file)
     if path.suffix == ".toml":
@@ -172,14 +174,14 @@ def _distance(file: str, test: Test) -> int:
     return 1 if test.file.startswith(f"{place.parent.as_posix()}/") else 2
 
 
-def first_of(tests: Iterable[Test]) -> list[Test]:
+def first_of(tests: Iterable[MappedTest]) -> list[MappedTest]:
     """Return a short session: two cases of every function before the rest of them, in few files, for a short time."""
     counts: dict[str, int] = {}
     early, late = [], []
     for test in tests:
         counts[test.function] = counts.get(test.function, 0) + 1
         (early if counts[test.function] <= 2 else late).append(test)
-    session: list[Test] = []
+    session: list[MappedTest] = []
     chosen_files: set[str] = set()
     seconds = 0.0
     for test in (*early, *late):
@@ -193,7 +195,7 @@ def first_of(tests: Iterable[Test]) -> list[Test]:
     return session
 
 
-def second_of(tests: Sequence[Test]) -> list[Test]:
+def second_of(tests: Sequence[MappedTest]) -> list[MappedTest]:
     """Return a long session; it begins with the files whose tests execute most, since a change of much shows there."""
     widest = sorted(tests, key=lambda test: -len(test.blocks))
     wide_files = list(dict.fromkeys(test.file for test in widest))[:WIDE_FILES]
@@ -306,7 +308,7 @@ def state_folder(paths: Sequence[str]) -> Path:
     return ROOT / ".mutants" / total.hexdigest()[:16]
 
 
-def map_of_tests(runner: Runner, workers: int) -> list[Test]:
+def map_of_tests(runner: Runner, workers: int) -> list[MappedTest]:
     """Return what every test executes, from a run of all tests without a fault.
 
     Raises
@@ -333,7 +335,7 @@ def map_of_tests(runner: Runner, workers: int) -> list[Test]:
         draft.write_text("".join(part.read_text() for part in sorted(notes.glob("tests-*.jsonl"))))
         draft.rename(file)
     lines = map(json.loads, file.read_text().splitlines())
-    return [Test(line["test"], line["seconds"], frozenset(line["blocks"])) for line in lines]
+    return [MappedTest(line["test"], line["seconds"], frozenset(line["blocks"])) for line in lines]
 
 
 def put(place: Path, fault: Fault, number: int) -> None:
@@ -368,16 +370,21 @@ def verdict(status: int | None, failed: str, running: str) -> str | None:
 
 
 def run_fault(
-    runner: Runner, place: Path, fault: Fault, tests: list[Test], numbers: dict[str, int], first_only: bool
+    runner: Runner,
+    place: Path,
+    fault: Fault,
+    tests: list[MappedTest],
+    numbers: dict[str, int],
+    first_only: bool,
 ) -> tuple[str, str]:
     """Return the outcome of a fault that a copy has, and by what it was noticed."""
     source = (ROOT / fault.site.file).read_text()
-    executing = tests_of(fault.site.file, fault.line, source, tests, numbers)
+    executing = executing_tests(fault.site.file, fault.line, source, tests, numbers)
     first = first_of(executing)
     names = {test.name for test in first}
     second = second_of([test for test in executing if test.name not in names])
     suite = sum(test.seconds for test in tests)
-    sessions: list[tuple[list[Test], bool, float]] = [(first, False, HANGS_S)]
+    sessions: list[tuple[list[MappedTest], bool, float]] = [(first, False, HANGS_S)]
     if not first_only:
         sessions += [(second, False, HANGS_S + 60), ([], True, HANGS_S + TIMES_LONGER * suite)]
     done: list[str] = []
@@ -406,7 +413,7 @@ def run_fault(
 
 
 def run_all(
-    runner: Runner, listed: Sequence[Fault], tests: list[Test], workers: int, first_only: bool
+    runner: Runner, listed: Sequence[Fault], tests: list[MappedTest], workers: int, first_only: bool
 ) -> None:
     """Run the faults that have no outcome yet, as long as there is time, and write each outcome down at once."""
     numbers = {file: number for number, file in enumerate(execution_map.files(ROOT))}

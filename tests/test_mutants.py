@@ -126,14 +126,14 @@ def test_probes_tell_what_runs(monkeypatch):
 
 
 @pytest.fixture
-def tests() -> list[mutants.Test]:
+def tests() -> list[mutants.MappedTest]:
     base = execution_map._LINES
     return [
-        mutants.Test("tests/b/test_g.py::test_far", 0.1, frozenset({base + 3})),
-        mutants.Test("tests/b/test_f.py::test_mirrored", 0.1, frozenset({base + 3, base + 8})),
-        mutants.Test("tests/b/test_f.py::test_narrow", 0.1, frozenset({base + 3})),
-        mutants.Test("tests/b/test_f.py::test_other", 0.1, frozenset({base + 5})),
-        mutants.Test("tests/c/test_h.py::test_elsewhere", 0.1, frozenset({2 * base + 3})),
+        mutants.MappedTest("tests/b/test_g.py::test_far", 0.1, frozenset({base + 3})),
+        mutants.MappedTest("tests/b/test_f.py::test_mirrored", 0.1, frozenset({base + 3, base + 8})),
+        mutants.MappedTest("tests/b/test_f.py::test_narrow", 0.1, frozenset({base + 3})),
+        mutants.MappedTest("tests/b/test_f.py::test_other", 0.1, frozenset({base + 5})),
+        mutants.MappedTest("tests/c/test_h.py::test_elsewhere", 0.1, frozenset({2 * base + 3})),
     ]
 
 
@@ -141,7 +141,7 @@ def test_the_tests_of_a_line_execute_it_and_the_nearest_come_first(tests):
     numbers = {"codegen/strapgen/b/f.py": 1}
 
     def names(line: int) -> list[str]:
-        chosen = mutants.tests_of("codegen/strapgen/b/f.py", line, SOURCE, tests, numbers)
+        chosen = mutants.executing_tests("codegen/strapgen/b/f.py", line, SOURCE, tests, numbers)
         return [test.name.partition("::")[2] for test in chosen]
 
     assert names(6) == ["test_narrow", "test_mirrored", "test_far"]
@@ -150,17 +150,17 @@ def test_the_tests_of_a_line_execute_it_and_the_nearest_come_first(tests):
 
 
 def test_the_first_session_has_two_cases_of_every_function_before_more(tests):
-    cases = [mutants.Test(f"tests/b/test_f.py::test_x[{k}]", 0.1, frozenset()) for k in range(4)]
+    cases = [mutants.MappedTest(f"tests/b/test_f.py::test_x[{k}]", 0.1, frozenset()) for k in range(4)]
     names = [test.name.partition("::")[2] for test in mutants.first_of([*cases, *tests])]
     assert names[:3] == ["test_x[0]", "test_x[1]", "test_far"]
     assert names[-2:] == ["test_x[2]", "test_x[3]"]
-    long = mutants.Test("tests/b/test_f.py::test_long", 2.0 * mutants.FIRST_S, frozenset())
+    long = mutants.MappedTest("tests/b/test_f.py::test_long", 2.0 * mutants.FIRST_S, frozenset())
     assert mutants.first_of([long, *tests]) == mutants.first_of(tests)
 
 
 def test_the_second_session_begins_with_the_files_whose_tests_execute_most(tests):
-    wide = mutants.Test("tests/w.py::test_all", 1.0, frozenset(range(50)))
-    narrow = mutants.Test("tests/w.py::test_one", 1.0, frozenset())
+    wide = mutants.MappedTest("tests/w.py::test_all", 1.0, frozenset(range(50)))
+    narrow = mutants.MappedTest("tests/w.py::test_one", 1.0, frozenset())
     session = mutants.second_of([*tests, narrow, wide])
     assert session[:2] == [narrow, wide]
     assert set(session) == {*tests, narrow, wide}

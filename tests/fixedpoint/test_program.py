@@ -133,6 +133,17 @@ def test_a_cut_of_the_box_saves_a_bit():
     assert product.range.magnitude <= Fraction(1, 2)
 
 
+def test_products_by_a_value_and_by_a_number_are_counted_and_shifts_are_not():
+    terms = [op("multiply", number(3), "x_1"), op("multiply", "x_2", "x_3"), op("multiply", number(4), "x_2")]
+    counts = []
+    for used in (terms[:1], terms[:2], terms):
+        total = used[0]
+        for term in used[1:]:
+            total = op("add", total, term)
+        counts.append(quantize(hand_made({"y": total}, "y"), Settings(32)).operations["multiply"])
+    assert counts == [1, 2, 2]
+
+
 def test_sums_of_increments_are_exact():
     for count in (2, 3, 4):
         fixed = quantize(program(Choice("euler", "rk2", count)), Settings(16))
