@@ -7,13 +7,15 @@ READY := .venv/.ready
 TOOLS := .venv/.ready-to-test
 BENCH := .venv-bench/.ready
 
-.PHONY: help demo test test-long test-modules check bench generate clean
+.PHONY: help demo test test-long test-modules mutants check bench generate clean \
+  check-generated check-style check-layout check-types
 
 help:
 	@echo "make demo      set up, then a short tour: formulas, their C, a table on every back end"
 	@echo "make test      set up, with what tests need; run the test suite"
 	@echo "make test-long the tests that take long: every word, rounding and residual on every kernel"
 	@echo "make test-modules  list anew which kernels the tests compile"
+	@echo "make mutants   put 80 faults into copies of the code, one by one, and see that tests notice; half an hour"
 	@echo "make check     generated code in step, ruff, mypy"
 	@echo "make bench     measure against other code generators, and the back ends; about a quarter of an hour"
 	@echo "make generate  rebuild generated/"
@@ -61,10 +63,21 @@ test-modules: $(TOOLS)
 	  -m "not long" --record-modules $$folder/modules \
 	  && sort -u $$folder/modules > tests/data/modules.jsonl && rm -r $$folder
 
+# It goes on where it was stopped: the outcomes are in .mutants/. More with MUTANTS="--only rotations --list", see --help.
+mutants: $(TOOLS)
+	$(BIN)/python tests/mutants.py $(MUTANTS)
+
+# Side by side, each part's output in one piece.
 check: $(TOOLS)
+	@$(MAKE) --no-print-directory -j --output-sync=target check-generated check-style check-layout check-types
+
+check-generated:
 	$(BIN)/strapgen generate --all --check
+check-style:
 	$(BIN)/ruff check .
+check-layout:
 	$(BIN)/ruff format --check .
+check-types:
 	$(BIN)/mypy
 
 # The other generators bring their own requirements: they get an environment of their own, each by itself, so that one
@@ -87,5 +100,5 @@ generate: $(READY)
 	$(BIN)/strapgen generate --all
 
 clean:
-	rm -rf .venv .venv-bench .mypy_cache .ruff_cache .pytest_cache .hypothesis build dist
+	rm -rf .venv .venv-bench .mypy_cache .ruff_cache .pytest_cache .hypothesis .mutants build dist
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -104,6 +104,9 @@ def test_spans_of_the_numpy_scan_join_without_a_seam(monkeypatch, rng, span, ort
     pieces = backend.propagate(increments, 1, orthonormalize_every)
     scale = np.abs(whole).max()  # without orthonormalization first order grows
     assert np.abs(pieces - whole).max() <= scale * roundoff(backend, 700)
+    # A record falls on any place of a span.
+    some = backend.propagate(increments, 7, orthonormalize_every)
+    np.testing.assert_array_equal(some, pieces[:, ::7])
 
 
 @pytest.mark.long

@@ -17,6 +17,7 @@ from strapgen.backends.fixed import ModelEvaluator
 from strapgen.catalogue import Choice
 from strapgen.fixedpoint.derivation import quantities
 from strapgen.fixedpoint.intervals import Interval
+from strapgen.fixedpoint.quantization_context import _is_polynomial
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.integer_program import IntegerSum
 from strapgen.ir.program import Assignment, Constant, Operation, Program, Reference, Result
@@ -131,6 +132,34 @@ def test_a_cut_of_the_box_saves_a_bit():
     made = quantities(hand_made(body, "y"), box).items
     product = next(q for name, q in made.items() if name.startswith("cube_factor"))
     assert product.range.magnitude <= Fraction(1, 2)
+
+
+def test_products_by_a_value_and_by_a_number_are_counted_and_shifts_are_not():
+    terms = [op("multiply", number(3), "x_1"), op("multiply", "x_2", "x_3"), op("multiply", number(4), "x_2")]
+    counts = []
+    for used in (terms[:1], terms[:2], terms):
+        total = used[0]
+        for term in used[1:]:
+            total = op("add", total, term)
+        counts.append(quantize(hand_made({"y": total}, "y"), Settings(32)).operations["multiply"])
+    assert counts == [1, 2, 2]
+
+
+def test_what_a_root_goes_into_is_no_polynomial_of_the_inputs():
+    box = {name: Interval.symmetric(1) for name in ("x_1", "x_2", "x_3")}
+    body = {
+        "sum": op("add", op("multiply", "x_1", "x_1"), number(1)),
+        "cube": op("multiply", "sum", "x_3"),
+        "root": op("sqrt", "sum"),
+        "y": op("multiply", "root", "x_2"),
+    }
+    made = quantities(hand_made(body, "cube", "y"), box)
+    assert {name: _is_polynomial(made, name) for name in body} == {
+        "sum": True,
+        "cube": True,
+        "root": False,
+        "y": False,
+    }
 
 
 def test_sums_of_increments_are_exact():

@@ -49,6 +49,14 @@ def test_a_name_is_not_used_before_its_assignment():
     program(late, Assignment("r", Operation("negate", (Reference("s"),))))
 
 
+@pytest.mark.parametrize("turns", [-1, 0, 1])
+@pytest.mark.parametrize("angle", [-3.0, -1.0, 0.0, 1.0, 3.0])
+def test_an_angle_is_wrapped_by_whole_turns(angle, turns):
+    beyond = angle + turns * math.tau
+    if abs(beyond) <= 3 * math.pi:
+        assert OPERATIONS["wrap"](beyond) == pytest.approx(angle, abs=1e-12)
+
+
 def test_a_name_is_not_used_in_its_own_assignment():
     with pytest.raises(ValueError, match=r"'r' uses \['r'\]"):
         program(Assignment("r", Operation("negate", (Reference("r"),))))

@@ -71,3 +71,6 @@ def test_the_resolvent_is_the_inverse(matrix, zeros, ones):
 def test_other_eigenvalues_are_told():
     assert resolvent([[Fraction(1, 2)]], Fraction(1)) is None
     assert resolvent([[Fraction(0), Fraction(-1)], [Fraction(1), Fraction(0)]], Fraction(1)) is None
+    # A 1 among them is divided out first.
+    assert resolvent([[Fraction(1), Fraction(0)], [Fraction(5), Fraction(1, 2)]], Fraction(1)) is None
+    assert resolvent([[Fraction(1), Fraction(0)], [Fraction(0), Fraction(2)]], Fraction(1)) is None

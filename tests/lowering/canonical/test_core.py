@@ -48,6 +48,12 @@ def test_rates_of_a_fourth_order_step_are_linear_in_its_increments():
     assert core.base() == [(3 * half, -half), (half, half)]
 
 
+@pytest.mark.parametrize("previous", [0, 1])
+def test_the_sum_of_the_increments_of_a_step_leaves_out_those_before_it(previous):
+    core = extract(derive("euler", method="rk2", increments=2, previous=previous))
+    assert core.whole == (0,) * previous + (1, 1)
+
+
 def test_an_input_that_is_used_as_it_stands_is_a_vector_too():
     assert forms(extract(derive("dcm", method="rk4", increments=1))) == {"d1": (1,)}
     rates = catalogue.derive(catalogue.choose("dcm", "rk4", rates=True))
