@@ -11,6 +11,7 @@ import sympy as sp
 
 from strapgen.ir.program import Program
 from strapgen.reports.latex import align_environment
+from strapgen.reports.report import Report
 from strapgen.reports.table import Column, TextTable
 from strapgen.symbolic.kernel import Kernel, Stage
 from strapgen.targets.contract import operations_text
@@ -74,8 +75,44 @@ def program_as_text(program: Program) -> str:
 def operations_as_text(kernel: Kernel, program: Program) -> str:
     """Return the number of operations of each kind, and of temporaries, as a table."""
     columns = (Column(align="<", least=12), Column(least=5, gap=0))
-    counts = {**program.operations, "temporaries": program.temporaries}
-    return "\n".join([kernel.name, *TextTable(columns, list(counts.items())).lines("  ")])
+    return "\n".join([kernel.name, *TextTable(columns, _counts(program)).lines("  ")])
+
+
+def _counts(program: Program) -> list[tuple[str, int]]:
+    return list({**program.operations, "temporaries": program.temporaries}.items())
+
+
+def formulas_report(kernel: Kernel, program: Program, show: str) -> Report:
+    """Return what is to be shown of a kernel as a report.
+
+    Parameters
+    ----------
+    kernel : Kernel
+    program : Program
+    show : str
+        "text" or "latex" for the formulas, "program" or "operations"; the last two are tables.
+    """
+    texts = {
+        "text": lambda: as_text(kernel, program.notes),
+        "latex": lambda: as_latex(kernel),
+        "program": lambda: program_as_text(program),
+        "operations": lambda: operations_as_text(kernel, program),
+    }
+    more = {"latex": lambda: as_latex(kernel), "program": lambda: program_as_data(program)}
+
+    def data() -> dict[str, Any]:
+        return as_data(kernel, program) | ({show: more[show]()} if show in more else {})
+
+    rows = {
+        "program": lambda: list(program_as_data(program).items()),
+        "operations": lambda: _counts(program),
+    }
+    heads = {"program": ("name", "value"), "operations": ("operation", "number")}
+    if show not in rows:
+        return Report(texts[show], data)
+    align = "<" if show == "program" else ">"
+    columns = [Column(heads[show][0], "<"), Column(heads[show][1], align)]
+    return Report(texts[show], data, lambda: TextTable(columns, rows[show]()))
 
 
 def program_as_data(program: Program) -> dict[str, str]:

@@ -6,7 +6,8 @@ import textwrap
 from collections.abc import Sequence
 from typing import Any
 
-from strapgen.experiments.thesis_tables import ALGORITHMS, ORDERS, Table, TableEntry
+from strapgen.experiments.thesis_tables import ALGORITHMS, ORDERS, TABLES, Table, TableEntry
+from strapgen.reports.report import Report, flat_table
 from strapgen.reports.table import Column, TextTable
 
 _NAMES = {"dcm": "direction cosines", "euler": "Euler parameters"}
@@ -49,6 +50,20 @@ def thesis_table_text(table: Table, entries: Sequence[TableEntry]) -> str:
         first = k * (1 + len(backends))
         text += [f"  {_NAMES[algorithm]}", *lines[first : first + 1 + len(backends)]]
     return "\n".join([*text, *_notes(entries)])
+
+
+def thesis_tables_report(entries: Sequence[TableEntry]) -> Report:
+    """Return the entries of all tables as a report."""
+    data = [entry.as_dict() for entry in entries]
+
+    def text() -> str:
+        parts = (
+            thesis_table_text(table, [entry for entry in entries if entry.table == table.number])
+            for table in TABLES
+        )
+        return "\n\n".join(parts)
+
+    return Report(text, lambda: data, lambda: flat_table(data))
 
 
 def _printed_row(table: Table, algorithm: str) -> list[Any]:

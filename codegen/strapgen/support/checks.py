@@ -9,6 +9,7 @@ from numbers import Integral
 from typing import TYPE_CHECKING, Any
 
 from strapgen.support.exceptions import InputError, InputTypeError
+from strapgen.support.suggestions import unknown
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -23,7 +24,7 @@ MOST_TEXT = 500
 _MARKS = ("/*", "*/", '"""', "\\")
 
 
-def choice(what: str, value: str, allowed: Iterable[str]) -> str:
+def choice(what: str, value: str, allowed: Iterable[str], also: str = "", section: str = "") -> str:
     """Return `value` if it is one of `allowed`.
 
     Parameters
@@ -32,6 +33,10 @@ def choice(what: str, value: str, allowed: Iterable[str]) -> str:
         Name of the value in an error message.
     value : str
     allowed : iterable of str
+    also : str, optional
+        What else is allowed, in words for the message.
+    section : str, optional
+        Section of ``strapgen list`` that shows all names, where there are many; by default that of the kind.
 
     Returns
     -------
@@ -40,7 +45,7 @@ def choice(what: str, value: str, allowed: Iterable[str]) -> str:
     Raises
     ------
     InputError
-        If it is not; the message lists what is allowed.
+        If it is not; the message says what was perhaps meant, and what is allowed.
 
     Examples
     --------
@@ -48,8 +53,8 @@ def choice(what: str, value: str, allowed: Iterable[str]) -> str:
     'rk4'
     """
     names = list(allowed)
-    if value not in names:
-        raise InputError(f"{what} {value!r} is not known; allowed: {', '.join(names)}")
+    if not isinstance(value, str) or value not in names:
+        raise InputError(unknown(what, value, names, also, section))
     return value
 
 
