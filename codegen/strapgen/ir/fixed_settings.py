@@ -118,15 +118,15 @@ class Settings:
             That bound itself, in rad.
         """
         if (max_rate_deg_s is None) != (step is None):
-            missing = "step" if step is None else "max-rate-deg-s"
-            raise InputError(f"max-rate-deg-s and step go together; {missing} is missing")
+            missing = "step" if step is None else "max_rate_deg_s"
+            raise InputError(f"max_rate_deg_s and step go together; {missing} is missing")
         if max_rate_deg_s is not None and largest_angle is not None:
             raise InputError("the largest angle and the largest rate are both given; one is needed")
         angle = DEFAULT_ANGLE
         if largest_angle is not None:
             angle = checks.number("largest angle", largest_angle, positive=True)
         elif max_rate_deg_s is not None:
-            rate = checks.number("max-rate-deg-s", max_rate_deg_s, positive=True)
+            rate = checks.number("max_rate_deg_s", max_rate_deg_s, positive=True)
             angle = rate * checks.number("step", step, positive=True) * _DEGREE / increments
         stated = "" if max_rate_deg_s is None else f"--max-rate-deg-s {max_rate_deg_s} --step {step}"
         return cls(word, Fraction(math.ceil(angle * _LIMIT_UNIT), _LIMIT_UNIT), **rest, stated=stated)

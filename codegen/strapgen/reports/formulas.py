@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -16,6 +16,9 @@ from strapgen.reports.table import Column, TextTable
 from strapgen.symbolic.kernel import Kernel, Stage
 from strapgen.targets.contract import operations_text
 from strapgen.targets.printer import Printer
+
+_PROGRAM_COLUMNS = (Column("name", "<"), Column("value", "<"))
+_OPERATION_COLUMNS = (Column("operation", "<"), Column("number"))
 
 
 def as_text(kernel: Kernel, notes: Sequence[str] | None = None) -> str:
@@ -92,27 +95,25 @@ def formulas_report(kernel: Kernel, program: Program, show: str) -> Report:
     show : str
         "text" or "latex" for the formulas, "program" or "operations"; the last two are tables.
     """
-    texts = {
+    texts: dict[str, Callable[[], str]] = {
         "text": lambda: as_text(kernel, program.notes),
         "latex": lambda: as_latex(kernel),
         "program": lambda: program_as_text(program),
         "operations": lambda: operations_as_text(kernel, program),
     }
-    more = {"latex": lambda: as_latex(kernel), "program": lambda: program_as_data(program)}
 
     def data() -> dict[str, Any]:
-        return as_data(kernel, program) | ({show: more[show]()} if show in more else {})
+        shown: dict[str, Any] = {}
+        if show in ("latex", "program"):
+            shown[show] = as_latex(kernel) if show == "latex" else program_as_data(program)
+        return as_data(kernel, program) | shown
 
-    rows = {
-        "program": lambda: list(program_as_data(program).items()),
-        "operations": lambda: _counts(program),
-    }
-    heads = {"program": ("name", "value"), "operations": ("operation", "number")}
-    if show not in rows:
-        return Report(texts[show], data)
-    align = "<" if show == "program" else ">"
-    columns = [Column(heads[show][0], "<"), Column(heads[show][1], align)]
-    return Report(texts[show], data, lambda: TextTable(columns, rows[show]()))
+    def table() -> TextTable:
+        if show == "program":
+            return TextTable(_PROGRAM_COLUMNS, list(program_as_data(program).items()))
+        return TextTable(_OPERATION_COLUMNS, _counts(program))
+
+    return Report(texts[show], data, table if show in ("program", "operations") else None)
 
 
 def program_as_data(program: Program) -> dict[str, str]:

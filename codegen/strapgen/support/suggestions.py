@@ -9,12 +9,13 @@ from collections.abc import Iterable
 MOST_NAMES = 8
 #: Most names that a message suggests.
 _MOST_SUGGESTIONS = 3
+#: Likeness from which on a name is suggested: the part of all characters that two names share.
+_ALIKE = 0.6
 #: Most characters of a value that a message repeats.
 _MOST_CHARACTERS = 60
 
 #: Sections of ``strapgen list`` that show all names of a kind.
 SECTIONS = {
-    "algorithm": "algorithms",
     "kernel": "kernels",
     "method": "methods",
     "motion": "motions",
@@ -112,7 +113,8 @@ def suggestions(what: str, value: str, allowed: Iterable[str]) -> list[str]:
     likely = [name for name in SYNONYMS.get(what, {}).get(plain, ()) if name in names]
     if likely:
         return likely
-    close = difflib.get_close_matches(plain, names, _MOST_SUGGESTIONS)
+    alike = {name: difflib.SequenceMatcher(None, plain, name).ratio() for name in names}
+    close = sorted((name for name in names if alike[name] >= _ALIKE), key=lambda name: -alike[name])
     inside = [name for name in names if len(plain) > 2 and plain in name]
     return list(dict.fromkeys([*close, *inside]))[:_MOST_SUGGESTIONS]
 
@@ -142,16 +144,35 @@ def unknown(what: str, value: object, allowed: Iterable[str], also: str = "", se
     """
     names = list(allowed)
     section = section or SECTIONS.get(what, "")
-    shown = " ".join(repr(value).split())
-    if len(shown) > _MOST_CHARACTERS:
-        shown = f"{shown[:_MOST_CHARACTERS]}..."
     meant = suggestions(what, value, names) if isinstance(value, str) else []
     question = f" (did you mean {alternatives(meant)}?)" if meant else ""
     cut = bool(section) and len(names) > MOST_NAMES + 1
     listed = some(names) if cut else ", ".join(names)
     listed += f", or {also}" if also else ""
     listed += f"; strapgen list {section} shows all" if cut else ""
-    return f"{what} {shown} is not known{question}; allowed: {listed}"
+    return f"{what} {shown(value)} is not known{question}; allowed: {listed}"
+
+
+def shown(value: object) -> str:
+    """Return a value on one line; of a long one the beginning."""
+    line = " ".join(repr(value).split())
+    return line if len(line) <= _MOST_CHARACTERS else f"{line[:_MOST_CHARACTERS]}..."
+
+
+def counted(number: int, one: str, many: str = "") -> str:
+    """Return a number with its noun.
+
+    Examples
+    --------
+    >>> counted(1, "row"), counted(2, "row"), counted(2, "entry", "entries")
+    ('1 row', '2 rows', '2 entries')
+    """
+    return f"{number} {one if number == 1 else many or f'{one}s'}"
+
+
+def needed(number: int) -> str:
+    """Return that so many are needed."""
+    return f"{number} {'is' if number == 1 else 'are'} needed"
 
 
 def some(names: Iterable[str]) -> str:

@@ -67,7 +67,7 @@ def compare(
     output.check(algorithm, methods.tableau, source.increments_csv, source.rates_csv)
     choices = methods.choices(algorithm)
     names = _backends(backend, reference)
-    most = limit("fail-above", fail_above)
+    most = limit("--fail-above", fail_above)
     source.check()
     _check_fixed(fixed, {*names, reference})
 

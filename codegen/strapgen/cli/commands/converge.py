@@ -98,7 +98,7 @@ def converge(
     """
     output.check(algorithm, methods.tableau)
     names = backends("--backend", backend, ())
-    most = limit("fail-beyond", fail_beyond)
+    most = limit("--fail-beyond", fail_beyond)
     ladder.check()
     choices = methods.choices(algorithm)
     profile, words = ladder.profile()

@@ -47,8 +47,8 @@ class Start:
 
         from strapgen.simulation.courses import NavigationFrame
 
-        begin = np.radians(_three("initial-deg", self.initial))
-        return NavigationFrame(begin, np.radians(_three("frame-rate-deg-h", self.frame_rate)) / 3600)
+        begin = np.radians(_three("--initial-deg", self.initial))
+        return NavigationFrame(begin, np.radians(_three("--frame-rate-deg-h", self.frame_rate)) / 3600)
 
 
 @grouped
@@ -109,8 +109,8 @@ def strapdown(
         covered = course(
             algorithm,
             data,
-            fast_cycles=whole("fast-cycles", fast_cycles) or 0,
-            slow_cycles=whole("slow-cycles", slow_cycles) or 0,
+            fast_cycles=whole("fast_cycles", fast_cycles) or 0,
+            slow_cycles=whole("slow_cycles", slow_cycles) or 0,
             sculling=whole("sculling", sculling) or 0,
             backend=backend,
             settings=settings,
@@ -130,5 +130,5 @@ def _three(name: str, text: str) -> list[float]:
 
     parts = text.split(",")
     if len(parts) != 3:
-        raise InputError(f"--{name} is {text!r}; three numbers with commas between are needed")
+        raise InputError(f"{name} is {text!r}; three numbers with commas between are needed")
     return [float(checks.number(name, part)) for part in parts]

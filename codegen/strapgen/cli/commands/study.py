@@ -138,8 +138,6 @@ def word_length(
 
     checks.choice("algorithm", algorithm, catalogue.ALGORITHMS)
     checks.choice("motion", motion, catalogue.MOTIONS)
-    for name in listed("--method", sweep.methods):
-        catalogue.choose(algorithm, name, whole("increments", sweep.increments))
     count = whole("jobs", jobs)
     if count is not None:
         checks.count("jobs", count, largest=1024)

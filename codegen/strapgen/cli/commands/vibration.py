@@ -186,10 +186,10 @@ class VibrationOutput(Output):
         if self.span is not None:
             ends = self.span.split(",")
             if len(ends) != 2:
-                raise InputError(f"plot-hz is {self.span!r}; two frequencies, LOW,HIGH, are needed")
-            low, high = (float(checks.number("plot-hz", end, positive=True)) for end in ends)
+                raise InputError(f"--plot-hz is {self.span!r}; two frequencies, LOW,HIGH, are needed")
+            low, high = (float(checks.number("--plot-hz", end, positive=True)) for end in ends)
         lowest, highest = (times * sampling for times in _PLOTTED)
-        for name, end in (("plot-hz", low), ("plot-hz", high), ("frequency-hz", marked)):
+        for name, end in (("--plot-hz", low), ("--plot-hz", high), ("--frequency-hz", marked)):
             if not lowest <= end <= highest < math.inf:
                 raise InputError(
                     f"{name} is {end:g}; a plot takes {lowest:g} to {highest:g} Hz, "
@@ -312,7 +312,7 @@ def _image(cases: list[AssessedCase], source: VibrationSource, output: Vibration
 
     step = source.step or ""
     sampling = max(case.samples for case in cases) / float(checks.number("step", step, positive=True))
-    marked = float(checks.number("frequency-hz", source.frequency or ""))
+    marked = float(checks.number("--frequency-hz", source.frequency or ""))
     hertz = curves.frequencies(*output.frequencies(sampling, marked))
     drawn = [
         (case.label, curves.curve(case.assessment, hertz, step, cycles=case.cycles, **source.amplitudes))
