@@ -81,8 +81,8 @@ def pulses(increments: Any, size: float | str | Fraction, previous: int = 0) -> 
     Raises
     ------
     InputError, InputTypeError
-        If the increments are no numbers or have another shape, the size is not above 0, or the angle is more pulses than
-        can be counted.
+        If the increments are no numbers or have another shape, the size is not above 0, or the angle is more pulses
+        than can be counted.
 
     Examples
     --------

@@ -195,8 +195,16 @@ def cases(study: Study | None = None, **values: Any) -> list[Case]:
     [(12, 'full'), (16, 'full')]
     """
     study = replace(study or Study(), **values)
-    study = replace(study, **{name: _several(getattr(study, name)) for name in _SWEPT})
-    study = replace(study, words=[checks.whole("word", w) if isinstance(w, str) else w for w in study.words])
+    words = [checks.whole("word", w) if isinstance(w, str) else w for w in _several(study.words)]
+    study = replace(
+        study,
+        methods=_several(study.methods),
+        words=words,
+        roundings=_several(study.roundings),
+        carries=_several(study.carries),
+        steps=_several(study.steps),
+        pulses_arcsec=_several(study.pulses_arcsec),
+    )
     for method in study.methods:
         catalogue.choose_step(study.algorithm, method, study.increments)
     planned = study.cases()

@@ -79,7 +79,9 @@ class Settings:
         check_rounding(self.rounding)
         checks.choice("carry", self.carry, CARRIES)
         if not SMALLEST_ANGLE <= self.largest_angle <= LARGEST_ANGLE:
-            how = f" ({self.stated})" if self.stated else ""
+            # In the names of Python; the command line turns them into options again.
+            stated = self.stated.removeprefix("--").replace("max-rate-deg-s", "max_rate_deg_s")
+            how = f" ({stated.replace(' --', ', ')})" if stated else ""
             raise InputError(
                 f"largest angle increment is {float(self.largest_angle):g} rad{how}; "
                 f"from {float(SMALLEST_ANGLE):g} to {LARGEST_ANGLE} is needed"

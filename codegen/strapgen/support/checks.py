@@ -336,7 +336,8 @@ def numbers(what: str, value: Any, tail: tuple[int | None, ...] = ()) -> NDArray
         raise InputTypeError(f"{what} is {shown(value)}; an array of numbers is needed")
     last = array.shape[array.ndim - len(tail) :] if array.ndim >= len(tail) else None
     if last is None or any(want not in (None, have) for want, have in zip(tail, last, strict=True)):
-        axes = ", ".join(["...", *("N" if length is None else str(length) for length in tail)])
+        letters = iter("NKLM")
+        axes = ", ".join(["...", *(next(letters) if length is None else str(length) for length in tail)])
         raise InputError(f"{what} has shape {array.shape}; ({axes}) is needed")
     return np.asarray(array, np.float64)
 

@@ -9,8 +9,9 @@ from collections.abc import Iterable
 MOST_NAMES = 8
 #: Most names that a message suggests.
 _MOST_SUGGESTIONS = 3
-#: Likeness from which on a name is suggested: the part of all characters that two names share.
-_ALIKE = 0.6
+#: Likeness from which on a name is suggested, the part of all characters that two names share: for a name with the same
+#: first letter, and for any other.
+_ALIKE, _MORE_ALIKE = 0.6, 0.75
 #: Most characters of a value that a message repeats.
 _MOST_CHARACTERS = 60
 
@@ -48,6 +49,8 @@ SYNONYMS: dict[str, dict[str, tuple[str, ...]]] = {
         "quaternion-normalize": ("euler-normalize",),
     },
     "method": {
+        **dict.fromkeys(("heun", "heun2", "heuns-method"), ("rk2",)),
+        **dict.fromkeys(("runge", "rk2-midpoint"), ("midpoint",)),
         **dict.fromkeys(("runge-kutta", "rungekutta", "rk", "kutta", "classical"), ("rk4",)),
         **dict.fromkeys(("euler", "forward-euler", "rectangular"), ("rk1",)),
         **dict.fromkeys(("trapezoidal", "trapezoid", "improved-euler"), ("rk2",)),
@@ -114,7 +117,8 @@ def suggestions(what: str, value: str, allowed: Iterable[str]) -> list[str]:
     if likely:
         return likely
     alike = {name: difflib.SequenceMatcher(None, plain, name).ratio() for name in names}
-    close = sorted((name for name in names if alike[name] >= _ALIKE), key=lambda name: -alike[name])
+    close = [name for name in names if alike[name] >= (_ALIKE if name[:1] == plain[:1] else _MORE_ALIKE)]
+    close.sort(key=lambda name: -alike[name])
     inside = [name for name in names if len(plain) > 2 and plain in name]
     return list(dict.fromkeys([*close, *inside]))[:_MOST_SUGGESTIONS]
 

@@ -100,10 +100,10 @@ def read(path: str | Path) -> Tableau:
     InputError
         If the file cannot be read, a key or number is wrong, or a condition does not hold; the message names it.
     """
-    path = checks.path("path", path)
+    place = checks.path("path", path)
     try:
         try:
-            with path.open("rb") as file:
+            with place.open("rb") as file:
                 content = file.read(MOST_BYTES + 1)
         except OSError as error:
             raise InputError(f"cannot be read ({error.strerror})") from None
