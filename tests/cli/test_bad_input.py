@@ -361,7 +361,7 @@ BAD = {
     "generate --all --out file/folder": "file/folder cannot be written",
     # simulate: names
     f"simulate eulr {CONSTANT}": (
-        "algorithm 'eulr' is not known (did you mean euler?); allowed: dcm, euler, cayley-klein, or a Python file\n"
+        "algorithm 'eulr' is not known (did you mean euler?); allowed: dcm, euler, cayley-klein, or a Python file"
     ),
     f"simulate euler-product {CONSTANT}": "algorithm 'euler-product' is no attitude step",
     f"simulate euler --method rk5 {CONSTANT}": "method 'rk5' is not known",

@@ -75,8 +75,6 @@ def explanation(error: Any) -> str:
         word = re.search(r"'(.*?)'", said)
         meant = suggestions("command", word[1], known) if word else []
         return f"{said.split('.')[0]}{_question(meant)}. Allowed: {', '.join(known)}."
-    if name is not None and command is not None and "requires" in said:
-        return _needs(command, name, context)
     if name is not None and command is not None and said.startswith("No such option"):
         known = [option.opts[0] for option in _options(command, context)]
         return f"No such option: {name}{_question(suggestions('option', name, known))}; --help shows all"
@@ -121,6 +119,8 @@ def _refuse_missing_values(command: Any, context: Any, words: Sequence[str]) -> 
             before = ""
         else:
             before = word
+    if before in takes and not takes[before].is_flag:
+        context.fail(_needs(command, before, context))
 
 
 def _in_options(command: Any, message: str) -> str:
@@ -153,10 +153,10 @@ def _help(command: Any, context: Any) -> list[str]:
             else getattr(parameter, "rich_help_panel", None) or "Options"
         )
         panels.setdefault(title, []).append((_label(parameter), _help_text(parameter, context)))
-    last = panels.pop("Options", [])
-    if last:
-        panels["Other options" if {*panels} - {"Arguments"} else "Options"] = last
-    width = min(_MOST_OPTION, max(len(label) for rows in panels.values() for label, _ in rows))
+    for last in ("Output", "Options"):
+        if rows := panels.pop(last, []):
+            panels["Other options" if last == "Options" and {*panels} - {"Arguments"} else last] = rows
+    width = min(_MOST_OPTION, _width() // 3, max(len(label) for rows in panels.values() for label, _ in rows))
     for title, rows in panels.items():
         lines += ["", f"{title}:", *_definitions(rows, width)]
     return lines
@@ -176,9 +176,9 @@ def _help_text(parameter: Any, context: Any) -> str:
     return " ".join(record[1].split()) if record else ""
 
 
-def _unbroken(match: re.Match[str]) -> str:
-    """Return a short remark in brackets in such a form that no line ends inside it."""
-    return match[0].replace(" ", _SPACE) if len(match[0]) <= _MOST_REMARK else match[0]
+def _unbroken(remark: str, room: int) -> str:
+    """Return a remark in such a form that no line ends inside it, if it is short enough."""
+    return remark.replace(" ", _SPACE) if len(remark) <= room else remark
 
 
 def _summary(text: str) -> str:
@@ -238,7 +238,8 @@ def _chunks(command: str) -> Iterator[str]:
 
 def _filled(text: str, first: str, rest: str) -> list[str]:
     """Return a text in lines as wide as the terminal; names with hyphens stay whole."""
-    whole = re.sub(r"\[(?:default|required)[^]]*\]", _unbroken, text)
+    room = min(_MOST_REMARK, _width() - len(rest))
+    whole = re.sub(r"\[(?:default|required)[^]]*\]", lambda m: _unbroken(m[0], room), text)
     lines = textwrap.wrap(
         whole,
         _width(),
