@@ -64,7 +64,7 @@ class Output:
     format: Annotated[str | None, format_option(_TABLE)] = "text"
 
     def check(self, *read: str | Path | None) -> None:
-        """Check the format, and that output and plot have files of their own, none of which the command reads."""
+        """Check the format, the type of the image, and that no file is written over another or one that is read."""
         if self.format is not None:
             checks.choice("format", self.format, self.formats)
         if self.plot == _TERMINAL:
@@ -75,23 +75,29 @@ class Output:
         for name, path in (("--out", self.file), ("--plot", self.plot)):
             if path is not None and os.path.realpath(path) in files:
                 raise InputError(f"{name} {path} is a file that the command reads; another one is needed")
+        if self.plot is not None:
+            from strapgen.reports import plots
+
+            plots.require_kind(self.plot)
 
     @property
     def file(self) -> Path | None:
         """The file for the output; None for the terminal."""
         return None if self.out == _TERMINAL else self.out
 
-    def report(self, report: Report, image: Callable[[Path], bytes] | None = None) -> None:
+    def report(self, report: Report, image: Callable[[Path], bytes] | bytes | None = None) -> None:
         """Deliver a report in the format of the options.
 
         Parameters
         ----------
         report : Report
-        image : callable, optional
-            Returns the image for the file of --plot; it is called only if there is one.
+        image : bytes or callable, optional
+            The image for the file of --plot, or what returns it: that is called only if there is such a file.
         """
         text = report.written(self.format or "text")
-        self.deliver(text, image(self.plot) if image is not None and self.plot is not None else None)
+        if callable(image):
+            image = None if self.plot is None else image(self.plot)
+        self.deliver(text, image)
 
     def deliver(self, text: str, image: bytes | None = None) -> None:
         """Print the text, or write it and the image into their files, all or none; stderr says which were written."""

@@ -98,7 +98,6 @@ class DriftPlot:
         if self.steps is not None:
             ladder = tuple(listed("--step", self.steps))
         profile = motions.motion(motion, **settings)
-        plots.require_kind(path)
         agreements = [
             agreement.agreement(choice, profile, ladder, self.duration, powers)
             for powers in ((1,) if count == 1 else (1, 3))  # every other power may be without drift
@@ -198,8 +197,8 @@ def series(
     from strapgen.analysis.error_analysis import analyse
     from strapgen.reports.series import series_report
 
-    analyses = [analyse(choice, motion, most) for choice in choices]
-    output.report(series_report(analyses), lambda path: plot.draw(choices[0], motion, count, path))
+    image = None if output.plot is None else plot.draw(choices[0], motion, count, output.plot)
+    output.report(series_report([analyse(choice, motion, most) for choice in choices]), image)
 
 
 def _check_plot(motion: str, versus: Versus, plot: DriftPlot, output: Output) -> None:
