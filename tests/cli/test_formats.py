@@ -7,6 +7,7 @@ import io
 import json
 import re
 import shlex
+from pathlib import Path
 
 import pytest
 from gathering import each
@@ -72,6 +73,19 @@ def test_a_dash_is_the_terminal_and_a_file_holds_the_same(answer, tmp_path):
     assert not list(tmp_path.iterdir())
     assert answer("coning --samples 2 --format markdown --out pairs.md") == ""
     assert (tmp_path / "pairs.md").read_text() == printed
+
+
+def test_a_course_is_plotted_and_written_as_a_table(answer, tmp_path):
+    pytest.importorskip("matplotlib")
+    log = Path(__file__).resolve().parents[2] / "examples" / "inertial_log.csv"
+    run = f"strapdown dcm --increments-csv {log} --fast-cycles 4 --slow-cycles 50"
+    assert answer(f"{run} --format markdown --plot course.svg").startswith("| time_s | C_11 |")
+    assert "heading, deg" in (tmp_path / "course.svg").read_text()
+
+
+def test_several_back_ends_stand_side_by_side_without_more_words(answer):
+    said = answer("converge euler --method rk1 --step 1/2,1/4 --duration 1 --backend numpy,exact")
+    assert said.splitlines()[3].split("  ")[-2:] == ["euler-rk1-2, numpy", "euler-rk1-2, exact"]
 
 
 def test_one_kind_of_names_is_listed(answer):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import OneBackend, Sculling, TwoSpeedAlgorithm, option, whole
-from strapgen.cli.output import TEXT_OUTPUT, Output, format_option
+from strapgen.cli.output import Output, format_option, plot_option
 from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 class CourseOutput(Output):
     """Where the attitude and the velocity changes along a recording go."""
 
+    plot: Annotated[Path | None, plot_option("the attitude and the velocity changes")] = None
     format: Annotated[str | None, format_option(Output.formats, "  [default: text; csv with --out]")] = None
 
 
@@ -83,7 +84,7 @@ def strapdown(
     ],
     start: Start,
     fixed: Annotated[FixedOptions, Shown(only=("word", "rounding", "carry", "ranges", "formats"))],
-    output: Annotated[CourseOutput, Shown(only=TEXT_OUTPUT)],
+    output: CourseOutput,
 ) -> None:
     """Run an algorithm in two speeds along an inertial recording.
 
@@ -97,7 +98,7 @@ def strapdown(
     output.check(increments)
     import numpy as np
 
-    from strapgen.reports import runs
+    from strapgen.reports import plots, runs
     from strapgen.simulation import recording
     from strapgen.simulation.courses import course
 
@@ -122,7 +123,10 @@ def strapdown(
         "source": str(increments),
     }
     format = output.format or ("text" if output.file is None else "csv")
-    replace(output, format=format).report(runs.course_report(covered, facts))
+    title = f"{facts['algorithm']}, {backend}: {increments.name}"
+    replace(output, format=format).report(
+        runs.course_report(covered, facts), lambda path: plots.course_image(covered, title, path)
+    )
 
 
 def _three(name: str, text: str) -> list[float]:
