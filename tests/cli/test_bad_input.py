@@ -96,6 +96,7 @@ BAD = {
     "stability euler --plot a.xyz": "file type 'xyz' is not known",
     "tables --predict --backend c": "--predict and --backend do not go together",
     # Commands and options
+    "check": "Missing argument 'ALGORITHM': dcm, euler or cayley-klein, or a Python file of your own",
     "simulat": "No such command 'simulat' (did you mean simulate?). Allowed: list, derive, ",
     "study wordlength": "No such command 'wordlength' (did you mean word-length?). Allowed: word-length.",
     "simulate euler --methods rk4": "No such option: --methods (did you mean --method?); --help shows all",
@@ -136,7 +137,6 @@ BAD = {
     "converge euler --out a --plot a": "--out and --plot are both a",
     "converge euler --method rk1 --steps 1/2,1/4 --plot a.docx": "file type 'docx' is not known",
     "converge euler --method rk4 --tableau x.toml": "are both given; one is needed",
-    "check": "Missing argument",
     "check error-matrix": "algorithm 'error-matrix' is no attitude step",
     "check none.py": "none.py is no file",
     "check euler --format xml": "format 'xml' is not known; allowed: text, json, csv, markdown",

@@ -75,6 +75,9 @@ def explanation(error: Any) -> str:
         word = re.search(r"'(.*?)'", said)
         meant = suggestions("command", word[1], known) if word else []
         return f"{said.split('.')[0]}{_question(meant)}. Allowed: {', '.join(known)}."
+    parameter = getattr(error, "param", None)
+    if parameter is not None and said.startswith("Missing "):
+        return f"{said.rstrip('.')}: {_meaning(parameter, context)}"
     if name is not None and command is not None and said.startswith("No such option"):
         known = [option.opts[0] for option in _options(command, context)]
         return f"No such option: {name}{_question(suggestions('option', name, known))}; --help shows all"
@@ -93,8 +96,13 @@ def _headings(group: Any) -> dict[str, tuple[str, ...]]:
 def _needs(command: Any, name: str, context: Any) -> str:
     """Return the message that an option lacks its value, with what the help says of it."""
     option = next(option for option in _options(command, context) if name in option.opts)
-    meaning = re.sub(r"\s*\[.*\]$", "", _help_text(option, context)).rstrip(".")
-    return f"{name} needs a value, {option.metavar}: {meaning[:1].lower()}{meaning[1:]}"
+    return f"{name} needs a value, {option.metavar}: {_meaning(option, context)}"
+
+
+def _meaning(parameter: Any, context: Any) -> str:
+    """Return what the help says of a parameter, to stand behind a colon."""
+    text = re.sub(r"\s*\[.*\]$", "", _help_text(parameter, context)).rstrip(".")
+    return text if text[1:2].isupper() else f"{text[:1].lower()}{text[1:]}"
 
 
 def _options(command: Any, context: Any) -> list[Any]:
