@@ -77,7 +77,8 @@ def explanation(error: Any) -> str:
         return f"{said.split('.')[0]}{_question(meant)}. Allowed: {', '.join(known)}."
     parameter = getattr(error, "param", None)
     if parameter is not None and said.startswith("Missing "):
-        return f"{said.rstrip('.')}: {_meaning(parameter, context)}"
+        name = parameter.opts[0] if parameter.param_type_name == "option" else _label(parameter)
+        return f"Missing {parameter.param_type_name} '{name}': {_meaning(parameter, context)}"
     if name is not None and command is not None and said.startswith("No such option"):
         known = [option.opts[0] for option in _options(command, context)]
         return f"No such option: {name}{_question(suggestions('option', name, known))}; --help shows all"

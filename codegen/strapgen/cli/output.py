@@ -120,14 +120,6 @@ class Output:
 TEXT_OUTPUT = ("out", "format")
 
 
-@dataclass(frozen=True)
-class ProseOutput(Output):
-    """Options that say where a result that is no table goes."""
-
-    formats: ClassVar[tuple[str, ...]] = _PLAIN
-    format: Annotated[str | None, format_option(_PLAIN)] = "text"
-
-
 def check_format(value: str) -> str:
     """Check the value of --format of a command that writes source files."""
     return checks.choice("format", value, _PLAIN)
