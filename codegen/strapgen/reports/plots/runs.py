@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from strapgen.reports.plots import figures
 from strapgen.reports.runs import ANGLES, AXES, SKEW_PLANES
-from strapgen.simulation.courses import Course
 from strapgen.simulation.recording import History
 from strapgen.simulation.runs import Run
 from strapgen.support.files import write_file
+
+if TYPE_CHECKING:
+    from strapgen.simulation.courses import Course
 
 
 def plot_run(run: Run, title: str, path: str | Path) -> Path:
