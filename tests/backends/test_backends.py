@@ -211,7 +211,7 @@ def test_options_that_cannot_be_used(make, options):
 
 def test_number_of_inputs_and_axes_of_an_evaluator(backend_name):
     convert = strapgen.evaluator("dcm-from-euler", backend_name)
-    with pytest.raises(InputError, match="2 inputs; 1 are needed: state"):
+    with pytest.raises(InputError, match="2 inputs; 1 is needed: state"):
         convert(np.zeros(4), np.zeros(4))
     error = strapgen.evaluator("error-matrix", backend_name)
     with pytest.raises(InputError, match="do not broadcast"):
@@ -219,7 +219,10 @@ def test_number_of_inputs_and_axes_of_an_evaluator(backend_name):
 
 
 def test_unknown_names():
-    with pytest.raises(InputError, match="algorithm 'dmc' is not known; allowed: dcm, euler, cayley-klein"):
+    with pytest.raises(
+        InputError,
+        match=r"'dmc' is not known \(did you mean dcm\?\); allowed: dcm, euler, cayley-klein",
+    ):
         strapgen.backend("dmc")
     with pytest.raises(InputError, match="method 'rk9'"):
         strapgen.backend("dcm", "rk9")

@@ -15,7 +15,7 @@ import strapgen
 from strapgen.backends import BACKENDS
 from strapgen.experiments import comparison
 from strapgen.ir.fixed_settings import Settings
-from strapgen.reports.comparison import comparison_csv, comparison_json, comparison_text
+from strapgen.reports.comparison import ComparedKernel, comparison_report
 from strapgen.support.exceptions import InputError, InputTypeError
 
 FIXED_NAMES = ("c-q31", "c-q15", "fixed-model")
@@ -95,17 +95,18 @@ def test_names_that_cannot_be_used(backends, reference, said):
 
 def test_the_three_forms_say_the_same(increments):
     rows = comparison.compare("euler", "rk4", 2, ["numpy", "c-q15"], increments)
-    data = json.loads(comparison_json(rows))
+    report = comparison_report([ComparedKernel("euler-rk4-2", "title", rows)], "numpy", "drift")
+    data = json.loads(report.written("json"))
     assert [list(row)[:8] for row in data] == [
         ["backend", "max_abs_rad", "rms_rad", "max_ulp", "bound_rad", "drift_deg", "ns_per_step", "bytes"]
     ] * 2
-    table = list(csv.DictReader(io.StringIO(comparison_csv(rows))))
+    table = list(csv.DictReader(io.StringIO(report.written("csv"))))
     for plain, cells in zip(data, table, strict=True):
         for key, value in plain.items():
             if key != "operations":
                 assert cells[key] == ("" if value is None else str(value))
         assert cells["multiply"] == str(plain["operations"]["multiply"])
-    text = comparison_text(rows, "title", "numpy", "drift")
+    text = report.written("text")
     assert text.splitlines()[-1].startswith("c-q15") and f"{rows[1].bound_rad:.3g}" in text
 
 

@@ -16,7 +16,7 @@ from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.experiments import convergence
 from strapgen.experiments.convergence import Convergence, Rung, converge
 from strapgen.ir.attitude_step import Order
-from strapgen.reports.convergence import convergence_csv, convergence_text
+from strapgen.reports.convergence import convergence_report, convergence_text
 from strapgen.support.exceptions import InputError
 
 #: How far an observed order may be from the one of theory: the next term of the series is still there at these steps.
@@ -167,7 +167,7 @@ def test_reports_have_every_figure():
     assert text.count("euler-butcher6-3") == 10  # a heading and a note each, four side by side and one below
     assert "out of range" in text and "6.250e-04 (4.00)*" in text
     assert "method order 6, rate extraction order 3: the step is of order 4" in text
-    rows = list(csv.DictReader(io.StringIO(convergence_csv([FOUND]))))
+    rows = list(csv.DictReader(io.StringIO(convergence_report([FOUND], "A title").written("csv"))))
     assert [row["error_rad"] for row in rows] == ["", "0.01", "0.000625"]
     assert {row["predicted_order"] for row in rows} == {"4"}
     data = json.loads(json.dumps(FOUND.as_dict()))

@@ -10,7 +10,7 @@ import pytest
 from strapgen.experiments import word_length
 from strapgen.experiments.word_length import cases, run, run_case
 from strapgen.reports import plots
-from strapgen.reports.word_length import word_length_csv, word_length_text
+from strapgen.reports.word_length import word_length_report, word_length_text
 from strapgen.support.exceptions import InputError
 
 SMALL = {"duration": "5", "words": (12, 16, 24), "carries": ("none", "full")}
@@ -63,7 +63,7 @@ def test_a_run_that_leaves_its_range_is_told():
 
 
 def test_forms(outcomes):
-    rows = list(csv.DictReader(io.StringIO(word_length_csv(outcomes))))
+    rows = list(csv.DictReader(io.StringIO(word_length_report(outcomes).written("csv"))))
     assert len(rows) == len(outcomes)
     assert float(rows[0]["rounding_deg"]) == outcomes[0].rounding_deg
     assert rows[0]["settings"] == "a_deg_s=10 b_deg_s=10 g_deg_s=10"
@@ -90,7 +90,7 @@ def test_image(outcomes):
         ({"words": (7,)}, "word is 7"),
         ({"carries": ("p",)}, "carry 'p'"),
         ({"steps": ("0.7",)}, "not a whole multiple"),
-        ({"pulses_arcsec": ("-1",)}, "pulse-arcsec is -1"),
+        ({"pulses_arcsec": ("-1",)}, "pulse_arcsec is -1"),
     ],
 )
 def test_studies_that_cannot_be_run(values, said):

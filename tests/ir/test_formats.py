@@ -49,7 +49,7 @@ def test_formats_that_cannot_be_used(text, said):
         ({"largest_angle": "5"}, "largest angle increment is 5 rad"),
         ({"largest_angle": "0"}, "largest angle is 0"),
         ({"max_rate_deg_s": 10}, "step is missing"),
-        ({"step": 1}, "max-rate-deg-s is missing"),
+        ({"step": 1}, "max_rate_deg_s is missing"),
         ({"max_rate_deg_s": 10, "step": 1, "largest_angle": 1}, "both given"),
         ({"allowance": Fraction(2)}, "drift allowance is 2"),
         ({"ranges": {"time": Fraction(0)}}, "range of time is 0"),

@@ -63,7 +63,7 @@ def test_matrices_as_data(run):
 
 
 def test_csv_columns(run):
-    header = runs.run_csv(run).splitlines()[0].split(",")
+    header = runs.run_table(run).as_csv().splitlines()[0].split(",")
     wanted = ["time_s", *(f"scale_{axis}" for axis in "xyz")]
     wanted += [f"{kind}_{axis}_deg" for kind in ("skew", "drift") for axis in "xyz"]
     wanted += [f"{kind}_{place}" for kind in ("computed", "true", "difference", "error") for place in PLACES]
@@ -71,7 +71,7 @@ def test_csv_columns(run):
 
 
 def test_csv_comes_back_bit_for_bit(run):
-    table = rows(runs.run_csv(run))
+    table = rows(runs.run_table(run).as_csv())
     assert len(table) == len(run.time) == 121
     np.testing.assert_array_equal(floats(table, "time_s")[:, 0], run.time)
     np.testing.assert_array_equal(floats(table, *(f"scale_{axis}" for axis in "xyz")), run.scale)
@@ -147,7 +147,7 @@ def history(rng) -> History:
 
 
 def test_history_csv_comes_back(history):
-    table = rows(runs.history_csv(history, NAMES))
+    table = rows(runs.history_table(history, NAMES).as_csv())
     assert list(table[0]) == ["time_s", *NAMES]
     np.testing.assert_array_equal(floats(table, "time_s")[:, 0], history.time)
     np.testing.assert_array_equal(floats(table, *NAMES).astype(np.float32), history.states)
@@ -167,7 +167,7 @@ def test_history_of_matrices_is_flat():
     history = History(np.arange(2.0), np.tile(np.eye(3), (2, 1, 1)), 1.0, 0)
     elements = [f"C_{place}" for place in PLACES]
     assert runs.history_data(history, elements, {})["attitude"][1] == [1, 0, 0, 0, 1, 0, 0, 0, 1]
-    assert len(rows(runs.history_csv(history, elements))[0]) == 10
+    assert len(rows(runs.history_table(history, elements).as_csv())[0]) == 10
 
 
 def test_history_text(history):

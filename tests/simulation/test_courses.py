@@ -109,7 +109,7 @@ def test_reports_hold_every_number(wobble):
     data = json.loads(json.dumps(runs.course_data(made, {"backend": "numpy"}), allow_nan=False))
     assert data["attitude"] == made.states.tolist()
     assert data["velocity_changes_m_s"] == made.velocity_changes.tolist()
-    rows = list(csv.DictReader(io.StringIO(runs.course_csv(made))))
+    rows = list(csv.DictReader(io.StringIO(runs.course_table(made).as_csv())))
     assert [float(row["time_s"]) for row in rows] == data["time_s"]
     for name in ("roll_deg", "pitch_deg", "heading_deg"):
         assert [float(row[name]) for row in rows] == data[name]

@@ -246,7 +246,7 @@ def test_uneven_times_name_the_worst_interval(write, read):
     path = write(rows)
     refused(read, path, "line 6: sample times are not even: the interval of 0.0111 s", "the median is 0.01 s")
     remedy = (
-        "increments are needed at even times" if read is read_increments else "--resample-hz integrates them"
+        "increments are needed at even times" if read is read_increments else "resample_hz integrates them"
     )
     refused(read, path, remedy)
 
@@ -261,7 +261,7 @@ def test_times_rounded_to_microseconds_are_even(write, read):
     [
         ("", "holds 0 rows of numbers; at least 2 are needed"),
         ("t,dx,dy,dz\n", "holds 0 rows"),
-        ("t,dx,dy,dz\n0.1,0,0,0\n", "holds 1 rows"),
+        ("t,dx,dy,dz\n0.1,0,0,0\n", "holds 1 row of numbers"),
         (b"\xff\xfe0\x00,\x001\x00", "is no text file of comma-separated values"),
         (b"\x89PNG\r\n\x1a\n\x00\x00", "is no text file of comma-separated values"),
         ("0;0;0;0\n0.1;0;0;0\n", ""),
@@ -341,11 +341,11 @@ def test_resampling_keeps_the_whole_angle():
 @pytest.mark.parametrize(
     ("hertz", "said"),
     [
-        ("0", "resample-hz is 0; a number above 0 is needed"),
-        ("-5", "resample-hz is -5; a number above 0 is needed"),
-        ("nan", "resample-hz is 'nan'; a finite number is needed"),
-        ("often", "resample-hz is 'often'; a finite number is needed"),
-        ("0.2", r"resample-hz 0.2: .* is 4 s long, less than one interval"),
+        ("0", "resample_hz is 0; a number above 0 is needed"),
+        ("-5", "resample_hz is -5; a number above 0 is needed"),
+        ("nan", "resample_hz is 'nan'; a finite number is needed"),
+        ("often", "resample_hz is 'often'; a finite number is needed"),
+        ("0.2", r"resample_hz 0.2: .* is 4 s long, less than one interval"),
         ("1e-320", "less than one interval"),
         ("1e300", "would make over"),
     ],

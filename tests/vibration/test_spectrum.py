@@ -290,7 +290,7 @@ def test_a_file_of_several_rows_is_integrated(name, quantity, one, step, cycles,
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("frequency_hz,density,angle_x_rad\n1,1,1\n", "holds 1 rows below its header; at least 2"),
+        ("frequency_hz,density,angle_x_rad\n1,1,1\n", "holds 1 row below its header; at least 2"),
         (ROWS.replace("density", "psd"), "column 'psd' is not known; allowed: frequency_hz, density"),
         (ROWS.replace("angle_y_rad", "angle_x_rad"), "column 'angle_x_rad' is there twice"),
         (ROWS.replace("angle_y_rad", "acceleration_y_m_s2"), "has no column angle_y_rad beside it"),

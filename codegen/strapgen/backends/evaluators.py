@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from strapgen.ir.sources import Sources
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
+from strapgen.support.suggestions import counted, needed
 
 Array = NDArray[Any]
 
@@ -60,7 +61,7 @@ class Evaluator(ABC):
         if len(values) != len(signals):
             names = ", ".join(signal.name for signal in signals)
             raise InputError(
-                f"{self.function.name} got {len(values)} inputs; {len(signals)} are needed: {names}"
+                f"{self.function.name} got {counted(len(values), 'input')}; {needed(len(signals))}: {names}"
             )
         arrays = [
             checks.real_array(signal.name, value, signal.shape, self.dtype)

@@ -25,7 +25,7 @@ from strapgen.catalogue import Choice
 from strapgen.ir.program import OPERATIONS, Program
 from strapgen.ir.sources import Sources
 from strapgen.library import generated_sources
-from strapgen.support import stages
+from strapgen.support import checks, stages
 
 #: Decimal digits of the arithmetic, of which a million steps lose six.
 DIGITS = 40
@@ -130,7 +130,7 @@ def propagate(program: Program, increments: Any, initial: Any = None) -> NDArray
 
     Raises
     ------
-    InputError
+    InputError, InputTypeError
         If the program is no attitude step, or a shape or a value does not fit.
 
     Examples
@@ -141,7 +141,7 @@ def propagate(program: Program, increments: Any, initial: Any = None) -> NDArray
     """
     stages.require("propagate", program, Program)
     backend = ExactBackend(StepSources(sources_of_program(program, _TARGET)))
-    return backend.propagate(np.asarray(increments, np.float64), initial=initial)
+    return backend.propagate(checks.numbers("increments", increments), initial=initial)
 
 
 def interpreter(name: str, step: Program | None = None) -> Interpreter:

@@ -34,8 +34,8 @@ def windows(increments: Any, count: int, previous: int = 0) -> NDArray[np.float6
 
     Raises
     ------
-    InputError
-        If a number is not allowed, or the row does not consist of whole steps.
+    InputError, InputTypeError
+        If a number is not allowed, or the row holds no numbers or does not consist of whole steps.
 
     Examples
     --------
@@ -43,7 +43,7 @@ def windows(increments: Any, count: int, previous: int = 0) -> NDArray[np.float6
     array([[ 0.,  3.,  6.],
            [ 6.,  9., 12.]])
     """
-    row = np.ascontiguousarray(increments, np.float64)
+    row = np.ascontiguousarray(checks.numbers("increments", increments))
     checks.count("count", count)
     checks.count("previous", previous, smallest=0)
     if row.ndim != 2 or row.shape[1] != 3 or (len(row) - previous) % count or len(row) < previous:
@@ -80,8 +80,9 @@ def pulses(increments: Any, size: float | str | Fraction, previous: int = 0) -> 
 
     Raises
     ------
-    InputError
-        If the size is not above 0, or the angle is more pulses than can be counted.
+    InputError, InputTypeError
+        If the increments are no numbers or have another shape, the size is not above 0, or the angle is more pulses
+        than can be counted.
 
     Examples
     --------
@@ -89,7 +90,7 @@ def pulses(increments: Any, size: float | str | Fraction, previous: int = 0) -> 
     array([0., 1., 0., 1.])
     """
     pulse = float(checks.number("pulse", size, positive=True))
-    d = np.asarray(increments, np.float64)
+    d = checks.numbers("increments", increments, (None, None, 3))
     if previous and d.ndim > 3 and d.size:
         return np.stack([pulses(run, size, previous) for run in d])
     if previous and d.size:

@@ -22,6 +22,10 @@ from strapgen.catalogue.names import (
 from strapgen.catalogue.user import loading
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError, InputTypeError
+from strapgen.support.suggestions import some
+
+#: What every message about an algorithm allows beside the names.
+_FILE = "a Python file"
 
 
 def choose(
@@ -61,10 +65,8 @@ def choose(
         return _choose_users(name, method, increments, rates, previous)
     if name not in RESERVED:
         shown = [kernel for kernel, recipe in KERNELS.items() if recipe.standard]
-        raise InputError(
-            f"algorithm {name!r} is not known; "
-            f"allowed: {_allowed(*VECTORS, *shown, 'other kernels of strapgen list')}"
-        )
+        names = [*_algorithms(), *VECTORS, *shown, *KERNELS]
+        checks.choice("algorithm", name, dict.fromkeys(names), _FILE, "kernels")
     if name in KERNELS:
         options = {
             "method": method.name if isinstance(method, Tableau) else method,
@@ -114,13 +116,14 @@ def _choose_users(
     return Choice.of_user(loading.load(name, **options))
 
 
-def _allowed(*more: str) -> str:
-    return f"{', '.join(dict.fromkeys([*ALGORITHMS, *loading.installed(), *more]))}, or a Python file"
+def _algorithms() -> list[str]:
+    """Return the names of all attitude steps: those of the catalogue, and those that users have installed."""
+    return list(dict.fromkeys([*ALGORITHMS, *loading.installed()]))
 
 
 def _tableau_name(method: str) -> str:
     if method in INTEGRATORS:
-        raise InputError(f"method {method!r} has no tableau; these have: {', '.join(TABLEAUX)}")
+        raise InputError(f"method {method!r} has no tableau; these have: {some(TABLEAUX)}")
     return checks.choice("method", method, TABLEAUX)
 
 
@@ -133,7 +136,11 @@ def choose_step(
 ) -> Choice:
     """Check a choice of attitude step; parameters and errors are those of `choose`."""
     if name in KERNELS or name in VECTORS:
-        raise InputError(f"algorithm {name!r} is no attitude step; allowed: {_allowed()}")
+        raise InputError(
+            f"algorithm {name!r} is no attitude step; allowed: {some(_algorithms())}, or {_FILE}"
+        )
+    if isinstance(name, str) and not name.endswith(".py"):
+        checks.choice("algorithm", name, _algorithms(), _FILE)
     return choose(name, method, increments, rates, previous)
 
 

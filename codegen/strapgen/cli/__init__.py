@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
+from typing import Any, ClassVar
 
 import typer
 
@@ -17,44 +18,64 @@ from strapgen.cli.commands import (
     derive,
     generate,
     listing,
+    rate_table,
     series,
     simulate,
     stability,
     strapdown,
-    stress,
     study,
     tableau,
     tables,
     two_speed,
     vibration,
 )
+from strapgen.cli.help import PlainCommand, PlainGroup, explanation
 from strapgen.support.exceptions import StrapgenError
+
+#: Headings of ``strapgen --help``, and the commands below each.
+COMMANDS: dict[str, dict[str, Any]] = {
+    "Derive": {
+        "list": listing.list_names,
+        "derive": derive.derive,
+        "tableau": tableau.tableau,
+        "coning": coning.coning,
+    },
+    "Generate": {"generate": generate.generate, "two-speed": two_speed.two_speed},
+    "Run": {"simulate": simulate.simulate, "strapdown": strapdown.strapdown, "compare": compare.compare},
+    "Analyse": {
+        "series": series.series,
+        "vibration": vibration.vibration,
+        "stability": stability.stability,
+        "converge": converge.converge,
+        "check": check.check,
+    },
+    "Reproduce": {"tables": tables.tables, "rate-table": rate_table.rate_table, "study": study.app},
+}
+
+
+class _Strapgen(PlainGroup):
+    """The program itself."""
+
+    headings: ClassVar[dict[str, tuple[str, ...]]] = {
+        heading: tuple(commands) for heading, commands in COMMANDS.items()
+    }
+
 
 app = typer.Typer(
     name="strapgen",
-    help="Derive strapdown attitude algorithms, generate numpy and C code for them, and test it against truth.",
+    cls=_Strapgen,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.callback()(version_option.options)
-app.command("list")(listing.list_names)
-app.command("tableau")(tableau.tableau)
-app.command("coning")(coning.coning)
-app.command("derive")(derive.derive)
-app.command("generate")(generate.generate)
-app.command("simulate")(simulate.simulate)
-app.command("compare")(compare.compare)
-app.command("converge")(converge.converge)
-app.command("series")(series.series)
-app.command("stability")(stability.stability)
-app.command("check")(check.check)
-app.command("vibration")(vibration.vibration)
-app.command("tables")(tables.tables)
-app.command("two-speed")(two_speed.two_speed)
-app.command("strapdown")(strapdown.strapdown)
-app.command("stress")(stress.stress)
-app.add_typer(study.app, name="study")
+for _commands in COMMANDS.values():
+    for _name, _command in _commands.items():
+        if isinstance(_command, typer.Typer):
+            app.add_typer(_command, name=_name)
+        else:
+            app.command(_name, cls=PlainCommand)(_command)
+app.command("stress", cls=PlainCommand, hidden=True)(rate_table.rate_table)  # its name in earlier releases
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -81,15 +102,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         sys.exit(130)
     except Exception as error:
         # Typer's errors of usage share no public base class over the releases that are allowed.
-        explain = getattr(error, "format_message", None)
-        if explain is None:
+        if not hasattr(error, "format_message"):
             raise
-        said = explain() or "a command is needed"
-        if said.startswith(("No such command", "Missing command")):
-            context = getattr(error, "ctx", None)
-            known = getattr(context and context.command, "commands", {})
-            said += f" Allowed: {', '.join(known)}."
-        _fail(said)
+        _fail(explanation(error))
     sys.exit(status if isinstance(status, int) else 0)
 
 

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-import typer
-
-from strapgen.cli.options import whole
+from strapgen.cli.options import one, option, whole
 from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
@@ -26,68 +24,63 @@ RUN_OPTIONS = ("word", "max_rate_deg_s", "rounding", "carry", "drift_allowance")
 class FixedOptions:
     """Options that set the word and the rounding of fixed-point code, and the largest numbers that it must hold."""
 
+    panel: ClassVar[str] = "Fixed point"
+
     word: Annotated[
         _Text,
-        typer.Option(
+        option(
             "--word",
             metavar="BITS",
             help="Word length in bits: 16, 32 or 64 in C, 8 to 64 in the integer model.  [default: 32]",
-            show_default=False,
         ),
     ] = None
     max_rate_deg_s: Annotated[
         _Text,
-        typer.Option(
+        option(
             "--max-rate-deg-s",
-            metavar="RATE",
+            metavar="DEG_S",
             help="Largest body rate about any axis in deg/s; the formats then hold the increments at this rate.",
-            show_default=False,
         ),
     ] = None
     step: Annotated[
-        _Text,
-        typer.Option(
-            "--step", metavar="S", help="Step length in s; it goes with --max-rate-deg-s.", show_default=False
-        ),
+        _Text, option("--step", metavar="S", help="Step length in s; it goes with --max-rate-deg-s.")
     ] = None
     max_angle_rad: Annotated[
         _Text,
-        typer.Option(
+        option(
             "--max-angle-rad",
             metavar="RAD",
             help="Largest angle increment about any axis in rad, in place of a rate and a step.  [default: 1/8]",
-            show_default=False,
         ),
     ] = None
     rounding: Annotated[
         _Text,
-        typer.Option(
+        option(
             "--rounding",
+            metavar="NAME",
             help="How results are rounded: nearest or truncation.  [default: nearest]",
-            show_default=False,
         ),
     ] = None
     carry: Annotated[
         _Text,
-        typer.Option(
+        option(
             "--carry",
+            metavar="NAME",
             help="Error feedback, which adds the rounding errors of a step to the next one: none; state for those of "
             "the state; full for those of the transition too.  [default: none]",
-            show_default=False,
         ),
     ] = None
     drift_allowance: Annotated[
         _Text,
-        typer.Option(
+        option(
             "--drift-allowance",
             metavar="A",
             help="Amount by which the magnitude of a state element may exceed 1.  [default: 1/16]",
-            show_default=False,
         ),
     ] = None
     ranges: Annotated[
         list[str] | None,
-        typer.Option(
+        option(
             "--range",
             metavar="NAME=MAX",
             help="Largest magnitude of the input NAME in its unit, for an input whose range strapgen does not know.",
@@ -95,7 +88,7 @@ class FixedOptions:
     ] = None
     formats: Annotated[
         list[str] | None,
-        typer.Option(
+        option(
             "--fix",
             metavar="NAME=Qm.n",
             help="Format of the argument or value NAME, if you choose it yourself.",
@@ -125,10 +118,13 @@ class FixedOptions:
         from strapgen.ir.fixed_settings import Settings
         from strapgen.support import checks
 
+        if (self.max_rate_deg_s is None) != (self.step is None):
+            missing = "--step" if self.step is None else "--max-rate-deg-s"
+            raise InputError(f"--max-rate-deg-s and --step go together; {missing} is missing")
         bits = whole("word", self.word)
         allowance = {}
         if self.drift_allowance is not None:
-            allowance["allowance"] = checks.number("drift-allowance", self.drift_allowance)
+            allowance["allowance"] = checks.number("drift allowance", self.drift_allowance)
         return Settings.of(
             word=32 if bits is None else bits,
             max_rate_deg_s=self.max_rate_deg_s,
@@ -151,6 +147,7 @@ class FixedOptions:
         from strapgen.backends import BACKENDS
         from strapgen.support import checks
 
+        one("--backend", backend)
         checks.choice("backend", backend, BACKENDS)
         if self.stated and not BACKENDS[backend].fixed:
             raise InputError(f"{next(iter(self.stated))} is for fixed-point back ends, not for {backend}")

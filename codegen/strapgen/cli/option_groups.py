@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
+from copy import copy
 from functools import wraps
 from inspect import Parameter, Signature
-from typing import Any, NamedTuple, TypeVar, get_type_hints
+from typing import Annotated, Any, NamedTuple, TypeVar, get_type_hints
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 #: Typer passes every value by its name, so that one without a default may stand behind others.
@@ -32,7 +33,7 @@ def grouped(command: Command) -> Command:
     """Let Typer see the fields of a command's groups as options of the command.
 
     A group is a parameter whose type is a dataclass with fields annotated as Typer reads them. The command gets an
-    object of the dataclass in place of the single values.
+    object of the dataclass in place of the single values. Its class variable `panel` is the heading of its options.
 
     Raises
     ------
@@ -73,10 +74,20 @@ def _options(group: type[Any], only: tuple[str, ...]) -> list[Parameter]:
     fields = {field.name: field for field in dataclasses.fields(group)}
     if unknown := {*only} - {*fields}:
         raise TypeError(f"{group.__name__} has no option {', '.join(sorted(unknown))}")
+    panel = getattr(group, "panel", None)
     return [
-        Parameter(name, _KEYWORD, default=_default(fields[name]), annotation=hints[name])
+        Parameter(name, _KEYWORD, default=_default(fields[name]), annotation=_in_panel(hints[name], panel))
         for name in only or fields
     ]
+
+
+def _in_panel(hint: Any, panel: str | None) -> Any:
+    """Return the annotation of an option that the help shows among those of its group."""
+    metadata = [copy(item) if hasattr(item, "rich_help_panel") else item for item in hint.__metadata__]
+    for item in metadata:
+        if hasattr(item, "rich_help_panel"):
+            item.rich_help_panel = panel
+    return Annotated[hint.__origin__, *metadata]
 
 
 def _default(field: dataclasses.Field[Any]) -> Any:

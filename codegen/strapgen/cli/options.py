@@ -1,10 +1,11 @@
-"""Options that choose an algorithm and its method, shared by several commands, and readers of option values."""
+"""Options that several commands share, and readers of option values; each option has one name, metavar and sentence."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import typer
 
@@ -15,23 +16,80 @@ from strapgen.support.exceptions import InputError
 if TYPE_CHECKING:
     from strapgen.catalogue import Choice
 
+_Text = str | None
+
+
+def option(*names: str, metavar: str | None = None, help: str, panel: str | None = None) -> Any:
+    """Return an option of a command; the names after the first one are aliases, which the help does not show.
+
+    A default that the parameter has is shown if it is no None; one that the command finds stands in the help.
+    """
+    return typer.Option(*names, metavar=metavar, help=help, rich_help_panel=panel)
+
+
+def _argument(help: str) -> Any:
+    return typer.Argument(metavar="ALGORITHM", help=help, show_default=False)
+
+
 Algorithm = Annotated[
     str,
-    typer.Argument(
-        help="dcm, euler, cayley-klein, any other kernel that strapgen list shows, or a Python file of your own."
+    _argument(
+        "dcm, euler, cayley-klein, any other kernel that strapgen list kernels shows, or a Python file of your own."
     ),
 ]
-StepAlgorithm = Annotated[
-    str, typer.Argument(help="dcm, euler or cayley-klein, or a Python file with your own algorithm.")
+OptionalAlgorithm = Annotated[
+    _Text,
+    _argument(
+        "dcm, euler, cayley-klein, any other kernel that strapgen list kernels shows, or a Python file of your own."
+    ),
 ]
-Increments = Annotated[
-    str | None,
-    typer.Option(
-        "--increments",
+StepAlgorithm = Annotated[str, _argument("dcm, euler or cayley-klein, or a Python file of your own.")]
+OptionalStepAlgorithm = Annotated[
+    _Text, _argument("dcm, euler or cayley-klein, or a Python file of your own.")
+]
+TwoSpeedAlgorithm = Annotated[str, _argument("dcm or euler.")]
+
+_SHOWN_BACKENDS = "strapgen list backends shows all."
+#: One back end.
+OneBackend = Annotated[
+    str, option("--backend", metavar="NAME", help=f"Back end; {_SHOWN_BACKENDS}", panel="Algorithm")
+]
+#: Several back ends side by side.
+SeveralBackends = Annotated[
+    str,
+    option(
+        "--backend",
+        "--backends",
+        metavar="NAME,...",
+        help=f"Back ends, with commas between; {_SHOWN_BACKENDS}",
+        panel="Algorithm",
+    ),
+]
+#: Several back ends; by default those that are fast.
+FastBackends = Annotated[
+    _Text,
+    option(
+        "--backend",
+        "--backends",
+        metavar="NAME,...",
+        help=f"Back ends, with commas between; {_SHOWN_BACKENDS}  "
+        "[default: all but fixed-model and exact, which are slow]",
+        panel="Algorithm",
+    ),
+]
+Sculling = Annotated[
+    str,
+    option(
+        "--sculling",
         metavar="N",
-        help="Number of angle increments in a step, 1 to 8.  [default: 2]",
-        show_default=False,
+        help="Form of the sculling integral: 1 with the rotation compensation, 2 without.",
+        panel="Algorithm",
     ),
+]
+Duration = Annotated[str, option("--duration", metavar="S", help="Duration of each run in s.", panel="Input")]
+Increments = Annotated[
+    _Text,
+    option("--increments", metavar="N", help="Number of angle increments in a step, 1 to 8.  [default: 2]"),
 ]
 
 
@@ -39,36 +97,36 @@ Increments = Annotated[
 class MethodOptions:
     """Options that choose the integration method of an algorithm and the samples that a step takes."""
 
+    panel: ClassVar[str] = "Algorithm"
+
     method: Annotated[
-        str | None,
-        typer.Option(
+        _Text,
+        option(
             "--method",
-            help="Integration method; strapgen list shows all.  [default: rk4]",
-            show_default=False,
+            metavar="NAME",
+            help="Integration method; strapgen list methods shows all.  [default: rk4]",
         ),
     ] = None
     tableau: Annotated[
         Path | None,
-        typer.Option(
+        option(
             "--tableau",
             metavar="FILE",
             help="TOML file with the Butcher tableau of your own method, in place of --method.",
-            show_default=False,
         ),
     ] = None
     increments: Increments = None
     previous: Annotated[
-        str | None,
-        typer.Option(
+        _Text,
+        option(
             "--previous",
             metavar="N",
             help="Number of increments from before the step that it uses as well, 0 to 3.  [default: 0]",
-            show_default=False,
         ),
     ] = None
     rates: Annotated[
         bool,
-        typer.Option(
+        option(
             "--rates",
             help="Let the step take, in place of increments, body rates at the method's nodes, times the step length.",
         ),
@@ -85,6 +143,7 @@ class MethodOptions:
             )
         method = self.method if self.tableau is None else tableaux.read(self.tableau)
         choose = catalogue.choose_step if step else catalogue.choose
+        one("--method", self.method)
         count, before = whole("increments", self.increments), whole("previous", self.previous) or 0
         with waiting(f"deriving {algorithm}"):  # a user's code may take its time
             return choose(algorithm, method, count, self.rates, before)
@@ -92,6 +151,51 @@ class MethodOptions:
 
 #: The options of an attitude step, which takes increments.
 STEP_OPTIONS = ("method", "tableau", "increments", "previous")
+
+
+@dataclass(frozen=True)
+class SeveralMethods(MethodOptions):
+    """Options that choose the methods to show side by side, and the numbers of increments of each."""
+
+    method: Annotated[
+        _Text,
+        option(
+            "--method",
+            metavar="NAME,...",
+            help="Integration methods, with commas between; strapgen list methods shows all.  [default: rk4]",
+        ),
+    ] = None
+    increments: Annotated[
+        _Text,
+        option(
+            "--increments",
+            metavar="N,...",
+            help="Numbers of angle increments in a step, 1 to 8; enough: as many as each method needs.  [default: 2]",
+        ),
+    ] = None
+
+    def each(self) -> list[SeveralMethods]:
+        """Return the options with one method and one number of increments each."""
+        return [
+            replace(self, method=name, increments=count)
+            for name in _parts("--method", self.method)
+            for count in _parts("--increments", self.increments)
+        ]
+
+    def choices(self, algorithm: str, *, step: bool = True) -> list[Choice]:
+        """Return the algorithm with every method and every number of increments."""
+        return [options.choose(algorithm, step=step) for options in self.each()]
+
+    def choose(self, algorithm: str, *, step: bool = True) -> Choice:
+        """Return the algorithm with one method; see `MethodOptions.choose`."""
+        if self.increments != "enough":
+            return super().choose(algorithm, step=step)
+        from strapgen import catalogue
+
+        choice = replace(self, increments=None).choose(algorithm, step=step)
+        if choice.method is None or choice.increments is None:
+            raise InputError(f"--increments enough does not go with {algorithm}; a number does")
+        return replace(choice, increments=catalogue.enough(choice.method))
 
 
 def whole(what: str, value: str | None) -> int | None:
@@ -109,15 +213,35 @@ def limit(what: str, value: str | None) -> float | None:
     return number
 
 
-def listed(option: str, text: str, empty: str = "") -> list[str]:
+def one(option: str, value: str | None) -> None:
+    """Refuse a list where one name is needed."""
+    if value is not None and "," in value:
+        raise InputError(f"{option} {value} is a list; one name is needed here")
+
+
+def listed(option: str, text: str) -> list[str]:
     """Return the values of a comma-separated list, each once.
 
     Raises
     ------
     InputError
-        If there is none; the message is the option and `empty`.
+        If there is none.
     """
     values = list(dict.fromkeys(value.strip() for value in text.split(",") if value.strip()))
     if not values:
-        raise InputError(f"{option} {empty or f'is {text!r}; at least one value is needed'}")
+        raise InputError(f"{option} is {text!r}; at least one value is needed")
     return values
+
+
+def backends(option: str, text: str | None, default: Sequence[str]) -> list[str]:
+    """Return the back ends of a list, checked; the default without one."""
+    from strapgen.backends import BACKENDS
+
+    if text is None:
+        return list(default)
+    return [checks.choice("backend", name, BACKENDS) for name in listed(option, text)]
+
+
+def _parts(option: str, text: str | None) -> list[str | None]:
+    """Return the values of a list; None stands for the default."""
+    return [None] if text is None else [*listed(option, text)]

@@ -2,47 +2,102 @@
 
 from __future__ import annotations
 
-import json
 import os
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import typer
 
+from strapgen.cli.options import option
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
+from strapgen.support.suggestions import alternatives
 
-Format = Annotated[str, typer.Option("--format", help="Format of the output: text or json.")]
+if TYPE_CHECKING:
+    from strapgen.reports.report import Report
+
+_TABLE = ("text", "json", "csv", "markdown")
+_PLAIN = ("text", "json")
+#: The value of --out that stands for the terminal.
+_TERMINAL = Path("-")
+
+
+def format_option(formats: tuple[str, ...], default: str = "") -> Any:
+    """Return the option --format; `default` says in words what holds without it, where that depends."""
+    return option(
+        "--format",
+        metavar="NAME",
+        help=f"Format of the output: {alternatives([*formats])}.{default}",
+        panel="Output",
+    )
+
+
+def plot_option(what: str) -> Any:
+    """Return the option --plot for a picture of something."""
+    return option("--plot", metavar="FILE", help=f"Image file for {what}; its ending says the type.")
+
+
+#: The format of a command that writes source files.
+Format = Annotated[str, format_option(_PLAIN)]
+#: The folder of a command that writes source files.
+Folder = Annotated[
+    Path | None,
+    option("--out", metavar="FOLDER", help="Folder for the files.  [default: here]", panel="Output"),
+]
 
 
 @dataclass(frozen=True)
 class Output:
-    """Options that say where the output goes, and in which format."""
+    """Options that say where a result goes, and in which format."""
+
+    panel: ClassVar[str] = "Output"
+    formats: ClassVar[tuple[str, ...]] = _TABLE
 
     out: Annotated[
         Path | None,
-        typer.Option("--out", help="File for the output.  [default: the terminal]", show_default=False),
+        option("--out", metavar="FILE", help="File for the output; - is the terminal.  [default: -]"),
     ] = None
-    plot: Annotated[
-        Path | None, typer.Option("--plot", help="Image file for the plot.", show_default=False)
-    ] = None
-    format: Annotated[
-        str | None, typer.Option("--format", help="Format of the output: text, json or csv.")
-    ] = "text"
-    formats: ClassVar[tuple[str, ...]] = ("text", "json", "csv")
+    plot: Annotated[Path | None, plot_option("the plot")] = None
+    format: Annotated[str | None, format_option(_TABLE)] = "text"
 
     def check(self, *read: str | Path | None) -> None:
-        """Check the format, and that output and plot have files of their own, none of which the command reads."""
+        """Check the format, the type of the image, and that no file is written over another or one that is read."""
         if self.format is not None:
             checks.choice("format", self.format, self.formats)
-        if self.out is not None and self.plot is not None and self.out.resolve() == self.plot.resolve():
+        if self.plot == _TERMINAL:
+            raise InputError("--plot - is no file; an image is not written to the terminal")
+        if self.file is not None and self.plot is not None and self.file.resolve() == self.plot.resolve():
             raise InputError(f"--out and --plot are both {self.out}; two files are needed")
         files = {os.path.realpath(path) for path in read if path is not None and Path(path).is_file()}
-        for option, path in (("--out", self.out), ("--plot", self.plot)):
+        for name, path in (("--out", self.file), ("--plot", self.plot)):
             if path is not None and os.path.realpath(path) in files:
-                raise InputError(f"{option} {path} is a file that the command reads; another one is needed")
+                raise InputError(f"{name} {path} is a file that the command reads; another one is needed")
+        if self.plot is not None:
+            from strapgen.reports import plots
+
+            plots.require_kind(self.plot)
+
+    @property
+    def file(self) -> Path | None:
+        """The file for the output; None for the terminal."""
+        return None if self.out == _TERMINAL else self.out
+
+    def report(self, report: Report, image: Callable[[Path], bytes] | bytes | None = None) -> None:
+        """Deliver a report in the format of the options.
+
+        Parameters
+        ----------
+        report : Report
+        image : bytes or callable, optional
+            The image for the file of --plot, or what returns it: that is called only if there is such a file.
+        """
+        text = report.written(self.format or "text")
+        if callable(image):
+            image = None if self.plot is None else image(self.plot)
+        self.deliver(text, image)
 
     def deliver(self, text: str, image: bytes | None = None) -> None:
         """Print the text, or write it and the image into their files, all or none; stderr says which were written."""
@@ -50,27 +105,28 @@ class Output:
 
         text = text.rstrip("\n")
         files: dict[str, str | bytes] = {}
-        if self.out is not None:
-            files[str(self.out)] = f"{text}\n"
+        if self.file is not None:
+            files[str(self.file)] = f"{text}\n"
         if self.plot is not None and image is not None:
             files[str(self.plot)] = image
         written = write_files(Path(), files)
-        if self.out is None:
+        if self.file is None:
             typer.echo(text)
         if written:
             typer.echo(f"wrote {' and '.join(map(str, written))}", err=True)
 
 
-def check_format(value: str, *more: str) -> str:
-    """Check the value of --format: text, json, or one of `more`."""
-    return checks.choice("format", value, ["text", "json", *more])
+#: The options of a result without a picture.
+TEXT_OUTPUT = ("out", "format")
 
 
-def as_json(data: Any) -> str:
-    """Return data as JSON: a list on one line, an object indented."""
-    return json.dumps(data, indent=None if isinstance(data, list) else 1)
+def check_format(value: str) -> str:
+    """Check the value of --format of a command that writes source files."""
+    return checks.choice("format", value, _PLAIN)
 
 
 def print_json(data: Any) -> None:
-    """Print data as JSON; see `as_json`."""
+    """Print data as JSON."""
+    from strapgen.reports.report import as_json
+
     sys.stdout.write(as_json(data) + "\n")

@@ -6,10 +6,9 @@ import math
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-import typer
-
+from strapgen.cli.options import option
 from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
@@ -20,10 +19,15 @@ if TYPE_CHECKING:
 
 _Text = str | None
 
+#: Names of motions, for the help.
+MOTION_NAMES = "constant, sinusoidal, coning or polynomial"
 MotionSettings = Annotated[
     list[str] | None,
-    typer.Option(
-        "--set", metavar="KEY=VALUE...", help="Parameters of the motion; strapgen list shows their names."
+    option(
+        "--set",
+        metavar="KEY=VALUE...",
+        help="Parameters of the motion; strapgen list motions shows their names.",
+        panel="Input",
     ),
 ]
 
@@ -53,57 +57,45 @@ class Inputs:
 class SampleSource:
     """Options that say where a run takes its increments from."""
 
-    motion: Annotated[
-        _Text,
-        typer.Option(
-            "--motion",
-            help="Motion to run on: constant, sinusoidal, coning or polynomial.",
-            show_default=False,
-        ),
-    ] = None
+    panel: ClassVar[str] = "Input"
+
+    motion: Annotated[_Text, option("--motion", metavar="NAME", help=f"Motion: {MOTION_NAMES}.")] = None
     settings: MotionSettings = None
-    step: Annotated[
-        _Text, typer.Option("--step", metavar="S", help="Step length in s.", show_default=False)
-    ] = None
-    duration: Annotated[
-        _Text, typer.Option("--duration", metavar="S", help="Duration of the run in s.", show_default=False)
-    ] = None
+    step: Annotated[_Text, option("--step", metavar="S", help="Step length in s.")] = None
+    duration: Annotated[_Text, option("--duration", metavar="S", help="Duration of each run in s.")] = None
     increments_csv: Annotated[
         Path | None,
-        typer.Option(
+        option(
             "--increments-csv",
+            metavar="FILE",
             help="CSV file of increments, in place of a motion: columns t in s, and dx, dy, dz in rad.",
         ),
     ] = None
     rates_csv: Annotated[
         Path | None,
-        typer.Option(
+        option(
             "--rates-csv",
+            metavar="FILE",
             help="CSV file of rates, in place of a motion: the first four columns are the time in s and three rates.",
         ),
     ] = None
     rate_unit: Annotated[
-        _Text,
-        typer.Option(
-            "--rate-unit", help="Unit of the rates in --rates-csv: deg/s or rad/s.", show_default=False
-        ),
+        _Text, option("--rate-unit", metavar="UNIT", help="Unit of the rates in --rates-csv: deg/s or rad/s.")
     ] = None
     resample_hz: Annotated[
         _Text,
-        typer.Option(
+        option(
             "--resample-hz",
             metavar="HZ",
             help="Integrate unevenly timed rates over an even grid of this frequency in Hz.",
-            show_default=False,
         ),
     ] = None
     pulse_arcsec: Annotated[
         _Text,
-        typer.Option(
+        option(
             "--pulse-arcsec",
-            metavar="ANGLE",
+            metavar="ARCSEC",
             help="Angle of a gyro pulse in arc seconds; increments become whole pulses, the rest goes into the next.",
-            show_default=False,
         ),
     ] = None
 
@@ -140,13 +132,18 @@ class SampleSource:
 
         if self.pulse_arcsec is None:
             return None
-        return math.radians(float(checks.number("pulse-arcsec", self.pulse_arcsec, positive=True)) / 3600)
+        return math.radians(float(checks.number("pulse_arcsec", self.pulse_arcsec, positive=True)) / 3600)
 
     def profile(self) -> Motion:
         """Return the motion with its parameters."""
         from strapgen.simulation.motions import motion
 
         return motion(self.motion or "", **pairs(self.settings or []))
+
+    @property
+    def words(self) -> str:
+        """The parameters of the motion, for a title."""
+        return ", ".join(self.settings or [])
 
     def times(self) -> tuple[Fraction, Fraction]:
         """Return the step and the duration of a run on a motion in s."""
@@ -200,7 +197,9 @@ class SampleSource:
         steps = checks.multiple("duration", duration, "step", step)
         increments, length = profile.increments(step, steps, samples, previous), float(step)
         truth = profile.attitude(np.arange(1 + steps) * length)
-        return Inputs(increments, truth, length, f"{self.motion} motion, {steps} steps of {self.step} s")
+        return Inputs(
+            increments, truth, length, f"{self.motion} motion ({self.words}), {steps} steps of {self.step} s"
+        )
 
     def _recorded(self, samples: int, previous: int) -> Inputs:
         from strapgen.backends.increments import windows

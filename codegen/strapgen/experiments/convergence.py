@@ -179,7 +179,7 @@ def converge(
 
 
 def labels(outcomes: Sequence[Convergence]) -> list[str]:
-    """Return a name for every outcome: that of its kernel, and the options where several kernels have one name.
+    """Return a name for every outcome: that of its kernel, with options or a back end where the kernel has several.
 
     Examples
     --------
@@ -187,9 +187,11 @@ def labels(outcomes: Sequence[Convergence]) -> list[str]:
     >>> labels([by_rk1, by_rk4])
     ['mine, mine.py --method rk1', 'mine, mine.py --method rk4']
     """
-    names = [outcome.kernel for outcome in outcomes]
+    names = [kernel for kernel, _ in {(outcome.kernel, outcome.arguments) for outcome in outcomes}]
+    several = len({outcome.backend for outcome in outcomes}) > 1
     return [
-        f"{one.kernel}, {one.arguments}" if one.arguments and names.count(one.kernel) > 1 else one.kernel
+        (f"{one.kernel}, {one.arguments}" if one.arguments and names.count(one.kernel) > 1 else one.kernel)
+        + (f", {one.backend}" if several else "")
         for one in outcomes
     ]
 

@@ -7,7 +7,7 @@ import math
 import multiprocessing
 import os
 import signal
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, fields, replace
 from itertools import product
@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from strapgen import catalogue
 from strapgen.backends import backend
 from strapgen.backends.increments import pulses
 from strapgen.experiments.comparison import certified_angle
@@ -126,7 +127,7 @@ class Study:
     increments : int
         Increments per step.
     methods, words, roundings, carries, steps, pulses_arcsec : sequence
-        Values that are swept, see `Case`.
+        Values that are swept, see `Case`; a single value stands for itself.
     duration : str
         In s.
     motion_name : str
@@ -194,6 +195,18 @@ def cases(study: Study | None = None, **values: Any) -> list[Case]:
     [(12, 'full'), (16, 'full')]
     """
     study = replace(study or Study(), **values)
+    words = [checks.whole("word", w) if isinstance(w, str) else w for w in _several(study.words)]
+    study = replace(
+        study,
+        methods=_several(study.methods),
+        words=words,
+        roundings=_several(study.roundings),
+        carries=_several(study.carries),
+        steps=_several(study.steps),
+        pulses_arcsec=_several(study.pulses_arcsec),
+    )
+    for method in study.methods:
+        catalogue.choose_step(study.algorithm, method, study.increments)
     planned = study.cases()
     if not 0 < len(planned) <= _MOST_CASES:
         raise InputError(f"the study has {len(planned)} cases; 1 to {_MOST_CASES} are allowed")
@@ -201,11 +214,17 @@ def cases(study: Study | None = None, **values: Any) -> list[Case]:
     for step in study.steps:
         checks.multiple("duration", total, "step", checks.number("step", step, positive=True))
     for pulse in study.pulses_arcsec:
-        if checks.number("pulse-arcsec", pulse) < 0:
-            raise InputError(f"pulse-arcsec is {pulse}; 0 for none, or a number above 0 is needed")
+        if checks.number("pulse_arcsec", pulse) < 0:
+            raise InputError(f"pulse_arcsec is {pulse}; 0 for none, or a number above 0 is needed")
     for case in planned:
         Settings(case.word, rounding=case.rounding, carry=case.carry)
     return planned
+
+
+def _several(values: Any) -> tuple[Any, ...]:
+    """Return the values that a study sweeps; a single one stands for itself."""
+    single = isinstance(values, str | bytes) or not isinstance(values, Iterable)
+    return (values,) if single else tuple(values)
 
 
 def run_case(case: Case) -> Outcome:
@@ -235,7 +254,7 @@ def _run(case: Case) -> Outcome:
     h = checks.number("step", case.step, positive=True)
     steps = checks.multiple("duration", checks.number("duration", case.duration, positive=True), "step", h)
     exact = case.profile.increments(h, steps, case.increments)
-    pulse = float(checks.number("pulse-arcsec", case.pulse_arcsec)) / 3600
+    pulse = float(checks.number("pulse_arcsec", case.pulse_arcsec)) / 3600
     measured = pulses(exact, math.radians(pulse)) if pulse else exact
     settings = Settings(case.word, rounding=case.rounding, carry=case.carry)
     settings = settings.fitted(float(np.abs(measured).max()))

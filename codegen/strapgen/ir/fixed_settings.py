@@ -79,7 +79,9 @@ class Settings:
         check_rounding(self.rounding)
         checks.choice("carry", self.carry, CARRIES)
         if not SMALLEST_ANGLE <= self.largest_angle <= LARGEST_ANGLE:
-            how = f" ({self.stated})" if self.stated else ""
+            # In the names of Python; the command line turns them into options again.
+            stated = self.stated.removeprefix("--").replace("max-rate-deg-s", "max_rate_deg_s")
+            how = f" ({stated.replace(' --', ', ')})" if stated else ""
             raise InputError(
                 f"largest angle increment is {float(self.largest_angle):g} rad{how}; "
                 f"from {float(SMALLEST_ANGLE):g} to {LARGEST_ANGLE} is needed"
@@ -118,15 +120,15 @@ class Settings:
             That bound itself, in rad.
         """
         if (max_rate_deg_s is None) != (step is None):
-            missing = "step" if step is None else "max-rate-deg-s"
-            raise InputError(f"max-rate-deg-s and step go together; {missing} is missing")
+            missing = "step" if step is None else "max_rate_deg_s"
+            raise InputError(f"max_rate_deg_s and step go together; {missing} is missing")
         if max_rate_deg_s is not None and largest_angle is not None:
             raise InputError("the largest angle and the largest rate are both given; one is needed")
         angle = DEFAULT_ANGLE
         if largest_angle is not None:
             angle = checks.number("largest angle", largest_angle, positive=True)
         elif max_rate_deg_s is not None:
-            rate = checks.number("max-rate-deg-s", max_rate_deg_s, positive=True)
+            rate = checks.number("max_rate_deg_s", max_rate_deg_s, positive=True)
             angle = rate * checks.number("step", step, positive=True) * _DEGREE / increments
         stated = "" if max_rate_deg_s is None else f"--max-rate-deg-s {max_rate_deg_s} --step {step}"
         return cls(word, Fraction(math.ceil(angle * _LIMIT_UNIT), _LIMIT_UNIT), **rest, stated=stated)

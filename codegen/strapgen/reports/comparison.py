@@ -1,13 +1,13 @@
-"""Reports a comparison of back ends as text, JSON and CSV."""
+"""Reports a comparison of back ends in every format."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from typing import Any
 
 from strapgen.experiments.comparison import Comparison
+from strapgen.reports.report import Report
 from strapgen.reports.table import ANGLE, Column, TextTable
 
 _COLUMNS = (
@@ -23,20 +23,50 @@ _COLUMNS = (
 )
 
 
-def comparison_json(rows: Sequence[Comparison]) -> str:
-    """Return comparisons as a JSON list."""
-    return json.dumps([row.as_dict() for row in rows])
+@dataclass(frozen=True)
+class ComparedKernel:
+    """The back ends of one kernel, compared.
+
+    Parameters
+    ----------
+    kernel : str
+    title : str
+        The kernel and its run in words.
+    rows : sequence of Comparison
+        One for every back end.
+    """
+
+    kernel: str
+    title: str
+    rows: Sequence[Comparison]
 
 
-def comparison_csv(rows: Sequence[Comparison]) -> str:
-    """Return comparisons as comma-separated values; a column for every kind of operation."""
-    kinds = list(dict.fromkeys(kind for row in rows for kind in row.operations))
+def comparison_report(kernels: Sequence[ComparedKernel], reference: str, drift: str) -> Report:
+    """Return comparisons of several kernels as a report; parameters as for `comparison_text`."""
+
+    def text() -> str:
+        return "\n\n".join(comparison_text(one.rows, one.title, reference, drift) for one in kernels)
+
+    def data() -> list[dict[str, Any]]:
+        return [row.as_dict() | {"kernel": one.kernel} for one in kernels for row in one.rows]
+
+    def markdown() -> TextTable:
+        rows = [[one.kernel, *_cells(row)] for one in kernels for row in one.rows]
+        return TextTable([Column("kernel", "<"), Column("back end", "<"), *_COLUMNS[1:]], rows)
+
+    return Report(text, data, lambda: _table(kernels), markdown)
+
+
+def _table(kernels: Sequence[ComparedKernel]) -> TextTable:
+    """Return all figures of all rows; a column for every kind of operation."""
+    every = [(one.kernel, row) for one in kernels for row in one.rows]
+    kinds = list(dict.fromkeys(kind for _, row in every for kind in row.operations))
     names = [field.name for field in fields(Comparison) if field.name != "operations"]
     values = [
-        [*(getattr(row, name) for name in names), *(row.operations.get(kind, 0) for kind in kinds)]
-        for row in rows
+        [*(getattr(row, name) for name in names), *(row.operations.get(kind, 0) for kind in kinds), kernel]
+        for kernel, row in every
     ]
-    return TextTable([Column(name) for name in (*names, *kinds)], values).as_csv()
+    return TextTable([Column(name) for name in (*names, *kinds, "kernel")], values)
 
 
 def comparison_text(rows: Sequence[Comparison], title: str, reference: str, drift: str) -> str:

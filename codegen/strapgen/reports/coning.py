@@ -9,6 +9,7 @@ from strapgen.catalogue.methods.coning import method, sample_terms
 from strapgen.catalogue.methods.coning_coefficients import SOURCES, Design
 from strapgen.catalogue.methods.rotation_series import Scalars
 from strapgen.catalogue.methods.samples import sample_names
+from strapgen.reports.report import Report
 from strapgen.reports.table import Column, TextTable
 
 _PAIR_COLUMNS = (Column(align="<"), Column(), Column(spec=".9f", least=12))
@@ -88,6 +89,22 @@ def coning_text(design: Design, data: Mapping[str, Any]) -> str:
         f"kernels: strapgen derive rotation-vector {option}; euler, dcm and sculling take the same options",
     ]
     return "\n".join(lines).replace("+ -", "- ")
+
+
+def coning_report(design: Design, data: Mapping[str, Any]) -> Report:
+    """Return a design as a report, whose table has a row for each pair; parameters as for `coning_text`."""
+    columns = (
+        Column("older", "<"),
+        Column("newer", "<"),
+        Column("coefficient"),
+        Column("decimal", spec=".9f"),
+    )
+
+    def table() -> TextTable:
+        pairs = zip(data["pairs"], data["coefficients"], design.pairs.values(), strict=True)
+        return TextTable(columns, [(older, newer, text, float(c)) for (older, newer), text, c in pairs])
+
+    return Report(lambda: coning_text(design, data), lambda: data, table)
 
 
 def _samples_text(design: Design) -> str:

@@ -1,17 +1,24 @@
-"""Reports observed orders as text and CSV."""
+"""Reports observed orders in every format."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 from strapgen.experiments.convergence import Convergence, Rung, labels
+from strapgen.reports.report import Report
 from strapgen.reports.table import ERROR, SECONDS, Column, TextTable
 
 #: Algorithms side by side in a report.
 _MOST_COLUMNS = 4
-_CSV_NAMES = (
-    *("kernel", "backend", "step_s", "error_rad", "slope", "used"),
-    *("observed_order", "predicted_order"),
+_COLUMNS = (
+    Column("kernel", "<"),
+    Column("backend", "<"),
+    Column("step_s", spec=SECONDS),
+    Column("error_rad", spec=ERROR),
+    Column("slope", spec=".2f"),
+    Column("used"),
+    Column("observed_order", spec=".3f"),
+    Column("predicted_order"),
 )
 
 
@@ -47,14 +54,20 @@ def _cell(rung: Rung) -> str:
     return f"{rung.error_rad:{ERROR}}{slope}{'*' if rung.used else ' '}"
 
 
-def convergence_csv(outcomes: Sequence[Convergence]) -> str:
-    """Return outcomes as comma-separated values, a row for every step of every algorithm."""
-    rows = [
-        (
-            *(one.kernel, one.backend, rung.step_s, rung.error_rad, rung.slope, rung.used),
-            *(one.observed, one.predicted),
-        )
-        for one in outcomes
-        for rung in one.rungs
-    ]
-    return TextTable([Column(name) for name in _CSV_NAMES], rows).as_csv()
+def convergence_report(outcomes: Sequence[Convergence], title: str) -> Report:
+    """Return outcomes as a report, whose table has a row for every step of every algorithm."""
+
+    def table() -> TextTable:
+        rows = [
+            (
+                *(one.kernel, one.backend, rung.step_s, rung.error_rad, rung.slope, rung.used),
+                *(one.observed, one.predicted),
+            )
+            for one in outcomes
+            for rung in one.rungs
+        ]
+        return TextTable(_COLUMNS, rows)
+
+    return Report(
+        lambda: convergence_text(outcomes, title), lambda: [one.as_dict() for one in outcomes], table
+    )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -11,10 +11,14 @@ import sympy as sp
 
 from strapgen.ir.program import Program
 from strapgen.reports.latex import align_environment
+from strapgen.reports.report import Report
 from strapgen.reports.table import Column, TextTable
 from strapgen.symbolic.kernel import Kernel, Stage
 from strapgen.targets.contract import operations_text
 from strapgen.targets.printer import Printer
+
+_PROGRAM_COLUMNS = (Column("name", "<"), Column("value", "<"))
+_OPERATION_COLUMNS = (Column("operation", "<"), Column("number"))
 
 
 def as_text(kernel: Kernel, notes: Sequence[str] | None = None) -> str:
@@ -74,8 +78,42 @@ def program_as_text(program: Program) -> str:
 def operations_as_text(kernel: Kernel, program: Program) -> str:
     """Return the number of operations of each kind, and of temporaries, as a table."""
     columns = (Column(align="<", least=12), Column(least=5, gap=0))
-    counts = {**program.operations, "temporaries": program.temporaries}
-    return "\n".join([kernel.name, *TextTable(columns, list(counts.items())).lines("  ")])
+    return "\n".join([kernel.name, *TextTable(columns, _counts(program)).lines("  ")])
+
+
+def _counts(program: Program) -> list[tuple[str, int]]:
+    return list({**program.operations, "temporaries": program.temporaries}.items())
+
+
+def formulas_report(kernel: Kernel, program: Program, show: str) -> Report:
+    """Return what is to be shown of a kernel as a report.
+
+    Parameters
+    ----------
+    kernel : Kernel
+    program : Program
+    show : str
+        "text" or "latex" for the formulas, "program" or "operations"; the last two are tables.
+    """
+    texts: dict[str, Callable[[], str]] = {
+        "text": lambda: as_text(kernel, program.notes),
+        "latex": lambda: as_latex(kernel),
+        "program": lambda: program_as_text(program),
+        "operations": lambda: operations_as_text(kernel, program),
+    }
+
+    def data() -> dict[str, Any]:
+        shown: dict[str, Any] = {}
+        if show in ("latex", "program"):
+            shown[show] = as_latex(kernel) if show == "latex" else program_as_data(program)
+        return as_data(kernel, program) | shown
+
+    def table() -> TextTable:
+        if show == "program":
+            return TextTable(_PROGRAM_COLUMNS, list(program_as_data(program).items()))
+        return TextTable(_OPERATION_COLUMNS, _counts(program))
+
+    return Report(texts[show], data, table if show in ("program", "operations") else None)
 
 
 def program_as_data(program: Program) -> dict[str, str]:

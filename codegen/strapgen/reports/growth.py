@@ -1,4 +1,4 @@
-"""Reports the stability of steps as text."""
+"""Reports the stability of steps."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import sympy as sp
 
 from strapgen.analysis.growth import Stability
 from strapgen.analysis.notation import intervals_text
+from strapgen.reports.report import Report
 from strapgen.reports.table import Column, TextTable
 
 _COLUMNS = (
@@ -19,7 +20,20 @@ _COLUMNS = (
 
 def stability_text(stabilities: Sequence[Stability]) -> str:
     """Return stabilities as a table."""
+    return _table(stabilities).as_text()
+
+
+def stability_report(stabilities: Sequence[Stability]) -> Report:
+    """Return stabilities as a report."""
+    return Report(
+        lambda: stability_text(stabilities),
+        lambda: [one.as_dict() for one in stabilities],
+        lambda: _table(stabilities),
+    )
+
+
+def _table(stabilities: Sequence[Stability]) -> TextTable:
     rows = [
         (one.kernel, intervals_text(one.contractive), sp.sstr(one.stretch_squared)) for one in stabilities
     ]
-    return TextTable(_COLUMNS, rows).as_text()
+    return TextTable(_COLUMNS, rows)

@@ -1,4 +1,4 @@
-"""Reports the overview of the catalogue as text, with one row for each algorithm and method."""
+"""Reports the overview of the catalogue, with one row for each algorithm and method."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 import sympy as sp
 
 from strapgen.analysis.overview import CONING_DEG_S, STEP_S, WORK, OverviewRow
+from strapgen.reports.report import Report, flat_table
 from strapgen.reports.table import ERROR, Column, TextTable
 
 #: Most terms of a vector that are written out.
@@ -37,7 +38,7 @@ def overview_text(rows: Sequence[OverviewRow]) -> str:
     drifts = [(row.kernel, _general(row)) for row in rows]
     return "\n".join(
         [
-            *TextTable(_COLUMNS, [_cells(row) for row in rows]).lines(),
+            *_table(rows).lines(),
             "",
             *_NOTES,
             "",
@@ -45,6 +46,16 @@ def overview_text(rows: Sequence[OverviewRow]) -> str:
             *TextTable([Column(align="<")] * 2, drifts).lines("  "),
         ]
     )
+
+
+def overview_report(rows: Sequence[OverviewRow]) -> Report:
+    """Return rows as a report."""
+    data = [row.as_dict() for row in rows]
+    return Report(lambda: overview_text(rows), lambda: data, lambda: flat_table(data), lambda: _table(rows))
+
+
+def _table(rows: Sequence[OverviewRow]) -> TextTable:
+    return TextTable(_COLUMNS, [_cells(row) for row in rows])
 
 
 def _cells(row: OverviewRow) -> list[Any]:

@@ -1,11 +1,14 @@
-"""Reports the tables of the thesis, as the series predict them, as text."""
+"""Reports the tables of the thesis, as the series predict them."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+from strapgen.analysis.ratios import Claim
 from strapgen.experiments.predicted_tables import PredictedEntry
 from strapgen.experiments.thesis_tables import TABLES
+from strapgen.reports.ratios import claims_text
+from strapgen.reports.report import Report, flat_table
 from strapgen.reports.table import Column, TextTable
 
 _COLUMNS = (
@@ -37,6 +40,15 @@ def predicted_text(entries: Sequence[PredictedEntry]) -> str:
     if not all(entry.agrees for entry in entries):
         lines.append("* not the thesis's figure in its printed digits\n")
     return "\n".join(lines)
+
+
+def predicted_report(entries: Sequence[PredictedEntry], claims: Sequence[Claim]) -> Report:
+    """Return predicted tables, and the ratios that the thesis reads from them, as a report."""
+    rows = [entry.as_dict() for entry in entries]
+    data = {"entries": rows, "ratios": [claim.as_dict() for claim in claims]}
+    return Report(
+        lambda: f"{predicted_text(entries)}\n{claims_text(claims)}", lambda: data, lambda: flat_table(rows)
+    )
 
 
 def _cells(entry: PredictedEntry) -> tuple[str | float, ...]:

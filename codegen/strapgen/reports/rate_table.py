@@ -1,4 +1,4 @@
-"""Reports the rate-table test as text."""
+"""Reports the rate-table test."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 
 from strapgen.experiments.rate_table import RATE_DEG_S, Row
+from strapgen.reports.report import Report, flat_table
 from strapgen.reports.table import ERROR, Column, TextTable
 
 
@@ -37,3 +38,9 @@ def rate_table_text(rows: Sequence[Row], duration: str, sample: str) -> str:
         ]
         lines += ["", f"{motion}; pitch up to {steepest:.2f} deg", *TextTable(columns, cells).lines()]
     return "\n".join(lines)
+
+
+def rate_table_report(rows: Sequence[Row], duration: str, sample: str) -> Report:
+    """Return rows as a report; parameters as for `rate_table_text`."""
+    data = [row.as_dict() for row in rows]
+    return Report(lambda: rate_table_text(rows, duration, sample), lambda: data, lambda: flat_table(data))

@@ -8,6 +8,7 @@ import sympy as sp
 
 from strapgen.analysis.ratios import STEP_ANGLE, Claim, Ratio, columns
 from strapgen.reports.latex import align_environment
+from strapgen.reports.report import Report
 from strapgen.reports.table import Column, TextTable
 
 
@@ -44,6 +45,11 @@ def ratio_latex(comparison: Ratio) -> str:
     if comparison.expression is not None:
         rows.append(rf"  \text{{ratio}} &= {sp.latex(comparison.expression)}")
     return f"% {comparison.quantity}, {comparison.motion} motion\n{align_environment(rows)}"
+
+
+def ratio_report(comparison: Ratio) -> Report:
+    """Return a comparison as a report."""
+    return Report(lambda: ratio_text(comparison), comparison.as_dict, latex=lambda: ratio_latex(comparison))
 
 
 def claims_text(claims: Sequence[Claim]) -> str:

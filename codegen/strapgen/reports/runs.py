@@ -1,4 +1,4 @@
-"""Reports runs and recordings as JSON data, comma-separated values and text."""
+"""Reports runs and recordings in every format."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from strapgen.reports.report import Report
 from strapgen.reports.table import Column, TextTable
 from strapgen.simulation.recording import History
 from strapgen.simulation.runs import Run
@@ -20,6 +21,8 @@ ANGLES = ("roll", "pitch", "heading")
 SKEW_PLANES = ("y-z", "z-x", "x-y")
 _PLACES = [f"{row}{column}" for row in "123" for column in "123"]
 _MOST_ROWS = 36
+#: Digits of the numbers in Markdown.
+_DIGITS = ".9g"
 #: Parts of an error matrix, and the unit in the names of their columns.
 _PARTS = (("scale", ""), ("skew", "_deg"), ("drift", "_deg"))
 
@@ -55,6 +58,32 @@ def run_data(run: Run, settings: dict[str, Any]) -> dict[str, Any]:
     }
 
 
+def run_report(run: Run, settings: dict[str, Any], motion: str, matrices: bool = False) -> Report:
+    """Return a run as a report.
+
+    Parameters
+    ----------
+    run : Run
+    settings : dict
+        Settings that the run was made with.
+    motion : str
+        The motion with its parameters in words, for the text.
+    matrices : bool, optional
+        Whether all matrices follow in JSON.
+    """
+
+    def text() -> str:
+        return run_text(run, settings | {"motion": motion})
+
+    def data() -> dict[str, Any]:
+        return run_data(run, settings) | (matrices_data(run) if matrices else {})
+
+    def markdown() -> TextTable:
+        return TextTable(_ERROR_COLUMNS, _error_rows(run, range(len(run.time))))
+
+    return Report(text, data, lambda: run_table(run), markdown, indented=False)
+
+
 def matrices_data(run: Run) -> dict[str, Any]:
     """Return the matrices of a run as plain JSON data."""
     return {
@@ -65,8 +94,8 @@ def matrices_data(run: Run) -> dict[str, Any]:
     }
 
 
-def run_csv(run: Run) -> str:
-    """Return a run as comma-separated values: the nine errors and all matrices at each record."""
+def run_table(run: Run) -> TextTable:
+    """Return a run as a table: the nine errors and all matrices at each record."""
     header = ["time_s"]
     header += [f"{kind}_{axis}{unit}" for kind, unit in _PARTS for axis in AXES]
     header += [
@@ -74,17 +103,16 @@ def run_csv(run: Run) -> str:
     ]
     flat = [m.reshape(-1, 9) for m in (run.computed, run.true, run.computed - run.true, run.error)]
     columns = [run.time[:, None], run.scale, np.degrees(run.skew), np.degrees(run.drift), *flat]
-    return _csv(header, np.hstack(columns).tolist())
+    return _table(header, np.hstack(columns).tolist())
 
 
 def run_text(run: Run, settings: dict[str, Any]) -> str:
     """Return a run as a report: the nine errors in time, the matrices at the end, the mean drift."""
     shown = _thinned(len(run.time))
-    parts = np.hstack([run.scale, np.degrees(run.skew), np.degrees(run.drift)])
     lines = [
         _settings_text(settings),
         "",
-        *TextTable(_ERROR_COLUMNS, [(run.time[k], *parts[k]) for k in shown]).lines(),
+        *TextTable(_ERROR_COLUMNS, _error_rows(run, shown)).lines(),
     ]
     if len(shown) < len(run.time):
         lines.append(
@@ -106,6 +134,12 @@ def run_text(run: Run, settings: dict[str, Any]) -> str:
     )
 
 
+def _error_rows(run: Run, records: Iterable[int]) -> list[tuple[float, ...]]:
+    """Return the time and the nine errors of some records."""
+    parts = np.hstack([run.scale, np.degrees(run.skew), np.degrees(run.drift)])
+    return [(run.time[k], *parts[k]) for k in records]
+
+
 def _matrix_lines(run: Run) -> list[str]:
     """Return the matrices at the end of a run side by side."""
     computed, true = run.computed[-1], run.true[-1]
@@ -117,10 +151,20 @@ def _settings_text(settings: dict[str, Any]) -> str:
     return ", ".join(f"{key} {value}" for key, value in settings.items() if value is not None)
 
 
-def history_csv(history: History, elements: Sequence[str]) -> str:
-    """Return an attitude history as comma-separated values."""
+def history_table(history: History, elements: Sequence[str]) -> TextTable:
+    """Return an attitude history as a table."""
     rows = np.column_stack([history.time, history.states.reshape(len(history.time), -1)]).tolist()
-    return _csv(["time_s", *elements], rows)
+    return _table(["time_s", *elements], rows)
+
+
+def history_report(history: History, elements: Sequence[str], settings: dict[str, Any]) -> Report:
+    """Return an attitude history as a report."""
+    return Report(
+        lambda: history_text(history, elements, settings),
+        lambda: history_data(history, elements, settings),
+        lambda: history_table(history, elements),
+        indented=False,
+    )
 
 
 def history_data(history: History, elements: Sequence[str], settings: dict[str, Any]) -> dict[str, Any]:
@@ -149,8 +193,8 @@ def history_text(history: History, elements: Sequence[str], settings: dict[str, 
     return "\n".join(lines)
 
 
-def course_csv(course: Course) -> str:
-    """Return attitude and velocity along a recording as comma-separated values."""
+def course_table(course: Course) -> TextTable:
+    """Return attitude and velocity along a recording as a table."""
     count = len(course.time)
     columns = (
         course.time,
@@ -164,7 +208,17 @@ def course_csv(course: Course) -> str:
         *(f"{name}_deg" for name in ANGLES),
         *(f"dv{axis}_m_s" for axis in AXES),
     ]
-    return _csv(header, np.column_stack(columns).tolist())
+    return _table(header, np.column_stack(columns).tolist())
+
+
+def course_report(course: Course, settings: dict[str, Any]) -> Report:
+    """Return attitude and velocity along a recording as a report."""
+    return Report(
+        lambda: course_text(course, settings),
+        lambda: course_data(course, settings),
+        lambda: course_table(course),
+        indented=False,
+    )
 
 
 def course_data(course: Course, settings: dict[str, Any]) -> dict[str, Any]:
@@ -205,5 +259,5 @@ def _thinned(count: int) -> list[int]:
     return sorted({round(k * (count - 1) / _MOST_ROWS) for k in range(_MOST_ROWS + 1)})
 
 
-def _csv(names: Iterable[str], rows: Sequence[Sequence[float]]) -> str:
-    return TextTable([Column(name) for name in names], rows).as_csv()
+def _table(names: Iterable[str], rows: Sequence[Sequence[float]]) -> TextTable:
+    return TextTable([Column(name, spec=_DIGITS) for name in names], rows)

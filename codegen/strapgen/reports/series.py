@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import sympy as sp
 
@@ -12,6 +13,7 @@ from strapgen.analysis.motion_rates import is_plain
 from strapgen.analysis.notation import LATEX, covariant_text, intervals_text, scalar_text
 from strapgen.analysis.series import PARTS, STEP
 from strapgen.reports.latex import align_environment
+from strapgen.reports.report import Report
 
 
 def series_text(analysis: ErrorAnalysis) -> str:
@@ -56,6 +58,20 @@ def series_text(analysis: ErrorAnalysis) -> str:
         ]
     lines += ["", *_growth_lines(analysis.growth)]
     return "\n".join(lines)
+
+
+def series_report(analyses: Sequence[ErrorAnalysis]) -> Report:
+    """Return one analysis, or several side by side, as a report."""
+
+    def data() -> Any:
+        every = [analysis.as_dict() for analysis in analyses]
+        return every if len(every) > 1 else every[0]
+
+    return Report(
+        lambda: "\n\n".join(map(series_text, analyses)),
+        data,
+        latex=lambda: "\n\n".join(map(series_latex, analyses)),
+    )
 
 
 def _growth_lines(gain: Growth) -> Iterator[str]:

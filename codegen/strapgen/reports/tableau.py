@@ -8,6 +8,7 @@ from typing import Any
 from strapgen.catalogue.methods import order_conditions
 from strapgen.catalogue.methods.coefficients import text
 from strapgen.catalogue.methods.tableau import Tableau
+from strapgen.reports.report import Report
 from strapgen.reports.table import Column, TextTable
 
 #: Widest table; a wider tableau is listed coefficient by coefficient.
@@ -67,6 +68,24 @@ def tableau_text(data: Mapping[str, Any]) -> str:
             *(tableau if max(map(len, tableau)) <= _WIDEST else _coefficient_lines(data)),
         ]
     )
+
+
+def tableau_report(data: Mapping[str, Any]) -> Report:
+    """Return a tableau as a report, whose table has a row for each stage, then those of the weights."""
+
+    def table() -> TextTable:
+        stages = data["stages"]
+        rows = [
+            [f"stage {number}", node, *row, *[None] * (stages - len(row))]
+            for number, (node, row) in enumerate(zip(data["nodes"], data["matrix"], strict=True), 1)
+        ]
+        rows.append(["weights", None, *data["weights"]])
+        if data["embedded_weights"]:
+            rows.append(["embedded weights", None, *data["embedded_weights"]])
+        heads = [Column("row", "<"), Column("node", missing="")]
+        return TextTable([*heads, *(Column(f"k{k}", missing="") for k in range(1, stages + 1))], rows)
+
+    return Report(lambda: tableau_text(data), lambda: data, table)
 
 
 def _tableau_lines(data: Mapping[str, Any]) -> list[str]:

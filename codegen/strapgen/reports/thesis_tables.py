@@ -6,7 +6,8 @@ import textwrap
 from collections.abc import Sequence
 from typing import Any
 
-from strapgen.experiments.thesis_tables import ALGORITHMS, ORDERS, Table, TableEntry
+from strapgen.experiments.thesis_tables import ALGORITHMS, ORDERS, TABLES, Table, TableEntry
+from strapgen.reports.report import Report, flat_table
 from strapgen.reports.table import Column, TextTable
 
 _NAMES = {"dcm": "direction cosines", "euler": "Euler parameters"}
@@ -49,6 +50,17 @@ def thesis_table_text(table: Table, entries: Sequence[TableEntry]) -> str:
         first = k * (1 + len(backends))
         text += [f"  {_NAMES[algorithm]}", *lines[first : first + 1 + len(backends)]]
     return "\n".join([*text, *_notes(entries)])
+
+
+def thesis_tables_report(entries: Sequence[TableEntry]) -> Report:
+    """Return the entries of one table or of several as a report."""
+    data = [entry.as_dict() for entry in entries]
+
+    def text() -> str:
+        of_tables = ((table, [e for e in entries if e.table == table.number]) for table in TABLES)
+        return "\n\n".join(thesis_table_text(table, here) for table, here in of_tables if here)
+
+    return Report(text, lambda: data, lambda: flat_table(data))
 
 
 def _printed_row(table: Table, algorithm: str) -> list[Any]:

@@ -10,6 +10,7 @@ from typing import Any
 import sympy as sp
 
 from strapgen.reports.latex import align_environment
+from strapgen.reports.report import Report, flat_table
 from strapgen.reports.table import Column, TextTable
 from strapgen.reports.units import READABLE_UNITS
 from strapgen.support.exceptions import InputError
@@ -157,6 +158,39 @@ def _rate_table(group: Sequence[CaseRates], unit: str) -> TextTable:
         Column(f"error, {readable}", spec=".6g", least=18),
     ]
     return TextTable(columns, rows)
+
+
+def vibration_report(outcomes: Sequence[CaseRates], cases: Sequence[AssessedCase], title: str) -> Report:
+    """Return mean rates as a report, whose table has a row for each quantity of each algorithm.
+
+    Parameters
+    ----------
+    outcomes : sequence of CaseRates
+    cases : sequence of AssessedCase
+        The cases themselves, whose closed forms LaTeX shows.
+    title : str
+        The vibration in words.
+    """
+
+    def data() -> Any:
+        every = vibration_data(outcomes)
+        return every if len(every) > 1 else every[0]
+
+    return Report(
+        lambda: vibration_text(outcomes, title),
+        data,
+        lambda: flat_table([_flat(outcome) for outcome in outcomes]),
+        latex=lambda: vibration_latex(cases),
+    )
+
+
+def _flat(outcome: CaseRates) -> dict[str, Any]:
+    """Return the rates of one case as one row."""
+    case = outcome.case
+    row = {"kernel": case.assessment.kernel, "increments": case.samples, "quantity": case.quantity}
+    row |= {"unit": case.assessment.unit, **outcome.rates._asdict()}
+    errors = {} if outcome.quadrature is None else outcome.quadrature._asdict()
+    return row | {f"{part}_quadrature": value for part, value in errors.items()}
 
 
 def vibration_latex(cases: Sequence[AssessedCase]) -> str:

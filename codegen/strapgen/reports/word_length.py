@@ -1,4 +1,4 @@
-"""Reports the word-length study as text and CSV."""
+"""Reports the word-length study."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from strapgen.experiments.word_length import Outcome
+from strapgen.reports.report import Report, flat_table
 from strapgen.reports.table import ANGLE, Column, TextTable
 
 _COLUMNS = (
@@ -38,10 +39,10 @@ def by_method_step_and_pulse(outcomes: Sequence[Outcome]) -> dict[tuple[str, str
     return groups
 
 
-def word_length_csv(outcomes: Sequence[Outcome]) -> str:
-    """Return outcomes as comma-separated values."""
-    rows = [outcome.as_dict() | {"settings": settings_text(outcome, " ")} for outcome in outcomes]
-    return TextTable([Column(name) for name in rows[0]], [list(row.values()) for row in rows]).as_csv()
+def word_length_report(outcomes: Sequence[Outcome]) -> Report:
+    """Return outcomes as a report."""
+    rows = [outcome.as_dict() for outcome in outcomes]
+    return Report(lambda: word_length_text(outcomes), lambda: rows, lambda: flat_table(rows))
 
 
 def word_length_text(outcomes: Sequence[Outcome]) -> str:

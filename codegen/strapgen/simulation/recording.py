@@ -17,6 +17,7 @@ from strapgen.backends.increments import pulses, windows
 from strapgen.simulation.runs import require_finite
 from strapgen.support import checks, stages
 from strapgen.support.exceptions import InputError, InputTypeError
+from strapgen.support.suggestions import counted
 
 Array = NDArray[np.float64]
 
@@ -112,7 +113,7 @@ def _rows(path: Path, names: tuple[str, ...] | None) -> tuple[Array, list[int]]:
     except (UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path} is no text file of comma-separated values ({error})") from None
     if len(values) < 2:
-        raise InputError(f"{path} holds {len(values)} rows of numbers; at least 2 are needed")
+        raise InputError(f"{path} holds {counted(len(values), 'row')} of numbers; at least 2 are needed")
     return np.array(values), lines
 
 
@@ -208,7 +209,7 @@ def read_increments(path: str | Path) -> Recording:
     >>> read_increments(log).increments[:, 2]
     array([0.001, 0.002])
     """
-    start, interval, values = _even_increments(Path(path), _INCREMENT_COLUMNS)
+    start, interval, values = _even_increments(checks.path("path", path), _INCREMENT_COLUMNS)
     return Recording(start, interval, values)
 
 
@@ -240,7 +241,7 @@ def read_inertial(path: str | Path) -> InertialRecording:
     >>> read_inertial(log).velocity_increments[:, 2]
     array([0.98, 0.98])
     """
-    start, interval, values = _even_increments(Path(path), _INERTIAL_COLUMNS)
+    start, interval, values = _even_increments(checks.path("path", path), _INERTIAL_COLUMNS)
     return InertialRecording(start, interval, *map(np.ascontiguousarray, np.hsplit(values, 2)))
 
 
@@ -286,23 +287,23 @@ def read_rates(path: str | Path, unit: str, resample_hz: float | str | None = No
     >>> read_rates(log, "rad/s", resample_hz=2).increments[:, 2]
     array([0.75, 1.25, 1.5 , 1.5 ])
     """
-    path = Path(path)
+    path = checks.path("path", path)
     factor = RATE_UNITS[checks.choice("rate unit", unit, RATE_UNITS)]
     values, lines = _rows(path, None)
     time, rates = values[:, 0], values[:, 1:] * factor
     intervals, median = _intervals(path, time, lines)
     pieces = (rates[1:] + rates[:-1]) / 2 * intervals[:, None]
     if resample_hz is None:
-        _require_even(path, intervals, median, lines, "--resample-hz integrates them over an even grid")
+        _require_even(path, intervals, median, lines, "resample_hz integrates them over an even grid")
         return Recording(float(time[0]), float((time[-1] - time[0]) / len(intervals)), pieces)
-    interval = 1 / float(checks.number("resample-hz", resample_hz, positive=True))
+    interval = 1 / float(checks.number("resample_hz", resample_hz, positive=True))
     ratio = float((time[-1] - time[0]) / interval * (1 + 1e-12))
     if ratio > checks.MOST:
-        raise InputError(f"resample-hz {resample_hz}: {path} would make over {checks.MOST:.0e} increments")
+        raise InputError(f"resample_hz {resample_hz}: {path} would make over {checks.MOST:.0e} increments")
     count = math.floor(ratio)
     if count < 1:
         raise InputError(
-            f"resample-hz {resample_hz}: {path} is {time[-1] - time[0]:.6g} s long, less than one interval"
+            f"resample_hz {resample_hz}: {path} is {time[-1] - time[0]:.6g} s long, less than one interval"
         )
     grid = np.minimum(time[0] + interval * np.arange(count + 1), time[-1])
     before = np.minimum(np.searchsorted(time, grid, side="right") - 1, len(intervals) - 1)

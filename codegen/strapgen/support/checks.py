@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Iterable
 from fractions import Fraction
 from numbers import Integral
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from strapgen.support.exceptions import InputError, InputTypeError
+from strapgen.support.suggestions import shown, unknown
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -23,7 +26,7 @@ MOST_TEXT = 500
 _MARKS = ("/*", "*/", '"""', "\\")
 
 
-def choice(what: str, value: str, allowed: Iterable[str]) -> str:
+def choice(what: str, value: str, allowed: Iterable[str], also: str = "", section: str = "") -> str:
     """Return `value` if it is one of `allowed`.
 
     Parameters
@@ -32,6 +35,10 @@ def choice(what: str, value: str, allowed: Iterable[str]) -> str:
         Name of the value in an error message.
     value : str
     allowed : iterable of str
+    also : str, optional
+        What else is allowed, in words for the message.
+    section : str, optional
+        Section of ``strapgen list`` that shows all names, where there are many; by default that of the kind.
 
     Returns
     -------
@@ -40,7 +47,7 @@ def choice(what: str, value: str, allowed: Iterable[str]) -> str:
     Raises
     ------
     InputError
-        If it is not; the message lists what is allowed.
+        If it is not; the message says what was perhaps meant, and what is allowed.
 
     Examples
     --------
@@ -48,8 +55,8 @@ def choice(what: str, value: str, allowed: Iterable[str]) -> str:
     'rk4'
     """
     names = list(allowed)
-    if value not in names:
-        raise InputError(f"{what} {value!r} is not known; allowed: {', '.join(names)}")
+    if not isinstance(value, str) or value not in names:
+        raise InputError(unknown(what, value, names, also, section))
     return value
 
 
@@ -133,7 +140,7 @@ def number(what: str, value: str | float | Fraction, *, positive: bool = False) 
     except (ValueError, ZeroDivisionError, OverflowError):
         near = math.nan
     if not math.isfinite(near):
-        raise InputError(f"{what} is {str(value)!r}; a finite number is needed")
+        raise InputError(f"{what} is {shown(str(value))}; a finite number is needed")
     if positive and exact <= 0:
         raise InputError(f"{what} is {value}; a number above 0 is needed")
     return exact
@@ -162,7 +169,7 @@ def count(what: str, value: Any, *, smallest: int = 1, largest: int | None = Non
     limit = f"at least {smallest}" if largest is None else f"from {smallest} to {largest}"
     whole = isinstance(value, Integral) and not isinstance(value, bool)
     if not whole or value < smallest or (largest is not None and value > largest):
-        raise InputError(f"{what} is {value!r}; a whole number {limit} is needed")
+        raise InputError(f"{what} is {shown(value)}; a whole number {limit} is needed")
     return int(value)
 
 
@@ -271,6 +278,11 @@ def real_array(what: str, value: Any, tail: tuple[int, ...], dtype: Any = float)
         array = np.asarray(value)
     except ValueError:
         raise InputError(f"{what} has rows of different lengths; an array of numbers is needed") from None
+    if array.dtype.kind in "iu":
+        raise InputTypeError(
+            f"{what} holds whole numbers, of dtype {array.dtype}; a floating-point dtype is needed: "
+            f"numpy.asarray({what.split()[0]}, float)"
+        )
     if array.dtype.kind != "f":
         raise InputTypeError(f"{what} has dtype {array.dtype}; a floating-point dtype is needed")
     if array.shape[array.ndim - len(tail) :] != tail or array.ndim < len(tail):
@@ -285,3 +297,74 @@ def real_array(what: str, value: Any, tail: tuple[int, ...], dtype: Any = float)
     if converted.dtype.itemsize < array.dtype.itemsize and not np.isfinite(converted).all():
         raise InputError(f"{what} holds numbers beyond the range of {converted.dtype}")
     return converted
+
+
+def numbers(what: str, value: Any, tail: tuple[int | None, ...] = ()) -> NDArray[Any]:
+    """Return `value` as an array of doubles whose last axes have the shape `tail`; whole numbers are converted.
+
+    Parameters
+    ----------
+    what : str
+        Name of the value in an error message.
+    value : array_like
+    tail : tuple of int or None, optional
+        Shape of the last axes, None for any length.
+
+    Returns
+    -------
+    array, (..., *tail)
+
+    Raises
+    ------
+    InputTypeError
+        If it does not hold numbers.
+    InputError
+        If its rows differ in length, or its last axes have another shape.
+
+    Examples
+    --------
+    >>> numbers("increments", [[1, 0, 0]], (3,))
+    array([[1., 0., 0.]])
+    """
+    import numpy as np
+
+    try:
+        array = np.asarray(value)
+    except ValueError:
+        raise InputError(f"{what} has rows of different lengths; an array of numbers is needed") from None
+    if array.dtype.kind not in "fiu":
+        raise InputTypeError(f"{what} is {shown(value)}; an array of numbers is needed")
+    last = array.shape[array.ndim - len(tail) :] if array.ndim >= len(tail) else None
+    if last is None or any(want not in (None, have) for want, have in zip(tail, last, strict=True)):
+        letters = iter("NKLM")
+        axes = ", ".join(["...", *(next(letters) if length is None else str(length) for length in tail)])
+        raise InputError(f"{what} has shape {array.shape}; ({axes}) is needed")
+    return np.asarray(array, np.float64)
+
+
+def path(what: str, value: Any) -> Path:
+    """Return `value` as a path.
+
+    Parameters
+    ----------
+    what : str
+        Name of the value in an error message.
+    value : path
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    InputTypeError
+        If it is none.
+
+    Examples
+    --------
+    >>> path("path", "gyro.csv").name
+    'gyro.csv'
+    """
+    if not isinstance(value, str | os.PathLike):
+        raise InputTypeError(f"{what} is {shown(value)}; the path of a file is needed")
+    return Path(value)

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError, InputTypeError
+from strapgen.support.suggestions import counted, needed
 from strapgen.vibration.mean_rates import Assessment, Rates
 from strapgen.vibration.quadrature import integrate
 
@@ -319,7 +320,9 @@ def _columns(path: Path) -> dict[str, Array]:
     except (UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path} is no text file of comma-separated values ({error})") from None
     if len(rows) < 3:
-        raise InputError(f"{path} holds {max(0, len(rows) - 1)} rows below its header; at least 2 are needed")
+        raise InputError(
+            f"{path} holds {counted(max(0, len(rows) - 1), 'row')} below its header; at least 2 are needed"
+        )
     header = [cell.strip().lower() for cell in rows[0][1]]
     for name in header:
         if name not in allowed:
@@ -353,7 +356,7 @@ def _neighbours(values: Array) -> tuple[Array, Array]:
 
 def _numbers(path: Path, line: int, row: list[str], header: list[str]) -> list[float]:
     if len(row) != len(header):
-        raise InputError(f"{path}, line {line}: {len(row)} cells; {len(header)} are needed")
+        raise InputError(f"{path}, line {line}: {counted(len(row), 'cell')}; {needed(len(header))}")
     numbers = []
     for cell, name in zip(row, header, strict=True):
         number = checks.double(cell)

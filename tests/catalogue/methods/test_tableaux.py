@@ -215,12 +215,12 @@ WRONG = {
     # shapes
     "nodes has 0 entries; from 1 to 20 are allowed": {"nodes": "[]", "matrix": "[]", "weights": "[]"},
     "nodes has 21 entries; from 1 to 20 are allowed": {"nodes": str([0] * 21)},
-    "matrix has 1 rows; as many as nodes are needed: 2": {"matrix": "[[]]"},
-    "matrix row 2 has 2 entries: not explicit, 1 are needed, left of": {"matrix": '[[], ["1/2", "1/2"]]'},
-    "matrix row 1 has 1 entries: not explicit, 0 are needed": {"matrix": "[[0], [1]]"},
-    "matrix row 2 has 0 entries: 1 are needed": {"matrix": "[[], []]"},
+    "matrix has 1 row; as many as nodes are needed: 2": {"matrix": "[[]]"},
+    "matrix row 2 has 2 entries: not explicit, 1 is needed, left of": {"matrix": '[[], ["1/2", "1/2"]]'},
+    "matrix row 1 has 1 entry: not explicit, 0 are needed": {"matrix": "[[0], [1]]"},
+    "matrix row 2 has 0 entries: 1 is needed": {"matrix": "[[], []]"},
     "weights has 3 entries; as many as nodes are needed: 2": {"weights": '["1/2", "1/2", 0]'},
-    "embedded_weights has 1 entries; as many": {"embedded_weights": "[1]"},
+    "embedded_weights has 1 entry; as many": {"embedded_weights": "[1]"},
     # conditions
     "matrix row 2 sums to 1; its node is 1/2": {"nodes": '[0, "1/2"]'},
     "matrix row 1 sums to 0; its node is 1/5": {"nodes": '["1/5", 1]'},

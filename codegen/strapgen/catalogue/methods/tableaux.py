@@ -18,6 +18,7 @@ from strapgen.catalogue.methods import coefficients, order_conditions
 from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
+from strapgen.support.suggestions import counted, needed
 
 if TYPE_CHECKING:
     from strapgen.catalogue.methods.coefficients import Number
@@ -99,9 +100,10 @@ def read(path: str | Path) -> Tableau:
     InputError
         If the file cannot be read, a key or number is wrong, or a condition does not hold; the message names it.
     """
+    place = checks.path("path", path)
     try:
         try:
-            with Path(path).open("rb") as file:
+            with place.open("rb") as file:
                 content = file.read(MOST_BYTES + 1)
         except OSError as error:
             raise InputError(f"cannot be read ({error.strerror})") from None
@@ -171,13 +173,14 @@ def _tableau(data: Mapping[str, Any], name: str) -> Tableau:
         raise InputError(f"nodes has {stages} entries; from 1 to {MOST_STAGES} are allowed")
     rows = _list("matrix", data["matrix"])
     if len(rows) != stages:
-        raise InputError(f"matrix has {len(rows)} rows; as many as nodes are needed: {stages}")
+        raise InputError(f"matrix has {counted(len(rows), 'row')}; as many as nodes are needed: {stages}")
     for number, row in enumerate(rows, 1):
         entries = len(_list(f"matrix row {number}", row))
         if entries != number - 1:
             why = "not explicit, " if entries >= number else ""
             raise InputError(
-                f"matrix row {number} has {entries} entries: {why}{number - 1} are needed, left of the diagonal"
+                f"matrix row {number} has {counted(entries, 'entry', 'entries')}: "
+                f"{why}{needed(number - 1)}, left of the diagonal"
             )
     embedded = data.get("embedded_weights")
     tableau = Tableau(
@@ -209,7 +212,9 @@ def _numbers(what: str, values: list[Any]) -> tuple[Number, ...]:
 def _weights(what: str, value: Any, stages: int) -> tuple[Number, ...]:
     weights = _numbers(what, _list(what, value))
     if len(weights) != stages:
-        raise InputError(f"{what} has {len(weights)} entries; as many as nodes are needed: {stages}")
+        raise InputError(
+            f"{what} has {counted(len(weights), 'entry', 'entries')}; as many as nodes are needed: {stages}"
+        )
     return weights
 
 

@@ -4,43 +4,57 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import typer
-
-from strapgen.cli.options import whole
-from strapgen.cli.output import Format, check_format, print_json
+from strapgen.cli.option_groups import Shown, grouped
+from strapgen.cli.options import option, whole
+from strapgen.cli.output import TEXT_OUTPUT, Output
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 
+#: Samples, those before the slow cycle included, for which terms of third and fourth order are listed.
+_MOST_SAMPLES = 6
 
+
+@grouped
 def coning(
     samples: Annotated[
-        str, typer.Option("--samples", metavar="N", help="Number of gyro samples in a slow cycle, 1 to 8.")
+        str,
+        option(
+            *("--samples", "--increments"),
+            metavar="N",
+            help="Number of gyro samples in a slow cycle, 1 to 8.",
+            panel="Algorithm",
+        ),
     ],
     previous: Annotated[
         str,
-        typer.Option(
+        option(
             "--previous",
             metavar="N",
-            help="Number of samples from before the slow cycle that are used as well, 0 to 3.",
+            help="Number of samples from before the slow cycle that it uses as well, 0 to 3.",
+            panel="Algorithm",
         ),
     ] = "0",
     form: Annotated[
         str,
-        typer.Option(
+        option(
             "--form",
+            metavar="NAME",
             help="Form of the correction: compressed suits coning, uncompressed polynomial rates, combined both.",
+            panel="Algorithm",
         ),
     ] = "compressed",
     terms: Annotated[
         bool,
-        typer.Option(
+        option(
             "--terms",
             help="Also list the third- and fourth-order terms of the rotation vector, for up to six samples in all.",
+            panel="Output",
         ),
     ] = False,
-    format: Format = "text",
+    *,
+    output: Annotated[Output, Shown(only=TEXT_OUTPUT)],
 ) -> None:
-    """Derive exact coning coefficients for a number of samples, and show the drift that remains with them.
+    """Derive exact coning coefficients and the drift that remains.
 
     A coefficient multiplies the cross product older sample x newer sample. The pairs are in the order of the newer
     sample, then of the older one, so that the newest pair is last. The residual is the mean drift on coning in rad/s,
@@ -49,10 +63,10 @@ def coning(
 
     Example: strapgen coning --samples 4 --form combined
     """
-    check_format(format)
+    output.check()
     from strapgen import catalogue
     from strapgen.catalogue.methods import coning_coefficients
-    from strapgen.reports.coning import coning_data, coning_text
+    from strapgen.reports.coning import coning_data, coning_report
 
     count = checks.count("samples", whole("samples", samples), largest=catalogue.MOST_INCREMENTS)
     before = checks.count(
@@ -64,12 +78,4 @@ def coning(
             f"terms of third and fourth order are listed for up to {_MOST_SAMPLES} samples; {count + before} are given"
         )
     design = coning_coefficients.design(count, before, form)
-    data = coning_data(design, terms)
-    if format == "json":
-        print_json(data)
-    else:
-        typer.echo(coning_text(design, data))
-
-
-#: Samples, those before the slow cycle included, for which terms of third and fourth order are listed.
-_MOST_SAMPLES = 6
+    output.report(coning_report(design, coning_data(design, terms)))

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import typer
-
-from strapgen.cli.option_groups import grouped
-from strapgen.cli.options import Algorithm, MethodOptions
-from strapgen.cli.output import Format, check_format, print_json
+from strapgen.cli.option_groups import Shown, grouped
+from strapgen.cli.options import Algorithm, MethodOptions, option
+from strapgen.cli.output import TEXT_OUTPUT, Output
 from strapgen.support import checks
+from strapgen.support.exceptions import InputError
+
+_SHOWN = ("text", "latex", "program", "operations")
 
 
 @grouped
@@ -19,35 +20,30 @@ def derive(
     method: MethodOptions,
     show: Annotated[
         str,
-        typer.Option("--show", help="What to show: text or latex (the formulas), program, or operations."),
+        option(
+            "--show",
+            metavar="NAME",
+            help="What to show: text or latex (the formulas), program, or operations.",
+            panel="Output",
+        ),
     ] = "text",
-    format: Format = "text",
+    output: Annotated[Output, Shown(only=TEXT_OUTPUT)],
 ) -> None:
-    """Derive a kernel and show its formulas, the program lowered from them, or its number of operations.
+    """Show the formulas, the program or the operations of a kernel.
+
+    The program is lowered from the formulas. It and the operations are tables, which --format csv and --format markdown
+    write.
 
     Example: strapgen derive euler --method rk4 --increments 2 --show operations
     """
-    check_format(format)
-    checks.choice("show", show, ("text", "latex", "program", "operations"))
+    output.check(algorithm, method.tableau)
+    checks.choice("show", show, _SHOWN)
+    if output.format in ("csv", "markdown") and show in ("text", "latex"):
+        raise InputError(f"--format {output.format} goes with --show program or --show operations")
     choice = method.choose(algorithm, step=False)
     from strapgen import pipeline
     from strapgen.library import generated_sources
-    from strapgen.reports import formulas
+    from strapgen.reports.formulas import formulas_report
 
     kernel = pipeline.derive(choice)
-    program = generated_sources.program(choice)
-    if format == "json":
-        data = formulas.as_data(kernel, program)
-        if show == "latex":
-            data["latex"] = formulas.as_latex(kernel)
-        elif show == "program":
-            data["program"] = formulas.program_as_data(program)
-        print_json(data)
-    elif show == "text":
-        typer.echo(formulas.as_text(kernel, program.notes))
-    elif show == "latex":
-        typer.echo(formulas.as_latex(kernel))
-    elif show == "program":
-        typer.echo(formulas.program_as_text(program))
-    else:
-        typer.echo(formulas.operations_as_text(kernel, program))
+    output.report(formulas_report(kernel, generated_sources.program(choice), show))

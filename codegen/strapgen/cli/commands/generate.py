@@ -9,7 +9,7 @@ import typer
 
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import grouped
-from strapgen.cli.options import MethodOptions
+from strapgen.cli.options import MethodOptions, OptionalAlgorithm, one, option
 from strapgen.cli.output import Format, check_format, print_json
 from strapgen.cli.progress import track
 from strapgen.support import checks
@@ -22,53 +22,50 @@ if TYPE_CHECKING:
 
 @grouped
 def generate(
-    algorithm: Annotated[
-        str | None,
-        typer.Argument(
-            help="dcm, euler, cayley-klein, any other kernel that strapgen list shows, or a Python file of your own."
-        ),
-    ] = None,
+    algorithm: OptionalAlgorithm = None,
     *,
     method: MethodOptions,
     target: Annotated[
         str | None,
-        typer.Option(
+        option(
             "--target",
+            metavar="NAME",
             help="Kind of code: numpy, c, c-float, c-fixed or fixed-model (Python on integers).  [default: numpy]",
-            show_default=False,
+            panel="Algorithm",
         ),
     ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out", help="Folder for the files.  [default: here; generated/ with --all]", show_default=False
-        ),
-    ] = None,
-    all_: Annotated[bool, typer.Option("--all", help="Generate the whole standard catalogue.")] = False,
-    check: Annotated[
-        bool,
-        typer.Option(
-            "--check",
-            help="With --all: write nothing; print a diff and exit with 1 if the files in the folder differ.",
-        ),
+    all_: Annotated[
+        bool, option("--all", help="Generate the whole standard catalogue.", panel="Algorithm")
     ] = False,
     fixed: FixedOptions,
+    out: Annotated[
+        Path | None,
+        option(
+            "--out",
+            metavar="FOLDER",
+            help="Folder for the files.  [default: here; generated/ with --all]",
+            panel="Output",
+        ),
+    ] = None,
+    check: Annotated[
+        bool,
+        option(
+            "--check",
+            help="With --all: write nothing; print a diff and exit with 1 if the files in the folder differ.",
+            panel="Output",
+        ),
+    ] = False,
     format: Format = "text",
 ) -> None:
-    """Generate source code for an algorithm, or for the standard catalogue.
+    """Generate source code for an algorithm, or for the whole catalogue.
 
     For the targets c-fixed and fixed-model, state the largest body rate and the step length. The formats and the
     error bounds then hold for all increments up to that rate.
 
-    Example:
+    Example: strapgen generate euler --method rk4 --increments 2 --target c --out firmware
 
-    \b
-      strapgen generate euler --method rk4 --increments 2 --target c --out firmware
-
-    \b
-      strapgen generate euler --target c-fixed --word 32 \\
-        --max-rate-deg-s 400 --step 0.01 --out firmware
-    """  # noqa: D301
+    Example: strapgen generate euler --target c-fixed --word 32 --max-rate-deg-s 400 --step 0.01 --out firmware
+    """
     check_format(format)
     if check and not all_:
         raise InputError("--check goes with --all")
@@ -77,13 +74,14 @@ def generate(
         _generate_all(out, check, format)
         return
     if algorithm is None:
-        raise InputError("an algorithm is needed, or --all; strapgen list shows them")
+        raise InputError("an algorithm is needed, or --all; strapgen list kernels shows them")
     from strapgen.library import generated_sources
     from strapgen.support.files import write_files
     from strapgen.targets import TARGETS, fixed_targets
 
     choice = method.choose(algorithm, step=False)
     settings = fixed.settings(choice.increments_per_step)
+    one("--target", target)
     target = checks.choice("target", "numpy" if target is None else target, TARGETS)
     if settings is not None and not TARGETS[target].fixed:
         raise InputError(

@@ -2,32 +2,51 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import typer
 
-from strapgen.cli.output import Format, check_format, print_json
+from strapgen.cli.option_groups import Shown, grouped
+from strapgen.cli.output import TEXT_OUTPUT, Output
+from strapgen.support import checks
+
+#: The kinds of names, in the order in which they are listed.
+KINDS = ("algorithms", "methods", "vectors", "kernels", "motions", "targets", "backends")
 
 
-def list_names(format: Format = "text") -> None:
-    """List all names that the other commands take, from algorithms and methods to motions and back ends.
+@grouped
+def list_names(
+    kind: Annotated[
+        str | None,
+        typer.Argument(metavar="KIND", help=f"Kind of names: {', '.join(KINDS)}.  [default: all]"),
+    ] = None,
+    *,
+    output: Annotated[Output, Shown(only=TEXT_OUTPUT)],
+) -> None:
+    """List all names that the other commands take.
 
-    Example: strapgen list
+    Example: strapgen list methods
+
+    Example: strapgen list kernels --format markdown
     """
-    check_format(format)
+    output.check()
+    if kind is not None:
+        kind = checks.choice(
+            "kind", kind if kind in KINDS else f"{kind}s" if f"{kind}s" in KINDS else kind, KINDS
+        )
+    from strapgen.reports.names import names_report
+
     parts = _parts()
-    if format == "json":
-        print_json(parts)
-        return
-    parts["methods"] = _with_one_line_for_taylor(parts["methods"])
-    parts["kernels"] = _with_one_line_for_updates(parts["kernels"])
-    width = max(len(name) for part in parts.values() for name in part)
-    for title, part in parts.items():
-        typer.echo(title)
-        for name, meaning in part.items():
-            typer.echo(f"  {name:<{width}}  {meaning}".rstrip())
+    shown = parts if kind is None else {kind: parts[kind]}
+    short = dict(shown)
+    if kind is None:
+        short["methods"] = _with_one_line_for_taylor(parts["methods"])
+        short["kernels"] = _with_one_line_for_updates(parts["kernels"])
+    output.report(names_report(shown, short, kind is None))
 
 
 def _parts() -> dict[str, dict[str, str]]:
-    """Return all names with their meanings, by the heading under which they are listed."""
+    """Return all names with their meanings, by their kinds."""
     from strapgen import catalogue
     from strapgen.backends import BACKENDS
     from strapgen.catalogue.user import loading
@@ -41,7 +60,7 @@ def _parts() -> dict[str, dict[str, str]]:
     }
     return {
         "algorithms": {**catalogue.ALGORITHMS, **installed},
-        "methods": catalogue.METHODS,
+        "methods": dict(catalogue.METHODS),
         "vectors": {
             name: f"{vector.title}; methods {', '.join(vector.methods)}"
             for name, vector in catalogue.VECTORS.items()

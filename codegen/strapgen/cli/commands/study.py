@@ -3,59 +3,74 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import typer
 
-from strapgen.cli.option_groups import Shown, grouped
-from strapgen.cli.options import Increments, listed, whole
-from strapgen.cli.output import Output, as_json
+from strapgen.cli.help import PlainCommand, PlainGroup
+from strapgen.cli.option_groups import grouped
+from strapgen.cli.options import Duration, Increments, listed, option, whole
+from strapgen.cli.output import Output
 from strapgen.cli.progress import track
-from strapgen.cli.sample_source import pairs
+from strapgen.cli.sample_source import MOTION_NAMES, pairs
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 
-if TYPE_CHECKING:
-    from strapgen.experiments.word_length import Outcome
-
-app = typer.Typer(
-    help="Run an algorithm with many settings, and see how they change the drift.", rich_markup_mode=None
-)
+app = typer.Typer(cls=PlainGroup, rich_markup_mode=None)
 
 
 @app.callback()
 def _group() -> None:
-    """Run an algorithm with many settings, and see how they change the drift."""
+    """Run an algorithm with many settings, and show the drift."""
 
 
 @dataclass(frozen=True)
 class Sweep:
     """Options with lists of values; a study runs every combination of them."""
 
-    methods: Annotated[str, typer.Option("--methods", metavar="NAME,...", help="Integration methods.")] = (
-        "rk4"
-    )
+    panel: ClassVar[str] = "Sweep"
+
+    methods: Annotated[
+        str,
+        option(
+            *("--method", "--methods"),
+            metavar="NAME,...",
+            help="Integration methods, with commas between; strapgen list methods shows all.",
+        ),
+    ] = "rk4"
     increments: Increments = None
     words: Annotated[
-        str, typer.Option("--words", metavar="BITS,...", help="Word lengths in bits, 8 to 64.")
+        str, option(*("--word", "--words"), metavar="BITS,...", help="Word lengths in bits, 8 to 64.")
     ] = "8,10,12,14,16,18,20,24,28,32"
     roundings: Annotated[
-        str, typer.Option("--roundings", metavar="NAME,...", help="Roundings: nearest, truncation.")
+        str,
+        option(
+            *("--rounding", "--roundings"),
+            metavar="NAME,...",
+            help="How results are rounded: nearest, truncation.",
+        ),
     ] = "nearest"
     carries: Annotated[
         str,
-        typer.Option(
-            "--carries",
+        option(
+            *("--carry", "--carries"),
             metavar="NAME,...",
             help="Error feedback from step to step: none, state, full.",
         ),
     ] = "none,state,full"
-    steps: Annotated[str, typer.Option("--steps", metavar="S,...", help="Step lengths in s.")] = "0.125"
+    steps: Annotated[
+        str,
+        option(
+            *("--step", "--steps"),
+            metavar="S,...",
+            help="Step lengths in s; each must divide the duration.",
+        ),
+    ] = "0.125"
     pulses_arcsec: Annotated[
         str,
-        typer.Option(
-            "--pulses-arcsec",
-            metavar="ANGLE,...",
+        option(
+            *("--pulse-arcsec", "--pulses-arcsec"),
+            metavar="ARCSEC,...",
             help="Angles of a gyro pulse in arc seconds; 0 for increments without pulses.",
         ),
     ] = "0"
@@ -63,74 +78,71 @@ class Sweep:
     def values(self) -> dict[str, Any]:
         """Return the lists by the parameters of `word_length.cases`."""
         return {
-            "methods": listed("--methods", self.methods),
+            "methods": listed("--method", self.methods),
             "increments": whole("increments", self.increments) or 2,
-            "words": [checks.whole("words", word) for word in listed("--words", self.words)],
-            "roundings": listed("--roundings", self.roundings),
-            "carries": listed("--carries", self.carries),
-            "steps": listed("--steps", self.steps),
-            "pulses_arcsec": listed("--pulses-arcsec", self.pulses_arcsec),
+            "words": [checks.whole("word", word) for word in listed("--word", self.words)],
+            "roundings": listed("--rounding", self.roundings),
+            "carries": listed("--carry", self.carries),
+            "steps": listed("--step", self.steps),
+            "pulses_arcsec": listed("--pulse-arcsec", self.pulses_arcsec),
         }
 
 
-@app.command("word-length")
+@app.command("word-length", cls=PlainCommand)
 @grouped
 def word_length(
     *,
     algorithm: Annotated[
-        str, typer.Option("--algorithm", help="Algorithm: dcm, euler or cayley-klein.")
+        str,
+        option(
+            "--algorithm", metavar="NAME", help="Algorithm: dcm, euler or cayley-klein.", panel="Algorithm"
+        ),
     ] = "euler",
     sweep: Sweep,
     motion: Annotated[
-        str, typer.Option("--motion", help="Motion to run on: constant, sinusoidal, coning or polynomial.")
+        str, option("--motion", metavar="NAME", help=f"Motion: {MOTION_NAMES}.", panel="Input")
     ] = "coning",
     settings: Annotated[
         list[str] | None,
-        typer.Option(
+        option(
             "--set",
             metavar="KEY=VALUE...",
-            help="Parameters of the motion.  [default: those of table 5 of the thesis]",
-            show_default=False,
+            help="Parameters of the motion; strapgen list motions shows their names.  "
+            "[default: those of table 5 of the thesis]",
+            panel="Input",
         ),
     ] = None,
-    duration: Annotated[
-        str, typer.Option("--duration", metavar="S", help="Duration of each run in s.")
-    ] = "180",
+    duration: Duration = "180",
     jobs: Annotated[
         str | None,
-        typer.Option(
+        option(
             "--jobs",
             metavar="N",
             help="Number of processes that run side by side.  [default: one for each processor]",
-            show_default=False,
+            panel="Run",
         ),
     ] = None,
-    output: Annotated[Output, Shown(only=("plot", "out", "format"))],
+    output: Output,
 ) -> None:
-    """Show the drift against word length, for every combination of word, rounding, carry, step, method and gyro pulse.
+    """Show the drift against the word length of fixed point.
 
-    The integer model runs each combination on a motion with known attitude. You see the drift from the truth and its
-    three parts: the rounding of the arithmetic, beside its certified bound; the rounding of the increments; and the
-    truncation error of the method. Finished runs stay in the cache, so that a study that you stop goes on from there.
+    The integer model runs every combination of method, word, rounding, carry, step and gyro pulse on a motion with
+    known attitude. You see the drift from the truth and its three parts: the rounding of the arithmetic, beside its
+    certified bound; the rounding of the increments; and the truncation error of the method. Finished runs stay in the
+    cache, so that a study that you stop goes on from there.
 
-    Example:
-
-    \b
-      strapgen study word-length --words 12,16,20,24,32 \\
-        --carries none,full --plot out/word-length.png
-    """  # noqa: D301
+    Example: strapgen study word-length --word 12,16,20,24,32 --carry none,full --plot out/word-length.png
+    """
     output.check(algorithm)
     from strapgen import catalogue
 
     checks.choice("algorithm", algorithm, catalogue.ALGORITHMS)
     checks.choice("motion", motion, catalogue.MOTIONS)
-    for name in listed("--methods", sweep.methods):
-        catalogue.choose(algorithm, name, whole("increments", sweep.increments))
     count = whole("jobs", jobs)
     if count is not None:
         checks.count("jobs", count, largest=1024)
     if settings is None and motion != "coning":
-        raise InputError(f"--motion {motion} needs --set; strapgen list shows the keys")
+        raise InputError(f"--motion {motion} needs --set; strapgen list motions shows the keys")
 
     import numpy as np
 
@@ -146,20 +158,8 @@ def word_length(
     _ = planned[0].profile  # a motion that lacks a parameter is told before anything runs
     with np.errstate(all="ignore"):
         outcomes = {done.case: done for done in track(run(planned, count), "running", len(planned))}
-    _deliver([outcomes[case] for case in planned], output)
+    from strapgen.reports import plots
+    from strapgen.reports.word_length import word_length_report
 
-
-def _deliver(outcomes: list[Outcome], output: Output) -> None:
-    from strapgen.reports.word_length import word_length_csv, word_length_text
-
-    image = None
-    if output.plot is not None:
-        from strapgen.reports import plots
-
-        image = plots.word_length_image(outcomes, output.plot)
-    if output.format == "json":
-        output.deliver(as_json([outcome.as_dict() for outcome in outcomes]), image)
-    elif output.format == "csv":
-        output.deliver(word_length_csv(outcomes), image)
-    else:
-        output.deliver(word_length_text(outcomes), image)
+    rows = [outcomes[case] for case in planned]
+    output.report(word_length_report(rows), lambda path: plots.word_length_image(rows, path))

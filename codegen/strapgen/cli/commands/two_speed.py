@@ -9,33 +9,30 @@ import typer
 
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
-from strapgen.cli.options import whole
-from strapgen.cli.output import Format, check_format, print_json
+from strapgen.cli.options import Sculling, TwoSpeedAlgorithm, option, whole
+from strapgen.cli.output import Folder, Format, check_format, print_json
 from strapgen.support.exceptions import InputError
 
 
 @grouped
 def two_speed(
-    algorithm: Annotated[str, typer.Argument(help="dcm or euler.")],
+    algorithm: TwoSpeedAlgorithm,
     *,
-    sculling: Annotated[
+    sculling: Sculling = "2",
+    target: Annotated[
         str,
-        typer.Option(
-            "--sculling",
-            help="Form of the sculling integral: 1 with the rotation compensation, 2 without.",
-        ),
-    ] = "2",
-    target: Annotated[str, typer.Option("--target", help="Kind of code: c, c-float or c-fixed.")] = "c",
-    out: Annotated[
-        Path | None, typer.Option("--out", help="Folder for the files.  [default: here]", show_default=False)
-    ] = None,
+        option("--target", metavar="NAME", help="Kind of code: c, c-float or c-fixed.", panel="Algorithm"),
+    ] = "c",
     fixed: Annotated[
         FixedOptions,
         Shown(only=("word", "rounding", "carry", "drift_allowance", "ranges", "formats")),
     ],
+    out: Folder = None,
     format: Format = "text",
 ) -> None:
-    """Generate the C code of an algorithm in two speeds: a function for each loop, and one that runs them all.
+    """Generate the C code of an algorithm in two speeds.
+
+    You get a function for each loop, and one that runs them all.
 
     Example: strapgen two-speed dcm --target c --out firmware
     """

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import typer
 
-from strapgen.cli.option_groups import Shown, grouped
-from strapgen.cli.options import MethodOptions, listed, whole
-from strapgen.cli.output import Output, as_json
+from strapgen.cli.option_groups import grouped
+from strapgen.cli.options import MethodOptions, SeveralMethods, option, whole
+from strapgen.cli.output import Output, format_option, plot_option
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 
@@ -28,92 +28,61 @@ _TWO_SPEED = "two-speed"
 
 
 @dataclass(frozen=True)
-class AssessedMethods(MethodOptions):
+class AssessedMethods(SeveralMethods):
     """Options that choose the methods to assess side by side, and the numbers of increments of each."""
 
-    method: Annotated[
-        _Text,
-        typer.Option(
-            "--method",
-            metavar="NAME,...",
-            help="Integration methods to show side by side.  [default: rk4 for an attitude step]",
-            show_default=False,
-        ),
-    ] = None
     increments: Annotated[
         _Text,
-        typer.Option(
+        option(
             "--increments",
             metavar="N,...",
-            help="Numbers of angle increments in a step; of a fast loop and of two-speed, the fast cycles in a slow "
-            "cycle.  [default: 2 in a step]",
-            show_default=False,
+            help="Numbers of angle increments in a step, 1 to 8; enough: as many as each method needs; of a fast loop "
+            "and of two-speed, the fast cycles in a slow cycle.  [default: 2]",
         ),
     ] = None
-
-    def each(self) -> list[AssessedMethods]:
-        """Return the options with one method and one number of increments each."""
-        return [
-            replace(self, method=name, increments=count)
-            for name in _parts("--method", self.method)
-            for count in _parts("--increments", self.increments)
-        ]
 
 
 @dataclass(frozen=True)
 class VibrationSource:
     """Options of the vibration: at one frequency, or random with a spectrum from a file."""
 
-    frequency: Annotated[
-        _Text,
-        typer.Option(
-            "--frequency-hz", metavar="F", help="Frequency f of the vibration in Hz.", show_default=False
-        ),
-    ] = None
+    panel: ClassVar[str] = "Input"
+
     step: Annotated[
         _Text,
-        typer.Option(
+        option(
             "--step",
             metavar="S",
             help="Step length T in s; for a fast loop and two-speed, the length of the slow cycle.",
-            show_default=False,
         ),
+    ] = None
+    frequency: Annotated[
+        _Text, option("--frequency-hz", metavar="HZ", help="Frequency f of the vibration in Hz.")
     ] = None
     theta_x: Annotated[
-        _Text,
-        typer.Option(
-            "--theta-x-rad", metavar="X", help="Amplitude X of the angle about x in rad.", show_default=False
-        ),
+        _Text, option("--theta-x-rad", metavar="RAD", help="Amplitude X of the angle about x in rad.")
     ] = None
     theta_y: Annotated[
-        _Text,
-        typer.Option(
-            "--theta-y-rad", metavar="Y", help="Amplitude Y of the angle about y in rad.", show_default=False
-        ),
+        _Text, option("--theta-y-rad", metavar="RAD", help="Amplitude Y of the angle about y in rad.")
     ] = None
     phase: Annotated[
-        _Text,
-        typer.Option(
-            "--phase-rad", metavar="P", help="Phase P in rad by which y leads x.", show_default=False
-        ),
+        _Text, option("--phase-rad", metavar="RAD", help="Phase P in rad by which y leads x.")
     ] = None
     acceleration: Annotated[
         _Text,
-        typer.Option(
+        option(
             "--acceleration-y",
             metavar="M_S2",
             help="Amplitude of the acceleration along y in m/s^2, to assess sculling as well.",
-            show_default=False,
         ),
     ] = None
     spectrum: Annotated[
         Path | None,
-        typer.Option(
+        option(
             "--spectrum",
             metavar="FILE",
             help="CSV file of random vibration, in place of one frequency: columns frequency_hz, density, angle_x_rad, "
             "angle_x_phase_rad, ...",
-            show_default=False,
         ),
     ] = None
 
@@ -134,7 +103,8 @@ class VibrationSource:
                     raise InputError(f"{name} goes with one frequency, not with --spectrum")
             if output.format == "latex":
                 raise InputError(
-                    "--format latex writes closed forms of one frequency; with --spectrum text or json is allowed"
+                    "--format latex writes closed forms of one frequency; "
+                    "with --spectrum text, json, csv and markdown are allowed"
                 )
             return
         for name, value in needed.items():
@@ -196,25 +166,19 @@ class VibrationSource:
 
 @dataclass(frozen=True)
 class VibrationOutput(Output):
-    """Where the mean rates go: as text, JSON or LaTeX to the terminal, and over frequency into an image file."""
+    """Where the mean rates go, and in which format; over frequency into an image file."""
 
-    plot: Annotated[
-        Path | None,
-        typer.Option("--plot", help="Image file for the errors over frequency.", show_default=False),
-    ] = None
+    plot: Annotated[Path | None, plot_option("the errors over frequency")] = None
     span: Annotated[
         _Text,
-        typer.Option(
+        option(
             "--plot-hz",
             metavar="LOW,HIGH",
             help="Lowest and highest frequency of the plot in Hz.  [default: up to half the sampling frequency]",
-            show_default=False,
         ),
     ] = None
-    format: Annotated[_Text, typer.Option("--format", help="Format of the output: text, json or latex.")] = (
-        "text"
-    )
-    formats: ClassVar[tuple[str, ...]] = ("text", "json", "latex")
+    format: Annotated[_Text, format_option((*Output.formats, "latex"))] = "text"
+    formats: ClassVar[tuple[str, ...]] = (*Output.formats, "latex")
 
     def frequencies(self, sampling: float, marked: float) -> tuple[float, float]:
         """Return the ends of the plot in Hz, checked like the marked frequency against the sampling frequency."""
@@ -222,13 +186,13 @@ class VibrationOutput(Output):
         if self.span is not None:
             ends = self.span.split(",")
             if len(ends) != 2:
-                raise InputError(f"plot-hz is {self.span!r}; two frequencies, LOW,HIGH, are needed")
-            low, high = (float(checks.number("plot-hz", end, positive=True)) for end in ends)
+                raise InputError(f"--plot-hz is {self.span!r}; two frequencies, LOW,HIGH, are needed")
+            low, high = (float(checks.number("--plot-hz", end, positive=True)) for end in ends)
         lowest, highest = (times * sampling for times in _PLOTTED)
-        for option, end in (("plot-hz", low), ("plot-hz", high), ("frequency-hz", marked)):
+        for name, end in (("--plot-hz", low), ("--plot-hz", high), ("--frequency-hz", marked)):
             if not lowest <= end <= highest < math.inf:
                 raise InputError(
-                    f"{option} is {end:g}; a plot takes {lowest:g} to {highest:g} Hz, "
+                    f"{name} is {end:g}; a plot takes {lowest:g} to {highest:g} Hz, "
                     f"{_PLOTTED[0]:g} to {_PLOTTED[1]:g} times the sampling frequency"
                 )
         return low, high
@@ -239,51 +203,40 @@ def vibration(
     algorithm: Annotated[
         str,
         typer.Argument(
+            metavar="ALGORITHM",
             help="dcm, euler, cayley-klein, rotation-vector, sculling, a fast loop (coning-fast, sculling-fast-1, "
-            "sculling-fast-2, two-speed-fast-1, two-speed-fast-2), two-speed (both loops), or your own Python file."
+            "sculling-fast-2, two-speed-fast-1, two-speed-fast-2), two-speed (both loops), or a Python file of your "
+            "own.",
         ),
     ],
     *,
     methods: AssessedMethods,
     source: VibrationSource,
-    output: Annotated[VibrationOutput, Shown(only=("plot", "span", "format"))],
+    output: VibrationOutput,
 ) -> None:
-    """Show the mean drift rate about z that an algorithm computes under vibration, the true one, and the error.
+    """Show the drift that an algorithm computes under vibration.
 
-    The angles are X sin(2 pi f t) about x and Y sin(2 pi f t + P) about y; an acceleration along y has the phase P too.
-    The rates are closed forms to second order in the amplitudes, derived from the algorithm itself. Several methods, or
-    numbers of increments, are shown side by side.
+    You see the mean drift rate about z that it computes, the true one, and the error. The angles are X sin(2 pi f t)
+    about x and Y sin(2 pi f t + P) about y; an acceleration along y has the phase P too. The rates are closed forms to
+    second order in the amplitudes, derived from the algorithm itself. Several methods, or numbers of increments, are
+    shown side by side.
 
     For a fast loop alone, the continuous and the computed rate leave out a term in the slow cycle T_m: the slow loop
     adds that to both, so that the error is that of both loops.
 
-    Example:
-
-    \b
-      strapgen vibration euler --method coning-compressed --increments 4 --frequency-hz 10 \\
-        --step 0.04 --theta-x-rad 0.01 --theta-y-rad 0.01 --phase-rad 1.5 --acceleration-y 5
-    """  # noqa: D301
+    Example: strapgen vibration euler --method coning-compressed --increments 4 --frequency-hz 10 --step 0.04
+    --theta-x-rad 0.01 --theta-y-rad 0.01 --phase-rad 1.5 --acceleration-y 5
+    """
     output.check(algorithm, methods.tableau, source.spectrum)
     source.check(output)
     cases = [case for method in methods.each() for case in _assessed(algorithm, method, source)]
     outcomes, words = source.rates(cases)
-    image = None if output.plot is None else _image(cases, source, output, output.plot)
-    from strapgen.reports.vibration import vibration_data, vibration_latex, vibration_text
+    from strapgen.reports.vibration import vibration_report
 
-    if output.format == "json":
-        data = vibration_data(outcomes)
-        output.deliver(as_json(data[0] if len(data) == 1 else data), image)
-    elif output.format == "latex":
-        output.deliver(vibration_latex(cases), image)
-    else:
-        output.deliver(vibration_text(outcomes, f"{words}; step {source.step} s"), image)
-
-
-def _parts(option: str, text: _Text) -> list[_Text]:
-    """Return the values of a list; None stands for the default."""
-    if text is None:
-        return [None]
-    return [*listed(option, text, f"is {text!r}; a list with commas between is needed")]
+    output.report(
+        vibration_report(outcomes, cases, f"{words}; step {source.step} s"),
+        lambda path: _image(cases, source, output, path),
+    )
 
 
 def _check_known(algorithm: str, names: tuple[str, ...], installed: tuple[str, ...]) -> None:
@@ -292,11 +245,14 @@ def _check_known(algorithm: str, names: tuple[str, ...], installed: tuple[str, .
 
     if algorithm in (*names, *installed) or algorithm.endswith(".py"):
         return
-    why = "has no rate under vibration" if algorithm in catalogue.RESERVED else "is not known"
-    raise InputError(f"algorithm {algorithm!r} {why}; allowed: {', '.join(names)}, or your own Python file")
+    if algorithm not in catalogue.RESERVED:
+        checks.choice("algorithm", algorithm, names, "a Python file")
+    raise InputError(
+        f"algorithm {algorithm!r} has no rate under vibration; allowed: {', '.join(names)}, or a Python file"
+    )
 
 
-def _assessed(algorithm: str, method: AssessedMethods, source: VibrationSource) -> list[AssessedCase]:
+def _assessed(algorithm: str, method: MethodOptions, source: VibrationSource) -> list[AssessedCase]:
     """Return a case for each quantity of an algorithm that the options ask for."""
     from strapgen.catalogue.user import loading
     from strapgen.reports.vibration import AssessedCase
@@ -328,14 +284,14 @@ def _cycles(algorithm: str, method: MethodOptions, loop: str) -> int:
 
 def _check_plain(algorithm: str, method: MethodOptions) -> None:
     """Refuse the options of a method for an algorithm that has its own."""
-    for option, value in (
+    for name, value in (
         ("--method", method.method),
         ("--tableau", method.tableau),
         ("--previous", method.previous),
         ("--rates", method.rates or None),
     ):
         if value is not None:
-            raise InputError(f"{algorithm} takes no {option}")
+            raise InputError(f"{algorithm} takes no {name}")
 
 
 def _quantities(algorithm: str, possible: tuple[str, ...], source: VibrationSource) -> list[str]:
@@ -356,7 +312,7 @@ def _image(cases: list[AssessedCase], source: VibrationSource, output: Vibration
 
     step = source.step or ""
     sampling = max(case.samples for case in cases) / float(checks.number("step", step, positive=True))
-    marked = float(checks.number("frequency-hz", source.frequency or ""))
+    marked = float(checks.number("--frequency-hz", source.frequency or ""))
     hertz = curves.frequencies(*output.frequencies(sampling, marked))
     drawn = [
         (case.label, curves.curve(case.assessment, hertz, step, cycles=case.cycles, **source.amplitudes))

@@ -3,6 +3,7 @@
 from strapgen.reports.plots.agreement import agreement_image as agreement_image
 from strapgen.reports.plots.convergence import convergence_image as convergence_image
 from strapgen.reports.plots.figures import require_kind as require_kind
+from strapgen.reports.plots.runs import course_image as course_image
 from strapgen.reports.plots.runs import history_image as history_image
 from strapgen.reports.plots.runs import plot_history as plot_history
 from strapgen.reports.plots.runs import plot_run as plot_run

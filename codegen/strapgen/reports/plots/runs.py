@@ -1,17 +1,21 @@
-"""Plots the errors of a run, and an attitude history, against time."""
+"""Plots the errors of a run, an attitude history, and a course with velocities, against time."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from strapgen.reports.plots import figures
-from strapgen.reports.runs import AXES, SKEW_PLANES
+from strapgen.reports.runs import ANGLES, AXES, SKEW_PLANES
 from strapgen.simulation.recording import History
 from strapgen.simulation.runs import Run
 from strapgen.support.files import write_file
+
+if TYPE_CHECKING:
+    from strapgen.simulation.courses import Course
 
 
 def plot_run(run: Run, title: str, path: str | Path) -> Path:
@@ -78,5 +82,25 @@ def history_image(history: History, elements: Sequence[str], title: str, path: s
         axes.set_ylim(-1.05, 1.05)
     for axes in grid[-1]:
         axes.set_xlabel("time, s")
+    figure.suptitle(figures.printable(title), fontsize=12)
+    return figures.image(figure, path)
+
+
+def course_image(course: Course, title: str, path: str | Path) -> bytes:
+    """Return attitude and velocity changes along a recording against time; otherwise as `run_image`."""
+    figure, grid = figures.grid_of_axes(2, 3, (12, 6))
+    parts = (
+        [f"{name}, deg" for name in ANGLES],
+        [f"velocity change along {axis}, m/s" for axis in AXES],
+    )
+    values = (np.degrees(course.angles), course.velocity_changes)
+    for row, names in enumerate(parts):
+        for column, name in enumerate(names):
+            axes = grid[row, column]
+            axes.plot(course.time, values[row][:, column], color=figures.COLOURS[row], linewidth=1.2)
+            axes.set_title(name, loc="left", fontsize=10)
+            figures.style_over_time(axes)
+            if row == 1:
+                axes.set_xlabel("time, s")
     figure.suptitle(figures.printable(title), fontsize=12)
     return figures.image(figure, path)

@@ -1,0 +1,112 @@
+"""The help of every command: plain text as wide as the terminal, the same words for the same option."""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+
+import pytest
+from typer.main import get_command
+
+from strapgen.cli import COMMANDS, app
+from strapgen.cli.help import PlainCommand
+from strapgen.support.suggestions import SYNONYMS
+
+
+def commands(group, path=()):
+    """Yield every command and every group of commands of the program with its name."""
+    yield " ".join(path), group
+    for name, command in getattr(group, "commands", {}).items():
+        yield from commands(command, (*path, name))
+
+
+EVERY = dict(commands(get_command(app)))
+
+
+def help_of(name: str) -> list[str]:
+    command = EVERY[name]
+    with command.make_context(f"strapgen {name}".strip(), [], resilient_parsing=True) as context:
+        return command.get_help(context).splitlines()
+
+
+@pytest.mark.parametrize("width", [60, 80, 100])
+def test_no_line_is_wider_than_the_terminal(width, monkeypatch):
+    monkeypatch.setenv("COLUMNS", str(width))
+    long = [f"{name}: {line}" for name in EVERY for line in help_of(name) if len(line) > width]
+
+    assert not long
+
+
+def test_commands_stand_in_groups_with_a_whole_sentence_each(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    lines = help_of("")
+    headings = [line[:-1] for line in lines if re.fullmatch(r"[A-Z]\w+:", line)]
+    assert headings[-5:] == ["Derive", "Generate", "Run", "Analyse", "Reproduce"]
+    shown = {
+        heading: [
+            line.split()[0]
+            for line in "\n".join(lines).split(f"\n{heading}:\n")[1].split("\n\n")[0].split("\n")
+        ]
+        for heading in headings[-5:]
+    }
+    assert shown == {heading: list(names) for heading, names in COMMANDS.items()}
+    assert not [line for line in lines[1:] if line.endswith("...")]
+    assert "stress" not in " ".join(lines)
+
+
+def test_an_option_and_its_value_stay_on_one_line_of_an_example(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "60")
+    text = "\n".join(help_of("simulate"))
+    assert "    --set a_deg_s=10 b_deg_s=10 g_deg_s=10" in text
+    first = text.split("Examples:\n\n")[1].split("\n\n")[0].splitlines()
+    assert first[0].startswith("  strapgen simulate euler --method rk4")
+    assert all(line.endswith(" \\") for line in first[:-1]) and not first[-1].endswith("\\")
+
+
+def test_every_value_has_a_name_in_capitals():
+    for name, command in EVERY.items():
+        for parameter in command.params:
+            if not getattr(parameter, "is_flag", False) and parameter.name != "show_completion":
+                assert re.fullmatch(r"[A-Z][A-Z_0-9=,.|mnQ]*", parameter.metavar or ""), (
+                    name,
+                    parameter.name,
+                )
+
+
+def test_one_option_has_one_metavar_and_one_beginning_of_its_sentence():
+    """A list of values has an ellipsis; files and folders differ."""
+    metavars = defaultdict(set)
+    for command in EVERY.values():
+        for parameter in command.params:
+            if parameter.opts[0].startswith("--") and not parameter.is_flag:
+                metavars[parameter.opts[0]].add(parameter.metavar.removesuffix(",..."))
+    several = {option: names for option, names in metavars.items() if len(names) > 1}
+    assert several == {"--out": {"FILE", "FOLDER"}}
+
+
+def test_no_option_is_declared_in_the_plural():
+    singular = {option.opts[0] for command in EVERY.values() for option in command.params}
+    assert not {option for option in singular if f"{option[:-1]}" in singular} - {"--samples"}
+    assert all(
+        isinstance(command, PlainCommand) or hasattr(command, "headings") for command in EVERY.values()
+    )
+
+
+def test_every_synonym_leads_to_a_name_that_exists():
+    from strapgen import catalogue
+    from strapgen.backends import BACKENDS
+    from strapgen.targets import TARGETS
+
+    names = {
+        "algorithm": catalogue.RESERVED,
+        "kernel": catalogue.RESERVED,
+        "method": catalogue.METHODS,
+        "motion": catalogue.MOTIONS,
+        "target": TARGETS,
+        "backend": BACKENDS,
+        "reference": BACKENDS,
+    }
+    for kind, synonyms in SYNONYMS.items():
+        for synonym, meant in synonyms.items():
+            assert {*meant} <= {*names[kind]}, (kind, synonym)
+            assert kind in ("algorithm", "kernel") or synonym not in names[kind], (kind, synonym)

@@ -1,0 +1,54 @@
+"""Spellings and JSON keys that earlier releases had: they go on working, whatever else the commands learn."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from pathlib import Path
+
+import pytest
+from gathering import each
+from typer.main import get_command
+
+from strapgen.backends import BACKENDS
+from strapgen.cli import app, main
+
+DATA = Path(__file__).resolve().parents[1] / "data"
+PROMISED = json.loads((DATA / "promised_command_line.json").read_text())
+
+
+def command(name: str):
+    found = get_command(app)
+    for word in name.split():
+        found = found.commands[word]
+    return found
+
+
+@each("name", PROMISED["options"])
+def test_every_option_is_still_taken(name):
+    taken = {spelling for option in command(name).params for spelling in option.opts}
+    assert {*PROMISED["options"][name].split()} <= taken
+
+
+def test_back_ends_keep_their_names():
+    assert {"numpy", "c", "c-float", "c-q31", "c-q15", "fixed-model", "exact"} <= BACKENDS.keys()
+
+
+def test_every_line_answers_with_the_keys_that_it_had(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "data").symlink_to(DATA)
+    (tmp_path / "examples").symlink_to(DATA.parents[1] / "examples")
+
+    @each("promise", PROMISED["json"])
+    def kept(promise):
+        if "--plot" in promise["line"]:
+            pytest.importorskip("matplotlib")
+        with pytest.raises(SystemExit) as stop:
+            main(shlex.split(promise["line"]))
+        said = capsys.readouterr()
+        assert stop.value.code == 0, said.err
+        answer = json.loads(said.out)
+        assert isinstance(answer, list) == promise["list"]
+        assert {*promise["keys"].split()} <= (answer[0] if promise["list"] else answer).keys()
+
+    kept()
