@@ -38,7 +38,7 @@ def tables(
     fixed: Annotated[FixedOptions, Shown(only=("rounding", "carry"))],
     output: Annotated[Output, Shown(only=TEXT_OUTPUT)],
 ) -> None:
-    """Compute the five tables of the thesis, or one of them, beside its figures.
+    """Compute the tables of the thesis beside its printed figures.
 
     Example: strapgen tables --backend c-q31 --carry full
     """
