@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import session_library
 import typer.main
+from covering import mark_combinations
 from gathering import SEED
 
 import strapgen
@@ -50,9 +51,10 @@ def _is_of_cayley_klein(value: object) -> bool:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Let Cayley-Klein parameters run with the long tests, and not on back ends that show nothing new of them.
+    """Let combinations and Cayley-Klein parameters run with the long tests.
 
-    Their kernels and programs are those of Euler parameters but for names, which tests/catalogue, tests/lowering and
+    Every value of every parameter is in a quick test; all combinations of several are in the long ones. Cayley-Klein
+    parameters do not run on back ends that show nothing new of them: their kernels and programs are those of Euler parameters but for names, which tests/catalogue, tests/lowering and
     tests/test_claims.py prove.
     """
     left = []
@@ -65,6 +67,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if left:
         config.hook.pytest_deselected(items=left)
         items[:] = [item for item in items if item not in set(left)]
+    mark_combinations(items)
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:

@@ -1,26 +1,69 @@
-"""Cases of a test on every combination of some values: few that cover every value at once, all others long."""
+"""Tests on every combination of several parameters: few that have every value of each run at once, all others long."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from itertools import product
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import pytest
 
 
-def covering(*values: Iterable[Any]) -> list[Any]:
-    """Return all combinations, one value of each list, as parameters of a test.
+def covering(cases: Sequence[Sequence[Any]]) -> Iterator[int]:
+    """Yield the places of few cases that have every value of every parameter.
 
-    As many of them as the longest list has values run at once: together they have every value of every list. Against
-    each other, lists whose lengths have no common divisor are covered in many ways. The others are marked long.
+    Parameters
+    ----------
+    cases : sequence of sequence
+        For each case a value of each parameter.
+
+    Examples
+    --------
+    >>> list(covering([(method, state) for method in ("rk1", "rk2", "rk4") for state in ("dcm", "euler")]))
+    [0, 3, 4]
     """
-    lists = [list(several) for several in values]
-    chosen = {tuple(number % len(several) for several in lists) for number in range(max(map(len, lists)))}
-    return [
-        pytest.param(
-            *(several[place] for several, place in zip(lists, places, strict=True)),
-            marks=() if places in chosen else pytest.mark.long,
+    values = [list(dict.fromkeys(column)) for column in zip(*cases, strict=True)]
+    pending = [{(axis, value) for axis, value in enumerate(case)} for case in cases]
+    missing = set().union(*pending)
+    number = 0
+    while missing:
+        # Along the diagonal, so that each value meets others than its neighbour does.
+        diagonal = {(axis, several[number % len(several)]) for axis, several in enumerate(values)}
+        best = max(
+            range(len(cases)), key=lambda k: (len(pending[k] & missing), len(pending[k] & diagonal), -k)
         )
-        for places in product(*(range(len(several)) for several in lists))
+        yield best
+        missing -= pending[best]
+        number += 1
+
+
+def mark_combinations(items: Iterable[pytest.Item]) -> None:
+    """Mark as long the combinations whose every value is in another test that is not.
+
+    Parameters of one list belong together: each of its rows counts as one value.
+    """
+    tests: dict[Any, list[pytest.Function]] = {}
+    for item in items:
+        is_combination = isinstance(item, pytest.Function) and len(_axes(item)) > 1
+        if is_combination and item.get_closest_marker("long") is None:
+            tests.setdefault(item.function, []).append(item)
+    for several in tests.values():
+        axes = _axes(several[0])
+        cases = [
+            [repr([item.callspec.params.get(name) for name in names]) for names in axes] for item in several
+        ]
+        chosen = {*covering(cases)}
+        for number, item in enumerate(several):
+            if number not in chosen:
+                item.add_marker(pytest.mark.long)
+
+
+def _axes(item: pytest.Function) -> list[tuple[str, ...]]:
+    """Return the parameters of a test, those of one list together."""
+    names = getattr(getattr(item, "callspec", None), "params", {})
+    lists = [mark.args[0] for mark in item.iter_markers("parametrize")]
+    together = [
+        tuple(part.strip() for part in some.split(",")) if isinstance(some, str) else tuple(some)
+        for some in lists
     ]
+    listed = {name for some in together for name in some}
+    return [*together, *((name,) for name in names if name not in listed)]

@@ -6,7 +6,6 @@ import json
 
 import pytest
 import sympy as sp
-from covering import covering
 
 from strapgen.analysis.error_analysis import analyse
 from strapgen.analysis.notation import LATEX, covariant_text
@@ -19,7 +18,9 @@ W = sp.symbols("w_x w_y w_z")
 RANK = {"rk1": 1, "rk2": 2, "rk3": 3, "rk4": 4}
 
 
-@pytest.mark.parametrize(("motion", "algorithm", "method"), covering(MOTIONS, ALGORITHMS, RANK))
+@pytest.mark.parametrize("method", RANK)
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+@pytest.mark.parametrize("motion", MOTIONS)
 def test_the_order_is_that_of_theory_or_better(algorithm, motion, method):
     order, rank = series(choose(algorithm, method, 2), motion, 1).order, RANK[method]
     assert order == rank if motion in ("general", "coning") else order >= rank
@@ -51,6 +52,7 @@ def test_the_vector_invariant_form_is_the_components():
     )
 
 
+@pytest.mark.long
 def test_exponentials_lose_nothing_at_a_constant_rate():
     found = analyse(choose("dcm", "magnus4", 2), "constant")
     assert found.step.order is None
@@ -80,6 +82,7 @@ def test_every_method_has_its_order_on_a_general_motion(method):
     assert series(choice, "general", 1).order == derive(choice).order.step
 
 
+@pytest.mark.long
 def test_irrational_coefficients_stay_exact():
     found = series(choose("euler", "cooper-verner8", 6), "constant", 1)
     (coefficient,) = {row[1] for row in found.drift.values()}
@@ -87,6 +90,7 @@ def test_irrational_coefficients_stay_exact():
     assert min(found.drift) == 9
 
 
+@pytest.mark.long
 def test_rounded_coefficients_show_no_order_that_is_not_there():
     found = series(choose("euler", "dormand-prince8", 6), "constant", 1)
     assert min(found.drift) == 9
@@ -100,7 +104,10 @@ def test_a_users_step_that_is_not_linear_has_no_closed_form_of_a_run(own_algorit
     assert "not linear in its state" in series_text(found)
 
 
-@pytest.mark.parametrize("motion", MOTIONS)
+@pytest.mark.parametrize(
+    "motion",
+    [pytest.param(m, marks=() if m in ("constant", "sinusoidal") else pytest.mark.long) for m in MOTIONS],
+)
 def test_reports_say_every_part(motion):
     found = analyse(choose("dcm", "rk2", 2), motion, 1)
     text = series_text(found)

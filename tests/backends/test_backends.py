@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 from derived import generated
@@ -14,6 +16,7 @@ import strapgen
 from strapgen.backends import BACKENDS
 from strapgen.backends import numpy_backend as numpy_module
 from strapgen.backends.increments import windows
+from strapgen.ir.program import Program
 from strapgen.support.exceptions import InputError, InputTypeError
 
 STEPS = 1440
@@ -236,16 +239,21 @@ def test_unknown_names():
         strapgen.build(strapgen.generate(strapgen.lower(strapgen.derive("error-matrix")), "numpy"))
 
 
+@cache
+def lowered(*chosen: object, **more: object) -> Program:
+    """Return a program by the stages themselves, once for all back ends."""
+    return strapgen.lower(strapgen.derive(*chosen, **more))
+
+
 def test_the_pipeline_by_hand_gives_the_same_back_end(backend_name, rng):
-    built = strapgen.build(generated(strapgen.lower(strapgen.derive("dcm", "rk3", 2)), backend_name))
+    built = strapgen.build(generated(lowered("dcm", "rk3", 2), backend_name))
     increments = random_increments(rng, 20, 2)
     cached = strapgen.backend("dcm", "rk3", 2, backend_name)
     np.testing.assert_array_equal(built.propagate(increments), cached.propagate(increments))
 
 
 def test_a_step_from_rates_on_every_back_end(backend_name, rng):
-    kernel = strapgen.derive("dcm", "rk4", rates=True)
-    backend = strapgen.build(generated(strapgen.lower(kernel), backend_name))
+    backend = strapgen.build(generated(lowered("dcm", "rk4", rates=True), backend_name))
     other = strapgen.backend("dcm", "rk4", 2, backend_name)
     d = random_increments(rng, 40, 2, size=0.01)
     # Rate extraction of two increments (thesis, chapter 3 A), at nodes 0, 1/2 and 1.

@@ -89,7 +89,8 @@ def test_a_copy_refuses_what_the_back_end_refuses(increments):
         copied(backend).propagate(increments, 1, 4)
 
 
-@pytest.mark.parametrize("algorithm", [pytest.param("euler", marks=pytest.mark.long), FILE])
+@pytest.mark.long
+@pytest.mark.parametrize("algorithm", ["euler", FILE])
 def test_a_pool_of_processes_runs_a_back_end(algorithm, rng):
     backend = strapgen.backend(algorithm, backend="c")
     runs = [rng.normal(scale=0.02, size=(50, 2, 3)) for _ in range(4)]

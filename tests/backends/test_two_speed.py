@@ -188,7 +188,7 @@ def test_c_and_model_agree_bit_for_bit(carry, rng):
         np.testing.assert_array_equal(one, other)
 
 
-@pytest.mark.parametrize("algorithm", ALGORITHMS)
+@pytest.mark.parametrize("algorithm", ["euler", pytest.param("dcm", marks=pytest.mark.long)])
 def test_error_feedback_in_the_memory_of_the_c_is_that_of_the_model(algorithm):
     """Words of 16 bits, rounded down, on a long vibration: bit for bit, and not what runs without feedback."""
     angles, velocities = vibration(60)

@@ -569,10 +569,12 @@ def test_run_that_the_memory_does_not_hold(folder, capsys, monkeypatch):
     "command",
     [
         "derive eulr",
-        "simulate",
-        "simulate euler --increments-csv nan.csv",
+        *(
+            pytest.param(c, marks=pytest.mark.long)
+            for c in ("simulate", "simulate euler --increments-csv nan.csv")
+        ),
         f"simulate dcm --motion constant --set x_deg_s=1e300 {TIMES}",
-        "simulate dcm --rates-csv large.csv --rate-unit rad/s",
+        pytest.param("simulate dcm --rates-csv large.csv --rate-unit rad/s", marks=pytest.mark.long),
     ],
 )
 def test_so_it_is_for_a_process(command, folder):

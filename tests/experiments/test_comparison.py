@@ -29,6 +29,7 @@ def increments(rng):
 @pytest.mark.parametrize(
     "reference", ["exact", *(pytest.param(r, marks=pytest.mark.long) for r in ("numpy", "c-float"))]
 )
+@pytest.mark.parametrize("algorithm", ["euler", pytest.param("dcm", marks=pytest.mark.long)])
 def test_every_back_end_against_every_kind_of_reference(algorithm, reference, increments):
     rows = comparison.compare(algorithm, "rk4", 2, list(BACKENDS), increments, reference=reference)
     assert [row.backend for row in rows] == list(BACKENDS)

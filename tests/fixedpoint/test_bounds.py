@@ -197,10 +197,10 @@ def angles_apart(made, increments) -> np.ndarray:
     ("name", "carry", "limit"),
     [
         ("c-q31", "none", 2e-6),
-        ("c-q31", "state", 2e-6),
+        pytest.param("c-q31", "state", 2e-6, marks=pytest.mark.long),
         ("c-q31", "full", 1e-7),
-        ("c-q15", "none", 0.3),
-        ("c-q15", "state", 0.04),
+        pytest.param("c-q15", "none", 0.3, marks=pytest.mark.long),
+        pytest.param("c-q15", "state", 0.04, marks=pytest.mark.long),
         ("c-q15", "full", 0.008),
     ],
 )

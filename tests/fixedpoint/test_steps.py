@@ -7,7 +7,6 @@ from fractions import Fraction
 import mpmath
 import numpy as np
 import pytest
-from covering import covering
 from derived import precisely, program, quantized
 
 import strapgen
@@ -36,11 +35,10 @@ def exact_step(
 
 
 @pytest.mark.parametrize(
-    ("samples", "algorithm"),
-    covering([*((m, 0) for m in EXPONENTIALS), ("magnus4", 1), ("rk4", 2)], ["euler", "dcm"]),
+    ("method", "previous"), [*((m, 0) for m in EXPONENTIALS), ("magnus4", 1), ("rk4", 2)]
 )
-def test_a_call_is_inside_its_bound(algorithm, samples, rng):
-    method, previous = samples
+@pytest.mark.parametrize("algorithm", ["dcm", "euler"])
+def test_a_call_is_inside_its_bound(algorithm, method, previous, rng):
     kernel = strapgen.derive(algorithm, method, 2, previous=previous)
     backend = strapgen.backend(algorithm, method, 2, "fixed-model", previous=previous)
     evaluator = backend.evaluator
@@ -62,7 +60,8 @@ def test_a_call_is_inside_its_bound(algorithm, samples, rng):
     assert worst > 0.3, "something is rounded"
 
 
-@pytest.mark.parametrize(("method", "algorithm"), covering(EXPONENTIALS, ["euler", "dcm"]))
+@pytest.mark.parametrize("method", EXPONENTIALS)
+@pytest.mark.parametrize("algorithm", ["dcm", "euler"])
 def test_the_bound_of_an_exponential_is_a_few_places(algorithm, method):
     # The root of a small square is inexact; cosine and sin(x)/x are taken from the square itself.
     fixed = quantized(Choice(algorithm, method, 2), Settings())

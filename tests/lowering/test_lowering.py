@@ -8,7 +8,7 @@ from random import Random
 import mpmath
 import pytest
 import sympy as sp
-from derived import FUNCTIONS, kernel, precisely, program
+from derived import FUNCTIONS, kernel, precisely, program, tells_more
 from gathering import each
 
 from strapgen import catalogue, derive
@@ -20,7 +20,10 @@ from strapgen.symbolic.kernel import Kernel
 from strapgen.symbolic.rational_constants import rationalized
 
 STANDARD = catalogue.standard()
-EVERY = pytest.mark.parametrize("choice", STANDARD, ids=lambda choice: choice.kernel)
+EVERY = pytest.mark.parametrize(
+    "choice",
+    [pytest.param(c, marks=() if tells_more(c) else pytest.mark.long, id=c.kernel) for c in STANDARD],
+)
 TOGETHER = each("choice", STANDARD, ids=lambda choice: choice.kernel)
 
 

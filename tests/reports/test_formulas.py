@@ -6,10 +6,11 @@ import json
 import re
 from fractions import Fraction
 
+import derived
 import pytest
 import sympy as sp
 
-from strapgen import catalogue, pipeline
+from strapgen import pipeline
 from strapgen.catalogue import standard
 from strapgen.reports import formulas
 
@@ -21,7 +22,7 @@ SOME += [choice for choice in standard() if choice.method is None]
 
 @pytest.fixture(params=SOME, ids=lambda choice: choice.kernel)
 def kernel(request):
-    return catalogue.derive(request.param)
+    return derived.kernel(request.param)
 
 
 def stages(kernel):
@@ -64,7 +65,7 @@ def test_latex_names():
 
 
 def test_data_reads_back(kernel):
-    program = pipeline.lower(kernel)
+    program = derived.programs()[kernel.name]
     data = json.loads(json.dumps(formulas.as_data(kernel, program), allow_nan=False))
     wanted = [
         "kernel",

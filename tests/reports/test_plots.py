@@ -123,7 +123,12 @@ def test_vibration_has_a_panel_for_drift_and_one_for_acceleration(figures):
 
 
 @pytest.mark.parametrize(
-    ("name", "head"), [("run.png", b"\x89PNG\r\n\x1a\n"), ("run.PDF", b"%PDF-"), ("run.svg", b"<?xml")]
+    ("name", "head"),
+    [
+        ("run.png", b"\x89PNG\r\n\x1a\n"),
+        pytest.param("run.PDF", b"%PDF-", marks=pytest.mark.long),
+        ("run.svg", b"<?xml"),
+    ],
 )
 def test_image_is_of_the_kind_that_the_ending_says(name, head, run, tmp_path):
     path = plots.plot_run(run, "A title", tmp_path / "new" / name)

@@ -17,7 +17,7 @@ from strapgen.lowering.canonical.vectors import components
 from strapgen.symbolic.covariants import Decomposition, Frame, NotCovariantError, invariants, transform
 from strapgen.symbolic.polynomials import ONE, Polynomial, add, multiply, scale
 
-SETTINGS = settings(max_examples=60, derandomize=True, database=None, deadline=None)
+SETTINGS = settings(max_examples=25, derandomize=True, database=None, deadline=None)
 Vector = tuple[Fraction, ...]
 
 numbers = st.sampled_from([Fraction(n, d) for n in (-5, -3, -1, 0, 1, 2, 4) for d in (1, 2, 3)])

@@ -119,7 +119,12 @@ def test_a_sculling_kernel_has_the_rate_of_its_dual(options):
 
 
 @pytest.mark.parametrize(
-    "options", [("rk4", 2), ("butcher6", 4), ("rk2", None, True), ("magnus6", None, True)]
+    "options",
+    [
+        ("rk4", 2),
+        ("magnus6", None, True),
+        *(pytest.param(more, marks=pytest.mark.long) for more in (("butcher6", 4), ("rk2", None, True))),
+    ],
 )
 def test_the_representation_does_not_matter(options):
     first, *others = (vibration.of(choose(name, *options)) for name in ("euler", "dcm", "cayley-klein"))

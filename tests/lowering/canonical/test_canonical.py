@@ -71,10 +71,10 @@ def test_every_candidate_is_exact_not_only_the_one_that_is_taken(choice):
         (Choice("euler", "rk4", 1), 25, 17),
         (Choice("euler", "rk4", 2), 38, 30),
         (Choice("cayley-klein", "rk4", 2), 38, 30),
-        (Choice("euler", "rk4", 3), 58, 49),
+        pytest.param(Choice("euler", "rk4", 3), 58, 49, marks=pytest.mark.long),
         (Choice("dcm", "rk4", 1), 45, 32),
         (Choice("dcm", "rk4", 2), 75, 66),
-        (Choice("dcm", "rk4", 3), 96, 88),
+        pytest.param(Choice("dcm", "rk4", 3), 96, 88, marks=pytest.mark.long),
     ],
     ids=lambda value: value.kernel if isinstance(value, Choice) else str(value),
 )
