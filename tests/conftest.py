@@ -54,8 +54,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     """Let combinations and Cayley-Klein parameters run with the long tests.
 
     Every value of every parameter is in a quick test; all combinations of several are in the long ones. Cayley-Klein
-    parameters do not run on back ends that show nothing new of them: their kernels and programs are those of Euler parameters but for names, which tests/catalogue, tests/lowering and
-    tests/test_claims.py prove.
+    parameters do not run on back ends that show nothing new of them: their kernels and programs are those of Euler
+    parameters but for names, which tests/catalogue, tests/lowering and tests/test_claims.py prove.
     """
     left = []
     for item in items:
