@@ -8,6 +8,7 @@ from contextlib import ExitStack
 from functools import cache
 from pathlib import Path
 
+import hypothesis
 import numpy as np
 import pytest
 import session_library
@@ -33,6 +34,13 @@ BACKEND_NAMES = [
 #: Back ends on which Cayley-Klein parameters run too. Their programs are those of Euler parameters but for names, which
 #: tests/lowering proves: numpy and C in double show it, the others would compile the same C again.
 CAYLEY_KLEIN = ("numpy", "c")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Let properties that say no number of examples of their own take a quarter of them, except in the long tests."""
+    if config.getoption("markexpr") == "not long":
+        hypothesis.settings.register_profile("quick", max_examples=25, deadline=None)
+        hypothesis.settings.load_profile("quick")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -41,7 +41,9 @@ def test_prediction_leaves_the_next_order_for_other_methods(name, method):
         assert found.slopes[-1] > found.order + found.terms - 0.15
 
 
-@pytest.mark.parametrize("order", [1, 2, 3, 4])
+@pytest.mark.parametrize(
+    "order", [1, pytest.param(2, marks=pytest.mark.long), pytest.param(3, marks=pytest.mark.long), 4]
+)
 def test_constant_rate_adds_up_along_the_rate(order):
     run = accumulate(choose("dcm", f"rk{order}", 2), "constant", 1)
     w = sp.Matrix(sp.symbols("w_x w_y w_z"))
@@ -57,7 +59,10 @@ def test_constant_rate_adds_up_along_the_rate(order):
     assert not run.bounded
 
 
-@pytest.mark.parametrize(("order", "power"), [(1, 1), (2, 2), (3, 4), (4, 4)])
+@pytest.mark.parametrize(
+    ("order", "power"),
+    [(1, 1), pytest.param(2, 2, marks=pytest.mark.long), (3, 4), pytest.param(4, 4, marks=pytest.mark.long)],
+)
 @pytest.mark.parametrize("algorithm", ["dcm", "euler"])
 def test_drift_on_a_sinusoid_is_bounded(algorithm, order, power):
     """The thesis's third-order guess, b^3 where a = b, is wrong: third order grows with b^4, as the fourth does."""
@@ -71,7 +76,14 @@ def test_drift_on_a_sinusoid_is_bounded(algorithm, order, power):
     assert b not in scaled.free_symbols
 
 
-@pytest.mark.parametrize(("method", "share"), [("rk1", 1), ("rk2", 4), ("rk4", 16)])
+@pytest.mark.parametrize(
+    ("method", "share"),
+    [
+        pytest.param("rk1", 1, marks=pytest.mark.long),
+        ("rk2", 4),
+        pytest.param("rk4", 16, marks=pytest.mark.long),
+    ],
+)
 def test_drift_ratio_on_a_sinusoid(method, share):
     """Table 3: the ratio of Euler parameters to direction cosines is 1, 1/4, 1/16, at all times."""
     ours, theirs = (accumulate(choose(name, method, 2), "sinusoidal", 1).bounded for name in ("euler", "dcm"))
@@ -79,7 +91,9 @@ def test_drift_ratio_on_a_sinusoid(method, share):
     assert sp.expand(share * ours[power][1] - theirs[power][1]) == 0
 
 
-@pytest.mark.parametrize("method", ["rk2", "rk3", "magnus4"])
+@pytest.mark.parametrize(
+    "method", ["rk2", *(pytest.param(m, marks=pytest.mark.long) for m in ("rk3", "magnus4"))]
+)
 def test_coning_adds_up_along_its_axis(method):
     """Without the constant rate's own part: what is secular is along (0, b + g, a), the bounded part has no mean."""
     run = accumulate(choose("euler", method, 2), "coning", 1)

@@ -52,6 +52,7 @@ def test_second_order_loses_a_quarter(motion):
     assert ratio[0] == R(1, 4)
 
 
+@pytest.mark.long
 def test_steps_of_one_method_on_coning():
     """Exponentials of the same rotation vector lose the same, whatever the state."""
     found = versus(choose("euler", "magnus4", 2), choose("dcm", "magnus4", 2), "coning")

@@ -72,7 +72,7 @@ def test_orthonormalization_comes_after_every_so_many_steps(make, algorithm, rng
     assert np.abs(backend.propagate(increments) - history).max() > 1e-4, "orthonormalization must be seen"
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=10, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     steps=st.integers(0, 120),
     record_every=st.integers(1, 50),
@@ -265,9 +265,8 @@ def test_a_step_from_rates_on_every_back_end(backend_name, rng):
 
 
 def test_a_simulation_needs_increments(backend_name):
-    kernel = strapgen.derive("euler", "rk4", rates=True)
-    backend = strapgen.build(generated(strapgen.lower(kernel), backend_name))
-    with pytest.raises(InputError, match="euler-rk4-rates takes turns"):
+    backend = strapgen.build(generated(lowered("euler", "rk2", rates=True), backend_name))
+    with pytest.raises(InputError, match="euler-rk2-rates takes turns"):
         strapgen.simulate(backend, strapgen.motion("constant", x_deg_s=1), 1, 10)
 
 

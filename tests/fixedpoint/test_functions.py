@@ -211,7 +211,7 @@ def test_c_computes_what_the_model_does(case, word, rounding):
 
 
 @pytest.mark.parametrize("case", CASES)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(data=st.data())
 def test_any_argument_stays_below_the_bound(case, data):
     kind = CASES[case][0]

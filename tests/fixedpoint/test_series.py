@@ -26,7 +26,7 @@ def at(series: Series, values: list[Fraction]) -> Fraction:
     return total
 
 
-@settings(derandomize=True, database=None, deadline=None, max_examples=60)
+@settings(derandomize=True, database=None, deadline=None, max_examples=25)
 @given(
     data=st.lists(
         st.tuples(st.integers(0, 3), st.integers(0, 3), st.integers(0, 3)), min_size=1, max_size=12

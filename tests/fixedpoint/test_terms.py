@@ -11,7 +11,7 @@ from strapgen.fixedpoint.terms import Placed, aligned, largest_wide, nearest, up
 from strapgen.ir.integer_program import Term
 
 numbers = st.fractions(min_value=-100, max_value=100, max_denominator=10**4)
-SETTINGS = settings(derandomize=True, database=None, deadline=None, max_examples=40)
+SETTINGS = settings(derandomize=True, database=None, deadline=None, max_examples=25)
 
 
 @SETTINGS

@@ -21,7 +21,7 @@ from strapgen.lowering.arithmetic import (
 )
 from strapgen.symbolic.polynomials import Polynomial
 
-SETTINGS = settings(max_examples=80, derandomize=True, database=None, deadline=None)
+SETTINGS = settings(max_examples=25, derandomize=True, database=None, deadline=None)
 NAMES = "xyz"
 x, y, z = map(Reference, NAMES)
 

@@ -297,7 +297,7 @@ def samples(draw: st.DrawFn) -> tuple[np.ndarray, np.ndarray]:
 
 
 @given(samples(), st.floats(20, 1500))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=25, deadline=None)
 def test_resampling_integrates_a_piecewise_linear_rate_exactly(tmp_path_factory, sampled, hertz):
     time, values = sampled
     if (time[-1] - time[0]) * hertz < 1.001:

@@ -231,6 +231,7 @@ print(json.dumps(backend.propagate([[[0.1, 0.2, 0.3]]] * 5).tolist()))
 """
 
 
+@pytest.mark.long
 def test_processes_may_build_the_same_at_once(root):
     processes = [
         subprocess.Popen(

@@ -353,6 +353,7 @@ KNOWN = [
 ]
 
 
+@pytest.mark.long
 def test_kernels_are_called_as_functions_of_the_library_are(tmp_path):
     for name in KNOWN:
         admission._require_names(step(HARMLESS._replace(kernel=name)))

@@ -90,7 +90,7 @@ def constant(expression):
 
 
 @pytest.mark.parametrize("name", FROM_DCM)
-@settings(derandomize=True, database=None, deadline=None, max_examples=60)
+@settings(derandomize=True, database=None, deadline=None, max_examples=25)
 @given(unit=rational_units())
 def test_round_trips_are_exact(name, unit):
     matrix = convert("dcm-from-euler", unit)
@@ -99,7 +99,7 @@ def test_round_trips_are_exact(name, unit):
     assert tuple(again) in (unit, tuple(-x for x in unit))
 
 
-@settings(derandomize=True, database=None, deadline=None, max_examples=60)
+@settings(derandomize=True, database=None, deadline=None, max_examples=25)
 @given(unit=rational_units())
 def test_round_trips_of_matrices_are_exact(unit):
     assume(unit[3] != 0)

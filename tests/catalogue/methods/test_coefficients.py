@@ -85,7 +85,7 @@ EXPRESSIONS = st.recursive(
 )
 
 
-@settings(QUICK, max_examples=60)
+@settings(QUICK, max_examples=25)
 @given(EXPRESSIONS)
 def test_an_expression_has_the_value_that_python_gives_it(written):
     try:

@@ -127,7 +127,7 @@ POLYNOMIALS = COUNTS.flatmap(
 )
 
 
-@settings(derandomize=True, database=None, deadline=None, max_examples=50)
+@settings(derandomize=True, database=None, deadline=None, max_examples=25)
 @given(case=POLYNOMIALS, node=RATIONALS, power=st.integers(0, 4))
 def test_k_and_m_increments_are_exact_on_rates_of_degree_k_plus_m_minus_1(case, node, power):
     (count, previous), coefficients = case
@@ -181,7 +181,7 @@ def test_previous_increments_give_the_formulas_of_backward_differences():
 # Rates at nodes
 
 
-@settings(derandomize=True, database=None, deadline=None, max_examples=50)
+@settings(derandomize=True, database=None, deadline=None, max_examples=25)
 @given(
     data=st.lists(st.tuples(RATIONALS, RATIONALS), min_size=1, max_size=6, unique_by=lambda pair: pair[0]),
     node=RATIONALS,

@@ -101,7 +101,7 @@ def test_names_and_meanings_are_those_of_the_field():
 
 
 def test_a_transition_depends_on_nothing_but_the_increments():
-    for choice in (Choice("euler", "rk4", 3), Choice("dcm", "rk4", 3)):
+    for choice in (Choice("euler", "rk4", 2), Choice("dcm", "rk4", 2)):
         made = program(choice).transition_program()
         assert [signal.name for signal in made.inputs] == ["increments"]
         assert made.operations["multiply"] == program(choice).operations["multiply"] - (

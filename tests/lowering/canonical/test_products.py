@@ -11,7 +11,7 @@ from strapgen.lowering.canonical.products import choose_products
 from strapgen.lowering.canonical.vectors import Form
 from strapgen.symbolic.polynomials import Polynomial, atoms
 
-SETTINGS = settings(max_examples=40, derandomize=True, database=None, deadline=None)
+SETTINGS = settings(max_examples=25, derandomize=True, database=None, deadline=None)
 
 #: What vectors may be called; the first ones are a basis.
 OFFERED: dict[int, dict[str, tuple[int, ...]]] = {

@@ -16,7 +16,7 @@ from strapgen.lowering.canonical.vectors import (
     proportion,
 )
 
-SETTINGS = settings(max_examples=80, derandomize=True, database=None, deadline=None)
+SETTINGS = settings(max_examples=25, derandomize=True, database=None, deadline=None)
 
 numbers = st.sampled_from([Fraction(n, d) for n in (-3, -1, 0, 0, 1, 2) for d in (1, 2)])
 #: Several forms in the same inputs.

@@ -24,7 +24,7 @@ from strapgen.lowering.passes import PASSES, cost, optimize, remove_unused
 
 INPUTS = ("x", "y", "z")
 EVERY = pytest.mark.parametrize("run", PASSES, ids=lambda run: run.__name__)
-SETTINGS = settings(max_examples=40, derandomize=True, database=None, deadline=None)
+SETTINGS = settings(max_examples=25, derandomize=True, database=None, deadline=None)
 
 KINDS = 2 * ("add", "subtract", "multiply", "negate") + ("scale", "divide", "select", "maximum")
 #: What the name of a value begins with; a value without a name is written out wherever it is used.
