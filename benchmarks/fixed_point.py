@@ -98,7 +98,7 @@ def candidates(folder: Path) -> list[Candidate]:
     sources = strapgen.generate(program, "c")
     (folder / "double").mkdir()
     text = "\n".join(sources.files.values()).replace(f'#include "{sources.function.name}.h"', "")
-    text += _ADAPTOR.format(word="double", call="one_(e, d, next);\n    return 0")
+    text += _ADAPTOR.format(word="double", call=f"{sources.function.name}_one_(e, d, next);\n    return 0")
     made.append(candidate("double, strapgen", compiled(folder / "plain", text), increments, start, none))
     for word in (32, 16):
         for carry in ("none", "state", "full"):
@@ -106,7 +106,9 @@ def candidates(folder: Path) -> list[Candidate]:
             sources = strapgen.generate(fixed, "c-fixed")
             text = "\n".join(sources.files.values()).replace(f'#include "{sources.function.name}.h"', "")
             kept = f"(uint{word}_t *)kept, " if carry != "none" else ""
-            text += _ADAPTOR.format(word=f"int{word}_t", call=f"return one_(e, d, {kept}next)")
+            text += _ADAPTOR.format(
+                word=f"int{word}_t", call=f"return {sources.function.name}_one_(e, d, {kept}next)"
+            )
             given, held = fixed.interface.inputs[1], fixed.interface.inputs[0]
             integers = np.rint(np.ldexp(increments, given.format.fraction)).astype(f"int{word}")
             first = np.rint(np.ldexp(start, held.format.fraction)).astype(f"int{word}")

@@ -14,7 +14,10 @@ LANGUAGE = "c"
 
 _ADAPTOR = """#include "{name}.c"
 #define HAS_LOOPS
-static inline void step(const double *state, const double *samples, double *next) {{ one_(state, samples, next); }}
+static inline void step(const double *state, const double *samples, double *next)
+{{
+    {name}_one_(state, samples, next);
+}}
 static inline void loop(size_t steps, const double *samples, const double *state, double *history)
 {{
     {name}_propagate(1, steps, steps, 0, 0, state, samples, history);
