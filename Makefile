@@ -45,11 +45,12 @@ demo: $(READY)
 	@echo
 	@echo "4. Table 5 of the thesis on every back end; c-q31 and c-q15 have 32- and 16-bit words"
 	$(BIN)/strapgen tables --table 5
+	@echo
 	@echo "More: source .venv/bin/activate, then"
 	@echo "  strapgen list      all algorithms, methods, kernels, motions and back ends"
 	@echo "  strapgen --help    all commands, each with an example in its own --help"
 	@echo "  strapgen tables    all five tables"
-	@echo "README.md goes on with five minutes of examples; docs/ has the theory."
+	@echo "docs/command-line.md shows every command at work; docs/README.md answers questions."
 
 test: $(TOOLS)
 	$(BIN)/python -m pytest -n auto --dist worksteal -m "not long"

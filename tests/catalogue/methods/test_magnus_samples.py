@@ -43,7 +43,15 @@ def drift_deg(method: str, count: int, previous: int, frequency_hz: float) -> fl
     return float(np.degrees(run.mean_drift))
 
 
-@SAMPLES
+@pytest.mark.parametrize(
+    ("count", "previous"),
+    [
+        (1, 0),
+        (3, 0),
+        (1, 3),
+        *(pytest.param(n, p, marks=pytest.mark.long) for n, p in ((2, 0), (4, 0), (5, 0), (8, 0), (3, 2))),
+    ],
+)
 @pytest.mark.parametrize("method", ["magnus4", "magnus6"])
 def test_the_term_of_second_order_is_that_of_the_polynomial_through_the_samples(method, count, previous):
     kernel = derive("rotation-vector", method, count, previous=previous)
