@@ -60,9 +60,12 @@ test-long: $(TOOLS)
 
 # With an empty cache, so that every module is built and noted.
 test-modules: $(TOOLS)
-	folder=$$(mktemp -d) && STRAPGEN_CACHE_DIR=$$folder/cache $(BIN)/python -m pytest -n auto --dist worksteal \
-	  -m "not long" --record-modules $$folder/modules \
-	  && sort -u $$folder/modules > tests/data/modules.jsonl && rm -r $$folder
+	for which in "not long" long; do \
+	  folder=$$(mktemp -d) && STRAPGEN_CACHE_DIR=$$folder/cache $(BIN)/python -m pytest -n auto --dist worksteal \
+	    -m "$$which" --record-modules $$folder/modules || exit 1; \
+	  case $$which in long) file=modules-long ;; *) file=modules ;; esac; \
+	  sort -u $$folder/modules > tests/data/$$file.jsonl && rm -r $$folder; \
+	done
 
 # It goes on where it was stopped: the outcomes are in .mutants/. More with MUTANTS="--only rotations --list", see --help.
 mutants: $(TOOLS)

@@ -115,7 +115,10 @@ def compiled(optimization: None, request: pytest.FixtureRequest) -> Iterator[Non
         if file is not None:
             stack.enter_context(session_library.recorded(file.absolute()))
         elif len(request.session.items) >= session_library.FEWEST_TESTS:
-            session_library.provide()
+            which = request.config.getoption("markexpr")
+            session_library.provide(
+                session_library.FORECASTS.get(which, session_library.FORECASTS["not long"])
+            )
         yield
 
 

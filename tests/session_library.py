@@ -1,9 +1,9 @@
 """One library of C for all tests of a session: its processes compile together what the tests build, before they begin.
 
 A compiled module costs more for the compiler's start, Python's headers and the linker than for the kernel in it.
-tests/data/modules.jsonl lists the kernels that tests build, a line each. The list is no more than a forecast: a module
-that it lacks is built alone when a test needs it, and one too many costs a few hundredths of a second.
-``make test-modules`` writes it anew.
+tests/data/modules.jsonl lists the kernels that quick tests build, a line each, and modules-long.jsonl those of long
+tests. The lists are no more than forecasts: a module that one lacks is built alone when a test needs it, and one too
+many costs a few hundredths of a second. ``make test-modules`` writes them anew.
 """
 
 from __future__ import annotations
@@ -28,8 +28,11 @@ from strapgen.support import cache
 from strapgen.support.exceptions import InputError
 from strapgen.toolchain import compiler
 
-#: The kernels that tests build: kernel, target, and what fixed point is made for.
-FORECAST = Path(__file__).parent / "data" / "modules.jsonl"
+#: The kernels that tests build, quick ones and long ones: kernel, target, and what fixed point is made for.
+FORECASTS = {
+    "not long": Path(__file__).parent / "data" / "modules.jsonl",
+    "long": Path(__file__).parent / "data" / "modules-long.jsonl",
+}
 #: A session of fewer tests builds what it needs.
 FEWEST_TESTS = 1000
 #: Sources that are compiled in one call of the compiler; several calls keep all processes busy.
@@ -111,10 +114,10 @@ def folder(name: str, parts: Iterable[str], fill: Callable[[Path], None]) -> Pat
         return cache.entry(name, key, fill)
 
 
-def provide() -> None:
-    """Compile what the forecast lists, together with the other processes of the session."""
-    entries = [json.loads(text) for text in FORECAST.read_text().splitlines()]
-    state = cache.digest([cache.generator_digest(), FORECAST.read_bytes(), *compiler._flags])
+def provide(forecast: Path) -> None:
+    """Compile what a forecast lists, together with the other processes of the session."""
+    entries = [json.loads(text) for text in forecast.read_text().splitlines()]
+    state = cache.digest([cache.generator_digest(), forecast.read_bytes(), *compiler._flags])
     folder = cache.root() / "session-library" / state
 
     @memoized
