@@ -249,7 +249,7 @@ FEW = [
 
 @pytest.mark.parametrize(
     ("word", "few"),
-    [(16, True), *(pytest.param(word, word > 16, marks=pytest.mark.long) for word in (8, 16, 32, 64))],
+    [(16, True), *(pytest.param(word, False, marks=pytest.mark.long) for word in (8, 16, 32, 64))],
 )
 @pytest.mark.parametrize("choice", LOWERED)
 def test_no_value_and_no_partial_sum_leaves_its_type(choice, word, few):

@@ -230,7 +230,7 @@ def test_output_may_be_an_input(target, library, rng):
             size = len(own[output].tobytes())
             assert own[output].tobytes() == wanted[output][:size], (kernel, output, shared)
             checked += 1
-    assert checked >= len(KERNELS) / 3
+    assert checked >= len(KERNELS) / 2
 
 
 def test_every_step_and_orthonormalization_has_a_shared_size():

@@ -226,7 +226,7 @@ def values_of(kernel: Kernel, state: list, samples: list) -> dict[str, object]:
     )
 
 
-@each(("count", "previous"), [(1, 1), (1, 3), (2, 1), (3, 2)])
+@each(("count", "previous"), [(1, 1), (1, 3), (2, 1), (3, 2), (8, 3)])
 @each("method", ["rk2", "rk4", "nystrom5"])
 @ALGORITHM
 def test_with_previous_increments_a_step_is_that_of_the_rates_they_fit(algorithm, method, count, previous):

@@ -39,10 +39,13 @@ def transition(kernel: Kernel, samples: list[mpmath.mpf]) -> mpmath.matrix:
     ("algorithm", "order", "count", "previous"),
     [
         *(("dcm", 4, 4, 0), ("euler", 4, 3, 0), ("euler", 4, 1, 3)),
-        *(pytest.param(*more, marks=pytest.mark.long) for more in (("euler", 8, 4, 0), ("dcm", 2, 8, 0))),
+        *(
+            pytest.param(*more, marks=pytest.mark.long)
+            for more in (("euler", 4, 4, 0), ("cayley-klein", 4, 4, 0), ("euler", 8, 4, 0), ("dcm", 2, 8, 0))
+        ),
         *(
             pytest.param(algorithm, order, count, 0, marks=pytest.mark.long)
-            for algorithm in ("dcm", "euler")
+            for algorithm in ALGORITHMS
             for order in (1, 5, 8)
             for count in (3, 5, 8)
         ),
