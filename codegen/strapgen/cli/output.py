@@ -47,6 +47,14 @@ Folder = Annotated[
     Path | None,
     option("--out", metavar="FOLDER", help="Folder for the files.  [default: here]", panel="Output"),
 ]
+WithRuns = Annotated[
+    bool,
+    option(
+        "--with-runs",
+        help="In C: write the loops over samples and runs too, for simulations on a host.",
+        panel="Output",
+    ),
+]
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from strapgen.fixedpoint.quantization_context import Quantization, integer_value
 from strapgen.fixedpoint.terms import Aligned, Placed, aligned, largest_wide, nearest, up
 from strapgen.ir.fixed_interface import ErrorFeedback
 from strapgen.ir.formats import Format, finest
-from strapgen.ir.integer_program import IntegerSum, Term, Value
+from strapgen.ir.integer_program import Coefficient, IntegerSum, Term, Value
 from strapgen.support.exceptions import InputError
 
 
@@ -104,7 +104,8 @@ def _product_term(context: Quantization, monomial: Monomial, coefficient: Fracti
     factor, bits = _nearest_word(coefficient, context.word)
     wrong = abs(Fraction(factor, 1) / Fraction(2) ** bits - coefficient)
     stored = values[0].magnitude / Fraction(2) ** values[0].fraction
-    return Placed(Term(names, factor), places + bits, up(error + wrong * stored))
+    term = Term(names, factor, coefficient=Coefficient(coefficient, bits))
+    return Placed(term, places + bits, up(error + wrong * stored))
 
 
 def _product_error(context: Quantization, values: Sequence[Value], monomial: Monomial) -> Fraction:
@@ -135,7 +136,7 @@ def _constant_term(constant: Fraction, places: Sequence[int], word: int) -> Plac
     place = min(place, longest - math.ceil(abs(constant)).bit_length())
     integer = nearest(constant * Fraction(2) ** place)
     wrong = abs(integer / Fraction(2) ** place - constant)
-    return Placed(Term((), integer), place, up(wrong))
+    return Placed(Term((), integer, coefficient=Coefficient(constant, place)), place, up(wrong))
 
 
 # Rounding
@@ -194,8 +195,9 @@ def _rounded(
     coarse = aligned([item for item in terms if item.place <= fraction], fraction, word, values)
     if not coarse.fits(word, values):
         raise context.too_short(quantity.name)
+    largest_word = context.largest(fraction)
     if not fine_terms:
-        definition = IntegerSum(coarse.terms)
+        definition = IntegerSum(coarse.terms, in_words=coarse.peak <= largest_word)
         return integer_value(
             context, quantity, definition, fraction, coarse.error, coarse.peak, followed=followed
         )
@@ -211,7 +213,14 @@ def _rounded(
     value = integer_value(
         context,
         quantity,
-        IntegerSum(fine.aligned.terms, fine.shift - drop, coarse.terms, feedback, drop),
+        IntegerSum(
+            fine.aligned.terms,
+            fine.shift - drop,
+            coarse.terms,
+            feedback,
+            drop,
+            in_words=coarse.peak + rounded_peak <= largest_word,
+        ),
         fraction,
         error,
         max(fine.peak, coarse.peak + rounded_peak),

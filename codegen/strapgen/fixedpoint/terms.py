@@ -94,7 +94,9 @@ def aligned(terms: Iterable[Placed], place: int, word: int, values: Mapping[str,
             error += wrong + abs(integer - exact) / Fraction(2) ** place
             if not integer:
                 continue
-            shifted.append(Term((), integer))
+            known = term.coefficient
+            coefficient = known and replace(known, fraction=known.fraction + shift)
+            shifted.append(Term((), integer, coefficient=coefficient))
         else:
             shifted.append(replace(term, shift=shift))
             error += wrong + (Fraction(2) ** -place if shift < 0 else 0)

@@ -17,6 +17,14 @@ from strapgen.ir.program import Program
 
 
 @dataclass(frozen=True)
+class Coefficient:
+    """The exact number that an integer factor stands for: the factor is ``value * 2**fraction``, rounded."""
+
+    value: Fraction
+    fraction: int
+
+
+@dataclass(frozen=True)
 class Term:
     """``factor * product of values * 2**shift``, an integer; a shift below zero rounds down.
 
@@ -27,11 +35,14 @@ class Term:
     factor : int
         Not zero; 1 or -1 with two values.
     shift : int
+    coefficient : Coefficient or None
+        What the factor stands for, if it is a rounded number.
     """
 
     names: tuple[str, ...]
     factor: int
     shift: int = 0
+    coefficient: Coefficient | None = None
 
 
 @dataclass(frozen=True)
@@ -55,6 +66,9 @@ class IntegerSum:
         The rounding error of the last call; it is added in place of half a unit.
     drop : int
         Places below the last one of the error feedback; they are dropped before it is added.
+    in_words : bool
+        Whether what is left of the fine terms after rounding, and every partial sum with the coarse terms, fits into a
+        word.
     """
 
     fine: tuple[Term, ...]
@@ -62,6 +76,7 @@ class IntegerSum:
     coarse: tuple[Term, ...] = ()
     residual: ErrorFeedback | None = None
     drop: int = 0
+    in_words: bool = False
 
 
 @dataclass(frozen=True)

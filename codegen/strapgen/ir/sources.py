@@ -46,6 +46,8 @@ class Sources:
     own : tuple of Program
         Programs of the kernels that a user's step brings. Sources from the cache have none: there the step's choice
         has the kernels.
+    runs : tuple of str
+        Names of the files that hold loops over samples and runs, which a host calls and firmware does not need.
     """
 
     kernel: str
@@ -58,6 +60,12 @@ class Sources:
     fixed: Interface | None = None
     recursion: Recursion | None = None
     own: tuple[Program, ...] = ()
+    runs: tuple[str, ...] = ()
+
+    @property
+    def step_files(self) -> dict[str, str]:
+        """The files without those of `runs`."""
+        return {name: text for name, text in self.files.items() if name not in self.runs}
 
     def interface(self) -> dict[str, Any]:
         """Return everything but the text and the programs of `own` as plain JSON data."""
@@ -65,6 +73,7 @@ class Sources:
             "kernel": self.kernel,
             "target": self.target,
             "files": list(self.files),
+            "runs": list(self.runs),
             "function": {
                 "name": self.function.name,
                 "inputs": [signal.as_dict() for signal in self.function.inputs],
@@ -95,4 +104,5 @@ class Sources:
             interface["companions"] and Companions.from_dict(interface["companions"]),
             interface["fixed"] and Interface.from_dict(interface["fixed"]),
             interface["recursion"] and Recursion.from_dict(interface["recursion"]),
+            runs=tuple(interface["runs"]),
         )

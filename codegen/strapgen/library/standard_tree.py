@@ -48,7 +48,7 @@ def tree(lowered: Iterable[Program]) -> dict[str, str]:
             if BUILT_IN[target].fixed and not fixedpoint.can_lower(program):
                 continue
             sources = pipeline.generate(program, target)
-            for name, text in sources.files.items():
+            for name, text in sources.step_files.items():
                 files[f"{_FOLDERS[target]}/{name}"] = text
         counts = program.operations
         shown = [counts[kind] for kind in ("add", "multiply", "divide", "sqrt")] + [program.temporaries]

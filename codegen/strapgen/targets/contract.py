@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from fractions import Fraction
 
 from strapgen.ir.fixed_interface import Argument, ErrorFeedback, RoundingAccumulation
 from strapgen.ir.fixed_settings import DEFAULT_ALLOWANCE, DEFAULT_ANGLE, Settings
+from strapgen.ir.formats import Format
 from strapgen.ir.integer_program import FixedProgram, Value
 from strapgen.ir.program import Program
 from strapgen.ir.signals import Signal
@@ -105,3 +107,29 @@ def operations_text(program: Program) -> str:
     """Return the operation count in words."""
     counts = ", ".join(f"{number} {kind}" for kind, number in program.operations.items() if number)
     return f"{counts or 'none'}; {program.temporaries} temporaries"
+
+
+def value_text(value: Value, word: int) -> str:
+    """Return format, range and error bound of a value in words, and the offset that is not stored."""
+    unit = Fraction(2) ** -value.fraction
+    format_ = Format(word * (1 + value.wide), value.fraction)
+    error = f"error {_outward(value.error, up=True, digits=2)}" if value.error else "exact"
+    low, high = _outward(value.low * unit, up=False), _outward(value.high * unit, up=True)
+    offset = f"; stands for {value.name} {'-' if value.offset > 0 else '+'} {abs(value.offset)}" if value.offset else ""
+    return f"{format_}, {low} .. {high}, {error}{offset}"
+
+
+def _outward(value: Fraction, up: bool, digits: int = 3) -> str:
+    """Return a number with few digits, rounded up or down."""
+    if not value:
+        return "0"
+    place = math.floor(math.log10(abs(value))) - digits + 1
+    scaled = value / Fraction(10) ** place
+    integer = math.ceil(scaled) if up else math.floor(scaled)
+    return f"{float(integer * Fraction(10) ** place):.{digits}g}"
+
+
+def exact_text(value: Fraction) -> str:
+    """Return an exact number as a fraction if that is short, otherwise with 17 digits."""
+    text = str(value)
+    return text if len(text) <= 24 else f"{float(value):.17g}"

@@ -53,3 +53,31 @@ def environment(folder: Path | None = None) -> jinja2.Environment:
 def render(template: str, **values: Any) -> str:
     """Return a template of `templates/` filled with values."""
     return environment().get_template(template).render(**values)
+
+
+def render_c(folder: str, name: str, **values: Any) -> dict[str, str]:
+    """Return the files of a function in C: the function alone, then its loops over samples and runs.
+
+    Parameters
+    ----------
+    folder : str
+        Folder of the templates.
+    name : str
+        Name of the function.
+    **values
+        What the templates are filled with.
+
+    Returns
+    -------
+    dict of str to str
+        Text by file name; `runs_of` names those of the loops.
+    """
+    files = {f"{name}.h": "header.h", f"{name}.c": "source.c"} | dict(
+        zip(runs_of(name), ("runs.h", "runs.c"), strict=True)
+    )
+    return {file: render(f"{folder}/{template}.j2", name=name, **values) for file, template in files.items()}
+
+
+def runs_of(name: str) -> tuple[str, str]:
+    """Return the names of the files with the loops of a function in C."""
+    return f"{name}_runs.h", f"{name}_runs.c"

@@ -271,9 +271,9 @@ def _compile(many: Sequence[Sources], name: str, path: str, draft: Path) -> None
     files = {file: text for sources in many for file, text in sources.files.items()}
     for file, text in files.items():
         (draft / file).write_text(text)
-    headers = [next(file for file in sources.files if file.endswith(".h")) for sources in many]
+    headers = [file for file in files if file.endswith(".h")]
     code = [file for file in files if file.endswith(".c")]
-    if len(many) > 1:  # their static names are different: one translation unit, in one call of the compiler
+    if len(code) > 1:  # one translation unit: loops can take steps in, and the compiler is called once
         (draft / f"{name}_kernels.c").write_text("".join(f'#include "{file}"\n' for file in code))
         code = [f"{name}_kernels.c"]
     request = {

@@ -10,7 +10,7 @@ import typer
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import grouped
 from strapgen.cli.options import MethodOptions, OptionalAlgorithm, one, option
-from strapgen.cli.output import Format, check_format, print_json
+from strapgen.cli.output import Format, WithRuns, check_format, print_json
 from strapgen.cli.progress import track
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
@@ -47,6 +47,7 @@ def generate(
             panel="Output",
         ),
     ] = None,
+    with_runs: WithRuns = False,
     check: Annotated[
         bool,
         option(
@@ -93,7 +94,9 @@ def generate(
         raise InputError(
             f"kernel {choice.kernel} rounds no state that goes on to the next step; --carry keeps nothing"
         )
-    written = write_files(out or Path(), sources.files)
+    if with_runs and not sources.runs:
+        raise InputError(f"--with-runs goes with targets of C; {target} has its loops in the one file")
+    written = write_files(out or Path(), sources.files if with_runs else sources.step_files)
     if format == "json":
         print_json(_data(choice, sources, target, written))
     else:

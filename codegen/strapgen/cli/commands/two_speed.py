@@ -10,7 +10,7 @@ import typer
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import Sculling, TwoSpeedAlgorithm, option, whole
-from strapgen.cli.output import Folder, Format, check_format, print_json
+from strapgen.cli.output import Folder, Format, WithRuns, check_format, print_json
 from strapgen.support.exceptions import InputError
 
 
@@ -28,6 +28,7 @@ def two_speed(
         Shown(only=("word", "rounding", "carry", "drift_allowance", "ranges", "formats")),
     ],
     out: Folder = None,
+    with_runs: WithRuns = False,
     format: Format = "text",
 ) -> None:
     """Generate the C code of an algorithm in two speeds.
@@ -49,7 +50,7 @@ def two_speed(
     elif settings is not None:
         raise InputError(f"the options of fixed point go with --target c-fixed, not with {target}")
     sources = two_speed_sources.sources(algorithm, form, target, settings)
-    written = write_files(out or Path(), sources.files)
+    written = write_files(out or Path(), sources.files if with_runs else sources.step_files)
     if format == "json":
         print_json(
             {

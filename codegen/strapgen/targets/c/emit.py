@@ -14,7 +14,7 @@ from strapgen.targets.lines import fill_expression
 from strapgen.targets.names import C, external, printed
 from strapgen.targets.printer import Printer
 from strapgen.targets.registry import TARGETS
-from strapgen.targets.rendering import render
+from strapgen.targets.rendering import render_c, runs_of
 
 
 @dataclass(frozen=True)
@@ -104,8 +104,8 @@ def emit(program: Program, target: str) -> Sources:
     Returns
     -------
     Sources
-        Two files. The function ``<name>`` works on one sample, ``<name>_array`` on many; a step has
-        ``<name>_propagate`` too, the loop over runs and steps.
+        Two files with the function ``<name>`` on one sample, and two with ``<name>_array`` on many; a step has
+        ``<name>_propagate`` there too, the loop over runs and steps.
     """
     real = real_of(target)
     name = external(program.name, real.infix)
@@ -122,6 +122,7 @@ def emit(program: Program, target: str) -> Sources:
         program.temporaries,
         program.companions,
         recursion=program.recursion,
+        runs=runs_of(name),
     )
 
 
@@ -132,7 +133,6 @@ def _files(program: Program, name: str, target: str) -> dict[str, str]:
     nodes = [node for a in program.body for node in walk(a.value) if isinstance(node, Operation)]
     values = {
         "program": program,
-        "name": name,
         "guard": f"{name}_h".upper(),
         "command": f"strapgen generate {program.arguments} --target {target}",
         "real": real,
@@ -140,22 +140,18 @@ def _files(program: Program, name: str, target: str) -> dict[str, str]:
         "samples": program.inputs[-1],
         "result": program.outputs[0].signal,
         "parameters": _parameters(program, real),
-        "names": ", ".join(s.name for s in (*program.inputs, *(r.signal for r in program.outputs))),
         "arrays": _arrays(program, real),
         "calls": _calls(program),
         "unused": [s.name for s in program.inputs if not program.used() & set(s.elements)],
         "code": _code(program, printer),
-        "propagation": _loop(program, printer) if program.companions else None,
+        "propagation": _loop(program, CPrinter(real, f"{name}_runs")) if program.companions else None,
         "uses_math": any(
             node.kind in _FUNCTIONS and node.kind not in ("at_least", "select", "wrap") for node in nodes
         ),
-        "uses_sinc": any(node.kind == "sinc" for node in nodes),
+        "functions": {node.kind for node in nodes},
         "turn": tuple(map(printer.constant, _HALF_TURNS)) if any(n.kind == "wrap" for n in nodes) else None,
     }
-    return {
-        f"{name}.h": render("c/header.h.j2", **values),
-        f"{name}.c": render("c/source.c.j2", **values),
-    }
+    return render_c("c", name, **values)
 
 
 def _code(

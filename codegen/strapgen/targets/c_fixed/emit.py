@@ -5,6 +5,7 @@ The code has no undefined or implementation-defined behaviour, and returns an er
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from strapgen.ir.integer_program import (
@@ -20,9 +21,10 @@ from strapgen.ir.integer_program import (
     used_by,
 )
 from strapgen.ir.sources import Function, Sources
+from strapgen.targets import contract
 from strapgen.targets.lines import fill_expression
 from strapgen.targets.names import C, external, printed
-from strapgen.targets.rendering import render
+from strapgen.targets.rendering import render_c, runs_of
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,8 @@ class Word:
     wide, magnitude : str
         Types of a product, and of the magnitude of a product. C has none for words of 64 bits: a file defines them
         under names of its own.
+    check : str
+        Type in which the ranges of inputs are checked.
     """
 
     bits: int
@@ -47,6 +51,7 @@ class Word:
     fast: str
     wide: str
     magnitude: str
+    check: str
 
     def within(self, name: str) -> Word:
         """Return the types as the file of a function calls them."""
@@ -54,9 +59,9 @@ class Word:
 
 
 WORDS = {
-    16: Word(16, "int16_t", "uint16_t", "int", "int32_t", "uint32_t"),
-    32: Word(32, "int32_t", "uint32_t", "int_fast32_t", "int64_t", "uint64_t"),
-    64: Word(64, "int64_t", "uint64_t", "int64_t", "{}_wide_", "{}_magnitude_"),
+    16: Word(16, "int16_t", "uint16_t", "int_fast16_t", "int32_t", "uint32_t", "uint_fast16_t"),
+    32: Word(32, "int32_t", "uint32_t", "int32_t", "int64_t", "uint64_t", "uint32_t"),
+    64: Word(64, "int64_t", "uint64_t", "int64_t", "{}_wide_", "{}_magnitude_", "uint64_t"),
 }
 
 
@@ -73,8 +78,8 @@ def emit(fixed: FixedProgram, target: str) -> Sources:
     Returns
     -------
     Sources
-        Two files. The function ``<name>`` works on one sample, ``<name>_array`` on many; a step has
-        ``<name>_propagate`` too, the loop over runs and steps.
+        Two files with the function ``<name>`` on one sample, and two with ``<name>_array`` on many; a step has
+        ``<name>_propagate`` there too, the loop over runs and steps.
     """
     interface, name = fixed.interface, external(fixed.program.name, f"_q{fixed.word - 1}")
     arguments = (*interface.inputs, *interface.outputs)
@@ -93,6 +98,7 @@ def emit(fixed: FixedProgram, target: str) -> Sources:
         fixed.program.companions,
         interface,
         fixed.program.recursion,
+        runs=runs_of(name),
     )
 
 
@@ -102,48 +108,35 @@ def _files(fixed: FixedProgram, name: str, target: str) -> dict[str, str]:
     printer = _Printer(fixed, word, name)
     signals = [(a.signal, "const ") for a in interface.inputs] + [(a.signal, "") for a in interface.outputs]
     feedback_words = len(interface.residuals)
-    pieces = [f"{constant}{word.type} {s.name}[{s.size}]" for s, constant in signals]
-    inner = [f"{constant}{word.type} {printer.memory(s.name)}[{s.size}]" for s, constant in signals]
+    pieces = [f"{constant}{word.type} {printer.memory(s.name)}[{s.size}]" for s, constant in signals]
     arrays = [f"{constant}{word.type} *{s.name}" for s, constant in signals]
     calls = [f"{s.name} + {s.size} * k" for s, _ in signals]
-    names = [s.name for s, _ in signals]
     if feedback_words:
         place = len(interface.inputs)
         pieces.insert(place, f"{word.residual} residuals[{feedback_words}]")
-        inner.insert(place, f"{word.residual} *restrict residuals")
         arrays.insert(place, f"{word.residual} *residuals")
         calls.insert(place, f"residuals + {feedback_words} * k")
-        names.insert(place, "residuals")
-    definitions = [value.definition for value in fixed.body]
     values = {
         "fixed": fixed,
         "target": target,
         "program": fixed.program,
         "interface": interface,
-        "name": name,
         "guard": f"{name}_h".upper(),
         "word": word,
         "state": interface.inputs[0].signal,
         "samples": interface.inputs[-1].signal,
         "residuals": feedback_words,
         "parameters": ", ".join(pieces),
-        "inner_parameters": ", ".join(inner),
         "arrays": ", ".join(arrays),
         "calls": ", ".join(calls),
-        "names": ", ".join(names),
         "code": printer.code(),
         "counts": ", ".join(f"{number} {kind}" for kind, number in fixed.operations.items() if number),
         "nearest": interface.settings.rounding == "nearest",
         "fresh": dict.fromkeys(f"UINT{fixed.word}_C({r.fresh})" for r in interface.residuals),
-        "uses_shift": printer.uses_shift,
-        "uses_root": any(isinstance(d, IntegerRoot) for d in definitions),
-        "uses_quotient": any(isinstance(d, IntegerQuotient) for d in definitions),
+        "uses": printer.uses,
         "guarded": tuple(value for value in fixed.body if value.guarded),
     }
-    return {
-        f"{name}.h": render("c_fixed/header.h.j2", **values),
-        f"{name}.c": render("c_fixed/source.c.j2", **values),
-    }
+    return render_c("c_fixed", name, **values)
 
 
 class _Printer:
@@ -151,7 +144,7 @@ class _Printer:
 
     def __init__(self, fixed: FixedProgram, word: Word, name: str) -> None:
         self.fixed, self.word, self.name = fixed, word, name
-        self.uses_shift = False
+        self.uses: set[str] = set()
         self.wide_names = {value.name for value in fixed.body if value.wide}
         self.places = {feedback.name: k for k, feedback in enumerate(fixed.interface.residuals)}
         self.checks = any(value.guarded for value in fixed.body)
@@ -176,10 +169,10 @@ class _Printer:
                 if element in used:
                     loads.append(f"const {kind} {element} = {source};")
                     source = element
-                checks.append(f"{self.name}_out_({source}, {limit})")
+                checks.append(self._call("out", source, limit))
         body = [line for value in self.fixed.body for line in self.statements(value)]
         stores = [
-            f"{self.memory(argument.signal.name)}[{number}] = ({self.word.type}){name};"
+            f"{self.memory(argument.signal.name)}[{number}] = {self._stored(name)};"
             for argument in interface.outputs
             for number, name in enumerate(argument.values)
         ]
@@ -187,61 +180,91 @@ class _Printer:
             stores += [f"residuals[{k}] = next_{r.name};" for k, r in enumerate(interface.residuals)]
         return {"loads": loads, "checks": checks, "body": body, "stores": stores}
 
+    def _stored(self, name: str) -> str:
+        return name if self.word.fast == self.word.type else f"({self.word.type}){name}"
+
+    def _call(self, helper: str, *arguments: str) -> str:
+        """Return a call of one of the file's own functions."""
+        self.uses.add(helper)
+        return f"{self.name}_{helper}_({', '.join(arguments)})"
+
     def statements(self, value: Value) -> list[str]:
         """Return the statements that compute a value."""
         lines = [f"/* {value.meaning} */"] if value.meaning else []
         kind = self.word.wide if value.wide else self.word.fast
-        name = value.name
+        name, note = value.name, contract.value_text(value, self.word.bits)
         match value.definition:
             case IntegerSum() as total:
-                lines += self._sum(value, total, kind)
+                lines += self._sum(value, total, kind, note)
             case IntegerQuotient(numerator, denominator):
-                text = f"{self.name}_div_({self.scaled(numerator)}, {denominator})"
-                lines.append(_declared(kind, name, self.cast(text, value)))
+                text = self._call("div", self.scaled(numerator), denominator)
+                lines.append(_declared(kind, name, self.narrow(text, value), note))
             case IntegerRoot(argument):
-                text = f"{self.name}_sqrt_(({self.word.magnitude})({self.scaled(argument)}))"
-                lines.append(_declared(kind, name, text))
+                text = self._call("sqrt", f"({self.word.magnitude})({self.scaled(argument)})")
+                lines.append(_declared(kind, name, text, note))
             case IntegerMaximum((first, *others)):
-                lines.append(f"{kind} {name} = {self.cast(self.scaled(first), value)};")
+                lines.append(f"{kind} {name} = {self.narrow(self.scaled(first), value)}; /* {note} */")
                 for other in others:
                     text = self.scaled(other)
-                    lines.append(f"if ({text} > {name})\n        {name} = {self.cast(text, value)};")
+                    lines.append(f"if ({text} > {name}) {{")
+                    lines.append(f"    {name} = {self.narrow(text, value)};")
+                    lines.append("}")
             case IntegerSelection(cases, otherwise):
-                text = self.scaled(otherwise)
-                for left, right, result in reversed(cases):
-                    condition = f"{self.scaled(left)} >= {self.scaled(right)}"
-                    text = f"{condition} ? {self.scaled(result)}\n        : {text}"
-                lines.append(f"const {kind} {name} = {self.cast(f'({text})', value)};")
+                lines += self._selection(value, kind, cases, otherwise, note)
         # The word of a sum is checked before it is narrowed.
-        if value.guarded and (value.wide or not isinstance(value.definition, IntegerSum)):
-            lines.append(self._guard(name, value))
+        if value.guarded and (value.wide or not self._checked_in_sum(value)):
+            lines += self._guard(name, value)
         return lines
 
-    def _guard(self, name: str, value: Value) -> str:
+    @staticmethod
+    def _checked_in_sum(value: Value) -> bool:
+        return isinstance(value.definition, IntegerSum) and not value.definition.in_words
+
+    def _selection(
+        self,
+        value: Value,
+        kind: str,
+        cases: Sequence[tuple[Scaled, Scaled, Scaled]],
+        otherwise: Scaled,
+        note: str,
+    ) -> list[str]:
+        """Return a chain of conditions, the first that holds before all others."""
+        lines = [f"{kind} {value.name}; /* {note} */"]
+        for number, (left, right, result) in enumerate(cases):
+            word = "if" if not number else "} else if"
+            lines.append(f"{word} ({self.scaled(left)} >= {self.scaled(right)}) {{")
+            lines.append(f"    {value.name} = {self.narrow(self.scaled(result), value)};")
+        lines.append("} else {")
+        lines.append(f"    {value.name} = {self.narrow(self.scaled(otherwise), value)};")
+        return [*lines, "}"]
+
+    def _guard(self, name: str, value: Value) -> list[str]:
         limits = self.constant(value.low), self.constant(value.high)
-        return f"if ({name} < {limits[0]}\n        || {name} > {limits[1]})\n        return 2;"
+        return [f"if (({name} < {limits[0]})\n        || ({name} > {limits[1]})) {{", "    return 2;", "}"]
 
-    def cast(self, text: str, value: Value) -> str:
-        """Return an expression of a wide number as one of the value's type."""
-        return text if value.wide else f"({self.word.fast})({text})"
+    def narrow(self, text: str, value: Value, shift: int = 0) -> str:
+        """Return an expression of a wide number, shifted down, as one of the value's type."""
+        if value.wide:
+            return self._shifted(text, shift) if shift else text
+        return self._call("narrow", text, str(shift))
 
-    def _sum(self, value: Value, definition: IntegerSum, kind: str) -> list[str]:
+    def _sum(self, value: Value, definition: IntegerSum, kind: str, note: str) -> list[str]:
         name, wide = value.name, self.word.wide
         fine = self._joined([self.term(term) for term in definition.fine])
-        coarse = [self.term(term) for term in definition.coarse]
         if not definition.shift:
-            total = self._joined(
-                [*coarse, *([] if not definition.fine else [self.term(t) for t in definition.fine])]
-            )
-            return self._result(value, kind, total or "0")
-        feedback, lines = definition.residual, []
+            terms = (*definition.coarse, *definition.fine)
+            if definition.in_words and all(map(self._is_word, terms)):
+                text = self._joined([self.word_term(term) for term in terms])
+                return [_declared(kind, name, text or "0", note)]
+            return self._result(value, kind, self._joined([self.term(term) for term in terms]) or "0", note)
+        feedback, lines, shift = definition.residual, [], definition.shift
         if feedback is None:
             half = f" + {self.constant(1 << (definition.shift - 1), wide=True)}" if self.nearest else ""
-            rounded = self._shifted(fine + half, -definition.shift)
+            total = fine + half
         else:
             place = f"residuals[{self.places[feedback.name]}]"
             fed_back = self._scaled_text(f"({wide}){place}", feedback.shift)
-            before = self._shifted(fine, -definition.drop) if definition.drop else fine
+            before = self._shifted(fine, definition.drop) if definition.drop else fine
             lines.append(_declared(wide, f"{name}_sum", f"{before} + {fed_back}"))
             left = (
                 f"({self.word.magnitude}){name}_sum << {-feedback.shift}" if feedback.shift else f"{name}_sum"
@@ -251,22 +274,45 @@ class _Printer:
                 lines.append(f"const {word} next_{feedback.name} = ({word})({left});")
             else:
                 lines.append(f"{place} = ({word})({left});")
-            rounded = self._shifted(f"{name}_sum", -definition.shift)
-        terms = [*coarse[:1], f"+{rounded}", *coarse[1:]]
-        return lines + self._result(value, kind, self._joined(terms))
+            total = f"{name}_sum"
+        if definition.in_words and all(map(self._is_word, definition.coarse)):
+            terms = [self.word_term(term) for term in definition.coarse]
+            rounded = f"+{self._call('narrow', total, str(shift))}"
+            text = self._joined([*terms[:1], rounded, *terms[1:]])
+            return [*lines, _declared(kind, name, text, note)]
+        coarse = [self.term(term) for term in definition.coarse]
+        if not coarse and not value.guarded:
+            return [*lines, _declared(kind, name, self.narrow(total, value, shift), note)]
+        rounded = f"+{self._shifted(total, shift)}"
+        return lines + self._result(value, kind, self._joined([*coarse[:1], rounded, *coarse[1:]]), note)
 
-    def _result(self, value: Value, kind: str, text: str) -> list[str]:
+    def _result(self, value: Value, kind: str, text: str, note: str) -> list[str]:
         """Return the statements that store a sum; a word with a range check is checked before it is narrowed."""
         if value.guarded and not value.wide:
             name = f"{value.name}_unchecked"
             return [
                 _declared(self.word.wide, name, text),
-                self._guard(name, value),
-                _declared(kind, value.name, f"({kind}){name}"),
+                *self._guard(name, value),
+                _declared(kind, value.name, self.narrow(name, value), note),
             ]
-        if value.wide:
-            return [_declared(kind, value.name, text)]
-        return [_declared(kind, value.name, f"({kind})({text})")]
+        return [_declared(kind, value.name, self.narrow(text, value), note)]
+
+    def _is_word(self, term: Term) -> bool:
+        """Tell whether a term is a word, or a small multiple of one, so that it is computed in words."""
+        return not term.names or (
+            len(term.names) == 1
+            and term.names[0] not in self.wide_names
+            and abs(term.factor) == 1
+            and term.shift >= 0
+        )
+
+    def word_term(self, term: Term) -> str:
+        """Return a term that is a word, its sign in front."""
+        sign = "-" if term.factor < 0 else "+"
+        if not term.names:
+            return sign + self.constant(abs(term.factor) << term.shift) + _exactly(term)
+        (name,) = term.names
+        return sign + (f"{name} * {self.constant(1 << term.shift)}" if term.shift else name)
 
     @staticmethod
     def _joined(terms: list[str]) -> str:
@@ -283,28 +329,27 @@ class _Printer:
         sign = "-" if term.factor < 0 else "+"
         if not term.names:
             value = term.factor << term.shift if term.shift > 0 else term.factor
-            return sign + self.constant(abs(value), wide=True)
-        first, *others = term.names
-        start = first if first in self.wide_names else f"({wide}){first}"
-        negative = term.shift < 0 and term.factor < 0  # what is shifted down is the signed product
-        parts = [f"-{start}" if negative else start, *others]
+            return sign + self.constant(abs(value), wide=True) + _exactly(term)
+        factors = list(term.names)
         if abs(term.factor) != 1:
-            parts.append(self.constant(abs(term.factor)))
-        text = self._scaled_text(" * ".join(parts), term.shift)
-        return f"+{text}" if negative else sign + text
+            factors.append(self.constant(abs(term.factor)) + _exactly(term))
+        if len(factors) == 2:
+            text = self._call("mul", *factors)
+        else:
+            (text,) = factors
+            text = text if text in self.wide_names else f"({wide}){text}"
+        if term.shift < 0 and term.factor < 0:  # what is shifted down is the signed product
+            return f"+{self._scaled_text(f'-{text}', term.shift)}"
+        return sign + self._scaled_text(text, term.shift)
 
     def _scaled_text(self, text: str, shift: int) -> str:
         """Return an expression times a power of two."""
         if not shift:
             return text
-        return f"{text} * {self._power(shift)}" if shift > 0 else self._shifted(text, shift)
-
-    def _power(self, shift: int) -> str:
-        return self.constant(1 << shift, wide=True)
+        return f"{text} * {self.constant(1 << shift, wide=True)}" if shift > 0 else self._shifted(text, -shift)
 
     def _shifted(self, text: str, shift: int) -> str:
-        self.uses_shift = True
-        return f"{self.name}_shr_({text}, {-shift})"
+        return self._call("shr", text, str(shift)) if shift else text
 
     def scaled(self, scaled: Scaled) -> str:
         """Return a scaled value as an expression of a wide number."""
@@ -321,6 +366,8 @@ class _Printer:
         """Return an integer as a constant expression, with the type of a wide number if `wide` is true."""
         if value < 0:
             return f"(-{self.constant(-value, wide)})"
+        if value >= 1 << 4 and not value & (value - 1):
+            return self._power_of_two(value.bit_length() - 1)
         if value < 1 << 15:
             return f"({self.word.wide}){value}" if wide and self.word.bits == 64 else str(value)
         if value < 1 << 31:
@@ -328,14 +375,33 @@ class _Printer:
         if value < 1 << 63:
             return f"INT64_C({value})"
         high, low = divmod(value, 1 << 62)
-        text = f"({self.word.wide}){self.constant(high)} * INT64_C({1 << 62})"
+        text = f"({self.word.wide}){self.constant(high)} * (INT64_C(1) << 62)"
         return f"({text} + INT64_C({low}))" if low else f"({text})"
 
+    def _power_of_two(self, exponent: int) -> str:
+        if exponent < 15:
+            return f"(1 << {exponent})"
+        if exponent < 31:
+            return f"(INT32_C(1) << {exponent})"
+        if exponent < 63:
+            return f"(INT64_C(1) << {exponent})"
+        return f"(({self.word.wide})1 << {exponent})"
 
-def _declared(kind: str, name: str, text: str) -> str:
+
+def _exactly(term: Term) -> str:
+    """Return the exact number that a rounded constant stands for, as a comment."""
+    if term.coefficient is None or term.coefficient.value.denominator & (term.coefficient.value.denominator - 1) == 0:
+        return ""
+    return f" /* {contract.exact_text(abs(term.coefficient.value))} in Q{term.coefficient.fraction} */"
+
+
+def _declared(kind: str, name: str, text: str, note: str = "") -> str:
     """Return a declaration, its value on a line of its own where the first line would be too long."""
     indent = " " * 8
-    statement = fill_expression(f"const {kind} {name} = {text};", indent, 100)
-    if len(statement.partition("\n")[0]) <= 96:
+    statement = fill_expression(f"const {kind} {name} = {text};", indent, 92)
+    if len(statement.partition("\n")[0]) > 92:
+        statement = f"const {kind} {name} =\n" + fill_expression(f"{indent}{text};", indent, 96)
+    if not note:
         return statement
-    return f"const {kind} {name} =\n" + fill_expression(f"{indent}{text};", indent, 100)
+    beside = len(statement.rpartition("\n")[2]) + len(note) + 7 <= 96
+    return f"{statement} /* {note} */" if beside else f"{statement}\n{indent}/* {note} */"

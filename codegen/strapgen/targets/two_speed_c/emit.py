@@ -12,7 +12,7 @@ from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Function, Sources
 from strapgen.targets.c.emit import real_of
 from strapgen.targets.c_fixed.emit import WORDS
-from strapgen.targets.rendering import render
+from strapgen.targets.rendering import render_c, runs_of
 
 #: Names of the loops, from the fastest.
 LOOPS = ("fast", "slow", "navigation")
@@ -87,7 +87,6 @@ def whole(name: str, title: str, command: str, loops: Sequence[Sources]) -> Sour
     identifier = name.replace("-", "_") + numbers.suffix
     outputs = (state, *wires.results[2])
     values = {
-        "name": identifier,
         "title": title,
         "command": command,
         "guard": f"{identifier}_h".upper(),
@@ -105,16 +104,13 @@ def whole(name: str, title: str, command: str, loops: Sequence[Sources]) -> Sour
         **_cycles(loops, wires, numbers.type, identifier),
         **_run(wires, numbers.type, outputs),
     }
-    files = {
-        f"{identifier}.h": render("two_speed_c/header.h.j2", **values),
-        f"{identifier}.c": render("two_speed_c/source.c.j2", **values),
-    }
+    files = render_c("two_speed_c", identifier, **values)
     for loop in loops:
-        files |= loop.files
+        files |= loop.step_files
     counts = {kind: sum(loop.operations[kind] for loop in loops) for kind in fast.operations}
     temporaries = sum(loop.temporaries for loop in loops)
     function = Function(identifier, sum(wires.samples, ()), outputs)
-    return Sources(name, fast.target, files, function, counts, temporaries, None)
+    return Sources(name, fast.target, files, function, counts, temporaries, None, runs=runs_of(identifier))
 
 
 class _Numbers(NamedTuple):
