@@ -14,8 +14,8 @@ def fill(text: str, indent: str, width: int = 100) -> str:
 
 
 def fill_expression(text: str, indent: str, width: int = 100) -> str:
-    """Wrap an expression before its sums' signs, every line after the first with `indent`."""
-    return _filled(re.split(r" (?=[+-] )", text), indent, width)
+    """Wrap an expression before the signs of sums and choices, every line after the first with `indent`."""
+    return _filled(re.split(r" (?=[+?:-] )", text), indent, width)
 
 
 def fill_arguments(text: str, indent: str, width: int = 100) -> str:

@@ -203,11 +203,10 @@ class _Printer:
                 text = self._call("sqrt", f"({self.word.magnitude})({self.scaled(argument)})")
                 lines.append(_declared(kind, name, text, note))
             case IntegerMaximum((first, *others)):
-                lines.append(f"{kind} {name} = {self.narrow(self.scaled(first), value)}; /* {note} */")
+                lines.append(_noted(f"{kind} {name} = {self.narrowed(first, value)};", note))
                 for other in others:
-                    text = self.scaled(other)
-                    lines.append(f"if ({text} > {name}) {{")
-                    lines.append(f"    {name} = {self.narrow(text, value)};")
+                    lines.append(f"if ({self.scaled(other)} > {name}) {{")
+                    lines.append(f"    {name} = {self.narrowed(other, value)};")
                     lines.append("}")
             case IntegerSelection(cases, otherwise):
                 lines += self._selection(value, kind, cases, otherwise, note)
@@ -229,24 +228,31 @@ class _Printer:
         note: str,
     ) -> list[str]:
         """Return a chain of conditions, the first that holds before all others."""
-        lines = [f"{kind} {value.name}; /* {note} */"]
+        lines = [_noted(f"{kind} {value.name};", note)]
         for number, (left, right, result) in enumerate(cases):
             word = "if" if not number else "} else if"
             lines.append(f"{word} ({self.scaled(left)} >= {self.scaled(right)}) {{")
-            lines.append(f"    {value.name} = {self.narrow(self.scaled(result), value)};")
+            lines.append(f"    {value.name} = {self.narrowed(result, value)};")
         lines.append("} else {")
-        lines.append(f"    {value.name} = {self.narrow(self.scaled(otherwise), value)};")
+        lines.append(f"    {value.name} = {self.narrowed(otherwise, value)};")
         return [*lines, "}"]
 
     def _guard(self, name: str, value: Value) -> list[str]:
         limits = self.constant(value.low), self.constant(value.high)
-        return [f"if (({name} < {limits[0]})\n        || ({name} > {limits[1]})) {{", "    return 2;", "}"]
+        return [f"if (({name} < {limits[0]}) || ({name} > {limits[1]})) {{", "    return 2;", "}"]
 
     def narrow(self, text: str, value: Value, shift: int = 0) -> str:
         """Return an expression of a wide number, shifted down, as one of the value's type."""
         if value.wide:
             return self._shifted(text, shift) if shift else text
         return self._call("narrow", text, str(shift))
+
+    def narrowed(self, scaled: Scaled, value: Value) -> str:
+        """Return a scaled value as one of another value's type."""
+        if not value.wide and isinstance(scaled.value, str) and not scaled.shift:
+            if scaled.value not in self.wide_names:
+                return scaled.value
+        return self.narrow(self.scaled(scaled), value)
 
     def _sum(self, value: Value, definition: IntegerSum, kind: str, note: str) -> list[str]:
         name, wide = value.name, self.word.wide
@@ -401,7 +407,10 @@ def _declared(kind: str, name: str, text: str, note: str = "") -> str:
     statement = fill_expression(f"const {kind} {name} = {text};", indent, 92)
     if len(statement.partition("\n")[0]) > 92:
         statement = f"const {kind} {name} =\n" + fill_expression(f"{indent}{text};", indent, 96)
-    if not note:
-        return statement
-    beside = len(statement.rpartition("\n")[2]) + len(note) + 7 <= 96
-    return f"{statement} /* {note} */" if beside else f"{statement}\n{indent}/* {note} */"
+    return _noted(statement, note) if note else statement
+
+
+def _noted(statement: str, note: str) -> str:
+    """Return a statement with a comment behind it, or on the next line where there is no room."""
+    beside = len(statement.rpartition("\n")[2]) + len(note) + 7 <= 95
+    return f"{statement} /* {note} */" if beside else f"{statement}\n        /* {note} */"
