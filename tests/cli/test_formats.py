@@ -7,6 +7,7 @@ import io
 import json
 import re
 import shlex
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -50,7 +51,11 @@ def answer(capsys, tmp_path, monkeypatch):
     return run
 
 
-def test_a_table_has_the_same_rows_in_every_format(answer):
+#: Lines of `TABLES` that write a picture with one of their formats, with texts that stand in it.
+DRAWN = {"compare": ("time, s", "exact"), "rate-table": ("largest drift of the run, deg", "dcm-rk1-2")}
+
+
+def test_a_table_has_the_same_rows_in_every_format(answer, tmp_path):
     @each("command", TABLES)
     def written(command):
         first, count = TABLES[command]
@@ -62,7 +67,10 @@ def test_a_table_has_the_same_rows_in_every_format(answer):
         assert re.fullmatch(r"\|( :?-+:? \|)+", marked[1])
         width = {line.replace(r"\|", "").count("|") for line in marked}
         assert len(width) == 1
-        json.loads(answer(f"{command} --format json"))
+        drawn = DRAWN.get(command.split()[0], ()) if find_spec("matplotlib") else ()
+        json.loads(answer(f"{command} --format json{' --plot drawn.svg' if drawn else ''}"))
+        for text in drawn:
+            assert f"<!-- {text} -->" in (tmp_path / "drawn.svg").read_text()
 
     written()
 
