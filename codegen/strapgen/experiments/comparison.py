@@ -222,11 +222,8 @@ def _angle_bound(candidate: Backend, increments: Array, reference: Array) -> Cal
     """Return a function from a number of steps of a run to the bound of `certified_angle` after as many."""
     rounded = not np.array_equal(candidate.representable(increments), increments)
     matrix = candidate.attitude is None
-    size = float(
-        (
-            np.linalg.norm(reference, ord=2, axis=(-2, -1)) if matrix else np.linalg.norm(reference, axis=-1)
-        ).max()
-    )
+    norms = np.linalg.norm(reference, ord=2, axis=(-2, -1)) if matrix else np.linalg.norm(reference, axis=-1)
+    size = float(norms.max())
 
     def bound(steps: int) -> float | None:
         length = candidate.rounding_bound(steps, rounded)
