@@ -37,20 +37,20 @@ demo: $(READY)
 	@echo "1. Derive every kernel of the catalogue; generate numpy, C and fixed point"
 	$(BIN)/strapgen generate --all
 	@echo
-	@echo "2. One step as formulas: Euler parameters by Euler's method from two gyro samples"
+	@echo "2. One step as formulas: Euler parameters, Euler's method, two gyro samples"
 	$(BIN)/strapgen derive euler --method rk1 --show program
 	@echo
 	@echo "3. The same step in C, from generated/c/euler_rk1_2.c"
 	@sed -n '/^static inline void euler_rk1_2_one_/,/^}/p' generated/c/euler_rk1_2.c
 	@echo
-	@echo "4. Table 5 of the thesis on every back end; c-q31 and c-q15 have 32- and 16-bit words"
+	@echo "4. Table 5 of the thesis on every back end; c-q31 has 32-bit words, c-q15 16-bit"
 	$(BIN)/strapgen tables --table 5
 	@echo
 	@echo "More: source .venv/bin/activate, then"
 	@echo "  strapgen list      all algorithms, methods, kernels, motions and back ends"
 	@echo "  strapgen --help    all commands, each with an example in its own --help"
 	@echo "  strapgen tables    all five tables"
-	@echo "docs/command-line.md shows every command at work; docs/README.md answers questions."
+	@echo "docs/command-line.md shows all commands; docs/README.md answers questions."
 
 test: $(TOOLS)
 	$(BIN)/python -m pytest -n auto --dist worksteal -m "not long"

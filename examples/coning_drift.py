@@ -8,7 +8,7 @@ import strapgen
 
 DESIGNS = (
     ("compressed", 1, 0, "no coning correction"),
-    ("compressed", 1, 1, "one kept sample"),
+    ("compressed", 1, 1, "one previous sample"),
     ("compressed", 4, 0, ""),
     ("compressed", 5, 0, ""),
     ("uncompressed", 5, 0, ""),
@@ -32,8 +32,8 @@ def main():
         backend = strapgen.backend("euler", f"coning-{form}", samples, "c", previous=previous)
         run = strapgen.simulate(backend, cone, Fraction(samples, 100), duration)
         drift = np.degrees(np.abs(run.drift @ axis).max()) / duration * 3600
-        kept = f" and {previous} kept" if previous else ""
-        print(f"  {f'{form}, {samples}{kept}':<24}{drift:>10.4f}  {remark}".rstrip())
+        before = f" and {previous} previous" if previous else ""
+        print(f"  {f'{form}, {samples}{before}':<28}{drift:>10.4f}  {remark}".rstrip())
 
 
 if __name__ == "__main__":

@@ -928,8 +928,10 @@ def test_round_off_of_table_5(strapgen_says):
     assert abs(drift("c-q31", "--carry full") - double) < 1e-7
 
 
-def test_one_table_by_its_number(strapgen_says):
-    said = strapgen_says("tables --table 5 --backend numpy")
+def test_one_table_by_its_number(strapgen_says, tmp_path):
+    pytest.importorskip("matplotlib")
+    said = strapgen_says("tables --table 5 --backend numpy --plot table.svg")
+    assert "<!-- Table 5: coning on a constant" in (tmp_path / "table.svg").read_text()
     assert said.startswith("Table 5: ") and said.count("Table ") == 1
     assert said.strip() in strapgen_says("tables --backend numpy")
 
@@ -1137,7 +1139,8 @@ def test_stability(strapgen_says, tmp_path):
 
 @pytest.mark.long
 def test_tables_predicted(strapgen_says):
-    data = json.loads(strapgen_says("tables --predict --format json"))
+    data = json.loads(strapgen_says("tables --predict --format json --plot predicted.svg"))
+    assert "<!-- predicted -->" in Path("predicted.svg").read_text()
     assert len(data["entries"]) == 30
     assert all(abs(entry["deviation"]) < 0.01 and entry["agrees"] for entry in data["entries"])
     assert data["ratios"][0]["ratio"] == "9*x**2/80 + 1/4"

@@ -7,12 +7,14 @@ import io
 import json
 import re
 import shlex
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 from gathering import each
 
 from strapgen.cli import main
+from strapgen.reports.plots import figures
 
 RUN = "--motion constant --set y_deg_s=10 --step 0.5 --duration 1"
 WAVE = "--step 0.02 --frequency-hz 10 --theta-x-rad 0.01 --theta-y-rad 0.02 --phase-rad 1.1"
@@ -50,7 +52,17 @@ def answer(capsys, tmp_path, monkeypatch):
     return run
 
 
-def test_a_table_has_the_same_rows_in_every_format(answer):
+#: Commands of `TABLES` that draw with one of their formats, with the axis of x; `make test-long` draws them to the end.
+DRAWN = {"compare": "time, s", "rate-table": "largest drift of the run, deg"}
+
+
+def test_a_table_has_the_same_rows_in_every_format(answer, tmp_path, monkeypatch):
+    def label_of_x(figure, path):
+        figures.pyplot().close(figure)
+        return figure.axes[0].get_xlabel().encode()
+
+    monkeypatch.setattr(figures, "image", label_of_x)
+
     @each("command", TABLES)
     def written(command):
         first, count = TABLES[command]
@@ -62,7 +74,9 @@ def test_a_table_has_the_same_rows_in_every_format(answer):
         assert re.fullmatch(r"\|( :?-+:? \|)+", marked[1])
         width = {line.replace(r"\|", "").count("|") for line in marked}
         assert len(width) == 1
-        json.loads(answer(f"{command} --format json"))
+        drawn = DRAWN.get(command.split()[0], "") if find_spec("matplotlib") else ""
+        json.loads(answer(f"{command} --format json{' --plot drawn.svg' if drawn else ''}"))
+        assert not drawn or (tmp_path / "drawn.svg").read_text() == drawn
 
     written()
 

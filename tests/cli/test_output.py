@@ -18,6 +18,9 @@ WITH_PLOTS = (
     "converge euler --method rk1 --steps 1/2,1/4",
     "series euler --method rk1 --motion constant",
     "study word-length --words 16 --carries none --duration 1",
+    f"compare euler {RUN}",
+    "tables --table 1",
+    "rate-table --duration 1",
 )
 
 
@@ -44,19 +47,24 @@ def test_nothing_is_written_where_one_file_cannot_be(tmp_path, monkeypatch, caps
 
 
 @pytest.mark.filterwarnings("error")
-def test_every_command_that_draws_needs_a_file_for_the_text_and_one_for_the_plot(
+def test_every_command_that_draws_refuses_files_that_it_cannot_write_before_it_runs(
     tmp_path, monkeypatch, capsys
 ):
+    pytest.importorskip("matplotlib")
     monkeypatch.chdir(tmp_path)
 
     @each("command", WITH_PLOTS)
     def refused(command):
-        with pytest.raises(SystemExit) as stop:
-            main(shlex.split(f"{command} --out run.png --plot ./run.png"))
-        said = capsys.readouterr()
-        assert (stop.value.code, said.out) == (2, "")
-        assert said.err == "strapgen: --out and --plot are both run.png; two files are needed\n"
-        assert not list(tmp_path.iterdir())
+        for files, line in (
+            ("--out run.png --plot ./run.png", "--out and --plot are both run.png; two files are needed\n"),
+            ("--plot run.docx", "plot run.docx: file type 'docx' is not known; allowed: "),
+        ):
+            with pytest.raises(SystemExit) as stop:
+                main(shlex.split(f"{command} {files}"))
+            said = capsys.readouterr()
+            assert (stop.value.code, said.out) == (2, "")
+            assert said.err.startswith(f"strapgen: {line}") and said.err.count("\n") == 1
+            assert not list(tmp_path.iterdir())
 
     refused()
 

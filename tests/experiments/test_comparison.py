@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -38,6 +39,12 @@ def test_every_back_end_against_every_kind_of_reference(algorithm, reference, in
         assert row.ns_per_step > 0
         assert (row.bytes is None) == (row.backend in ("numpy", "fixed-model", "exact"))
         assert (row.bound_rad is None) == (row.backend not in FIXED_NAMES)
+        angles, bounds = row.history.angles_rad, row.history.bounds_rad
+        assert angles.shape == (121,) and angles.max() == row.max_abs_rad
+        assert bounds[-1:] == (() if row.bound_rad is None else ((120, row.bound_rad),))
+        assert all(one < other for one, other in pairwise(bound for _, bound in bounds))
+        if reference == "exact":
+            assert all(angles[step] <= bound for step, bound in bounds)
         assert row.drift_deg <= math.degrees(row.max_abs_rad) * math.sqrt(3) * (1 + 1e-9)
         if row.backend == reference:
             assert row.max_abs_rad <= 1e-15 and row.max_ulp == 0
@@ -134,6 +141,12 @@ def test_what_does_not_go_with_a_choice_is_told(options, error, said):
         comparison.compare(
             strapgen.choose("euler", "rk2", 2), **({"increments": np.zeros((2, 2, 3))} | options)
         )
+
+
+def test_a_back_end_is_shown_under_the_name_that_was_asked_for(increments, monkeypatch):
+    monkeypatch.setitem(BACKENDS, "mine", BACKENDS["exact"])
+    rows = comparison.compare("euler", "rk4", 2, ["mine", "exact"], increments[:2])
+    assert [row.backend for row in rows] == ["mine", "exact"]
 
 
 def test_slow_back_ends_are_compared_where_they_are_named():

@@ -5,14 +5,21 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from fractions import Fraction
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 import strapgen
+from strapgen.experiments.comparison import AngleHistory, Comparison
 from strapgen.experiments.convergence import Convergence, Rung
+from strapgen.experiments.predicted_tables import PredictedEntry
+from strapgen.experiments.rate_table import Row
+from strapgen.experiments.thesis_tables import ALGORITHMS, ORDERS, TABLES, TableEntry
 from strapgen.ir.attitude_step import Order
 from strapgen.reports import plots
+from strapgen.reports.comparison import ComparedKernel
 from strapgen.reports.plots import figures as drawing
 from strapgen.simulation.recording import History
 from strapgen.simulation.runs import Run, simulate
@@ -120,6 +127,131 @@ def test_vibration_has_a_panel_for_drift_and_one_for_acceleration(figures):
     assert len(figure.legends[0].get_texts()) == 3
     still = [("still", Curve("still", "rad/s", hertz, 0 * hertz, 0 * hertz))]
     plots.vibration_image(still, "Nothing moves", "vibration.png")
+
+
+def test_comparison_has_a_line_and_a_bound_for_each_back_end(figures):
+    def row(backend, angles, bounds=()):
+        history = AngleHistory(np.array(angles), bounds)
+        return Comparison(backend, max(angles), 0.0, 0.0, None, 0.0, 1.0, None, {}, history)
+
+    long = np.zeros(5001)
+    long[777] = 1e-5
+    kernels = [
+        ComparedKernel(
+            "euler-rk4-2",
+            "euler-rk4-2: a run",
+            [
+                row("numpy", [0.0, 0.0, 0.0]),
+                row("c-float", [0.0, 1e-7, 2e-7]),
+                row("c-q15", [0.0, 1e-4, 2e-4], ((1, 2e-4), (2, 4e-4))),
+                row("c-q31", [0.0, 1e-8, 2e-8], ((1, 1.0), (2, 100.0))),
+            ],
+            0.125,
+        ),
+        ComparedKernel("mine", "mine: a run", [row("c", list(long))], 0.5),
+        ComparedKernel("still", "still: a run", [row("c", [0.0])]),
+    ]
+    plots.comparison_image(kernels, "exact", "compare.png")
+    (figure,) = figures
+    first, second, _, unused = figure.axes
+    assert first.get_title(loc="left") == "euler-rk4-2\na run" and not unused.get_visible()
+    assert (first.get_ylabel(), second.get_xlabel()) == ("angle from exact, rad", "time, s")
+    _, single, short, bound, *_ = first.get_lines()
+    for line, values in ((single, [1e-7, 2e-7]), (short, [1e-4, 2e-4]), (bound, [2e-4, 4e-4])):
+        np.testing.assert_array_equal(line.get_ydata(), values)
+        np.testing.assert_allclose(line.get_xdata(), [0.125, 0.25])
+    assert bound.get_color() == short.get_color() != single.get_color() and bound.get_linestyle() == ":"
+    labels = {text.get_text(): text.get_position()[1] for text in first.texts}
+    assert list(labels) == ["numpy: equal", "c-q31", "c-float", "c-q15", "c-q15, certified"]
+    assert all(other - one > 0.02 for one, other in pairwise(labels.values()))
+    assert first.get_ylim()[1] <= 4  # half a turn
+    (line,) = second.get_lines()
+    assert len(line.get_xdata()) < 1000 and np.nanmax(line.get_ydata()) == 1e-5
+    assert first.get_xlim() == second.get_xlim() == (0, 2500)
+
+
+def test_labels_at_the_right_cover_none_another():
+    figure, grid = drawing.grid_of_axes(1, 1, (5, 3))
+    drawing.labels_at_the_right(
+        grid[0, 0], [(1.0, "a", "k"), (0.0, "b", "k"), (1.0, "c", "k"), (9.0, "d", "k")]
+    )
+    places = {text.get_text(): text.get_position()[1] for text in grid[0, 0].texts}
+    pyplot.close(figure)
+    heights = [places[name] for name in "bacd"]
+    assert heights[0] == 0 and heights[-1] == 1
+    assert all(other - one > 0.04 for one, other in pairwise(heights))
+
+
+def test_thesis_tables_have_a_panel_each_with_printed_and_computed_figures(figures):
+    entries = [
+        TableEntry(
+            table.number,
+            backend,
+            algorithm,
+            order,
+            0.5,
+            factor * float(Fraction(printed)),
+            printed,
+            factor < 2,
+        )
+        for table in TABLES
+        for backend, factor in (("numpy", 1.0), ("c-q15", 3.0))
+        for algorithm in ALGORITHMS
+        for order, printed in zip(ORDERS, table.printed[algorithm], strict=True)
+    ]
+    plots.thesis_tables_image(entries, "tables.png")
+    predicted = [
+        PredictedEntry(4, e.algorithm, e.order, 0.5, e.normalised, 0.5, 1.0, e.thesis, True)
+        for e in entries
+        if (e.table, e.backend) == (4, "numpy")
+    ]
+    plots.predicted_tables_image(predicted, "predicted.png")
+    whole, single = figures
+    assert [axes.get_visible() for axes in whole.axes] == [True] * 5 + [False]
+    for axes, table in zip(whole.axes, TABLES, strict=False):
+        assert " ".join(axes.get_title(loc="left").split()).startswith(f"Table {table.number}: {table.title}")
+        bars = [bar.get_segments()[0][0][1] for bar in axes.collections]
+        printed = [float(Fraction(figure)) for name in ALGORITHMS for figure in table.printed[name]]
+        assert bars == printed
+        marks = [
+            (float(line.get_ydata()[0]), line.get_markerfacecolor() == "white") for line in axes.get_lines()
+        ]
+        assert marks == [(figure * 1.0, False) for figure in printed] + [
+            (figure * 3.0, True) for figure in printed
+        ]
+        middles = [bar.get_segments()[0].mean(axis=0)[0] for bar in axes.collections]
+        assert [round(middle) for middle in middles] == [0, 1, 2] * 2
+        for line, middle in zip(axes.get_lines(), middles * 2, strict=True):
+            assert abs(line.get_xdata()[0] - middle) < 0.2
+    words = [text.get_text() for text in single.legends[0].get_texts()]
+    assert {"figure of the thesis", "direction cosines", "Euler parameters", "predicted", "simulated"} < {
+        *words
+    }
+    assert (
+        sum(line.get_markerfacecolor() == "white" for line in single.axes[0].get_lines()) == 4
+    )  # 1.0 is "1"
+
+
+def test_rate_table_has_a_panel_a_motion_and_tells_what_is_out_of_range(figures):
+    names = ("dcm-rk4-2", "euler-rk4-2", "euler two-speed")
+    drifts = {"numpy": (1e-6, 1e-8, 1e-13), "c-q15": (0.3, None, 0.1)}
+    rows = [
+        Row(motion, name, backend, drift, None if drift is None else 88.25)
+        for motion in ("linear", "oscillating")
+        for backend, column in drifts.items()
+        for name, drift in zip(names, column, strict=True)
+    ]
+    plots.rate_table_image(rows, "20", "0.01", "rate.png")
+    (figure,) = figures
+    for axes, motion in zip(figure.axes, ("linear", "oscillating"), strict=True):
+        assert axes.get_title(loc="left").startswith(motion)
+        assert axes.get_xlabel() == "largest drift of the run, deg"
+        for line, column in zip(axes.get_lines(), drifts.values(), strict=False):
+            np.testing.assert_array_equal(line.get_xdata(), np.array(column, float))
+        assert "out of range: c-q15" in [text.get_text() for text in axes.texts]
+    assert [label.get_text() for label in figure.axes[0].get_yticklabels()] == list(names)
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == list(drifts)
+    assert "70 deg/s" in figure.get_suptitle()
 
 
 @pytest.mark.parametrize(

@@ -118,6 +118,22 @@ def test_sources_are_cached_until_a_file_of_the_package_changes(toy, monkeypatch
     assert generated() == before.replace("import math", "import math  # changed")
 
 
+def test_the_identity_of_a_target_covers_its_distribution(toy, site):
+    def identity() -> str:
+        registry._loaded.cache_clear()  # as in a new process
+        return registry.identity("plain-python")
+
+    (info,) = site.glob("*.dist-info")
+    (info / "RECORD").write_text("beside.py,,\ngone.py,,\n")
+    (site / "beside.py").write_text("")
+    seen = [identity(), identity()]
+    (site / "beside.py").write_text("changed = True\n")
+    seen.append(identity())
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: toy\nVersion: 1.1\n")
+    seen.append(identity())
+    assert seen[0] == seen[1] and len({*seen}) == 3
+
+
 def test_settings_and_programs_of_fixed_point_are_refused(toy):
     with pytest.raises(InputError, match=r"^target plain-python takes no fixed-point settings; these do: "):
         strapgen.generate(program(EULER), "plain-python", strapgen.Settings())

@@ -88,7 +88,18 @@ def test_external_names_of_the_catalogue_differ_in_the_31_characters_that_c99_pr
     assert [start for start, count in Counter(name[:31] for name in names).items() if count > 1] == []
 
 
+def test_a_kernel_of_a_user_s_that_has_the_short_name_of_another_is_told_apart():
+    catalogued = [kernel.replace("-", "_") for kernel in KERNELS]
+    shortened = [external(name) for name in catalogued if external(name) != name]
+    assert "dcm_orth_optimal" in shortened
+    assert {external(name) for name in shortened}.isdisjoint(shortened)
+    long = ("orthonormalize", "orth")
+    users = [f"of_a_user_{first}_then_{second}" for first, second in product(long, long)]
+    assert len({external(name).lower() for name in users}) == 4
+
+
 def test_names_that_fit_are_not_shortened():
+    assert external("mrp_norm") == "mrp_norm"
     assert external("dcm_orthonormalize") == "dcm_orthonormalize"
     assert external("cayley_klein_normalize", "_q31") == "cayley_klein_normalize_q31"
     assert external("normalizer_of_twenty_four") == "normalizer_of_twenty_four"

@@ -262,10 +262,14 @@ def test_what_is_there_is_not_compiled_again(many, counting):
 
 
 def test_functions_of_one_name_go_into_two_modules(sources, counting, root):
+    """Each module has one kernel: it is what `load` compiles of that alone, and found without a pointer."""
     pair = [sources, other(sources, 1)]
     compiler.compile_together(pair)
+    calls = counting()
+    shutil.rmtree(root / "shared", ignore_errors=True)
     assert len(list((root / "builds").iterdir())) == 2
     assert len({compiler.load(one).__file__ for one in pair}) == 2
+    assert counting() == calls
 
 
 @pytest.mark.parametrize("kind", ["builds", "shared"])

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -26,6 +26,24 @@ Array = NDArray[np.float64]
 
 #: Number of timed runs, of which the shortest counts.
 _TIMED = 3
+#: Number of steps, about, at which a history has the certified bound.
+_BOUNDS = 65
+
+
+@dataclass(frozen=True)
+class AngleHistory:
+    """The angle of a back end from the reference along a run.
+
+    Parameters
+    ----------
+    angles_rad : array, (1 + N,)
+        The angle after every step in rad, the first one before the run.
+    bounds_rad : tuple of (int, float)
+        Numbers of steps, and the certified bound of the angle after as many; empty where no useful bound is known.
+    """
+
+    angles_rad: Array
+    bounds_rad: tuple[tuple[int, float], ...]
 
 
 @dataclass(frozen=True)
@@ -50,6 +68,8 @@ class Comparison:
         Size of code and constants in object code; None for Python.
     operations : dict of str to int
         Number of operations of a step by kind.
+    history : AngleHistory, optional
+        The angle along the run, for a plot; no part of the JSON data.
     """
 
     backend: str
@@ -61,10 +81,13 @@ class Comparison:
     ns_per_step: float
     bytes: int | None
     operations: dict[str, int]
+    history: AngleHistory | None = field(default=None, repr=False, compare=False)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the comparison as plain JSON data."""
-        return asdict(self)
+        data = asdict(replace(self, history=None))
+        del data["history"]
+        return data
 
 
 def compare(
@@ -135,25 +158,22 @@ def compare(
     states: Array = standard.propagate(d).astype(np.float64)
     require_finite(standard, states, np.arange(len(states), dtype=np.float64))
     matrices = attitude(standard, states)
-    return [
-        _compared(load(name), d, states, matrices, truth, 1 if BACKENDS[name].slow else _TIMED)
-        for name in backends
-    ]
+    return [_compared(name, load(name), d, states, matrices, truth) for name in backends]
 
 
 def _compared(
+    name: str,
     candidate: Backend,
     increments: Array,
     reference: Array,
     matrices: Array,
     truth: Array | None,
-    timed: int,
 ) -> Comparison:
-    """Compare a back end with the states and the attitudes of the reference."""
+    """Compare a back end, under the name that was asked for, with the states and the attitudes of the reference."""
     steps = len(increments)
     states = candidate.propagate(increments)
     run, seconds = candidate.prepared(increments), math.inf
-    for _ in range(timed):
+    for _ in range(1 if BACKENDS[name].slow else _TIMED):
         start = time.perf_counter()
         run()
         seconds = min(seconds, time.perf_counter() - start)
@@ -161,16 +181,18 @@ def _compared(
     computed = attitude(candidate, states)
     angles = np.linalg.norm(drift_between(computed, matrices), axis=-1)
     drifts = drift_between(computed, matrices if truth is None else truth)
+    bound = _angle_bound(candidate, increments, reference)
     return Comparison(
-        candidate.name,
+        name,
         float(angles.max()),
         float(np.sqrt(np.mean(angles**2))),
         float(np.abs(states.astype(np.float64) - reference).max() / candidate.unit),
-        certified_angle(candidate, increments, reference),
+        bound(steps),
         math.degrees(float(np.linalg.norm(np.abs(drifts).max(axis=0)))),
         seconds / max(1, steps) * 1e9,
         compiler.code_size(candidate.sources),
         candidate.sources.operations,
+        AngleHistory(angles, _bounds(bound, steps)),
     )
 
 
@@ -193,12 +215,27 @@ def certified_angle(candidate: Backend, increments: Array, reference: Array) -> 
     float or None
         In rad; None in floating point, and where no useful bound is known.
     """
+    return _angle_bound(candidate, increments, reference)(len(increments))
+
+
+def _angle_bound(candidate: Backend, increments: Array, reference: Array) -> Callable[[int], float | None]:
+    """Return a function from a number of steps of a run to the bound of `certified_angle` after as many."""
     rounded = not np.array_equal(candidate.representable(increments), increments)
-    length = candidate.rounding_bound(len(increments), rounded)
-    if length is None or not math.isfinite(length):
-        return None
-    if candidate.attitude is None:
-        size = float(np.linalg.norm(reference, ord=2, axis=(-2, -1)).max())
-        return math.sqrt(1.5) * size * length
-    size = float(np.linalg.norm(reference, axis=-1).max())
-    return 2 * size * length * (size**2 + size * length)
+    matrix = candidate.attitude is None
+    norms = np.linalg.norm(reference, ord=2, axis=(-2, -1)) if matrix else np.linalg.norm(reference, axis=-1)
+    size = float(norms.max())
+
+    def bound(steps: int) -> float | None:
+        length = candidate.rounding_bound(steps, rounded)
+        if length is None or not math.isfinite(length):
+            return None
+        return math.sqrt(1.5) * size * length if matrix else 2 * size * length * (size**2 + size * length)
+
+    return bound
+
+
+def _bounds(bound: Callable[[int], float | None], steps: int) -> tuple[tuple[int, float], ...]:
+    """Return steps along a run with their bounds."""
+    every = sorted({*range(1, steps + 1, -(-steps // _BOUNDS) or 1), steps} - {0})
+    pairs = [(step, bound(step)) for step in every]
+    return tuple((step, value) for step, value in pairs if value is not None)

@@ -57,6 +57,11 @@ class PredictedEntry:
     agrees: bool
 
     @property
+    def agrees_simulated(self) -> bool:
+        """Whether `simulated` has the printed digits."""
+        return agrees(self.simulated, self.thesis)
+
+    @property
     def deviation(self) -> float:
         """Relative difference of the predicted ratio from the simulated one."""
         return self.normalised / self.simulated - 1

@@ -34,11 +34,14 @@ class ComparedKernel:
         The kernel and its run in words.
     rows : sequence of Comparison
         One for every back end.
+    step_s : float, optional
+        Length of a step in s, which a plot needs.
     """
 
     kernel: str
     title: str
     rows: Sequence[Comparison]
+    step_s: float = 1.0
 
 
 def comparison_report(kernels: Sequence[ComparedKernel], reference: str, drift: str) -> Report:
@@ -61,7 +64,7 @@ def _table(kernels: Sequence[ComparedKernel]) -> TextTable:
     """Return all figures of all rows; a column for every kind of operation."""
     every = [(one.kernel, row) for one in kernels for row in one.rows]
     kinds = list(dict.fromkeys(kind for _, row in every for kind in row.operations))
-    names = [field.name for field in fields(Comparison) if field.name != "operations"]
+    names = [field.name for field in fields(Comparison) if field.name not in ("operations", "history")]
     values = [
         [*(getattr(row, name) for name in names), *(row.operations.get(kind, 0) for kind in kinds), kernel]
         for kernel, row in every

@@ -10,12 +10,13 @@ from strapgen.experiments.thesis_tables import ALGORITHMS, ORDERS, TABLES, Table
 from strapgen.reports.report import Report, flat_table
 from strapgen.reports.table import Column, TextTable
 
-_NAMES = {"dcm": "direction cosines", "euler": "Euler parameters"}
+#: What the algorithms are called.
+NAMES = {"dcm": "direction cosines", "euler": "Euler parameters"}
 #: Drift and ratio at one order, and the mark behind them.
 _FIGURES = (
     Column("drift", spec=".4g", least=9),
     Column("ratio", spec=".4g", least=9),
-    Column(align="<", least=2, gap=0),
+    Column(align="<", least=1, gap=0),
 )
 #: Width of the notes in characters.
 _WIDTH = 90
@@ -31,14 +32,14 @@ def thesis_table_text(table: Table, entries: Sequence[TableEntry]) -> str:
         Those of this table, for all algorithms and orders.
     """
     backends = list(dict.fromkeys(entry.backend for entry in entries))
-    label = Column(align="<", least=max([10, *map(len, backends)]))
+    label = Column(align="<", least=max([7, *map(len, backends)]))
     rows: list[list[Any]] = []
     for algorithm in ALGORITHMS:
         rows.append(_printed_row(table, algorithm))
         rows += [_row(entries, backend, algorithm) for backend in backends]
     head, *lines = TextTable([label, *_FIGURES * len(ORDERS)], rows).lines("    ")
     # An order stands over the middle of its figures.
-    orders = [Column(f"order {order}", least=18, gap=6 if k else 2) for k, order in enumerate(ORDERS)]
+    orders = [Column(f"order {order}", least=18, gap=5 if k else 2) for k, order in enumerate(ORDERS)]
     ratio = "of the same order" if table.by_order else "of first order"
     text = [
         f"Table {table.number}: {table.title}",
@@ -48,7 +49,7 @@ def thesis_table_text(table: Table, entries: Sequence[TableEntry]) -> str:
     ]
     for k, algorithm in enumerate(ALGORITHMS):
         first = k * (1 + len(backends))
-        text += [f"  {_NAMES[algorithm]}", *lines[first : first + 1 + len(backends)]]
+        text += [f"  {NAMES[algorithm]}", *lines[first : first + 1 + len(backends)]]
     return "\n".join([*text, *_notes(entries)])
 
 

@@ -7,6 +7,7 @@ import importlib.util
 import sys
 import traceback
 from collections.abc import Callable, Iterator
+from importlib.metadata import EntryPoint
 from pathlib import Path
 
 from strapgen.support.exceptions import InputError, StrapgenError
@@ -32,6 +33,18 @@ def contents(module: str) -> list[str | bytes]:
         return []
     files = sorted(path for path in root.rglob("*") if path.is_file() and "__pycache__" not in path.parts)
     return [part for path in files or [root] for part in (str(path.relative_to(root)), path.read_bytes())]
+
+
+def installed_with(point: EntryPoint) -> list[str | bytes]:
+    """Return name and version of an entry point's distribution, and all files that it installed."""
+    if point.dist is None:
+        return []
+    parts: list[str | bytes] = [point.dist.name, point.dist.version]
+    for file in sorted(point.dist.files or (), key=str):
+        path = Path(str(file.locate()))
+        if path.is_file() and "__pycache__" not in path.parts:
+            parts += [str(file), path.read_bytes()]
+    return parts
 
 
 def belongs_to(module: str) -> Callable[[Path], bool]:

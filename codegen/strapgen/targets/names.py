@@ -127,8 +127,23 @@ _SHORT = {
 }
 
 
+def _replaced(name: str, word: str, other: str) -> str:
+    """Return a name with another word in place of each that is the same."""
+    return re.sub(rf"(?<![a-z]){word}(?![a-z])", other, name)
+
+
+def _marked(name: str) -> str:
+    """Mark the short words of a name that is long enough with long words in their place."""
+    longest = marked = name
+    for word, short in _SHORT.items():
+        longest, marked = _replaced(longest, short, word), _replaced(marked, short, f"{short}_Kernel")
+    return marked if len(longest) > _MOST else name
+
+
 def external(name: str, ending: str = "") -> str:
     """Return the name of a kernel's function in C: shortened if too long, changed if a library or a keyword has it.
+
+    A name that has a short word itself, and could be what a longer name is shortened to, is marked.
 
     Parameters
     ----------
@@ -141,10 +156,13 @@ def external(name: str, ending: str = "") -> str:
     --------
     >>> external("euler_rk4_2"), external("hypot"), external("dcm_orthonormalize_optimal", "_float")
     ('euler_rk4_2', 'hypot_Kernel', 'dcm_orth_optimal_float')
+    >>> external("dcm_orth_optimal"), external("mrp_norm")
+    ('dcm_orth_Kernel_optimal', 'mrp_norm')
     """
+    name = _marked(name)
     for word, short in _SHORT.items():
         if len(name) > _MOST:
-            name = re.sub(rf"(?<![a-z]){word}(?![a-z])", short, name)
+            name = _replaced(name, word, short)
     name += ending
     free = _c_allows(name) and name not in LIBRARY and not name.endswith("_t")
     return name if free else f"{name}_Kernel"  # a capital letter stands in no other kernel's name

@@ -208,11 +208,14 @@ def _label(point: EntryPoint) -> str:
 
 @cache
 def _loaded(point: EntryPoint) -> tuple[Target, str]:
-    """Return the target of an entry point and the hash of its package's files, as they are when it is imported."""
+    """Return the target of an entry point and the hash of its code as it is when it is imported.
+
+    The code is all files of its package, the version of its distribution, and what else that installed.
+    """
     label = f"target {_label(point)}"
     if not point.pattern.match(point.value):
         raise InputError(f"{label}: the entry point is no 'module:name'")
-    code = digest([point.value, *packages.contents(point.module)])
+    code = digest([point.value, *packages.contents(point.module), *packages.installed_with(point)])
     with packages.guarded(label, "define a Target", packages.belongs_to(point.module)):
         try:
             target = point.load()

@@ -95,6 +95,10 @@ def compile_together(many: Iterable[Sources]) -> None:
             if _shared(key) is None and cache.lookup("builds", key) is None:
                 missing[key] = sources
     for group in _groups(missing):
+        if len(group) == 1:  # as `load` compiles it, which finds it without a pointer
+            for key, sources in group.items():
+                _alone(sources, key)
+            continue
         together = _key(group.values())
         name = f"strapgen_{together}"
         folder = _build(list(group.values()), name, together)
@@ -182,11 +186,16 @@ def _chosen_compiler() -> str:
 
 def _compiled(sources: Sources) -> Any:
     key = _key([sources])
-    name = f"strapgen_{sources.function.name}"
-    file = _shared(key) or _build([sources], name, key) / _library(name)
+    file = _shared(key) or _alone(sources, key)
     if file not in _modules:
         _modules[file] = _import_file(file)
     return _modules[file]
+
+
+def _alone(sources: Sources, key: str) -> Path:
+    """Return the file of the module of one source, compiled if it is not in the cache."""
+    name = f"strapgen_{sources.function.name}"
+    return _build([sources], name, key) / _library(name)
 
 
 def _import_file(file: Path) -> ModuleType:

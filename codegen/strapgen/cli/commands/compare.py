@@ -18,7 +18,7 @@ from strapgen.cli.options import (
     one,
     option,
 )
-from strapgen.cli.output import TEXT_OUTPUT, Output
+from strapgen.cli.output import Output
 from strapgen.cli.sample_source import SampleSource
 from strapgen.support.exceptions import InputError
 
@@ -52,14 +52,14 @@ def compare(
             panel="Output",
         ),
     ] = None,
-    output: Annotated[Output, Shown(only=TEXT_OUTPUT)],
+    output: Output,
 ) -> None:
     """Compare back ends on the same increments with a reference.
 
     For each back end the table shows the largest and the rms angle from the reference in rad, for fixed point the
     certified bound, the largest angle in units in the last place, the drift, the time of a step, the bytes of its
     object code and its operations. Fixed-point formats are chosen for the increments of the run, or for
-    --max-rate-deg-s if you give it.
+    --max-rate-deg-s if you give it. --plot draws the angle over time, and the certified bound after as many steps.
 
     Example: strapgen compare euler --method rk4 --increments 2 --backend numpy,c,c-q31,c-q15 --carry full
     --reference exact --motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 --step 0.125 --duration 180
@@ -74,6 +74,7 @@ def compare(
     import numpy as np
 
     from strapgen.experiments import comparison
+    from strapgen.reports import plots
     from strapgen.reports.comparison import ComparedKernel, comparison_report
 
     kernels = []
@@ -88,9 +89,14 @@ def compare(
                 truth=inputs.truth,
                 settings=fixed.at_step(inputs.step).settings(choice.increments_per_step),
             )
-            kernels.append(ComparedKernel(choice.kernel, f"{choice.kernel}: {inputs.title}", rows))
+            kernels.append(
+                ComparedKernel(choice.kernel, f"{choice.kernel}: {inputs.title}", rows, inputs.step)
+            )
     drift = "drift from the truth" if source.motion is not None else f"drift from {reference}"
-    output.report(comparison_report(kernels, reference, drift))
+    output.report(
+        comparison_report(kernels, reference, drift),
+        lambda path: plots.comparison_image(kernels, reference, path),
+    )
     if most is not None:
         _fail_above(kernels, most, f"further from {reference} than {fail_above} rad")
 

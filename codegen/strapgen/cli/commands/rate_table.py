@@ -7,7 +7,7 @@ from typing import Annotated
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import Duration, FastBackends, backends, listed, option
-from strapgen.cli.output import TEXT_OUTPUT, Output
+from strapgen.cli.output import Output
 from strapgen.cli.progress import track
 
 
@@ -30,7 +30,7 @@ def rate_table(
         str, option("--sample", metavar="S", help="Time between gyro samples in s.", panel="Input")
     ] = "0.01",
     fixed: Annotated[FixedOptions, Shown(only=("rounding", "carry"))],
-    output: Annotated[Output, Shown(only=TEXT_OUTPUT)],
+    output: Output,
 ) -> None:
     """Run the rate-table test of 1984 on every algorithm and back end.
 
@@ -42,6 +42,7 @@ def rate_table(
     """
     output.check()
     from strapgen.experiments import rate_table as experiment
+    from strapgen.reports import plots
     from strapgen.reports.rate_table import rate_table_report
 
     names = experiment.ALGORITHMS if algorithm is None else listed("--algorithm", algorithm)
@@ -49,4 +50,7 @@ def rate_table(
     count = len(list(experiment.cases(names, places)))
     runs = experiment.stress(duration, sample, 1, places, names, fixed.settings(1))
     rows = list(track(runs, "running", count))
-    output.report(rate_table_report(rows, duration, sample))
+    output.report(
+        rate_table_report(rows, duration, sample),
+        lambda path: plots.rate_table_image(rows, duration, sample, path),
+    )

@@ -9,7 +9,7 @@ import typer
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import FastBackends, backends, option, whole
-from strapgen.cli.output import TEXT_OUTPUT, Output
+from strapgen.cli.output import Output
 from strapgen.cli.progress import track
 from strapgen.support.exceptions import InputError
 
@@ -36,7 +36,7 @@ def tables(
         ),
     ] = False,
     fixed: Annotated[FixedOptions, Shown(only=("rounding", "carry"))],
-    output: Annotated[Output, Shown(only=TEXT_OUTPUT)],
+    output: Output,
 ) -> None:
     """Compute the tables of the thesis beside its printed figures.
 
@@ -51,6 +51,7 @@ def tables(
         return
     from strapgen.backends import BACKENDS
     from strapgen.experiments.thesis_tables import ALGORITHMS, ORDERS, TABLES, build_all, run_tables
+    from strapgen.reports import plots
     from strapgen.reports.thesis_tables import thesis_tables_report
     from strapgen.support import checks
 
@@ -64,7 +65,7 @@ def tables(
     for _ in track(build_all(names, settings, chosen), "building", cases):
         pass
     entries = list(track(run_tables(names, settings, chosen), "simulating", cases * len(chosen)))
-    output.report(thesis_tables_report(entries))
+    output.report(thesis_tables_report(entries), lambda path: plots.thesis_tables_image(entries, path))
 
 
 def _predict(output: Output) -> None:
@@ -72,11 +73,14 @@ def _predict(output: Output) -> None:
     from strapgen.analysis import ratios
     from strapgen.experiments import predicted_tables
     from strapgen.experiments.thesis_tables import ALGORITHMS, ORDERS, TABLES
+    from strapgen.reports import plots
     from strapgen.reports.predicted_tables import predicted_report
 
     cases = len(TABLES) * len(ALGORITHMS) * len(ORDERS)
     entries = list(track(predicted_tables.predicted(), "predicting", cases))
-    output.report(predicted_report(entries, ratios.claims()))
+    output.report(
+        predicted_report(entries, ratios.claims()), lambda path: plots.predicted_tables_image(entries, path)
+    )
 
 
 def _runnable() -> tuple[str, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import os
 from collections.abc import Iterable
 from pathlib import Path
@@ -13,6 +14,7 @@ from strapgen.support.exceptions import InputError, MissingExtraError
 #: Resolution of images of pixels, in dots per inch.
 RESOLUTION_DPI = 150
 COLOURS = ("#1f5f8b", "#b5562b", "#3d7a4f")
+_SEVERAL = (*COLOURS, "#8a4f9e", "#c79a1b", "#2a9d9d", "#a83250", "#6b6b6b")
 
 
 def pyplot() -> Any:
@@ -84,6 +86,11 @@ def colours(count: int, last: float) -> Any:
     return pyplot().get_cmap("viridis")(np.linspace(0.0, last, count))
 
 
+def several_colours(count: int) -> list[str]:
+    """Return so many colours that are told apart without an order."""
+    return [_SEVERAL[number % len(_SEVERAL)] for number in range(count)]
+
+
 def title(figure: Any, text: str) -> None:
     """Write a title at the left of a figure."""
     figure.suptitle(printable(text), fontsize=11, x=0.01, ha="left")
@@ -115,6 +122,39 @@ def step_ticks(axes: Any, steps: Iterable[float]) -> None:
     axes.set_xticks(steps, [fraction(step) for step in steps])
     axes.minorticks_off()
     axes.set_xlabel("step, s")
+
+
+def labels_at_the_right(axes: Any, labels: Iterable[tuple[float, str, Any]]) -> None:
+    """Write labels beside the right end of axes, at a height in data or a little off, so that none covers another.
+
+    Parameters
+    ----------
+    axes : Axes
+        With its final limits.
+    labels : iterable of (float, str, colour)
+        Heights, texts and colours; a height outside of the axes stands at their border.
+    """
+    height = axes.get_position().height * axes.figure.get_size_inches()[1]
+    apart = 11.5 / 72 / height  # a line of text, as a part of the height
+    upwards = sorted(labels, key=lambda label: label[0])
+    places = [_height(axes, value) for value, _, _ in upwards]
+    for number in range(1, len(places)):
+        places[number] = max(places[number], places[number - 1] + apart)
+    for number in reversed(range(len(places))):
+        limit = 1.0 if number == len(places) - 1 else places[number + 1] - apart
+        places[number] = min(places[number], limit)
+    for place, (_, text, colour) in zip(places, upwards, strict=True):
+        axes.text(
+            1.01, place, printable(text), transform=axes.transAxes, fontsize=9, color=colour, va="center"
+        )
+
+
+def _height(axes: Any, value: float) -> float:
+    """Return where a number stands between the lower and the upper end of axes, 0 to 1."""
+    low, high = map(float, axes.get_ylim())
+    if axes.get_yscale() == "log":
+        low, high, value = math.log(low), math.log(high), math.log(value) if value > 0 else -math.inf
+    return min(1.0, max(0.0, (value - low) / (high - low)))
 
 
 def common_legend(figure: Any, panels: Iterable[Any], **options: Any) -> None:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 _RATES = {"rad/s": "mean drift", "m/s^2": "mean acceleration"}
 #: The lowest error that is drawn, as a part of the highest true rate.
 _LOWEST = 1e-9
-_COLOURS = (*figures.COLOURS, "#8a4f9e", "#c79a1b", "#2a9d9d", "#a83250", "#6b6b6b")
+_COLOURS = figures.several_colours(8)
 _LINES = ("-", (0, (5, 2)), (0, (1, 1.5)))
 
 
