@@ -6,19 +6,26 @@ import re
 import textwrap
 
 
-def fill(text: str, indent: str, width: int = 100) -> str:
+def fill(text: str, indent: str, width: int = 99) -> str:
     """Wrap text at spaces, every line after the first with `indent`."""
     return "\n".join(
         textwrap.wrap(text, width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
     )
 
 
-def fill_expression(text: str, indent: str, width: int = 100) -> str:
-    """Wrap an expression before the signs of sums and choices, every line after the first with `indent`."""
-    return _filled(re.split(r" (?=[+?:-] )", text), indent, width)
+def fill_expression(text: str, indent: str, width: int = 99) -> str:
+    """Wrap an expression before the signs of sums and choices, every line after the first with `indent`.
+
+    What is still too long is wrapped before the signs of products and comparisons.
+    """
+    pieces: list[str] = []
+    for piece in re.split(r" (?=[+?:-] )", text):
+        too_long = len(indent) + len(piece) > width
+        pieces += re.split(r" (?=(?:[*/]|>=) )", piece) if too_long else [piece]
+    return _filled(pieces, indent, width)
 
 
-def fill_arguments(text: str, indent: str, width: int = 100) -> str:
+def fill_arguments(text: str, indent: str, width: int = 99) -> str:
     """Wrap a declaration or a call after its commas, every line after the first with `indent`."""
     return _filled(re.split(r"(?<=,) ", text), indent, width)
 

@@ -13,6 +13,9 @@ from strapgen.targets import contract
 from strapgen.targets.contract import elements_text, operations_text, range_text
 from strapgen.targets.lines import fill, fill_arguments
 
+#: First parameters of the loop over runs and steps, in every type of number.
+PROPAGATE = ("size_t runs", "size_t steps", "size_t record_every", "size_t orthonormalize_every")
+
 
 @cache
 def environment(folder: Path | None = None) -> jinja2.Environment:

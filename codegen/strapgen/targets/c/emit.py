@@ -14,7 +14,7 @@ from strapgen.targets.lines import fill_expression
 from strapgen.targets.names import C, external, printed
 from strapgen.targets.printer import Printer
 from strapgen.targets.registry import TARGETS
-from strapgen.targets.rendering import render_c, runs_of
+from strapgen.targets.rendering import PROPAGATE, render_c, runs_of
 
 
 @dataclass(frozen=True)
@@ -140,6 +140,15 @@ def _files(program: Program, name: str, target: str) -> dict[str, str]:
         "samples": program.inputs[-1],
         "result": program.outputs[0].signal,
         "parameters": _parameters(program, real),
+        "propagate_parameters": ", ".join(
+            [
+                *PROPAGATE,
+                f"{name}_orthonormalizer orthonormalize",
+                f"const {real.name} *initial",
+                f"const {real.name} *{program.inputs[-1].name}",
+                f"{real.name} *history",
+            ]
+        ),
         "arrays": _arrays(program, real),
         "calls": _calls(program),
         "unused": [s.name for s in program.inputs if not program.used() & set(s.elements)],
@@ -180,7 +189,7 @@ def _code(
                 "text": fill_expression(
                     f"const {real} {a.name} = {printer.text(a.value)};",
                     " " * 4 * (depth + 1),
-                    100 - 4 * depth,
+                    99 - 4 * depth,
                 ),
                 "meaning": a.meaning,
             }

@@ -24,7 +24,7 @@ from strapgen.ir.sources import Function, Sources
 from strapgen.targets import contract
 from strapgen.targets.lines import fill_expression
 from strapgen.targets.names import C, external, printed
-from strapgen.targets.rendering import render_c, runs_of
+from strapgen.targets.rendering import PROPAGATE, render_c, runs_of
 
 
 @dataclass(frozen=True)
@@ -127,6 +127,17 @@ def _files(fixed: FixedProgram, name: str, target: str) -> dict[str, str]:
         "samples": interface.inputs[-1].signal,
         "residuals": feedback_words,
         "parameters": ", ".join(pieces),
+        "propagate_parameters": ", ".join(
+            [
+                *PROPAGATE,
+                f"{name}_orthonormalizer orthonormalize",
+                f"const {word.type} *initial",
+                f"const {word.type} *{interface.inputs[-1].signal.name}",
+                *([f"{word.residual} *residuals"] if feedback_words else []),
+                f"{word.type} *history",
+                "size_t *stopped",
+            ]
+        ),
         "arrays": ", ".join(arrays),
         "calls": ", ".join(calls),
         "code": printer.code(),
@@ -203,7 +214,7 @@ class _Printer:
                 text = self._call("sqrt", f"({self.word.magnitude})({self.scaled(argument)})")
                 lines.append(_declared(kind, name, text, note))
             case IntegerMaximum((first, *others)):
-                lines.append(_noted(f"{kind} {name} = {self.narrowed(first, value)};", note))
+                lines.append(_declared(kind, name, self.narrowed(first, value), note, constant=False))
                 for other in others:
                     lines.append(f"if ({self.scaled(other)} > {name}) {{")
                     lines.append(f"    {name} = {self.narrowed(other, value)};")
@@ -239,7 +250,10 @@ class _Printer:
 
     def _guard(self, name: str, value: Value) -> list[str]:
         limits = self.constant(value.low), self.constant(value.high)
-        return [f"if (({name} < {limits[0]}) || ({name} > {limits[1]})) {{", "    return 2;", "}"]
+        condition = f"if (({name} < {limits[0]}) || ({name} > {limits[1]})) {{"
+        if len(condition) > 90:
+            condition = condition.replace(" || ", "\n        || ")
+        return [condition, "    return 2;", "}"]
 
     def narrow(self, text: str, value: Value, shift: int = 0) -> str:
         """Return an expression of a wide number, shifted down, as one of the value's type."""
@@ -401,12 +415,12 @@ def _exactly(term: Term) -> str:
     return f" /* {contract.exact_text(abs(term.coefficient.value))} in Q{term.coefficient.fraction} */"
 
 
-def _declared(kind: str, name: str, text: str, note: str = "") -> str:
+def _declared(kind: str, name: str, text: str, note: str = "", constant: bool = True) -> str:
     """Return a declaration, its value on a line of its own where the first line would be too long."""
-    indent = " " * 8
-    statement = fill_expression(f"const {kind} {name} = {text};", indent, 92)
+    indent, start = " " * 8, f"{'const ' * constant}{kind} {name} ="
+    statement = fill_expression(f"{start} {text};", indent, 92)
     if len(statement.partition("\n")[0]) > 92:
-        statement = f"const {kind} {name} =\n" + fill_expression(f"{indent}{text};", indent, 96)
+        statement = f"{start}\n" + fill_expression(f"{indent}{text};", indent, 96)
     return _noted(statement, note) if note else statement
 
 
