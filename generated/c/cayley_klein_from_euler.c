@@ -4,8 +4,8 @@
  */
 #include "cayley_klein_from_euler.h"
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void cayley_klein_from_euler_one_(const double state[4], double converted[4])
+
+void cayley_klein_from_euler(const double state[4], double converted[4])
 {
     const double e_x = state[0];
     const double e_y = state[1];
@@ -15,15 +15,4 @@ static inline void cayley_klein_from_euler_one_(const double state[4], double co
     converted[1] = e_x;
     converted[2] = e_y;
     converted[3] = e_z;
-}
-
-void cayley_klein_from_euler(const double state[4], double converted[4])
-{
-    cayley_klein_from_euler_one_(state, converted);
-}
-
-void cayley_klein_from_euler_array(size_t count, const double *state, double *converted)
-{
-    for (size_t k = 0; k < count; ++k)
-        cayley_klein_from_euler_one_(state + 4 * k, converted + 4 * k);
 }

@@ -4,9 +4,8 @@
  */
 #include "cayley_klein_product.h"
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void cayley_klein_product_one_(const double state[4], const double transition[4],
-    double next[4])
+
+void cayley_klein_product(const double state[4], const double transition[4], double next[4])
 {
     const double a_s = state[0];
     const double a_x = state[1];
@@ -25,16 +24,4 @@ static inline void cayley_klein_product_one_(const double state[4], const double
     next[1] = next_x;
     next[2] = next_y;
     next[3] = next_z;
-}
-
-void cayley_klein_product(const double state[4], const double transition[4], double next[4])
-{
-    cayley_klein_product_one_(state, transition, next);
-}
-
-void cayley_klein_product_array(size_t count, const double *state, const double *transition,
-    double *next)
-{
-    for (size_t k = 0; k < count; ++k)
-        cayley_klein_product_one_(state + 4 * k, transition + 4 * k, next + 4 * k);
 }

@@ -4,8 +4,8 @@
  */
 #include "coning_fast.h"
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void coning_fast_one_(const double angle_sum[3], const double coning[3],
+
+void coning_fast(const double angle_sum[3], const double coning[3],
     const double previous_increment[3], const double increment[3], double next_angle_sum[3],
     double next_coning[3], double next_previous_increment[3])
 {
@@ -44,22 +44,4 @@ static inline void coning_fast_one_(const double angle_sum[3], const double coni
     next_previous_increment[0] = d_x;
     next_previous_increment[1] = d_y;
     next_previous_increment[2] = d_z;
-}
-
-void coning_fast(const double angle_sum[3], const double coning[3],
-    const double previous_increment[3], const double increment[3], double next_angle_sum[3],
-    double next_coning[3], double next_previous_increment[3])
-{
-    coning_fast_one_(angle_sum, coning, previous_increment, increment, next_angle_sum, next_coning,
-        next_previous_increment);
-}
-
-void coning_fast_array(size_t count, const double *angle_sum, const double *coning,
-    const double *previous_increment, const double *increment, double *next_angle_sum,
-    double *next_coning, double *next_previous_increment)
-{
-    for (size_t k = 0; k < count; ++k)
-        coning_fast_one_(angle_sum + 3 * k, coning + 3 * k, previous_increment + 3 * k,
-            increment + 3 * k, next_angle_sum + 3 * k, next_coning + 3 * k,
-            next_previous_increment + 3 * k);
 }

@@ -7,13 +7,11 @@
  *     equation (26).
  * Operations of one call: 12 add, 12 multiply; 5 temporaries.
  *
- * No heap, no global state, reentrant. In one call every input is read before any output is written: an
- * output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is written:
+ * an output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef CONING_FAST_H
 #define CONING_FAST_H
-
-#include <stddef.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -24,10 +22,11 @@ extern "C" {
  *      beta_y, beta_z; any finite number; at most 1 in magnitude in proper use.
  * in   coning[3]: coning correction since the slow cycle began; unit rad; coning_x, coning_y,
  *      coning_z; any finite number; at most 1/8 in magnitude in proper use.
- * in   previous_increment[3]: angle increment of the fast cycle before; zero at the start; unit rad;
- *      past_x, past_y, past_z; any finite number; at most 1/8 in magnitude in proper use.
- * in   increment[3]: angle increment of the fast cycle, body axes: exact integral of the body rate;
- *      unit rad; d_x, d_y, d_z; any finite number; at most 1/8 in magnitude in proper use.
+ * in   previous_increment[3]: angle increment of the fast cycle before; zero at the start; unit
+ *      rad; past_x, past_y, past_z; any finite number; at most 1/8 in magnitude in proper use.
+ * in   increment[3]: angle increment of the fast cycle, body axes: exact integral of the body
+ *      rate; unit rad; d_x, d_y, d_z; any finite number; at most 1/8 in magnitude in proper
+ *      use.
  * out  next_angle_sum[3]: sum of the angle increments since the slow cycle began, after the call;
  *      unit rad; next_beta_x, next_beta_y, next_beta_z.
  * out  next_coning[3]: coning correction since the slow cycle began, after the call; unit rad;
@@ -38,13 +37,6 @@ extern "C" {
 void coning_fast(const double angle_sum[3], const double coning[3],
     const double previous_increment[3], const double increment[3], double next_angle_sum[3],
     double next_coning[3], double next_previous_increment[3]);
-
-/* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
- * whose samples have the same size; otherwise they must not overlap.
- */
-void coning_fast_array(size_t count, const double *angle_sum, const double *coning,
-    const double *previous_increment, const double *increment, double *next_angle_sum,
-    double *next_coning, double *next_previous_increment);
 
 #ifdef __cplusplus
 }

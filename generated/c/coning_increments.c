@@ -12,8 +12,8 @@ static double coning_increments_sinc_(double x)
     return x >= 0.0 && x <= 0.0 ? 1.0 : sin(x) / x;
 }
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void coning_increments_one_(double middle, double width, double a, double b, double g,
+
+void coning_increments(double middle, double width, double a, double b, double g,
     double increment[3])
 {
     const double shared_1 = b * middle;
@@ -25,17 +25,4 @@ static inline void coning_increments_one_(double middle, double width, double a,
     increment[0] = increment_x;
     increment[1] = increment_y;
     increment[2] = increment_z;
-}
-
-void coning_increments(double middle, double width, double a, double b, double g,
-    double increment[3])
-{
-    coning_increments_one_(middle, width, a, b, g, increment);
-}
-
-void coning_increments_array(size_t count, const double *middle, const double *width,
-    const double *a, const double *b, const double *g, double *increment)
-{
-    for (size_t k = 0; k < count; ++k)
-        coning_increments_one_(middle[k], width[k], a[k], b[k], g[k], increment + 3 * k);
 }

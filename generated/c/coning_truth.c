@@ -12,9 +12,8 @@ static double coning_truth_sinc_(double x)
     return x >= 0.0 && x <= 0.0 ? 1.0 : sin(x) / x;
 }
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void coning_truth_one_(double time, double a, double b, double g, double rate[3],
-    double attitude[9])
+
+void coning_truth(double time, double a, double b, double g, double rate[3], double attitude[9])
 {
     const double shared_1 = b * time;
     const double shared_2 = sin(shared_1);
@@ -63,16 +62,4 @@ static inline void coning_truth_one_(double time, double a, double b, double g, 
     attitude[6] = C_31;
     attitude[7] = C_32;
     attitude[8] = C_33;
-}
-
-void coning_truth(double time, double a, double b, double g, double rate[3], double attitude[9])
-{
-    coning_truth_one_(time, a, b, g, rate, attitude);
-}
-
-void coning_truth_array(size_t count, const double *time, const double *a, const double *b,
-    const double *g, double *rate, double *attitude)
-{
-    for (size_t k = 0; k < count; ++k)
-        coning_truth_one_(time[k], a[k], b[k], g[k], rate + 3 * k, attitude + 9 * k);
 }

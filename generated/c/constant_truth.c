@@ -12,9 +12,8 @@ static double constant_truth_sinc_(double x)
     return x >= 0.0 && x <= 0.0 ? 1.0 : sin(x) / x;
 }
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void constant_truth_one_(double time, double x, double y, double z, double rate[3],
-    double attitude[9])
+
+void constant_truth(double time, double x, double y, double z, double rate[3], double attitude[9])
 {
     const double shared_1 = time * time;
     const double shared_2 = shared_1 * (y * y);
@@ -57,16 +56,4 @@ static inline void constant_truth_one_(double time, double x, double y, double z
     attitude[6] = C_31;
     attitude[7] = C_32;
     attitude[8] = C_33;
-}
-
-void constant_truth(double time, double x, double y, double z, double rate[3], double attitude[9])
-{
-    constant_truth_one_(time, x, y, z, rate, attitude);
-}
-
-void constant_truth_array(size_t count, const double *time, const double *x, const double *y,
-    const double *z, double *rate, double *attitude)
-{
-    for (size_t k = 0; k < count; ++k)
-        constant_truth_one_(time[k], x[k], y[k], z[k], rate + 3 * k, attitude + 9 * k);
 }

@@ -4,8 +4,8 @@
  */
 #include "dcm_from_cayley_klein.h"
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void dcm_from_cayley_klein_one_(const double state[4], double attitude[9])
+
+void dcm_from_cayley_klein(const double state[4], double attitude[9])
 {
     const double a_s = state[0];
     const double a_x = state[1];
@@ -44,15 +44,4 @@ static inline void dcm_from_cayley_klein_one_(const double state[4], double atti
     attitude[6] = C_31;
     attitude[7] = C_32;
     attitude[8] = C_33;
-}
-
-void dcm_from_cayley_klein(const double state[4], double attitude[9])
-{
-    dcm_from_cayley_klein_one_(state, attitude);
-}
-
-void dcm_from_cayley_klein_array(size_t count, const double *state, double *attitude)
-{
-    for (size_t k = 0; k < count; ++k)
-        dcm_from_cayley_klein_one_(state + 4 * k, attitude + 9 * k);
 }

@@ -6,8 +6,8 @@
 
 #include <math.h>
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void dcm_from_euler_angles_one_(const double angles[3], double attitude[9])
+
+void dcm_from_euler_angles(const double angles[3], double attitude[9])
 {
     const double roll = angles[0];
     const double pitch = angles[1];
@@ -41,15 +41,4 @@ static inline void dcm_from_euler_angles_one_(const double angles[3], double att
     attitude[6] = C_31;
     attitude[7] = C_32;
     attitude[8] = C_33;
-}
-
-void dcm_from_euler_angles(const double angles[3], double attitude[9])
-{
-    dcm_from_euler_angles_one_(angles, attitude);
-}
-
-void dcm_from_euler_angles_array(size_t count, const double *angles, double *attitude)
-{
-    for (size_t k = 0; k < count; ++k)
-        dcm_from_euler_angles_one_(angles + 3 * k, attitude + 9 * k);
 }

@@ -7,13 +7,11 @@
  *     equation (60).
  * Operations of one call: 4 add, 12 multiply, 1 negate, 6 function; 10 temporaries.
  *
- * No heap, no global state, reentrant. In one call every input is read before any output is written: an
- * output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is written:
+ * an output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef DCM_FROM_EULER_ANGLES_H
 #define DCM_FROM_EULER_ANGLES_H
-
-#include <stddef.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -25,11 +23,6 @@ extern "C" {
  * out  attitude[9]: direction cosine matrix, body to reference; unit 1; C_11, ..., C_33.
  */
 void dcm_from_euler_angles(const double angles[3], double attitude[9]);
-
-/* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
- * whose samples have the same size; otherwise they must not overlap.
- */
-void dcm_from_euler_angles_array(size_t count, const double *angles, double *attitude);
 
 #ifdef __cplusplus
 }

@@ -6,8 +6,8 @@
 
 #include <math.h>
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void dcm_orth_optimal_one_(const double computed[9], double orthonormalized[9])
+
+void dcm_orth_optimal(const double computed[9], double orthonormalized[9])
 {
     const double C_11 = computed[0];
     const double C_12 = computed[1];
@@ -91,15 +91,24 @@ static inline void dcm_orth_optimal_one_(const double computed[9], double orthon
     const double root_32 = adjugate_12 * gram_13 + adjugate_22 * gram_23 + adjugate_23 * shared_9;
     const double root_33 = shared_5 + shared_8 + adjugate_33 * shared_9;
     /* direction cosine matrix, body to reference, orthonormalized */
-    const double next_11 = inverse_determinant * (C_11 * root_11 + C_12 * root_21 + C_13 * root_31);
-    const double next_12 = inverse_determinant * (C_11 * root_12 + C_12 * root_22 + C_13 * root_32);
-    const double next_13 = inverse_determinant * (C_11 * root_13 + C_12 * root_23 + C_13 * root_33);
-    const double next_21 = inverse_determinant * (C_21 * root_11 + C_22 * root_21 + C_23 * root_31);
-    const double next_22 = inverse_determinant * (C_21 * root_12 + C_22 * root_22 + C_23 * root_32);
-    const double next_23 = inverse_determinant * (C_21 * root_13 + C_22 * root_23 + C_23 * root_33);
-    const double next_31 = inverse_determinant * (C_31 * root_11 + C_32 * root_21 + C_33 * root_31);
-    const double next_32 = inverse_determinant * (C_31 * root_12 + C_32 * root_22 + C_33 * root_32);
-    const double next_33 = inverse_determinant * (C_31 * root_13 + C_32 * root_23 + C_33 * root_33);
+    const double next_11 = inverse_determinant * (C_11 * root_11 + C_12 * root_21
+        + C_13 * root_31);
+    const double next_12 = inverse_determinant * (C_11 * root_12 + C_12 * root_22
+        + C_13 * root_32);
+    const double next_13 = inverse_determinant * (C_11 * root_13 + C_12 * root_23
+        + C_13 * root_33);
+    const double next_21 = inverse_determinant * (C_21 * root_11 + C_22 * root_21
+        + C_23 * root_31);
+    const double next_22 = inverse_determinant * (C_21 * root_12 + C_22 * root_22
+        + C_23 * root_32);
+    const double next_23 = inverse_determinant * (C_21 * root_13 + C_22 * root_23
+        + C_23 * root_33);
+    const double next_31 = inverse_determinant * (C_31 * root_11 + C_32 * root_21
+        + C_33 * root_31);
+    const double next_32 = inverse_determinant * (C_31 * root_12 + C_32 * root_22
+        + C_33 * root_32);
+    const double next_33 = inverse_determinant * (C_31 * root_13 + C_32 * root_23
+        + C_33 * root_33);
     orthonormalized[0] = next_11;
     orthonormalized[1] = next_12;
     orthonormalized[2] = next_13;
@@ -109,15 +118,4 @@ static inline void dcm_orth_optimal_one_(const double computed[9], double orthon
     orthonormalized[6] = next_31;
     orthonormalized[7] = next_32;
     orthonormalized[8] = next_33;
-}
-
-void dcm_orth_optimal(const double computed[9], double orthonormalized[9])
-{
-    dcm_orth_optimal_one_(computed, orthonormalized);
-}
-
-void dcm_orth_optimal_array(size_t count, const double *computed, double *orthonormalized)
-{
-    for (size_t k = 0; k < count; ++k)
-        dcm_orth_optimal_one_(computed + 9 * k, orthonormalized + 9 * k);
 }

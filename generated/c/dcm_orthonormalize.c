@@ -6,8 +6,8 @@
 
 #include <math.h>
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void dcm_orthonormalize_one_(const double computed[9], double orthonormalized[9])
+
+void dcm_orthonormalize(const double computed[9], double orthonormalized[9])
 {
     const double C_11 = computed[0];
     const double C_12 = computed[1];
@@ -58,15 +58,4 @@ static inline void dcm_orthonormalize_one_(const double computed[9], double orth
     orthonormalized[6] = next_31;
     orthonormalized[7] = next_32;
     orthonormalized[8] = next_33;
-}
-
-void dcm_orthonormalize(const double computed[9], double orthonormalized[9])
-{
-    dcm_orthonormalize_one_(computed, orthonormalized);
-}
-
-void dcm_orthonormalize_array(size_t count, const double *computed, double *orthonormalized)
-{
-    for (size_t k = 0; k < count; ++k)
-        dcm_orthonormalize_one_(computed + 9 * k, orthonormalized + 9 * k);
 }

@@ -12,9 +12,8 @@ static double dcm_update_sinc_(double x)
     return x >= 0.0 && x <= 0.0 ? 1.0 : sin(x) / x;
 }
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void dcm_update_one_(const double state[9], const double rotation_vector[3],
-    double next[9])
+
+void dcm_update(const double state[9], const double rotation_vector[3], double next[9])
 {
     const double C_11 = state[0];
     const double C_12 = state[1];
@@ -77,16 +76,4 @@ static inline void dcm_update_one_(const double state[9], const double rotation_
     next[6] = next_31;
     next[7] = next_32;
     next[8] = next_33;
-}
-
-void dcm_update(const double state[9], const double rotation_vector[3], double next[9])
-{
-    dcm_update_one_(state, rotation_vector, next);
-}
-
-void dcm_update_array(size_t count, const double *state, const double *rotation_vector,
-    double *next)
-{
-    for (size_t k = 0; k < count; ++k)
-        dcm_update_one_(state + 9 * k, rotation_vector + 3 * k, next + 9 * k);
 }

@@ -7,13 +7,11 @@
  *     equations (2) to (4) with all terms.
  * Operations of one call: 31 add, 44 multiply, 1 sqrt, 2 negate, 2 function; 28 temporaries.
  *
- * No heap, no global state, reentrant. In one call every input is read before any output is written: an
- * output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is written:
+ * an output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef DCM_UPDATE_H
 #define DCM_UPDATE_H
-
-#include <stddef.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -22,18 +20,12 @@ extern "C" {
 /* One call.
  * in   state[9]: direction cosine matrix, body to reference; unit 1; C_11, ..., C_33; any finite
  *      number; at most 1 in magnitude in proper use.
- * in   rotation_vector[3]: rotation vector of the cycle, body axes; unit rad; phi_x, phi_y, phi_z;
- *      any finite number; at most 1 in magnitude in proper use.
+ * in   rotation_vector[3]: rotation vector of the cycle, body axes; unit rad; phi_x, phi_y,
+ *      phi_z; any finite number; at most 1 in magnitude in proper use.
  * out  next[9]: direction cosine matrix, body to reference, after the step; unit 1; next_11, ...,
  *      next_33.
  */
 void dcm_update(const double state[9], const double rotation_vector[3], double next[9]);
-
-/* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
- * whose samples have the same size; otherwise they must not overlap.
- */
-void dcm_update_array(size_t count, const double *state, const double *rotation_vector,
-    double *next);
 
 #ifdef __cplusplus
 }

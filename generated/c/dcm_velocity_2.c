@@ -4,9 +4,9 @@
  */
 #include "dcm_velocity_2.h"
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void dcm_velocity_2_one_(const double state[9], const double velocity_sum[3],
-    const double sculling[3], const double angle_sum[3], double transformed[3])
+
+void dcm_velocity_2(const double state[9], const double velocity_sum[3], const double sculling[3],
+    const double angle_sum[3], double transformed[3])
 {
     const double C_11 = state[0];
     const double C_12 = state[1];
@@ -39,18 +39,4 @@ static inline void dcm_velocity_2_one_(const double state[9], const double veloc
     transformed[0] = v_x;
     transformed[1] = v_y;
     transformed[2] = v_z;
-}
-
-void dcm_velocity_2(const double state[9], const double velocity_sum[3], const double sculling[3],
-    const double angle_sum[3], double transformed[3])
-{
-    dcm_velocity_2_one_(state, velocity_sum, sculling, angle_sum, transformed);
-}
-
-void dcm_velocity_2_array(size_t count, const double *state, const double *velocity_sum,
-    const double *sculling, const double *angle_sum, double *transformed)
-{
-    for (size_t k = 0; k < count; ++k)
-        dcm_velocity_2_one_(state + 9 * k, velocity_sum + 3 * k, sculling + 3 * k,
-            angle_sum + 3 * k, transformed + 3 * k);
 }

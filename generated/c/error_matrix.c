@@ -4,9 +4,9 @@
  */
 #include "error_matrix.h"
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void error_matrix_one_(const double computed[9], const double truth[9],
-    double error[9], double scale[3], double skew[3], double drift[3])
+
+void error_matrix(const double computed[9], const double truth[9], double error[9],
+    double scale[3], double skew[3], double drift[3])
 {
     const double C_11 = computed[0];
     const double C_12 = computed[1];
@@ -68,18 +68,4 @@ static inline void error_matrix_one_(const double computed[9], const double trut
     drift[0] = drift_x;
     drift[1] = drift_y;
     drift[2] = drift_z;
-}
-
-void error_matrix(const double computed[9], const double truth[9], double error[9], double scale[3],
-    double skew[3], double drift[3])
-{
-    error_matrix_one_(computed, truth, error, scale, skew, drift);
-}
-
-void error_matrix_array(size_t count, const double *computed, const double *truth, double *error,
-    double *scale, double *skew, double *drift)
-{
-    for (size_t k = 0; k < count; ++k)
-        error_matrix_one_(computed + 9 * k, truth + 9 * k, error + 9 * k, scale + 3 * k,
-            skew + 3 * k, drift + 3 * k);
 }

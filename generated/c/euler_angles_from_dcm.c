@@ -12,9 +12,8 @@ static double euler_angles_from_dcm_wrap_(double x)
     return x > 3.141592653589793 ? x - 6.283185307179586 : x < -3.141592653589793 ? x + 6.283185307179586 : x;
 }
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void euler_angles_from_dcm_one_(const double state[9], const double previous[3],
-    double next[3])
+
+void euler_angles_from_dcm(const double state[9], const double previous[3], double next[3])
 {
     const double C_11 = state[0];
     const double C_12 = state[1];
@@ -31,28 +30,17 @@ static inline void euler_angles_from_dcm_one_(const double state[9], const doubl
     /* pitch */
     const double next_pitch = atan2(-C_31, sqrt(cosine_squared));
     /* roll; held where pitch is vertical */
-    const double next_roll = (4.0 * (2.220446049250313e-16 * 2.220446049250313e-16) >= cosine_squared ? last_roll : atan2(C_32, C_33));
+    const double next_roll = (4.0 * (2.220446049250313e-16 * 2.220446049250313e-16)
+        >= cosine_squared ? last_roll : atan2(C_32, C_33));
     /* heading - roll, or + */
     const double steep_sine = (0.0 >= C_31 ? C_23 - C_12 : -(C_12 + C_23));
     const double steep_cosine = (0.0 >= C_31 ? C_13 + C_22 : C_22 - C_13);
     /* the angle between or together */
     const double apart = atan2(steep_sine, steep_cosine);
     /* heading */
-    const double next_heading = (cosine_squared >= 0.25 ? atan2(C_21, C_11) : euler_angles_from_dcm_wrap_(apart
-        + (0.0 >= C_31 ? next_roll : -next_roll)));
+    const double next_heading = (cosine_squared >= 0.25 ? atan2(C_21, C_11)
+        : euler_angles_from_dcm_wrap_(apart + (0.0 >= C_31 ? next_roll : -next_roll)));
     next[0] = next_roll;
     next[1] = next_pitch;
     next[2] = next_heading;
-}
-
-void euler_angles_from_dcm(const double state[9], const double previous[3], double next[3])
-{
-    euler_angles_from_dcm_one_(state, previous, next);
-}
-
-void euler_angles_from_dcm_array(size_t count, const double *state, const double *previous,
-    double *next)
-{
-    for (size_t k = 0; k < count; ++k)
-        euler_angles_from_dcm_one_(state + 9 * k, previous + 3 * k, next + 3 * k);
 }

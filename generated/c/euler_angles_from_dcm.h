@@ -8,15 +8,14 @@
  * Heading - roll at pitch up, heading + roll at pitch down, are as good as the matrix at every
  * pitch.
  * Errors of angles are told without whole turns.
- * Operations of one call: 6 add, 4 multiply, 1 sqrt, 3 negate, 5 select, 5 function; 4 temporaries.
+ * Operations of one call: 6 add, 4 multiply, 1 sqrt, 3 negate, 5 select, 5 function; 4
+ *     temporaries.
  *
- * No heap, no global state, reentrant. In one call every input is read before any output is written: an
- * output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is written:
+ * an output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef EULER_ANGLES_FROM_DCM_H
 #define EULER_ANGLES_FROM_DCM_H
-
-#include <stddef.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -31,12 +30,6 @@ extern "C" {
  *      found_heading.
  */
 void euler_angles_from_dcm(const double state[9], const double previous[3], double next[3]);
-
-/* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
- * whose samples have the same size; otherwise they must not overlap.
- */
-void euler_angles_from_dcm_array(size_t count, const double *state, const double *previous,
-    double *next);
 
 #ifdef __cplusplus
 }

@@ -4,8 +4,8 @@
  */
 #include "euler_from_cayley_klein.h"
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void euler_from_cayley_klein_one_(const double state[4], double converted[4])
+
+void euler_from_cayley_klein(const double state[4], double converted[4])
 {
     const double a_s = state[0];
     const double a_x = state[1];
@@ -15,15 +15,4 @@ static inline void euler_from_cayley_klein_one_(const double state[4], double co
     converted[1] = a_y;
     converted[2] = a_z;
     converted[3] = a_s;
-}
-
-void euler_from_cayley_klein(const double state[4], double converted[4])
-{
-    euler_from_cayley_klein_one_(state, converted);
-}
-
-void euler_from_cayley_klein_array(size_t count, const double *state, double *converted)
-{
-    for (size_t k = 0; k < count; ++k)
-        euler_from_cayley_klein_one_(state + 4 * k, converted + 4 * k);
 }

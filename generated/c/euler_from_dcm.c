@@ -6,8 +6,8 @@
 
 #include <math.h>
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void euler_from_dcm_one_(const double state[9], double converted[4])
+
+void euler_from_dcm(const double state[9], double converted[4])
 {
     const double C_11 = state[0];
     const double C_12 = state[1];
@@ -35,10 +35,14 @@ static inline void euler_from_dcm_one_(const double state[9], double converted[4
     /* 4 times the square of the largest parameter */
     const double largest = fmax(fmax(fmax(four_ss, four_xx), four_yy), four_zz);
     /* the column of 4 e e' through the largest */
-    const double column_s = (four_ss >= largest ? four_ss : (four_xx >= largest ? four_sx : (four_yy >= largest ? four_sy : four_sz)));
-    const double column_x = (four_ss >= largest ? four_sx : (four_xx >= largest ? four_xx : (four_yy >= largest ? four_xy : four_zx)));
-    const double column_y = (four_ss >= largest ? four_sy : (four_xx >= largest ? four_xy : (four_yy >= largest ? four_yy : four_yz)));
-    const double column_z = (four_ss >= largest ? four_sz : (four_xx >= largest ? four_zx : (four_yy >= largest ? four_yz : four_zz)));
+    const double column_s = (four_ss >= largest ? four_ss : (four_xx >= largest ? four_sx
+        : (four_yy >= largest ? four_sy : four_sz)));
+    const double column_x = (four_ss >= largest ? four_sx : (four_xx >= largest ? four_xx
+        : (four_yy >= largest ? four_xy : four_zx)));
+    const double column_y = (four_ss >= largest ? four_sy : (four_xx >= largest ? four_xy
+        : (four_yy >= largest ? four_yy : four_yz)));
+    const double column_z = (four_ss >= largest ? four_sz : (four_xx >= largest ? four_zx
+        : (four_yy >= largest ? four_yz : four_zz)));
     /* makes the scalar part positive */
     const double factor = 0.5 * ((column_s >= 0.0 ? 1.0 : -1.0) / sqrt(largest));
     /* Euler parameters, body to reference, scalar last */
@@ -50,15 +54,4 @@ static inline void euler_from_dcm_one_(const double state[9], double converted[4
     converted[1] = next_y;
     converted[2] = next_z;
     converted[3] = next_s;
-}
-
-void euler_from_dcm(const double state[9], double converted[4])
-{
-    euler_from_dcm_one_(state, converted);
-}
-
-void euler_from_dcm_array(size_t count, const double *state, double *converted)
-{
-    for (size_t k = 0; k < count; ++k)
-        euler_from_dcm_one_(state + 9 * k, converted + 4 * k);
 }

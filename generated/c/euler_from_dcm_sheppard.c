@@ -6,9 +6,8 @@
 
 #include <math.h>
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void euler_from_dcm_sheppard_one_(const double state[9], const double previous[4],
-    double converted[4])
+
+void euler_from_dcm_sheppard(const double state[9], const double previous[4], double converted[4])
 {
     const double C_11 = state[0];
     const double C_12 = state[1];
@@ -40,12 +39,17 @@ static inline void euler_from_dcm_sheppard_one_(const double state[9], const dou
     /* 4 times the square of the largest parameter */
     const double largest = fmax(fmax(fmax(four_ss, four_xx), four_yy), four_zz);
     /* the column of 4 e e' through the largest */
-    const double column_s = (four_ss >= largest ? four_ss : (four_xx >= largest ? four_sx : (four_yy >= largest ? four_sy : four_sz)));
-    const double column_x = (four_ss >= largest ? four_sx : (four_xx >= largest ? four_xx : (four_yy >= largest ? four_xy : four_zx)));
-    const double column_y = (four_ss >= largest ? four_sy : (four_xx >= largest ? four_xy : (four_yy >= largest ? four_yy : four_yz)));
-    const double column_z = (four_ss >= largest ? four_sz : (four_xx >= largest ? four_zx : (four_yy >= largest ? four_yz : four_zz)));
+    const double column_s = (four_ss >= largest ? four_ss : (four_xx >= largest ? four_sx
+        : (four_yy >= largest ? four_sy : four_sz)));
+    const double column_x = (four_ss >= largest ? four_sx : (four_xx >= largest ? four_xx
+        : (four_yy >= largest ? four_xy : four_zx)));
+    const double column_y = (four_ss >= largest ? four_sy : (four_xx >= largest ? four_xy
+        : (four_yy >= largest ? four_yy : four_yz)));
+    const double column_z = (four_ss >= largest ? four_sz : (four_xx >= largest ? four_zx
+        : (four_yy >= largest ? four_yz : four_zz)));
     /* the largest parameter, before */
-    const double before = (four_ss >= largest ? last_s : (four_xx >= largest ? last_x : (four_yy >= largest ? last_y : last_z)));
+    const double before = (four_ss >= largest ? last_s : (four_xx >= largest ? last_x
+        : (four_yy >= largest ? last_y : last_z)));
     /* carries the sign */
     const double factor = 0.5 * ((before >= 0.0 ? 1.0 : -1.0) / sqrt(largest));
     /* Euler parameters, body to reference, scalar last */
@@ -57,16 +61,4 @@ static inline void euler_from_dcm_sheppard_one_(const double state[9], const dou
     converted[1] = next_y;
     converted[2] = next_z;
     converted[3] = next_s;
-}
-
-void euler_from_dcm_sheppard(const double state[9], const double previous[4], double converted[4])
-{
-    euler_from_dcm_sheppard_one_(state, previous, converted);
-}
-
-void euler_from_dcm_sheppard_array(size_t count, const double *state, const double *previous,
-    double *converted)
-{
-    for (size_t k = 0; k < count; ++k)
-        euler_from_dcm_sheppard_one_(state + 9 * k, previous + 4 * k, converted + 4 * k);
 }

@@ -6,8 +6,8 @@
 
 #include <math.h>
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void euler_normalize_one_(const double state[4], double next[4])
+
+void euler_normalize(const double state[4], double next[4])
 {
     const double e_x = state[0];
     const double e_y = state[1];
@@ -24,15 +24,4 @@ static inline void euler_normalize_one_(const double state[4], double next[4])
     next[1] = next_y;
     next[2] = next_z;
     next[3] = next_s;
-}
-
-void euler_normalize(const double state[4], double next[4])
-{
-    euler_normalize_one_(state, next);
-}
-
-void euler_normalize_array(size_t count, const double *state, double *next)
-{
-    for (size_t k = 0; k < count; ++k)
-        euler_normalize_one_(state + 4 * k, next + 4 * k);
 }

@@ -4,9 +4,8 @@
  */
 #include "euler_product.h"
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void euler_product_one_(const double state[4], const double transition[4],
-    double next[4])
+
+void euler_product(const double state[4], const double transition[4], double next[4])
 {
     const double e_x = state[0];
     const double e_y = state[1];
@@ -25,15 +24,4 @@ static inline void euler_product_one_(const double state[4], const double transi
     next[1] = next_y;
     next[2] = next_z;
     next[3] = next_s;
-}
-
-void euler_product(const double state[4], const double transition[4], double next[4])
-{
-    euler_product_one_(state, transition, next);
-}
-
-void euler_product_array(size_t count, const double *state, const double *transition, double *next)
-{
-    for (size_t k = 0; k < count; ++k)
-        euler_product_one_(state + 4 * k, transition + 4 * k, next + 4 * k);
 }

@@ -4,9 +4,9 @@
  */
 #include "polynomial_increments.h"
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void polynomial_increments_one_(double middle, double width, double a0, double a1,
-    double a2, double a3, double a4, double increment[3])
+
+void polynomial_increments(double middle, double width, double a0, double a1, double a2, double a3,
+    double a4, double increment[3])
 {
     const double shared_3 = width * width;
     const double shared_1 = shared_3 * width;
@@ -19,19 +19,4 @@ static inline void polynomial_increments_one_(double middle, double width, doubl
     increment[0] = 0.0;
     increment[1] = increment_y;
     increment[2] = 0.0;
-}
-
-void polynomial_increments(double middle, double width, double a0, double a1, double a2, double a3,
-    double a4, double increment[3])
-{
-    polynomial_increments_one_(middle, width, a0, a1, a2, a3, a4, increment);
-}
-
-void polynomial_increments_array(size_t count, const double *middle, const double *width,
-    const double *a0, const double *a1, const double *a2, const double *a3, const double *a4,
-    double *increment)
-{
-    for (size_t k = 0; k < count; ++k)
-        polynomial_increments_one_(middle[k], width[k], a0[k], a1[k], a2[k], a3[k], a4[k],
-            increment + 3 * k);
 }

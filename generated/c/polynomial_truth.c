@@ -6,9 +6,9 @@
 
 #include <math.h>
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void polynomial_truth_one_(double time, double a0, double a1, double a2, double a3,
-    double a4, double rate[3], double attitude[9])
+
+void polynomial_truth(double time, double a0, double a1, double a2, double a3, double a4,
+    double rate[3], double attitude[9])
 {
     const double factor_1 = time * time;
     const double shared_2 = factor_1 * factor_1;
@@ -34,18 +34,4 @@ static inline void polynomial_truth_one_(double time, double a0, double a1, doub
     attitude[6] = C_31;
     attitude[7] = 0.0;
     attitude[8] = C_33;
-}
-
-void polynomial_truth(double time, double a0, double a1, double a2, double a3, double a4,
-    double rate[3], double attitude[9])
-{
-    polynomial_truth_one_(time, a0, a1, a2, a3, a4, rate, attitude);
-}
-
-void polynomial_truth_array(size_t count, const double *time, const double *a0, const double *a1,
-    const double *a2, const double *a3, const double *a4, double *rate, double *attitude)
-{
-    for (size_t k = 0; k < count; ++k)
-        polynomial_truth_one_(time[k], a0[k], a1[k], a2[k], a3[k], a4[k], rate + 3 * k,
-            attitude + 9 * k);
 }

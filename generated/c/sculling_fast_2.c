@@ -4,8 +4,8 @@
  */
 #include "sculling_fast_2.h"
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void sculling_fast_2_one_(const double angle_sum[3], const double velocity_sum[3],
+
+void sculling_fast_2(const double angle_sum[3], const double velocity_sum[3],
     const double sculling[3], const double increment[3], const double velocity_increment[3],
     double next_angle_sum[3], double next_velocity_sum[3], double next_sculling[3])
 {
@@ -33,9 +33,12 @@ static inline void sculling_fast_2_one_(const double angle_sum[3], const double 
     const double next_u_y = dv_y + u_y;
     const double next_u_z = dv_z + u_z;
     /* sculling integral since the slow cycle began, after the call */
-    const double next_eta_x = eta_x + 0.5 * (beta_y * dv_z - beta_z * dv_y - d_y * u_z + d_z * u_y);
-    const double next_eta_y = eta_y + 0.5 * (beta_z * dv_x - beta_x * dv_z + d_x * u_z - d_z * u_x);
-    const double next_eta_z = eta_z + 0.5 * (beta_x * dv_y - beta_y * dv_x - d_x * u_y + d_y * u_x);
+    const double next_eta_x = eta_x + 0.5 * (beta_y * dv_z - beta_z * dv_y - d_y * u_z
+        + d_z * u_y);
+    const double next_eta_y = eta_y + 0.5 * (beta_z * dv_x - beta_x * dv_z + d_x * u_z
+        - d_z * u_x);
+    const double next_eta_z = eta_z + 0.5 * (beta_x * dv_y - beta_y * dv_x - d_x * u_y
+        + d_y * u_x);
     next_angle_sum[0] = next_beta_x;
     next_angle_sum[1] = next_beta_y;
     next_angle_sum[2] = next_beta_z;
@@ -45,22 +48,4 @@ static inline void sculling_fast_2_one_(const double angle_sum[3], const double 
     next_sculling[0] = next_eta_x;
     next_sculling[1] = next_eta_y;
     next_sculling[2] = next_eta_z;
-}
-
-void sculling_fast_2(const double angle_sum[3], const double velocity_sum[3],
-    const double sculling[3], const double increment[3], const double velocity_increment[3],
-    double next_angle_sum[3], double next_velocity_sum[3], double next_sculling[3])
-{
-    sculling_fast_2_one_(angle_sum, velocity_sum, sculling, increment, velocity_increment,
-        next_angle_sum, next_velocity_sum, next_sculling);
-}
-
-void sculling_fast_2_array(size_t count, const double *angle_sum, const double *velocity_sum,
-    const double *sculling, const double *increment, const double *velocity_increment,
-    double *next_angle_sum, double *next_velocity_sum, double *next_sculling)
-{
-    for (size_t k = 0; k < count; ++k)
-        sculling_fast_2_one_(angle_sum + 3 * k, velocity_sum + 3 * k, sculling + 3 * k,
-            increment + 3 * k, velocity_increment + 3 * k, next_angle_sum + 3 * k,
-            next_velocity_sum + 3 * k, next_sculling + 3 * k);
 }

@@ -12,25 +12,13 @@ static double sinusoidal_increments_sinc_(double x)
     return x >= 0.0 && x <= 0.0 ? 1.0 : sin(x) / x;
 }
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void sinusoidal_increments_one_(double middle, double width, double a, double b,
-    double increment[3])
-{
-    /* angle increment over the interval, body axes */
-    const double increment_y = a * width * cos(b * middle) * sinusoidal_increments_sinc_(0.5 * (b * width));
-    increment[0] = 0.0;
-    increment[1] = increment_y;
-    increment[2] = 0.0;
-}
 
 void sinusoidal_increments(double middle, double width, double a, double b, double increment[3])
 {
-    sinusoidal_increments_one_(middle, width, a, b, increment);
-}
-
-void sinusoidal_increments_array(size_t count, const double *middle, const double *width,
-    const double *a, const double *b, double *increment)
-{
-    for (size_t k = 0; k < count; ++k)
-        sinusoidal_increments_one_(middle[k], width[k], a[k], b[k], increment + 3 * k);
+    /* angle increment over the interval, body axes */
+    const double increment_y = a * width * cos(b * middle) * sinusoidal_increments_sinc_(0.5 * (b
+        * width));
+    increment[0] = 0.0;
+    increment[1] = increment_y;
+    increment[2] = 0.0;
 }

@@ -12,9 +12,8 @@ static double sinusoidal_truth_sinc_(double x)
     return x >= 0.0 && x <= 0.0 ? 1.0 : sin(x) / x;
 }
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void sinusoidal_truth_one_(double time, double a, double b, double rate[3],
-    double attitude[9])
+
+void sinusoidal_truth(double time, double a, double b, double rate[3], double attitude[9])
 {
     const double shared_1 = b * time;
     /* body rate, body axes */
@@ -39,16 +38,4 @@ static inline void sinusoidal_truth_one_(double time, double a, double b, double
     attitude[6] = C_31;
     attitude[7] = 0.0;
     attitude[8] = C_33;
-}
-
-void sinusoidal_truth(double time, double a, double b, double rate[3], double attitude[9])
-{
-    sinusoidal_truth_one_(time, a, b, rate, attitude);
-}
-
-void sinusoidal_truth_array(size_t count, const double *time, const double *a, const double *b,
-    double *rate, double *attitude)
-{
-    for (size_t k = 0; k < count; ++k)
-        sinusoidal_truth_one_(time[k], a[k], b[k], rate + 3 * k, attitude + 9 * k);
 }

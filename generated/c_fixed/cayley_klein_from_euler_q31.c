@@ -5,47 +5,29 @@
 #include "cayley_klein_from_euler_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int cayley_klein_from_euler_q31_out_(int_fast32_t x, int_fast32_t limit)
+static inline int cayley_klein_from_euler_q31_out_(int32_t x, int32_t limit)
 {
-    return (uint64_t)x + (uint64_t)limit > 2 * (uint64_t)limit;
+    return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
 
-/* The algorithm. Static, so that the loops below can take it in. */
-static inline int cayley_klein_from_euler_q31_one_(const int32_t state[4], int32_t converted[4])
+int cayley_klein_from_euler_q31(const int32_t state[4], int32_t converted[4])
 {
-    const int_fast32_t e_x = state[0];
-    const int_fast32_t e_y = state[1];
-    const int_fast32_t e_z = state[2];
-    const int_fast32_t e_s = state[3];
+    const int32_t e_x = state[0];
+    const int32_t e_y = state[1];
+    const int32_t e_z = state[2];
+    const int32_t e_s = state[3];
     if (cayley_klein_from_euler_q31_out_(e_x, INT32_C(1140850688))
         || cayley_klein_from_euler_q31_out_(e_y, INT32_C(1140850688))
         || cayley_klein_from_euler_q31_out_(e_z, INT32_C(1140850688))
         || cayley_klein_from_euler_q31_out_(e_s, INT32_C(1140850688)))
         return 1;
-    const int_fast32_t next_s = (int_fast32_t)((int64_t)e_s);
-    const int_fast32_t next_x = (int_fast32_t)((int64_t)e_x);
-    const int_fast32_t next_y = (int_fast32_t)((int64_t)e_y);
-    const int_fast32_t next_z = (int_fast32_t)((int64_t)e_z);
-    converted[0] = (int32_t)next_s;
-    converted[1] = (int32_t)next_x;
-    converted[2] = (int32_t)next_y;
-    converted[3] = (int32_t)next_z;
+    const int32_t next_s = e_s; /* Q1.30, -1.07 .. 1.07, exact */
+    const int32_t next_x = e_x; /* Q1.30, -1.07 .. 1.07, exact */
+    const int32_t next_y = e_y; /* Q1.30, -1.07 .. 1.07, exact */
+    const int32_t next_z = e_z; /* Q1.30, -1.07 .. 1.07, exact */
+    converted[0] = next_s;
+    converted[1] = next_x;
+    converted[2] = next_y;
+    converted[3] = next_z;
     return 0;
-}
-
-int cayley_klein_from_euler_q31(const int32_t state[4], int32_t converted[4])
-{
-    return cayley_klein_from_euler_q31_one_(state, converted);
-}
-
-size_t cayley_klein_from_euler_q31_array(size_t count, int *status, const int32_t *state,
-    int32_t *converted)
-{
-    *status = 0;
-    for (size_t k = 0; k < count; ++k) {
-        *status = cayley_klein_from_euler_q31_one_(state + 4 * k, converted + 4 * k);
-        if (*status)
-            return k;
-    }
-    return count;
 }

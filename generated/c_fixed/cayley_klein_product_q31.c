@@ -5,31 +5,69 @@
 #include "cayley_klein_product_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int cayley_klein_product_q31_out_(int_fast32_t x, int_fast32_t limit)
+static inline int cayley_klein_product_q31_out_(int32_t x, int32_t limit)
 {
-    return (uint64_t)x + (uint64_t)limit > 2 * (uint64_t)limit;
+    return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
 
-/* x / 2^n, rounded down. The right shift of a negative number is left to the compiler by the standard; this is not, and
- * compilers make one arithmetic shift of it.
+/* The exact product of two words. */
+#if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
+/* These processors have no instruction for it: the high word takes four products of half words. */
+__attribute__((noinline)) static int64_t cayley_klein_product_q31_mul_(int32_t a, int32_t b)
+{
+    const uint32_t a_low = (uint32_t)a & 0xFFFFu;
+    const uint32_t b_low = (uint32_t)b & 0xFFFFu;
+    const int32_t a_high = (a < 0) ? ~(~a >> 16) : (a >> 16);
+    const int32_t b_high = (b < 0) ? ~(~b >> 16) : (b >> 16);
+    const uint32_t low = a_low * b_low;
+    const int32_t middle = (a_high * (int32_t)b_low) + (int32_t)(low >> 16);
+    const int32_t other = (b_high * (int32_t)a_low) + (int32_t)((uint32_t)middle & 0xFFFFu);
+    const int32_t high = (a_high * b_high) + ((middle < 0) ? ~(~middle >> 16) : (middle >> 16))
+        + ((other < 0) ? ~(~other >> 16) : (other >> 16));
+    const uint64_t bits = ((uint64_t)(uint32_t)high << 32) | ((uint32_t)a * (uint32_t)b);
+    return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
+}
+#else
+static inline int64_t cayley_klein_product_q31_mul_(int32_t a, int32_t b)
+{
+    return (int64_t)a * b;
+}
+#endif
+
+/* x / 2^n, rounded down, where the proof of the ranges shows that it fits into a word: then the
+ * 32 bits of x from bit n on, read as a number with a sign, are that quotient. For n above 32 the
+ * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
+ * number and no conversion of a number out of range.
  */
+static inline int32_t cayley_klein_product_q31_narrow_(int64_t x, int n)
+{
+#ifdef __FRAMAC__
+    return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
+#else
+    const int beyond = (n > 32) ? (n - 32) : 0;
+    const uint32_t bits = (uint32_t)((uint64_t)x >> (n - beyond));
+    const int32_t high = (bits <= (UINT32_MAX >> 1)) ? (int32_t)bits
+                                                 : (-1 - (int32_t)(UINT32_MAX - bits));
+    return (high < 0) ? ~(~high >> beyond) : (high >> beyond);
+#endif
+}
+
+/* x / 2^n, rounded down, as a wide number. */
 static inline int64_t cayley_klein_product_q31_shr_(int64_t x, int n)
 {
-    return x < 0 ? ~(~x >> n) : x >> n;
+    return (x < 0) ? ~(~x >> n) : (x >> n);
 }
 
-/* The algorithm. Static, so that the loops below can take it in. */
-static inline int cayley_klein_product_q31_one_(const int32_t state[4], const int32_t transition[4],
-    int32_t next[4])
+int cayley_klein_product_q31(const int32_t state[4], const int32_t transition[4], int32_t next[4])
 {
-    const int_fast32_t a_s = state[0];
-    const int_fast32_t a_x = state[1];
-    const int_fast32_t a_y = state[2];
-    const int_fast32_t a_z = state[3];
-    const int_fast32_t p_s = transition[0];
-    const int_fast32_t p_x = transition[1];
-    const int_fast32_t p_y = transition[2];
-    const int_fast32_t p_z = transition[3];
+    const int32_t a_s = state[0];
+    const int32_t a_x = state[1];
+    const int32_t a_y = state[2];
+    const int32_t a_z = state[3];
+    const int32_t p_s = transition[0];
+    const int32_t p_x = transition[1];
+    const int32_t p_y = transition[2];
+    const int32_t p_z = transition[3];
     if (cayley_klein_product_q31_out_(a_s, INT32_C(1140850688))
         || cayley_klein_product_q31_out_(a_x, INT32_C(1140850688))
         || cayley_klein_product_q31_out_(a_y, INT32_C(1140850688))
@@ -40,50 +78,49 @@ static inline int cayley_klein_product_q31_one_(const int32_t state[4], const in
         || cayley_klein_product_q31_out_(p_z, INT32_C(1140850688)))
         return 1;
     /* Cayley-Klein parameters, body to reference, scalar first, after the step */
-    const int64_t next_s_unchecked = cayley_klein_product_q31_shr_((int64_t)a_s * p_s
-        - (int64_t)a_x * p_x - (int64_t)a_y * p_y - (int64_t)a_z * p_z + INT32_C(536870912), 30);
-    if (next_s_unchecked < (-INT32_C(1140850688))
-        || next_s_unchecked > INT32_C(1140850688))
+    const int64_t next_s_unchecked =
+        cayley_klein_product_q31_shr_(cayley_klein_product_q31_mul_(a_s, p_s)
+        - cayley_klein_product_q31_mul_(a_x, p_x) - cayley_klein_product_q31_mul_(a_y, p_y)
+        - cayley_klein_product_q31_mul_(a_z, p_z) + (INT32_C(1) << 29), 30);
+    if ((next_s_unchecked < (-INT32_C(1140850688)))
+        || (next_s_unchecked > INT32_C(1140850688))) {
         return 2;
-    const int_fast32_t next_s = (int_fast32_t)next_s_unchecked;
-    const int64_t next_x_unchecked = cayley_klein_product_q31_shr_((int64_t)a_s * p_x
-        + (int64_t)a_x * p_s + (int64_t)a_y * p_z - (int64_t)a_z * p_y + INT32_C(536870912), 30);
-    if (next_x_unchecked < (-INT32_C(1140850688))
-        || next_x_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t next_x = (int_fast32_t)next_x_unchecked;
-    const int64_t next_y_unchecked = cayley_klein_product_q31_shr_((int64_t)a_s * p_y
-        - (int64_t)a_x * p_z + (int64_t)a_y * p_s + (int64_t)a_z * p_x + INT32_C(536870912), 30);
-    if (next_y_unchecked < (-INT32_C(1140850688))
-        || next_y_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t next_y = (int_fast32_t)next_y_unchecked;
-    const int64_t next_z_unchecked = cayley_klein_product_q31_shr_((int64_t)a_s * p_z
-        + (int64_t)a_x * p_y - (int64_t)a_y * p_x + (int64_t)a_z * p_s + INT32_C(536870912), 30);
-    if (next_z_unchecked < (-INT32_C(1140850688))
-        || next_z_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t next_z = (int_fast32_t)next_z_unchecked;
-    next[0] = (int32_t)next_s;
-    next[1] = (int32_t)next_x;
-    next[2] = (int32_t)next_y;
-    next[3] = (int32_t)next_z;
-    return 0;
-}
-
-int cayley_klein_product_q31(const int32_t state[4], const int32_t transition[4], int32_t next[4])
-{
-    return cayley_klein_product_q31_one_(state, transition, next);
-}
-
-size_t cayley_klein_product_q31_array(size_t count, int *status, const int32_t *state,
-    const int32_t *transition, int32_t *next)
-{
-    *status = 0;
-    for (size_t k = 0; k < count; ++k) {
-        *status = cayley_klein_product_q31_one_(state + 4 * k, transition + 4 * k, next + 4 * k);
-        if (*status)
-            return k;
     }
-    return count;
+    const int32_t next_s = cayley_klein_product_q31_narrow_(next_s_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
+    const int64_t next_x_unchecked =
+        cayley_klein_product_q31_shr_(cayley_klein_product_q31_mul_(a_s, p_x)
+        + cayley_klein_product_q31_mul_(a_x, p_s) + cayley_klein_product_q31_mul_(a_y, p_z)
+        - cayley_klein_product_q31_mul_(a_z, p_y) + (INT32_C(1) << 29), 30);
+    if ((next_x_unchecked < (-INT32_C(1140850688)))
+        || (next_x_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t next_x = cayley_klein_product_q31_narrow_(next_x_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
+    const int64_t next_y_unchecked =
+        cayley_klein_product_q31_shr_(cayley_klein_product_q31_mul_(a_s, p_y)
+        - cayley_klein_product_q31_mul_(a_x, p_z) + cayley_klein_product_q31_mul_(a_y, p_s)
+        + cayley_klein_product_q31_mul_(a_z, p_x) + (INT32_C(1) << 29), 30);
+    if ((next_y_unchecked < (-INT32_C(1140850688)))
+        || (next_y_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t next_y = cayley_klein_product_q31_narrow_(next_y_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
+    const int64_t next_z_unchecked =
+        cayley_klein_product_q31_shr_(cayley_klein_product_q31_mul_(a_s, p_z)
+        + cayley_klein_product_q31_mul_(a_x, p_y) - cayley_klein_product_q31_mul_(a_y, p_x)
+        + cayley_klein_product_q31_mul_(a_z, p_s) + (INT32_C(1) << 29), 30);
+    if ((next_z_unchecked < (-INT32_C(1140850688)))
+        || (next_z_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t next_z = cayley_klein_product_q31_narrow_(next_z_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
+    next[0] = next_s;
+    next[1] = next_x;
+    next[2] = next_y;
+    next[3] = next_z;
+    return 0;
 }

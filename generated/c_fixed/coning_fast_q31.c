@@ -5,122 +5,147 @@
 #include "coning_fast_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int coning_fast_q31_out_(int_fast32_t x, int_fast32_t limit)
+static inline int coning_fast_q31_out_(int32_t x, int32_t limit)
 {
-    return (uint64_t)x + (uint64_t)limit > 2 * (uint64_t)limit;
+    return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
 
-/* x / 2^n, rounded down. The right shift of a negative number is left to the compiler by the standard; this is not, and
- * compilers make one arithmetic shift of it.
+/* The exact product of two words. */
+#if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
+/* These processors have no instruction for it: the high word takes four products of half words. */
+__attribute__((noinline)) static int64_t coning_fast_q31_mul_(int32_t a, int32_t b)
+{
+    const uint32_t a_low = (uint32_t)a & 0xFFFFu;
+    const uint32_t b_low = (uint32_t)b & 0xFFFFu;
+    const int32_t a_high = (a < 0) ? ~(~a >> 16) : (a >> 16);
+    const int32_t b_high = (b < 0) ? ~(~b >> 16) : (b >> 16);
+    const uint32_t low = a_low * b_low;
+    const int32_t middle = (a_high * (int32_t)b_low) + (int32_t)(low >> 16);
+    const int32_t other = (b_high * (int32_t)a_low) + (int32_t)((uint32_t)middle & 0xFFFFu);
+    const int32_t high = (a_high * b_high) + ((middle < 0) ? ~(~middle >> 16) : (middle >> 16))
+        + ((other < 0) ? ~(~other >> 16) : (other >> 16));
+    const uint64_t bits = ((uint64_t)(uint32_t)high << 32) | ((uint32_t)a * (uint32_t)b);
+    return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
+}
+#else
+static inline int64_t coning_fast_q31_mul_(int32_t a, int32_t b)
+{
+    return (int64_t)a * b;
+}
+#endif
+
+/* x / 2^n, rounded down, where the proof of the ranges shows that it fits into a word: then the
+ * 32 bits of x from bit n on, read as a number with a sign, are that quotient. For n above 32 the
+ * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
+ * number and no conversion of a number out of range.
  */
+static inline int32_t coning_fast_q31_narrow_(int64_t x, int n)
+{
+#ifdef __FRAMAC__
+    return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
+#else
+    const int beyond = (n > 32) ? (n - 32) : 0;
+    const uint32_t bits = (uint32_t)((uint64_t)x >> (n - beyond));
+    const int32_t high = (bits <= (UINT32_MAX >> 1)) ? (int32_t)bits
+                                                 : (-1 - (int32_t)(UINT32_MAX - bits));
+    return (high < 0) ? ~(~high >> beyond) : (high >> beyond);
+#endif
+}
+
+/* x / 2^n, rounded down, as a wide number. */
 static inline int64_t coning_fast_q31_shr_(int64_t x, int n)
 {
-    return x < 0 ? ~(~x >> n) : x >> n;
-}
-
-/* The algorithm. Static, so that the loops below can take it in. */
-static inline int coning_fast_q31_one_(const int32_t angle_sum[3], const int32_t coning[3],
-    const int32_t previous_increment[3], const int32_t increment[3], int32_t next_angle_sum[3],
-    int32_t next_coning[3], int32_t next_previous_increment[3])
-{
-    const int_fast32_t beta_x = angle_sum[0];
-    const int_fast32_t beta_y = angle_sum[1];
-    const int_fast32_t beta_z = angle_sum[2];
-    const int_fast32_t coning_x = coning[0];
-    const int_fast32_t coning_y = coning[1];
-    const int_fast32_t coning_z = coning[2];
-    const int_fast32_t past_x = previous_increment[0];
-    const int_fast32_t past_y = previous_increment[1];
-    const int_fast32_t past_z = previous_increment[2];
-    const int_fast32_t d_x = increment[0];
-    const int_fast32_t d_y = increment[1];
-    const int_fast32_t d_z = increment[2];
-    if (coning_fast_q31_out_(beta_x, INT32_C(1073741824))
-        || coning_fast_q31_out_(beta_y, INT32_C(1073741824))
-        || coning_fast_q31_out_(beta_z, INT32_C(1073741824))
-        || coning_fast_q31_out_(coning_x, INT32_C(1073741824))
-        || coning_fast_q31_out_(coning_y, INT32_C(1073741824))
-        || coning_fast_q31_out_(coning_z, INT32_C(1073741824))
-        || coning_fast_q31_out_(past_x, INT32_C(1073741824))
-        || coning_fast_q31_out_(past_y, INT32_C(1073741824))
-        || coning_fast_q31_out_(past_z, INT32_C(1073741824))
-        || coning_fast_q31_out_(d_x, INT32_C(1073741824))
-        || coning_fast_q31_out_(d_y, INT32_C(1073741824))
-        || coning_fast_q31_out_(d_z, INT32_C(1073741824)))
-        return 1;
-    /* angle at the middle of the cycle, for coning */
-    const int_fast32_t arm_x = (int_fast32_t)((int64_t)beta_x
-        + coning_fast_q31_shr_((int64_t)past_x * INT32_C(1431655765) + INT64_C(34359738368), 36));
-    const int_fast32_t arm_y = (int_fast32_t)((int64_t)beta_y
-        + coning_fast_q31_shr_((int64_t)past_y * INT32_C(1431655765) + INT64_C(34359738368), 36));
-    const int64_t arm_z = (int64_t)beta_z * INT64_C(4294967296)
-        + coning_fast_q31_shr_((int64_t)past_z * INT32_C(1431655765), 4);
-    /* sum of the angle increments since the slow cycle began, after the call */
-    const int_fast32_t next_beta_x =
-        (int_fast32_t)((int64_t)beta_x + coning_fast_q31_shr_((int64_t)d_x + 4, 3));
-    const int_fast32_t next_beta_y =
-        (int_fast32_t)((int64_t)beta_y + coning_fast_q31_shr_((int64_t)d_y + 4, 3));
-    const int_fast32_t next_beta_z =
-        (int_fast32_t)((int64_t)beta_z + coning_fast_q31_shr_((int64_t)d_z + 4, 3));
-    const int_fast32_t shared_1 = (int_fast32_t)((int64_t)d_z);
-    const int_fast32_t shared_2 =
-        (int_fast32_t)(coning_fast_q31_shr_(arm_z + INT64_C(2147483648), 32));
-    /* coning correction since the slow cycle began, after the call */
-    const int64_t next_coning_x_unchecked = (int64_t)coning_x
-        + coning_fast_q31_shr_((int64_t)arm_y * shared_1 - (int64_t)d_y * shared_2
-        + INT32_C(1073741824), 31);
-    if (next_coning_x_unchecked < (-INT32_C(1073741824))
-        || next_coning_x_unchecked > INT32_C(1073741824))
-        return 2;
-    const int_fast32_t next_coning_x = (int_fast32_t)next_coning_x_unchecked;
-    const int64_t next_coning_y_unchecked = (int64_t)coning_y
-        + coning_fast_q31_shr_(-(int64_t)arm_x * shared_1 + (int64_t)d_x * shared_2
-        + INT32_C(1073741824), 31);
-    if (next_coning_y_unchecked < (-INT32_C(1073741824))
-        || next_coning_y_unchecked > INT32_C(1073741824))
-        return 2;
-    const int_fast32_t next_coning_y = (int_fast32_t)next_coning_y_unchecked;
-    const int64_t next_coning_z_unchecked = (int64_t)coning_z
-        + coning_fast_q31_shr_((int64_t)arm_x * d_y - (int64_t)arm_y * d_x
-        + INT32_C(1073741824), 31);
-    if (next_coning_z_unchecked < (-INT32_C(1073741824))
-        || next_coning_z_unchecked > INT32_C(1073741824))
-        return 2;
-    const int_fast32_t next_coning_z = (int_fast32_t)next_coning_z_unchecked;
-    const int_fast32_t next_past_x = (int_fast32_t)((int64_t)d_x);
-    const int_fast32_t next_past_y = (int_fast32_t)((int64_t)d_y);
-    const int_fast32_t next_past_z = (int_fast32_t)((int64_t)d_z);
-    next_angle_sum[0] = (int32_t)next_beta_x;
-    next_angle_sum[1] = (int32_t)next_beta_y;
-    next_angle_sum[2] = (int32_t)next_beta_z;
-    next_coning[0] = (int32_t)next_coning_x;
-    next_coning[1] = (int32_t)next_coning_y;
-    next_coning[2] = (int32_t)next_coning_z;
-    next_previous_increment[0] = (int32_t)next_past_x;
-    next_previous_increment[1] = (int32_t)next_past_y;
-    next_previous_increment[2] = (int32_t)next_past_z;
-    return 0;
+    return (x < 0) ? ~(~x >> n) : (x >> n);
 }
 
 int coning_fast_q31(const int32_t angle_sum[3], const int32_t coning[3],
     const int32_t previous_increment[3], const int32_t increment[3], int32_t next_angle_sum[3],
     int32_t next_coning[3], int32_t next_previous_increment[3])
 {
-    return coning_fast_q31_one_(angle_sum, coning, previous_increment, increment, next_angle_sum,
-        next_coning, next_previous_increment);
-}
-
-size_t coning_fast_q31_array(size_t count, int *status, const int32_t *angle_sum,
-    const int32_t *coning, const int32_t *previous_increment, const int32_t *increment,
-    int32_t *next_angle_sum, int32_t *next_coning, int32_t *next_previous_increment)
-{
-    *status = 0;
-    for (size_t k = 0; k < count; ++k) {
-        *status = coning_fast_q31_one_(angle_sum + 3 * k, coning + 3 * k,
-            previous_increment + 3 * k, increment + 3 * k, next_angle_sum + 3 * k,
-            next_coning + 3 * k, next_previous_increment + 3 * k);
-        if (*status)
-            return k;
+    const int32_t beta_x = angle_sum[0];
+    const int32_t beta_y = angle_sum[1];
+    const int32_t beta_z = angle_sum[2];
+    const int32_t coning_x = coning[0];
+    const int32_t coning_y = coning[1];
+    const int32_t coning_z = coning[2];
+    const int32_t past_x = previous_increment[0];
+    const int32_t past_y = previous_increment[1];
+    const int32_t past_z = previous_increment[2];
+    const int32_t d_x = increment[0];
+    const int32_t d_y = increment[1];
+    const int32_t d_z = increment[2];
+    if (coning_fast_q31_out_(beta_x, (INT32_C(1) << 30))
+        || coning_fast_q31_out_(beta_y, (INT32_C(1) << 30))
+        || coning_fast_q31_out_(beta_z, (INT32_C(1) << 30))
+        || coning_fast_q31_out_(coning_x, (INT32_C(1) << 30))
+        || coning_fast_q31_out_(coning_y, (INT32_C(1) << 30))
+        || coning_fast_q31_out_(coning_z, (INT32_C(1) << 30))
+        || coning_fast_q31_out_(past_x, (INT32_C(1) << 30))
+        || coning_fast_q31_out_(past_y, (INT32_C(1) << 30))
+        || coning_fast_q31_out_(past_z, (INT32_C(1) << 30))
+        || coning_fast_q31_out_(d_x, (INT32_C(1) << 30))
+        || coning_fast_q31_out_(d_y, (INT32_C(1) << 30))
+        || coning_fast_q31_out_(d_z, (INT32_C(1) << 30)))
+        return 1;
+    /* angle at the middle of the cycle, for coning */
+    const int32_t arm_x = beta_x
+        + coning_fast_q31_narrow_(coning_fast_q31_mul_(past_x, INT32_C(1431655765) /* 1/6 in Q33 */)
+        + (INT64_C(1) << 35), 36); /* Q1.30, -1.03 .. 1.03, error 4.8e-10 */
+    const int32_t arm_y = beta_y
+        + coning_fast_q31_narrow_(coning_fast_q31_mul_(past_y, INT32_C(1431655765) /* 1/6 in Q33 */)
+        + (INT64_C(1) << 35), 36); /* Q1.30, -1.03 .. 1.03, error 4.8e-10 */
+    const int64_t arm_z = (int64_t)beta_z * (INT64_C(1) << 32)
+        + coning_fast_q31_shr_(coning_fast_q31_mul_(past_z, INT32_C(1431655765) /* 1/6 in Q33 */), 4);
+        /* Q1.62, -1.03 .. 1.03, error 4.9e-12 */
+    /* sum of the angle increments since the slow cycle began, after the call */
+    const int32_t next_beta_x = beta_x + coning_fast_q31_narrow_((int64_t)d_x + 4, 3);
+        /* Q1.30, -1.13 .. 1.13, error 4.7e-10 */
+    const int32_t next_beta_y = beta_y + coning_fast_q31_narrow_((int64_t)d_y + 4, 3);
+        /* Q1.30, -1.13 .. 1.13, error 4.7e-10 */
+    const int32_t next_beta_z = beta_z + coning_fast_q31_narrow_((int64_t)d_z + 4, 3);
+        /* Q1.30, -1.13 .. 1.13, error 4.7e-10 */
+    const int32_t shared_1 = d_z; /* Q-3.34, -0.0625 .. 0.0625, exact */
+    const int32_t shared_2 = coning_fast_q31_narrow_(arm_z + (INT64_C(1) << 31), 32);
+        /* Q0.31, -0.511 .. 0.511, error 2.4e-10 */
+    /* coning correction since the slow cycle began, after the call */
+    const int64_t next_coning_x_unchecked = (int64_t)coning_x
+        + coning_fast_q31_shr_(coning_fast_q31_mul_(arm_y, shared_1)
+        - coning_fast_q31_mul_(d_y, shared_2) + (INT32_C(1) << 30), 31);
+    if ((next_coning_x_unchecked < (-(INT32_C(1) << 30)))
+        || (next_coning_x_unchecked > (INT32_C(1) << 30))) {
+        return 2;
     }
-    return count;
+    const int32_t next_coning_x = coning_fast_q31_narrow_(next_coning_x_unchecked, 0);
+        /* Q-2.33, -0.125 .. 0.125, error 1.2e-10 */
+    const int64_t next_coning_y_unchecked = (int64_t)coning_y
+        + coning_fast_q31_shr_(-coning_fast_q31_mul_(arm_x, shared_1)
+        + coning_fast_q31_mul_(d_x, shared_2) + (INT32_C(1) << 30), 31);
+    if ((next_coning_y_unchecked < (-(INT32_C(1) << 30)))
+        || (next_coning_y_unchecked > (INT32_C(1) << 30))) {
+        return 2;
+    }
+    const int32_t next_coning_y = coning_fast_q31_narrow_(next_coning_y_unchecked, 0);
+        /* Q-2.33, -0.125 .. 0.125, error 1.2e-10 */
+    const int64_t next_coning_z_unchecked = (int64_t)coning_z
+        + coning_fast_q31_shr_(coning_fast_q31_mul_(arm_x, d_y)
+        - coning_fast_q31_mul_(arm_y, d_x) + (INT32_C(1) << 30), 31);
+    if ((next_coning_z_unchecked < (-(INT32_C(1) << 30)))
+        || (next_coning_z_unchecked > (INT32_C(1) << 30))) {
+        return 2;
+    }
+    const int32_t next_coning_z = coning_fast_q31_narrow_(next_coning_z_unchecked, 0);
+        /* Q-2.33, -0.125 .. 0.125, error 1.2e-10 */
+    const int32_t next_past_x = d_x; /* Q-2.33, -0.125 .. 0.125, exact */
+    const int32_t next_past_y = d_y; /* Q-2.33, -0.125 .. 0.125, exact */
+    const int32_t next_past_z = d_z; /* Q-2.33, -0.125 .. 0.125, exact */
+    next_angle_sum[0] = next_beta_x;
+    next_angle_sum[1] = next_beta_y;
+    next_angle_sum[2] = next_beta_z;
+    next_coning[0] = next_coning_x;
+    next_coning[1] = next_coning_y;
+    next_coning[2] = next_coning_z;
+    next_previous_increment[0] = next_past_x;
+    next_previous_increment[1] = next_past_y;
+    next_previous_increment[2] = next_past_z;
+    return 0;
 }

@@ -7,16 +7,16 @@
  *     equation (26).
  * Integer operations of one call: 21 add, 9 multiply, 11 shift; 5 temporaries.
  *
- * A number in format Qm.n is an integer times 2^-n. Rounding: nearest. No sum or product on the way
- * can overflow for input inside the ranges below, which every call checks; an error is the
+ * A number in format Qm.n is an integer times 2^-n. Rounding: nearest. No sum or product on the
+ * way can overflow for input inside the ranges below, which every call checks; an error is the
  * distance from what exact arithmetic makes of the same integers.
- * No heap, no global state, no floating point, reentrant. In one call every input is read before any
- * output is written: an output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, no floating point, reentrant. In one call every input is read before
+ * any output is written: an output may be the same memory as an input. Matrices are stored by
+ * rows.
  */
 #ifndef CONING_FAST_Q31_H
 #define CONING_FAST_Q31_H
 
-#include <stddef.h>
 #include <stdint.h>
 
 #ifdef __cplusplus
@@ -29,21 +29,22 @@ extern "C" {
  * in      coning[3]: coning correction since the slow cycle began; coning_x, coning_y, coning_z;
  *         format Q-2.33, unit 2^-33 rad; range -1073741824 to 1073741824 (-0.125 to 0.125).
  * in      previous_increment[3]: angle increment of the fast cycle before; zero at the start;
- *         past_x, past_y, past_z; format Q-2.33, unit 2^-33 rad; range -1073741824 to 1073741824
- *         (-0.125 to 0.125).
+ *         past_x, past_y, past_z; format Q-2.33, unit 2^-33 rad; range -1073741824 to
+ *         1073741824 (-0.125 to 0.125).
  * in      increment[3]: angle increment of the fast cycle, body axes: exact integral of the body
  *         rate; d_x, d_y, d_z; format Q-2.33, unit 2^-33 rad; range -1073741824 to 1073741824
  *         (-0.125 to 0.125).
- * out     next_angle_sum[3]: sum of the angle increments since the slow cycle began, after the call;
- *         next_beta_x, next_beta_y, next_beta_z; format Q1.30, unit 2^-30 rad; range -1207959553
- *         to 1207959553 (-1.125 to 1.125); error at most 4.65661e-10, 0.5000 of the last place.
+ * out     next_angle_sum[3]: sum of the angle increments since the slow cycle began, after the
+ *         call; next_beta_x, next_beta_y, next_beta_z; format Q1.30, unit 2^-30 rad; range
+ *         -1207959553 to 1207959553 (-1.125 to 1.125); error at most 4.65661e-10, 0.5000 of
+ *         the last place.
  * out     next_coning[3]: coning correction since the slow cycle began, after the call;
  *         next_coning_x, next_coning_y, next_coning_z; format Q-2.33, unit 2^-33 rad; range
- *         -1073741824 to 1073741824 (-0.125 to 0.125); error at most 1.17022e-10, 1.0052 of the
- *         last place.
+ *         -1073741824 to 1073741824 (-0.125 to 0.125); error at most 1.17022e-10, 1.0052 of
+ *         the last place.
  * out     next_previous_increment[3]: angle increment of the fast cycle before, after the call;
- *         next_past_x, next_past_y, next_past_z; format Q-2.33, unit 2^-33 rad; range -1073741824
- *         to 1073741824 (-0.125 to 0.125).
+ *         next_past_x, next_past_y, next_past_z; format Q-2.33, unit 2^-33 rad; range
+ *         -1073741824 to 1073741824 (-0.125 to 0.125).
  * Returns 0; or, with the outputs left alone, 1 if an input lies outside its range,
  * 2 if it is too far from a proper one, so that something leaves its limits: next_coning_x,
  *   next_coning_y, next_coning_z from -0.125 to 0.125.
@@ -51,15 +52,6 @@ extern "C" {
 int coning_fast_q31(const int32_t angle_sum[3], const int32_t coning[3],
     const int32_t previous_increment[3], const int32_t increment[3], int32_t next_angle_sum[3],
     int32_t next_coning[3], int32_t next_previous_increment[3]);
-
-/* `count` calls on arrays of samples, one after the other, up to the first that is refused: every array holds `count`
- * times what one call takes.
- * An output may be the same memory as an input whose samples have the same size; otherwise they must not overlap.
- * Returns how many calls were done, and in `status` what the last one returned.
- */
-size_t coning_fast_q31_array(size_t count, int *status, const int32_t *angle_sum,
-    const int32_t *coning, const int32_t *previous_increment, const int32_t *increment,
-    int32_t *next_angle_sum, int32_t *next_coning, int32_t *next_previous_increment);
 
 #ifdef __cplusplus
 }

@@ -5,282 +5,383 @@
 #include "dcm_from_euler_angles_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int dcm_from_euler_angles_q31_out_(int_fast32_t x, int_fast32_t limit)
+static inline int dcm_from_euler_angles_q31_out_(int32_t x, int32_t limit)
 {
-    return (uint64_t)x + (uint64_t)limit > 2 * (uint64_t)limit;
+    return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
 
-/* x / 2^n, rounded down. The right shift of a negative number is left to the compiler by the standard; this is not, and
- * compilers make one arithmetic shift of it.
+/* The exact product of two words. */
+#if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
+/* These processors have no instruction for it: the high word takes four products of half words. */
+__attribute__((noinline)) static int64_t dcm_from_euler_angles_q31_mul_(int32_t a, int32_t b)
+{
+    const uint32_t a_low = (uint32_t)a & 0xFFFFu;
+    const uint32_t b_low = (uint32_t)b & 0xFFFFu;
+    const int32_t a_high = (a < 0) ? ~(~a >> 16) : (a >> 16);
+    const int32_t b_high = (b < 0) ? ~(~b >> 16) : (b >> 16);
+    const uint32_t low = a_low * b_low;
+    const int32_t middle = (a_high * (int32_t)b_low) + (int32_t)(low >> 16);
+    const int32_t other = (b_high * (int32_t)a_low) + (int32_t)((uint32_t)middle & 0xFFFFu);
+    const int32_t high = (a_high * b_high) + ((middle < 0) ? ~(~middle >> 16) : (middle >> 16))
+        + ((other < 0) ? ~(~other >> 16) : (other >> 16));
+    const uint64_t bits = ((uint64_t)(uint32_t)high << 32) | ((uint32_t)a * (uint32_t)b);
+    return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
+}
+#else
+static inline int64_t dcm_from_euler_angles_q31_mul_(int32_t a, int32_t b)
+{
+    return (int64_t)a * b;
+}
+#endif
+
+/* x / 2^n, rounded down, where the proof of the ranges shows that it fits into a word: then the
+ * 32 bits of x from bit n on, read as a number with a sign, are that quotient. For n above 32 the
+ * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
+ * number and no conversion of a number out of range.
  */
+static inline int32_t dcm_from_euler_angles_q31_narrow_(int64_t x, int n)
+{
+#ifdef __FRAMAC__
+    return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
+#else
+    const int beyond = (n > 32) ? (n - 32) : 0;
+    const uint32_t bits = (uint32_t)((uint64_t)x >> (n - beyond));
+    const int32_t high = (bits <= (UINT32_MAX >> 1)) ? (int32_t)bits
+                                                 : (-1 - (int32_t)(UINT32_MAX - bits));
+    return (high < 0) ? ~(~high >> beyond) : (high >> beyond);
+#endif
+}
+
+/* x / 2^n, rounded down, as a wide number. */
 static inline int64_t dcm_from_euler_angles_q31_shr_(int64_t x, int n)
 {
-    return x < 0 ? ~(~x >> n) : x >> n;
-}
-
-/* The algorithm. Static, so that the loops below can take it in. */
-static inline int dcm_from_euler_angles_q31_one_(const int32_t angles[3], int32_t attitude[9])
-{
-    const int_fast32_t roll = angles[0];
-    const int_fast32_t pitch = angles[1];
-    const int_fast32_t heading = angles[2];
-    if (dcm_from_euler_angles_q31_out_(roll, INT32_C(1686629857))
-        || dcm_from_euler_angles_q31_out_(pitch, INT32_C(1686629857))
-        || dcm_from_euler_angles_q31_out_(heading, INT32_C(1686629857)))
-        return 1;
-    const int_fast32_t cos_heading_quarters =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)heading * INT32_C(1367130551)
-        + INT64_C(576460752303423488), 60));
-    const int_fast32_t cos_heading_rest = (int_fast32_t)((int64_t)heading * 4
-        + dcm_from_euler_angles_q31_shr_(-(int64_t)cos_heading_quarters * INT32_C(560513589)
-        + INT64_C(2147483648), 32) - (int64_t)cos_heading_quarters * INT32_C(1686629713) * 2);
-    const int_fast32_t cos_heading_turns =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_quarters + 2, 2));
-    const int64_t cos_heading_quarter_turns = (int64_t)cos_heading_quarters
-        - (int64_t)cos_heading_turns * 4;
-    const int_fast32_t cos_heading_square =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_rest * cos_heading_rest
-        + INT32_C(1073741824), 31));
-    const int_fast32_t cos_heading_series =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_(-(int64_t)cos_heading_square * INT32_C(56412333), 1)
-        + INT64_C(6662950945848033280) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_heading_series_2 =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_square * cos_heading_series, 5)
-        - INT64_C(7495819814078808064) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_heading_series_3 =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_square * cos_heading_series_2, 5)
-        + INT64_C(4919131752989213696) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_heading_series_4 =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_square * cos_heading_series_3, 3)
-        - INT64_C(6148914691236517216) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_heading_bend =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_square * cos_heading_series_4
-        + INT32_C(536870912), 30));
-    const int64_t cos_heading_sine = (int64_t)cos_heading_rest * INT64_C(4294967296)
-        + dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_rest * cos_heading_bend, 2);
-    const int_fast32_t cos_heading_series_5 =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_(-(int64_t)cos_heading_square * INT32_C(620535663), 4)
-        + INT64_C(7495819814078775296) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_heading_series_6 =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_square * cos_heading_series_5, 5)
-        - INT64_C(6558842337318952960) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_heading_series_7 =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_square * cos_heading_series_6, 4)
-        + INT64_C(6148914691236517248) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_heading_bend_2 =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_square * cos_heading_series_7
-        + INT32_C(536870912), 30));
-    const int64_t cos_heading_cosine = -(int64_t)cos_heading_square * INT32_C(1073741824)
-        + dcm_from_euler_angles_q31_shr_((int64_t)cos_heading_square * cos_heading_bend_2, 5)
-        + INT64_C(4611686018427387904);
-    const int64_t cos_heading_opposite = -cos_heading_sine;
-    const int64_t cos_heading_opposite_2 = -cos_heading_cosine;
-    const int64_t cos_heading_quarter = (cos_heading_quarter_turns >= 1 ? dcm_from_euler_angles_q31_shr_(cos_heading_opposite, 1)
-        : cos_heading_quarter_turns >= 0 ? cos_heading_cosine
-        : cos_heading_quarter_turns >= (-1) ? dcm_from_euler_angles_q31_shr_(cos_heading_sine, 1)
-        : cos_heading_opposite_2);
-    const int_fast32_t cos_heading =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(cos_heading_quarter
-        + INT64_C(2147483648), 32));
-    const int64_t sin_heading_quarter = (cos_heading_quarter_turns >= 1 ? cos_heading_cosine
-        : cos_heading_quarter_turns >= 0 ? dcm_from_euler_angles_q31_shr_(cos_heading_sine, 1)
-        : cos_heading_quarter_turns >= (-1) ? cos_heading_opposite_2
-        : dcm_from_euler_angles_q31_shr_(cos_heading_opposite, 1));
-    const int_fast32_t sin_heading =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(sin_heading_quarter
-        + INT64_C(2147483648), 32));
-    const int_fast32_t cos_pitch_quarters =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)pitch * INT32_C(1367130551)
-        + INT64_C(576460752303423488), 60));
-    const int_fast32_t cos_pitch_rest = (int_fast32_t)((int64_t)pitch * 4
-        + dcm_from_euler_angles_q31_shr_(-(int64_t)cos_pitch_quarters * INT32_C(560513589)
-        + INT64_C(2147483648), 32) - (int64_t)cos_pitch_quarters * INT32_C(1686629713) * 2);
-    const int_fast32_t cos_pitch_turns =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_quarters + 2, 2));
-    const int64_t cos_pitch_quarter_turns =
-        (int64_t)cos_pitch_quarters - (int64_t)cos_pitch_turns * 4;
-    const int_fast32_t cos_pitch_square =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_rest * cos_pitch_rest
-        + INT32_C(1073741824), 31));
-    const int_fast32_t cos_pitch_series =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_(-(int64_t)cos_pitch_square * INT32_C(56412333), 1)
-        + INT64_C(6662950945848033280) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_pitch_series_2 =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_square * cos_pitch_series, 5)
-        - INT64_C(7495819814078808064) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_pitch_series_3 =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_square * cos_pitch_series_2, 5)
-        + INT64_C(4919131752989213696) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_pitch_series_4 =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_square * cos_pitch_series_3, 3)
-        - INT64_C(6148914691236517216) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_pitch_bend =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_square * cos_pitch_series_4
-        + INT32_C(536870912), 30));
-    const int64_t cos_pitch_sine = (int64_t)cos_pitch_rest * INT64_C(4294967296)
-        + dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_rest * cos_pitch_bend, 2);
-    const int_fast32_t cos_pitch_series_5 =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_(-(int64_t)cos_pitch_square * INT32_C(620535663), 4)
-        + INT64_C(7495819814078775296) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_pitch_series_6 =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_square * cos_pitch_series_5, 5)
-        - INT64_C(6558842337318952960) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_pitch_series_7 =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_square * cos_pitch_series_6, 4)
-        + INT64_C(6148914691236517248) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_pitch_bend_2 =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_square * cos_pitch_series_7
-        + INT32_C(536870912), 30));
-    const int64_t cos_pitch_cosine = -(int64_t)cos_pitch_square * INT32_C(1073741824)
-        + dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch_square * cos_pitch_bend_2, 5)
-        + INT64_C(4611686018427387904);
-    const int64_t cos_pitch_opposite = -cos_pitch_sine;
-    const int64_t cos_pitch_opposite_2 = -cos_pitch_cosine;
-    const int64_t cos_pitch_quarter = (cos_pitch_quarter_turns >= 1 ? dcm_from_euler_angles_q31_shr_(cos_pitch_opposite, 1)
-        : cos_pitch_quarter_turns >= 0 ? cos_pitch_cosine
-        : cos_pitch_quarter_turns >= (-1) ? dcm_from_euler_angles_q31_shr_(cos_pitch_sine, 1)
-        : cos_pitch_opposite_2);
-    const int_fast32_t cos_pitch = (int_fast32_t)(dcm_from_euler_angles_q31_shr_(cos_pitch_quarter
-        + INT64_C(2147483648), 32));
-    const int64_t sin_pitch_quarter = (cos_pitch_quarter_turns >= 1 ? cos_pitch_cosine
-        : cos_pitch_quarter_turns >= 0 ? dcm_from_euler_angles_q31_shr_(cos_pitch_sine, 1)
-        : cos_pitch_quarter_turns >= (-1) ? cos_pitch_opposite_2
-        : dcm_from_euler_angles_q31_shr_(cos_pitch_opposite, 1));
-    const int_fast32_t sin_pitch = (int_fast32_t)(dcm_from_euler_angles_q31_shr_(sin_pitch_quarter
-        + INT64_C(2147483648), 32));
-    const int_fast32_t cos_roll_quarters =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)roll * INT32_C(1367130551)
-        + INT64_C(576460752303423488), 60));
-    const int_fast32_t cos_roll_rest = (int_fast32_t)((int64_t)roll * 4
-        + dcm_from_euler_angles_q31_shr_(-(int64_t)cos_roll_quarters * INT32_C(560513589)
-        + INT64_C(2147483648), 32) - (int64_t)cos_roll_quarters * INT32_C(1686629713) * 2);
-    const int_fast32_t cos_roll_turns =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_quarters + 2, 2));
-    const int64_t cos_roll_quarter_turns = (int64_t)cos_roll_quarters - (int64_t)cos_roll_turns * 4;
-    const int_fast32_t cos_roll_square =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_rest * cos_roll_rest
-        + INT32_C(1073741824), 31));
-    const int_fast32_t cos_roll_series =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_(-(int64_t)cos_roll_square * INT32_C(56412333), 1)
-        + INT64_C(6662950945848033280) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_roll_series_2 =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_square * cos_roll_series, 5)
-        - INT64_C(7495819814078808064) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_roll_series_3 =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_square * cos_roll_series_2, 5)
-        + INT64_C(4919131752989213696) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_roll_series_4 =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_square * cos_roll_series_3, 3)
-        - INT64_C(6148914691236517216) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_roll_bend =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_square * cos_roll_series_4
-        + INT32_C(536870912), 30));
-    const int64_t cos_roll_sine = (int64_t)cos_roll_rest * INT64_C(4294967296)
-        + dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_rest * cos_roll_bend, 2);
-    const int_fast32_t cos_roll_series_5 =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_(-(int64_t)cos_roll_square * INT32_C(620535663), 4)
-        + INT64_C(7495819814078775296) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_roll_series_6 =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_square * cos_roll_series_5, 5)
-        - INT64_C(6558842337318952960) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_roll_series_7 =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_square * cos_roll_series_6, 4)
-        + INT64_C(6148914691236517248) + INT64_C(2147483648), 32));
-    const int_fast32_t cos_roll_bend_2 =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_square * cos_roll_series_7
-        + INT32_C(536870912), 30));
-    const int64_t cos_roll_cosine = -(int64_t)cos_roll_square * INT32_C(1073741824)
-        + dcm_from_euler_angles_q31_shr_((int64_t)cos_roll_square * cos_roll_bend_2, 5)
-        + INT64_C(4611686018427387904);
-    const int64_t cos_roll_opposite = -cos_roll_sine;
-    const int64_t cos_roll_opposite_2 = -cos_roll_cosine;
-    const int64_t cos_roll_quarter = (cos_roll_quarter_turns >= 1 ? dcm_from_euler_angles_q31_shr_(cos_roll_opposite, 1)
-        : cos_roll_quarter_turns >= 0 ? cos_roll_cosine
-        : cos_roll_quarter_turns >= (-1) ? dcm_from_euler_angles_q31_shr_(cos_roll_sine, 1)
-        : cos_roll_opposite_2);
-    const int_fast32_t cos_roll = (int_fast32_t)(dcm_from_euler_angles_q31_shr_(cos_roll_quarter
-        + INT64_C(2147483648), 32));
-    const int64_t sin_roll_quarter = (cos_roll_quarter_turns >= 1 ? cos_roll_cosine
-        : cos_roll_quarter_turns >= 0 ? dcm_from_euler_angles_q31_shr_(cos_roll_sine, 1)
-        : cos_roll_quarter_turns >= (-1) ? cos_roll_opposite_2
-        : dcm_from_euler_angles_q31_shr_(cos_roll_opposite, 1));
-    const int_fast32_t sin_roll = (int_fast32_t)(dcm_from_euler_angles_q31_shr_(sin_roll_quarter
-        + INT64_C(2147483648), 32));
-    /* direction cosine matrix, body to reference */
-    const int_fast32_t C_11 =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading * cos_pitch
-        + INT32_C(536870912), 30));
-    const int_fast32_t shared_1 =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading * sin_roll
-        + INT32_C(536870912), 30));
-    const int_fast32_t shared_4 =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_roll * sin_heading
-        + INT32_C(536870912), 30));
-    const int64_t C_12_unchecked = -(int64_t)shared_4
-        + dcm_from_euler_angles_q31_shr_((int64_t)shared_1 * sin_pitch + INT32_C(536870912), 30);
-    if (C_12_unchecked < (-INT32_C(1140850688))
-        || C_12_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t C_12 = (int_fast32_t)C_12_unchecked;
-    const int_fast32_t shared_2 =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)sin_heading * sin_roll
-        + INT32_C(536870912), 30));
-    const int_fast32_t shared_3 =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_heading * cos_roll
-        + INT32_C(536870912), 30));
-    const int64_t C_13_unchecked = (int64_t)shared_2
-        + dcm_from_euler_angles_q31_shr_((int64_t)shared_3 * sin_pitch + INT32_C(536870912), 30);
-    if (C_13_unchecked < (-INT32_C(1140850688))
-        || C_13_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t C_13 = (int_fast32_t)C_13_unchecked;
-    const int_fast32_t C_21 =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch * sin_heading
-        + INT32_C(536870912), 30));
-    const int64_t C_22_unchecked = (int64_t)shared_3
-        + dcm_from_euler_angles_q31_shr_((int64_t)shared_2 * sin_pitch + INT32_C(536870912), 30);
-    if (C_22_unchecked < (-INT32_C(1140850688))
-        || C_22_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t C_22 = (int_fast32_t)C_22_unchecked;
-    const int64_t C_23_unchecked = -(int64_t)shared_1
-        + dcm_from_euler_angles_q31_shr_((int64_t)shared_4 * sin_pitch + INT32_C(536870912), 30);
-    if (C_23_unchecked < (-INT32_C(1140850688))
-        || C_23_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t C_23 = (int_fast32_t)C_23_unchecked;
-    const int_fast32_t C_31 = (int_fast32_t)(-(int64_t)sin_pitch);
-    const int_fast32_t C_32 =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch * sin_roll
-        + INT32_C(536870912), 30));
-    const int_fast32_t C_33 =
-        (int_fast32_t)(dcm_from_euler_angles_q31_shr_((int64_t)cos_pitch * cos_roll
-        + INT32_C(536870912), 30));
-    attitude[0] = (int32_t)C_11;
-    attitude[1] = (int32_t)C_12;
-    attitude[2] = (int32_t)C_13;
-    attitude[3] = (int32_t)C_21;
-    attitude[4] = (int32_t)C_22;
-    attitude[5] = (int32_t)C_23;
-    attitude[6] = (int32_t)C_31;
-    attitude[7] = (int32_t)C_32;
-    attitude[8] = (int32_t)C_33;
-    return 0;
+    return (x < 0) ? ~(~x >> n) : (x >> n);
 }
 
 int dcm_from_euler_angles_q31(const int32_t angles[3], int32_t attitude[9])
 {
-    return dcm_from_euler_angles_q31_one_(angles, attitude);
-}
-
-size_t dcm_from_euler_angles_q31_array(size_t count, int *status, const int32_t *angles,
-    int32_t *attitude)
-{
-    *status = 0;
-    for (size_t k = 0; k < count; ++k) {
-        *status = dcm_from_euler_angles_q31_one_(angles + 3 * k, attitude + 9 * k);
-        if (*status)
-            return k;
+    const int32_t roll = angles[0];
+    const int32_t pitch = angles[1];
+    const int32_t heading = angles[2];
+    if (dcm_from_euler_angles_q31_out_(roll, INT32_C(1686629857))
+        || dcm_from_euler_angles_q31_out_(pitch, INT32_C(1686629857))
+        || dcm_from_euler_angles_q31_out_(heading, INT32_C(1686629857)))
+        return 1;
+    const int32_t cos_heading_quarters =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_mul_(heading, INT32_C(1367130551))
+        + (INT64_C(1) << 59), 60); /* Q31.0, -2 .. 2, exact */
+    const int32_t cos_heading_rest = dcm_from_euler_angles_q31_narrow_((int64_t)heading * 4
+        + dcm_from_euler_angles_q31_shr_(-dcm_from_euler_angles_q31_mul_(cos_heading_quarters, INT32_C(560513589))
+        + (INT64_C(1) << 31), 32)
+        - dcm_from_euler_angles_q31_mul_(cos_heading_quarters, INT32_C(1686629713)) * 2, 0);
+        /* Q0.31, -0.786 .. 0.786, error 2.4e-10 */
+    const int32_t cos_heading_turns =
+        dcm_from_euler_angles_q31_narrow_((int64_t)cos_heading_quarters + 2, 2);
+        /* Q31.0, 0 .. 1, exact */
+    const int64_t cos_heading_quarter_turns = (int64_t)cos_heading_quarters
+        - (int64_t)cos_heading_turns * 4; /* Q63.0, -2 .. 1, exact */
+    const int32_t cos_heading_square =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_mul_(cos_heading_rest, cos_heading_rest)
+        + (INT32_C(1) << 30), 31); /* Q0.31, -9.32e-10 .. 0.617, error 6e-10 */
+    const int32_t cos_heading_series =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(-dcm_from_euler_angles_q31_mul_(cos_heading_square, INT32_C(56412333) /* 1/39916800 in Q51 */), 1)
+        + INT64_C(6662950945848033280) /* 1/362880 in Q60 */ + (INT64_C(1) << 31), 32);
+        /* 2.74e-06 .. 2.76e-06, error 9.1e-16 */
+    const int32_t cos_heading_series_2 =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_heading_square, cos_heading_series), 5)
+        - INT64_C(7495819814078808064) /* 1/5040 in Q60 */ + (INT64_C(1) << 31), 32);
+        /* Q-12.43, -0.000199 .. -0.000196, error 6e-14 */
+    const int32_t cos_heading_series_3 =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_heading_square, cos_heading_series_2), 5)
+        + INT64_C(4919131752989213696) /* 1/120 in Q60 */ + (INT64_C(1) << 31), 32);
+        /* 0.00821 .. 0.00834, error 3.8e-12 */
+    const int32_t cos_heading_series_4 =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_heading_square, cos_heading_series_3), 3)
+        - INT64_C(6148914691236517216) /* 1/6 in Q60 */ + (INT64_C(1) << 31), 32);
+        /* Q-2.33, -0.167 .. -0.161, error 6.6e-11 */
+    const int32_t cos_heading_bend =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_mul_(cos_heading_square, cos_heading_series_4)
+        + (INT32_C(1) << 29), 30); /* Q-3.34, -0.103 .. 1.75e-10, error 1.7e-10 */
+    const int64_t cos_heading_sine = (int64_t)cos_heading_rest * (INT64_C(1) << 32)
+        + dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_heading_rest, cos_heading_bend), 2);
+        /* Q0.63, -0.786 .. 0.786, error 4e-10 */
+    const int32_t cos_heading_series_5 =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(-dcm_from_euler_angles_q31_mul_(cos_heading_square, INT32_C(620535663) /* 1/3628800 in Q51 */), 4)
+        + INT64_C(7495819814078775296) /* 1/40320 in Q60 */ + (INT64_C(1) << 31), 32);
+        /* 2.46e-05 .. 2.49e-05, error 7.3e-15 */
+    const int32_t cos_heading_series_6 =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_heading_square, cos_heading_series_5), 5)
+        - INT64_C(6558842337318952960) /* 1/720 in Q60 */ + (INT64_C(1) << 31), 32);
+        /* Q-9.40, -0.00139 .. -0.00137, error 4.8e-13 */
+    const int32_t cos_heading_series_7 =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_heading_square, cos_heading_series_6), 4)
+        + INT64_C(6148914691236517248) /* 1/24 in Q60 */ + (INT64_C(1) << 31), 32);
+        /* 0.0408 .. 0.0417, error 1.6e-11 */
+    const int32_t cos_heading_bend_2 =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_mul_(cos_heading_square, cos_heading_series_7)
+        + (INT32_C(1) << 29), 30); /* Q-5.36, -4.37e-11 .. 0.0258, error 4.2e-11 */
+    const int64_t cos_heading_cosine = -(int64_t)cos_heading_square * (INT32_C(1) << 30)
+        + dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_heading_square, cos_heading_bend_2), 5)
+        + (INT64_C(1) << 62); /* Q1.62, 0.691 .. 1.01, error 4.6e-10 */
+    const int64_t cos_heading_opposite = -cos_heading_sine;
+        /* Q0.63, -0.786 .. 0.786, error 4e-10 */
+    const int64_t cos_heading_opposite_2 = -cos_heading_cosine;
+        /* Q1.62, -1.01 .. -0.691, error 4.6e-10 */
+    int64_t cos_heading_quarter; /* Q1.62, -1.01 .. 1.01, error 4.6e-10 */
+    if (cos_heading_quarter_turns >= 1) {
+        cos_heading_quarter = dcm_from_euler_angles_q31_shr_(cos_heading_opposite, 1);
+    } else if (cos_heading_quarter_turns >= 0) {
+        cos_heading_quarter = cos_heading_cosine;
+    } else if (cos_heading_quarter_turns >= (-1)) {
+        cos_heading_quarter = dcm_from_euler_angles_q31_shr_(cos_heading_sine, 1);
+    } else {
+        cos_heading_quarter = cos_heading_opposite_2;
     }
-    return count;
+    const int32_t cos_heading = dcm_from_euler_angles_q31_narrow_(cos_heading_quarter
+        + (INT64_C(1) << 31), 32); /* Q1.30, -1.01 .. 1.01, error 9.3e-10 */
+    int64_t sin_heading_quarter; /* Q1.62, -1.01 .. 1.01, error 4.6e-10 */
+    if (cos_heading_quarter_turns >= 1) {
+        sin_heading_quarter = cos_heading_cosine;
+    } else if (cos_heading_quarter_turns >= 0) {
+        sin_heading_quarter = dcm_from_euler_angles_q31_shr_(cos_heading_sine, 1);
+    } else if (cos_heading_quarter_turns >= (-1)) {
+        sin_heading_quarter = cos_heading_opposite_2;
+    } else {
+        sin_heading_quarter = dcm_from_euler_angles_q31_shr_(cos_heading_opposite, 1);
+    }
+    const int32_t sin_heading = dcm_from_euler_angles_q31_narrow_(sin_heading_quarter
+        + (INT64_C(1) << 31), 32); /* Q1.30, -1.01 .. 1.01, error 9.3e-10 */
+    const int32_t cos_pitch_quarters =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_mul_(pitch, INT32_C(1367130551))
+        + (INT64_C(1) << 59), 60); /* Q31.0, -2 .. 2, exact */
+    const int32_t cos_pitch_rest = dcm_from_euler_angles_q31_narrow_((int64_t)pitch * 4
+        + dcm_from_euler_angles_q31_shr_(-dcm_from_euler_angles_q31_mul_(cos_pitch_quarters, INT32_C(560513589))
+        + (INT64_C(1) << 31), 32)
+        - dcm_from_euler_angles_q31_mul_(cos_pitch_quarters, INT32_C(1686629713)) * 2, 0);
+        /* Q0.31, -0.786 .. 0.786, error 2.4e-10 */
+    const int32_t cos_pitch_turns =
+        dcm_from_euler_angles_q31_narrow_((int64_t)cos_pitch_quarters + 2, 2);
+        /* Q31.0, 0 .. 1, exact */
+    const int64_t cos_pitch_quarter_turns = (int64_t)cos_pitch_quarters
+        - (int64_t)cos_pitch_turns * 4; /* Q63.0, -2 .. 1, exact */
+    const int32_t cos_pitch_square =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_mul_(cos_pitch_rest, cos_pitch_rest)
+        + (INT32_C(1) << 30), 31); /* Q0.31, -9.32e-10 .. 0.617, error 6e-10 */
+    const int32_t cos_pitch_series =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(-dcm_from_euler_angles_q31_mul_(cos_pitch_square, INT32_C(56412333) /* 1/39916800 in Q51 */), 1)
+        + INT64_C(6662950945848033280) /* 1/362880 in Q60 */ + (INT64_C(1) << 31), 32);
+        /* 2.74e-06 .. 2.76e-06, error 9.1e-16 */
+    const int32_t cos_pitch_series_2 =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_pitch_square, cos_pitch_series), 5)
+        - INT64_C(7495819814078808064) /* 1/5040 in Q60 */ + (INT64_C(1) << 31), 32);
+        /* Q-12.43, -0.000199 .. -0.000196, error 6e-14 */
+    const int32_t cos_pitch_series_3 =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_pitch_square, cos_pitch_series_2), 5)
+        + INT64_C(4919131752989213696) /* 1/120 in Q60 */ + (INT64_C(1) << 31), 32);
+        /* 0.00821 .. 0.00834, error 3.8e-12 */
+    const int32_t cos_pitch_series_4 =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_pitch_square, cos_pitch_series_3), 3)
+        - INT64_C(6148914691236517216) /* 1/6 in Q60 */ + (INT64_C(1) << 31), 32);
+        /* Q-2.33, -0.167 .. -0.161, error 6.6e-11 */
+    const int32_t cos_pitch_bend =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_mul_(cos_pitch_square, cos_pitch_series_4)
+        + (INT32_C(1) << 29), 30); /* Q-3.34, -0.103 .. 1.75e-10, error 1.7e-10 */
+    const int64_t cos_pitch_sine = (int64_t)cos_pitch_rest * (INT64_C(1) << 32)
+        + dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_pitch_rest, cos_pitch_bend), 2);
+        /* Q0.63, -0.786 .. 0.786, error 4e-10 */
+    const int32_t cos_pitch_series_5 =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(-dcm_from_euler_angles_q31_mul_(cos_pitch_square, INT32_C(620535663) /* 1/3628800 in Q51 */), 4)
+        + INT64_C(7495819814078775296) /* 1/40320 in Q60 */ + (INT64_C(1) << 31), 32);
+        /* 2.46e-05 .. 2.49e-05, error 7.3e-15 */
+    const int32_t cos_pitch_series_6 =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_pitch_square, cos_pitch_series_5), 5)
+        - INT64_C(6558842337318952960) /* 1/720 in Q60 */ + (INT64_C(1) << 31), 32);
+        /* Q-9.40, -0.00139 .. -0.00137, error 4.8e-13 */
+    const int32_t cos_pitch_series_7 =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_pitch_square, cos_pitch_series_6), 4)
+        + INT64_C(6148914691236517248) /* 1/24 in Q60 */ + (INT64_C(1) << 31), 32);
+        /* 0.0408 .. 0.0417, error 1.6e-11 */
+    const int32_t cos_pitch_bend_2 =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_mul_(cos_pitch_square, cos_pitch_series_7)
+        + (INT32_C(1) << 29), 30); /* Q-5.36, -4.37e-11 .. 0.0258, error 4.2e-11 */
+    const int64_t cos_pitch_cosine = -(int64_t)cos_pitch_square * (INT32_C(1) << 30)
+        + dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_pitch_square, cos_pitch_bend_2), 5)
+        + (INT64_C(1) << 62); /* Q1.62, 0.691 .. 1.01, error 4.6e-10 */
+    const int64_t cos_pitch_opposite = -cos_pitch_sine; /* Q0.63, -0.786 .. 0.786, error 4e-10 */
+    const int64_t cos_pitch_opposite_2 = -cos_pitch_cosine;
+        /* Q1.62, -1.01 .. -0.691, error 4.6e-10 */
+    int64_t cos_pitch_quarter; /* Q1.62, -1.01 .. 1.01, error 4.6e-10 */
+    if (cos_pitch_quarter_turns >= 1) {
+        cos_pitch_quarter = dcm_from_euler_angles_q31_shr_(cos_pitch_opposite, 1);
+    } else if (cos_pitch_quarter_turns >= 0) {
+        cos_pitch_quarter = cos_pitch_cosine;
+    } else if (cos_pitch_quarter_turns >= (-1)) {
+        cos_pitch_quarter = dcm_from_euler_angles_q31_shr_(cos_pitch_sine, 1);
+    } else {
+        cos_pitch_quarter = cos_pitch_opposite_2;
+    }
+    const int32_t cos_pitch = dcm_from_euler_angles_q31_narrow_(cos_pitch_quarter
+        + (INT64_C(1) << 31), 32); /* Q1.30, -1.01 .. 1.01, error 9.3e-10 */
+    int64_t sin_pitch_quarter; /* Q1.62, -1.01 .. 1.01, error 4.6e-10 */
+    if (cos_pitch_quarter_turns >= 1) {
+        sin_pitch_quarter = cos_pitch_cosine;
+    } else if (cos_pitch_quarter_turns >= 0) {
+        sin_pitch_quarter = dcm_from_euler_angles_q31_shr_(cos_pitch_sine, 1);
+    } else if (cos_pitch_quarter_turns >= (-1)) {
+        sin_pitch_quarter = cos_pitch_opposite_2;
+    } else {
+        sin_pitch_quarter = dcm_from_euler_angles_q31_shr_(cos_pitch_opposite, 1);
+    }
+    const int32_t sin_pitch = dcm_from_euler_angles_q31_narrow_(sin_pitch_quarter
+        + (INT64_C(1) << 31), 32); /* Q1.30, -1.01 .. 1.01, error 9.3e-10 */
+    const int32_t cos_roll_quarters =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_mul_(roll, INT32_C(1367130551))
+        + (INT64_C(1) << 59), 60); /* Q31.0, -2 .. 2, exact */
+    const int32_t cos_roll_rest = dcm_from_euler_angles_q31_narrow_((int64_t)roll * 4
+        + dcm_from_euler_angles_q31_shr_(-dcm_from_euler_angles_q31_mul_(cos_roll_quarters, INT32_C(560513589))
+        + (INT64_C(1) << 31), 32)
+        - dcm_from_euler_angles_q31_mul_(cos_roll_quarters, INT32_C(1686629713)) * 2, 0);
+        /* Q0.31, -0.786 .. 0.786, error 2.4e-10 */
+    const int32_t cos_roll_turns = dcm_from_euler_angles_q31_narrow_((int64_t)cos_roll_quarters
+        + 2, 2); /* Q31.0, 0 .. 1, exact */
+    const int64_t cos_roll_quarter_turns = (int64_t)cos_roll_quarters
+        - (int64_t)cos_roll_turns * 4; /* Q63.0, -2 .. 1, exact */
+    const int32_t cos_roll_square =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_mul_(cos_roll_rest, cos_roll_rest)
+        + (INT32_C(1) << 30), 31); /* Q0.31, -9.32e-10 .. 0.617, error 6e-10 */
+    const int32_t cos_roll_series =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(-dcm_from_euler_angles_q31_mul_(cos_roll_square, INT32_C(56412333) /* 1/39916800 in Q51 */), 1)
+        + INT64_C(6662950945848033280) /* 1/362880 in Q60 */ + (INT64_C(1) << 31), 32);
+        /* 2.74e-06 .. 2.76e-06, error 9.1e-16 */
+    const int32_t cos_roll_series_2 =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_roll_square, cos_roll_series), 5)
+        - INT64_C(7495819814078808064) /* 1/5040 in Q60 */ + (INT64_C(1) << 31), 32);
+        /* Q-12.43, -0.000199 .. -0.000196, error 6e-14 */
+    const int32_t cos_roll_series_3 =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_roll_square, cos_roll_series_2), 5)
+        + INT64_C(4919131752989213696) /* 1/120 in Q60 */ + (INT64_C(1) << 31), 32);
+        /* 0.00821 .. 0.00834, error 3.8e-12 */
+    const int32_t cos_roll_series_4 =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_roll_square, cos_roll_series_3), 3)
+        - INT64_C(6148914691236517216) /* 1/6 in Q60 */ + (INT64_C(1) << 31), 32);
+        /* Q-2.33, -0.167 .. -0.161, error 6.6e-11 */
+    const int32_t cos_roll_bend =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_mul_(cos_roll_square, cos_roll_series_4)
+        + (INT32_C(1) << 29), 30); /* Q-3.34, -0.103 .. 1.75e-10, error 1.7e-10 */
+    const int64_t cos_roll_sine = (int64_t)cos_roll_rest * (INT64_C(1) << 32)
+        + dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_roll_rest, cos_roll_bend), 2);
+        /* Q0.63, -0.786 .. 0.786, error 4e-10 */
+    const int32_t cos_roll_series_5 =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(-dcm_from_euler_angles_q31_mul_(cos_roll_square, INT32_C(620535663) /* 1/3628800 in Q51 */), 4)
+        + INT64_C(7495819814078775296) /* 1/40320 in Q60 */ + (INT64_C(1) << 31), 32);
+        /* 2.46e-05 .. 2.49e-05, error 7.3e-15 */
+    const int32_t cos_roll_series_6 =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_roll_square, cos_roll_series_5), 5)
+        - INT64_C(6558842337318952960) /* 1/720 in Q60 */ + (INT64_C(1) << 31), 32);
+        /* Q-9.40, -0.00139 .. -0.00137, error 4.8e-13 */
+    const int32_t cos_roll_series_7 =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_roll_square, cos_roll_series_6), 4)
+        + INT64_C(6148914691236517248) /* 1/24 in Q60 */ + (INT64_C(1) << 31), 32);
+        /* 0.0408 .. 0.0417, error 1.6e-11 */
+    const int32_t cos_roll_bend_2 =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_mul_(cos_roll_square, cos_roll_series_7)
+        + (INT32_C(1) << 29), 30); /* Q-5.36, -4.37e-11 .. 0.0258, error 4.2e-11 */
+    const int64_t cos_roll_cosine = -(int64_t)cos_roll_square * (INT32_C(1) << 30)
+        + dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_roll_square, cos_roll_bend_2), 5)
+        + (INT64_C(1) << 62); /* Q1.62, 0.691 .. 1.01, error 4.6e-10 */
+    const int64_t cos_roll_opposite = -cos_roll_sine; /* Q0.63, -0.786 .. 0.786, error 4e-10 */
+    const int64_t cos_roll_opposite_2 = -cos_roll_cosine;
+        /* Q1.62, -1.01 .. -0.691, error 4.6e-10 */
+    int64_t cos_roll_quarter; /* Q1.62, -1.01 .. 1.01, error 4.6e-10 */
+    if (cos_roll_quarter_turns >= 1) {
+        cos_roll_quarter = dcm_from_euler_angles_q31_shr_(cos_roll_opposite, 1);
+    } else if (cos_roll_quarter_turns >= 0) {
+        cos_roll_quarter = cos_roll_cosine;
+    } else if (cos_roll_quarter_turns >= (-1)) {
+        cos_roll_quarter = dcm_from_euler_angles_q31_shr_(cos_roll_sine, 1);
+    } else {
+        cos_roll_quarter = cos_roll_opposite_2;
+    }
+    const int32_t cos_roll = dcm_from_euler_angles_q31_narrow_(cos_roll_quarter
+        + (INT64_C(1) << 31), 32); /* Q1.30, -1.01 .. 1.01, error 9.3e-10 */
+    int64_t sin_roll_quarter; /* Q1.62, -1.01 .. 1.01, error 4.6e-10 */
+    if (cos_roll_quarter_turns >= 1) {
+        sin_roll_quarter = cos_roll_cosine;
+    } else if (cos_roll_quarter_turns >= 0) {
+        sin_roll_quarter = dcm_from_euler_angles_q31_shr_(cos_roll_sine, 1);
+    } else if (cos_roll_quarter_turns >= (-1)) {
+        sin_roll_quarter = cos_roll_opposite_2;
+    } else {
+        sin_roll_quarter = dcm_from_euler_angles_q31_shr_(cos_roll_opposite, 1);
+    }
+    const int32_t sin_roll = dcm_from_euler_angles_q31_narrow_(sin_roll_quarter
+        + (INT64_C(1) << 31), 32); /* Q1.30, -1.01 .. 1.01, error 9.3e-10 */
+    /* direction cosine matrix, body to reference */
+    const int32_t C_11 =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_mul_(cos_heading, cos_pitch)
+        + (INT32_C(1) << 29), 30); /* Q1.30, -1.01 .. 1.01, error 2.4e-09 */
+    const int32_t shared_1 =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_mul_(cos_heading, sin_roll)
+        + (INT32_C(1) << 29), 30); /* Q1.30, -1.01 .. 1.01, error 2.4e-09 */
+    const int32_t shared_4 =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_mul_(cos_roll, sin_heading)
+        + (INT32_C(1) << 29), 30); /* Q1.30, -1.01 .. 1.01, error 2.4e-09 */
+    const int64_t C_12_unchecked = -(int64_t)shared_4
+        + dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(shared_1, sin_pitch)
+        + (INT32_C(1) << 29), 30);
+    if ((C_12_unchecked < (-INT32_C(1140850688))) || (C_12_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t C_12 = dcm_from_euler_angles_q31_narrow_(C_12_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 6.1e-09 */
+    const int32_t shared_2 =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_mul_(sin_heading, sin_roll)
+        + (INT32_C(1) << 29), 30); /* Q1.30, -1.01 .. 1.01, error 2.4e-09 */
+    const int32_t shared_3 =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_mul_(cos_heading, cos_roll)
+        + (INT32_C(1) << 29), 30); /* Q1.30, -1.01 .. 1.01, error 2.4e-09 */
+    const int64_t C_13_unchecked = (int64_t)shared_2
+        + dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(shared_3, sin_pitch)
+        + (INT32_C(1) << 29), 30);
+    if ((C_13_unchecked < (-INT32_C(1140850688))) || (C_13_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t C_13 = dcm_from_euler_angles_q31_narrow_(C_13_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 6.1e-09 */
+    const int32_t C_21 =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_mul_(cos_pitch, sin_heading)
+        + (INT32_C(1) << 29), 30); /* Q1.30, -1.01 .. 1.01, error 2.4e-09 */
+    const int64_t C_22_unchecked = (int64_t)shared_3
+        + dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(shared_2, sin_pitch)
+        + (INT32_C(1) << 29), 30);
+    if ((C_22_unchecked < (-INT32_C(1140850688))) || (C_22_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t C_22 = dcm_from_euler_angles_q31_narrow_(C_22_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 6.1e-09 */
+    const int64_t C_23_unchecked = -(int64_t)shared_1
+        + dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(shared_4, sin_pitch)
+        + (INT32_C(1) << 29), 30);
+    if ((C_23_unchecked < (-INT32_C(1140850688))) || (C_23_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t C_23 = dcm_from_euler_angles_q31_narrow_(C_23_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 6.1e-09 */
+    const int32_t C_31 = -sin_pitch; /* Q1.30, -1.01 .. 1.01, error 9.3e-10 */
+    const int32_t C_32 =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_mul_(cos_pitch, sin_roll)
+        + (INT32_C(1) << 29), 30); /* Q1.30, -1.01 .. 1.01, error 2.4e-09 */
+    const int32_t C_33 =
+        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_mul_(cos_pitch, cos_roll)
+        + (INT32_C(1) << 29), 30); /* Q1.30, -1.01 .. 1.01, error 2.4e-09 */
+    attitude[0] = C_11;
+    attitude[1] = C_12;
+    attitude[2] = C_13;
+    attitude[3] = C_21;
+    attitude[4] = C_22;
+    attitude[5] = C_23;
+    attitude[6] = C_31;
+    attitude[7] = C_32;
+    attitude[8] = C_33;
+    return 0;
 }

@@ -7,16 +7,16 @@
  *     equation (60).
  * Integer operations of one call: 100 add, 57 multiply, 123 shift, 18 compare; 70 temporaries.
  *
- * A number in format Qm.n is an integer times 2^-n. Rounding: nearest. No sum or product on the way
- * can overflow for input inside the ranges below, which every call checks; an error is the
+ * A number in format Qm.n is an integer times 2^-n. Rounding: nearest. No sum or product on the
+ * way can overflow for input inside the ranges below, which every call checks; an error is the
  * distance from what exact arithmetic makes of the same integers.
- * No heap, no global state, no floating point, reentrant. In one call every input is read before any
- * output is written: an output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, no floating point, reentrant. In one call every input is read before
+ * any output is written: an output may be the same memory as an input. Matrices are stored by
+ * rows.
  */
 #ifndef DCM_FROM_EULER_ANGLES_Q31_H
 #define DCM_FROM_EULER_ANGLES_Q31_H
 
-#include <stddef.h>
 #include <stdint.h>
 
 #ifdef __cplusplus
@@ -30,18 +30,10 @@ extern "C" {
  *         unit 2^-30; range -1140850688 to 1140850688 (-1.0625 to 1.0625); error at most
  *         6.00286e-09, 6.4455 of the last place.
  * Returns 0; or, with the outputs left alone, 1 if an input lies outside its range,
- * 2 if it is too far from a proper one, so that something leaves its limits: C_12, C_13, C_22, C_23
- *   from -1.0625 to 1.0625.
+ * 2 if it is too far from a proper one, so that something leaves its limits: C_12, C_13, C_22,
+ *   C_23 from -1.0625 to 1.0625.
  */
 int dcm_from_euler_angles_q31(const int32_t angles[3], int32_t attitude[9]);
-
-/* `count` calls on arrays of samples, one after the other, up to the first that is refused: every array holds `count`
- * times what one call takes.
- * An output may be the same memory as an input whose samples have the same size; otherwise they must not overlap.
- * Returns how many calls were done, and in `status` what the last one returned.
- */
-size_t dcm_from_euler_angles_q31_array(size_t count, int *status, const int32_t *angles,
-    int32_t *attitude);
 
 #ifdef __cplusplus
 }

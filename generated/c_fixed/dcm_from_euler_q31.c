@@ -5,124 +5,161 @@
 #include "dcm_from_euler_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int dcm_from_euler_q31_out_(int_fast32_t x, int_fast32_t limit)
+static inline int dcm_from_euler_q31_out_(int32_t x, int32_t limit)
 {
-    return (uint64_t)x + (uint64_t)limit > 2 * (uint64_t)limit;
+    return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
 
-/* x / 2^n, rounded down. The right shift of a negative number is left to the compiler by the standard; this is not, and
- * compilers make one arithmetic shift of it.
+/* The exact product of two words. */
+#if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
+/* These processors have no instruction for it: the high word takes four products of half words. */
+__attribute__((noinline)) static int64_t dcm_from_euler_q31_mul_(int32_t a, int32_t b)
+{
+    const uint32_t a_low = (uint32_t)a & 0xFFFFu;
+    const uint32_t b_low = (uint32_t)b & 0xFFFFu;
+    const int32_t a_high = (a < 0) ? ~(~a >> 16) : (a >> 16);
+    const int32_t b_high = (b < 0) ? ~(~b >> 16) : (b >> 16);
+    const uint32_t low = a_low * b_low;
+    const int32_t middle = (a_high * (int32_t)b_low) + (int32_t)(low >> 16);
+    const int32_t other = (b_high * (int32_t)a_low) + (int32_t)((uint32_t)middle & 0xFFFFu);
+    const int32_t high = (a_high * b_high) + ((middle < 0) ? ~(~middle >> 16) : (middle >> 16))
+        + ((other < 0) ? ~(~other >> 16) : (other >> 16));
+    const uint64_t bits = ((uint64_t)(uint32_t)high << 32) | ((uint32_t)a * (uint32_t)b);
+    return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
+}
+#else
+static inline int64_t dcm_from_euler_q31_mul_(int32_t a, int32_t b)
+{
+    return (int64_t)a * b;
+}
+#endif
+
+/* x / 2^n, rounded down, where the proof of the ranges shows that it fits into a word: then the
+ * 32 bits of x from bit n on, read as a number with a sign, are that quotient. For n above 32 the
+ * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
+ * number and no conversion of a number out of range.
  */
+static inline int32_t dcm_from_euler_q31_narrow_(int64_t x, int n)
+{
+#ifdef __FRAMAC__
+    return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
+#else
+    const int beyond = (n > 32) ? (n - 32) : 0;
+    const uint32_t bits = (uint32_t)((uint64_t)x >> (n - beyond));
+    const int32_t high = (bits <= (UINT32_MAX >> 1)) ? (int32_t)bits
+                                                 : (-1 - (int32_t)(UINT32_MAX - bits));
+    return (high < 0) ? ~(~high >> beyond) : (high >> beyond);
+#endif
+}
+
+/* x / 2^n, rounded down, as a wide number. */
 static inline int64_t dcm_from_euler_q31_shr_(int64_t x, int n)
 {
-    return x < 0 ? ~(~x >> n) : x >> n;
+    return (x < 0) ? ~(~x >> n) : (x >> n);
 }
 
-/* The algorithm. Static, so that the loops below can take it in. */
-static inline int dcm_from_euler_q31_one_(const int32_t state[4], int32_t attitude[9])
+int dcm_from_euler_q31(const int32_t state[4], int32_t attitude[9])
 {
-    const int_fast32_t e_x = state[0];
-    const int_fast32_t e_y = state[1];
-    const int_fast32_t e_z = state[2];
-    const int_fast32_t e_s = state[3];
+    const int32_t e_x = state[0];
+    const int32_t e_y = state[1];
+    const int32_t e_z = state[2];
+    const int32_t e_s = state[3];
     if (dcm_from_euler_q31_out_(e_x, INT32_C(1140850688))
         || dcm_from_euler_q31_out_(e_y, INT32_C(1140850688))
         || dcm_from_euler_q31_out_(e_z, INT32_C(1140850688))
         || dcm_from_euler_q31_out_(e_s, INT32_C(1140850688)))
         return 1;
-    const int64_t shared_1 = (int64_t)e_x * e_x;
-    const int64_t shared_2 = (int64_t)e_y * e_y;
-    const int64_t shared_4 = (int64_t)e_s * e_s;
-    const int64_t shared_5 = (int64_t)e_z * e_z;
-    const int64_t shared_6 = shared_4 - shared_5;
-    const int64_t shared_13 = shared_1 - shared_2;
+    const int64_t shared_1 = dcm_from_euler_q31_mul_(e_x, e_x); /* Q3.60, 0 .. 1.13, exact */
+    const int64_t shared_2 = dcm_from_euler_q31_mul_(e_y, e_y); /* Q3.60, 0 .. 1.13, exact */
+    const int64_t shared_4 = dcm_from_euler_q31_mul_(e_s, e_s); /* Q3.60, 0 .. 1.13, exact */
+    const int64_t shared_5 = dcm_from_euler_q31_mul_(e_z, e_z); /* Q3.60, 0 .. 1.13, exact */
+    const int64_t shared_6 = shared_4 - shared_5; /* Q3.60, -1.13 .. 1.13, exact */
+    const int64_t shared_13 = shared_1 - shared_2; /* Q3.60, -1.13 .. 1.13, exact */
     /* direction cosine matrix, body to reference */
     const int64_t C_11_unchecked = dcm_from_euler_q31_shr_(shared_13 + shared_6
-        + INT32_C(536870912), 30);
-    if (C_11_unchecked < (-INT32_C(1140850688))
-        || C_11_unchecked > INT32_C(1140850688))
+        + (INT32_C(1) << 29), 30);
+    if ((C_11_unchecked < (-INT32_C(1140850688))) || (C_11_unchecked > INT32_C(1140850688))) {
         return 2;
-    const int_fast32_t C_11 = (int_fast32_t)C_11_unchecked;
-    const int_fast32_t shared_7 = (int_fast32_t)((int64_t)e_s);
-    const int64_t shared_8 = (int64_t)e_z * shared_7;
-    const int_fast32_t shared_11 = (int_fast32_t)((int64_t)e_x);
-    const int64_t shared_10 = (int64_t)e_y * shared_11;
-    const int64_t C_12_unchecked = dcm_from_euler_q31_shr_(shared_10 - shared_8
-        + INT32_C(268435456), 29);
-    if (C_12_unchecked < (-INT32_C(1140850688))
-        || C_12_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t C_12 = (int_fast32_t)C_12_unchecked;
-    const int64_t shared_9 = (int64_t)e_y * shared_7;
-    const int64_t shared_14 = (int64_t)e_z * shared_11;
-    const int64_t C_13_unchecked = dcm_from_euler_q31_shr_(shared_9 + shared_14
-        + INT32_C(268435456), 29);
-    if (C_13_unchecked < (-INT32_C(1140850688))
-        || C_13_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t C_13 = (int_fast32_t)C_13_unchecked;
-    const int64_t C_21_unchecked = dcm_from_euler_q31_shr_(shared_8 + shared_10
-        + INT32_C(268435456), 29);
-    if (C_21_unchecked < (-INT32_C(1140850688))
-        || C_21_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t C_21 = (int_fast32_t)C_21_unchecked;
-    const int64_t C_22_unchecked = dcm_from_euler_q31_shr_(shared_6 - shared_13
-        + INT32_C(536870912), 30);
-    if (C_22_unchecked < (-INT32_C(1140850688))
-        || C_22_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t C_22 = (int_fast32_t)C_22_unchecked;
-    const int64_t shared_12 = (int64_t)e_x * shared_7;
-    const int64_t shared_3 = (int64_t)e_y * e_z;
-    const int64_t C_23_unchecked = dcm_from_euler_q31_shr_(shared_3 - shared_12
-        + INT32_C(268435456), 29);
-    if (C_23_unchecked < (-INT32_C(1140850688))
-        || C_23_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t C_23 = (int_fast32_t)C_23_unchecked;
-    const int64_t C_31_unchecked = dcm_from_euler_q31_shr_(shared_14 - shared_9
-        + INT32_C(268435456), 29);
-    if (C_31_unchecked < (-INT32_C(1140850688))
-        || C_31_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t C_31 = (int_fast32_t)C_31_unchecked;
-    const int64_t C_32_unchecked = dcm_from_euler_q31_shr_(shared_12 + shared_3
-        + INT32_C(268435456), 29);
-    if (C_32_unchecked < (-INT32_C(1140850688))
-        || C_32_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t C_32 = (int_fast32_t)C_32_unchecked;
-    const int64_t C_33_unchecked = dcm_from_euler_q31_shr_(shared_4 - shared_1 - shared_2 + shared_5
-        + INT32_C(536870912), 30);
-    if (C_33_unchecked < (-INT32_C(1140850688))
-        || C_33_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t C_33 = (int_fast32_t)C_33_unchecked;
-    attitude[0] = (int32_t)C_11;
-    attitude[1] = (int32_t)C_12;
-    attitude[2] = (int32_t)C_13;
-    attitude[3] = (int32_t)C_21;
-    attitude[4] = (int32_t)C_22;
-    attitude[5] = (int32_t)C_23;
-    attitude[6] = (int32_t)C_31;
-    attitude[7] = (int32_t)C_32;
-    attitude[8] = (int32_t)C_33;
-    return 0;
-}
-
-int dcm_from_euler_q31(const int32_t state[4], int32_t attitude[9])
-{
-    return dcm_from_euler_q31_one_(state, attitude);
-}
-
-size_t dcm_from_euler_q31_array(size_t count, int *status, const int32_t *state, int32_t *attitude)
-{
-    *status = 0;
-    for (size_t k = 0; k < count; ++k) {
-        *status = dcm_from_euler_q31_one_(state + 4 * k, attitude + 9 * k);
-        if (*status)
-            return k;
     }
-    return count;
+    const int32_t C_11 = dcm_from_euler_q31_narrow_(C_11_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
+    const int32_t shared_7 = e_s; /* Q2.29, -2.13 .. 2.13, exact */
+    const int64_t shared_8 = dcm_from_euler_q31_mul_(e_z, shared_7);
+        /* Q4.59, -2.26 .. 2.26, exact */
+    const int32_t shared_11 = e_x; /* Q2.29, -2.13 .. 2.13, exact */
+    const int64_t shared_10 = dcm_from_euler_q31_mul_(e_y, shared_11);
+        /* Q4.59, -2.26 .. 2.26, exact */
+    const int64_t C_12_unchecked = dcm_from_euler_q31_shr_(shared_10 - shared_8
+        + (INT32_C(1) << 28), 29);
+    if ((C_12_unchecked < (-INT32_C(1140850688))) || (C_12_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t C_12 = dcm_from_euler_q31_narrow_(C_12_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
+    const int64_t shared_9 = dcm_from_euler_q31_mul_(e_y, shared_7);
+        /* Q4.59, -2.26 .. 2.26, exact */
+    const int64_t shared_14 = dcm_from_euler_q31_mul_(e_z, shared_11);
+        /* Q4.59, -2.26 .. 2.26, exact */
+    const int64_t C_13_unchecked = dcm_from_euler_q31_shr_(shared_9 + shared_14
+        + (INT32_C(1) << 28), 29);
+    if ((C_13_unchecked < (-INT32_C(1140850688))) || (C_13_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t C_13 = dcm_from_euler_q31_narrow_(C_13_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
+    const int64_t C_21_unchecked = dcm_from_euler_q31_shr_(shared_8 + shared_10
+        + (INT32_C(1) << 28), 29);
+    if ((C_21_unchecked < (-INT32_C(1140850688))) || (C_21_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t C_21 = dcm_from_euler_q31_narrow_(C_21_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
+    const int64_t C_22_unchecked = dcm_from_euler_q31_shr_(shared_6 - shared_13
+        + (INT32_C(1) << 29), 30);
+    if ((C_22_unchecked < (-INT32_C(1140850688))) || (C_22_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t C_22 = dcm_from_euler_q31_narrow_(C_22_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
+    const int64_t shared_12 = dcm_from_euler_q31_mul_(e_x, shared_7);
+        /* Q4.59, -2.26 .. 2.26, exact */
+    const int64_t shared_3 = dcm_from_euler_q31_mul_(e_y, e_z); /* Q4.59, -2.26 .. 2.26, exact */
+    const int64_t C_23_unchecked = dcm_from_euler_q31_shr_(shared_3 - shared_12
+        + (INT32_C(1) << 28), 29);
+    if ((C_23_unchecked < (-INT32_C(1140850688))) || (C_23_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t C_23 = dcm_from_euler_q31_narrow_(C_23_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
+    const int64_t C_31_unchecked = dcm_from_euler_q31_shr_(shared_14 - shared_9
+        + (INT32_C(1) << 28), 29);
+    if ((C_31_unchecked < (-INT32_C(1140850688))) || (C_31_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t C_31 = dcm_from_euler_q31_narrow_(C_31_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
+    const int64_t C_32_unchecked = dcm_from_euler_q31_shr_(shared_12 + shared_3
+        + (INT32_C(1) << 28), 29);
+    if ((C_32_unchecked < (-INT32_C(1140850688))) || (C_32_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t C_32 = dcm_from_euler_q31_narrow_(C_32_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
+    const int64_t C_33_unchecked = dcm_from_euler_q31_shr_(shared_4 - shared_1 - shared_2
+        + shared_5 + (INT32_C(1) << 29), 30);
+    if ((C_33_unchecked < (-INT32_C(1140850688))) || (C_33_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t C_33 = dcm_from_euler_q31_narrow_(C_33_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
+    attitude[0] = C_11;
+    attitude[1] = C_12;
+    attitude[2] = C_13;
+    attitude[3] = C_21;
+    attitude[4] = C_22;
+    attitude[5] = C_23;
+    attitude[6] = C_31;
+    attitude[7] = C_32;
+    attitude[8] = C_33;
+    return 0;
 }

@@ -5,32 +5,70 @@
 #include "dcm_orth_first_order_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int dcm_orth_first_order_q31_out_(int_fast32_t x, int_fast32_t limit)
+static inline int dcm_orth_first_order_q31_out_(int32_t x, int32_t limit)
 {
-    return (uint64_t)x + (uint64_t)limit > 2 * (uint64_t)limit;
+    return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
 
-/* x / 2^n, rounded down. The right shift of a negative number is left to the compiler by the standard; this is not, and
- * compilers make one arithmetic shift of it.
+/* The exact product of two words. */
+#if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
+/* These processors have no instruction for it: the high word takes four products of half words. */
+__attribute__((noinline)) static int64_t dcm_orth_first_order_q31_mul_(int32_t a, int32_t b)
+{
+    const uint32_t a_low = (uint32_t)a & 0xFFFFu;
+    const uint32_t b_low = (uint32_t)b & 0xFFFFu;
+    const int32_t a_high = (a < 0) ? ~(~a >> 16) : (a >> 16);
+    const int32_t b_high = (b < 0) ? ~(~b >> 16) : (b >> 16);
+    const uint32_t low = a_low * b_low;
+    const int32_t middle = (a_high * (int32_t)b_low) + (int32_t)(low >> 16);
+    const int32_t other = (b_high * (int32_t)a_low) + (int32_t)((uint32_t)middle & 0xFFFFu);
+    const int32_t high = (a_high * b_high) + ((middle < 0) ? ~(~middle >> 16) : (middle >> 16))
+        + ((other < 0) ? ~(~other >> 16) : (other >> 16));
+    const uint64_t bits = ((uint64_t)(uint32_t)high << 32) | ((uint32_t)a * (uint32_t)b);
+    return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
+}
+#else
+static inline int64_t dcm_orth_first_order_q31_mul_(int32_t a, int32_t b)
+{
+    return (int64_t)a * b;
+}
+#endif
+
+/* x / 2^n, rounded down, where the proof of the ranges shows that it fits into a word: then the
+ * 32 bits of x from bit n on, read as a number with a sign, are that quotient. For n above 32 the
+ * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
+ * number and no conversion of a number out of range.
  */
+static inline int32_t dcm_orth_first_order_q31_narrow_(int64_t x, int n)
+{
+#ifdef __FRAMAC__
+    return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
+#else
+    const int beyond = (n > 32) ? (n - 32) : 0;
+    const uint32_t bits = (uint32_t)((uint64_t)x >> (n - beyond));
+    const int32_t high = (bits <= (UINT32_MAX >> 1)) ? (int32_t)bits
+                                                 : (-1 - (int32_t)(UINT32_MAX - bits));
+    return (high < 0) ? ~(~high >> beyond) : (high >> beyond);
+#endif
+}
+
+/* x / 2^n, rounded down, as a wide number. */
 static inline int64_t dcm_orth_first_order_q31_shr_(int64_t x, int n)
 {
-    return x < 0 ? ~(~x >> n) : x >> n;
+    return (x < 0) ? ~(~x >> n) : (x >> n);
 }
 
-/* The algorithm. Static, so that the loops below can take it in. */
-static inline int dcm_orth_first_order_q31_one_(const int32_t computed[9],
-    int32_t orthonormalized[9])
+int dcm_orth_first_order_q31(const int32_t computed[9], int32_t orthonormalized[9])
 {
-    const int_fast32_t C_11 = computed[0];
-    const int_fast32_t C_12 = computed[1];
-    const int_fast32_t C_13 = computed[2];
-    const int_fast32_t C_21 = computed[3];
-    const int_fast32_t C_22 = computed[4];
-    const int_fast32_t C_23 = computed[5];
-    const int_fast32_t C_31 = computed[6];
-    const int_fast32_t C_32 = computed[7];
-    const int_fast32_t C_33 = computed[8];
+    const int32_t C_11 = computed[0];
+    const int32_t C_12 = computed[1];
+    const int32_t C_13 = computed[2];
+    const int32_t C_21 = computed[3];
+    const int32_t C_22 = computed[4];
+    const int32_t C_23 = computed[5];
+    const int32_t C_31 = computed[6];
+    const int32_t C_32 = computed[7];
+    const int32_t C_33 = computed[8];
     if (dcm_orth_first_order_q31_out_(C_11, INT32_C(1140850688))
         || dcm_orth_first_order_q31_out_(C_12, INT32_C(1140850688))
         || dcm_orth_first_order_q31_out_(C_13, INT32_C(1140850688))
@@ -42,108 +80,142 @@ static inline int dcm_orth_first_order_q31_one_(const int32_t computed[9],
         || dcm_orth_first_order_q31_out_(C_33, INT32_C(1140850688)))
         return 1;
     /* C' C - I */
-    const int64_t excess_11 = (int64_t)C_11 * C_11 + (int64_t)C_21 * C_21 + (int64_t)C_31 * C_31
-        - INT64_C(1152921504606846976);
-    const int64_t excess_12 = (int64_t)C_11 * C_12 + (int64_t)C_21 * C_22 + (int64_t)C_31 * C_32;
-    const int64_t excess_13 = (int64_t)C_11 * C_13 + (int64_t)C_21 * C_23 + (int64_t)C_31 * C_33;
-    const int64_t excess_22 = (int64_t)C_12 * C_12 + (int64_t)C_22 * C_22 + (int64_t)C_32 * C_32
-        - INT64_C(1152921504606846976);
-    const int64_t excess_23 = (int64_t)C_12 * C_13 + (int64_t)C_22 * C_23 + (int64_t)C_32 * C_33;
-    const int64_t excess_33 = (int64_t)C_13 * C_13 + (int64_t)C_23 * C_23 + (int64_t)C_33 * C_33
-        - INT64_C(1152921504606846976);
+    const int64_t excess_11 = dcm_orth_first_order_q31_mul_(C_11, C_11)
+        + dcm_orth_first_order_q31_mul_(C_21, C_21)
+        + dcm_orth_first_order_q31_mul_(C_31, C_31) - (INT64_C(1) << 60);
+        /* Q3.60, -1 .. 2.39, exact */
+    const int64_t excess_12 = dcm_orth_first_order_q31_mul_(C_11, C_12)
+        + dcm_orth_first_order_q31_mul_(C_21, C_22)
+        + dcm_orth_first_order_q31_mul_(C_31, C_32); /* Q3.60, -3.39 .. 3.39, exact */
+    const int64_t excess_13 = dcm_orth_first_order_q31_mul_(C_11, C_13)
+        + dcm_orth_first_order_q31_mul_(C_21, C_23)
+        + dcm_orth_first_order_q31_mul_(C_31, C_33); /* Q3.60, -3.39 .. 3.39, exact */
+    const int64_t excess_22 = dcm_orth_first_order_q31_mul_(C_12, C_12)
+        + dcm_orth_first_order_q31_mul_(C_22, C_22)
+        + dcm_orth_first_order_q31_mul_(C_32, C_32) - (INT64_C(1) << 60);
+        /* Q3.60, -1 .. 2.39, exact */
+    const int64_t excess_23 = dcm_orth_first_order_q31_mul_(C_12, C_13)
+        + dcm_orth_first_order_q31_mul_(C_22, C_23)
+        + dcm_orth_first_order_q31_mul_(C_32, C_33); /* Q3.60, -3.39 .. 3.39, exact */
+    const int64_t excess_33 = dcm_orth_first_order_q31_mul_(C_13, C_13)
+        + dcm_orth_first_order_q31_mul_(C_23, C_23)
+        + dcm_orth_first_order_q31_mul_(C_33, C_33) - (INT64_C(1) << 60);
+        /* Q3.60, -1 .. 2.39, exact */
     /* inverse root of C' C to first order */
-    const int_fast32_t root_11 = (int_fast32_t)(INT32_C(1073741824)
-        + dcm_orth_first_order_q31_shr_(-excess_11 + INT32_C(1073741824), 31));
-    const int_fast32_t root_12 = (int_fast32_t)(dcm_orth_first_order_q31_shr_(-excess_12
-        + INT32_C(1073741824), 31));
-    const int_fast32_t root_13 = (int_fast32_t)(dcm_orth_first_order_q31_shr_(-excess_13
-        + INT32_C(1073741824), 31));
-    const int_fast32_t root_22 = (int_fast32_t)(INT32_C(1073741824)
-        + dcm_orth_first_order_q31_shr_(-excess_22 + INT32_C(1073741824), 31));
-    const int_fast32_t root_23 = (int_fast32_t)(dcm_orth_first_order_q31_shr_(-excess_23
-        + INT32_C(1073741824), 31));
-    const int_fast32_t root_33 = (int_fast32_t)(INT32_C(1073741824)
-        + dcm_orth_first_order_q31_shr_(-excess_33 + INT32_C(1073741824), 31));
+    const int32_t root_11 = dcm_orth_first_order_q31_narrow_((INT32_C(1) << 30)
+        + dcm_orth_first_order_q31_shr_(-excess_11 + (INT32_C(1) << 30), 31), 0);
+        /* Q1.30, -0.194 .. 1.51, error 4.7e-10 */
+    const int32_t root_12 = dcm_orth_first_order_q31_narrow_(-excess_12
+        + (INT32_C(1) << 30), 31); /* Q1.30, -1.7 .. 1.7, error 4.7e-10 */
+    const int32_t root_13 = dcm_orth_first_order_q31_narrow_(-excess_13
+        + (INT32_C(1) << 30), 31); /* Q1.30, -1.7 .. 1.7, error 4.7e-10 */
+    const int32_t root_22 = dcm_orth_first_order_q31_narrow_((INT32_C(1) << 30)
+        + dcm_orth_first_order_q31_shr_(-excess_22 + (INT32_C(1) << 30), 31), 0);
+        /* Q1.30, -0.194 .. 1.51, error 4.7e-10 */
+    const int32_t root_23 = dcm_orth_first_order_q31_narrow_(-excess_23
+        + (INT32_C(1) << 30), 31); /* Q1.30, -1.7 .. 1.7, error 4.7e-10 */
+    const int32_t root_33 = dcm_orth_first_order_q31_narrow_((INT32_C(1) << 30)
+        + dcm_orth_first_order_q31_shr_(-excess_33 + (INT32_C(1) << 30), 31), 0);
+        /* Q1.30, -0.194 .. 1.51, error 4.7e-10 */
     /* direction cosine matrix, body to reference, orthonormalized */
-    const int64_t next_11_unchecked = dcm_orth_first_order_q31_shr_((int64_t)C_11 * root_11
-        + (int64_t)C_12 * root_12 + (int64_t)C_13 * root_13 + INT32_C(536870912), 30);
-    if (next_11_unchecked < (-INT32_C(1140850688))
-        || next_11_unchecked > INT32_C(1140850688))
+    const int64_t next_11_unchecked =
+        dcm_orth_first_order_q31_shr_(dcm_orth_first_order_q31_mul_(C_11, root_11)
+        + dcm_orth_first_order_q31_mul_(C_12, root_12)
+        + dcm_orth_first_order_q31_mul_(C_13, root_13) + (INT32_C(1) << 29), 30);
+    if ((next_11_unchecked < (-INT32_C(1140850688)))
+        || (next_11_unchecked > INT32_C(1140850688))) {
         return 2;
-    const int_fast32_t next_11 = (int_fast32_t)next_11_unchecked;
-    const int64_t next_12_unchecked = dcm_orth_first_order_q31_shr_((int64_t)C_11 * root_12
-        + (int64_t)C_12 * root_22 + (int64_t)C_13 * root_23 + INT32_C(536870912), 30);
-    if (next_12_unchecked < (-INT32_C(1140850688))
-        || next_12_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t next_12 = (int_fast32_t)next_12_unchecked;
-    const int64_t next_13_unchecked = dcm_orth_first_order_q31_shr_((int64_t)C_11 * root_13
-        + (int64_t)C_12 * root_23 + (int64_t)C_13 * root_33 + INT32_C(536870912), 30);
-    if (next_13_unchecked < (-INT32_C(1140850688))
-        || next_13_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t next_13 = (int_fast32_t)next_13_unchecked;
-    const int64_t next_21_unchecked = dcm_orth_first_order_q31_shr_((int64_t)C_21 * root_11
-        + (int64_t)C_22 * root_12 + (int64_t)C_23 * root_13 + INT32_C(536870912), 30);
-    if (next_21_unchecked < (-INT32_C(1140850688))
-        || next_21_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t next_21 = (int_fast32_t)next_21_unchecked;
-    const int64_t next_22_unchecked = dcm_orth_first_order_q31_shr_((int64_t)C_21 * root_12
-        + (int64_t)C_22 * root_22 + (int64_t)C_23 * root_23 + INT32_C(536870912), 30);
-    if (next_22_unchecked < (-INT32_C(1140850688))
-        || next_22_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t next_22 = (int_fast32_t)next_22_unchecked;
-    const int64_t next_23_unchecked = dcm_orth_first_order_q31_shr_((int64_t)C_21 * root_13
-        + (int64_t)C_22 * root_23 + (int64_t)C_23 * root_33 + INT32_C(536870912), 30);
-    if (next_23_unchecked < (-INT32_C(1140850688))
-        || next_23_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t next_23 = (int_fast32_t)next_23_unchecked;
-    const int64_t next_31_unchecked = dcm_orth_first_order_q31_shr_((int64_t)C_31 * root_11
-        + (int64_t)C_32 * root_12 + (int64_t)C_33 * root_13 + INT32_C(536870912), 30);
-    if (next_31_unchecked < (-INT32_C(1140850688))
-        || next_31_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t next_31 = (int_fast32_t)next_31_unchecked;
-    const int64_t next_32_unchecked = dcm_orth_first_order_q31_shr_((int64_t)C_31 * root_12
-        + (int64_t)C_32 * root_22 + (int64_t)C_33 * root_23 + INT32_C(536870912), 30);
-    if (next_32_unchecked < (-INT32_C(1140850688))
-        || next_32_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t next_32 = (int_fast32_t)next_32_unchecked;
-    const int64_t next_33_unchecked = dcm_orth_first_order_q31_shr_((int64_t)C_31 * root_13
-        + (int64_t)C_32 * root_23 + (int64_t)C_33 * root_33 + INT32_C(536870912), 30);
-    if (next_33_unchecked < (-INT32_C(1140850688))
-        || next_33_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t next_33 = (int_fast32_t)next_33_unchecked;
-    orthonormalized[0] = (int32_t)next_11;
-    orthonormalized[1] = (int32_t)next_12;
-    orthonormalized[2] = (int32_t)next_13;
-    orthonormalized[3] = (int32_t)next_21;
-    orthonormalized[4] = (int32_t)next_22;
-    orthonormalized[5] = (int32_t)next_23;
-    orthonormalized[6] = (int32_t)next_31;
-    orthonormalized[7] = (int32_t)next_32;
-    orthonormalized[8] = (int32_t)next_33;
-    return 0;
-}
-
-int dcm_orth_first_order_q31(const int32_t computed[9], int32_t orthonormalized[9])
-{
-    return dcm_orth_first_order_q31_one_(computed, orthonormalized);
-}
-
-size_t dcm_orth_first_order_q31_array(size_t count, int *status, const int32_t *computed,
-    int32_t *orthonormalized)
-{
-    *status = 0;
-    for (size_t k = 0; k < count; ++k) {
-        *status = dcm_orth_first_order_q31_one_(computed + 9 * k, orthonormalized + 9 * k);
-        if (*status)
-            return k;
     }
-    return count;
+    const int32_t next_11 = dcm_orth_first_order_q31_narrow_(next_11_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 2e-09 */
+    const int64_t next_12_unchecked =
+        dcm_orth_first_order_q31_shr_(dcm_orth_first_order_q31_mul_(C_11, root_12)
+        + dcm_orth_first_order_q31_mul_(C_12, root_22)
+        + dcm_orth_first_order_q31_mul_(C_13, root_23) + (INT32_C(1) << 29), 30);
+    if ((next_12_unchecked < (-INT32_C(1140850688)))
+        || (next_12_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t next_12 = dcm_orth_first_order_q31_narrow_(next_12_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 2e-09 */
+    const int64_t next_13_unchecked =
+        dcm_orth_first_order_q31_shr_(dcm_orth_first_order_q31_mul_(C_11, root_13)
+        + dcm_orth_first_order_q31_mul_(C_12, root_23)
+        + dcm_orth_first_order_q31_mul_(C_13, root_33) + (INT32_C(1) << 29), 30);
+    if ((next_13_unchecked < (-INT32_C(1140850688)))
+        || (next_13_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t next_13 = dcm_orth_first_order_q31_narrow_(next_13_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 2e-09 */
+    const int64_t next_21_unchecked =
+        dcm_orth_first_order_q31_shr_(dcm_orth_first_order_q31_mul_(C_21, root_11)
+        + dcm_orth_first_order_q31_mul_(C_22, root_12)
+        + dcm_orth_first_order_q31_mul_(C_23, root_13) + (INT32_C(1) << 29), 30);
+    if ((next_21_unchecked < (-INT32_C(1140850688)))
+        || (next_21_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t next_21 = dcm_orth_first_order_q31_narrow_(next_21_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 2e-09 */
+    const int64_t next_22_unchecked =
+        dcm_orth_first_order_q31_shr_(dcm_orth_first_order_q31_mul_(C_21, root_12)
+        + dcm_orth_first_order_q31_mul_(C_22, root_22)
+        + dcm_orth_first_order_q31_mul_(C_23, root_23) + (INT32_C(1) << 29), 30);
+    if ((next_22_unchecked < (-INT32_C(1140850688)))
+        || (next_22_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t next_22 = dcm_orth_first_order_q31_narrow_(next_22_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 2e-09 */
+    const int64_t next_23_unchecked =
+        dcm_orth_first_order_q31_shr_(dcm_orth_first_order_q31_mul_(C_21, root_13)
+        + dcm_orth_first_order_q31_mul_(C_22, root_23)
+        + dcm_orth_first_order_q31_mul_(C_23, root_33) + (INT32_C(1) << 29), 30);
+    if ((next_23_unchecked < (-INT32_C(1140850688)))
+        || (next_23_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t next_23 = dcm_orth_first_order_q31_narrow_(next_23_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 2e-09 */
+    const int64_t next_31_unchecked =
+        dcm_orth_first_order_q31_shr_(dcm_orth_first_order_q31_mul_(C_31, root_11)
+        + dcm_orth_first_order_q31_mul_(C_32, root_12)
+        + dcm_orth_first_order_q31_mul_(C_33, root_13) + (INT32_C(1) << 29), 30);
+    if ((next_31_unchecked < (-INT32_C(1140850688)))
+        || (next_31_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t next_31 = dcm_orth_first_order_q31_narrow_(next_31_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 2e-09 */
+    const int64_t next_32_unchecked =
+        dcm_orth_first_order_q31_shr_(dcm_orth_first_order_q31_mul_(C_31, root_12)
+        + dcm_orth_first_order_q31_mul_(C_32, root_22)
+        + dcm_orth_first_order_q31_mul_(C_33, root_23) + (INT32_C(1) << 29), 30);
+    if ((next_32_unchecked < (-INT32_C(1140850688)))
+        || (next_32_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t next_32 = dcm_orth_first_order_q31_narrow_(next_32_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 2e-09 */
+    const int64_t next_33_unchecked =
+        dcm_orth_first_order_q31_shr_(dcm_orth_first_order_q31_mul_(C_31, root_13)
+        + dcm_orth_first_order_q31_mul_(C_32, root_23)
+        + dcm_orth_first_order_q31_mul_(C_33, root_33) + (INT32_C(1) << 29), 30);
+    if ((next_33_unchecked < (-INT32_C(1140850688)))
+        || (next_33_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t next_33 = dcm_orth_first_order_q31_narrow_(next_33_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 2e-09 */
+    orthonormalized[0] = next_11;
+    orthonormalized[1] = next_12;
+    orthonormalized[2] = next_13;
+    orthonormalized[3] = next_21;
+    orthonormalized[4] = next_22;
+    orthonormalized[5] = next_23;
+    orthonormalized[6] = next_31;
+    orthonormalized[7] = next_32;
+    orthonormalized[8] = next_33;
+    return 0;
 }

@@ -5,56 +5,97 @@
 #include "dcm_orthonormalize_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int dcm_orthonormalize_q31_out_(int_fast32_t x, int_fast32_t limit)
+static inline int dcm_orthonormalize_q31_out_(int32_t x, int32_t limit)
 {
-    return (uint64_t)x + (uint64_t)limit > 2 * (uint64_t)limit;
+    return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
 
-/* x / 2^n, rounded down. The right shift of a negative number is left to the compiler by the standard; this is not, and
- * compilers make one arithmetic shift of it.
+/* The exact product of two words. */
+#if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
+/* These processors have no instruction for it: the high word takes four products of half words. */
+__attribute__((noinline)) static int64_t dcm_orthonormalize_q31_mul_(int32_t a, int32_t b)
+{
+    const uint32_t a_low = (uint32_t)a & 0xFFFFu;
+    const uint32_t b_low = (uint32_t)b & 0xFFFFu;
+    const int32_t a_high = (a < 0) ? ~(~a >> 16) : (a >> 16);
+    const int32_t b_high = (b < 0) ? ~(~b >> 16) : (b >> 16);
+    const uint32_t low = a_low * b_low;
+    const int32_t middle = (a_high * (int32_t)b_low) + (int32_t)(low >> 16);
+    const int32_t other = (b_high * (int32_t)a_low) + (int32_t)((uint32_t)middle & 0xFFFFu);
+    const int32_t high = (a_high * b_high) + ((middle < 0) ? ~(~middle >> 16) : (middle >> 16))
+        + ((other < 0) ? ~(~other >> 16) : (other >> 16));
+    const uint64_t bits = ((uint64_t)(uint32_t)high << 32) | ((uint32_t)a * (uint32_t)b);
+    return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
+}
+#else
+static inline int64_t dcm_orthonormalize_q31_mul_(int32_t a, int32_t b)
+{
+    return (int64_t)a * b;
+}
+#endif
+
+/* x / 2^n, rounded down, where the proof of the ranges shows that it fits into a word: then the
+ * 32 bits of x from bit n on, read as a number with a sign, are that quotient. For n above 32 the
+ * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
+ * number and no conversion of a number out of range.
  */
+static inline int32_t dcm_orthonormalize_q31_narrow_(int64_t x, int n)
+{
+#ifdef __FRAMAC__
+    return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
+#else
+    const int beyond = (n > 32) ? (n - 32) : 0;
+    const uint32_t bits = (uint32_t)((uint64_t)x >> (n - beyond));
+    const int32_t high = (bits <= (UINT32_MAX >> 1)) ? (int32_t)bits
+                                                 : (-1 - (int32_t)(UINT32_MAX - bits));
+    return (high < 0) ? ~(~high >> beyond) : (high >> beyond);
+#endif
+}
+
+/* x / 2^n, rounded down, as a wide number. */
 static inline int64_t dcm_orthonormalize_q31_shr_(int64_t x, int n)
 {
-    return x < 0 ? ~(~x >> n) : x >> n;
+    return (x < 0) ? ~(~x >> n) : (x >> n);
 }
 
 /* numerator / denominator of their magnitudes, to the nearest; the sign comes last. */
 static int64_t dcm_orthonormalize_q31_div_(int64_t numerator, int64_t denominator)
 {
-    const int64_t top = numerator < 0 ? -numerator : numerator;
-    const int64_t below = denominator < 0 ? -denominator : denominator;
-    const int64_t quotient = (top + below / 2) / below;
-    return (numerator < 0) != (denominator < 0) ? -quotient : quotient;
+    const int64_t top = (numerator < 0) ? -numerator : numerator;
+    const int64_t below = (denominator < 0) ? -denominator : denominator;
+    const int64_t quotient = (top + (below / 2)) / below;
+    return ((numerator < 0) != (denominator < 0)) ? -quotient : quotient;
 }
 
 /* Square root bit by bit, to the nearest. */
-static int_fast32_t dcm_orthonormalize_q31_sqrt_(uint64_t square)
+static int32_t dcm_orthonormalize_q31_sqrt_(uint64_t square)
 {
-    uint64_t root = 0, bit = (uint64_t)1 << 62;
-    while (bit) {
+    uint64_t rest = square;
+    uint64_t root = 0;
+    uint64_t bit = (uint64_t)1 << 62;
+    while (bit != 0u) {
         const uint64_t tried = root + bit;
         root >>= 1;
-        if (square >= tried) {
-            square -= tried;
+        if (rest >= tried) {
+            rest -= tried;
             root += bit;
         }
         bit >>= 2;
     }
-    return (int_fast32_t)(root + (square > root));
+    return (int32_t)((rest > root) ? (root + 1u) : root);
 }
 
-/* The algorithm. Static, so that the loops below can take it in. */
-static inline int dcm_orthonormalize_q31_one_(const int32_t computed[9], int32_t orthonormalized[9])
+int dcm_orthonormalize_q31(const int32_t computed[9], int32_t orthonormalized[9])
 {
-    const int_fast32_t C_11 = computed[0];
-    const int_fast32_t C_12 = computed[1];
-    const int_fast32_t C_13 = computed[2];
-    const int_fast32_t C_21 = computed[3];
-    const int_fast32_t C_22 = computed[4];
-    const int_fast32_t C_23 = computed[5];
-    const int_fast32_t C_31 = computed[6];
-    const int_fast32_t C_32 = computed[7];
-    const int_fast32_t C_33 = computed[8];
+    const int32_t C_11 = computed[0];
+    const int32_t C_12 = computed[1];
+    const int32_t C_13 = computed[2];
+    const int32_t C_21 = computed[3];
+    const int32_t C_22 = computed[4];
+    const int32_t C_23 = computed[5];
+    const int32_t C_31 = computed[6];
+    const int32_t C_32 = computed[7];
+    const int32_t C_33 = computed[8];
     if (dcm_orthonormalize_q31_out_(C_11, INT32_C(1140850688))
         || dcm_orthonormalize_q31_out_(C_12, INT32_C(1140850688))
         || dcm_orthonormalize_q31_out_(C_13, INT32_C(1140850688))
@@ -66,151 +107,173 @@ static inline int dcm_orthonormalize_q31_one_(const int32_t computed[9], int32_t
         || dcm_orthonormalize_q31_out_(C_33, INT32_C(1140850688)))
         return 1;
     /* row 1 and its dual, added */
-    const int_fast32_t row_1_x =
-        (int_fast32_t)(dcm_orthonormalize_q31_shr_((int64_t)C_11 * INT32_C(1073741824)
-        + (int64_t)C_22 * C_33 - (int64_t)C_23 * C_32 + INT32_C(1073741824), 31));
-    const int_fast32_t row_1_y =
-        (int_fast32_t)(dcm_orthonormalize_q31_shr_((int64_t)C_12 * INT32_C(1073741824)
-        - (int64_t)C_21 * C_33 + (int64_t)C_23 * C_31 + INT32_C(1073741824), 31));
-    const int_fast32_t row_1_z =
-        (int_fast32_t)(dcm_orthonormalize_q31_shr_((int64_t)C_13 * INT32_C(1073741824)
-        + (int64_t)C_21 * C_32 - (int64_t)C_22 * C_31 + INT32_C(1073741824), 31));
+    const int32_t row_1_x = dcm_orthonormalize_q31_narrow_((int64_t)C_11 * (INT32_C(1) << 30)
+        + dcm_orthonormalize_q31_mul_(C_22, C_33) - dcm_orthonormalize_q31_mul_(C_23, C_32)
+        + (INT32_C(1) << 30), 31); /* Q2.29, -3.33 .. 3.33, error 9.4e-10 */
+    const int32_t row_1_y = dcm_orthonormalize_q31_narrow_((int64_t)C_12 * (INT32_C(1) << 30)
+        - dcm_orthonormalize_q31_mul_(C_21, C_33) + dcm_orthonormalize_q31_mul_(C_23, C_31)
+        + (INT32_C(1) << 30), 31); /* Q2.29, -3.33 .. 3.33, error 9.4e-10 */
+    const int32_t row_1_z = dcm_orthonormalize_q31_narrow_((int64_t)C_13 * (INT32_C(1) << 30)
+        + dcm_orthonormalize_q31_mul_(C_21, C_32) - dcm_orthonormalize_q31_mul_(C_22, C_31)
+        + (INT32_C(1) << 30), 31); /* Q2.29, -3.33 .. 3.33, error 9.4e-10 */
     const int64_t inverse_length_1_radicand =
-        dcm_orthonormalize_q31_shr_((int64_t)row_1_x * row_1_x, 1)
-        + dcm_orthonormalize_q31_shr_((int64_t)row_1_y * row_1_y, 1)
-        + dcm_orthonormalize_q31_shr_((int64_t)row_1_z * row_1_z, 1);
-    if (inverse_length_1_radicand < INT64_C(288230378825580548)
-        || inverse_length_1_radicand > INT64_C(1152921501932978172))
+        dcm_orthonormalize_q31_shr_(dcm_orthonormalize_q31_mul_(row_1_x, row_1_x), 1)
+        + dcm_orthonormalize_q31_shr_(dcm_orthonormalize_q31_mul_(row_1_y, row_1_y), 1)
+        + dcm_orthonormalize_q31_shr_(dcm_orthonormalize_q31_mul_(row_1_z, row_1_z), 1);
+        /* Q6.57, 2 .. 8, error 1.9e-08 */
+    if ((inverse_length_1_radicand < INT64_C(288230378825580548))
+        || (inverse_length_1_radicand > INT64_C(1152921501932978172))) {
         return 2;
-    const int_fast32_t inverse_length_1_root =
+    }
+    const int32_t inverse_length_1_root =
         dcm_orthonormalize_q31_sqrt_((uint64_t)(inverse_length_1_radicand * 2));
+        /* Q2.29, 1.41 .. 2.83, error 7.5e-09 */
     /* 1/|row 1| */
-    const int_fast32_t inverse_length_1 =
-        (int_fast32_t)(dcm_orthonormalize_q31_div_(INT64_C(1152921504606846976), inverse_length_1_root));
+    const int32_t inverse_length_1 =
+        dcm_orthonormalize_q31_narrow_(dcm_orthonormalize_q31_div_((INT64_C(1) << 60), inverse_length_1_root), 0);
+        /* Q0.31, 0.353 .. 0.708, error 4e-09 */
     /* row 2 and its dual, added */
-    const int_fast32_t row_2_x =
-        (int_fast32_t)(dcm_orthonormalize_q31_shr_((int64_t)C_21 * INT32_C(1073741824)
-        - (int64_t)C_12 * C_33 + (int64_t)C_13 * C_32 + INT32_C(1073741824), 31));
-    const int_fast32_t row_2_y =
-        (int_fast32_t)(dcm_orthonormalize_q31_shr_((int64_t)C_22 * INT32_C(1073741824)
-        + (int64_t)C_11 * C_33 - (int64_t)C_13 * C_31 + INT32_C(1073741824), 31));
-    const int_fast32_t row_2_z =
-        (int_fast32_t)(dcm_orthonormalize_q31_shr_((int64_t)C_23 * INT32_C(1073741824)
-        - (int64_t)C_11 * C_32 + (int64_t)C_12 * C_31 + INT32_C(1073741824), 31));
+    const int32_t row_2_x = dcm_orthonormalize_q31_narrow_((int64_t)C_21 * (INT32_C(1) << 30)
+        - dcm_orthonormalize_q31_mul_(C_12, C_33) + dcm_orthonormalize_q31_mul_(C_13, C_32)
+        + (INT32_C(1) << 30), 31); /* Q2.29, -3.33 .. 3.33, error 9.4e-10 */
+    const int32_t row_2_y = dcm_orthonormalize_q31_narrow_((int64_t)C_22 * (INT32_C(1) << 30)
+        + dcm_orthonormalize_q31_mul_(C_11, C_33) - dcm_orthonormalize_q31_mul_(C_13, C_31)
+        + (INT32_C(1) << 30), 31); /* Q2.29, -3.33 .. 3.33, error 9.4e-10 */
+    const int32_t row_2_z = dcm_orthonormalize_q31_narrow_((int64_t)C_23 * (INT32_C(1) << 30)
+        - dcm_orthonormalize_q31_mul_(C_11, C_32) + dcm_orthonormalize_q31_mul_(C_12, C_31)
+        + (INT32_C(1) << 30), 31); /* Q2.29, -3.33 .. 3.33, error 9.4e-10 */
     const int64_t inverse_length_2_radicand =
-        dcm_orthonormalize_q31_shr_((int64_t)row_2_x * row_2_x, 1)
-        + dcm_orthonormalize_q31_shr_((int64_t)row_2_y * row_2_y, 1)
-        + dcm_orthonormalize_q31_shr_((int64_t)row_2_z * row_2_z, 1);
-    if (inverse_length_2_radicand < INT64_C(288230378825580548)
-        || inverse_length_2_radicand > INT64_C(1152921501932978172))
+        dcm_orthonormalize_q31_shr_(dcm_orthonormalize_q31_mul_(row_2_x, row_2_x), 1)
+        + dcm_orthonormalize_q31_shr_(dcm_orthonormalize_q31_mul_(row_2_y, row_2_y), 1)
+        + dcm_orthonormalize_q31_shr_(dcm_orthonormalize_q31_mul_(row_2_z, row_2_z), 1);
+        /* Q6.57, 2 .. 8, error 1.9e-08 */
+    if ((inverse_length_2_radicand < INT64_C(288230378825580548))
+        || (inverse_length_2_radicand > INT64_C(1152921501932978172))) {
         return 2;
-    const int_fast32_t inverse_length_2_root =
+    }
+    const int32_t inverse_length_2_root =
         dcm_orthonormalize_q31_sqrt_((uint64_t)(inverse_length_2_radicand * 2));
+        /* Q2.29, 1.41 .. 2.83, error 7.5e-09 */
     /* 1/|row 2| */
-    const int_fast32_t inverse_length_2 =
-        (int_fast32_t)(dcm_orthonormalize_q31_div_(INT64_C(1152921504606846976), inverse_length_2_root));
+    const int32_t inverse_length_2 =
+        dcm_orthonormalize_q31_narrow_(dcm_orthonormalize_q31_div_((INT64_C(1) << 60), inverse_length_2_root), 0);
+        /* Q0.31, 0.353 .. 0.708, error 4e-09 */
     /* row 3 and its dual, added */
-    const int_fast32_t row_3_x =
-        (int_fast32_t)(dcm_orthonormalize_q31_shr_((int64_t)C_31 * INT32_C(1073741824)
-        + (int64_t)C_12 * C_23 - (int64_t)C_13 * C_22 + INT32_C(1073741824), 31));
-    const int_fast32_t row_3_y =
-        (int_fast32_t)(dcm_orthonormalize_q31_shr_((int64_t)C_32 * INT32_C(1073741824)
-        - (int64_t)C_11 * C_23 + (int64_t)C_13 * C_21 + INT32_C(1073741824), 31));
-    const int_fast32_t row_3_z =
-        (int_fast32_t)(dcm_orthonormalize_q31_shr_((int64_t)C_33 * INT32_C(1073741824)
-        + (int64_t)C_11 * C_22 - (int64_t)C_12 * C_21 + INT32_C(1073741824), 31));
+    const int32_t row_3_x = dcm_orthonormalize_q31_narrow_((int64_t)C_31 * (INT32_C(1) << 30)
+        + dcm_orthonormalize_q31_mul_(C_12, C_23) - dcm_orthonormalize_q31_mul_(C_13, C_22)
+        + (INT32_C(1) << 30), 31); /* Q2.29, -3.33 .. 3.33, error 9.4e-10 */
+    const int32_t row_3_y = dcm_orthonormalize_q31_narrow_((int64_t)C_32 * (INT32_C(1) << 30)
+        - dcm_orthonormalize_q31_mul_(C_11, C_23) + dcm_orthonormalize_q31_mul_(C_13, C_21)
+        + (INT32_C(1) << 30), 31); /* Q2.29, -3.33 .. 3.33, error 9.4e-10 */
+    const int32_t row_3_z = dcm_orthonormalize_q31_narrow_((int64_t)C_33 * (INT32_C(1) << 30)
+        + dcm_orthonormalize_q31_mul_(C_11, C_22) - dcm_orthonormalize_q31_mul_(C_12, C_21)
+        + (INT32_C(1) << 30), 31); /* Q2.29, -3.33 .. 3.33, error 9.4e-10 */
     const int64_t inverse_length_3_radicand =
-        dcm_orthonormalize_q31_shr_((int64_t)row_3_x * row_3_x, 1)
-        + dcm_orthonormalize_q31_shr_((int64_t)row_3_y * row_3_y, 1)
-        + dcm_orthonormalize_q31_shr_((int64_t)row_3_z * row_3_z, 1);
-    if (inverse_length_3_radicand < INT64_C(288230378825580548)
-        || inverse_length_3_radicand > INT64_C(1152921501932978172))
+        dcm_orthonormalize_q31_shr_(dcm_orthonormalize_q31_mul_(row_3_x, row_3_x), 1)
+        + dcm_orthonormalize_q31_shr_(dcm_orthonormalize_q31_mul_(row_3_y, row_3_y), 1)
+        + dcm_orthonormalize_q31_shr_(dcm_orthonormalize_q31_mul_(row_3_z, row_3_z), 1);
+        /* Q6.57, 2 .. 8, error 1.9e-08 */
+    if ((inverse_length_3_radicand < INT64_C(288230378825580548))
+        || (inverse_length_3_radicand > INT64_C(1152921501932978172))) {
         return 2;
-    const int_fast32_t inverse_length_3_root =
+    }
+    const int32_t inverse_length_3_root =
         dcm_orthonormalize_q31_sqrt_((uint64_t)(inverse_length_3_radicand * 2));
+        /* Q2.29, 1.41 .. 2.83, error 7.5e-09 */
     /* 1/|row 3| */
-    const int_fast32_t inverse_length_3 =
-        (int_fast32_t)(dcm_orthonormalize_q31_div_(INT64_C(1152921504606846976), inverse_length_3_root));
+    const int32_t inverse_length_3 =
+        dcm_orthonormalize_q31_narrow_(dcm_orthonormalize_q31_div_((INT64_C(1) << 60), inverse_length_3_root), 0);
+        /* Q0.31, 0.353 .. 0.708, error 4e-09 */
     /* direction cosine matrix, body to reference, orthonormalized */
     const int64_t next_11_unchecked =
-        dcm_orthonormalize_q31_shr_((int64_t)inverse_length_1 * row_1_x + INT32_C(536870912), 30);
-    if (next_11_unchecked < (-INT32_C(1140850688))
-        || next_11_unchecked > INT32_C(1140850688))
+        dcm_orthonormalize_q31_shr_(dcm_orthonormalize_q31_mul_(inverse_length_1, row_1_x)
+        + (INT32_C(1) << 29), 30);
+    if ((next_11_unchecked < (-INT32_C(1140850688)))
+        || (next_11_unchecked > INT32_C(1140850688))) {
         return 2;
-    const int_fast32_t next_11 = (int_fast32_t)next_11_unchecked;
-    const int64_t next_12_unchecked =
-        dcm_orthonormalize_q31_shr_((int64_t)inverse_length_1 * row_1_y + INT32_C(536870912), 30);
-    if (next_12_unchecked < (-INT32_C(1140850688))
-        || next_12_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t next_12 = (int_fast32_t)next_12_unchecked;
-    const int64_t next_13_unchecked =
-        dcm_orthonormalize_q31_shr_((int64_t)inverse_length_1 * row_1_z + INT32_C(536870912), 30);
-    if (next_13_unchecked < (-INT32_C(1140850688))
-        || next_13_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t next_13 = (int_fast32_t)next_13_unchecked;
-    const int64_t next_21_unchecked =
-        dcm_orthonormalize_q31_shr_((int64_t)inverse_length_2 * row_2_x + INT32_C(536870912), 30);
-    if (next_21_unchecked < (-INT32_C(1140850688))
-        || next_21_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t next_21 = (int_fast32_t)next_21_unchecked;
-    const int64_t next_22_unchecked =
-        dcm_orthonormalize_q31_shr_((int64_t)inverse_length_2 * row_2_y + INT32_C(536870912), 30);
-    if (next_22_unchecked < (-INT32_C(1140850688))
-        || next_22_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t next_22 = (int_fast32_t)next_22_unchecked;
-    const int64_t next_23_unchecked =
-        dcm_orthonormalize_q31_shr_((int64_t)inverse_length_2 * row_2_z + INT32_C(536870912), 30);
-    if (next_23_unchecked < (-INT32_C(1140850688))
-        || next_23_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t next_23 = (int_fast32_t)next_23_unchecked;
-    const int64_t next_31_unchecked =
-        dcm_orthonormalize_q31_shr_((int64_t)inverse_length_3 * row_3_x + INT32_C(536870912), 30);
-    if (next_31_unchecked < (-INT32_C(1140850688))
-        || next_31_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t next_31 = (int_fast32_t)next_31_unchecked;
-    const int64_t next_32_unchecked =
-        dcm_orthonormalize_q31_shr_((int64_t)inverse_length_3 * row_3_y + INT32_C(536870912), 30);
-    if (next_32_unchecked < (-INT32_C(1140850688))
-        || next_32_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t next_32 = (int_fast32_t)next_32_unchecked;
-    const int64_t next_33_unchecked =
-        dcm_orthonormalize_q31_shr_((int64_t)inverse_length_3 * row_3_z + INT32_C(536870912), 30);
-    if (next_33_unchecked < (-INT32_C(1140850688))
-        || next_33_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t next_33 = (int_fast32_t)next_33_unchecked;
-    orthonormalized[0] = (int32_t)next_11;
-    orthonormalized[1] = (int32_t)next_12;
-    orthonormalized[2] = (int32_t)next_13;
-    orthonormalized[3] = (int32_t)next_21;
-    orthonormalized[4] = (int32_t)next_22;
-    orthonormalized[5] = (int32_t)next_23;
-    orthonormalized[6] = (int32_t)next_31;
-    orthonormalized[7] = (int32_t)next_32;
-    orthonormalized[8] = (int32_t)next_33;
-    return 0;
-}
-
-int dcm_orthonormalize_q31(const int32_t computed[9], int32_t orthonormalized[9])
-{
-    return dcm_orthonormalize_q31_one_(computed, orthonormalized);
-}
-
-size_t dcm_orthonormalize_q31_array(size_t count, int *status, const int32_t *computed,
-    int32_t *orthonormalized)
-{
-    *status = 0;
-    for (size_t k = 0; k < count; ++k) {
-        *status = dcm_orthonormalize_q31_one_(computed + 9 * k, orthonormalized + 9 * k);
-        if (*status)
-            return k;
     }
-    return count;
+    const int32_t next_11 = dcm_orthonormalize_q31_narrow_(next_11_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 1.5e-08 */
+    const int64_t next_12_unchecked =
+        dcm_orthonormalize_q31_shr_(dcm_orthonormalize_q31_mul_(inverse_length_1, row_1_y)
+        + (INT32_C(1) << 29), 30);
+    if ((next_12_unchecked < (-INT32_C(1140850688)))
+        || (next_12_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t next_12 = dcm_orthonormalize_q31_narrow_(next_12_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 1.5e-08 */
+    const int64_t next_13_unchecked =
+        dcm_orthonormalize_q31_shr_(dcm_orthonormalize_q31_mul_(inverse_length_1, row_1_z)
+        + (INT32_C(1) << 29), 30);
+    if ((next_13_unchecked < (-INT32_C(1140850688)))
+        || (next_13_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t next_13 = dcm_orthonormalize_q31_narrow_(next_13_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 1.5e-08 */
+    const int64_t next_21_unchecked =
+        dcm_orthonormalize_q31_shr_(dcm_orthonormalize_q31_mul_(inverse_length_2, row_2_x)
+        + (INT32_C(1) << 29), 30);
+    if ((next_21_unchecked < (-INT32_C(1140850688)))
+        || (next_21_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t next_21 = dcm_orthonormalize_q31_narrow_(next_21_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 1.5e-08 */
+    const int64_t next_22_unchecked =
+        dcm_orthonormalize_q31_shr_(dcm_orthonormalize_q31_mul_(inverse_length_2, row_2_y)
+        + (INT32_C(1) << 29), 30);
+    if ((next_22_unchecked < (-INT32_C(1140850688)))
+        || (next_22_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t next_22 = dcm_orthonormalize_q31_narrow_(next_22_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 1.5e-08 */
+    const int64_t next_23_unchecked =
+        dcm_orthonormalize_q31_shr_(dcm_orthonormalize_q31_mul_(inverse_length_2, row_2_z)
+        + (INT32_C(1) << 29), 30);
+    if ((next_23_unchecked < (-INT32_C(1140850688)))
+        || (next_23_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t next_23 = dcm_orthonormalize_q31_narrow_(next_23_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 1.5e-08 */
+    const int64_t next_31_unchecked =
+        dcm_orthonormalize_q31_shr_(dcm_orthonormalize_q31_mul_(inverse_length_3, row_3_x)
+        + (INT32_C(1) << 29), 30);
+    if ((next_31_unchecked < (-INT32_C(1140850688)))
+        || (next_31_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t next_31 = dcm_orthonormalize_q31_narrow_(next_31_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 1.5e-08 */
+    const int64_t next_32_unchecked =
+        dcm_orthonormalize_q31_shr_(dcm_orthonormalize_q31_mul_(inverse_length_3, row_3_y)
+        + (INT32_C(1) << 29), 30);
+    if ((next_32_unchecked < (-INT32_C(1140850688)))
+        || (next_32_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t next_32 = dcm_orthonormalize_q31_narrow_(next_32_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 1.5e-08 */
+    const int64_t next_33_unchecked =
+        dcm_orthonormalize_q31_shr_(dcm_orthonormalize_q31_mul_(inverse_length_3, row_3_z)
+        + (INT32_C(1) << 29), 30);
+    if ((next_33_unchecked < (-INT32_C(1140850688)))
+        || (next_33_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t next_33 = dcm_orthonormalize_q31_narrow_(next_33_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 1.5e-08 */
+    orthonormalized[0] = next_11;
+    orthonormalized[1] = next_12;
+    orthonormalized[2] = next_13;
+    orthonormalized[3] = next_21;
+    orthonormalized[4] = next_22;
+    orthonormalized[5] = next_23;
+    orthonormalized[6] = next_31;
+    orthonormalized[7] = next_32;
+    orthonormalized[8] = next_33;
+    return 0;
 }

@@ -5,38 +5,76 @@
 #include "dcm_rk1_2_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int dcm_rk1_2_q31_out_(int_fast32_t x, int_fast32_t limit)
+static inline int dcm_rk1_2_q31_out_(int32_t x, int32_t limit)
 {
-    return (uint64_t)x + (uint64_t)limit > 2 * (uint64_t)limit;
+    return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
 
-/* x / 2^n, rounded down. The right shift of a negative number is left to the compiler by the standard; this is not, and
- * compilers make one arithmetic shift of it.
+/* The exact product of two words. */
+#if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
+/* These processors have no instruction for it: the high word takes four products of half words. */
+__attribute__((noinline)) static int64_t dcm_rk1_2_q31_mul_(int32_t a, int32_t b)
+{
+    const uint32_t a_low = (uint32_t)a & 0xFFFFu;
+    const uint32_t b_low = (uint32_t)b & 0xFFFFu;
+    const int32_t a_high = (a < 0) ? ~(~a >> 16) : (a >> 16);
+    const int32_t b_high = (b < 0) ? ~(~b >> 16) : (b >> 16);
+    const uint32_t low = a_low * b_low;
+    const int32_t middle = (a_high * (int32_t)b_low) + (int32_t)(low >> 16);
+    const int32_t other = (b_high * (int32_t)a_low) + (int32_t)((uint32_t)middle & 0xFFFFu);
+    const int32_t high = (a_high * b_high) + ((middle < 0) ? ~(~middle >> 16) : (middle >> 16))
+        + ((other < 0) ? ~(~other >> 16) : (other >> 16));
+    const uint64_t bits = ((uint64_t)(uint32_t)high << 32) | ((uint32_t)a * (uint32_t)b);
+    return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
+}
+#else
+static inline int64_t dcm_rk1_2_q31_mul_(int32_t a, int32_t b)
+{
+    return (int64_t)a * b;
+}
+#endif
+
+/* x / 2^n, rounded down, where the proof of the ranges shows that it fits into a word: then the
+ * 32 bits of x from bit n on, read as a number with a sign, are that quotient. For n above 32 the
+ * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
+ * number and no conversion of a number out of range.
  */
+static inline int32_t dcm_rk1_2_q31_narrow_(int64_t x, int n)
+{
+#ifdef __FRAMAC__
+    return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
+#else
+    const int beyond = (n > 32) ? (n - 32) : 0;
+    const uint32_t bits = (uint32_t)((uint64_t)x >> (n - beyond));
+    const int32_t high = (bits <= (UINT32_MAX >> 1)) ? (int32_t)bits
+                                                 : (-1 - (int32_t)(UINT32_MAX - bits));
+    return (high < 0) ? ~(~high >> beyond) : (high >> beyond);
+#endif
+}
+
+/* x / 2^n, rounded down, as a wide number. */
 static inline int64_t dcm_rk1_2_q31_shr_(int64_t x, int n)
 {
-    return x < 0 ? ~(~x >> n) : x >> n;
+    return (x < 0) ? ~(~x >> n) : (x >> n);
 }
 
-/* The algorithm. Static, so that the loops below can take it in. */
-static inline int dcm_rk1_2_q31_one_(const int32_t state[9], const int32_t increments[6],
-    int32_t next[9])
+int dcm_rk1_2_q31(const int32_t state[9], const int32_t increments[6], int32_t next[9])
 {
-    const int_fast32_t C_11 = state[0];
-    const int_fast32_t C_12 = state[1];
-    const int_fast32_t C_13 = state[2];
-    const int_fast32_t C_21 = state[3];
-    const int_fast32_t C_22 = state[4];
-    const int_fast32_t C_23 = state[5];
-    const int_fast32_t C_31 = state[6];
-    const int_fast32_t C_32 = state[7];
-    const int_fast32_t C_33 = state[8];
-    const int_fast32_t d1_x = increments[0];
-    const int_fast32_t d1_y = increments[1];
-    const int_fast32_t d1_z = increments[2];
-    const int_fast32_t d2_x = increments[3];
-    const int_fast32_t d2_y = increments[4];
-    const int_fast32_t d2_z = increments[5];
+    const int32_t C_11 = state[0];
+    const int32_t C_12 = state[1];
+    const int32_t C_13 = state[2];
+    const int32_t C_21 = state[3];
+    const int32_t C_22 = state[4];
+    const int32_t C_23 = state[5];
+    const int32_t C_31 = state[6];
+    const int32_t C_32 = state[7];
+    const int32_t C_33 = state[8];
+    const int32_t d1_x = increments[0];
+    const int32_t d1_y = increments[1];
+    const int32_t d1_z = increments[2];
+    const int32_t d2_x = increments[3];
+    const int32_t d2_y = increments[4];
+    const int32_t d2_z = increments[5];
     if (dcm_rk1_2_q31_out_(C_11, INT32_C(1140850688))
         || dcm_rk1_2_q31_out_(C_12, INT32_C(1140850688))
         || dcm_rk1_2_q31_out_(C_13, INT32_C(1140850688))
@@ -46,139 +84,114 @@ static inline int dcm_rk1_2_q31_one_(const int32_t state[9], const int32_t incre
         || dcm_rk1_2_q31_out_(C_31, INT32_C(1140850688))
         || dcm_rk1_2_q31_out_(C_32, INT32_C(1140850688))
         || dcm_rk1_2_q31_out_(C_33, INT32_C(1140850688))
-        || dcm_rk1_2_q31_out_(d1_x, INT32_C(1073741824))
-        || dcm_rk1_2_q31_out_(d1_y, INT32_C(1073741824))
-        || dcm_rk1_2_q31_out_(d1_z, INT32_C(1073741824))
-        || dcm_rk1_2_q31_out_(d2_x, INT32_C(1073741824))
-        || dcm_rk1_2_q31_out_(d2_y, INT32_C(1073741824))
-        || dcm_rk1_2_q31_out_(d2_z, INT32_C(1073741824)))
+        || dcm_rk1_2_q31_out_(d1_x, (INT32_C(1) << 30))
+        || dcm_rk1_2_q31_out_(d1_y, (INT32_C(1) << 30))
+        || dcm_rk1_2_q31_out_(d1_z, (INT32_C(1) << 30))
+        || dcm_rk1_2_q31_out_(d2_x, (INT32_C(1) << 30))
+        || dcm_rk1_2_q31_out_(d2_y, (INT32_C(1) << 30))
+        || dcm_rk1_2_q31_out_(d2_z, (INT32_C(1) << 30)))
         return 1;
     /* rate times the step, at node 0 */
-    const int_fast32_t turn_0_x =
-        (int_fast32_t)(dcm_rk1_2_q31_shr_((int64_t)d1_x * 3 - (int64_t)d2_x + 2, 2));
-    const int_fast32_t turn_0_y =
-        (int_fast32_t)(dcm_rk1_2_q31_shr_((int64_t)d1_y * 3 - (int64_t)d2_y + 2, 2));
-    const int_fast32_t turn_0_z =
-        (int_fast32_t)(dcm_rk1_2_q31_shr_((int64_t)d1_z * 3 - (int64_t)d2_z + 2, 2));
+    const int32_t turn_0_x = dcm_rk1_2_q31_narrow_(dcm_rk1_2_q31_mul_(d1_x, 3) - (int64_t)d2_x
+        + 2, 2); /* Q0.31, -0.501 .. 0.501, error 2.4e-10 */
+    const int32_t turn_0_y = dcm_rk1_2_q31_narrow_(dcm_rk1_2_q31_mul_(d1_y, 3) - (int64_t)d2_y
+        + 2, 2); /* Q0.31, -0.501 .. 0.501, error 2.4e-10 */
+    const int32_t turn_0_z = dcm_rk1_2_q31_narrow_(dcm_rk1_2_q31_mul_(d1_z, 3) - (int64_t)d2_z
+        + 2, 2); /* Q0.31, -0.501 .. 0.501, error 2.4e-10 */
     /* the step applied to the identity */
-    const int_fast32_t A_12 = (int_fast32_t)(-(int64_t)turn_0_z);
-    const int_fast32_t A_23 = (int_fast32_t)(-(int64_t)turn_0_x);
-    const int_fast32_t A_31 = (int_fast32_t)(-(int64_t)turn_0_y);
+    const int32_t A_12 = -turn_0_z; /* Q0.31, -0.501 .. 0.501, error 2.4e-10 */
+    const int32_t A_23 = -turn_0_x; /* Q0.31, -0.501 .. 0.501, error 2.4e-10 */
+    const int32_t A_31 = -turn_0_y; /* Q0.31, -0.501 .. 0.501, error 2.4e-10 */
     /* direction cosine matrix, body to reference, after the step */
-    const int64_t next_11_unchecked = (int64_t)C_11 + dcm_rk1_2_q31_shr_((int64_t)A_31 * C_13
-        + (int64_t)C_12 * turn_0_z + INT32_C(1073741824), 31);
-    if (next_11_unchecked < (-INT32_C(1140850688))
-        || next_11_unchecked > INT32_C(1140850688))
+    const int64_t next_11_unchecked = (int64_t)C_11
+        + dcm_rk1_2_q31_shr_(dcm_rk1_2_q31_mul_(A_31, C_13)
+        + dcm_rk1_2_q31_mul_(C_12, turn_0_z) + (INT32_C(1) << 30), 31);
+    if ((next_11_unchecked < (-INT32_C(1140850688)))
+        || (next_11_unchecked > INT32_C(1140850688))) {
         return 2;
-    const int_fast32_t next_11 = (int_fast32_t)next_11_unchecked;
-    const int64_t next_12_unchecked = (int64_t)C_12 + dcm_rk1_2_q31_shr_((int64_t)A_12 * C_11
-        + (int64_t)C_13 * turn_0_x + INT32_C(1073741824), 31);
-    if (next_12_unchecked < (-INT32_C(1140850688))
-        || next_12_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t next_12 = (int_fast32_t)next_12_unchecked;
-    const int64_t next_13_unchecked = (int64_t)C_13 + dcm_rk1_2_q31_shr_((int64_t)A_23 * C_12
-        + (int64_t)C_11 * turn_0_y + INT32_C(1073741824), 31);
-    if (next_13_unchecked < (-INT32_C(1140850688))
-        || next_13_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t next_13 = (int_fast32_t)next_13_unchecked;
-    const int64_t next_21_unchecked = (int64_t)C_21 + dcm_rk1_2_q31_shr_((int64_t)A_31 * C_23
-        + (int64_t)C_22 * turn_0_z + INT32_C(1073741824), 31);
-    if (next_21_unchecked < (-INT32_C(1140850688))
-        || next_21_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t next_21 = (int_fast32_t)next_21_unchecked;
-    const int64_t next_22_unchecked = (int64_t)C_22 + dcm_rk1_2_q31_shr_((int64_t)A_12 * C_21
-        + (int64_t)C_23 * turn_0_x + INT32_C(1073741824), 31);
-    if (next_22_unchecked < (-INT32_C(1140850688))
-        || next_22_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t next_22 = (int_fast32_t)next_22_unchecked;
-    const int64_t next_23_unchecked = (int64_t)C_23 + dcm_rk1_2_q31_shr_((int64_t)A_23 * C_22
-        + (int64_t)C_21 * turn_0_y + INT32_C(1073741824), 31);
-    if (next_23_unchecked < (-INT32_C(1140850688))
-        || next_23_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t next_23 = (int_fast32_t)next_23_unchecked;
-    const int64_t next_31_unchecked = (int64_t)C_31 + dcm_rk1_2_q31_shr_((int64_t)A_31 * C_33
-        + (int64_t)C_32 * turn_0_z + INT32_C(1073741824), 31);
-    if (next_31_unchecked < (-INT32_C(1140850688))
-        || next_31_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t next_31 = (int_fast32_t)next_31_unchecked;
-    const int64_t next_32_unchecked = (int64_t)C_32 + dcm_rk1_2_q31_shr_((int64_t)A_12 * C_31
-        + (int64_t)C_33 * turn_0_x + INT32_C(1073741824), 31);
-    if (next_32_unchecked < (-INT32_C(1140850688))
-        || next_32_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t next_32 = (int_fast32_t)next_32_unchecked;
-    const int64_t next_33_unchecked = (int64_t)C_33 + dcm_rk1_2_q31_shr_((int64_t)A_23 * C_32
-        + (int64_t)C_31 * turn_0_y + INT32_C(1073741824), 31);
-    if (next_33_unchecked < (-INT32_C(1140850688))
-        || next_33_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t next_33 = (int_fast32_t)next_33_unchecked;
-    next[0] = (int32_t)next_11;
-    next[1] = (int32_t)next_12;
-    next[2] = (int32_t)next_13;
-    next[3] = (int32_t)next_21;
-    next[4] = (int32_t)next_22;
-    next[5] = (int32_t)next_23;
-    next[6] = (int32_t)next_31;
-    next[7] = (int32_t)next_32;
-    next[8] = (int32_t)next_33;
-    return 0;
-}
-
-int dcm_rk1_2_q31(const int32_t state[9], const int32_t increments[6], int32_t next[9])
-{
-    return dcm_rk1_2_q31_one_(state, increments, next);
-}
-
-size_t dcm_rk1_2_q31_array(size_t count, int *status, const int32_t *state,
-    const int32_t *increments, int32_t *next)
-{
-    *status = 0;
-    for (size_t k = 0; k < count; ++k) {
-        *status = dcm_rk1_2_q31_one_(state + 9 * k, increments + 6 * k, next + 9 * k);
-        if (*status)
-            return k;
     }
-    return count;
-}
-
-int dcm_rk1_2_q31_propagate(size_t runs, size_t steps, size_t record_every, size_t orthonormalize_every,
-    dcm_rk1_2_q31_orthonormalizer orthonormalize, const int32_t *initial, const int32_t *increments,
-    int32_t *history, size_t *stopped)
-{
-    if (!initial || !history || (steps && !increments) || !record_every || (orthonormalize_every && !orthonormalize))
-        return 4;
-    for (size_t run = 0; run < runs; ++run) {
-        int32_t state[9];
-        size_t until_record = record_every, until_orthonormalize = orthonormalize_every;
-        for (size_t j = 0; j < 9; ++j)
-            state[j] = *history++ = *initial++;
-        for (size_t step = 0; step < steps; ++step, increments += 6) {
-            int status = dcm_rk1_2_q31_one_(state, increments, state);
-            if (!status && orthonormalize_every && !--until_orthonormalize) {
-                if (orthonormalize(state, state))
-                    status = 3;
-                until_orthonormalize = orthonormalize_every;
-            }
-            if (status) {
-                if (stopped) {
-                    stopped[0] = run;
-                    stopped[1] = step;
-                }
-                return status;
-            }
-            if (!--until_record) {
-                for (size_t j = 0; j < 9; ++j)
-                    *history++ = state[j];
-                until_record = record_every;
-            }
-        }
+    const int32_t next_11 = dcm_rk1_2_q31_narrow_(next_11_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 9.7e-10 */
+    const int64_t next_12_unchecked = (int64_t)C_12
+        + dcm_rk1_2_q31_shr_(dcm_rk1_2_q31_mul_(A_12, C_11)
+        + dcm_rk1_2_q31_mul_(C_13, turn_0_x) + (INT32_C(1) << 30), 31);
+    if ((next_12_unchecked < (-INT32_C(1140850688)))
+        || (next_12_unchecked > INT32_C(1140850688))) {
+        return 2;
     }
+    const int32_t next_12 = dcm_rk1_2_q31_narrow_(next_12_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 9.7e-10 */
+    const int64_t next_13_unchecked = (int64_t)C_13
+        + dcm_rk1_2_q31_shr_(dcm_rk1_2_q31_mul_(A_23, C_12)
+        + dcm_rk1_2_q31_mul_(C_11, turn_0_y) + (INT32_C(1) << 30), 31);
+    if ((next_13_unchecked < (-INT32_C(1140850688)))
+        || (next_13_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t next_13 = dcm_rk1_2_q31_narrow_(next_13_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 9.7e-10 */
+    const int64_t next_21_unchecked = (int64_t)C_21
+        + dcm_rk1_2_q31_shr_(dcm_rk1_2_q31_mul_(A_31, C_23)
+        + dcm_rk1_2_q31_mul_(C_22, turn_0_z) + (INT32_C(1) << 30), 31);
+    if ((next_21_unchecked < (-INT32_C(1140850688)))
+        || (next_21_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t next_21 = dcm_rk1_2_q31_narrow_(next_21_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 9.7e-10 */
+    const int64_t next_22_unchecked = (int64_t)C_22
+        + dcm_rk1_2_q31_shr_(dcm_rk1_2_q31_mul_(A_12, C_21)
+        + dcm_rk1_2_q31_mul_(C_23, turn_0_x) + (INT32_C(1) << 30), 31);
+    if ((next_22_unchecked < (-INT32_C(1140850688)))
+        || (next_22_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t next_22 = dcm_rk1_2_q31_narrow_(next_22_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 9.7e-10 */
+    const int64_t next_23_unchecked = (int64_t)C_23
+        + dcm_rk1_2_q31_shr_(dcm_rk1_2_q31_mul_(A_23, C_22)
+        + dcm_rk1_2_q31_mul_(C_21, turn_0_y) + (INT32_C(1) << 30), 31);
+    if ((next_23_unchecked < (-INT32_C(1140850688)))
+        || (next_23_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t next_23 = dcm_rk1_2_q31_narrow_(next_23_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 9.7e-10 */
+    const int64_t next_31_unchecked = (int64_t)C_31
+        + dcm_rk1_2_q31_shr_(dcm_rk1_2_q31_mul_(A_31, C_33)
+        + dcm_rk1_2_q31_mul_(C_32, turn_0_z) + (INT32_C(1) << 30), 31);
+    if ((next_31_unchecked < (-INT32_C(1140850688)))
+        || (next_31_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t next_31 = dcm_rk1_2_q31_narrow_(next_31_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 9.7e-10 */
+    const int64_t next_32_unchecked = (int64_t)C_32
+        + dcm_rk1_2_q31_shr_(dcm_rk1_2_q31_mul_(A_12, C_31)
+        + dcm_rk1_2_q31_mul_(C_33, turn_0_x) + (INT32_C(1) << 30), 31);
+    if ((next_32_unchecked < (-INT32_C(1140850688)))
+        || (next_32_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t next_32 = dcm_rk1_2_q31_narrow_(next_32_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 9.7e-10 */
+    const int64_t next_33_unchecked = (int64_t)C_33
+        + dcm_rk1_2_q31_shr_(dcm_rk1_2_q31_mul_(A_23, C_32)
+        + dcm_rk1_2_q31_mul_(C_31, turn_0_y) + (INT32_C(1) << 30), 31);
+    if ((next_33_unchecked < (-INT32_C(1140850688)))
+        || (next_33_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t next_33 = dcm_rk1_2_q31_narrow_(next_33_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 9.7e-10 */
+    next[0] = next_11;
+    next[1] = next_12;
+    next[2] = next_13;
+    next[3] = next_21;
+    next[4] = next_22;
+    next[5] = next_23;
+    next[6] = next_31;
+    next[7] = next_32;
+    next[8] = next_33;
     return 0;
 }

@@ -5,35 +5,73 @@
 #include "dcm_update_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int dcm_update_q31_out_(int_fast32_t x, int_fast32_t limit)
+static inline int dcm_update_q31_out_(int32_t x, int32_t limit)
 {
-    return (uint64_t)x + (uint64_t)limit > 2 * (uint64_t)limit;
+    return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
 
-/* x / 2^n, rounded down. The right shift of a negative number is left to the compiler by the standard; this is not, and
- * compilers make one arithmetic shift of it.
+/* The exact product of two words. */
+#if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
+/* These processors have no instruction for it: the high word takes four products of half words. */
+__attribute__((noinline)) static int64_t dcm_update_q31_mul_(int32_t a, int32_t b)
+{
+    const uint32_t a_low = (uint32_t)a & 0xFFFFu;
+    const uint32_t b_low = (uint32_t)b & 0xFFFFu;
+    const int32_t a_high = (a < 0) ? ~(~a >> 16) : (a >> 16);
+    const int32_t b_high = (b < 0) ? ~(~b >> 16) : (b >> 16);
+    const uint32_t low = a_low * b_low;
+    const int32_t middle = (a_high * (int32_t)b_low) + (int32_t)(low >> 16);
+    const int32_t other = (b_high * (int32_t)a_low) + (int32_t)((uint32_t)middle & 0xFFFFu);
+    const int32_t high = (a_high * b_high) + ((middle < 0) ? ~(~middle >> 16) : (middle >> 16))
+        + ((other < 0) ? ~(~other >> 16) : (other >> 16));
+    const uint64_t bits = ((uint64_t)(uint32_t)high << 32) | ((uint32_t)a * (uint32_t)b);
+    return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
+}
+#else
+static inline int64_t dcm_update_q31_mul_(int32_t a, int32_t b)
+{
+    return (int64_t)a * b;
+}
+#endif
+
+/* x / 2^n, rounded down, where the proof of the ranges shows that it fits into a word: then the
+ * 32 bits of x from bit n on, read as a number with a sign, are that quotient. For n above 32 the
+ * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
+ * number and no conversion of a number out of range.
  */
+static inline int32_t dcm_update_q31_narrow_(int64_t x, int n)
+{
+#ifdef __FRAMAC__
+    return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
+#else
+    const int beyond = (n > 32) ? (n - 32) : 0;
+    const uint32_t bits = (uint32_t)((uint64_t)x >> (n - beyond));
+    const int32_t high = (bits <= (UINT32_MAX >> 1)) ? (int32_t)bits
+                                                 : (-1 - (int32_t)(UINT32_MAX - bits));
+    return (high < 0) ? ~(~high >> beyond) : (high >> beyond);
+#endif
+}
+
+/* x / 2^n, rounded down, as a wide number. */
 static inline int64_t dcm_update_q31_shr_(int64_t x, int n)
 {
-    return x < 0 ? ~(~x >> n) : x >> n;
+    return (x < 0) ? ~(~x >> n) : (x >> n);
 }
 
-/* The algorithm. Static, so that the loops below can take it in. */
-static inline int dcm_update_q31_one_(const int32_t state[9], const int32_t rotation_vector[3],
-    int32_t next[9])
+int dcm_update_q31(const int32_t state[9], const int32_t rotation_vector[3], int32_t next[9])
 {
-    const int_fast32_t C_11 = state[0];
-    const int_fast32_t C_12 = state[1];
-    const int_fast32_t C_13 = state[2];
-    const int_fast32_t C_21 = state[3];
-    const int_fast32_t C_22 = state[4];
-    const int_fast32_t C_23 = state[5];
-    const int_fast32_t C_31 = state[6];
-    const int_fast32_t C_32 = state[7];
-    const int_fast32_t C_33 = state[8];
-    const int_fast32_t phi_x = rotation_vector[0];
-    const int_fast32_t phi_y = rotation_vector[1];
-    const int_fast32_t phi_z = rotation_vector[2];
+    const int32_t C_11 = state[0];
+    const int32_t C_12 = state[1];
+    const int32_t C_13 = state[2];
+    const int32_t C_21 = state[3];
+    const int32_t C_22 = state[4];
+    const int32_t C_23 = state[5];
+    const int32_t C_31 = state[6];
+    const int32_t C_32 = state[7];
+    const int32_t C_33 = state[8];
+    const int32_t phi_x = rotation_vector[0];
+    const int32_t phi_y = rotation_vector[1];
+    const int32_t phi_z = rotation_vector[2];
     if (dcm_update_q31_out_(C_11, INT32_C(1140850688))
         || dcm_update_q31_out_(C_12, INT32_C(1140850688))
         || dcm_update_q31_out_(C_13, INT32_C(1140850688))
@@ -43,186 +81,218 @@ static inline int dcm_update_q31_one_(const int32_t state[9], const int32_t rota
         || dcm_update_q31_out_(C_31, INT32_C(1140850688))
         || dcm_update_q31_out_(C_32, INT32_C(1140850688))
         || dcm_update_q31_out_(C_33, INT32_C(1140850688))
-        || dcm_update_q31_out_(phi_x, INT32_C(1073741824))
-        || dcm_update_q31_out_(phi_y, INT32_C(1073741824))
-        || dcm_update_q31_out_(phi_z, INT32_C(1073741824)))
+        || dcm_update_q31_out_(phi_x, (INT32_C(1) << 30))
+        || dcm_update_q31_out_(phi_y, (INT32_C(1) << 30))
+        || dcm_update_q31_out_(phi_z, (INT32_C(1) << 30)))
         return 1;
-    const int_fast32_t shared_1 = (int_fast32_t)(dcm_update_q31_shr_((int64_t)phi_x * phi_x
-        + INT32_C(536870912), 30));
-    const int_fast32_t shared_2 = (int_fast32_t)(dcm_update_q31_shr_((int64_t)phi_y * phi_y
-        + INT32_C(536870912), 30));
-    const int_fast32_t shared_3 = (int_fast32_t)(dcm_update_q31_shr_((int64_t)phi_z * phi_z
-        + INT32_C(536870912), 30));
+    const int32_t shared_1 = dcm_update_q31_narrow_(dcm_update_q31_mul_(phi_x, phi_x)
+        + (INT32_C(1) << 29), 30); /* Q1.30, -9.32e-10 .. 1.01, error 4.7e-10 */
+    const int32_t shared_2 = dcm_update_q31_narrow_(dcm_update_q31_mul_(phi_y, phi_y)
+        + (INT32_C(1) << 29), 30); /* Q1.30, -9.32e-10 .. 1.01, error 4.7e-10 */
+    const int32_t shared_3 = dcm_update_q31_narrow_(dcm_update_q31_mul_(phi_z, phi_z)
+        + (INT32_C(1) << 29), 30); /* Q1.30, -9.32e-10 .. 1.01, error 4.7e-10 */
     /* square of the angle */
-    const int_fast32_t angle_squared = (int_fast32_t)(dcm_update_q31_shr_((int64_t)shared_1
-        + (int64_t)shared_2 + (int64_t)shared_3 + 1, 1));
-    const int_fast32_t factor_1_under_root = (int_fast32_t)((int64_t)angle_squared);
-    const int_fast32_t factor_1_taken = (int_fast32_t)(((int64_t)factor_1_under_root >= INT32_C(1610612736) ? INT32_C(1610612736)
-        : 0 >= (int64_t)factor_1_under_root ? 0
-        : (int64_t)factor_1_under_root));
-    const int_fast32_t factor_1_series =
-        (int_fast32_t)(dcm_update_q31_shr_(dcm_update_q31_shr_(-(int64_t)factor_1_taken * INT32_C(56412333), 1)
-        + INT64_C(6662950945848033280) + INT64_C(2147483648), 32));
-    const int_fast32_t factor_1_series_2 =
-        (int_fast32_t)(dcm_update_q31_shr_(dcm_update_q31_shr_((int64_t)factor_1_taken * factor_1_series, 5)
-        - INT64_C(7495819814078808064) + INT64_C(2147483648), 32));
-    const int_fast32_t factor_1_series_3 =
-        (int_fast32_t)(dcm_update_q31_shr_(dcm_update_q31_shr_((int64_t)factor_1_taken * factor_1_series_2, 5)
-        + INT64_C(4919131752989213696) + INT64_C(2147483648), 32));
-    const int_fast32_t factor_1_bend =
-        (int_fast32_t)(dcm_update_q31_shr_((int64_t)factor_1_taken * factor_1_series_3
-        + INT64_C(8589934592), 34));
-    const int_fast32_t factor_1 = (int_fast32_t)(INT32_C(1073741824)
-        + dcm_update_q31_shr_(-(int64_t)factor_1_taken * INT32_C(1431655765) * 2
-        + (int64_t)factor_1_taken * factor_1_bend + INT64_C(17179869184), 35));
-    const int_fast32_t shared_18 = (int_fast32_t)(dcm_update_q31_shr_((int64_t)factor_1 * factor_1
-        + INT32_C(536870912), 30));
-    const int64_t shared_7 = (int64_t)shared_18 * shared_2;
-    const int64_t shared_8 = (int64_t)shared_18 * shared_3;
-    /* the step applied to the identity */
-    const int_fast32_t A_11 = (int_fast32_t)(INT32_C(1073741824) + dcm_update_q31_shr_(-shared_7
-        - shared_8 + INT32_C(1073741824), 31));
-    const int_fast32_t shared_9_taken = (int_fast32_t)(((int64_t)angle_squared >= INT32_C(1610612736) ? INT32_C(1610612736)
-        : 0 >= (int64_t)angle_squared ? 0
-        : (int64_t)angle_squared));
-    const int_fast32_t shared_9_series = (int_fast32_t)(INT32_C(1481185360)
-        + dcm_update_q31_shr_(-(int64_t)shared_9_taken * INT32_C(1805635485)
-        + INT64_C(68719476736), 37));
-    const int_fast32_t shared_9_series_2 =
-        (int_fast32_t)(dcm_update_q31_shr_(dcm_update_q31_shr_((int64_t)shared_9_taken * shared_9_series, 4)
-        - INT64_C(7753252009628663808) + INT64_C(2147483648), 32));
-    const int_fast32_t shared_9_series_3 =
-        (int_fast32_t)(dcm_update_q31_shr_(dcm_update_q31_shr_((int64_t)shared_9_taken * shared_9_series_2, 4)
-        + INT64_C(6662950945848033280) + INT64_C(2147483648), 32));
-    const int_fast32_t shared_9_series_4 =
-        (int_fast32_t)(dcm_update_q31_shr_(dcm_update_q31_shr_((int64_t)shared_9_taken * shared_9_series_3, 3)
-        - INT64_C(7495819814078808064) + INT64_C(2147483648), 32));
-    const int_fast32_t shared_9_series_5 =
-        (int_fast32_t)(dcm_update_q31_shr_(dcm_update_q31_shr_((int64_t)shared_9_taken * shared_9_series_4, 3)
-        + INT64_C(4919131752989213696) + INT64_C(2147483648), 32));
-    const int_fast32_t shared_9_bend =
-        (int_fast32_t)(dcm_update_q31_shr_((int64_t)shared_9_taken * shared_9_series_5
-        + INT32_C(536870912), 30));
-    const int_fast32_t shared_9 = (int_fast32_t)(INT32_C(1073741824)
-        + dcm_update_q31_shr_(-(int64_t)shared_9_taken * INT32_C(1431655765) * 2
-        + dcm_update_q31_shr_((int64_t)shared_9_taken * shared_9_bend, 2)
-        + INT64_C(4294967296), 33));
-    const int64_t shared_10 = (int64_t)phi_z * shared_9;
-    const int_fast32_t shared_11 = (int_fast32_t)(dcm_update_q31_shr_((int64_t)phi_x * shared_18
-        + INT32_C(536870912), 30));
-    const int64_t shared_12 = (int64_t)phi_y * shared_11;
-    const int_fast32_t A_12 = (int_fast32_t)(dcm_update_q31_shr_(shared_12 - shared_10 * 2
-        + INT32_C(1073741824), 31));
-    const int64_t shared_13 = (int64_t)phi_y * shared_9;
-    const int64_t shared_14 = (int64_t)phi_z * shared_11;
-    const int_fast32_t A_13 = (int_fast32_t)(dcm_update_q31_shr_(shared_13 * 2 + shared_14
-        + INT32_C(1073741824), 31));
-    const int_fast32_t A_21 = (int_fast32_t)(dcm_update_q31_shr_(shared_10 * 2 + shared_12
-        + INT32_C(1073741824), 31));
-    const int64_t shared_15 = (int64_t)shared_1 * shared_18;
-    const int_fast32_t A_22 = (int_fast32_t)(INT32_C(1073741824) + dcm_update_q31_shr_(-shared_15
-        - shared_8 + INT32_C(1073741824), 31));
-    const int64_t shared_16 = (int64_t)phi_x * shared_9;
-    const int_fast32_t shared_17 = (int_fast32_t)(dcm_update_q31_shr_((int64_t)phi_y * phi_z
-        + INT32_C(536870912), 30));
-    const int64_t shared_5 = (int64_t)shared_17 * shared_18;
-    const int_fast32_t A_23 = (int_fast32_t)(dcm_update_q31_shr_(shared_5 - shared_16 * 2
-        + INT32_C(1073741824), 31));
-    const int_fast32_t A_31 = (int_fast32_t)(dcm_update_q31_shr_(shared_14 - shared_13 * 2
-        + INT32_C(1073741824), 31));
-    const int_fast32_t A_32 = (int_fast32_t)(dcm_update_q31_shr_(shared_16 * 2 + shared_5
-        + INT32_C(1073741824), 31));
-    const int_fast32_t A_33 = (int_fast32_t)(INT32_C(1073741824) + dcm_update_q31_shr_(-shared_15
-        - shared_7 + INT32_C(1073741824), 31));
-    /* direction cosine matrix, body to reference, after the step */
-    const int64_t next_11_unchecked =
-        dcm_update_q31_shr_((int64_t)A_11 * C_11 + (int64_t)A_21 * C_12 + (int64_t)A_31 * C_13
-        + INT32_C(536870912), 30);
-    if (next_11_unchecked < (-INT32_C(1140850688))
-        || next_11_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t next_11 = (int_fast32_t)next_11_unchecked;
-    const int64_t next_12_unchecked =
-        dcm_update_q31_shr_((int64_t)A_12 * C_11 + (int64_t)A_22 * C_12 + (int64_t)A_32 * C_13
-        + INT32_C(536870912), 30);
-    if (next_12_unchecked < (-INT32_C(1140850688))
-        || next_12_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t next_12 = (int_fast32_t)next_12_unchecked;
-    const int64_t next_13_unchecked =
-        dcm_update_q31_shr_((int64_t)A_13 * C_11 + (int64_t)A_23 * C_12 + (int64_t)A_33 * C_13
-        + INT32_C(536870912), 30);
-    if (next_13_unchecked < (-INT32_C(1140850688))
-        || next_13_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t next_13 = (int_fast32_t)next_13_unchecked;
-    const int64_t next_21_unchecked =
-        dcm_update_q31_shr_((int64_t)A_11 * C_21 + (int64_t)A_21 * C_22 + (int64_t)A_31 * C_23
-        + INT32_C(536870912), 30);
-    if (next_21_unchecked < (-INT32_C(1140850688))
-        || next_21_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t next_21 = (int_fast32_t)next_21_unchecked;
-    const int64_t next_22_unchecked =
-        dcm_update_q31_shr_((int64_t)A_12 * C_21 + (int64_t)A_22 * C_22 + (int64_t)A_32 * C_23
-        + INT32_C(536870912), 30);
-    if (next_22_unchecked < (-INT32_C(1140850688))
-        || next_22_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t next_22 = (int_fast32_t)next_22_unchecked;
-    const int64_t next_23_unchecked =
-        dcm_update_q31_shr_((int64_t)A_13 * C_21 + (int64_t)A_23 * C_22 + (int64_t)A_33 * C_23
-        + INT32_C(536870912), 30);
-    if (next_23_unchecked < (-INT32_C(1140850688))
-        || next_23_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t next_23 = (int_fast32_t)next_23_unchecked;
-    const int64_t next_31_unchecked =
-        dcm_update_q31_shr_((int64_t)A_11 * C_31 + (int64_t)A_21 * C_32 + (int64_t)A_31 * C_33
-        + INT32_C(536870912), 30);
-    if (next_31_unchecked < (-INT32_C(1140850688))
-        || next_31_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t next_31 = (int_fast32_t)next_31_unchecked;
-    const int64_t next_32_unchecked =
-        dcm_update_q31_shr_((int64_t)A_12 * C_31 + (int64_t)A_22 * C_32 + (int64_t)A_32 * C_33
-        + INT32_C(536870912), 30);
-    if (next_32_unchecked < (-INT32_C(1140850688))
-        || next_32_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t next_32 = (int_fast32_t)next_32_unchecked;
-    const int64_t next_33_unchecked =
-        dcm_update_q31_shr_((int64_t)A_13 * C_31 + (int64_t)A_23 * C_32 + (int64_t)A_33 * C_33
-        + INT32_C(536870912), 30);
-    if (next_33_unchecked < (-INT32_C(1140850688))
-        || next_33_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t next_33 = (int_fast32_t)next_33_unchecked;
-    next[0] = (int32_t)next_11;
-    next[1] = (int32_t)next_12;
-    next[2] = (int32_t)next_13;
-    next[3] = (int32_t)next_21;
-    next[4] = (int32_t)next_22;
-    next[5] = (int32_t)next_23;
-    next[6] = (int32_t)next_31;
-    next[7] = (int32_t)next_32;
-    next[8] = (int32_t)next_33;
-    return 0;
-}
-
-int dcm_update_q31(const int32_t state[9], const int32_t rotation_vector[3], int32_t next[9])
-{
-    return dcm_update_q31_one_(state, rotation_vector, next);
-}
-
-size_t dcm_update_q31_array(size_t count, int *status, const int32_t *state,
-    const int32_t *rotation_vector, int32_t *next)
-{
-    *status = 0;
-    for (size_t k = 0; k < count; ++k) {
-        *status = dcm_update_q31_one_(state + 9 * k, rotation_vector + 3 * k, next + 9 * k);
-        if (*status)
-            return k;
+    const int32_t angle_squared = dcm_update_q31_narrow_((int64_t)shared_1 + (int64_t)shared_2
+        + (int64_t)shared_3 + 1, 1); /* Q2.29, -3.73e-09 .. 3.01, error 2.4e-09 */
+    const int32_t factor_1_under_root = angle_squared;
+        /* Q0.31, -9.32e-10 .. 0.751, error 5.9e-10 */
+    int32_t factor_1_taken; /* Q0.31, 0 .. 0.75, exact */
+    if ((int64_t)factor_1_under_root >= INT32_C(1610612736)) {
+        factor_1_taken = dcm_update_q31_narrow_(INT32_C(1610612736), 0);
+    } else if (0 >= (int64_t)factor_1_under_root) {
+        factor_1_taken = dcm_update_q31_narrow_(0, 0);
+    } else {
+        factor_1_taken = factor_1_under_root;
     }
-    return count;
+    const int32_t factor_1_series =
+        dcm_update_q31_narrow_(dcm_update_q31_shr_(-dcm_update_q31_mul_(factor_1_taken, INT32_C(56412333) /* 1/39916800 in Q51 */), 1)
+        + INT64_C(6662950945848033280) /* 1/362880 in Q60 */ + (INT64_C(1) << 31), 32);
+        /* 2.73e-06 .. 2.76e-06, error 9e-16 */
+    const int32_t factor_1_series_2 =
+        dcm_update_q31_narrow_(dcm_update_q31_shr_(dcm_update_q31_mul_(factor_1_taken, factor_1_series), 5)
+        - INT64_C(7495819814078808064) /* 1/5040 in Q60 */ + (INT64_C(1) << 31), 32);
+        /* Q-12.43, -0.000199 .. -0.000196, error 5.8e-14 */
+    const int32_t factor_1_series_3 =
+        dcm_update_q31_narrow_(dcm_update_q31_shr_(dcm_update_q31_mul_(factor_1_taken, factor_1_series_2), 5)
+        + INT64_C(4919131752989213696) /* 1/120 in Q60 */ + (INT64_C(1) << 31), 32);
+        /* 0.00818 .. 0.00834, error 3.7e-12 */
+    const int32_t factor_1_bend =
+        dcm_update_q31_narrow_(dcm_update_q31_mul_(factor_1_taken, factor_1_series_3)
+        + (INT64_C(1) << 33), 34); /* Q-3.34, -5.83e-11 .. 0.00626, error 3.2e-11 */
+    const int32_t factor_1 = (INT32_C(1) << 30)
+        + dcm_update_q31_narrow_(-dcm_update_q31_mul_(factor_1_taken, INT32_C(1431655765) /* 1/6 in Q33 */)
+        * 2 + dcm_update_q31_mul_(factor_1_taken, factor_1_bend) + (INT64_C(1) << 34), 35);
+        /* Q1.30, 0.874 .. 1.01, error 6.5e-10 */
+    const int32_t shared_18 = dcm_update_q31_narrow_(dcm_update_q31_mul_(factor_1, factor_1)
+        + (INT32_C(1) << 29), 30); /* Q0.31, 0.382 .. 0.501, error 8.8e-10 */
+    const int64_t shared_7 = dcm_update_q31_mul_(shared_18, shared_2);
+        /* Q2.61, -1.11e-09 .. 0.501, error 1.2e-09 */
+    const int64_t shared_8 = dcm_update_q31_mul_(shared_18, shared_3);
+        /* Q2.61, -1.11e-09 .. 0.501, error 1.2e-09; stands for shared_8 + 1 */
+    /* the step applied to the identity */
+    const int32_t A_11 = dcm_update_q31_narrow_((INT32_C(1) << 30)
+        + dcm_update_q31_shr_(-shared_7 - shared_8 + (INT32_C(1) << 30), 31), 0);
+        /* Q1.30, -2.8e-09 .. 1.01, error 2.7e-09 */
+    int32_t shared_9_taken; /* Q2.29, 0 .. 3, exact */
+    if ((int64_t)angle_squared >= INT32_C(1610612736)) {
+        shared_9_taken = dcm_update_q31_narrow_(INT32_C(1610612736), 0);
+    } else if (0 >= (int64_t)angle_squared) {
+        shared_9_taken = dcm_update_q31_narrow_(0, 0);
+    } else {
+        shared_9_taken = angle_squared;
+    }
+    const int32_t shared_9_series = INT32_C(1481185360) /* 1/6227020800 in Q60 */
+        + dcm_update_q31_narrow_(-dcm_update_q31_mul_(shared_9_taken, INT32_C(1805635485) /* 1/1307674368000 in Q71 */)
+        + (INT64_C(1) << 36), 37); /* 1.58e-10 .. 1.61e-10, error 2.1e-19 */
+    const int32_t shared_9_series_2 =
+        dcm_update_q31_narrow_(dcm_update_q31_shr_(dcm_update_q31_mul_(shared_9_taken, shared_9_series), 4)
+        - INT64_C(7753252009628663808) /* 1/39916800 in Q60 */ + (INT64_C(1) << 31), 32);
+        /* Q-25.56, -2.51e-08 .. -2.45e-08, error 7.9e-18 */
+    const int32_t shared_9_series_3 =
+        dcm_update_q31_narrow_(dcm_update_q31_shr_(dcm_update_q31_mul_(shared_9_taken, shared_9_series_2), 4)
+        + INT64_C(6662950945848033280) /* 1/362880 in Q60 */ + (INT64_C(1) << 31), 32);
+        /* 2.68e-06 .. 2.76e-06, error 9.2e-16 */
+    const int32_t shared_9_series_4 =
+        dcm_update_q31_narrow_(dcm_update_q31_shr_(dcm_update_q31_mul_(shared_9_taken, shared_9_series_3), 3)
+        - INT64_C(7495819814078808064) /* 1/5040 in Q60 */ + (INT64_C(1) << 31), 32);
+        /* Q-12.43, -0.000199 .. -0.00019, error 6e-14 */
+    const int32_t shared_9_series_5 =
+        dcm_update_q31_narrow_(dcm_update_q31_shr_(dcm_update_q31_mul_(shared_9_taken, shared_9_series_4), 3)
+        + INT64_C(4919131752989213696) /* 1/120 in Q60 */ + (INT64_C(1) << 31), 32);
+        /* 0.00773 .. 0.00834, error 3.9e-12 */
+    const int32_t shared_9_bend =
+        dcm_update_q31_narrow_(dcm_update_q31_mul_(shared_9_taken, shared_9_series_5)
+        + (INT32_C(1) << 29), 30); /* Q-5.36, -2.92e-11 .. 0.0251, error 1.9e-11 */
+    const int32_t shared_9 = (INT32_C(1) << 30)
+        + dcm_update_q31_narrow_(-dcm_update_q31_mul_(shared_9_taken, INT32_C(1431655765) /* 1/6 in Q33 */)
+        * 2 + dcm_update_q31_shr_(dcm_update_q31_mul_(shared_9_taken, shared_9_bend), 2)
+        + (INT64_C(1) << 32), 33); /* Q1.30, 0.499 .. 1.01, error 1.1e-09 */
+    const int64_t shared_10 = dcm_update_q31_mul_(phi_z, shared_9);
+        /* Q3.60, -1.01 .. 1.01, error 1.1e-09 */
+    const int32_t shared_11 = dcm_update_q31_narrow_(dcm_update_q31_mul_(phi_x, shared_18)
+        + (INT32_C(1) << 29), 30); /* Q0.31, -0.501 .. 0.501, error 1.2e-09 */
+    const int64_t shared_12 = dcm_update_q31_mul_(phi_y, shared_11);
+        /* Q2.61, -0.501 .. 0.501, error 1.2e-09 */
+    const int32_t A_12 = dcm_update_q31_narrow_(shared_12 - shared_10 * 2
+        + (INT32_C(1) << 30), 31); /* Q1.30, -1.51 .. 1.51, error 2.7e-09 */
+    const int64_t shared_13 = dcm_update_q31_mul_(phi_y, shared_9);
+        /* Q3.60, -1.01 .. 1.01, error 1.1e-09 */
+    const int64_t shared_14 = dcm_update_q31_mul_(phi_z, shared_11);
+        /* Q2.61, -0.501 .. 0.501, error 1.2e-09 */
+    const int32_t A_13 = dcm_update_q31_narrow_(shared_13 * 2 + shared_14
+        + (INT32_C(1) << 30), 31); /* Q1.30, -1.51 .. 1.51, error 2.7e-09 */
+    const int32_t A_21 = dcm_update_q31_narrow_(shared_10 * 2 + shared_12
+        + (INT32_C(1) << 30), 31); /* Q1.30, -1.51 .. 1.51, error 2.7e-09 */
+    const int64_t shared_15 = dcm_update_q31_mul_(shared_1, shared_18);
+        /* Q2.61, -1.11e-09 .. 0.501, error 1.2e-09 */
+    const int32_t A_22 = dcm_update_q31_narrow_((INT32_C(1) << 30)
+        + dcm_update_q31_shr_(-shared_15 - shared_8 + (INT32_C(1) << 30), 31), 0);
+        /* Q1.30, -2.8e-09 .. 1.01, error 2.7e-09 */
+    const int64_t shared_16 = dcm_update_q31_mul_(phi_x, shared_9);
+        /* Q3.60, -1.01 .. 1.01, error 1.1e-09 */
+    const int32_t shared_17 = dcm_update_q31_narrow_(dcm_update_q31_mul_(phi_y, phi_z)
+        + (INT32_C(1) << 29), 30); /* Q1.30, -1.01 .. 1.01, error 4.7e-10 */
+    const int64_t shared_5 = dcm_update_q31_mul_(shared_17, shared_18);
+        /* Q2.61, -0.501 .. 0.501, error 1.2e-09 */
+    const int32_t A_23 = dcm_update_q31_narrow_(shared_5 - shared_16 * 2
+        + (INT32_C(1) << 30), 31); /* Q1.30, -1.51 .. 1.51, error 2.7e-09 */
+    const int32_t A_31 = dcm_update_q31_narrow_(shared_14 - shared_13 * 2
+        + (INT32_C(1) << 30), 31); /* Q1.30, -1.51 .. 1.51, error 2.7e-09 */
+    const int32_t A_32 = dcm_update_q31_narrow_(shared_16 * 2 + shared_5
+        + (INT32_C(1) << 30), 31); /* Q1.30, -1.51 .. 1.51, error 2.7e-09 */
+    const int32_t A_33 = dcm_update_q31_narrow_((INT32_C(1) << 30)
+        + dcm_update_q31_shr_(-shared_15 - shared_7 + (INT32_C(1) << 30), 31), 0);
+        /* Q1.30, -2.8e-09 .. 1.01, error 2.7e-09 */
+    /* direction cosine matrix, body to reference, after the step */
+    const int64_t next_11_unchecked = dcm_update_q31_shr_(dcm_update_q31_mul_(A_11, C_11)
+        + dcm_update_q31_mul_(A_21, C_12) + dcm_update_q31_mul_(A_31, C_13)
+        + (INT32_C(1) << 29), 30);
+    if ((next_11_unchecked < (-INT32_C(1140850688)))
+        || (next_11_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t next_11 = dcm_update_q31_narrow_(next_11_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 8.9e-09 */
+    const int64_t next_12_unchecked = dcm_update_q31_shr_(dcm_update_q31_mul_(A_12, C_11)
+        + dcm_update_q31_mul_(A_22, C_12) + dcm_update_q31_mul_(A_32, C_13)
+        + (INT32_C(1) << 29), 30);
+    if ((next_12_unchecked < (-INT32_C(1140850688)))
+        || (next_12_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t next_12 = dcm_update_q31_narrow_(next_12_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 8.9e-09 */
+    const int64_t next_13_unchecked = dcm_update_q31_shr_(dcm_update_q31_mul_(A_13, C_11)
+        + dcm_update_q31_mul_(A_23, C_12) + dcm_update_q31_mul_(A_33, C_13)
+        + (INT32_C(1) << 29), 30);
+    if ((next_13_unchecked < (-INT32_C(1140850688)))
+        || (next_13_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t next_13 = dcm_update_q31_narrow_(next_13_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 8.9e-09 */
+    const int64_t next_21_unchecked = dcm_update_q31_shr_(dcm_update_q31_mul_(A_11, C_21)
+        + dcm_update_q31_mul_(A_21, C_22) + dcm_update_q31_mul_(A_31, C_23)
+        + (INT32_C(1) << 29), 30);
+    if ((next_21_unchecked < (-INT32_C(1140850688)))
+        || (next_21_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t next_21 = dcm_update_q31_narrow_(next_21_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 8.9e-09 */
+    const int64_t next_22_unchecked = dcm_update_q31_shr_(dcm_update_q31_mul_(A_12, C_21)
+        + dcm_update_q31_mul_(A_22, C_22) + dcm_update_q31_mul_(A_32, C_23)
+        + (INT32_C(1) << 29), 30);
+    if ((next_22_unchecked < (-INT32_C(1140850688)))
+        || (next_22_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t next_22 = dcm_update_q31_narrow_(next_22_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 8.9e-09 */
+    const int64_t next_23_unchecked = dcm_update_q31_shr_(dcm_update_q31_mul_(A_13, C_21)
+        + dcm_update_q31_mul_(A_23, C_22) + dcm_update_q31_mul_(A_33, C_23)
+        + (INT32_C(1) << 29), 30);
+    if ((next_23_unchecked < (-INT32_C(1140850688)))
+        || (next_23_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t next_23 = dcm_update_q31_narrow_(next_23_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 8.9e-09 */
+    const int64_t next_31_unchecked = dcm_update_q31_shr_(dcm_update_q31_mul_(A_11, C_31)
+        + dcm_update_q31_mul_(A_21, C_32) + dcm_update_q31_mul_(A_31, C_33)
+        + (INT32_C(1) << 29), 30);
+    if ((next_31_unchecked < (-INT32_C(1140850688)))
+        || (next_31_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t next_31 = dcm_update_q31_narrow_(next_31_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 8.9e-09 */
+    const int64_t next_32_unchecked = dcm_update_q31_shr_(dcm_update_q31_mul_(A_12, C_31)
+        + dcm_update_q31_mul_(A_22, C_32) + dcm_update_q31_mul_(A_32, C_33)
+        + (INT32_C(1) << 29), 30);
+    if ((next_32_unchecked < (-INT32_C(1140850688)))
+        || (next_32_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t next_32 = dcm_update_q31_narrow_(next_32_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 8.9e-09 */
+    const int64_t next_33_unchecked = dcm_update_q31_shr_(dcm_update_q31_mul_(A_13, C_31)
+        + dcm_update_q31_mul_(A_23, C_32) + dcm_update_q31_mul_(A_33, C_33)
+        + (INT32_C(1) << 29), 30);
+    if ((next_33_unchecked < (-INT32_C(1140850688)))
+        || (next_33_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t next_33 = dcm_update_q31_narrow_(next_33_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 8.9e-09 */
+    next[0] = next_11;
+    next[1] = next_12;
+    next[2] = next_13;
+    next[3] = next_21;
+    next[4] = next_22;
+    next[5] = next_23;
+    next[6] = next_31;
+    next[7] = next_32;
+    next[8] = next_33;
+    return 0;
 }

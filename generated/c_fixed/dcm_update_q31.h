@@ -7,16 +7,16 @@
  *     equations (2) to (4) with all terms.
  * Integer operations of one call: 81 add, 56 multiply, 66 shift, 4 compare; 40 temporaries.
  *
- * A number in format Qm.n is an integer times 2^-n. Rounding: nearest. No sum or product on the way
- * can overflow for input inside the ranges below, which every call checks; an error is the
+ * A number in format Qm.n is an integer times 2^-n. Rounding: nearest. No sum or product on the
+ * way can overflow for input inside the ranges below, which every call checks; an error is the
  * distance from what exact arithmetic makes of the same integers.
- * No heap, no global state, no floating point, reentrant. In one call every input is read before any
- * output is written: an output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, no floating point, reentrant. In one call every input is read before
+ * any output is written: an output may be the same memory as an input. Matrices are stored by
+ * rows.
  */
 #ifndef DCM_UPDATE_Q31_H
 #define DCM_UPDATE_Q31_H
 
-#include <stddef.h>
 #include <stdint.h>
 
 #ifdef __cplusplus
@@ -24,26 +24,18 @@ extern "C" {
 #endif
 
 /* One call.
- * in      state[9]: direction cosine matrix, body to reference; C_11, ..., C_33; format Q1.30, unit
- *         2^-30; range -1140850688 to 1140850688 (-1.0625 to 1.0625).
- * in      rotation_vector[3]: rotation vector of the cycle, body axes; phi_x, phi_y, phi_z; format
- *         Q1.30, unit 2^-30 rad; range -1073741824 to 1073741824 (-1 to 1).
+ * in      state[9]: direction cosine matrix, body to reference; C_11, ..., C_33; format Q1.30,
+ *         unit 2^-30; range -1140850688 to 1140850688 (-1.0625 to 1.0625).
+ * in      rotation_vector[3]: rotation vector of the cycle, body axes; phi_x, phi_y, phi_z;
+ *         format Q1.30, unit 2^-30 rad; range -1073741824 to 1073741824 (-1 to 1).
  * out     next[9]: direction cosine matrix, body to reference, after the step; next_11, ...,
- *         next_33; format Q1.30, unit 2^-30; range -1140850688 to 1140850688 (-1.0625 to 1.0625);
- *         error at most 8.88721e-09, 9.5426 of the last place.
+ *         next_33; format Q1.30, unit 2^-30; range -1140850688 to 1140850688 (-1.0625 to
+ *         1.0625); error at most 8.88721e-09, 9.5426 of the last place.
  * Returns 0; or, with the outputs left alone, 1 if an input lies outside its range,
  * 2 if it is too far from a proper one, so that something leaves its limits: next_11, next_12,
  *   next_13, next_21, next_22, next_23, next_31, next_32, next_33 from -1.0625 to 1.0625.
  */
 int dcm_update_q31(const int32_t state[9], const int32_t rotation_vector[3], int32_t next[9]);
-
-/* `count` calls on arrays of samples, one after the other, up to the first that is refused: every array holds `count`
- * times what one call takes.
- * An output may be the same memory as an input whose samples have the same size; otherwise they must not overlap.
- * Returns how many calls were done, and in `status` what the last one returned.
- */
-size_t dcm_update_q31_array(size_t count, int *status, const int32_t *state,
-    const int32_t *rotation_vector, int32_t *next);
 
 #ifdef __cplusplus
 }

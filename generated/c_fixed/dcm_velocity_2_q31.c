@@ -5,41 +5,74 @@
 #include "dcm_velocity_2_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int dcm_velocity_2_q31_out_(int_fast32_t x, int_fast32_t limit)
+static inline int dcm_velocity_2_q31_out_(int32_t x, int32_t limit)
 {
-    return (uint64_t)x + (uint64_t)limit > 2 * (uint64_t)limit;
+    return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
 
-/* x / 2^n, rounded down. The right shift of a negative number is left to the compiler by the standard; this is not, and
- * compilers make one arithmetic shift of it.
+/* The exact product of two words. */
+#if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
+/* These processors have no instruction for it: the high word takes four products of half words. */
+__attribute__((noinline)) static int64_t dcm_velocity_2_q31_mul_(int32_t a, int32_t b)
+{
+    const uint32_t a_low = (uint32_t)a & 0xFFFFu;
+    const uint32_t b_low = (uint32_t)b & 0xFFFFu;
+    const int32_t a_high = (a < 0) ? ~(~a >> 16) : (a >> 16);
+    const int32_t b_high = (b < 0) ? ~(~b >> 16) : (b >> 16);
+    const uint32_t low = a_low * b_low;
+    const int32_t middle = (a_high * (int32_t)b_low) + (int32_t)(low >> 16);
+    const int32_t other = (b_high * (int32_t)a_low) + (int32_t)((uint32_t)middle & 0xFFFFu);
+    const int32_t high = (a_high * b_high) + ((middle < 0) ? ~(~middle >> 16) : (middle >> 16))
+        + ((other < 0) ? ~(~other >> 16) : (other >> 16));
+    const uint64_t bits = ((uint64_t)(uint32_t)high << 32) | ((uint32_t)a * (uint32_t)b);
+    return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
+}
+#else
+static inline int64_t dcm_velocity_2_q31_mul_(int32_t a, int32_t b)
+{
+    return (int64_t)a * b;
+}
+#endif
+
+/* x / 2^n, rounded down, where the proof of the ranges shows that it fits into a word: then the
+ * 32 bits of x from bit n on, read as a number with a sign, are that quotient. For n above 32 the
+ * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
+ * number and no conversion of a number out of range.
  */
-static inline int64_t dcm_velocity_2_q31_shr_(int64_t x, int n)
+static inline int32_t dcm_velocity_2_q31_narrow_(int64_t x, int n)
 {
-    return x < 0 ? ~(~x >> n) : x >> n;
+#ifdef __FRAMAC__
+    return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
+#else
+    const int beyond = (n > 32) ? (n - 32) : 0;
+    const uint32_t bits = (uint32_t)((uint64_t)x >> (n - beyond));
+    const int32_t high = (bits <= (UINT32_MAX >> 1)) ? (int32_t)bits
+                                                 : (-1 - (int32_t)(UINT32_MAX - bits));
+    return (high < 0) ? ~(~high >> beyond) : (high >> beyond);
+#endif
 }
 
-/* The algorithm. Static, so that the loops below can take it in. */
-static inline int dcm_velocity_2_q31_one_(const int32_t state[9], const int32_t velocity_sum[3],
+int dcm_velocity_2_q31(const int32_t state[9], const int32_t velocity_sum[3],
     const int32_t sculling[3], const int32_t angle_sum[3], int32_t transformed[3])
 {
-    const int_fast32_t C_11 = state[0];
-    const int_fast32_t C_12 = state[1];
-    const int_fast32_t C_13 = state[2];
-    const int_fast32_t C_21 = state[3];
-    const int_fast32_t C_22 = state[4];
-    const int_fast32_t C_23 = state[5];
-    const int_fast32_t C_31 = state[6];
-    const int_fast32_t C_32 = state[7];
-    const int_fast32_t C_33 = state[8];
-    const int_fast32_t u_x = velocity_sum[0];
-    const int_fast32_t u_y = velocity_sum[1];
-    const int_fast32_t u_z = velocity_sum[2];
-    const int_fast32_t eta_x = sculling[0];
-    const int_fast32_t eta_y = sculling[1];
-    const int_fast32_t eta_z = sculling[2];
-    const int_fast32_t beta_x = angle_sum[0];
-    const int_fast32_t beta_y = angle_sum[1];
-    const int_fast32_t beta_z = angle_sum[2];
+    const int32_t C_11 = state[0];
+    const int32_t C_12 = state[1];
+    const int32_t C_13 = state[2];
+    const int32_t C_21 = state[3];
+    const int32_t C_22 = state[4];
+    const int32_t C_23 = state[5];
+    const int32_t C_31 = state[6];
+    const int32_t C_32 = state[7];
+    const int32_t C_33 = state[8];
+    const int32_t u_x = velocity_sum[0];
+    const int32_t u_y = velocity_sum[1];
+    const int32_t u_z = velocity_sum[2];
+    const int32_t eta_x = sculling[0];
+    const int32_t eta_y = sculling[1];
+    const int32_t eta_z = sculling[2];
+    const int32_t beta_x = angle_sum[0];
+    const int32_t beta_y = angle_sum[1];
+    const int32_t beta_z = angle_sum[2];
     if (dcm_velocity_2_q31_out_(C_11, INT32_C(1140850688))
         || dcm_velocity_2_q31_out_(C_12, INT32_C(1140850688))
         || dcm_velocity_2_q31_out_(C_13, INT32_C(1140850688))
@@ -49,60 +82,43 @@ static inline int dcm_velocity_2_q31_one_(const int32_t state[9], const int32_t 
         || dcm_velocity_2_q31_out_(C_31, INT32_C(1140850688))
         || dcm_velocity_2_q31_out_(C_32, INT32_C(1140850688))
         || dcm_velocity_2_q31_out_(C_33, INT32_C(1140850688))
-        || dcm_velocity_2_q31_out_(u_x, INT32_C(1073741824))
-        || dcm_velocity_2_q31_out_(u_y, INT32_C(1073741824))
-        || dcm_velocity_2_q31_out_(u_z, INT32_C(1073741824))
-        || dcm_velocity_2_q31_out_(eta_x, INT32_C(1073741824))
-        || dcm_velocity_2_q31_out_(eta_y, INT32_C(1073741824))
-        || dcm_velocity_2_q31_out_(eta_z, INT32_C(1073741824))
-        || dcm_velocity_2_q31_out_(beta_x, INT32_C(1073741824))
-        || dcm_velocity_2_q31_out_(beta_y, INT32_C(1073741824))
-        || dcm_velocity_2_q31_out_(beta_z, INT32_C(1073741824)))
+        || dcm_velocity_2_q31_out_(u_x, (INT32_C(1) << 30))
+        || dcm_velocity_2_q31_out_(u_y, (INT32_C(1) << 30))
+        || dcm_velocity_2_q31_out_(u_z, (INT32_C(1) << 30))
+        || dcm_velocity_2_q31_out_(eta_x, (INT32_C(1) << 30))
+        || dcm_velocity_2_q31_out_(eta_y, (INT32_C(1) << 30))
+        || dcm_velocity_2_q31_out_(eta_z, (INT32_C(1) << 30))
+        || dcm_velocity_2_q31_out_(beta_x, (INT32_C(1) << 30))
+        || dcm_velocity_2_q31_out_(beta_y, (INT32_C(1) << 30))
+        || dcm_velocity_2_q31_out_(beta_z, (INT32_C(1) << 30)))
         return 1;
-    const int_fast32_t shared_1 = (int_fast32_t)((int64_t)u_z);
-    const int_fast32_t shared_2 = (int_fast32_t)((int64_t)beta_z);
+    const int32_t shared_1 = u_z; /* Q3.28, -4 .. 4, exact */
+    const int32_t shared_2 = beta_z; /* Q0.31, -0.5 .. 0.5, exact */
     /* velocity increment, body axes at the start of the slow cycle */
-    const int_fast32_t w_x =
-        (int_fast32_t)(dcm_velocity_2_q31_shr_((int64_t)eta_x * INT32_C(1073741824)
-        + (int64_t)u_x * INT64_C(2147483648) + (int64_t)beta_y * shared_1 - (int64_t)shared_2 * u_y
-        + INT64_C(2147483648), 32));
-    const int_fast32_t w_y =
-        (int_fast32_t)(dcm_velocity_2_q31_shr_((int64_t)eta_y * INT32_C(1073741824)
-        + (int64_t)u_y * INT64_C(2147483648) - (int64_t)beta_x * shared_1 + (int64_t)shared_2 * u_x
-        + INT64_C(2147483648), 32));
-    const int_fast32_t w_z =
-        (int_fast32_t)(dcm_velocity_2_q31_shr_((int64_t)eta_z * INT32_C(1073741824)
-        + (int64_t)u_z * INT64_C(2147483648) + (int64_t)beta_x * u_y - (int64_t)beta_y * u_x
-        + INT64_C(2147483648), 32));
+    const int32_t w_x = dcm_velocity_2_q31_narrow_((int64_t)eta_x * (INT32_C(1) << 30)
+        + (int64_t)u_x * (INT64_C(1) << 31) + dcm_velocity_2_q31_mul_(beta_y, shared_1)
+        - dcm_velocity_2_q31_mul_(shared_2, u_y) + (INT64_C(1) << 31), 32);
+        /* Q5.26, -20.1 .. 20.1, error 7.5e-09 */
+    const int32_t w_y = dcm_velocity_2_q31_narrow_((int64_t)eta_y * (INT32_C(1) << 30)
+        + (int64_t)u_y * (INT64_C(1) << 31) - dcm_velocity_2_q31_mul_(beta_x, shared_1)
+        + dcm_velocity_2_q31_mul_(shared_2, u_x) + (INT64_C(1) << 31), 32);
+        /* Q5.26, -20.1 .. 20.1, error 7.5e-09 */
+    const int32_t w_z = dcm_velocity_2_q31_narrow_((int64_t)eta_z * (INT32_C(1) << 30)
+        + (int64_t)u_z * (INT64_C(1) << 31) + dcm_velocity_2_q31_mul_(beta_x, u_y)
+        - dcm_velocity_2_q31_mul_(beta_y, u_x) + (INT64_C(1) << 31), 32);
+        /* Q5.26, -20.1 .. 20.1, error 7.5e-09 */
     /* velocity increment of the slow cycle, navigation axes */
-    const int_fast32_t v_x = (int_fast32_t)(dcm_velocity_2_q31_shr_((int64_t)C_11 * w_x
-        + (int64_t)C_12 * w_y + (int64_t)C_13 * w_z + INT32_C(1073741824), 31));
-    const int_fast32_t v_y = (int_fast32_t)(dcm_velocity_2_q31_shr_((int64_t)C_21 * w_x
-        + (int64_t)C_22 * w_y + (int64_t)C_23 * w_z + INT32_C(1073741824), 31));
-    const int_fast32_t v_z = (int_fast32_t)(dcm_velocity_2_q31_shr_((int64_t)C_31 * w_x
-        + (int64_t)C_32 * w_y + (int64_t)C_33 * w_z + INT32_C(1073741824), 31));
-    transformed[0] = (int32_t)v_x;
-    transformed[1] = (int32_t)v_y;
-    transformed[2] = (int32_t)v_z;
+    const int32_t v_x = dcm_velocity_2_q31_narrow_(dcm_velocity_2_q31_mul_(C_11, w_x)
+        + dcm_velocity_2_q31_mul_(C_12, w_y) + dcm_velocity_2_q31_mul_(C_13, w_z)
+        + (INT32_C(1) << 30), 31); /* Q6.25, -63.8 .. 63.8, error 3.9e-08 */
+    const int32_t v_y = dcm_velocity_2_q31_narrow_(dcm_velocity_2_q31_mul_(C_21, w_x)
+        + dcm_velocity_2_q31_mul_(C_22, w_y) + dcm_velocity_2_q31_mul_(C_23, w_z)
+        + (INT32_C(1) << 30), 31); /* Q6.25, -63.8 .. 63.8, error 3.9e-08 */
+    const int32_t v_z = dcm_velocity_2_q31_narrow_(dcm_velocity_2_q31_mul_(C_31, w_x)
+        + dcm_velocity_2_q31_mul_(C_32, w_y) + dcm_velocity_2_q31_mul_(C_33, w_z)
+        + (INT32_C(1) << 30), 31); /* Q6.25, -63.8 .. 63.8, error 3.9e-08 */
+    transformed[0] = v_x;
+    transformed[1] = v_y;
+    transformed[2] = v_z;
     return 0;
-}
-
-int dcm_velocity_2_q31(const int32_t state[9], const int32_t velocity_sum[3],
-    const int32_t sculling[3], const int32_t angle_sum[3], int32_t transformed[3])
-{
-    return dcm_velocity_2_q31_one_(state, velocity_sum, sculling, angle_sum, transformed);
-}
-
-size_t dcm_velocity_2_q31_array(size_t count, int *status, const int32_t *state,
-    const int32_t *velocity_sum, const int32_t *sculling, const int32_t *angle_sum,
-    int32_t *transformed)
-{
-    *status = 0;
-    for (size_t k = 0; k < count; ++k) {
-        *status = dcm_velocity_2_q31_one_(state + 9 * k, velocity_sum + 3 * k, sculling + 3 * k,
-            angle_sum + 3 * k, transformed + 3 * k);
-        if (*status)
-            return k;
-    }
-    return count;
 }

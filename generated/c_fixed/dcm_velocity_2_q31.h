@@ -7,16 +7,16 @@
  *     equation (52).
  * Integer operations of one call: 21 add, 15 multiply, 12 shift; 5 temporaries.
  *
- * A number in format Qm.n is an integer times 2^-n. Rounding: nearest. No sum or product on the way
- * can overflow for input inside the ranges below, which every call checks; an error is the
+ * A number in format Qm.n is an integer times 2^-n. Rounding: nearest. No sum or product on the
+ * way can overflow for input inside the ranges below, which every call checks; an error is the
  * distance from what exact arithmetic makes of the same integers.
- * No heap, no global state, no floating point, reentrant. In one call every input is read before any
- * output is written: an output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, no floating point, reentrant. In one call every input is read before
+ * any output is written: an output may be the same memory as an input. Matrices are stored by
+ * rows.
  */
 #ifndef DCM_VELOCITY_2_Q31_H
 #define DCM_VELOCITY_2_Q31_H
 
-#include <stddef.h>
 #include <stdint.h>
 
 #ifdef __cplusplus
@@ -24,30 +24,21 @@ extern "C" {
 #endif
 
 /* One call.
- * in      state[9]: direction cosine matrix, body to reference; C_11, ..., C_33; format Q1.30, unit
- *         2^-30; range -1140850688 to 1140850688 (-1.0625 to 1.0625).
- * in      velocity_sum[3]: sum of the velocity increments since the slow cycle began; u_x, u_y, u_z;
- *         format Q4.27, unit 2^-27 m/s; range -1073741824 to 1073741824 (-8 to 8).
+ * in      state[9]: direction cosine matrix, body to reference; C_11, ..., C_33; format Q1.30,
+ *         unit 2^-30; range -1140850688 to 1140850688 (-1.0625 to 1.0625).
+ * in      velocity_sum[3]: sum of the velocity increments since the slow cycle began; u_x, u_y,
+ *         u_z; format Q4.27, unit 2^-27 m/s; range -1073741824 to 1073741824 (-8 to 8).
  * in      sculling[3]: sculling integral since the slow cycle began; eta_x, eta_y, eta_z; format
  *         Q3.28, unit 2^-28 m/s; range -1073741824 to 1073741824 (-4 to 4).
  * in      angle_sum[3]: sum of the angle increments since the slow cycle began; beta_x, beta_y,
  *         beta_z; format Q1.30, unit 2^-30 rad; range -1073741824 to 1073741824 (-1 to 1).
  * out     transformed[3]: velocity increment of the slow cycle, navigation axes; v_x, v_y, v_z;
- *         format Q6.25, unit 2^-25 m/s; range -2139095042 to 2139095042 (-63.75 to 63.75); error
- *         at most 3.86499e-08, 1.2969 of the last place.
+ *         format Q6.25, unit 2^-25 m/s; range -2139095042 to 2139095042 (-63.75 to 63.75);
+ *         error at most 3.86499e-08, 1.2969 of the last place.
  * Returns 0; or, with the outputs left alone, 1 if an input lies outside its range.
  */
 int dcm_velocity_2_q31(const int32_t state[9], const int32_t velocity_sum[3],
     const int32_t sculling[3], const int32_t angle_sum[3], int32_t transformed[3]);
-
-/* `count` calls on arrays of samples, one after the other, up to the first that is refused: every array holds `count`
- * times what one call takes.
- * An output may be the same memory as an input whose samples have the same size; otherwise they must not overlap.
- * Returns how many calls were done, and in `status` what the last one returned.
- */
-size_t dcm_velocity_2_q31_array(size_t count, int *status, const int32_t *state,
-    const int32_t *velocity_sum, const int32_t *sculling, const int32_t *angle_sum,
-    int32_t *transformed);
 
 #ifdef __cplusplus
 }

@@ -5,41 +5,74 @@
 #include "error_matrix_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int error_matrix_q31_out_(int_fast32_t x, int_fast32_t limit)
+static inline int error_matrix_q31_out_(int32_t x, int32_t limit)
 {
-    return (uint64_t)x + (uint64_t)limit > 2 * (uint64_t)limit;
+    return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
 
-/* x / 2^n, rounded down. The right shift of a negative number is left to the compiler by the standard; this is not, and
- * compilers make one arithmetic shift of it.
+/* The exact product of two words. */
+#if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
+/* These processors have no instruction for it: the high word takes four products of half words. */
+__attribute__((noinline)) static int64_t error_matrix_q31_mul_(int32_t a, int32_t b)
+{
+    const uint32_t a_low = (uint32_t)a & 0xFFFFu;
+    const uint32_t b_low = (uint32_t)b & 0xFFFFu;
+    const int32_t a_high = (a < 0) ? ~(~a >> 16) : (a >> 16);
+    const int32_t b_high = (b < 0) ? ~(~b >> 16) : (b >> 16);
+    const uint32_t low = a_low * b_low;
+    const int32_t middle = (a_high * (int32_t)b_low) + (int32_t)(low >> 16);
+    const int32_t other = (b_high * (int32_t)a_low) + (int32_t)((uint32_t)middle & 0xFFFFu);
+    const int32_t high = (a_high * b_high) + ((middle < 0) ? ~(~middle >> 16) : (middle >> 16))
+        + ((other < 0) ? ~(~other >> 16) : (other >> 16));
+    const uint64_t bits = ((uint64_t)(uint32_t)high << 32) | ((uint32_t)a * (uint32_t)b);
+    return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
+}
+#else
+static inline int64_t error_matrix_q31_mul_(int32_t a, int32_t b)
+{
+    return (int64_t)a * b;
+}
+#endif
+
+/* x / 2^n, rounded down, where the proof of the ranges shows that it fits into a word: then the
+ * 32 bits of x from bit n on, read as a number with a sign, are that quotient. For n above 32 the
+ * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
+ * number and no conversion of a number out of range.
  */
-static inline int64_t error_matrix_q31_shr_(int64_t x, int n)
+static inline int32_t error_matrix_q31_narrow_(int64_t x, int n)
 {
-    return x < 0 ? ~(~x >> n) : x >> n;
+#ifdef __FRAMAC__
+    return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
+#else
+    const int beyond = (n > 32) ? (n - 32) : 0;
+    const uint32_t bits = (uint32_t)((uint64_t)x >> (n - beyond));
+    const int32_t high = (bits <= (UINT32_MAX >> 1)) ? (int32_t)bits
+                                                 : (-1 - (int32_t)(UINT32_MAX - bits));
+    return (high < 0) ? ~(~high >> beyond) : (high >> beyond);
+#endif
 }
 
-/* The algorithm. Static, so that the loops below can take it in. */
-static inline int error_matrix_q31_one_(const int32_t computed[9], const int32_t truth[9],
-    int32_t error[9], int32_t scale[3], int32_t skew[3], int32_t drift[3])
+int error_matrix_q31(const int32_t computed[9], const int32_t truth[9], int32_t error[9],
+    int32_t scale[3], int32_t skew[3], int32_t drift[3])
 {
-    const int_fast32_t C_11 = computed[0];
-    const int_fast32_t C_12 = computed[1];
-    const int_fast32_t C_13 = computed[2];
-    const int_fast32_t C_21 = computed[3];
-    const int_fast32_t C_22 = computed[4];
-    const int_fast32_t C_23 = computed[5];
-    const int_fast32_t C_31 = computed[6];
-    const int_fast32_t C_32 = computed[7];
-    const int_fast32_t C_33 = computed[8];
-    const int_fast32_t T_11 = truth[0];
-    const int_fast32_t T_12 = truth[1];
-    const int_fast32_t T_13 = truth[2];
-    const int_fast32_t T_21 = truth[3];
-    const int_fast32_t T_22 = truth[4];
-    const int_fast32_t T_23 = truth[5];
-    const int_fast32_t T_31 = truth[6];
-    const int_fast32_t T_32 = truth[7];
-    const int_fast32_t T_33 = truth[8];
+    const int32_t C_11 = computed[0];
+    const int32_t C_12 = computed[1];
+    const int32_t C_13 = computed[2];
+    const int32_t C_21 = computed[3];
+    const int32_t C_22 = computed[4];
+    const int32_t C_23 = computed[5];
+    const int32_t C_31 = computed[6];
+    const int32_t C_32 = computed[7];
+    const int32_t C_33 = computed[8];
+    const int32_t T_11 = truth[0];
+    const int32_t T_12 = truth[1];
+    const int32_t T_13 = truth[2];
+    const int32_t T_21 = truth[3];
+    const int32_t T_22 = truth[4];
+    const int32_t T_23 = truth[5];
+    const int32_t T_31 = truth[6];
+    const int32_t T_32 = truth[7];
+    const int32_t T_33 = truth[8];
     if (error_matrix_q31_out_(C_11, INT32_C(1140850688))
         || error_matrix_q31_out_(C_12, INT32_C(1140850688))
         || error_matrix_q31_out_(C_13, INT32_C(1140850688))
@@ -60,77 +93,73 @@ static inline int error_matrix_q31_one_(const int32_t computed[9], const int32_t
         || error_matrix_q31_out_(T_33, INT32_C(1140850688)))
         return 1;
     /* error matrix, reference axes */
-    const int_fast32_t E_11 = (int_fast32_t)(-INT32_C(268435456)
-        + error_matrix_q31_shr_((int64_t)C_11 * T_11 + (int64_t)C_12 * T_12 + (int64_t)C_13 * T_13
-        + INT64_C(2147483648), 32));
-    const int_fast32_t E_12 = (int_fast32_t)(error_matrix_q31_shr_((int64_t)C_11 * T_21
-        + (int64_t)C_12 * T_22 + (int64_t)C_13 * T_23 + INT64_C(2147483648), 32));
-    const int_fast32_t E_13 = (int_fast32_t)(error_matrix_q31_shr_((int64_t)C_11 * T_31
-        + (int64_t)C_12 * T_32 + (int64_t)C_13 * T_33 + INT64_C(2147483648), 32));
-    const int_fast32_t E_21 = (int_fast32_t)(error_matrix_q31_shr_((int64_t)C_21 * T_11
-        + (int64_t)C_22 * T_12 + (int64_t)C_23 * T_13 + INT64_C(2147483648), 32));
-    const int_fast32_t E_22 = (int_fast32_t)(-INT32_C(268435456)
-        + error_matrix_q31_shr_((int64_t)C_21 * T_21 + (int64_t)C_22 * T_22 + (int64_t)C_23 * T_23
-        + INT64_C(2147483648), 32));
-    const int_fast32_t E_23 = (int_fast32_t)(error_matrix_q31_shr_((int64_t)C_21 * T_31
-        + (int64_t)C_22 * T_32 + (int64_t)C_23 * T_33 + INT64_C(2147483648), 32));
-    const int_fast32_t E_31 = (int_fast32_t)(error_matrix_q31_shr_((int64_t)C_31 * T_11
-        + (int64_t)C_32 * T_12 + (int64_t)C_33 * T_13 + INT64_C(2147483648), 32));
-    const int_fast32_t E_32 = (int_fast32_t)(error_matrix_q31_shr_((int64_t)C_31 * T_21
-        + (int64_t)C_32 * T_22 + (int64_t)C_33 * T_23 + INT64_C(2147483648), 32));
-    const int_fast32_t E_33 = (int_fast32_t)(-INT32_C(268435456)
-        + error_matrix_q31_shr_((int64_t)C_31 * T_31 + (int64_t)C_32 * T_32 + (int64_t)C_33 * T_33
-        + INT64_C(2147483648), 32));
-    const int64_t shared_1 = (int64_t)E_23;
-    const int64_t shared_2 = (int64_t)E_32;
+    const int32_t E_11 = -(INT32_C(1) << 28)
+        + error_matrix_q31_narrow_(error_matrix_q31_mul_(C_11, T_11)
+        + error_matrix_q31_mul_(C_12, T_12) + error_matrix_q31_mul_(C_13, T_13)
+        + (INT64_C(1) << 31), 32); /* Q3.28, -4.39 .. 2.39, error 1.9e-09 */
+    const int32_t E_12 = error_matrix_q31_narrow_(error_matrix_q31_mul_(C_11, T_21)
+        + error_matrix_q31_mul_(C_12, T_22) + error_matrix_q31_mul_(C_13, T_23)
+        + (INT64_C(1) << 31), 32); /* Q3.28, -3.39 .. 3.39, error 1.9e-09 */
+    const int32_t E_13 = error_matrix_q31_narrow_(error_matrix_q31_mul_(C_11, T_31)
+        + error_matrix_q31_mul_(C_12, T_32) + error_matrix_q31_mul_(C_13, T_33)
+        + (INT64_C(1) << 31), 32); /* Q3.28, -3.39 .. 3.39, error 1.9e-09 */
+    const int32_t E_21 = error_matrix_q31_narrow_(error_matrix_q31_mul_(C_21, T_11)
+        + error_matrix_q31_mul_(C_22, T_12) + error_matrix_q31_mul_(C_23, T_13)
+        + (INT64_C(1) << 31), 32); /* Q3.28, -3.39 .. 3.39, error 1.9e-09 */
+    const int32_t E_22 = -(INT32_C(1) << 28)
+        + error_matrix_q31_narrow_(error_matrix_q31_mul_(C_21, T_21)
+        + error_matrix_q31_mul_(C_22, T_22) + error_matrix_q31_mul_(C_23, T_23)
+        + (INT64_C(1) << 31), 32); /* Q3.28, -4.39 .. 2.39, error 1.9e-09 */
+    const int32_t E_23 = error_matrix_q31_narrow_(error_matrix_q31_mul_(C_21, T_31)
+        + error_matrix_q31_mul_(C_22, T_32) + error_matrix_q31_mul_(C_23, T_33)
+        + (INT64_C(1) << 31), 32); /* Q3.28, -3.39 .. 3.39, error 1.9e-09 */
+    const int32_t E_31 = error_matrix_q31_narrow_(error_matrix_q31_mul_(C_31, T_11)
+        + error_matrix_q31_mul_(C_32, T_12) + error_matrix_q31_mul_(C_33, T_13)
+        + (INT64_C(1) << 31), 32); /* Q3.28, -3.39 .. 3.39, error 1.9e-09 */
+    const int32_t E_32 = error_matrix_q31_narrow_(error_matrix_q31_mul_(C_31, T_21)
+        + error_matrix_q31_mul_(C_32, T_22) + error_matrix_q31_mul_(C_33, T_23)
+        + (INT64_C(1) << 31), 32); /* Q3.28, -3.39 .. 3.39, error 1.9e-09 */
+    const int32_t E_33 = -(INT32_C(1) << 28)
+        + error_matrix_q31_narrow_(error_matrix_q31_mul_(C_31, T_31)
+        + error_matrix_q31_mul_(C_32, T_32) + error_matrix_q31_mul_(C_33, T_33)
+        + (INT64_C(1) << 31), 32); /* Q3.28, -4.39 .. 2.39, error 1.9e-09 */
+    const int64_t shared_1 = (int64_t)E_23; /* Q34.29, -1.7 .. 1.7, error 9.4e-10 */
+    const int64_t shared_2 = (int64_t)E_32; /* Q34.29, -1.7 .. 1.7, error 9.4e-10 */
     /* skew errors, reference axes */
-    const int_fast32_t skew_x = (int_fast32_t)(shared_1 + shared_2);
-    const int64_t shared_3 = (int64_t)E_13;
-    const int64_t shared_6 = (int64_t)E_31;
-    const int_fast32_t skew_y = (int_fast32_t)(shared_6 + shared_3);
-    const int64_t shared_4 = (int64_t)E_12;
-    const int64_t shared_5 = (int64_t)E_21;
-    const int_fast32_t skew_z = (int_fast32_t)(shared_4 + shared_5);
+    const int32_t skew_x = error_matrix_q31_narrow_(shared_1 + shared_2, 0);
+        /* Q2.29, -3.39 .. 3.39, error 1.9e-09 */
+    const int64_t shared_3 = (int64_t)E_13; /* Q34.29, -1.7 .. 1.7, error 9.4e-10 */
+    const int64_t shared_6 = (int64_t)E_31; /* Q34.29, -1.7 .. 1.7, error 9.4e-10 */
+    const int32_t skew_y = error_matrix_q31_narrow_(shared_6 + shared_3, 0);
+        /* Q2.29, -3.39 .. 3.39, error 1.9e-09 */
+    const int64_t shared_4 = (int64_t)E_12; /* Q34.29, -1.7 .. 1.7, error 9.4e-10 */
+    const int64_t shared_5 = (int64_t)E_21; /* Q34.29, -1.7 .. 1.7, error 9.4e-10 */
+    const int32_t skew_z = error_matrix_q31_narrow_(shared_4 + shared_5, 0);
+        /* Q2.29, -3.39 .. 3.39, error 1.9e-09 */
     /* drift errors, reference axes: the rotation from the computed frame to the true one */
-    const int_fast32_t drift_x = (int_fast32_t)(shared_1 - shared_2);
-    const int_fast32_t drift_y = (int_fast32_t)(shared_6 - shared_3);
-    const int_fast32_t drift_z = (int_fast32_t)(shared_4 - shared_5);
-    error[0] = (int32_t)E_11;
-    error[1] = (int32_t)E_12;
-    error[2] = (int32_t)E_13;
-    error[3] = (int32_t)E_21;
-    error[4] = (int32_t)E_22;
-    error[5] = (int32_t)E_23;
-    error[6] = (int32_t)E_31;
-    error[7] = (int32_t)E_32;
-    error[8] = (int32_t)E_33;
-    scale[0] = (int32_t)E_11;
-    scale[1] = (int32_t)E_22;
-    scale[2] = (int32_t)E_33;
-    skew[0] = (int32_t)skew_x;
-    skew[1] = (int32_t)skew_y;
-    skew[2] = (int32_t)skew_z;
-    drift[0] = (int32_t)drift_x;
-    drift[1] = (int32_t)drift_y;
-    drift[2] = (int32_t)drift_z;
+    const int32_t drift_x = error_matrix_q31_narrow_(shared_1 - shared_2, 0);
+        /* Q2.29, -3.39 .. 3.39, error 1.9e-09 */
+    const int32_t drift_y = error_matrix_q31_narrow_(shared_6 - shared_3, 0);
+        /* Q2.29, -3.39 .. 3.39, error 1.9e-09 */
+    const int32_t drift_z = error_matrix_q31_narrow_(shared_4 - shared_5, 0);
+        /* Q2.29, -3.39 .. 3.39, error 1.9e-09 */
+    error[0] = E_11;
+    error[1] = E_12;
+    error[2] = E_13;
+    error[3] = E_21;
+    error[4] = E_22;
+    error[5] = E_23;
+    error[6] = E_31;
+    error[7] = E_32;
+    error[8] = E_33;
+    scale[0] = E_11;
+    scale[1] = E_22;
+    scale[2] = E_33;
+    skew[0] = skew_x;
+    skew[1] = skew_y;
+    skew[2] = skew_z;
+    drift[0] = drift_x;
+    drift[1] = drift_y;
+    drift[2] = drift_z;
     return 0;
-}
-
-int error_matrix_q31(const int32_t computed[9], const int32_t truth[9], int32_t error[9],
-    int32_t scale[3], int32_t skew[3], int32_t drift[3])
-{
-    return error_matrix_q31_one_(computed, truth, error, scale, skew, drift);
-}
-
-size_t error_matrix_q31_array(size_t count, int *status, const int32_t *computed,
-    const int32_t *truth, int32_t *error, int32_t *scale, int32_t *skew, int32_t *drift)
-{
-    *status = 0;
-    for (size_t k = 0; k < count; ++k) {
-        *status = error_matrix_q31_one_(computed + 9 * k, truth + 9 * k, error + 9 * k,
-            scale + 3 * k, skew + 3 * k, drift + 3 * k);
-        if (*status)
-            return k;
-    }
-    return count;
 }

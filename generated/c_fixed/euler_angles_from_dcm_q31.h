@@ -8,18 +8,19 @@
  * Heading - roll at pitch up, heading + roll at pitch down, are as good as the matrix at every
  * pitch.
  * Errors of angles are told without whole turns.
- * Integer operations of one call: 99 add, 37 multiply, 120 shift, 4 divide, 1 sqrt, 56 compare; 138 temporaries.
+ * Integer operations of one call: 99 add, 37 multiply, 120 shift, 4 divide, 1 sqrt, 56 compare;
+ *     138 temporaries.
  *
- * A number in format Qm.n is an integer times 2^-n. Rounding: nearest. No sum or product on the way
- * can overflow for input inside the ranges below, which every call checks; an error is the
+ * A number in format Qm.n is an integer times 2^-n. Rounding: nearest. No sum or product on the
+ * way can overflow for input inside the ranges below, which every call checks; an error is the
  * distance from what exact arithmetic makes of the same integers.
- * No heap, no global state, no floating point, reentrant. In one call every input is read before any
- * output is written: an output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, no floating point, reentrant. In one call every input is read before
+ * any output is written: an output may be the same memory as an input. Matrices are stored by
+ * rows.
  */
 #ifndef EULER_ANGLES_FROM_DCM_Q31_H
 #define EULER_ANGLES_FROM_DCM_Q31_H
 
-#include <stddef.h>
 #include <stdint.h>
 
 #ifdef __cplusplus
@@ -27,8 +28,8 @@ extern "C" {
 #endif
 
 /* One call.
- * in      state[9]: direction cosine matrix, body to reference; C_11, ..., C_33; format Q1.30, unit
- *         2^-30; range -1140850688 to 1140850688 (-1.0625 to 1.0625).
+ * in      state[9]: direction cosine matrix, body to reference; C_11, ..., C_33; format Q1.30,
+ *         unit 2^-30; range -1140850688 to 1140850688 (-1.0625 to 1.0625).
  * in      previous[3]: the angles before; last_roll, last_pitch, last_heading; format Q2.29, unit
  *         2^-29 rad; range -1686629857 to 1686629857 (-3.14159 to 3.14159).
  * out     next[3]: Euler angles: roll, pitch, heading; found_roll, found_pitch, found_heading;
@@ -39,14 +40,6 @@ extern "C" {
  *   from 0.5 to 2; apart_distance from 0.5 to 8.
  */
 int euler_angles_from_dcm_q31(const int32_t state[9], const int32_t previous[3], int32_t next[3]);
-
-/* `count` calls on arrays of samples, one after the other, up to the first that is refused: every array holds `count`
- * times what one call takes.
- * An output may be the same memory as an input whose samples have the same size; otherwise they must not overlap.
- * Returns how many calls were done, and in `status` what the last one returned.
- */
-size_t euler_angles_from_dcm_q31_array(size_t count, int *status, const int32_t *state,
-    const int32_t *previous, int32_t *next);
 
 #ifdef __cplusplus
 }

@@ -5,47 +5,29 @@
 #include "euler_from_cayley_klein_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int euler_from_cayley_klein_q31_out_(int_fast32_t x, int_fast32_t limit)
+static inline int euler_from_cayley_klein_q31_out_(int32_t x, int32_t limit)
 {
-    return (uint64_t)x + (uint64_t)limit > 2 * (uint64_t)limit;
+    return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
 
-/* The algorithm. Static, so that the loops below can take it in. */
-static inline int euler_from_cayley_klein_q31_one_(const int32_t state[4], int32_t converted[4])
+int euler_from_cayley_klein_q31(const int32_t state[4], int32_t converted[4])
 {
-    const int_fast32_t a_s = state[0];
-    const int_fast32_t a_x = state[1];
-    const int_fast32_t a_y = state[2];
-    const int_fast32_t a_z = state[3];
+    const int32_t a_s = state[0];
+    const int32_t a_x = state[1];
+    const int32_t a_y = state[2];
+    const int32_t a_z = state[3];
     if (euler_from_cayley_klein_q31_out_(a_s, INT32_C(1140850688))
         || euler_from_cayley_klein_q31_out_(a_x, INT32_C(1140850688))
         || euler_from_cayley_klein_q31_out_(a_y, INT32_C(1140850688))
         || euler_from_cayley_klein_q31_out_(a_z, INT32_C(1140850688)))
         return 1;
-    const int_fast32_t next_x = (int_fast32_t)((int64_t)a_x);
-    const int_fast32_t next_y = (int_fast32_t)((int64_t)a_y);
-    const int_fast32_t next_z = (int_fast32_t)((int64_t)a_z);
-    const int_fast32_t next_s = (int_fast32_t)((int64_t)a_s);
-    converted[0] = (int32_t)next_x;
-    converted[1] = (int32_t)next_y;
-    converted[2] = (int32_t)next_z;
-    converted[3] = (int32_t)next_s;
+    const int32_t next_x = a_x; /* Q1.30, -1.07 .. 1.07, exact */
+    const int32_t next_y = a_y; /* Q1.30, -1.07 .. 1.07, exact */
+    const int32_t next_z = a_z; /* Q1.30, -1.07 .. 1.07, exact */
+    const int32_t next_s = a_s; /* Q1.30, -1.07 .. 1.07, exact */
+    converted[0] = next_x;
+    converted[1] = next_y;
+    converted[2] = next_z;
+    converted[3] = next_s;
     return 0;
-}
-
-int euler_from_cayley_klein_q31(const int32_t state[4], int32_t converted[4])
-{
-    return euler_from_cayley_klein_q31_one_(state, converted);
-}
-
-size_t euler_from_cayley_klein_q31_array(size_t count, int *status, const int32_t *state,
-    int32_t *converted)
-{
-    *status = 0;
-    for (size_t k = 0; k < count; ++k) {
-        *status = euler_from_cayley_klein_q31_one_(state + 4 * k, converted + 4 * k);
-        if (*status)
-            return k;
-    }
-    return count;
 }

@@ -5,56 +5,97 @@
 #include "euler_from_dcm_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int euler_from_dcm_q31_out_(int_fast32_t x, int_fast32_t limit)
+static inline int euler_from_dcm_q31_out_(int32_t x, int32_t limit)
 {
-    return (uint64_t)x + (uint64_t)limit > 2 * (uint64_t)limit;
+    return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
 
-/* x / 2^n, rounded down. The right shift of a negative number is left to the compiler by the standard; this is not, and
- * compilers make one arithmetic shift of it.
+/* The exact product of two words. */
+#if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
+/* These processors have no instruction for it: the high word takes four products of half words. */
+__attribute__((noinline)) static int64_t euler_from_dcm_q31_mul_(int32_t a, int32_t b)
+{
+    const uint32_t a_low = (uint32_t)a & 0xFFFFu;
+    const uint32_t b_low = (uint32_t)b & 0xFFFFu;
+    const int32_t a_high = (a < 0) ? ~(~a >> 16) : (a >> 16);
+    const int32_t b_high = (b < 0) ? ~(~b >> 16) : (b >> 16);
+    const uint32_t low = a_low * b_low;
+    const int32_t middle = (a_high * (int32_t)b_low) + (int32_t)(low >> 16);
+    const int32_t other = (b_high * (int32_t)a_low) + (int32_t)((uint32_t)middle & 0xFFFFu);
+    const int32_t high = (a_high * b_high) + ((middle < 0) ? ~(~middle >> 16) : (middle >> 16))
+        + ((other < 0) ? ~(~other >> 16) : (other >> 16));
+    const uint64_t bits = ((uint64_t)(uint32_t)high << 32) | ((uint32_t)a * (uint32_t)b);
+    return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
+}
+#else
+static inline int64_t euler_from_dcm_q31_mul_(int32_t a, int32_t b)
+{
+    return (int64_t)a * b;
+}
+#endif
+
+/* x / 2^n, rounded down, where the proof of the ranges shows that it fits into a word: then the
+ * 32 bits of x from bit n on, read as a number with a sign, are that quotient. For n above 32 the
+ * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
+ * number and no conversion of a number out of range.
  */
+static inline int32_t euler_from_dcm_q31_narrow_(int64_t x, int n)
+{
+#ifdef __FRAMAC__
+    return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
+#else
+    const int beyond = (n > 32) ? (n - 32) : 0;
+    const uint32_t bits = (uint32_t)((uint64_t)x >> (n - beyond));
+    const int32_t high = (bits <= (UINT32_MAX >> 1)) ? (int32_t)bits
+                                                 : (-1 - (int32_t)(UINT32_MAX - bits));
+    return (high < 0) ? ~(~high >> beyond) : (high >> beyond);
+#endif
+}
+
+/* x / 2^n, rounded down, as a wide number. */
 static inline int64_t euler_from_dcm_q31_shr_(int64_t x, int n)
 {
-    return x < 0 ? ~(~x >> n) : x >> n;
+    return (x < 0) ? ~(~x >> n) : (x >> n);
 }
 
 /* numerator / denominator of their magnitudes, to the nearest; the sign comes last. */
 static int64_t euler_from_dcm_q31_div_(int64_t numerator, int64_t denominator)
 {
-    const int64_t top = numerator < 0 ? -numerator : numerator;
-    const int64_t below = denominator < 0 ? -denominator : denominator;
-    const int64_t quotient = (top + below / 2) / below;
-    return (numerator < 0) != (denominator < 0) ? -quotient : quotient;
+    const int64_t top = (numerator < 0) ? -numerator : numerator;
+    const int64_t below = (denominator < 0) ? -denominator : denominator;
+    const int64_t quotient = (top + (below / 2)) / below;
+    return ((numerator < 0) != (denominator < 0)) ? -quotient : quotient;
 }
 
 /* Square root bit by bit, to the nearest. */
-static int_fast32_t euler_from_dcm_q31_sqrt_(uint64_t square)
+static int32_t euler_from_dcm_q31_sqrt_(uint64_t square)
 {
-    uint64_t root = 0, bit = (uint64_t)1 << 62;
-    while (bit) {
+    uint64_t rest = square;
+    uint64_t root = 0;
+    uint64_t bit = (uint64_t)1 << 62;
+    while (bit != 0u) {
         const uint64_t tried = root + bit;
         root >>= 1;
-        if (square >= tried) {
-            square -= tried;
+        if (rest >= tried) {
+            rest -= tried;
             root += bit;
         }
         bit >>= 2;
     }
-    return (int_fast32_t)(root + (square > root));
+    return (int32_t)((rest > root) ? (root + 1u) : root);
 }
 
-/* The algorithm. Static, so that the loops below can take it in. */
-static inline int euler_from_dcm_q31_one_(const int32_t state[9], int32_t converted[4])
+int euler_from_dcm_q31(const int32_t state[9], int32_t converted[4])
 {
-    const int_fast32_t C_11 = state[0];
-    const int_fast32_t C_12 = state[1];
-    const int_fast32_t C_13 = state[2];
-    const int_fast32_t C_21 = state[3];
-    const int_fast32_t C_22 = state[4];
-    const int_fast32_t C_23 = state[5];
-    const int_fast32_t C_31 = state[6];
-    const int_fast32_t C_32 = state[7];
-    const int_fast32_t C_33 = state[8];
+    const int32_t C_11 = state[0];
+    const int32_t C_12 = state[1];
+    const int32_t C_13 = state[2];
+    const int32_t C_21 = state[3];
+    const int32_t C_22 = state[4];
+    const int32_t C_23 = state[5];
+    const int32_t C_31 = state[6];
+    const int32_t C_32 = state[7];
+    const int32_t C_33 = state[8];
     if (euler_from_dcm_q31_out_(C_11, INT32_C(1140850688))
         || euler_from_dcm_q31_out_(C_12, INT32_C(1140850688))
         || euler_from_dcm_q31_out_(C_13, INT32_C(1140850688))
@@ -67,99 +108,133 @@ static inline int euler_from_dcm_q31_one_(const int32_t state[9], int32_t conver
         return 1;
     /* trace of C */
     const int64_t trace = (int64_t)C_11 + (int64_t)C_22 + (int64_t)C_33;
-    const int64_t shared_1 = -trace + INT32_C(1073741824);
-    const int64_t four_xx = (int64_t)C_11 * 2 + shared_1;
-    const int64_t four_yy = (int64_t)C_22 * 2 + shared_1;
-    const int64_t four_zz = (int64_t)C_33 * 2 + shared_1;
+        /* Q33.30, -3.19 .. 3.19, exact */
+    const int64_t shared_1 = -trace + (INT32_C(1) << 30); /* Q33.30, -2.19 .. 4.19, exact */
+    const int64_t four_xx = (int64_t)C_11 * 2 + shared_1; /* Q33.30, -2.19 .. 4.19, exact */
+    const int64_t four_yy = (int64_t)C_22 * 2 + shared_1; /* Q33.30, -2.19 .. 4.19, exact */
+    const int64_t four_zz = (int64_t)C_33 * 2 + shared_1; /* Q33.30, -2.19 .. 4.19, exact */
     /* 4 e_s^2; the others are 4 e_x^2, 4 e_y^2, 4 e_z^2 */
-    const int64_t four_ss = trace + INT32_C(1073741824);
-    const int64_t four_yz = (int64_t)C_23 + (int64_t)C_32;
-    const int64_t four_sx = (int64_t)C_32 - (int64_t)C_23;
-    const int64_t four_zx = (int64_t)C_13 + (int64_t)C_31;
-    const int64_t four_sy = (int64_t)C_13 - (int64_t)C_31;
-    const int64_t four_xy = (int64_t)C_12 + (int64_t)C_21;
-    const int64_t four_sz = (int64_t)C_21 - (int64_t)C_12;
+    const int64_t four_ss = trace + (INT32_C(1) << 30); /* Q33.30, -2.19 .. 4.19, exact */
+    const int64_t four_yz = (int64_t)C_23 + (int64_t)C_32; /* Q33.30, -2.13 .. 2.13, exact */
+    const int64_t four_sx = (int64_t)C_32 - (int64_t)C_23; /* Q33.30, -2.13 .. 2.13, exact */
+    const int64_t four_zx = (int64_t)C_13 + (int64_t)C_31; /* Q33.30, -2.13 .. 2.13, exact */
+    const int64_t four_sy = (int64_t)C_13 - (int64_t)C_31; /* Q33.30, -2.13 .. 2.13, exact */
+    const int64_t four_xy = (int64_t)C_12 + (int64_t)C_21; /* Q33.30, -2.13 .. 2.13, exact */
+    const int64_t four_sz = (int64_t)C_21 - (int64_t)C_12; /* Q33.30, -2.13 .. 2.13, exact */
     /* 4 times the square of the largest parameter */
-    int64_t largest = four_ss;
-    if (four_xx > largest)
+    int64_t largest = four_ss; /* Q33.30, 1 .. 4.19, exact */
+    if (four_xx > largest) {
         largest = four_xx;
-    if (four_yy > largest)
-        largest = four_yy;
-    if (four_zz > largest)
-        largest = four_zz;
-    /* the column of 4 e e' through the largest */
-    const int64_t column_s = (four_ss >= largest ? four_ss
-        : four_xx >= largest ? four_sx
-        : four_yy >= largest ? four_sy
-        : four_sz);
-    const int64_t column_x = (four_ss >= largest ? four_sx
-        : four_xx >= largest ? four_xx
-        : four_yy >= largest ? four_xy
-        : four_zx);
-    const int64_t column_y = (four_ss >= largest ? four_sy
-        : four_xx >= largest ? four_xy
-        : four_yy >= largest ? four_yy
-        : four_yz);
-    const int64_t column_z = (four_ss >= largest ? four_sz
-        : four_xx >= largest ? four_zx
-        : four_yy >= largest ? four_yz
-        : four_zz);
-    const int_fast32_t factor_quotient_choice = (int_fast32_t)((column_s >= 0 ? 1
-        : (-1)));
-    const int_fast32_t factor_quotient_root =
-        euler_from_dcm_q31_sqrt_((uint64_t)(largest * INT32_C(268435456)));
-    const int_fast32_t factor_quotient =
-        (int_fast32_t)(euler_from_dcm_q31_div_((int64_t)factor_quotient_choice * INT64_C(576460752303423488), factor_quotient_root));
-    /* makes the scalar part positive */
-    const int_fast32_t factor = (int_fast32_t)((int64_t)factor_quotient);
-    const int_fast32_t column_s_word = (int_fast32_t)(euler_from_dcm_q31_shr_(column_s + 2, 2));
-    /* Euler parameters, body to reference, scalar last */
-    const int64_t next_s_unchecked = euler_from_dcm_q31_shr_((int64_t)column_s_word * factor
-        + INT32_C(268435456), 29);
-    if (next_s_unchecked < (-INT32_C(1140850688))
-        || next_s_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t next_s = (int_fast32_t)next_s_unchecked;
-    const int_fast32_t column_x_word = (int_fast32_t)(euler_from_dcm_q31_shr_(column_x + 2, 2));
-    const int64_t next_x_unchecked = euler_from_dcm_q31_shr_((int64_t)column_x_word * factor
-        + INT32_C(268435456), 29);
-    if (next_x_unchecked < (-INT32_C(1140850688))
-        || next_x_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t next_x = (int_fast32_t)next_x_unchecked;
-    const int_fast32_t column_y_word = (int_fast32_t)(euler_from_dcm_q31_shr_(column_y + 2, 2));
-    const int64_t next_y_unchecked = euler_from_dcm_q31_shr_((int64_t)column_y_word * factor
-        + INT32_C(268435456), 29);
-    if (next_y_unchecked < (-INT32_C(1140850688))
-        || next_y_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t next_y = (int_fast32_t)next_y_unchecked;
-    const int_fast32_t column_z_word = (int_fast32_t)(euler_from_dcm_q31_shr_(column_z + 2, 2));
-    const int64_t next_z_unchecked = euler_from_dcm_q31_shr_((int64_t)column_z_word * factor
-        + INT32_C(268435456), 29);
-    if (next_z_unchecked < (-INT32_C(1140850688))
-        || next_z_unchecked > INT32_C(1140850688))
-        return 2;
-    const int_fast32_t next_z = (int_fast32_t)next_z_unchecked;
-    converted[0] = (int32_t)next_x;
-    converted[1] = (int32_t)next_y;
-    converted[2] = (int32_t)next_z;
-    converted[3] = (int32_t)next_s;
-    return 0;
-}
-
-int euler_from_dcm_q31(const int32_t state[9], int32_t converted[4])
-{
-    return euler_from_dcm_q31_one_(state, converted);
-}
-
-size_t euler_from_dcm_q31_array(size_t count, int *status, const int32_t *state, int32_t *converted)
-{
-    *status = 0;
-    for (size_t k = 0; k < count; ++k) {
-        *status = euler_from_dcm_q31_one_(state + 9 * k, converted + 4 * k);
-        if (*status)
-            return k;
     }
-    return count;
+    if (four_yy > largest) {
+        largest = four_yy;
+    }
+    if (four_zz > largest) {
+        largest = four_zz;
+    }
+    /* the column of 4 e e' through the largest */
+    int64_t column_s; /* Q33.30, -2.19 .. 4.19, exact */
+    if (four_ss >= largest) {
+        column_s = four_ss;
+    } else if (four_xx >= largest) {
+        column_s = four_sx;
+    } else if (four_yy >= largest) {
+        column_s = four_sy;
+    } else {
+        column_s = four_sz;
+    }
+    int64_t column_x; /* Q33.30, -2.19 .. 4.19, exact */
+    if (four_ss >= largest) {
+        column_x = four_sx;
+    } else if (four_xx >= largest) {
+        column_x = four_xx;
+    } else if (four_yy >= largest) {
+        column_x = four_xy;
+    } else {
+        column_x = four_zx;
+    }
+    int64_t column_y; /* Q33.30, -2.19 .. 4.19, exact */
+    if (four_ss >= largest) {
+        column_y = four_sy;
+    } else if (four_xx >= largest) {
+        column_y = four_xy;
+    } else if (four_yy >= largest) {
+        column_y = four_yy;
+    } else {
+        column_y = four_yz;
+    }
+    int64_t column_z; /* Q33.30, -2.19 .. 4.19, exact */
+    if (four_ss >= largest) {
+        column_z = four_sz;
+    } else if (four_xx >= largest) {
+        column_z = four_zx;
+    } else if (four_yy >= largest) {
+        column_z = four_yz;
+    } else {
+        column_z = four_zz;
+    }
+    int32_t factor_quotient_choice; /* Q31.0, -1 .. 1, exact */
+    if (column_s >= 0) {
+        factor_quotient_choice = euler_from_dcm_q31_narrow_(1, 0);
+    } else {
+        factor_quotient_choice = euler_from_dcm_q31_narrow_((-1), 0);
+    }
+    const int32_t factor_quotient_root = euler_from_dcm_q31_sqrt_((uint64_t)(largest
+        * (INT32_C(1) << 28))); /* Q2.29, 0.999 .. 2.05, error 9.4e-10 */
+    const int32_t factor_quotient =
+        euler_from_dcm_q31_narrow_(euler_from_dcm_q31_div_((int64_t)factor_quotient_choice
+        * (INT64_C(1) << 59), factor_quotient_root), 0);
+        /* Q1.30, -1.01 .. 1.01, error 1.4e-09 */
+    /* makes the scalar part positive */
+    const int32_t factor = factor_quotient; /* Q0.31, -0.501 .. 0.501, error 7e-10 */
+    const int32_t column_s_word = euler_from_dcm_q31_narrow_(column_s + 2, 2);
+        /* Q3.28, -2.19 .. 4.19, error 1.9e-09 */
+    /* Euler parameters, body to reference, scalar last */
+    const int64_t next_s_unchecked =
+        euler_from_dcm_q31_shr_(euler_from_dcm_q31_mul_(column_s_word, factor)
+        + (INT32_C(1) << 28), 29);
+    if ((next_s_unchecked < (-INT32_C(1140850688)))
+        || (next_s_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t next_s = euler_from_dcm_q31_narrow_(next_s_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 4.4e-09 */
+    const int32_t column_x_word = euler_from_dcm_q31_narrow_(column_x + 2, 2);
+        /* Q3.28, -2.19 .. 4.19, error 1.9e-09 */
+    const int64_t next_x_unchecked =
+        euler_from_dcm_q31_shr_(euler_from_dcm_q31_mul_(column_x_word, factor)
+        + (INT32_C(1) << 28), 29);
+    if ((next_x_unchecked < (-INT32_C(1140850688)))
+        || (next_x_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t next_x = euler_from_dcm_q31_narrow_(next_x_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 4.4e-09 */
+    const int32_t column_y_word = euler_from_dcm_q31_narrow_(column_y + 2, 2);
+        /* Q3.28, -2.19 .. 4.19, error 1.9e-09 */
+    const int64_t next_y_unchecked =
+        euler_from_dcm_q31_shr_(euler_from_dcm_q31_mul_(column_y_word, factor)
+        + (INT32_C(1) << 28), 29);
+    if ((next_y_unchecked < (-INT32_C(1140850688)))
+        || (next_y_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t next_y = euler_from_dcm_q31_narrow_(next_y_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 4.4e-09 */
+    const int32_t column_z_word = euler_from_dcm_q31_narrow_(column_z + 2, 2);
+        /* Q3.28, -2.19 .. 4.19, error 1.9e-09 */
+    const int64_t next_z_unchecked =
+        euler_from_dcm_q31_shr_(euler_from_dcm_q31_mul_(column_z_word, factor)
+        + (INT32_C(1) << 28), 29);
+    if ((next_z_unchecked < (-INT32_C(1140850688)))
+        || (next_z_unchecked > INT32_C(1140850688))) {
+        return 2;
+    }
+    const int32_t next_z = euler_from_dcm_q31_narrow_(next_z_unchecked, 0);
+        /* Q1.30, -1.07 .. 1.07, error 4.4e-09 */
+    converted[0] = next_x;
+    converted[1] = next_y;
+    converted[2] = next_z;
+    converted[3] = next_s;
+    return 0;
 }

@@ -5,94 +5,127 @@
 #include "euler_normalize_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int euler_normalize_q31_out_(int_fast32_t x, int_fast32_t limit)
+static inline int euler_normalize_q31_out_(int32_t x, int32_t limit)
 {
-    return (uint64_t)x + (uint64_t)limit > 2 * (uint64_t)limit;
+    return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
 
-/* x / 2^n, rounded down. The right shift of a negative number is left to the compiler by the standard; this is not, and
- * compilers make one arithmetic shift of it.
+/* The exact product of two words. */
+#if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
+/* These processors have no instruction for it: the high word takes four products of half words. */
+__attribute__((noinline)) static int64_t euler_normalize_q31_mul_(int32_t a, int32_t b)
+{
+    const uint32_t a_low = (uint32_t)a & 0xFFFFu;
+    const uint32_t b_low = (uint32_t)b & 0xFFFFu;
+    const int32_t a_high = (a < 0) ? ~(~a >> 16) : (a >> 16);
+    const int32_t b_high = (b < 0) ? ~(~b >> 16) : (b >> 16);
+    const uint32_t low = a_low * b_low;
+    const int32_t middle = (a_high * (int32_t)b_low) + (int32_t)(low >> 16);
+    const int32_t other = (b_high * (int32_t)a_low) + (int32_t)((uint32_t)middle & 0xFFFFu);
+    const int32_t high = (a_high * b_high) + ((middle < 0) ? ~(~middle >> 16) : (middle >> 16))
+        + ((other < 0) ? ~(~other >> 16) : (other >> 16));
+    const uint64_t bits = ((uint64_t)(uint32_t)high << 32) | ((uint32_t)a * (uint32_t)b);
+    return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
+}
+#else
+static inline int64_t euler_normalize_q31_mul_(int32_t a, int32_t b)
+{
+    return (int64_t)a * b;
+}
+#endif
+
+/* x / 2^n, rounded down, where the proof of the ranges shows that it fits into a word: then the
+ * 32 bits of x from bit n on, read as a number with a sign, are that quotient. For n above 32 the
+ * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
+ * number and no conversion of a number out of range.
  */
+static inline int32_t euler_normalize_q31_narrow_(int64_t x, int n)
+{
+#ifdef __FRAMAC__
+    return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
+#else
+    const int beyond = (n > 32) ? (n - 32) : 0;
+    const uint32_t bits = (uint32_t)((uint64_t)x >> (n - beyond));
+    const int32_t high = (bits <= (UINT32_MAX >> 1)) ? (int32_t)bits
+                                                 : (-1 - (int32_t)(UINT32_MAX - bits));
+    return (high < 0) ? ~(~high >> beyond) : (high >> beyond);
+#endif
+}
+
+/* x / 2^n, rounded down, as a wide number. */
 static inline int64_t euler_normalize_q31_shr_(int64_t x, int n)
 {
-    return x < 0 ? ~(~x >> n) : x >> n;
+    return (x < 0) ? ~(~x >> n) : (x >> n);
 }
 
 /* numerator / denominator of their magnitudes, to the nearest; the sign comes last. */
 static int64_t euler_normalize_q31_div_(int64_t numerator, int64_t denominator)
 {
-    const int64_t top = numerator < 0 ? -numerator : numerator;
-    const int64_t below = denominator < 0 ? -denominator : denominator;
-    const int64_t quotient = (top + below / 2) / below;
-    return (numerator < 0) != (denominator < 0) ? -quotient : quotient;
+    const int64_t top = (numerator < 0) ? -numerator : numerator;
+    const int64_t below = (denominator < 0) ? -denominator : denominator;
+    const int64_t quotient = (top + (below / 2)) / below;
+    return ((numerator < 0) != (denominator < 0)) ? -quotient : quotient;
 }
 
 /* Square root bit by bit, to the nearest. */
-static int_fast32_t euler_normalize_q31_sqrt_(uint64_t square)
+static int32_t euler_normalize_q31_sqrt_(uint64_t square)
 {
-    uint64_t root = 0, bit = (uint64_t)1 << 62;
-    while (bit) {
+    uint64_t rest = square;
+    uint64_t root = 0;
+    uint64_t bit = (uint64_t)1 << 62;
+    while (bit != 0u) {
         const uint64_t tried = root + bit;
         root >>= 1;
-        if (square >= tried) {
-            square -= tried;
+        if (rest >= tried) {
+            rest -= tried;
             root += bit;
         }
         bit >>= 2;
     }
-    return (int_fast32_t)(root + (square > root));
+    return (int32_t)((rest > root) ? (root + 1u) : root);
 }
 
-/* The algorithm. Static, so that the loops below can take it in. */
-static inline int euler_normalize_q31_one_(const int32_t state[4], int32_t next[4])
+int euler_normalize_q31(const int32_t state[4], int32_t next[4])
 {
-    const int_fast32_t e_x = state[0];
-    const int_fast32_t e_y = state[1];
-    const int_fast32_t e_z = state[2];
-    const int_fast32_t e_s = state[3];
+    const int32_t e_x = state[0];
+    const int32_t e_y = state[1];
+    const int32_t e_z = state[2];
+    const int32_t e_s = state[3];
     if (euler_normalize_q31_out_(e_x, INT32_C(1140850688))
         || euler_normalize_q31_out_(e_y, INT32_C(1140850688))
         || euler_normalize_q31_out_(e_z, INT32_C(1140850688))
         || euler_normalize_q31_out_(e_s, INT32_C(1140850688)))
         return 1;
-    const int64_t inverse_norm_radicand =
-        (int64_t)e_s * e_s + (int64_t)e_x * e_x + (int64_t)e_y * e_y + (int64_t)e_z * e_z;
-    if (inverse_norm_radicand < INT64_C(576460752303423488)
-        || inverse_norm_radicand > INT64_C(2305843009213693952))
+    const int64_t inverse_norm_radicand = euler_normalize_q31_mul_(e_s, e_s)
+        + euler_normalize_q31_mul_(e_x, e_x) + euler_normalize_q31_mul_(e_y, e_y)
+        + euler_normalize_q31_mul_(e_z, e_z); /* Q3.60, 0.5 .. 2, exact */
+    if ((inverse_norm_radicand < (INT64_C(1) << 59))
+        || (inverse_norm_radicand > (INT64_C(1) << 61))) {
         return 2;
-    const int_fast32_t inverse_norm_root =
-        euler_normalize_q31_sqrt_((uint64_t)(euler_normalize_q31_shr_(inverse_norm_radicand, 2)));
-    /* 1/|state| */
-    const int_fast32_t inverse_norm =
-        (int_fast32_t)(euler_normalize_q31_div_(INT64_C(576460752303423488), inverse_norm_root));
-    /* Euler parameters, body to reference, scalar last, after the step */
-    const int_fast32_t next_s = (int_fast32_t)(euler_normalize_q31_shr_((int64_t)e_s * inverse_norm
-        + INT32_C(536870912), 30));
-    const int_fast32_t next_x = (int_fast32_t)(euler_normalize_q31_shr_((int64_t)e_x * inverse_norm
-        + INT32_C(536870912), 30));
-    const int_fast32_t next_y = (int_fast32_t)(euler_normalize_q31_shr_((int64_t)e_y * inverse_norm
-        + INT32_C(536870912), 30));
-    const int_fast32_t next_z = (int_fast32_t)(euler_normalize_q31_shr_((int64_t)e_z * inverse_norm
-        + INT32_C(536870912), 30));
-    next[0] = (int32_t)next_x;
-    next[1] = (int32_t)next_y;
-    next[2] = (int32_t)next_z;
-    next[3] = (int32_t)next_s;
-    return 0;
-}
-
-int euler_normalize_q31(const int32_t state[4], int32_t next[4])
-{
-    return euler_normalize_q31_one_(state, next);
-}
-
-size_t euler_normalize_q31_array(size_t count, int *status, const int32_t *state, int32_t *next)
-{
-    *status = 0;
-    for (size_t k = 0; k < count; ++k) {
-        *status = euler_normalize_q31_one_(state + 4 * k, next + 4 * k);
-        if (*status)
-            return k;
     }
-    return count;
+    const int32_t inverse_norm_root =
+        euler_normalize_q31_sqrt_((uint64_t)(euler_normalize_q31_shr_(inverse_norm_radicand, 2)));
+        /* Q2.29, 0.707 .. 1.42, error 9.4e-10 */
+    /* 1/|state| */
+    const int32_t inverse_norm =
+        euler_normalize_q31_narrow_(euler_normalize_q31_div_((INT64_C(1) << 59), inverse_norm_root), 0);
+        /* Q1.30, 0.707 .. 1.42, error 2.4e-09 */
+    /* Euler parameters, body to reference, scalar last, after the step */
+    const int32_t next_s =
+        euler_normalize_q31_narrow_(euler_normalize_q31_mul_(e_s, inverse_norm)
+        + (INT32_C(1) << 29), 30); /* Q1.30, -1.51 .. 1.51, error 3e-09 */
+    const int32_t next_x =
+        euler_normalize_q31_narrow_(euler_normalize_q31_mul_(e_x, inverse_norm)
+        + (INT32_C(1) << 29), 30); /* Q1.30, -1.51 .. 1.51, error 3e-09 */
+    const int32_t next_y =
+        euler_normalize_q31_narrow_(euler_normalize_q31_mul_(e_y, inverse_norm)
+        + (INT32_C(1) << 29), 30); /* Q1.30, -1.51 .. 1.51, error 3e-09 */
+    const int32_t next_z =
+        euler_normalize_q31_narrow_(euler_normalize_q31_mul_(e_z, inverse_norm)
+        + (INT32_C(1) << 29), 30); /* Q1.30, -1.51 .. 1.51, error 3e-09 */
+    next[0] = next_x;
+    next[1] = next_y;
+    next[2] = next_z;
+    next[3] = next_s;
+    return 0;
 }

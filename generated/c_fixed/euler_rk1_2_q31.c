@@ -5,119 +5,107 @@
 #include "euler_rk1_2_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int euler_rk1_2_q31_out_(int_fast32_t x, int_fast32_t limit)
+static inline int euler_rk1_2_q31_out_(int32_t x, int32_t limit)
 {
-    return (uint64_t)x + (uint64_t)limit > 2 * (uint64_t)limit;
+    return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
 
-/* x / 2^n, rounded down. The right shift of a negative number is left to the compiler by the standard; this is not, and
- * compilers make one arithmetic shift of it.
+/* The exact product of two words. */
+#if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
+/* These processors have no instruction for it: the high word takes four products of half words. */
+__attribute__((noinline)) static int64_t euler_rk1_2_q31_mul_(int32_t a, int32_t b)
+{
+    const uint32_t a_low = (uint32_t)a & 0xFFFFu;
+    const uint32_t b_low = (uint32_t)b & 0xFFFFu;
+    const int32_t a_high = (a < 0) ? ~(~a >> 16) : (a >> 16);
+    const int32_t b_high = (b < 0) ? ~(~b >> 16) : (b >> 16);
+    const uint32_t low = a_low * b_low;
+    const int32_t middle = (a_high * (int32_t)b_low) + (int32_t)(low >> 16);
+    const int32_t other = (b_high * (int32_t)a_low) + (int32_t)((uint32_t)middle & 0xFFFFu);
+    const int32_t high = (a_high * b_high) + ((middle < 0) ? ~(~middle >> 16) : (middle >> 16))
+        + ((other < 0) ? ~(~other >> 16) : (other >> 16));
+    const uint64_t bits = ((uint64_t)(uint32_t)high << 32) | ((uint32_t)a * (uint32_t)b);
+    return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
+}
+#else
+static inline int64_t euler_rk1_2_q31_mul_(int32_t a, int32_t b)
+{
+    return (int64_t)a * b;
+}
+#endif
+
+/* x / 2^n, rounded down, where the proof of the ranges shows that it fits into a word: then the
+ * 32 bits of x from bit n on, read as a number with a sign, are that quotient. For n above 32 the
+ * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
+ * number and no conversion of a number out of range.
  */
-static inline int64_t euler_rk1_2_q31_shr_(int64_t x, int n)
+static inline int32_t euler_rk1_2_q31_narrow_(int64_t x, int n)
 {
-    return x < 0 ? ~(~x >> n) : x >> n;
-}
-
-/* The algorithm. Static, so that the loops below can take it in. */
-static inline int euler_rk1_2_q31_one_(const int32_t state[4], const int32_t increments[6],
-    int32_t next[4])
-{
-    const int_fast32_t e_x = state[0];
-    const int_fast32_t e_y = state[1];
-    const int_fast32_t e_z = state[2];
-    const int_fast32_t e_s = state[3];
-    const int_fast32_t d1_x = increments[0];
-    const int_fast32_t d1_y = increments[1];
-    const int_fast32_t d1_z = increments[2];
-    const int_fast32_t d2_x = increments[3];
-    const int_fast32_t d2_y = increments[4];
-    const int_fast32_t d2_z = increments[5];
-    if (euler_rk1_2_q31_out_(e_x, INT32_C(1140850688))
-        || euler_rk1_2_q31_out_(e_y, INT32_C(1140850688))
-        || euler_rk1_2_q31_out_(e_z, INT32_C(1140850688))
-        || euler_rk1_2_q31_out_(e_s, INT32_C(1140850688))
-        || euler_rk1_2_q31_out_(d1_x, INT32_C(1073741824))
-        || euler_rk1_2_q31_out_(d1_y, INT32_C(1073741824))
-        || euler_rk1_2_q31_out_(d1_z, INT32_C(1073741824))
-        || euler_rk1_2_q31_out_(d2_x, INT32_C(1073741824))
-        || euler_rk1_2_q31_out_(d2_y, INT32_C(1073741824))
-        || euler_rk1_2_q31_out_(d2_z, INT32_C(1073741824)))
-        return 1;
-    /* half the rate times the step, at node 0 */
-    const int_fast32_t half_turn_0_x = (int_fast32_t)(euler_rk1_2_q31_shr_((int64_t)d1_x * 3
-        - (int64_t)d2_x + 2, 2));
-    const int_fast32_t half_turn_0_y = (int_fast32_t)(euler_rk1_2_q31_shr_((int64_t)d1_y * 3
-        - (int64_t)d2_y + 2, 2));
-    const int_fast32_t half_turn_0_z = (int_fast32_t)(euler_rk1_2_q31_shr_((int64_t)d1_z * 3
-        - (int64_t)d2_z + 2, 2));
-    /* Euler parameters, body to reference, scalar last, after the step */
-    const int_fast32_t next_s = (int_fast32_t)((int64_t)e_s
-        + euler_rk1_2_q31_shr_(-(int64_t)e_x * half_turn_0_x - (int64_t)e_y * half_turn_0_y
-        - (int64_t)e_z * half_turn_0_z + INT64_C(2147483648), 32));
-    const int_fast32_t next_x = (int_fast32_t)((int64_t)e_x
-        + euler_rk1_2_q31_shr_((int64_t)e_s * half_turn_0_x + (int64_t)e_y * half_turn_0_z
-        - (int64_t)e_z * half_turn_0_y + INT64_C(2147483648), 32));
-    const int_fast32_t next_y = (int_fast32_t)((int64_t)e_y
-        + euler_rk1_2_q31_shr_((int64_t)e_s * half_turn_0_y - (int64_t)e_x * half_turn_0_z
-        + (int64_t)e_z * half_turn_0_x + INT64_C(2147483648), 32));
-    const int_fast32_t next_z = (int_fast32_t)((int64_t)e_z
-        + euler_rk1_2_q31_shr_((int64_t)e_s * half_turn_0_z + (int64_t)e_x * half_turn_0_y
-        - (int64_t)e_y * half_turn_0_x + INT64_C(2147483648), 32));
-    next[0] = (int32_t)next_x;
-    next[1] = (int32_t)next_y;
-    next[2] = (int32_t)next_z;
-    next[3] = (int32_t)next_s;
-    return 0;
+#ifdef __FRAMAC__
+    return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
+#else
+    const int beyond = (n > 32) ? (n - 32) : 0;
+    const uint32_t bits = (uint32_t)((uint64_t)x >> (n - beyond));
+    const int32_t high = (bits <= (UINT32_MAX >> 1)) ? (int32_t)bits
+                                                 : (-1 - (int32_t)(UINT32_MAX - bits));
+    return (high < 0) ? ~(~high >> beyond) : (high >> beyond);
+#endif
 }
 
 int euler_rk1_2_q31(const int32_t state[4], const int32_t increments[6], int32_t next[4])
 {
-    return euler_rk1_2_q31_one_(state, increments, next);
-}
-
-size_t euler_rk1_2_q31_array(size_t count, int *status, const int32_t *state,
-    const int32_t *increments, int32_t *next)
-{
-    *status = 0;
-    for (size_t k = 0; k < count; ++k) {
-        *status = euler_rk1_2_q31_one_(state + 4 * k, increments + 6 * k, next + 4 * k);
-        if (*status)
-            return k;
-    }
-    return count;
-}
-
-int euler_rk1_2_q31_propagate(size_t runs, size_t steps, size_t record_every, size_t orthonormalize_every,
-    euler_rk1_2_q31_orthonormalizer orthonormalize, const int32_t *initial, const int32_t *increments,
-    int32_t *history, size_t *stopped)
-{
-    if (!initial || !history || (steps && !increments) || !record_every || (orthonormalize_every && !orthonormalize))
-        return 4;
-    for (size_t run = 0; run < runs; ++run) {
-        int32_t state[4];
-        size_t until_record = record_every, until_orthonormalize = orthonormalize_every;
-        for (size_t j = 0; j < 4; ++j)
-            state[j] = *history++ = *initial++;
-        for (size_t step = 0; step < steps; ++step, increments += 6) {
-            int status = euler_rk1_2_q31_one_(state, increments, state);
-            if (!status && orthonormalize_every && !--until_orthonormalize) {
-                if (orthonormalize(state, state))
-                    status = 3;
-                until_orthonormalize = orthonormalize_every;
-            }
-            if (status) {
-                if (stopped) {
-                    stopped[0] = run;
-                    stopped[1] = step;
-                }
-                return status;
-            }
-            if (!--until_record) {
-                for (size_t j = 0; j < 4; ++j)
-                    *history++ = state[j];
-                until_record = record_every;
-            }
-        }
-    }
+    const int32_t e_x = state[0];
+    const int32_t e_y = state[1];
+    const int32_t e_z = state[2];
+    const int32_t e_s = state[3];
+    const int32_t d1_x = increments[0];
+    const int32_t d1_y = increments[1];
+    const int32_t d1_z = increments[2];
+    const int32_t d2_x = increments[3];
+    const int32_t d2_y = increments[4];
+    const int32_t d2_z = increments[5];
+    if (euler_rk1_2_q31_out_(e_x, INT32_C(1140850688))
+        || euler_rk1_2_q31_out_(e_y, INT32_C(1140850688))
+        || euler_rk1_2_q31_out_(e_z, INT32_C(1140850688))
+        || euler_rk1_2_q31_out_(e_s, INT32_C(1140850688))
+        || euler_rk1_2_q31_out_(d1_x, (INT32_C(1) << 30))
+        || euler_rk1_2_q31_out_(d1_y, (INT32_C(1) << 30))
+        || euler_rk1_2_q31_out_(d1_z, (INT32_C(1) << 30))
+        || euler_rk1_2_q31_out_(d2_x, (INT32_C(1) << 30))
+        || euler_rk1_2_q31_out_(d2_y, (INT32_C(1) << 30))
+        || euler_rk1_2_q31_out_(d2_z, (INT32_C(1) << 30)))
+        return 1;
+    /* half the rate times the step, at node 0 */
+    const int32_t half_turn_0_x = euler_rk1_2_q31_narrow_(euler_rk1_2_q31_mul_(d1_x, 3)
+        - (int64_t)d2_x + 2, 2); /* Q-1.32, -0.251 .. 0.251, error 1.2e-10 */
+    const int32_t half_turn_0_y = euler_rk1_2_q31_narrow_(euler_rk1_2_q31_mul_(d1_y, 3)
+        - (int64_t)d2_y + 2, 2); /* Q-1.32, -0.251 .. 0.251, error 1.2e-10 */
+    const int32_t half_turn_0_z = euler_rk1_2_q31_narrow_(euler_rk1_2_q31_mul_(d1_z, 3)
+        - (int64_t)d2_z + 2, 2); /* Q-1.32, -0.251 .. 0.251, error 1.2e-10 */
+    /* Euler parameters, body to reference, scalar last, after the step */
+    const int32_t next_s = e_s
+        + euler_rk1_2_q31_narrow_(-euler_rk1_2_q31_mul_(e_x, half_turn_0_x)
+        - euler_rk1_2_q31_mul_(e_y, half_turn_0_y)
+        - euler_rk1_2_q31_mul_(e_z, half_turn_0_z) + (INT64_C(1) << 31), 32);
+        /* Q1.30, -1.86 .. 1.86, error 8.4e-10 */
+    const int32_t next_x = e_x
+        + euler_rk1_2_q31_narrow_(euler_rk1_2_q31_mul_(e_s, half_turn_0_x)
+        + euler_rk1_2_q31_mul_(e_y, half_turn_0_z)
+        - euler_rk1_2_q31_mul_(e_z, half_turn_0_y) + (INT64_C(1) << 31), 32);
+        /* Q1.30, -1.86 .. 1.86, error 8.4e-10 */
+    const int32_t next_y = e_y
+        + euler_rk1_2_q31_narrow_(euler_rk1_2_q31_mul_(e_s, half_turn_0_y)
+        - euler_rk1_2_q31_mul_(e_x, half_turn_0_z)
+        + euler_rk1_2_q31_mul_(e_z, half_turn_0_x) + (INT64_C(1) << 31), 32);
+        /* Q1.30, -1.86 .. 1.86, error 8.4e-10 */
+    const int32_t next_z = e_z
+        + euler_rk1_2_q31_narrow_(euler_rk1_2_q31_mul_(e_s, half_turn_0_z)
+        + euler_rk1_2_q31_mul_(e_x, half_turn_0_y)
+        - euler_rk1_2_q31_mul_(e_y, half_turn_0_x) + (INT64_C(1) << 31), 32);
+        /* Q1.30, -1.86 .. 1.86, error 8.4e-10 */
+    next[0] = next_x;
+    next[1] = next_y;
+    next[2] = next_z;
+    next[3] = next_s;
     return 0;
 }

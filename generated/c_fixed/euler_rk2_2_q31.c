@@ -5,137 +5,124 @@
 #include "euler_rk2_2_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int euler_rk2_2_q31_out_(int_fast32_t x, int_fast32_t limit)
+static inline int euler_rk2_2_q31_out_(int32_t x, int32_t limit)
 {
-    return (uint64_t)x + (uint64_t)limit > 2 * (uint64_t)limit;
+    return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
 
-/* x / 2^n, rounded down. The right shift of a negative number is left to the compiler by the standard; this is not, and
- * compilers make one arithmetic shift of it.
+/* The exact product of two words. */
+#if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
+/* These processors have no instruction for it: the high word takes four products of half words. */
+__attribute__((noinline)) static int64_t euler_rk2_2_q31_mul_(int32_t a, int32_t b)
+{
+    const uint32_t a_low = (uint32_t)a & 0xFFFFu;
+    const uint32_t b_low = (uint32_t)b & 0xFFFFu;
+    const int32_t a_high = (a < 0) ? ~(~a >> 16) : (a >> 16);
+    const int32_t b_high = (b < 0) ? ~(~b >> 16) : (b >> 16);
+    const uint32_t low = a_low * b_low;
+    const int32_t middle = (a_high * (int32_t)b_low) + (int32_t)(low >> 16);
+    const int32_t other = (b_high * (int32_t)a_low) + (int32_t)((uint32_t)middle & 0xFFFFu);
+    const int32_t high = (a_high * b_high) + ((middle < 0) ? ~(~middle >> 16) : (middle >> 16))
+        + ((other < 0) ? ~(~other >> 16) : (other >> 16));
+    const uint64_t bits = ((uint64_t)(uint32_t)high << 32) | ((uint32_t)a * (uint32_t)b);
+    return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
+}
+#else
+static inline int64_t euler_rk2_2_q31_mul_(int32_t a, int32_t b)
+{
+    return (int64_t)a * b;
+}
+#endif
+
+/* x / 2^n, rounded down, where the proof of the ranges shows that it fits into a word: then the
+ * 32 bits of x from bit n on, read as a number with a sign, are that quotient. For n above 32 the
+ * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
+ * number and no conversion of a number out of range.
  */
-static inline int64_t euler_rk2_2_q31_shr_(int64_t x, int n)
+static inline int32_t euler_rk2_2_q31_narrow_(int64_t x, int n)
 {
-    return x < 0 ? ~(~x >> n) : x >> n;
-}
-
-/* The algorithm. Static, so that the loops below can take it in. */
-static inline int euler_rk2_2_q31_one_(const int32_t state[4], const int32_t increments[6],
-    int32_t next[4])
-{
-    const int_fast32_t e_x = state[0];
-    const int_fast32_t e_y = state[1];
-    const int_fast32_t e_z = state[2];
-    const int_fast32_t e_s = state[3];
-    const int_fast32_t d1_x = increments[0];
-    const int_fast32_t d1_y = increments[1];
-    const int_fast32_t d1_z = increments[2];
-    const int_fast32_t d2_x = increments[3];
-    const int_fast32_t d2_y = increments[4];
-    const int_fast32_t d2_z = increments[5];
-    if (euler_rk2_2_q31_out_(e_x, INT32_C(1140850688))
-        || euler_rk2_2_q31_out_(e_y, INT32_C(1140850688))
-        || euler_rk2_2_q31_out_(e_z, INT32_C(1140850688))
-        || euler_rk2_2_q31_out_(e_s, INT32_C(1140850688))
-        || euler_rk2_2_q31_out_(d1_x, INT32_C(536870912))
-        || euler_rk2_2_q31_out_(d1_y, INT32_C(536870912))
-        || euler_rk2_2_q31_out_(d1_z, INT32_C(536870912))
-        || euler_rk2_2_q31_out_(d2_x, INT32_C(536870912))
-        || euler_rk2_2_q31_out_(d2_y, INT32_C(536870912))
-        || euler_rk2_2_q31_out_(d2_z, INT32_C(536870912)))
-        return 1;
-    /* the angle increment of the whole step */
-    const int_fast32_t sigma_x = (int_fast32_t)((int64_t)d1_x + (int64_t)d2_x);
-    const int_fast32_t sigma_y = (int_fast32_t)((int64_t)d1_y + (int64_t)d2_y);
-    const int_fast32_t sigma_z = (int_fast32_t)((int64_t)d1_z + (int64_t)d2_z);
-    const int64_t sigma_cross_d1_x = (int64_t)d1_z * sigma_y - (int64_t)d1_y * sigma_z;
-    const int64_t sigma_cross_d1_y = (int64_t)d1_x * sigma_z - (int64_t)d1_z * sigma_x;
-    const int64_t sigma_cross_d1_z = (int64_t)d1_y * sigma_x - (int64_t)d1_x * sigma_y;
-    /* the step applied to the identity: its vector part */
-    const int_fast32_t p_x =
-        (int_fast32_t)((int64_t)sigma_x + euler_rk2_2_q31_shr_(-sigma_cross_d1_x
-        + INT32_C(1073741824), 31));
-    const int_fast32_t p_y =
-        (int_fast32_t)((int64_t)sigma_y + euler_rk2_2_q31_shr_(-sigma_cross_d1_y
-        + INT32_C(1073741824), 31));
-    const int_fast32_t p_z =
-        (int_fast32_t)((int64_t)sigma_z + euler_rk2_2_q31_shr_(-sigma_cross_d1_z
-        + INT32_C(1073741824), 31));
-    const int64_t d1_dot_d2 = (int64_t)d1_x * d2_x + (int64_t)d1_y * d2_y + (int64_t)d1_z * d2_z;
-    const int_fast32_t sigma_dot_sigma =
-        (int_fast32_t)(euler_rk2_2_q31_shr_((int64_t)sigma_x * sigma_x + (int64_t)sigma_y * sigma_y
-        + (int64_t)sigma_z * sigma_z + INT32_C(1073741824), 31));
-    /* its scalar part */
-    const int_fast32_t p_s =
-        (int_fast32_t)(euler_rk2_2_q31_shr_((int64_t)sigma_dot_sigma * 3 * INT32_C(134217728)
-        - d1_dot_d2 + INT32_C(536870912), 30));
-    /* Euler parameters, body to reference, scalar last, after the step */
-    const int_fast32_t next_s =
-        (int_fast32_t)((int64_t)e_s + euler_rk2_2_q31_shr_((int64_t)e_s * p_s - (int64_t)e_x * p_x
-        - (int64_t)e_y * p_y - (int64_t)e_z * p_z + INT64_C(4294967296), 33));
-    const int_fast32_t next_x =
-        (int_fast32_t)((int64_t)e_x + euler_rk2_2_q31_shr_((int64_t)e_s * p_x + (int64_t)e_x * p_s
-        + (int64_t)e_y * p_z - (int64_t)e_z * p_y + INT64_C(4294967296), 33));
-    const int_fast32_t next_y =
-        (int_fast32_t)((int64_t)e_y + euler_rk2_2_q31_shr_((int64_t)e_s * p_y - (int64_t)e_x * p_z
-        + (int64_t)e_y * p_s + (int64_t)e_z * p_x + INT64_C(4294967296), 33));
-    const int_fast32_t next_z =
-        (int_fast32_t)((int64_t)e_z + euler_rk2_2_q31_shr_((int64_t)e_s * p_z + (int64_t)e_x * p_y
-        - (int64_t)e_y * p_x + (int64_t)e_z * p_s + INT64_C(4294967296), 33));
-    next[0] = (int32_t)next_x;
-    next[1] = (int32_t)next_y;
-    next[2] = (int32_t)next_z;
-    next[3] = (int32_t)next_s;
-    return 0;
+#ifdef __FRAMAC__
+    return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
+#else
+    const int beyond = (n > 32) ? (n - 32) : 0;
+    const uint32_t bits = (uint32_t)((uint64_t)x >> (n - beyond));
+    const int32_t high = (bits <= (UINT32_MAX >> 1)) ? (int32_t)bits
+                                                 : (-1 - (int32_t)(UINT32_MAX - bits));
+    return (high < 0) ? ~(~high >> beyond) : (high >> beyond);
+#endif
 }
 
 int euler_rk2_2_q31(const int32_t state[4], const int32_t increments[6], int32_t next[4])
 {
-    return euler_rk2_2_q31_one_(state, increments, next);
-}
-
-size_t euler_rk2_2_q31_array(size_t count, int *status, const int32_t *state,
-    const int32_t *increments, int32_t *next)
-{
-    *status = 0;
-    for (size_t k = 0; k < count; ++k) {
-        *status = euler_rk2_2_q31_one_(state + 4 * k, increments + 6 * k, next + 4 * k);
-        if (*status)
-            return k;
-    }
-    return count;
-}
-
-int euler_rk2_2_q31_propagate(size_t runs, size_t steps, size_t record_every, size_t orthonormalize_every,
-    euler_rk2_2_q31_orthonormalizer orthonormalize, const int32_t *initial, const int32_t *increments,
-    int32_t *history, size_t *stopped)
-{
-    if (!initial || !history || (steps && !increments) || !record_every || (orthonormalize_every && !orthonormalize))
-        return 4;
-    for (size_t run = 0; run < runs; ++run) {
-        int32_t state[4];
-        size_t until_record = record_every, until_orthonormalize = orthonormalize_every;
-        for (size_t j = 0; j < 4; ++j)
-            state[j] = *history++ = *initial++;
-        for (size_t step = 0; step < steps; ++step, increments += 6) {
-            int status = euler_rk2_2_q31_one_(state, increments, state);
-            if (!status && orthonormalize_every && !--until_orthonormalize) {
-                if (orthonormalize(state, state))
-                    status = 3;
-                until_orthonormalize = orthonormalize_every;
-            }
-            if (status) {
-                if (stopped) {
-                    stopped[0] = run;
-                    stopped[1] = step;
-                }
-                return status;
-            }
-            if (!--until_record) {
-                for (size_t j = 0; j < 4; ++j)
-                    *history++ = state[j];
-                until_record = record_every;
-            }
-        }
-    }
+    const int32_t e_x = state[0];
+    const int32_t e_y = state[1];
+    const int32_t e_z = state[2];
+    const int32_t e_s = state[3];
+    const int32_t d1_x = increments[0];
+    const int32_t d1_y = increments[1];
+    const int32_t d1_z = increments[2];
+    const int32_t d2_x = increments[3];
+    const int32_t d2_y = increments[4];
+    const int32_t d2_z = increments[5];
+    if (euler_rk2_2_q31_out_(e_x, INT32_C(1140850688))
+        || euler_rk2_2_q31_out_(e_y, INT32_C(1140850688))
+        || euler_rk2_2_q31_out_(e_z, INT32_C(1140850688))
+        || euler_rk2_2_q31_out_(e_s, INT32_C(1140850688))
+        || euler_rk2_2_q31_out_(d1_x, (INT32_C(1) << 29))
+        || euler_rk2_2_q31_out_(d1_y, (INT32_C(1) << 29))
+        || euler_rk2_2_q31_out_(d1_z, (INT32_C(1) << 29))
+        || euler_rk2_2_q31_out_(d2_x, (INT32_C(1) << 29))
+        || euler_rk2_2_q31_out_(d2_y, (INT32_C(1) << 29))
+        || euler_rk2_2_q31_out_(d2_z, (INT32_C(1) << 29)))
+        return 1;
+    /* the angle increment of the whole step */
+    const int32_t sigma_x = d1_x + d2_x; /* Q-1.32, -0.25 .. 0.25, exact */
+    const int32_t sigma_y = d1_y + d2_y; /* Q-1.32, -0.25 .. 0.25, exact */
+    const int32_t sigma_z = d1_z + d2_z; /* Q-1.32, -0.25 .. 0.25, exact */
+    const int64_t sigma_cross_d1_x = euler_rk2_2_q31_mul_(d1_z, sigma_y)
+        - euler_rk2_2_q31_mul_(d1_y, sigma_z); /* Q-1.64, -0.0313 .. 0.0313, exact */
+    const int64_t sigma_cross_d1_y = euler_rk2_2_q31_mul_(d1_x, sigma_z)
+        - euler_rk2_2_q31_mul_(d1_z, sigma_x); /* Q-1.64, -0.0313 .. 0.0313, exact */
+    const int64_t sigma_cross_d1_z = euler_rk2_2_q31_mul_(d1_y, sigma_x)
+        - euler_rk2_2_q31_mul_(d1_x, sigma_y); /* Q-1.64, -0.0313 .. 0.0313, exact */
+    /* the step applied to the identity: its vector part */
+    const int32_t p_x = sigma_x + euler_rk2_2_q31_narrow_(-sigma_cross_d1_x
+        + (INT32_C(1) << 30), 31); /* Q-2.33, -0.157 .. 0.157, error 5.9e-11 */
+    const int32_t p_y = sigma_y + euler_rk2_2_q31_narrow_(-sigma_cross_d1_y
+        + (INT32_C(1) << 30), 31); /* Q-2.33, -0.157 .. 0.157, error 5.9e-11 */
+    const int32_t p_z = sigma_z + euler_rk2_2_q31_narrow_(-sigma_cross_d1_z
+        + (INT32_C(1) << 30), 31); /* Q-2.33, -0.157 .. 0.157, error 5.9e-11 */
+    const int64_t d1_dot_d2 = euler_rk2_2_q31_mul_(d1_x, d2_x)
+        + euler_rk2_2_q31_mul_(d1_y, d2_y) + euler_rk2_2_q31_mul_(d1_z, d2_z);
+        /* Q-1.64, -0.0469 .. 0.0469, exact */
+    const int32_t sigma_dot_sigma =
+        euler_rk2_2_q31_narrow_(euler_rk2_2_q31_mul_(sigma_x, sigma_x)
+        + euler_rk2_2_q31_mul_(sigma_y, sigma_y) + euler_rk2_2_q31_mul_(sigma_z, sigma_z)
+        + (INT32_C(1) << 30), 31); /* Q-2.33, -1.17e-10 .. 0.188, error 5.9e-11 */
+    /* its scalar part */
+    const int32_t p_s = euler_rk2_2_q31_narrow_(euler_rk2_2_q31_mul_(sigma_dot_sigma, 3)
+        * (INT32_C(1) << 27) - d1_dot_d2 + (INT32_C(1) << 29), 30);
+        /* Q-2.33, -0.0586 .. 0.0938, error 8.1e-11; stands for p_s - 1 */
+    /* Euler parameters, body to reference, scalar last, after the step */
+    const int32_t next_s = e_s + euler_rk2_2_q31_narrow_(euler_rk2_2_q31_mul_(e_s, p_s)
+        - euler_rk2_2_q31_mul_(e_x, p_x) - euler_rk2_2_q31_mul_(e_y, p_y)
+        - euler_rk2_2_q31_mul_(e_z, p_z) + (INT64_C(1) << 32), 33);
+        /* Q1.30, -1.67 .. 1.67, error 7.4e-10 */
+    const int32_t next_x = e_x + euler_rk2_2_q31_narrow_(euler_rk2_2_q31_mul_(e_s, p_x)
+        + euler_rk2_2_q31_mul_(e_x, p_s) + euler_rk2_2_q31_mul_(e_y, p_z)
+        - euler_rk2_2_q31_mul_(e_z, p_y) + (INT64_C(1) << 32), 33);
+        /* Q1.30, -1.67 .. 1.67, error 7.4e-10 */
+    const int32_t next_y = e_y + euler_rk2_2_q31_narrow_(euler_rk2_2_q31_mul_(e_s, p_y)
+        - euler_rk2_2_q31_mul_(e_x, p_z) + euler_rk2_2_q31_mul_(e_y, p_s)
+        + euler_rk2_2_q31_mul_(e_z, p_x) + (INT64_C(1) << 32), 33);
+        /* Q1.30, -1.67 .. 1.67, error 7.4e-10 */
+    const int32_t next_z = e_z + euler_rk2_2_q31_narrow_(euler_rk2_2_q31_mul_(e_s, p_z)
+        + euler_rk2_2_q31_mul_(e_x, p_y) - euler_rk2_2_q31_mul_(e_y, p_x)
+        + euler_rk2_2_q31_mul_(e_z, p_s) + (INT64_C(1) << 32), 33);
+        /* Q1.30, -1.67 .. 1.67, error 7.4e-10 */
+    next[0] = next_x;
+    next[1] = next_y;
+    next[2] = next_z;
+    next[3] = next_s;
     return 0;
 }

@@ -7,16 +7,16 @@
  *     equation (56).
  * Integer operations of one call: 27 add, 12 multiply, 9 shift; 0 temporaries.
  *
- * A number in format Qm.n is an integer times 2^-n. Rounding: nearest. No sum or product on the way
- * can overflow for input inside the ranges below, which every call checks; an error is the
+ * A number in format Qm.n is an integer times 2^-n. Rounding: nearest. No sum or product on the
+ * way can overflow for input inside the ranges below, which every call checks; an error is the
  * distance from what exact arithmetic makes of the same integers.
- * No heap, no global state, no floating point, reentrant. In one call every input is read before any
- * output is written: an output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, no floating point, reentrant. In one call every input is read before
+ * any output is written: an output may be the same memory as an input. Matrices are stored by
+ * rows.
  */
 #ifndef SCULLING_FAST_2_Q31_H
 #define SCULLING_FAST_2_Q31_H
 
-#include <stddef.h>
 #include <stdint.h>
 
 #ifdef __cplusplus
@@ -26,40 +26,32 @@ extern "C" {
 /* One call.
  * in      angle_sum[3]: sum of the angle increments since the slow cycle began; beta_x, beta_y,
  *         beta_z; format Q1.30, unit 2^-30 rad; range -1073741824 to 1073741824 (-1 to 1).
- * in      velocity_sum[3]: sum of the velocity increments since the slow cycle began; u_x, u_y, u_z;
- *         format Q4.27, unit 2^-27 m/s; range -1073741824 to 1073741824 (-8 to 8).
+ * in      velocity_sum[3]: sum of the velocity increments since the slow cycle began; u_x, u_y,
+ *         u_z; format Q4.27, unit 2^-27 m/s; range -1073741824 to 1073741824 (-8 to 8).
  * in      sculling[3]: sculling integral since the slow cycle began; eta_x, eta_y, eta_z; format
  *         Q3.28, unit 2^-28 m/s; range -1073741824 to 1073741824 (-4 to 4).
  * in      increment[3]: angle increment of the fast cycle, body axes: exact integral of the body
  *         rate; d_x, d_y, d_z; format Q-2.33, unit 2^-33 rad; range -1073741824 to 1073741824
  *         (-0.125 to 0.125).
- * in      velocity_increment[3]: velocity increment of the fast cycle, body axes: exact integral of
- *         the specific force; dv_x, dv_y, dv_z; format Q1.30, unit 2^-30 m/s; range -1073741824
- *         to 1073741824 (-1 to 1).
- * out     next_angle_sum[3]: sum of the angle increments since the slow cycle began, after the call;
- *         next_beta_x, next_beta_y, next_beta_z; format Q1.30, unit 2^-30 rad; range -1207959553
- *         to 1207959553 (-1.125 to 1.125); error at most 4.65661e-10, 0.5000 of the last place.
- * out     next_velocity_sum[3]: sum of the velocity increments since the slow cycle began, after the
- *         call; next_u_x, next_u_y, next_u_z; format Q4.27, unit 2^-27 m/s; range -1207959553 to
- *         1207959553 (-9 to 9); error at most 3.72529e-09, 0.5000 of the last place.
+ * in      velocity_increment[3]: velocity increment of the fast cycle, body axes: exact integral
+ *         of the specific force; dv_x, dv_y, dv_z; format Q1.30, unit 2^-30 m/s; range
+ *         -1073741824 to 1073741824 (-1 to 1).
+ * out     next_angle_sum[3]: sum of the angle increments since the slow cycle began, after the
+ *         call; next_beta_x, next_beta_y, next_beta_z; format Q1.30, unit 2^-30 rad; range
+ *         -1207959553 to 1207959553 (-1.125 to 1.125); error at most 4.65661e-10, 0.5000 of
+ *         the last place.
+ * out     next_velocity_sum[3]: sum of the velocity increments since the slow cycle began, after
+ *         the call; next_u_x, next_u_y, next_u_z; format Q4.27, unit 2^-27 m/s; range
+ *         -1207959553 to 1207959553 (-9 to 9); error at most 3.72529e-09, 0.5000 of the last
+ *         place.
  * out     next_sculling[3]: sculling integral since the slow cycle began, after the call;
- *         next_eta_x, next_eta_y, next_eta_z; format Q3.28, unit 2^-28 m/s; range -1610612737 to
- *         1610612737 (-6 to 6); error at most 1.86265e-09, 0.5000 of the last place.
+ *         next_eta_x, next_eta_y, next_eta_z; format Q3.28, unit 2^-28 m/s; range -1610612737
+ *         to 1610612737 (-6 to 6); error at most 1.86265e-09, 0.5000 of the last place.
  * Returns 0; or, with the outputs left alone, 1 if an input lies outside its range.
  */
 int sculling_fast_2_q31(const int32_t angle_sum[3], const int32_t velocity_sum[3],
     const int32_t sculling[3], const int32_t increment[3], const int32_t velocity_increment[3],
     int32_t next_angle_sum[3], int32_t next_velocity_sum[3], int32_t next_sculling[3]);
-
-/* `count` calls on arrays of samples, one after the other, up to the first that is refused: every array holds `count`
- * times what one call takes.
- * An output may be the same memory as an input whose samples have the same size; otherwise they must not overlap.
- * Returns how many calls were done, and in `status` what the last one returned.
- */
-size_t sculling_fast_2_q31_array(size_t count, int *status, const int32_t *angle_sum,
-    const int32_t *velocity_sum, const int32_t *sculling, const int32_t *increment,
-    const int32_t *velocity_increment, int32_t *next_angle_sum, int32_t *next_velocity_sum,
-    int32_t *next_sculling);
 
 #ifdef __cplusplus
 }

@@ -6,8 +6,8 @@
 
 #include <math.h>
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void cayley_klein_from_dcm_float_one_(const float state[9], float converted[4])
+
+void cayley_klein_from_dcm_float(const float state[9], float converted[4])
 {
     const float C_11 = state[0];
     const float C_12 = state[1];
@@ -35,10 +35,14 @@ static inline void cayley_klein_from_dcm_float_one_(const float state[9], float 
     /* 4 times the square of the largest parameter */
     const float largest = fmaxf(fmaxf(fmaxf(four_ss, four_xx), four_yy), four_zz);
     /* the column of 4 e e' through the largest */
-    const float column_s = (four_ss >= largest ? four_ss : (four_xx >= largest ? four_sx : (four_yy >= largest ? four_sy : four_sz)));
-    const float column_x = (four_ss >= largest ? four_sx : (four_xx >= largest ? four_xx : (four_yy >= largest ? four_xy : four_zx)));
-    const float column_y = (four_ss >= largest ? four_sy : (four_xx >= largest ? four_xy : (four_yy >= largest ? four_yy : four_yz)));
-    const float column_z = (four_ss >= largest ? four_sz : (four_xx >= largest ? four_zx : (four_yy >= largest ? four_yz : four_zz)));
+    const float column_s = (four_ss >= largest ? four_ss : (four_xx >= largest ? four_sx
+        : (four_yy >= largest ? four_sy : four_sz)));
+    const float column_x = (four_ss >= largest ? four_sx : (four_xx >= largest ? four_xx
+        : (four_yy >= largest ? four_xy : four_zx)));
+    const float column_y = (four_ss >= largest ? four_sy : (four_xx >= largest ? four_xy
+        : (four_yy >= largest ? four_yy : four_yz)));
+    const float column_z = (four_ss >= largest ? four_sz : (four_xx >= largest ? four_zx
+        : (four_yy >= largest ? four_yz : four_zz)));
     /* makes the scalar part positive */
     const float factor = 0.5f * ((column_s >= 0.0f ? 1.0f : -1.0f) / sqrtf(largest));
     /* Cayley-Klein parameters, body to reference, scalar first */
@@ -50,15 +54,4 @@ static inline void cayley_klein_from_dcm_float_one_(const float state[9], float 
     converted[1] = next_x;
     converted[2] = next_y;
     converted[3] = next_z;
-}
-
-void cayley_klein_from_dcm_float(const float state[9], float converted[4])
-{
-    cayley_klein_from_dcm_float_one_(state, converted);
-}
-
-void cayley_klein_from_dcm_float_array(size_t count, const float *state, float *converted)
-{
-    for (size_t k = 0; k < count; ++k)
-        cayley_klein_from_dcm_float_one_(state + 9 * k, converted + 4 * k);
 }

@@ -6,8 +6,8 @@
 
 #include <math.h>
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void cayley_klein_normalize_float_one_(const float state[4], float next[4])
+
+void cayley_klein_normalize_float(const float state[4], float next[4])
 {
     const float a_s = state[0];
     const float a_x = state[1];
@@ -24,15 +24,4 @@ static inline void cayley_klein_normalize_float_one_(const float state[4], float
     next[1] = next_x;
     next[2] = next_y;
     next[3] = next_z;
-}
-
-void cayley_klein_normalize_float(const float state[4], float next[4])
-{
-    cayley_klein_normalize_float_one_(state, next);
-}
-
-void cayley_klein_normalize_float_array(size_t count, const float *state, float *next)
-{
-    for (size_t k = 0; k < count; ++k)
-        cayley_klein_normalize_float_one_(state + 4 * k, next + 4 * k);
 }

@@ -4,8 +4,8 @@
  */
 #include "coning_fast_float.h"
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void coning_fast_float_one_(const float angle_sum[3], const float coning[3],
+
+void coning_fast_float(const float angle_sum[3], const float coning[3],
     const float previous_increment[3], const float increment[3], float next_angle_sum[3],
     float next_coning[3], float next_previous_increment[3])
 {
@@ -44,22 +44,4 @@ static inline void coning_fast_float_one_(const float angle_sum[3], const float 
     next_previous_increment[0] = d_x;
     next_previous_increment[1] = d_y;
     next_previous_increment[2] = d_z;
-}
-
-void coning_fast_float(const float angle_sum[3], const float coning[3],
-    const float previous_increment[3], const float increment[3], float next_angle_sum[3],
-    float next_coning[3], float next_previous_increment[3])
-{
-    coning_fast_float_one_(angle_sum, coning, previous_increment, increment, next_angle_sum,
-        next_coning, next_previous_increment);
-}
-
-void coning_fast_float_array(size_t count, const float *angle_sum, const float *coning,
-    const float *previous_increment, const float *increment, float *next_angle_sum,
-    float *next_coning, float *next_previous_increment)
-{
-    for (size_t k = 0; k < count; ++k)
-        coning_fast_float_one_(angle_sum + 3 * k, coning + 3 * k, previous_increment + 3 * k,
-            increment + 3 * k, next_angle_sum + 3 * k, next_coning + 3 * k,
-            next_previous_increment + 3 * k);
 }

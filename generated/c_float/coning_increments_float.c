@@ -12,9 +12,9 @@ static float coning_increments_float_sinc_(float x)
     return x >= 0.0f && x <= 0.0f ? 1.0f : sinf(x) / x;
 }
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void coning_increments_float_one_(float middle, float width, float a, float b,
-    float g, float increment[3])
+
+void coning_increments_float(float middle, float width, float a, float b, float g,
+    float increment[3])
 {
     const float shared_1 = b * middle;
     const float shared_2 = a * width * coning_increments_float_sinc_(0.5f * (b * width));
@@ -25,17 +25,4 @@ static inline void coning_increments_float_one_(float middle, float width, float
     increment[0] = increment_x;
     increment[1] = increment_y;
     increment[2] = increment_z;
-}
-
-void coning_increments_float(float middle, float width, float a, float b, float g,
-    float increment[3])
-{
-    coning_increments_float_one_(middle, width, a, b, g, increment);
-}
-
-void coning_increments_float_array(size_t count, const float *middle, const float *width,
-    const float *a, const float *b, const float *g, float *increment)
-{
-    for (size_t k = 0; k < count; ++k)
-        coning_increments_float_one_(middle[k], width[k], a[k], b[k], g[k], increment + 3 * k);
 }

@@ -12,9 +12,8 @@ static float coning_truth_float_sinc_(float x)
     return x >= 0.0f && x <= 0.0f ? 1.0f : sinf(x) / x;
 }
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void coning_truth_float_one_(float time, float a, float b, float g, float rate[3],
-    float attitude[9])
+
+void coning_truth_float(float time, float a, float b, float g, float rate[3], float attitude[9])
 {
     const float shared_1 = b * time;
     const float shared_2 = sinf(shared_1);
@@ -63,16 +62,4 @@ static inline void coning_truth_float_one_(float time, float a, float b, float g
     attitude[6] = C_31;
     attitude[7] = C_32;
     attitude[8] = C_33;
-}
-
-void coning_truth_float(float time, float a, float b, float g, float rate[3], float attitude[9])
-{
-    coning_truth_float_one_(time, a, b, g, rate, attitude);
-}
-
-void coning_truth_float_array(size_t count, const float *time, const float *a, const float *b,
-    const float *g, float *rate, float *attitude)
-{
-    for (size_t k = 0; k < count; ++k)
-        coning_truth_float_one_(time[k], a[k], b[k], g[k], rate + 3 * k, attitude + 9 * k);
 }

@@ -4,9 +4,9 @@
  */
 #include "constant_increments_float.h"
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void constant_increments_float_one_(float middle, float width, float x, float y,
-    float z, float increment[3])
+
+void constant_increments_float(float middle, float width, float x, float y, float z,
+    float increment[3])
 {
     (void)middle;
     /* angle increment over the interval, body axes */
@@ -16,17 +16,4 @@ static inline void constant_increments_float_one_(float middle, float width, flo
     increment[0] = increment_x;
     increment[1] = increment_y;
     increment[2] = increment_z;
-}
-
-void constant_increments_float(float middle, float width, float x, float y, float z,
-    float increment[3])
-{
-    constant_increments_float_one_(middle, width, x, y, z, increment);
-}
-
-void constant_increments_float_array(size_t count, const float *middle, const float *width,
-    const float *x, const float *y, const float *z, float *increment)
-{
-    for (size_t k = 0; k < count; ++k)
-        constant_increments_float_one_(middle[k], width[k], x[k], y[k], z[k], increment + 3 * k);
 }

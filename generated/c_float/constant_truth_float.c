@@ -12,9 +12,8 @@ static float constant_truth_float_sinc_(float x)
     return x >= 0.0f && x <= 0.0f ? 1.0f : sinf(x) / x;
 }
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void constant_truth_float_one_(float time, float x, float y, float z, float rate[3],
-    float attitude[9])
+
+void constant_truth_float(float time, float x, float y, float z, float rate[3], float attitude[9])
 {
     const float shared_1 = time * time;
     const float shared_2 = shared_1 * (y * y);
@@ -57,16 +56,4 @@ static inline void constant_truth_float_one_(float time, float x, float y, float
     attitude[6] = C_31;
     attitude[7] = C_32;
     attitude[8] = C_33;
-}
-
-void constant_truth_float(float time, float x, float y, float z, float rate[3], float attitude[9])
-{
-    constant_truth_float_one_(time, x, y, z, rate, attitude);
-}
-
-void constant_truth_float_array(size_t count, const float *time, const float *x, const float *y,
-    const float *z, float *rate, float *attitude)
-{
-    for (size_t k = 0; k < count; ++k)
-        constant_truth_float_one_(time[k], x[k], y[k], z[k], rate + 3 * k, attitude + 9 * k);
 }

@@ -4,8 +4,8 @@
  */
 #include "dcm_from_cayley_klein_float.h"
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void dcm_from_cayley_klein_float_one_(const float state[4], float attitude[9])
+
+void dcm_from_cayley_klein_float(const float state[4], float attitude[9])
 {
     const float a_s = state[0];
     const float a_x = state[1];
@@ -44,15 +44,4 @@ static inline void dcm_from_cayley_klein_float_one_(const float state[4], float 
     attitude[6] = C_31;
     attitude[7] = C_32;
     attitude[8] = C_33;
-}
-
-void dcm_from_cayley_klein_float(const float state[4], float attitude[9])
-{
-    dcm_from_cayley_klein_float_one_(state, attitude);
-}
-
-void dcm_from_cayley_klein_float_array(size_t count, const float *state, float *attitude)
-{
-    for (size_t k = 0; k < count; ++k)
-        dcm_from_cayley_klein_float_one_(state + 4 * k, attitude + 9 * k);
 }

@@ -6,8 +6,8 @@
 
 #include <math.h>
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void dcm_from_euler_angles_float_one_(const float angles[3], float attitude[9])
+
+void dcm_from_euler_angles_float(const float angles[3], float attitude[9])
 {
     const float roll = angles[0];
     const float pitch = angles[1];
@@ -41,15 +41,4 @@ static inline void dcm_from_euler_angles_float_one_(const float angles[3], float
     attitude[6] = C_31;
     attitude[7] = C_32;
     attitude[8] = C_33;
-}
-
-void dcm_from_euler_angles_float(const float angles[3], float attitude[9])
-{
-    dcm_from_euler_angles_float_one_(angles, attitude);
-}
-
-void dcm_from_euler_angles_float_array(size_t count, const float *angles, float *attitude)
-{
-    for (size_t k = 0; k < count; ++k)
-        dcm_from_euler_angles_float_one_(angles + 3 * k, attitude + 9 * k);
 }

@@ -6,8 +6,8 @@
 
 #include <math.h>
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void dcm_orth_optimal_float_one_(const float computed[9], float orthonormalized[9])
+
+void dcm_orth_optimal_float(const float computed[9], float orthonormalized[9])
 {
     const float C_11 = computed[0];
     const float C_12 = computed[1];
@@ -109,15 +109,4 @@ static inline void dcm_orth_optimal_float_one_(const float computed[9], float or
     orthonormalized[6] = next_31;
     orthonormalized[7] = next_32;
     orthonormalized[8] = next_33;
-}
-
-void dcm_orth_optimal_float(const float computed[9], float orthonormalized[9])
-{
-    dcm_orth_optimal_float_one_(computed, orthonormalized);
-}
-
-void dcm_orth_optimal_float_array(size_t count, const float *computed, float *orthonormalized)
-{
-    for (size_t k = 0; k < count; ++k)
-        dcm_orth_optimal_float_one_(computed + 9 * k, orthonormalized + 9 * k);
 }

@@ -4,9 +4,8 @@
  */
 #include "dcm_product_float.h"
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void dcm_product_float_one_(const float state[9], const float transition[9],
-    float next[9])
+
+void dcm_product_float(const float state[9], const float transition[9], float next[9])
 {
     const float C_11 = state[0];
     const float C_12 = state[1];
@@ -45,15 +44,4 @@ static inline void dcm_product_float_one_(const float state[9], const float tran
     next[6] = next_31;
     next[7] = next_32;
     next[8] = next_33;
-}
-
-void dcm_product_float(const float state[9], const float transition[9], float next[9])
-{
-    dcm_product_float_one_(state, transition, next);
-}
-
-void dcm_product_float_array(size_t count, const float *state, const float *transition, float *next)
-{
-    for (size_t k = 0; k < count; ++k)
-        dcm_product_float_one_(state + 9 * k, transition + 9 * k, next + 9 * k);
 }

@@ -12,9 +12,8 @@ static float dcm_update_float_sinc_(float x)
     return x >= 0.0f && x <= 0.0f ? 1.0f : sinf(x) / x;
 }
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void dcm_update_float_one_(const float state[9], const float rotation_vector[3],
-    float next[9])
+
+void dcm_update_float(const float state[9], const float rotation_vector[3], float next[9])
 {
     const float C_11 = state[0];
     const float C_12 = state[1];
@@ -77,16 +76,4 @@ static inline void dcm_update_float_one_(const float state[9], const float rotat
     next[6] = next_31;
     next[7] = next_32;
     next[8] = next_33;
-}
-
-void dcm_update_float(const float state[9], const float rotation_vector[3], float next[9])
-{
-    dcm_update_float_one_(state, rotation_vector, next);
-}
-
-void dcm_update_float_array(size_t count, const float *state, const float *rotation_vector,
-    float *next)
-{
-    for (size_t k = 0; k < count; ++k)
-        dcm_update_float_one_(state + 9 * k, rotation_vector + 3 * k, next + 9 * k);
 }

@@ -4,8 +4,8 @@
  */
 #include "dcm_velocity_2_float.h"
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void dcm_velocity_2_float_one_(const float state[9], const float velocity_sum[3],
+
+void dcm_velocity_2_float(const float state[9], const float velocity_sum[3],
     const float sculling[3], const float angle_sum[3], float transformed[3])
 {
     const float C_11 = state[0];
@@ -39,18 +39,4 @@ static inline void dcm_velocity_2_float_one_(const float state[9], const float v
     transformed[0] = v_x;
     transformed[1] = v_y;
     transformed[2] = v_z;
-}
-
-void dcm_velocity_2_float(const float state[9], const float velocity_sum[3],
-    const float sculling[3], const float angle_sum[3], float transformed[3])
-{
-    dcm_velocity_2_float_one_(state, velocity_sum, sculling, angle_sum, transformed);
-}
-
-void dcm_velocity_2_float_array(size_t count, const float *state, const float *velocity_sum,
-    const float *sculling, const float *angle_sum, float *transformed)
-{
-    for (size_t k = 0; k < count; ++k)
-        dcm_velocity_2_float_one_(state + 9 * k, velocity_sum + 3 * k, sculling + 3 * k,
-            angle_sum + 3 * k, transformed + 3 * k);
 }

@@ -7,13 +7,11 @@
  *     equation (52).
  * Operations of one call: 15 add, 18 multiply; 5 temporaries.
  *
- * No heap, no global state, reentrant. In one call every input is read before any output is written: an
- * output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is written:
+ * an output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef DCM_VELOCITY_2_FLOAT_H
 #define DCM_VELOCITY_2_FLOAT_H
-
-#include <stddef.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -24,8 +22,8 @@ extern "C" {
  *      number; at most 1 in magnitude in proper use.
  * in   velocity_sum[3]: sum of the velocity increments since the slow cycle began; unit m/s; u_x,
  *      u_y, u_z; any finite number; at most 8 in magnitude in proper use.
- * in   sculling[3]: sculling integral since the slow cycle began; unit m/s; eta_x, eta_y, eta_z; any
- *      finite number; at most 4 in magnitude in proper use.
+ * in   sculling[3]: sculling integral since the slow cycle began; unit m/s; eta_x, eta_y, eta_z;
+ *      any finite number; at most 4 in magnitude in proper use.
  * in   angle_sum[3]: sum of the angle increments since the slow cycle began; unit rad; beta_x,
  *      beta_y, beta_z; any finite number; at most 1 in magnitude in proper use.
  * out  transformed[3]: velocity increment of the slow cycle, navigation axes; unit m/s; v_x, v_y,
@@ -33,12 +31,6 @@ extern "C" {
  */
 void dcm_velocity_2_float(const float state[9], const float velocity_sum[3],
     const float sculling[3], const float angle_sum[3], float transformed[3]);
-
-/* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
- * whose samples have the same size; otherwise they must not overlap.
- */
-void dcm_velocity_2_float_array(size_t count, const float *state, const float *velocity_sum,
-    const float *sculling, const float *angle_sum, float *transformed);
 
 #ifdef __cplusplus
 }

@@ -4,9 +4,9 @@
  */
 #include "error_matrix_float.h"
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void error_matrix_float_one_(const float computed[9], const float truth[9],
-    float error[9], float scale[3], float skew[3], float drift[3])
+
+void error_matrix_float(const float computed[9], const float truth[9], float error[9],
+    float scale[3], float skew[3], float drift[3])
 {
     const float C_11 = computed[0];
     const float C_12 = computed[1];
@@ -68,18 +68,4 @@ static inline void error_matrix_float_one_(const float computed[9], const float 
     drift[0] = drift_x;
     drift[1] = drift_y;
     drift[2] = drift_z;
-}
-
-void error_matrix_float(const float computed[9], const float truth[9], float error[9],
-    float scale[3], float skew[3], float drift[3])
-{
-    error_matrix_float_one_(computed, truth, error, scale, skew, drift);
-}
-
-void error_matrix_float_array(size_t count, const float *computed, const float *truth, float *error,
-    float *scale, float *skew, float *drift)
-{
-    for (size_t k = 0; k < count; ++k)
-        error_matrix_float_one_(computed + 9 * k, truth + 9 * k, error + 9 * k, scale + 3 * k,
-            skew + 3 * k, drift + 3 * k);
 }

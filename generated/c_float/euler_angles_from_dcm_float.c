@@ -12,9 +12,8 @@ static float euler_angles_from_dcm_float_wrap_(float x)
     return x > 3.1415927f ? x - 6.2831855f : x < -3.1415927f ? x + 6.2831855f : x;
 }
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void euler_angles_from_dcm_float_one_(const float state[9], const float previous[3],
-    float next[3])
+
+void euler_angles_from_dcm_float(const float state[9], const float previous[3], float next[3])
 {
     const float C_11 = state[0];
     const float C_12 = state[1];
@@ -31,28 +30,17 @@ static inline void euler_angles_from_dcm_float_one_(const float state[9], const 
     /* pitch */
     const float next_pitch = atan2f(-C_31, sqrtf(cosine_squared));
     /* roll; held where pitch is vertical */
-    const float next_roll = (4.0f * (1.1920929e-07f * 1.1920929e-07f) >= cosine_squared ? last_roll : atan2f(C_32, C_33));
+    const float next_roll = (4.0f * (1.1920929e-07f * 1.1920929e-07f) >= cosine_squared ? last_roll
+        : atan2f(C_32, C_33));
     /* heading - roll, or + */
     const float steep_sine = (0.0f >= C_31 ? C_23 - C_12 : -(C_12 + C_23));
     const float steep_cosine = (0.0f >= C_31 ? C_13 + C_22 : C_22 - C_13);
     /* the angle between or together */
     const float apart = atan2f(steep_sine, steep_cosine);
     /* heading */
-    const float next_heading = (cosine_squared >= 0.25f ? atan2f(C_21, C_11) : euler_angles_from_dcm_float_wrap_(apart
-        + (0.0f >= C_31 ? next_roll : -next_roll)));
+    const float next_heading = (cosine_squared >= 0.25f ? atan2f(C_21, C_11)
+        : euler_angles_from_dcm_float_wrap_(apart + (0.0f >= C_31 ? next_roll : -next_roll)));
     next[0] = next_roll;
     next[1] = next_pitch;
     next[2] = next_heading;
-}
-
-void euler_angles_from_dcm_float(const float state[9], const float previous[3], float next[3])
-{
-    euler_angles_from_dcm_float_one_(state, previous, next);
-}
-
-void euler_angles_from_dcm_float_array(size_t count, const float *state, const float *previous,
-    float *next)
-{
-    for (size_t k = 0; k < count; ++k)
-        euler_angles_from_dcm_float_one_(state + 9 * k, previous + 3 * k, next + 3 * k);
 }

@@ -4,8 +4,8 @@
  */
 #include "euler_from_cayley_klein_float.h"
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void euler_from_cayley_klein_float_one_(const float state[4], float converted[4])
+
+void euler_from_cayley_klein_float(const float state[4], float converted[4])
 {
     const float a_s = state[0];
     const float a_x = state[1];
@@ -15,15 +15,4 @@ static inline void euler_from_cayley_klein_float_one_(const float state[4], floa
     converted[1] = a_y;
     converted[2] = a_z;
     converted[3] = a_s;
-}
-
-void euler_from_cayley_klein_float(const float state[4], float converted[4])
-{
-    euler_from_cayley_klein_float_one_(state, converted);
-}
-
-void euler_from_cayley_klein_float_array(size_t count, const float *state, float *converted)
-{
-    for (size_t k = 0; k < count; ++k)
-        euler_from_cayley_klein_float_one_(state + 4 * k, converted + 4 * k);
 }

@@ -8,13 +8,11 @@
  * The sign is continuous for turns of less than 60 degrees from call to call.
  * Operations of one call: 13 add, 8 multiply, 1 divide, 1 sqrt, 19 select; 19 temporaries.
  *
- * No heap, no global state, reentrant. In one call every input is read before any output is written: an
- * output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is written:
+ * an output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef EULER_FROM_DCM_SHEPPARD_FLOAT_H
 #define EULER_FROM_DCM_SHEPPARD_FLOAT_H
-
-#include <stddef.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -24,18 +22,13 @@ extern "C" {
  * in   state[9]: direction cosine matrix, body to reference; unit 1; C_11, ..., C_33; any finite
  *      number; at most 1 in magnitude in proper use.
  * in   previous[4]: Euler parameters, body to reference, scalar last, of the call before; unit 1;
- *      last_x, last_y, last_z, last_s; any finite number; at most 1 in magnitude in proper use.
+ *      last_x, last_y, last_z, last_s; any finite number; at most 1 in magnitude in proper
+ *      use.
  * out  converted[4]: Euler parameters, body to reference, scalar last; unit 1; next_x, next_y,
  *      next_z, next_s.
  */
 void euler_from_dcm_sheppard_float(const float state[9], const float previous[4],
     float converted[4]);
-
-/* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
- * whose samples have the same size; otherwise they must not overlap.
- */
-void euler_from_dcm_sheppard_float_array(size_t count, const float *state, const float *previous,
-    float *converted);
 
 #ifdef __cplusplus
 }

@@ -6,8 +6,8 @@
 
 #include <math.h>
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void euler_normalize_float_one_(const float state[4], float next[4])
+
+void euler_normalize_float(const float state[4], float next[4])
 {
     const float e_x = state[0];
     const float e_y = state[1];
@@ -24,15 +24,4 @@ static inline void euler_normalize_float_one_(const float state[4], float next[4
     next[1] = next_y;
     next[2] = next_z;
     next[3] = next_s;
-}
-
-void euler_normalize_float(const float state[4], float next[4])
-{
-    euler_normalize_float_one_(state, next);
-}
-
-void euler_normalize_float_array(size_t count, const float *state, float *next)
-{
-    for (size_t k = 0; k < count; ++k)
-        euler_normalize_float_one_(state + 4 * k, next + 4 * k);
 }

@@ -4,9 +4,8 @@
  */
 #include "euler_product_float.h"
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void euler_product_float_one_(const float state[4], const float transition[4],
-    float next[4])
+
+void euler_product_float(const float state[4], const float transition[4], float next[4])
 {
     const float e_x = state[0];
     const float e_y = state[1];
@@ -25,16 +24,4 @@ static inline void euler_product_float_one_(const float state[4], const float tr
     next[1] = next_y;
     next[2] = next_z;
     next[3] = next_s;
-}
-
-void euler_product_float(const float state[4], const float transition[4], float next[4])
-{
-    euler_product_float_one_(state, transition, next);
-}
-
-void euler_product_float_array(size_t count, const float *state, const float *transition,
-    float *next)
-{
-    for (size_t k = 0; k < count; ++k)
-        euler_product_float_one_(state + 4 * k, transition + 4 * k, next + 4 * k);
 }

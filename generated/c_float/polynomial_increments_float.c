@@ -4,9 +4,9 @@
  */
 #include "polynomial_increments_float.h"
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void polynomial_increments_float_one_(float middle, float width, float a0, float a1,
-    float a2, float a3, float a4, float increment[3])
+
+void polynomial_increments_float(float middle, float width, float a0, float a1, float a2, float a3,
+    float a4, float increment[3])
 {
     const float shared_3 = width * width;
     const float shared_1 = shared_3 * width;
@@ -19,19 +19,4 @@ static inline void polynomial_increments_float_one_(float middle, float width, f
     increment[0] = 0.0f;
     increment[1] = increment_y;
     increment[2] = 0.0f;
-}
-
-void polynomial_increments_float(float middle, float width, float a0, float a1, float a2, float a3,
-    float a4, float increment[3])
-{
-    polynomial_increments_float_one_(middle, width, a0, a1, a2, a3, a4, increment);
-}
-
-void polynomial_increments_float_array(size_t count, const float *middle, const float *width,
-    const float *a0, const float *a1, const float *a2, const float *a3, const float *a4,
-    float *increment)
-{
-    for (size_t k = 0; k < count; ++k)
-        polynomial_increments_float_one_(middle[k], width[k], a0[k], a1[k], a2[k], a3[k], a4[k],
-            increment + 3 * k);
 }

@@ -6,9 +6,9 @@
 
 #include <math.h>
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void polynomial_truth_float_one_(float time, float a0, float a1, float a2, float a3,
-    float a4, float rate[3], float attitude[9])
+
+void polynomial_truth_float(float time, float a0, float a1, float a2, float a3, float a4,
+    float rate[3], float attitude[9])
 {
     const float factor_1 = time * time;
     const float shared_2 = factor_1 * factor_1;
@@ -34,18 +34,4 @@ static inline void polynomial_truth_float_one_(float time, float a0, float a1, f
     attitude[6] = C_31;
     attitude[7] = 0.0f;
     attitude[8] = C_33;
-}
-
-void polynomial_truth_float(float time, float a0, float a1, float a2, float a3, float a4,
-    float rate[3], float attitude[9])
-{
-    polynomial_truth_float_one_(time, a0, a1, a2, a3, a4, rate, attitude);
-}
-
-void polynomial_truth_float_array(size_t count, const float *time, const float *a0, const float *a1,
-    const float *a2, const float *a3, const float *a4, float *rate, float *attitude)
-{
-    for (size_t k = 0; k < count; ++k)
-        polynomial_truth_float_one_(time[k], a0[k], a1[k], a2[k], a3[k], a4[k], rate + 3 * k,
-            attitude + 9 * k);
 }

@@ -4,8 +4,8 @@
  */
 #include "sculling_fast_2_float.h"
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void sculling_fast_2_float_one_(const float angle_sum[3], const float velocity_sum[3],
+
+void sculling_fast_2_float(const float angle_sum[3], const float velocity_sum[3],
     const float sculling[3], const float increment[3], const float velocity_increment[3],
     float next_angle_sum[3], float next_velocity_sum[3], float next_sculling[3])
 {
@@ -33,9 +33,12 @@ static inline void sculling_fast_2_float_one_(const float angle_sum[3], const fl
     const float next_u_y = dv_y + u_y;
     const float next_u_z = dv_z + u_z;
     /* sculling integral since the slow cycle began, after the call */
-    const float next_eta_x = eta_x + 0.5f * (beta_y * dv_z - beta_z * dv_y - d_y * u_z + d_z * u_y);
-    const float next_eta_y = eta_y + 0.5f * (beta_z * dv_x - beta_x * dv_z + d_x * u_z - d_z * u_x);
-    const float next_eta_z = eta_z + 0.5f * (beta_x * dv_y - beta_y * dv_x - d_x * u_y + d_y * u_x);
+    const float next_eta_x = eta_x + 0.5f * (beta_y * dv_z - beta_z * dv_y - d_y * u_z
+        + d_z * u_y);
+    const float next_eta_y = eta_y + 0.5f * (beta_z * dv_x - beta_x * dv_z + d_x * u_z
+        - d_z * u_x);
+    const float next_eta_z = eta_z + 0.5f * (beta_x * dv_y - beta_y * dv_x - d_x * u_y
+        + d_y * u_x);
     next_angle_sum[0] = next_beta_x;
     next_angle_sum[1] = next_beta_y;
     next_angle_sum[2] = next_beta_z;
@@ -45,22 +48,4 @@ static inline void sculling_fast_2_float_one_(const float angle_sum[3], const fl
     next_sculling[0] = next_eta_x;
     next_sculling[1] = next_eta_y;
     next_sculling[2] = next_eta_z;
-}
-
-void sculling_fast_2_float(const float angle_sum[3], const float velocity_sum[3],
-    const float sculling[3], const float increment[3], const float velocity_increment[3],
-    float next_angle_sum[3], float next_velocity_sum[3], float next_sculling[3])
-{
-    sculling_fast_2_float_one_(angle_sum, velocity_sum, sculling, increment, velocity_increment,
-        next_angle_sum, next_velocity_sum, next_sculling);
-}
-
-void sculling_fast_2_float_array(size_t count, const float *angle_sum, const float *velocity_sum,
-    const float *sculling, const float *increment, const float *velocity_increment,
-    float *next_angle_sum, float *next_velocity_sum, float *next_sculling)
-{
-    for (size_t k = 0; k < count; ++k)
-        sculling_fast_2_float_one_(angle_sum + 3 * k, velocity_sum + 3 * k, sculling + 3 * k,
-            increment + 3 * k, velocity_increment + 3 * k, next_angle_sum + 3 * k,
-            next_velocity_sum + 3 * k, next_sculling + 3 * k);
 }

@@ -7,13 +7,11 @@
  *     equation (56).
  * Operations of one call: 18 add, 15 multiply; 0 temporaries.
  *
- * No heap, no global state, reentrant. In one call every input is read before any output is written: an
- * output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is written:
+ * an output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef SCULLING_FAST_2_FLOAT_H
 #define SCULLING_FAST_2_FLOAT_H
-
-#include <stddef.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -24,13 +22,14 @@ extern "C" {
  *      beta_y, beta_z; any finite number; at most 1 in magnitude in proper use.
  * in   velocity_sum[3]: sum of the velocity increments since the slow cycle began; unit m/s; u_x,
  *      u_y, u_z; any finite number; at most 8 in magnitude in proper use.
- * in   sculling[3]: sculling integral since the slow cycle began; unit m/s; eta_x, eta_y, eta_z; any
- *      finite number; at most 4 in magnitude in proper use.
- * in   increment[3]: angle increment of the fast cycle, body axes: exact integral of the body rate;
- *      unit rad; d_x, d_y, d_z; any finite number; at most 1/8 in magnitude in proper use.
- * in   velocity_increment[3]: velocity increment of the fast cycle, body axes: exact integral of the
- *      specific force; unit m/s; dv_x, dv_y, dv_z; any finite number; at most 1 in magnitude in
- *      proper use.
+ * in   sculling[3]: sculling integral since the slow cycle began; unit m/s; eta_x, eta_y, eta_z;
+ *      any finite number; at most 4 in magnitude in proper use.
+ * in   increment[3]: angle increment of the fast cycle, body axes: exact integral of the body
+ *      rate; unit rad; d_x, d_y, d_z; any finite number; at most 1/8 in magnitude in proper
+ *      use.
+ * in   velocity_increment[3]: velocity increment of the fast cycle, body axes: exact integral of
+ *      the specific force; unit m/s; dv_x, dv_y, dv_z; any finite number; at most 1 in
+ *      magnitude in proper use.
  * out  next_angle_sum[3]: sum of the angle increments since the slow cycle began, after the call;
  *      unit rad; next_beta_x, next_beta_y, next_beta_z.
  * out  next_velocity_sum[3]: sum of the velocity increments since the slow cycle began, after the
@@ -41,13 +40,6 @@ extern "C" {
 void sculling_fast_2_float(const float angle_sum[3], const float velocity_sum[3],
     const float sculling[3], const float increment[3], const float velocity_increment[3],
     float next_angle_sum[3], float next_velocity_sum[3], float next_sculling[3]);
-
-/* `count` calls on arrays of samples, one after the other. An output may be the same memory as an input
- * whose samples have the same size; otherwise they must not overlap.
- */
-void sculling_fast_2_float_array(size_t count, const float *angle_sum, const float *velocity_sum,
-    const float *sculling, const float *increment, const float *velocity_increment,
-    float *next_angle_sum, float *next_velocity_sum, float *next_sculling);
 
 #ifdef __cplusplus
 }

@@ -12,25 +12,13 @@ static float sinusoidal_increments_float_sinc_(float x)
     return x >= 0.0f && x <= 0.0f ? 1.0f : sinf(x) / x;
 }
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void sinusoidal_increments_float_one_(float middle, float width, float a, float b,
-    float increment[3])
-{
-    /* angle increment over the interval, body axes */
-    const float increment_y = a * width * cosf(b * middle) * sinusoidal_increments_float_sinc_(0.5f * (b * width));
-    increment[0] = 0.0f;
-    increment[1] = increment_y;
-    increment[2] = 0.0f;
-}
 
 void sinusoidal_increments_float(float middle, float width, float a, float b, float increment[3])
 {
-    sinusoidal_increments_float_one_(middle, width, a, b, increment);
-}
-
-void sinusoidal_increments_float_array(size_t count, const float *middle, const float *width,
-    const float *a, const float *b, float *increment)
-{
-    for (size_t k = 0; k < count; ++k)
-        sinusoidal_increments_float_one_(middle[k], width[k], a[k], b[k], increment + 3 * k);
+    /* angle increment over the interval, body axes */
+    const float increment_y = a * width * cosf(b * middle) * sinusoidal_increments_float_sinc_(0.5f
+        * (b * width));
+    increment[0] = 0.0f;
+    increment[1] = increment_y;
+    increment[2] = 0.0f;
 }

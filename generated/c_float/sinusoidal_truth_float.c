@@ -12,9 +12,8 @@ static float sinusoidal_truth_float_sinc_(float x)
     return x >= 0.0f && x <= 0.0f ? 1.0f : sinf(x) / x;
 }
 
-/* The algorithm. Static, so that the loop below can take it in. */
-static inline void sinusoidal_truth_float_one_(float time, float a, float b, float rate[3],
-    float attitude[9])
+
+void sinusoidal_truth_float(float time, float a, float b, float rate[3], float attitude[9])
 {
     const float shared_1 = b * time;
     /* body rate, body axes */
@@ -39,16 +38,4 @@ static inline void sinusoidal_truth_float_one_(float time, float a, float b, flo
     attitude[6] = C_31;
     attitude[7] = 0.0f;
     attitude[8] = C_33;
-}
-
-void sinusoidal_truth_float(float time, float a, float b, float rate[3], float attitude[9])
-{
-    sinusoidal_truth_float_one_(time, a, b, rate, attitude);
-}
-
-void sinusoidal_truth_float_array(size_t count, const float *time, const float *a, const float *b,
-    float *rate, float *attitude)
-{
-    for (size_t k = 0; k < count; ++k)
-        sinusoidal_truth_float_one_(time[k], a[k], b[k], rate + 3 * k, attitude + 9 * k);
 }

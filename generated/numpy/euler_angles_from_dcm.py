@@ -58,7 +58,8 @@ def euler_angles_from_dcm(state, previous, out=None):
     next_pitch = np.arctan2(-C_31, np.sqrt(cosine_squared))
     # roll; held where pitch is vertical
     next_roll = (
-        np.where(4.0 * (2.220446049250313e-16 * 2.220446049250313e-16) >= cosine_squared, last_roll, np.arctan2(C_32, C_33))
+        np.where(4.0 * (2.220446049250313e-16 * 2.220446049250313e-16)
+        >= cosine_squared, last_roll, np.arctan2(C_32, C_33))
     )
     # heading - roll, or +
     steep_sine = np.where(0.0 >= C_31, C_23 - C_12, -(C_12 + C_23))

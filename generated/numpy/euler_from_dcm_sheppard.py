@@ -68,20 +68,25 @@ def euler_from_dcm_sheppard(state, previous, out=None):
     largest = np.maximum(np.maximum(np.maximum(four_ss, four_xx), four_yy), four_zz)
     # the column of 4 e e' through the largest
     column_s = (
-        np.where(four_ss >= largest, four_ss, np.where(four_xx >= largest, four_sx, np.where(four_yy >= largest, four_sy, four_sz)))
+        np.where(four_ss >= largest, four_ss, np.where(four_xx >= largest, four_sx, np.where(four_yy
+        >= largest, four_sy, four_sz)))
     )
     column_x = (
-        np.where(four_ss >= largest, four_sx, np.where(four_xx >= largest, four_xx, np.where(four_yy >= largest, four_xy, four_zx)))
+        np.where(four_ss >= largest, four_sx, np.where(four_xx >= largest, four_xx, np.where(four_yy
+        >= largest, four_xy, four_zx)))
     )
     column_y = (
-        np.where(four_ss >= largest, four_sy, np.where(four_xx >= largest, four_xy, np.where(four_yy >= largest, four_yy, four_yz)))
+        np.where(four_ss >= largest, four_sy, np.where(four_xx >= largest, four_xy, np.where(four_yy
+        >= largest, four_yy, four_yz)))
     )
     column_z = (
-        np.where(four_ss >= largest, four_sz, np.where(four_xx >= largest, four_zx, np.where(four_yy >= largest, four_yz, four_zz)))
+        np.where(four_ss >= largest, four_sz, np.where(four_xx >= largest, four_zx, np.where(four_yy
+        >= largest, four_yz, four_zz)))
     )
     # the largest parameter, before
     before = (
-        np.where(four_ss >= largest, last_s, np.where(four_xx >= largest, last_x, np.where(four_yy >= largest, last_y, last_z)))
+        np.where(four_ss >= largest, last_s, np.where(four_xx >= largest, last_x, np.where(four_yy
+        >= largest, last_y, last_z)))
     )
     # carries the sign
     factor = 0.5 * (np.where(before >= 0.0, 1.0, -1.0) / np.sqrt(largest))

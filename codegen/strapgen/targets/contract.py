@@ -115,7 +115,11 @@ def value_text(value: Value, word: int) -> str:
     format_ = Format(word * (1 + value.wide), value.fraction)
     error = f"error {_outward(value.error, up=True, digits=2)}" if value.error else "exact"
     low, high = _outward(value.low * unit, up=False), _outward(value.high * unit, up=True)
-    offset = f"; stands for {value.name} {'-' if value.offset > 0 else '+'} {abs(value.offset)}" if value.offset else ""
+    offset = (
+        f"; stands for {value.name} {'-' if value.offset > 0 else '+'} {abs(value.offset)}"
+        if value.offset
+        else ""
+    )
     return f"{format_}, {low} .. {high}, {error}{offset}"
 
 

@@ -11,7 +11,7 @@ from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Function, Sources
 from strapgen.targets.c.emit import real_of
-from strapgen.targets.c_fixed.emit import WORDS
+from strapgen.targets.c_fixed.words import WORDS
 from strapgen.targets.rendering import render_c, runs_of
 
 #: Names of the loops, from the fastest.

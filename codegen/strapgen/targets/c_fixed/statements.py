@@ -1,0 +1,306 @@
+"""Prints the values of a fixed-point program as C statements, each with its format, range and error bound."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from strapgen.ir.integer_program import (
+    FixedProgram,
+    IntegerMaximum,
+    IntegerQuotient,
+    IntegerRoot,
+    IntegerSelection,
+    IntegerSum,
+    Scaled,
+    Term,
+    Value,
+    used_by,
+)
+from strapgen.targets import contract
+from strapgen.targets.c_fixed.words import Word
+from strapgen.targets.lines import fill_expression
+
+
+class StatementPrinter:
+    """Prints the values of a fixed-point program as C statements."""
+
+    def __init__(self, fixed: FixedProgram, word: Word, name: str) -> None:
+        self.fixed, self.word, self.name = fixed, word, name
+        self.uses: set[str] = set()
+        self.wide_names = {value.name for value in fixed.body if value.wide}
+        self.places = {feedback.name: k for k, feedback in enumerate(fixed.interface.residuals)}
+        self.checks = any(value.guarded for value in fixed.body)
+        self.nearest = fixed.interface.settings.rounding == "nearest"
+        self.names = {value.name for value in fixed.body}
+        self.names |= {name for argument in fixed.interface.inputs for name in argument.signal.elements}
+
+    def memory(self, name: str) -> str:
+        """Return the name of an argument's array; it differs from the names of all values."""
+        return f"{name}_words" if name in self.names else name
+
+    def code(self) -> dict[str, list[str]]:
+        """Return the statements of one call: loads, checks of the inputs, the body, stores."""
+        interface, kind = self.fixed.interface, self.word.fast
+        used = {name for value in self.fixed.body for name in used_by(value)}
+        loads, checks = [], []
+        for argument in interface.inputs:
+            assert argument.low == -argument.high, "inputs have symmetric ranges"
+            limit = self.constant(argument.high)
+            for number, element in enumerate(argument.signal.elements):
+                source = f"{self.memory(argument.signal.name)}[{number}]"
+                if element in used:
+                    loads.append(f"const {kind} {element} = {source};")
+                    source = element
+                checks.append(self._call("out", source, limit))
+        body = [line for value in self.fixed.body for line in self.statements(value)]
+        stores = [
+            f"{self.memory(argument.signal.name)}[{number}] = {self._stored(name)};"
+            for argument in interface.outputs
+            for number, name in enumerate(argument.values)
+        ]
+        if self.checks:
+            stores += [f"residuals[{k}] = next_{r.name};" for k, r in enumerate(interface.residuals)]
+        return {"loads": loads, "checks": checks, "body": body, "stores": stores}
+
+    def _stored(self, name: str) -> str:
+        return name if self.word.fast == self.word.type else f"({self.word.type}){name}"
+
+    def _call(self, helper: str, *arguments: str) -> str:
+        """Return a call of one of the file's own functions."""
+        self.uses.add(helper)
+        return f"{self.name}_{helper}_({', '.join(arguments)})"
+
+    def statements(self, value: Value) -> list[str]:
+        """Return the statements that compute a value."""
+        lines = [f"/* {value.meaning} */"] if value.meaning else []
+        kind = self.word.wide if value.wide else self.word.fast
+        name, note = value.name, contract.value_text(value, self.word.bits)
+        match value.definition:
+            case IntegerSum() as total:
+                lines += self._sum(value, total, kind, note)
+            case IntegerQuotient(numerator, denominator):
+                text = self._call("div", self.scaled(numerator), denominator)
+                lines.append(_declared(kind, name, self.narrow(text, value), note))
+            case IntegerRoot(argument):
+                text = self._call("sqrt", f"({self.word.magnitude})({self.scaled(argument)})")
+                lines.append(_declared(kind, name, text, note))
+            case IntegerMaximum((first, *others)):
+                lines.append(_declared(kind, name, self.narrowed(first, value), note, constant=False))
+                for other in others:
+                    lines.append(f"if ({self.scaled(other)} > {name}) {{")
+                    lines.append(f"    {name} = {self.narrowed(other, value)};")
+                    lines.append("}")
+            case IntegerSelection(cases, otherwise):
+                lines += self._selection(value, kind, cases, otherwise, note)
+        # The word of a sum is checked before it is narrowed.
+        if value.guarded and (value.wide or not self._checked_in_sum(value)):
+            lines += self._guard(name, value)
+        return lines
+
+    @staticmethod
+    def _checked_in_sum(value: Value) -> bool:
+        return isinstance(value.definition, IntegerSum) and not value.definition.in_words
+
+    def _selection(
+        self,
+        value: Value,
+        kind: str,
+        cases: Sequence[tuple[Scaled, Scaled, Scaled]],
+        otherwise: Scaled,
+        note: str,
+    ) -> list[str]:
+        """Return a chain of conditions, the first that holds before all others."""
+        lines = [_noted(f"{kind} {value.name};", note)]
+        for number, (left, right, result) in enumerate(cases):
+            word = "if" if not number else "} else if"
+            lines.append(f"{word} ({self.scaled(left)} >= {self.scaled(right)}) {{")
+            lines.append(f"    {value.name} = {self.narrowed(result, value)};")
+        lines.append("} else {")
+        lines.append(f"    {value.name} = {self.narrowed(otherwise, value)};")
+        return [*lines, "}"]
+
+    def _guard(self, name: str, value: Value) -> list[str]:
+        limits = self.constant(value.low), self.constant(value.high)
+        condition = f"if (({name} < {limits[0]}) || ({name} > {limits[1]})) {{"
+        if len(condition) > 90:
+            condition = condition.replace(" || ", "\n        || ")
+        return [condition, "    return 2;", "}"]
+
+    def narrow(self, text: str, value: Value, shift: int = 0) -> str:
+        """Return an expression of a wide number, shifted down, as one of the value's type."""
+        if value.wide:
+            return self._shifted(text, shift) if shift else text
+        return self._call("narrow", text, str(shift))
+
+    def narrowed(self, scaled: Scaled, value: Value) -> str:
+        """Return a scaled value as one of another value's type."""
+        name = scaled.value
+        if isinstance(name, str) and not (value.wide or scaled.shift or name in self.wide_names):
+            return name
+        return self.narrow(self.scaled(scaled), value)
+
+    def _sum(self, value: Value, definition: IntegerSum, kind: str, note: str) -> list[str]:
+        name, wide = value.name, self.word.wide
+        fine = self._joined([self.term(term) for term in definition.fine])
+        if not definition.shift:
+            terms = (*definition.coarse, *definition.fine)
+            if definition.in_words and all(map(self._is_word, terms)):
+                text = self._joined([self.word_term(term) for term in terms])
+                return [_declared(kind, name, text or "0", note)]
+            return self._result(value, kind, self._joined([self.term(term) for term in terms]) or "0", note)
+        feedback, lines, shift = definition.residual, [], definition.shift
+        if feedback is None:
+            half = f" + {self.constant(1 << (definition.shift - 1), wide=True)}" if self.nearest else ""
+            total = fine + half
+        else:
+            place = f"residuals[{self.places[feedback.name]}]"
+            fed_back = self._scaled_text(f"({wide}){place}", feedback.shift)
+            before = self._shifted(fine, definition.drop) if definition.drop else fine
+            lines.append(_declared(wide, f"{name}_sum", f"{before} + {fed_back}"))
+            left = (
+                f"({self.word.magnitude}){name}_sum << {-feedback.shift}" if feedback.shift else f"{name}_sum"
+            )
+            word = self.word.residual
+            if self.checks:  # a call that a later check refuses leaves it as it was
+                lines.append(f"const {word} next_{feedback.name} = ({word})({left});")
+            else:
+                lines.append(f"{place} = ({word})({left});")
+            total = f"{name}_sum"
+        if definition.in_words and all(map(self._is_word, definition.coarse)):
+            words = [self.word_term(term) for term in definition.coarse]
+            rounded = f"+{self._call('narrow', total, str(shift))}"
+            text = self._joined([*words[:1], rounded, *words[1:]])
+            return [*lines, _declared(kind, name, text, note)]
+        coarse = [self.term(term) for term in definition.coarse]
+        if not coarse and not value.guarded:
+            return [*lines, _declared(kind, name, self.narrow(total, value, shift), note)]
+        rounded = f"+{self._shifted(total, shift)}"
+        return lines + self._result(value, kind, self._joined([*coarse[:1], rounded, *coarse[1:]]), note)
+
+    def _result(self, value: Value, kind: str, text: str, note: str) -> list[str]:
+        """Return the statements that store a sum; a word with a range check is checked before it is narrowed."""
+        if value.guarded and not value.wide:
+            name = f"{value.name}_unchecked"
+            return [
+                _declared(self.word.wide, name, text),
+                *self._guard(name, value),
+                _declared(kind, value.name, self.narrow(name, value), note),
+            ]
+        return [_declared(kind, value.name, self.narrow(text, value), note)]
+
+    def _is_word(self, term: Term) -> bool:
+        """Tell whether a term is a word, or a small multiple of one, so that it is computed in words."""
+        return not term.names or (
+            len(term.names) == 1
+            and term.names[0] not in self.wide_names
+            and abs(term.factor) == 1
+            and term.shift >= 0
+        )
+
+    def word_term(self, term: Term) -> str:
+        """Return a term that is a word, its sign in front."""
+        sign = "-" if term.factor < 0 else "+"
+        if not term.names:
+            return sign + self.constant(abs(term.factor) << term.shift) + _exactly(term)
+        (name,) = term.names
+        return sign + (f"{name} * {self.constant(1 << term.shift)}" if term.shift else name)
+
+    @staticmethod
+    def _joined(terms: list[str]) -> str:
+        """Return signed terms as a sum."""
+        text = ""
+        for term in terms:
+            sign, rest = (term[0], term[1:]) if term[:1] in "+-" else ("+", term)
+            text += f" {sign} {rest}" if text else (f"-{rest}" if sign == "-" else rest)
+        return text
+
+    def term(self, term: Term) -> str:
+        """Return a term as an expression of a wide number, its sign in front."""
+        wide = self.word.wide
+        sign = "-" if term.factor < 0 else "+"
+        if not term.names:
+            value = term.factor << term.shift if term.shift > 0 else term.factor
+            return sign + self.constant(abs(value), wide=True) + _exactly(term)
+        factors = list(term.names)
+        if abs(term.factor) != 1:
+            factors.append(self.constant(abs(term.factor)) + _exactly(term))
+        if len(factors) == 2:
+            text = self._call("mul", *factors)
+        else:
+            (text,) = factors
+            text = text if text in self.wide_names else f"({wide}){text}"
+        if term.shift < 0 and term.factor < 0:  # what is shifted down is the signed product
+            return f"+{self._scaled_text(f'-{text}', term.shift)}"
+        return sign + self._scaled_text(text, term.shift)
+
+    def _scaled_text(self, text: str, shift: int) -> str:
+        """Return an expression times a power of two."""
+        if not shift:
+            return text
+        return (
+            f"{text} * {self.constant(1 << shift, wide=True)}" if shift > 0 else self._shifted(text, -shift)
+        )
+
+    def _shifted(self, text: str, shift: int) -> str:
+        return self._call("shr", text, str(shift)) if shift else text
+
+    def scaled(self, scaled: Scaled) -> str:
+        """Return a scaled value as an expression of a wide number."""
+        if isinstance(scaled.value, int):
+            return self.constant(
+                scaled.value << scaled.shift if scaled.shift > 0 else scaled.value, wide=True
+            )
+        name = scaled.value
+        return self._scaled_text(
+            name if name in self.wide_names else f"({self.word.wide}){name}", scaled.shift
+        )
+
+    def constant(self, value: int, wide: bool = False) -> str:
+        """Return an integer as a constant expression, with the type of a wide number if `wide` is true."""
+        if value < 0:
+            return f"(-{self.constant(-value, wide)})"
+        if value >= 1 << 4 and not value & (value - 1):
+            return self._power_of_two(value.bit_length() - 1)
+        if value < 1 << 15:
+            return f"({self.word.wide}){value}" if wide and self.word.bits == 64 else str(value)
+        if value < 1 << 31:
+            return f"INT32_C({value})"
+        if value < 1 << 63:
+            return f"INT64_C({value})"
+        high, low = divmod(value, 1 << 62)
+        text = f"({self.word.wide}){self.constant(high)} * (INT64_C(1) << 62)"
+        return f"({text} + INT64_C({low}))" if low else f"({text})"
+
+    def _power_of_two(self, exponent: int) -> str:
+        if exponent < 15:
+            return f"(1 << {exponent})"
+        if exponent < 31:
+            return f"(INT32_C(1) << {exponent})"
+        if exponent < 63:
+            return f"(INT64_C(1) << {exponent})"
+        return f"(({self.word.wide})1 << {exponent})"
+
+
+def _exactly(term: Term) -> str:
+    """Return the exact number that a rounded constant stands for, as a comment."""
+    if (
+        term.coefficient is None
+        or term.coefficient.value.denominator & (term.coefficient.value.denominator - 1) == 0
+    ):
+        return ""
+    return f" /* {contract.exact_text(abs(term.coefficient.value))} in Q{term.coefficient.fraction} */"
+
+
+def _declared(kind: str, name: str, text: str, note: str = "", constant: bool = True) -> str:
+    """Return a declaration, its value on a line of its own where the first line would be too long."""
+    indent, start = " " * 8, f"{'const ' * constant}{kind} {name} ="
+    statement = fill_expression(f"{start} {text};", indent, 92)
+    if len(statement.partition("\n")[0]) > 92:
+        statement = f"{start}\n" + fill_expression(f"{indent}{text};", indent, 96)
+    return _noted(statement, note) if note else statement
+
+
+def _noted(statement: str, note: str) -> str:
+    """Return a statement with a comment behind it, or on the next line where there is no room."""
+    beside = len(statement.rpartition("\n")[2]) + len(note) + 7 <= 95
+    return f"{statement} /* {note} */" if beside else f"{statement}\n        /* {note} */"
