@@ -244,7 +244,8 @@ def test_an_entry_point_that_names_no_module(site):
 def test_nobody_compares_the_names_of_targets():
     offenders = []
     for path in Path(strapgen.__file__).parent.rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text())):
+        text = path.read_text()
+        for node in ast.walk(ast.parse(text)) if "target" in text else ():
             sides = [node.left, *node.comparators] if isinstance(node, ast.Compare) else []
             if isinstance(node, ast.Call) and ast.unparse(node.func).endswith(".startswith"):
                 sides = [node.func.value, *node.args]  # type: ignore[attr-defined]
