@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+from dataclasses import replace
 from fractions import Fraction
 from functools import cache
+from itertools import cycle, product
 from typing import Any
 
 import mpmath
@@ -25,11 +27,11 @@ from strapgen.ir.program import Assignment, Constant, Operation, Program, Refere
 from strapgen.ir.signals import Signal
 from strapgen.support.exceptions import InputError
 from strapgen.targets import emit
+from strapgen.toolchain import compiler
 
 PRECISE = mpmath.mp.clone()
 PRECISE.prec = 400
 
-MODEL_WORDS = (16, 24, 32, 64)
 C_WORDS = (16, 32, 64)
 #: Functions, the ranges of their arguments, and how many last places the bound may be.
 CASES = {
@@ -86,7 +88,8 @@ def program_of(kind: str, bounds: tuple[Fraction, ...], body: Any = None) -> Pro
 @cache
 def fixed(case: str, word: int, rounding: str = "nearest") -> FixedProgram:
     kind, bounds, _ = CASES[case]
-    return quantize(program_of(kind, bounds), Settings(word=word, rounding=rounding))
+    named = replace(program_of(kind, bounds), name=f"tested_{case.replace('-', '_')}")
+    return quantize(named, Settings(word=word, rounding=rounding))
 
 
 @cache
@@ -181,13 +184,25 @@ def _precise(value: Fraction) -> Any:
 # One function
 
 
-@each("rounding", ["nearest", "truncation"])
-@each("word", MODEL_WORDS)
-@each("case", CASES)
-def test_error_stays_below_its_bound(case, word, rounding):
+@pytest.mark.parametrize(
+    "words",
+    [(16, 64), pytest.param((24, 32), marks=pytest.mark.long)],
+    ids=lambda words: "-".join(map(str, words)),
+)
+def test_error_stays_below_its_bound(words):
+    @each("rounding", ["nearest", "truncation"])
+    @each("word", words)
+    @each("case", CASES)
+    def keep(case, word, rounding):
+        error_is_below_its_bound(case, word, rounding)
+
+    keep()
+
+
+def error_is_below_its_bound(case, word, rounding):
     kind, _, places = CASES[case]
     lowered, evaluator = fixed(case, word, rounding), model(case, word, rounding)
-    inputs = corners_and_others(evaluator, 200)
+    inputs = corners_and_others(evaluator, 120)
     (integers,) = outputs(evaluator, inputs)
     (argument,) = lowered.interface.outputs
     bound = argument.errors[0]
@@ -199,15 +214,29 @@ def test_error_stays_below_its_bound(case, word, rounding):
         assert bound <= 3 * worst
 
 
-@pytest.mark.parametrize("rounding", ["nearest", pytest.param("truncation", marks=pytest.mark.long)])
-@pytest.mark.parametrize("word", C_WORDS)
-@pytest.mark.parametrize("case", CASES)
-def test_c_computes_what_the_model_does(case, word, rounding):
-    evaluator = model(case, word, rounding)
-    generated = CFixedEvaluator(emit(fixed(case, word, rounding), "c-fixed"))
-    inputs = corners_and_others(evaluator, 3000)
-    (expected,), (computed,) = outputs(evaluator, inputs), outputs(generated, inputs)
-    assert (expected == computed).all()
+@pytest.mark.parametrize(
+    ("rounding", "cases"),
+    [
+        ("nearest", list(zip(CASES, cycle(C_WORDS), strict=False))),
+        *(
+            pytest.param(rounding, list(product(CASES, C_WORDS)), marks=pytest.mark.long)
+            for rounding in ("nearest", "truncation")
+        ),
+    ],
+    ids=["nearest-one-word-each", "nearest", "truncation"],
+)
+def test_c_computes_what_the_model_does(rounding, cases):
+    several = {case: emit(fixed(*case, rounding), "c-fixed") for case in cases}
+    compiler.compile_together(several.values())
+
+    @each(("case", "word"), cases)
+    def agree(case, word):
+        evaluator, generated = model(case, word, rounding), CFixedEvaluator(several[case, word])
+        inputs = corners_and_others(evaluator, 3000)
+        (expected,), (computed,) = outputs(evaluator, inputs), outputs(generated, inputs)
+        assert (expected == computed).all()
+
+    agree()
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -443,7 +472,7 @@ def test_nearest_rotation(size):
 def test_nearest_rotation_refuses_the_same_input_in_c_and_model():
     lowered = quantize(programs()["dcm-orthonormalize-optimal"], Settings(word=32))
     both = ModelEvaluator(emit(lowered, "fixed-model")), CFixedEvaluator(emit(lowered, "c-fixed"))
-    inputs = corners_and_others(both[0], 200)[0]
+    inputs = corners_and_others(both[0], 60)[0]
     accepted = 0
     for sample in (*inputs, *near_rotations(both[0], 50, 0.05)):
         results = []
@@ -472,13 +501,11 @@ def sources(name: str, word: int) -> Any:
 @pytest.mark.parametrize("word", C_WORDS)
 @pytest.mark.parametrize("name", [*CASES, *MOTIONS, "dcm-orthonormalize-optimal"])
 def test_c_compiles_without_a_warning(name, word, tmp_path):
-    compiler = shutil.which("gcc") or pytest.skip("gcc is not on this machine")
+    gcc = shutil.which("gcc") or pytest.skip("gcc is not on this machine")
     for file, text in sources(name, word).files.items():
         (tmp_path / file).write_text(text)
     files = sorted(map(str, tmp_path.glob("*.c")))
-    done = subprocess.run(
-        [compiler, *STRICT, "-c", "-o", "/dev/null", *files], capture_output=True, text=True
-    )
+    done = subprocess.run([gcc, *STRICT, "-c", "-o", "/dev/null", *files], capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
 
 
@@ -514,7 +541,7 @@ int main(void)
 @pytest.mark.parametrize("word", C_WORDS)
 @pytest.mark.parametrize("name", [*CASES, *MOTIONS, "dcm-orthonormalize-optimal"])
 def test_c_has_no_undefined_behaviour(name, word, tmp_path):
-    compiler = shutil.which("gcc") or pytest.skip("gcc is not on this machine")
+    gcc = shutil.which("gcc") or pytest.skip("gcc is not on this machine")
     made = sources(name, word)
     for file, text in made.files.items():
         (tmp_path / file).write_text(text)
@@ -533,7 +560,7 @@ def test_c_has_no_undefined_behaviour(name, word, tmp_path):
     program = tmp_path / "driver"
     flags = ["-std=c99", "-O1", "-fsanitize=undefined,address", "-fno-sanitize-recover=all"]
     files = sorted(map(str, tmp_path.glob("*.c")))
-    subprocess.run([compiler, *flags, "-o", str(program), *files], check=True)
+    subprocess.run([gcc, *flags, "-o", str(program), *files], check=True)
     done = subprocess.run([str(program)], capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
     # Most matrices are too far from a rotation; every argument of the others is accepted.

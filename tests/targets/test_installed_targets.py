@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from derived import program
+from derived import program, tells_more
 
 import strapgen
 from strapgen import catalogue, targets
@@ -64,7 +64,7 @@ def lists(values: np.ndarray) -> list[float] | float:
 def test_the_example_computes_what_numpy_does(toy, rng):
     """Bit for bit, but where the sines of two libraries are rounded differently."""
     with_sines = 0
-    for choice in catalogue.standard():
+    for choice in filter(tells_more, catalogue.standard()):
         sources = strapgen.generate(program(choice), "plain-python")
         (text,) = sources.files.values()
         scope: dict[str, Any] = {}
@@ -260,7 +260,8 @@ def test_an_entry_point_that_names_no_module(site):
 def test_nobody_compares_the_names_of_targets():
     offenders = []
     for path in Path(strapgen.__file__).parent.rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text())):
+        text = path.read_text()
+        for node in ast.walk(ast.parse(text)) if "target" in text else ():
             sides = [node.left, *node.comparators] if isinstance(node, ast.Compare) else []
             if isinstance(node, ast.Call) and ast.unparse(node.func).endswith(".startswith"):
                 sides = [node.func.value, *node.args]  # type: ignore[attr-defined]

@@ -168,7 +168,7 @@ def finite_trees(number: Any, wanted: int) -> list[Node]:
 def test_compiled_text_has_the_value_of_the_tree(target, real, number, tmp_path):
     if shutil.which("gcc") is None:
         pytest.skip("gcc is not on this machine")
-    chosen = finite_trees(number, 80)
+    chosen = finite_trees(number, 50)
     sources = emit.emit(program(*chosen), target)
     for name, text in sources.files.items():
         (tmp_path / name).write_text(text)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from fractions import Fraction
+from functools import lru_cache
 
 import numpy as np
 
@@ -52,8 +53,17 @@ def quantities(
     InputError
         If an operation cannot be done in fixed point on these ranges.
     """
+    derived = _derived(program, tuple(ranges.items()), split, word)
+    return Quantities(dict(derived.items), dict(derived.results))
+
+
+@lru_cache(maxsize=8)
+def _derived(
+    program: Program, ranges: tuple[tuple[str, Interval], ...], split: bool, word: int
+) -> Quantities:
+    """Derive the quantities once for all roundings and residuals of a kernel."""
     with np.errstate(all="ignore"):  # samples are hints: what is not finite hints at nothing
-        context = _context(program, ranges, split, word)
+        context = _context(program, dict(ranges), split, word)
         for assignment in program.body:
             _assign(context, assignment)
         for result in program.outputs:

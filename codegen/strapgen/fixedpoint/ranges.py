@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 
-from strapgen.fixedpoint.intervals import Interval
+from strapgen.fixedpoint.intervals import GRID, Interval
 from strapgen.fixedpoint.quantities import InputElement, Monomial, Quantity, Sum, Terms, combined
 
 #: Degree up to which a quantity is expanded in the inputs for its range, and terms that this may take.
@@ -103,28 +104,23 @@ class Ranges:
         bits, lost = math.frexp(seen * (1 + 1e-9))[1], math.frexp(float(enclosure.magnitude))[1]
         if lost <= bits or any(not isinstance(q.definition, InputElement | Sum) for q in self.items.values()):
             return enclosure
-        goal = Fraction(2) ** bits
+        goal = Interval.of(Fraction(2) ** bits).low
         needed = self._needed(definition)
-        pending, proved, spent = [self.box], Interval(0, 0), 0
         names = [n for n in self.box if n in needed]
         if not names or 2 ** len(names) > _MOST_BOXES:  # not even a cut of every side in two
             return enclosure
-        steps = [q for name, q in self.items.items() if name in needed]
+        parts = _Parts(self.box, [q for name, q in self.items.items() if name in needed], definition)
+        pending, proved, spent = [parts.whole()], Interval(0, 0), 0
         while pending:
-            box = pending.pop()
-            inside = self._on(box, definition, steps)
-            if inside.magnitude <= goal:
+            part = pending.pop()
+            inside = parts.evaluate(part)
+            if max(abs(inside.low), abs(inside.high)) <= goal:
                 proved = proved.join(inside)
                 continue
             spent += 2
             if spent > _MOST_BOXES:
                 return enclosure
-            # Widest first, each measured against what it was.
-            widest = max(
-                names,
-                key=lambda n: Fraction(box[n].high - box[n].low, max(1, self.box[n].high - self.box[n].low)),
-            )
-            pending += [box | {widest: half} for half in box[widest].halves()]
+            pending += parts.halves(part, parts.widest(part, names))
         return enclosure.meet(proved)
 
     def _needed(self, definition: Sum) -> set[str]:
@@ -135,13 +131,119 @@ class Ranges:
                 needed |= {name for monomial, _ in quantity.definition.terms for name in monomial}
         return needed
 
-    def _on(self, box: Mapping[str, Interval], definition: Sum, steps: list[Quantity]) -> Interval:
-        """Return the interval of a sum on a part of the inputs' box; the steps lead to it."""
-        known: dict[str, Interval] = {}
-        for quantity in steps:
-            known[quantity.name] = (
-                self.enclosure(quantity.definition.terms, known).meet(quantity.range)
-                if isinstance(quantity.definition, Sum)
-                else box[quantity.name]
-            )
-        return self.enclosure(definition.terms, known)
+
+#: A term as plain integers: the places of its factors, None where it has one alone, and its coefficient.
+_Product = tuple[int, int | None, int, int]
+
+
+@dataclass
+class _Part:
+    """A part of the inputs' box: both ends of every value by its place, and whose values are still to be computed."""
+
+    lows: list[int]
+    highs: list[int]
+    pending: Sequence[int]
+
+
+class _Parts:
+    """Evaluates a sum on parts of the inputs' box.
+
+    There are thousands of them: ends of intervals are plain integers here, in units of 2**-GRID, and a half takes from
+    the whole what does not depend on the side that is cut.
+
+    Parameters
+    ----------
+    box : mapping of str to Interval
+        Range of every element of an input.
+    steps : sequence of Quantity
+        Elements of inputs and sums that lead to the sum, each after those that it is made from.
+    definition : Sum
+    """
+
+    def __init__(self, box: Mapping[str, Interval], steps: Sequence[Quantity], definition: Sum) -> None:
+        self._box, self._ranges = box, [quantity.range for quantity in steps]
+        self._places = {quantity.name: place for place, quantity in enumerate(steps)}
+        self._terms = [
+            self._plain(quantity.definition) if isinstance(quantity.definition, Sum) else None
+            for quantity in steps
+        ]
+        self._result = self._plain(definition)
+        self._dependent: dict[str, list[int]] = {}
+        for name, place in self._places.items():
+            if name in box:
+                self._dependent[name] = self._after(place)
+
+    def _plain(self, definition: Sum) -> tuple[Interval, list[_Product]]:
+        """Return the constant of a sum and its products."""
+        constant, products = Interval(0, 0), []
+        for monomial, coefficient in definition.terms:
+            if monomial:
+                first, second = self._places[monomial[0]], None if len(monomial) == 1 else monomial[1]
+                other = None if second is None else self._places[second]
+                products.append((first, other, coefficient.numerator, coefficient.denominator))
+            else:
+                constant += Interval.of(coefficient)
+        return constant, products
+
+    def _after(self, start: int) -> list[int]:
+        """Return the places of the sums that depend on the value at a place."""
+        changed = {start}
+        for place, plain in enumerate(self._terms):
+            if plain and any(first in changed or second in changed for first, second, *_ in plain[1]):
+                changed.add(place)
+        return sorted(changed - {start})
+
+    def whole(self) -> _Part:
+        """Return the whole box."""
+        ranges = [self._box.get(name, known) for name, known in zip(self._places, self._ranges, strict=True)]
+        sums = [place for place, plain in enumerate(self._terms) if plain]
+        return _Part([r.low for r in ranges], [r.high for r in ranges], sums)
+
+    def widest(self, part: _Part, names: Iterable[str]) -> str:
+        """Return the widest side, each measured against what it was."""
+
+        def share(name: str) -> Fraction:
+            place, side = self._places[name], self._box[name]
+            return Fraction(part.highs[place] - part.lows[place], max(1, side.high - side.low))
+
+        return max(names, key=share)
+
+    def halves(self, part: _Part, name: str) -> list[_Part]:
+        """Return both halves of a part that is cut through one side."""
+        place = self._places[name]
+        halves = []
+        for half in Interval(part.lows[place], part.highs[place]).halves():
+            lows, highs = part.lows.copy(), part.highs.copy()
+            lows[place], highs[place] = half.low, half.high
+            halves.append(_Part(lows, highs, self._dependent[name]))
+        return halves
+
+    def evaluate(self, part: _Part) -> Interval:
+        """Compute the values on a part that are not known yet, and return the interval of the sum."""
+        lows, highs = part.lows, part.highs
+        for place in part.pending:
+            plain, known = self._terms[place], self._ranges[place]
+            assert plain is not None
+            low, high = _sum(plain, lows, highs)
+            lows[place], highs[place] = max(low, known.low), min(high, known.high)
+        return Interval(*_sum(self._result, lows, highs))
+
+
+def _sum(plain: tuple[Interval, list[_Product]], lows: list[int], highs: list[int]) -> tuple[int, int]:
+    """Return the ends of a sum, rounded outward as those of `Interval` are."""
+    low, high = plain[0].low, plain[0].high
+    for first, second, numerator, denominator in plain[1]:
+        a, b = lows[first], highs[first]
+        if second == first:
+            most = max(abs(a), abs(b))
+            least = 0 if a <= 0 <= b else min(abs(a), abs(b))
+            a, b = least * least >> GRID, -(-most * most >> GRID)
+        elif second is not None:
+            c, d = lows[second], highs[second]
+            corners = (a * c, a * d, b * c, b * d)
+            a, b = min(corners) >> GRID, -(-max(corners) >> GRID)
+        if numerator < 0:
+            a, b = b, a
+        low += a * numerator // denominator
+        high -= -b * numerator // denominator
+    return low, high

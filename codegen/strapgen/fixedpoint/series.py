@@ -50,6 +50,10 @@ class Truncated:
         self.degree = 1
         while math.comb(len(sizes) + self.degree + 1, self.degree + 1) <= most:
             self.degree += 1
+        #: The largest magnitudes over one denominator, and the numerators of their products.
+        self._denominator = math.lcm(*(size.denominator for size in self.sizes))
+        self._numerators = [int(size * self._denominator) for size in self.sizes]
+        self._products: dict[Monomial, int] = {}
         #: Largest magnitude of a product of variables that is kept.
         self._largest = max([Fraction(1), *self.sizes]) ** self.degree
 
@@ -113,12 +117,14 @@ class Truncated:
         return Series(_without_zeros(terms), one.rest + other.rest)
 
     def _size(self, part: dict[Monomial, int]) -> Fraction:
-        """Return a bound of the magnitude of terms."""
-        products = (
-            abs(c) * math.prod((self.sizes[place] for place in key), start=Fraction(1))
-            for key, c in part.items()
-        )
-        return sum(products, Fraction(0)) * _UNIT
+        """Return a bound of the magnitude of terms of one degree."""
+        products, total, degree = self._products, 0, 0
+        for key, coefficient in part.items():
+            if key not in products:
+                products[key] = math.prod(self._numerators[place] for place in key)
+            total += abs(coefficient) * products[key]
+            degree = len(key)
+        return Fraction(total, self._denominator**degree << _PLACES)
 
 
 def _without_zeros(terms: dict[int, dict[Monomial, int]]) -> dict[int, dict[Monomial, int]]:

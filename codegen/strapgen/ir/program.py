@@ -383,11 +383,13 @@ class Program:
 
 
 def walk(node: Node) -> Iterator[Node]:
-    """Yield a node and all below it."""
-    yield node
-    if isinstance(node, Operation):
-        for argument in node.arguments:
-            yield from walk(argument)
+    """Yield a node and all below it, each before its arguments."""
+    pending = [node]
+    while pending:
+        node = pending.pop()
+        yield node
+        if isinstance(node, Operation):
+            pending.extend(reversed(node.arguments))
 
 
 def references(node: Node) -> Iterator[str]:

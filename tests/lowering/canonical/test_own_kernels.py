@@ -135,8 +135,7 @@ def test_what_turns_with_its_inputs_has_canonical_forms_that_are_exact(kernel):
     expected = kernel.polynomials()
     for candidate in candidates(kernel, core):
         assert polynomials(candidate) == expected
-        assert polynomials(optimize(candidate)) == expected
-    assert polynomials(lower(kernel)) == expected
+        assert polynomials(optimize(candidate)) == expected  # `lower` takes one of them
 
 
 def test_a_product_of_three_skew_matrices_is_shorter_than_it_was_written():
