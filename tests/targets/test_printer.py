@@ -172,7 +172,7 @@ def test_compiled_text_has_the_value_of_the_tree(target, real, number, tmp_path)
     sources = emit.emit(program(*chosen), target)
     for name, text in sources.files.items():
         (tmp_path / name).write_text(text)
-    source = next(tmp_path.glob("*.c"))
+    source = next(tmp_path / name for name in sources.step_files if name.endswith(".c"))
     built = tmp_path / "trees.so"
     command = ["gcc", *C_FLAGS, "-shared", "-fPIC", "-o", str(built), str(source), "-lm"]
     subprocess.run(command, check=True)
