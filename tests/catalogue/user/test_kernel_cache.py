@@ -219,10 +219,11 @@ def test_what_pickle_does_not_restore_in_every_part_is_not_kept():
     x = sp.Symbol("x", real=True)
 
     def whole(part: object) -> list:
-        return [(Fraction(1, 2), Signal.scalar("x")), (sp.sqrt(x) + sp.sin(x * part),)]
+        return [(Fraction(1, 2), Signal.scalar("x")), (sp.sin(sp.sqrt(x)), part)]
 
     assert kernel_cache._alike(whole(sp.Integer(3)), whole(sp.Integer(3)))
     assert kernel_cache._alike(whole(Marked("y", "!")), whole(Marked("y", "!")))
+    assert not kernel_cache._alike(whole(sp.sin(x + 1)), whole(sp.sin(x + 2)))
     for other in (sp.Integer(4), sp.Float(3), sp.Symbol("x"), sp.pi, Marked("y", "!")):
         assert not kernel_cache._alike(whole(other), whole(sp.Integer(3)))
     assert not kernel_cache._alike(whole(Marked("y", "!")), whole(Marked("y", "?")))
