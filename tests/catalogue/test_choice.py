@@ -7,6 +7,7 @@ import pickle
 import shlex
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -76,6 +77,18 @@ def test_choices_of_two_kernels_of_one_name_differ(chosen):
     assert pickle.loads(pickle.dumps(first)) == first
     assert catalogue.derive(first) != catalogue.derive(second)
     assert (first.increments_per_step, first.previous) == (2, 0)
+
+
+def test_choices_differ_in_the_kernels_that_a_step_brings(chosen):
+    kernel = catalogue.derive(chosen["rk1"])
+    for place, own in enumerate(kernel.own):
+        (output,) = own.outputs
+        doubled = replace(output, expressions=tuple(2 * x for x in output.expressions))
+        others = [*kernel.own]
+        others[place] = replace(own, outputs=(doubled,))
+        other = catalogue.Choice.of_user(replace(kernel, own=tuple(others)))
+        assert other.identity != chosen["rk1"].identity
+    assert len(kernel.own) > 1
 
 
 def test_each_runs_as_its_own_method(chosen, rng):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import sys
 import time
 from importlib import metadata
 from pathlib import Path
@@ -48,6 +49,19 @@ def test_a_package_that_comes_or_goes_is_noticed(tmp_path: Path, monkeypatch: py
     assert names() == ["third"]
     monkeypatch.chdir(tmp_path)
     assert names() == ["second"]
+
+
+def test_another_finder_of_packages_is_asked(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+    class Finder(metadata.DistributionFinder):
+        def find_spec(self, *_):
+            return None
+
+        def find_distributions(self, context):
+            return [metadata.PathDistribution(install(tmp_path, "found"))] if context.name is None else []
+
+    assert names() == []
+    monkeypatch.setattr("sys.meta_path", [*sys.meta_path, Finder()])
+    assert names() == ["found"]
 
 
 def test_what_has_not_changed_is_read_once(monkeypatch: pytest.MonkeyPatch):
