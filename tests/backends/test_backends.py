@@ -22,6 +22,11 @@ from strapgen.support.exceptions import InputError, InputTypeError
 STEPS = 1440
 
 
+def few(backend_name: str, number: int) -> int:
+    """Return a number of steps or calls, an eighth of it on a back end that takes its time for each."""
+    return number // 8 if BACKENDS[backend_name].slow else number
+
+
 def random_increments(rng, *shape: int, size: float = 0.01) -> np.ndarray:
     return rng.normal(scale=size, size=(*shape, 3))
 
@@ -30,21 +35,23 @@ def random_increments(rng, *shape: int, size: float = 0.01) -> np.ndarray:
     "method", [*(pytest.param(f"rk{order}", marks=pytest.mark.long) for order in (1, 2, 3)), "rk4"]
 )
 def test_back_ends_agree_over_a_run(make, backend_name, algorithm, method, rng):
-    increments = random_increments(rng, STEPS, 2)
+    steps = few(backend_name, STEPS)
+    increments = random_increments(rng, steps, 2)
     reference = strapgen.backend(algorithm, method, 2, "numpy")
     candidate = make(algorithm, method)
     # Orthonormalized as in the tables, so that a low order does not grow out of the range of the bound.
     history = candidate.propagate(increments, orthonormalize_every=40)
     wanted = reference.propagate(increments, orthonormalize_every=40)
-    allowed = 1e-12 if candidate.name in ("numpy", "c") else roundoff(candidate, STEPS, STEPS // 40)
+    allowed = 1e-12 if candidate.name in ("numpy", "c") else roundoff(candidate, steps, steps // 40)
     assert np.abs(history - wanted).max() <= allowed
 
 
-def test_plain_fourth_order_run_agrees(make, algorithm, rng):
-    increments = random_increments(rng, STEPS, 2)
+def test_plain_fourth_order_run_agrees(make, backend_name, algorithm, rng):
+    steps = few(backend_name, STEPS)
+    increments = random_increments(rng, steps, 2)
     candidate = make(algorithm)
     wanted = strapgen.backend(algorithm, backend="numpy").propagate(increments)
-    allowed = 1e-12 if candidate.name in ("numpy", "c") else roundoff(candidate, STEPS)
+    allowed = 1e-12 if candidate.name in ("numpy", "c") else roundoff(candidate, steps)
     assert np.abs(candidate.propagate(increments) - wanted).max() <= allowed
 
 
@@ -241,14 +248,14 @@ def test_unknown_names():
 
 @cache
 def lowered(*chosen: object, **more: object) -> Program:
-    """Return a program by the stages themselves, once for all back ends."""
+    """Return a program by the stages themselves, once for all back ends that run in this process."""
     return strapgen.lower(strapgen.derive(*chosen, **more))
 
 
 def test_the_pipeline_by_hand_gives_the_same_back_end(backend_name, rng):
-    built = strapgen.build(generated(lowered("dcm", "rk3", 2), backend_name))
+    built = strapgen.build(generated(lowered("euler", "rk2", 2), backend_name))
     increments = random_increments(rng, 20, 2)
-    cached = strapgen.backend("dcm", "rk3", 2, backend_name)
+    cached = strapgen.backend("euler", "rk2", 2, backend_name)
     np.testing.assert_array_equal(built.propagate(increments), cached.propagate(increments))
 
 
@@ -265,8 +272,8 @@ def test_a_step_from_rates_on_every_back_end(backend_name, rng):
 
 
 def test_a_simulation_needs_increments(backend_name):
-    backend = strapgen.build(generated(lowered("euler", "rk2", rates=True), backend_name))
-    with pytest.raises(InputError, match="euler-rk2-rates takes turns"):
+    backend = strapgen.build(generated(lowered("dcm", "rk4", rates=True), backend_name))
+    with pytest.raises(InputError, match="dcm-rk4-rates takes turns"):
         strapgen.simulate(backend, strapgen.motion("constant", x_deg_s=1), 1, 10)
 
 
@@ -295,7 +302,7 @@ def test_every_orthonormalization_restores_the_constraint(make, rng):
 def test_conversions_close_on_every_back_end(backend_name, rng):
     to_dcm = strapgen.evaluator("dcm-from-euler", backend_name)
     back = strapgen.evaluator("euler-from-dcm", backend_name)
-    e = rng.normal(size=(1000, 4))
+    e = rng.normal(size=(few(backend_name, 1000), 4))
     e *= np.sign(e[:, 3:]) / np.linalg.norm(e, axis=1, keepdims=True)
     # Each element of the matrix is off by a few units; the largest parameter is at least 1/2, so dividing by
     # four times it magnifies no more than that.

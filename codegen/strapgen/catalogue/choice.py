@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -10,7 +10,7 @@ from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.catalogue.names import KERNELS
 
 if TYPE_CHECKING:
-    from strapgen.symbolic.kernel import Kernel
+    from strapgen.symbolic.kernel import Kernel, Stage
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Choice:
         It is the name of the kernel and, where that is a user's to choose, the tableau with its file or the kernel.
         """
         if self.user_kernel is not None:
-            return f"{self.kernel} {self.user_kernel!r} {_formulas(self.user_kernel)}"
+            return f"{self.kernel} {_text(self.user_kernel)}"
         if isinstance(self.method, Tableau):
             return f"{self.kernel} {self.method!r} {self.method.file}"
         return self.kernel
@@ -102,13 +102,18 @@ class Choice:
         return next((Choice.of_user(kernel) for kernel in brought if kernel.name == name), Choice(name))
 
 
-def _formulas(kernel: Kernel) -> str:
-    """Return all formulas with the class of every part: `repr` shows the number pi and a symbol of that name alike."""
+def _text(kernel: Kernel) -> str:
+    """Return a kernel as text, its formulas with the class of every part.
+
+    `repr` shows the number pi and a symbol of that name alike.
+    """
     from sympy import srepr
 
-    kernels = (kernel, *kernel.own)
-    stages = [stage for each in kernels for stage in (*each.stages, *each.outputs)]
-    return " ".join(srepr(expression) for stage in stages for expression in stage.expressions)
+    def shown(stages: tuple[Stage, ...]) -> str:
+        return repr([(s.signal, [srepr(x, order="none") for x in s.expressions]) for s in stages])
+
+    rest = replace(kernel, stages=(), outputs=(), own=())
+    return " ".join([repr(rest), shown(kernel.stages), shown(kernel.outputs), *map(_text, kernel.own)])
 
 
 def increments(choice: Choice) -> int:

@@ -6,11 +6,37 @@ import contextlib
 import importlib.util
 import sys
 import traceback
-from collections.abc import Callable, Iterator
-from importlib.metadata import EntryPoint
+from collections.abc import Callable, Hashable, Iterator
+from functools import lru_cache
+from importlib import metadata
 from pathlib import Path
 
 from strapgen.support.exceptions import InputError, StrapgenError
+
+
+def entry_points(group: str) -> tuple[metadata.EntryPoint, ...]:
+    """Return the entry points of installed packages in a group.
+
+    They are read again when the path changes or a package is installed or removed, which shows in its folder's time.
+    """
+    return _entry_points(group, _state_of_path())
+
+
+@lru_cache(maxsize=32)
+def _entry_points(group: str, state: Hashable) -> tuple[metadata.EntryPoint, ...]:
+    return tuple(metadata.entry_points(group=group))
+
+
+def _state_of_path() -> Hashable:
+    """Return what changes when other packages can be found: the path, the times of its entries, and other finders."""
+    times: list[tuple[str, int | None]] = []
+    for entry in sys.path:
+        there = Path(entry).absolute()
+        try:
+            times.append((str(there), there.stat().st_mtime_ns))
+        except (OSError, ValueError):
+            times.append((str(there), None))
+    return (*times, *(finder for finder in sys.meta_path if hasattr(finder, "find_distributions")))
 
 
 def place(module: str) -> Path | None:
@@ -35,7 +61,7 @@ def contents(module: str) -> list[str | bytes]:
     return [part for path in files or [root] for part in (str(path.relative_to(root)), path.read_bytes())]
 
 
-def installed_with(point: EntryPoint) -> list[str | bytes]:
+def installed_with(point: metadata.EntryPoint) -> list[str | bytes]:
     """Return name and version of an entry point's distribution, and all files that it installed."""
     if point.dist is None:
         return []

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib import import_module
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from strapgen.ir.sources import Sources
 from strapgen.support import checks, packages
 from strapgen.support.cache import digest
 from strapgen.support.exceptions import InputError, StrapgenError
+from strapgen.support.packages import entry_points
 
 #: Entry points of installed packages.
 GROUP = "strapgen.targets"

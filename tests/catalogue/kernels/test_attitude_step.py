@@ -11,9 +11,10 @@ import pytest
 import sympy as sp
 from gathering import each
 
-from strapgen import catalogue, derive, lower
+from strapgen import catalogue, derive
 from strapgen.catalogue import ALGORITHMS, INTEGRATORS, MOST_INCREMENTS, MOST_PREVIOUS
 from strapgen.catalogue.methods.rate_fit import step_order
+from strapgen.catalogue.methods.runge_kutta import method
 from strapgen.catalogue.methods.samples import increments_signal, label, labels, turns_signal
 from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.catalogue.methods.tableaux import TABLEAUX, read
@@ -78,13 +79,13 @@ def test_nodes_that_are_nearly_the_same_are_told_apart():
     weights = Fraction(1, 2), Fraction(1, 4), Fraction(1, 4)
     tableau = Tableau("near", "Near", "this test", 1, (Fraction(0), near, nearer), rows, weights)
     for chosen in ({"rates": True}, {"increments": 3}):
-        program = lower(derive("dcm", tableau, **chosen))
-        assert program.operations["multiply"] > 0
+        elements = [name for signal in derive("dcm", tableau, **chosen).signals for name in signal.elements]
+        assert any("0_1235_2" in name for name in elements) and len(elements) == len(set(elements))
 
 
 @pytest.mark.parametrize("name", [*TABLEAUX, *(n for n, i in INTEGRATORS.items() if i.takes_rates)])
 def test_nodes_of_every_method_have_names_of_their_own(name):
-    kernel = derive("dcm", name, rates=True)
+    kernel = derive("euler", name, rates=True)
     signals = [*kernel.inputs, *(stage.signal for stage in kernel.stages)]
     elements = [element for signal in signals for element in signal.elements]
     assert len(elements) == len(set(elements))
@@ -129,7 +130,7 @@ def test_an_order_in_words(order, text, limited):
         ("rk4", 1, 2, Order(4, 4, 3, 4)),
         ("rk4", 2, 0, Order(4, 4, 2, 4)),
         ("magnus6", 2, 3, Order(6, 6, 5, 6)),
-        ("taylor20", 8, 0, Order(20, 20, 8, 10)),
+        ("taylor12", 8, 0, Order(12, 12, 8, 10)),
         ("munthe-kaas4", 1, 1, Order(4, 4, 2, 3)),
     ],
 )
@@ -140,7 +141,7 @@ def test_orders_of_steps(method, count, previous, expected):
 def test_the_order_of_a_step_is_that_of_the_weaker_part():
     for count in range(1, MOST_INCREMENTS + 1):
         for previous in range(MOST_PREVIOUS + 1):
-            order = derive("euler", "rk3", count, previous=previous).order
+            order = method(TABLEAUX["rk3"]).step_order(count, previous)
             assert order.step == min(3, step_order(count, previous))
 
 
@@ -226,8 +227,10 @@ def values_of(kernel: Kernel, state: list, samples: list) -> dict[str, object]:
     )
 
 
-@each(("count", "previous"), [(1, 1), (1, 3), (2, 1), (3, 2), (8, 3)])
-@each("method", ["rk2", "rk4", "nystrom5"])
+@each(
+    ("method", "count", "previous"),
+    [("rk4", 1, 1), ("rk2", 1, 3), ("nystrom5", 2, 1), ("rk4", 3, 2), ("rk2", 8, 3)],
+)
 @ALGORITHM
 def test_with_previous_increments_a_step_is_that_of_the_rates_they_fit(algorithm, method, count, previous):
     # On a rate of degree K + m - 1, as polynomials in the step length.

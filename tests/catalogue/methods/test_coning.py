@@ -31,6 +31,12 @@ from strapgen.symbolic.rotations import cross_elements
 #: Every number of samples, and of those kept.
 ALL = [(n, p) for n in range(1, MOST_INCREMENTS + 1) for p in range(MOST_PREVIOUS + 1)]
 FEW = [(1, 1), (2, 0), (3, 0), (4, 0), (5, 0), (2, 2), (3, 1)]
+#: Those whose designs take no time, and all.
+MANY = pytest.mark.parametrize(
+    "many",
+    [[(n, p) for n, p in ALL if n + p <= 6], pytest.param(ALL, marks=pytest.mark.long)],
+    ids=["few", "all"],
+)
 FORM = pytest.mark.parametrize("form", FORMS)
 
 
@@ -60,7 +66,7 @@ def test_published_coefficients(samples, previous, form, published):
 
 
 @FORM
-@each(("samples", "previous"), [*FEW, (8, 3)])
+@each(("samples", "previous"), [*FEW, (4, 3)])
 def test_pairs_are_ordered_by_the_newer_sample_the_newest_pair_last(samples, previous, form):
     total = samples + previous
     pairs = list(design(samples, previous, form).pairs)
@@ -77,11 +83,12 @@ def test_compressed_coefficients_leave_what_the_literature_says(samples):
     assert found == (2 * samples + 1, -size)
 
 
-@each(("samples", "previous"), ALL)
-def test_compressed_and_combined_annul_coning_as_far_as_there_are_distances(samples, previous):
-    residual = design(samples, previous).residual()
-    assert residual.leading[0] == 2 * (samples + previous) + 1
-    assert design(samples, previous, "combined").residual() == residual
+@MANY
+def test_compressed_and_combined_annul_coning_as_far_as_there_are_distances(many):
+    for samples, previous in many:
+        residual = design(samples, previous).residual()
+        assert residual.leading[0] == 2 * (samples + previous) + 1
+        assert design(samples, previous, "combined").residual() == residual
 
 
 @pytest.mark.parametrize(("samples", "previous"), FEW)
@@ -111,9 +118,14 @@ def test_the_series_is_that_of_the_expression(samples, previous):
     residual = design(samples, previous, "uncompressed").residual()
     omega, T, alpha = sp.symbols("omega T alpha")
     power, c = residual.leading
-    expansion = sp.sympify(residual.expression).subs(omega, 1).series(T, 0, power).removeO()
+
+    def sine(x: sp.Expr) -> sp.Expr:
+        """Return the series of a sine beyond the power that is looked at."""
+        return sp.Add(*((-1) ** k * x ** (2 * k + 1) / sp.factorial(2 * k + 1) for k in range(power)))
+
+    expansion = sp.expand(sp.sympify(residual.expression).subs(omega, 1).replace(sp.sin, sine))
     leading = sp.sympify(residual.leading_expression)
-    assert sp.expand(expansion - leading.subs(omega, 1)) == 0
+    assert sp.Add(*(expansion.coeff(T, k) * T**k for k in range(-1, power))) == leading.subs(omega, 1)
     assert leading == sp.Rational(c.numerator, c.denominator * samples) * alpha**2 * omega**power * T ** (
         power - 1
     )
@@ -139,8 +151,13 @@ def times(a: list[Fraction], b: list[Fraction]) -> list[Fraction]:
     return out
 
 
-@each(("samples", "previous"), ALL)
-def test_uncompressed_coefficients_are_exact_for_polynomials_through_the_samples(samples, previous):
+@MANY
+def test_uncompressed_coefficients_are_exact_for_polynomials_through_the_samples(many):
+    for samples, previous in many:
+        check_on_polynomials(samples, previous)
+
+
+def check_on_polynomials(samples: int, previous: int) -> None:
     rate = polynomials(samples + previous)
     ends = [Fraction(k, samples) for k in range(-previous, samples + 1)]
     row = [[at(integral(p), b) - at(integral(p), a) for p in rate] for a, b in pairwise(ends)]
@@ -156,9 +173,11 @@ def test_uncompressed_coefficients_are_exact_for_polynomials_through_the_samples
     assert computed == true
 
 
-@each(("samples", "previous"), ALL)
-def test_combined_coefficients_keep_the_order_of_uncompressed_ones(samples, previous):
-    assert design(samples, previous, "combined").degree == design(samples, previous, "uncompressed").degree
+@MANY
+def test_combined_coefficients_keep_the_order_of_uncompressed_ones(many):
+    for samples, previous in many:
+        combined, uncompressed = (design(samples, previous, form) for form in ("combined", "uncompressed"))
+        assert combined.degree == uncompressed.degree
 
 
 @pytest.mark.parametrize(("samples", "previous"), [(5, 0), (2, 2), (6, 0)])
@@ -179,7 +198,8 @@ def test_combined_coefficients_are_the_nearest_to_uncompressed_ones(samples, pre
     assert all(direction.dot(change) == 0 for direction in free)
 
 
-def test_orders_of_the_forms():
+@MANY
+def test_orders_of_the_forms(many):
     assert [method("compressed").step_order(n, 0).step for n in range(1, 9)] == [
         2,
         4,
@@ -187,10 +207,11 @@ def test_orders_of_the_forms():
     ]
     assert [method("uncompressed").step_order(n, 0).step for n in range(1, 9)] == [2, *[4] * 7]
     combined = method("combined")
-    assert [combined.step_order(n, 0).step for n in range(1, 9)] == [2, 4, 4, *[6] * 5]
+    alone = [n for n, previous in many if previous == 0]
+    assert [combined.step_order(n, 0).step for n in alone] == [2, 4, 4, *[6] * (len(alone) - 3)]
     assert [combined.step_order(1, p).step for p in range(4)] == [2, 3, 4, 5]
     polynomial = method("polynomial")
-    for samples, previous in ALL:
+    for samples, previous in many:
         assert polynomial.step_order(samples, previous) == combined.step_order(samples, previous)
 
 
@@ -389,8 +410,8 @@ def stated(form: str, samples: int, previous: int, alpha, omega, T):
 @pytest.mark.parametrize(
     ("form", "samples", "previous"),
     [
-        *(("compressed", n, p) for n, p in [(1, 0), (1, 1), (2, 0), (3, 0), (4, 0), (5, 0), (1, 3), (2, 2)]),
-        *(("uncompressed", n, p) for n, p in [(3, 0), (4, 0), (5, 0), (1, 2)]),
+        *(("compressed", n, p) for n, p in [(1, 0), (1, 1), (4, 0), (2, 2)]),
+        *(("uncompressed", n, p) for n, p in [(3, 0), (1, 2)]),
         *(("combined", n, p) for n, p in [(3, 0), (1, 2)]),
         *(pytest.param("combined", n, p, marks=pytest.mark.long) for n, p in [(4, 0), (5, 0), (2, 2)]),
     ],
@@ -474,7 +495,6 @@ def test_a_cone_of_one_degree():
     assert largest("compressed", 1, 1) == pytest.approx(9.78, abs=0.005)
     assert largest("compressed", 4) == pytest.approx(0.123, abs=0.0005)
     assert largest("compressed", 5) == pytest.approx(0.156, abs=0.0005)
-    assert largest("combined", 5) < 0.01
 
 
 @pytest.mark.parametrize("samples", [4, pytest.param(5, marks=pytest.mark.long)])
@@ -487,7 +507,8 @@ def test_with_the_terms_a_cone_of_one_degree_leaves_the_residual(samples):
 
 
 @pytest.mark.long
-def test_six_samples_leave_less():
+def test_more_samples_leave_less():
+    assert largest("combined", 5) < 0.01
     assert largest("combined", 6) < 0.001
 
 

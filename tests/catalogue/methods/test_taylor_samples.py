@@ -38,16 +38,16 @@ def transition(kernel: Kernel, samples: list[mpmath.mpf]) -> mpmath.matrix:
 @pytest.mark.parametrize(
     ("algorithm", "order", "count", "previous"),
     [
-        *(("dcm", 4, 4, 0), ("euler", 4, 3, 0), ("euler", 4, 1, 3)),
+        *(("dcm", 2, 3, 0), ("euler", 4, 3, 0)),
         *(
             pytest.param(*more, marks=pytest.mark.long)
-            for more in (("euler", 4, 4, 0), ("cayley-klein", 4, 4, 0), ("euler", 8, 4, 0), ("dcm", 2, 8, 0))
+            for more in (("dcm", 4, 4, 0), ("euler", 4, 1, 3), ("cayley-klein", 4, 4, 0), ("euler", 8, 4, 0))
         ),
+        # Every order meets every count of samples once, on one state or the other.
         *(
-            pytest.param(algorithm, order, count, 0, marks=pytest.mark.long)
-            for algorithm in ALGORITHMS
-            for order in (1, 5, 8)
-            for count in (3, 5, 8)
+            pytest.param(("dcm", "euler")[(row + column) % 2], order, count, 0, marks=pytest.mark.long)
+            for row, order in enumerate((1, 5, 8))
+            for column, count in enumerate((3, 5, 8))
         ),
     ],
 )
@@ -64,10 +64,9 @@ def test_three_minutes_on_a_fast_cone_end_on_a_rotation(algorithm, order, count,
     ("order", "count", "frequency_hz", "most_deg"),
     [
         (4, 3, 5, 0.005),
-        (6, 4, 5, 0.0004),
         *(
             pytest.param(*more, marks=pytest.mark.long)
-            for more in ((4, 4, 5, 0.012), (8, 4, 20, 1.3), (8, 5, 10, 0.025))
+            for more in ((6, 4, 5, 0.0004), (4, 4, 5, 0.012), (8, 4, 20, 1.3), (8, 5, 10, 0.025))
         ),
     ],
 )

@@ -37,7 +37,13 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture
-def strapgen_says(capsys: pytest.CaptureFixture[str], folder: Path):
+def here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the commands run in the folder of the algorithms itself: their kernels are derived once for all tests."""
+    monkeypatch.chdir(FOLDER)
+
+
+@pytest.fixture
+def strapgen_says(capsys: pytest.CaptureFixture[str]):
     """Run a command line and return what it prints; it must succeed and be quiet."""
 
     def run(command: str) -> str:
@@ -75,7 +81,7 @@ def test_a_file_is_an_algorithm(folder):
         ({"method": TABLEAUX["rk3"]}, "mrp-rk3-2", "mrp.py --method rk3"),
     ],
 )
-def test_options_reach_the_algorithm_and_the_command_in_its_code(folder, chosen, name, arguments):
+def test_options_reach_the_algorithm_and_the_command_in_its_code(here, chosen, name, arguments):
     kernel = strapgen.derive("mrp.py", **chosen)
     assert (kernel.name, kernel.arguments) == (name, arguments)
     choice = catalogue.choose("mrp.py", **chosen)
@@ -351,7 +357,7 @@ def test_an_attitude_kernel_must_turn_the_state_into_a_matrix(folder):
         ("mrp.py", {"rates": True}, "mrp.py: an algorithm of a user takes increments, not rates"),
     ],
 )
-def test_options_that_an_algorithm_does_not_take(folder, file, chosen, said):
+def test_options_that_an_algorithm_does_not_take(here, file, chosen, said):
     with pytest.raises(InputError, match=said):
         strapgen.derive(file, **chosen)
 
@@ -366,13 +372,13 @@ def test_some_options_are_listed_where_one_is_refused(folder):
 # Running
 
 
-def test_a_step_with_the_companions_of_the_catalogue_has_its_order(folder):
+def test_a_step_with_the_companions_of_the_catalogue_has_its_order(here):
     # The rotation vector is right to fourth order and its cosine and sine to third.
     assert local_error(strapgen.derive("picard.py"), generic_rate(3), 5) == 4
 
 
 @pytest.mark.parametrize("method", ["rk2", "rk4"])
-def test_a_step_with_a_state_of_its_own_has_the_order_of_its_tableau(folder, method):
+def test_a_step_with_a_state_of_its_own_has_the_order_of_its_tableau(here, method):
     kernel = strapgen.derive("mrp.py", method, 3)
     top = int(method[2:]) + 1
     state, samples = kernel.inputs
@@ -388,14 +394,14 @@ def test_a_step_with_a_state_of_its_own_has_the_order_of_its_tableau(folder, met
 
 @pytest.mark.parametrize("backend", ["numpy", "c"])
 @pytest.mark.parametrize(("file", "most"), [("mrp.py", 1e-7), ("picard.py", 1e-4)])
-def test_users_algorithms_run_on_the_back_ends(strapgen_says, file, most, backend):
+def test_users_algorithms_run_on_the_back_ends(here, strapgen_says, file, most, backend):
     # 40 steps of about 0.04 rad: the drift is what the orders, 4 and 3, leave.
     data = json.loads(strapgen_says(f"simulate {file} --backend {backend} {CONING} --format json"))
     assert 0 < data["mean_drift_deg"] < most
     assert data["backend"] == backend
 
 
-def test_back_ends_agree_on_a_step_that_is_not_linear_in_its_state(strapgen_says, rng):
+def test_back_ends_agree_on_a_step_that_is_not_linear_in_its_state(here, rng):
     d = rng.normal(scale=0.01, size=(2, 60, 2, 3))
     by = {name: strapgen.backend("mrp.py", backend=name) for name in ("numpy", "c")}
     histories = {name: backend.propagate(d, record_every=3) for name, backend in by.items()}
@@ -409,7 +415,7 @@ def test_back_ends_agree_on_a_step_that_is_not_linear_in_its_state(strapgen_says
         by["c"].propagate(d[0], orthonormalize_every=5)
 
 
-def test_attitudes_of_a_state_of_its_own_are_those_of_euler_parameters(folder):
+def test_attitudes_of_a_state_of_its_own_are_those_of_euler_parameters(here):
     run = strapgen.simulate(
         strapgen.backend("mrp.py", increments=1, previous=2),
         strapgen.motion("coning", a_deg_s=5, b_deg_s=20, g_deg_s=7),
@@ -420,7 +426,7 @@ def test_attitudes_of_a_state_of_its_own_are_those_of_euler_parameters(folder):
     assert np.abs(run.error).max() < 1e-7
 
 
-def test_users_algorithms_are_derived_and_compared(strapgen_says):
+def test_users_algorithms_are_derived_and_compared(here, strapgen_says):
     assert "Modified Rodrigues parameters: step by" in strapgen_says(
         "derive mrp.py --method rk2 --previous 1"
     )
@@ -446,7 +452,7 @@ def test_generated_code_says_how_to_make_it_again_and_compiles(strapgen_says, fo
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_a_program_is_the_same_polynomial_as_a_user_s_kernel(folder):
+def test_a_program_is_the_same_polynomial_as_a_user_s_kernel(here):
     kernel = strapgen.derive("mrp.py", "rk2", 1)
     names = [name for signal in kernel.inputs for name in signal.elements]
     ring, *generators = sp.ring(names, sp.QQ)

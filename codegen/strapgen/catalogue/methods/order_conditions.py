@@ -194,7 +194,8 @@ class _Stages:
         self.nodes, self.weights, *self.matrix = converted
         self.zero, one = self.rational(Fraction(0)), self.rational(Fraction(1))
         self.ones = [one] * len(self.nodes)
-        self.trees: dict[Tree, list[Any]] = {}
+        self.trees: dict[Tree, list[Any]] = {(): self.ones}
+        self.branches: dict[Tree, list[Any]] = {(): [*self.nodes]}
         self.words: dict[Word, list[Any]] = {(): self.ones}
 
     def applied(self, vector: list[Any]) -> list[Any]:
@@ -207,12 +208,16 @@ class _Stages:
     def tree(self, tree: Tree) -> list[Any]:
         """Return the product over the subtrees of the matrix times their vectors, or the nodes for a leaf."""
         if tree not in self.trees:
-            vector = self.ones
-            for subtree in tree:
-                factor = self.applied(self.tree(subtree)) if subtree else self.nodes
-                vector = [x * y for x, y in zip(vector, factor, strict=True)]
-            self.trees[tree] = vector
+            *others, last = tree
+            rest, factor = self.tree(tuple(others)), self.branch(last)
+            self.trees[tree] = [x * y for x, y in zip(rest, factor, strict=True)] if others else factor
         return self.trees[tree]
+
+    def branch(self, subtree: Tree) -> list[Any]:
+        """Return the matrix times the vector of a subtree, which many trees have; the nodes for a leaf."""
+        if subtree not in self.branches:
+            self.branches[subtree] = self.applied(self.tree(subtree))
+        return self.branches[subtree]
 
     def word(self, word: Word) -> list[Any]:
         """Return C^k_1 A C^k_2 A ... C^k_m 1."""
@@ -287,13 +292,15 @@ def first_failure(tableau: Tableau, order: int) -> tuple[Tree, Number] | None:
     return None
 
 
-def order(tableau: Tableau, most: int = 20) -> int:
+def order(tableau: Tableau, most: int = 20, known: int = 0) -> int:
     """Return the classical order of a method, at most `most`.
 
     Parameters
     ----------
     tableau : Tableau
     most : int, optional
+    known : int, optional
+        An order up to which its conditions have been checked; they are not looked at again.
 
     Returns
     -------
@@ -305,7 +312,7 @@ def order(tableau: Tableau, most: int = 20) -> int:
     >>> order(TABLEAUX["rk4"])
     4
     """
-    return next((p - 1 for p in range(1, most + 1) if first_failure(tableau, p)), most)
+    return next((p - 1 for p in range(known + 1, most + 1) if first_failure(tableau, p)), most)
 
 
 def embedded_order(tableau: Tableau) -> int:
@@ -314,6 +321,7 @@ def embedded_order(tableau: Tableau) -> int:
     return order(replace(tableau, weights=tableau.embedded_weights, embedded_weights=None))
 
 
+@lru_cache(maxsize=128)
 def attitude_order(tableau: Tableau, derivatives: int | None = None) -> int:
     """Return the order of a method on attitude kinematics, or on any x' = A(t) x.
 

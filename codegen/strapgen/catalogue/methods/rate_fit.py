@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
+from math import comb
 
 import sympy as sp
 
@@ -40,7 +42,11 @@ class Fit:
     def at(self, node: Fraction | sp.Expr) -> list[sp.Expr]:
         """Return the weights of the samples in the rate at a node."""
         t = exact(node)
-        return [_reduced(sum((c * t**k for k, c in enumerate(row)), sp.Integer(0))) for row in self.basis]
+        powers = [t**k for k in range(self.degree + 1)]
+        return [
+            _reduced(sum((c * power for c, power in zip(row, powers, strict=True)), sp.Integer(0)))
+            for row in self.basis
+        ]
 
     def taylor(self, power: int, middle: sp.Rational = sp.S.Zero) -> list[sp.Expr]:
         """Return the weights of the samples in the coefficient of a power of time.
@@ -56,16 +62,9 @@ class Fit:
         >>> from_increments(2).taylor(0), from_increments(2).taylor(0, sp.Rational(1, 2))
         ([3, -1], [1, 1])
         """
+        factors = [comb(k, power) * middle ** (k - power) for k in range(power, self.degree + 1)]
         return [
-            _reduced(
-                sp.Add(
-                    *(
-                        c * sp.binomial(k, power) * middle ** (k - power)
-                        for k, c in enumerate(row)
-                        if k >= power
-                    )
-                )
-            )
+            _reduced(sum((c * x for c, x in zip(row[power:], factors, strict=True)), sp.Integer(0)))
             for row in self.basis
         ]
 
@@ -87,14 +86,15 @@ class Fit:
     def moment(self, power: int) -> list[sp.Expr]:
         """Return the weights of the samples in the integral over the step of the rate times (t - 1/2)^power."""
         half = sp.Rational(1, 2)
-        weights = []
-        for row in self.basis:
-            total = sp.Integer(0)
-            for k, c in enumerate(row):
-                for j in range(power + 1):  # (t - 1/2)^power, multiplied out
-                    total += c * sp.binomial(power, j) * (-half) ** (power - j) / (k + j + 1)
-            weights.append(_reduced(total))
-        return weights
+        expanded = [comb(power, j) * (-half) ** (power - j) for j in range(power + 1)]  # (t - 1/2)^power
+        integrals = [
+            sum((c / (k + j + 1) for j, c in enumerate(expanded)), sp.Integer(0))
+            for k in range(self.degree + 1)
+        ]
+        return [
+            _reduced(sum((c * x for c, x in zip(row, integrals, strict=True)), sp.Integer(0)))
+            for row in self.basis
+        ]
 
 
 def legendre(degree: int, middle: sp.Rational = sp.S.Zero) -> Coefficients:
@@ -118,6 +118,7 @@ def legendre(degree: int, middle: sp.Rational = sp.S.Zero) -> Coefficients:
     return tuple(reversed(polynomial.all_coeffs()))
 
 
+@lru_cache(maxsize=64)
 def from_increments(increments: int, previous: int = 0) -> Fit:
     """Fit angle increments: the polynomial through the samples of the integrated rate, differentiated.
 

@@ -125,7 +125,7 @@ def read(path: str | Path) -> Tableau:
         tableau = replace(_tableau(data, name), file=checks.text("the name of the file", str(path)))
         verify(tableau)
         # A file may state less than the actual order.
-        tableau = replace(tableau, order=order_conditions.order(tableau, MOST_ORDER))
+        tableau = replace(tableau, order=order_conditions.order(tableau, MOST_ORDER, known=tableau.order))
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     return tableau

@@ -12,15 +12,17 @@ import os
 import shlex
 from collections.abc import Iterator
 from dataclasses import replace
-from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from strapgen.catalogue.user import isolation, kernel_cache
 from strapgen.support import cache, checks, packages
 from strapgen.support.exceptions import InputError
+from strapgen.support.packages import entry_points
 
 if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
+
     from strapgen.symbolic.kernel import Kernel
 
 #: Entry points of installed packages.
