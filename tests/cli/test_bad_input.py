@@ -11,6 +11,7 @@ import pytest
 from gathering import each
 
 from strapgen.cli import main
+from strapgen.reports.plots import figures
 
 # A warning would be a second line on stderr.
 pytestmark = pytest.mark.filterwarnings("error")
@@ -496,8 +497,9 @@ FILES = {
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return the folder in which the commands run, with the files that they are to stumble over."""
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, shared_results: None) -> Path:
+    """Return the folder in which the commands run, with the files that they are to stumble over; images are blank."""
+    monkeypatch.setattr(figures, "image", lambda figure, path: figures.pyplot().close(figure) or b"blank")
     place = tmp_path / "folder"
     place.mkdir()
     for name, text in FILES.items():
