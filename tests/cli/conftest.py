@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from strapgen.analysis import accumulation, constant_rate, error_analysis, growth, overview, ratios, series
-from strapgen.experiments import thesis_tables
+from strapgen.experiments import predicted_tables, thesis_tables
 from strapgen.ir.fixed_settings import Settings
 from strapgen.reports.plots import figures
 
@@ -22,6 +22,17 @@ ONCE = {
     "series": cache(series.series),
 }
 _draw, _entries = figures.image, thesis_tables.entries
+_predicted, _claims = predicted_tables.predicted, ratios.claims
+
+
+@cache
+def _predicted_once() -> tuple[predicted_tables.PredictedEntry, ...]:
+    return tuple(_predicted())
+
+
+@cache
+def _claims_once() -> tuple[ratios.Claim, ...]:
+    return tuple(_claims())
 
 
 @cache
@@ -50,4 +61,6 @@ def shared_results(monkeypatch: pytest.MonkeyPatch) -> None:
             if hasattr(module, name):
                 monkeypatch.setattr(module, name, function)
     monkeypatch.setattr(thesis_tables, "entries", _entries_once)
+    monkeypatch.setattr(predicted_tables, "predicted", _predicted_once)
+    monkeypatch.setattr(ratios, "claims", _claims_once)
     monkeypatch.setattr(figures, "image", _image)

@@ -1021,7 +1021,7 @@ def test_reader_that_leaves_is_no_error(command):
 
 
 def test_reader_that_is_gone_before_is_no_error():
-    program = [sys.executable, "-m", "strapgen", "list"]
+    program = [sys.executable, "-m", "strapgen", "tableau", "rk1"]
     with subprocess.Popen(program, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         process.stdout.close()
         assert process.stderr.read() == ""
@@ -1031,10 +1031,10 @@ def test_reader_that_is_gone_before_is_no_error():
 @pytest.mark.parametrize(
     "command",
     [
-        "list",
+        "tableau rk1",
         *(
             pytest.param(c, marks=pytest.mark.long)
-            for c in (f"simulate dcm {CONING}", "tables --format json")
+            for c in ("list", f"simulate dcm {CONING}", "tables --format json")
         ),
     ],
 )
@@ -1148,6 +1148,9 @@ def test_tables_predicted(strapgen_says):
     assert len(data["entries"]) == 30
     assert all(abs(entry["deviation"]) < 0.01 and entry["agrees"] for entry in data["entries"])
     assert data["ratios"][0]["ratio"] == "9*x**2/80 + 1/4"
+    said = strapgen_says("tables --predict")
+    for table in TABLES:
+        assert f"Table {table.number}" in said
 
 
 def test_strapdown_is_the_course_of_python(strapgen_says, tmp_path):
