@@ -47,6 +47,9 @@ _UNOPTIMIZED = '#if defined(__GNUC__) && !defined(__clang__)\n#pragma GCC optimi
 #: Kind of cache entry that says in which module of many a source was compiled.
 _SHARED = "shared"
 
+#: Kind of cache entry that holds the size of object code, and its file.
+_SIZES, _SIZE = "sizes", "size.txt"
+
 _loaded: dict[str, Any] = {}
 _modules: dict[Path, Any] = {}
 
@@ -207,14 +210,14 @@ def _import_file(file: Path) -> ModuleType:
     return module
 
 
-def _key(many: Iterable[Sources]) -> str:
+def _key(many: Iterable[Sources], flags: Sequence[str] | None = None) -> str:
     """Return the key of a build: compiling with another compiler, or for another Python, makes another entry."""
     executable = Path(compiler()).resolve()
     stat = executable.stat()
     return cache.digest(
         [
             *(part for sources in many for part in (*sources.files, *sources.files.values())),
-            *_flags,
+            *(_flags if flags is None else flags),
             _VISIBILITY,
             _UNOPTIMIZED,
             _chosen_compiler(),
@@ -239,6 +242,8 @@ def _build(many: Sequence[Sources], name: str, key: str) -> Path:
 def code_size(sources: Sources) -> int | None:
     """Return the size in bytes of the code and constants of a compiled C source; None if it cannot be determined.
 
+    The cache keeps it: to measure it takes a compilation of its own.
+
     Parameters
     ----------
     sources : Sources
@@ -258,6 +263,22 @@ def code_size(sources: Sources) -> int | None:
     path, counter = compiler(), shutil.which("size")
     if counter is None:
         return None
+    key = _key([sources], C_FLAGS)
+    place = cache.lookup(_SIZES, key)
+    if place is not None:
+        return int((place / _SIZE).read_text())
+    size = _measured_size(sources, path, counter)
+    if size is not None:
+        cache.entry(_SIZES, key, partial(_note_size, size))
+    return size
+
+
+def _note_size(size: int, draft: Path) -> None:
+    (draft / _SIZE).write_text(str(size))
+
+
+def _measured_size(sources: Sources, path: str, counter: str) -> int | None:
+    """Return the size of compiled sources, measured by a program."""
     with tempfile.TemporaryDirectory() as folder:
         for name, text in sources.files.items():
             (Path(folder) / name).write_text(text)
