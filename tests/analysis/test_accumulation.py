@@ -130,6 +130,15 @@ def test_first_order_on_coning_needs_products_of_errors():
     assert list(run.bounded) == [1]
 
 
+def test_bounded_drift_ends_before_the_first_product_of_two_errors():
+    """Of errors of order h, the rate has a part in h^2 too, but products of two errors are of that power as well."""
+    step = choose("euler", "rk1", 2)
+    assert {1, 2} <= {*error_rate(step, "coning", 2).matrices}
+    run = accumulate(step, "coning", 2)
+    assert list(run.secular) == [2, 4]
+    assert list(run.bounded) == [1]
+
+
 def test_growth_of_scale_is_that_of_the_closed_form():
     run = accumulate(choose("dcm", "rk4", 2), "constant", 1)
     square = sum(x**2 for x in sp.symbols("w_x w_y w_z"))
