@@ -24,7 +24,7 @@ FIXED_NAMES = ("c-q31", "c-q15", "fixed-model")
 
 @pytest.fixture
 def increments(rng):
-    return rng.uniform(-1, 1, (1, 1, 3)) / 100 + rng.normal(scale=2e-3, size=(120, 2, 3))
+    return rng.uniform(-1, 1, (1, 1, 3)) / 100 + rng.normal(scale=2e-3, size=(60, 2, 3))
 
 
 @pytest.mark.parametrize(
