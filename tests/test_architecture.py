@@ -77,9 +77,19 @@ def tree(path: Path) -> ast.Module:
     return ast.parse(path.read_text())
 
 
-def imports(path: Path) -> Iterator[str]:
-    """Yield the modules of the package that a file imports, inside functions and for types too."""
-    for node in ast.walk(tree(path)):
+@cache
+def nodes(source: ast.Module) -> tuple[ast.AST, ...]:
+    return tuple(ast.walk(source))
+
+
+@cache
+def imports(path: Path) -> tuple[str, ...]:
+    """Return the modules of the package that a file imports, inside functions and for types too."""
+    return tuple(_imports(path))
+
+
+def _imports(path: Path) -> Iterator[str]:
+    for node in nodes(tree(path)):
         if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "strapgen":
             for alias in node.names:
                 full = f"{node.module}.{alias.name}"
@@ -181,7 +191,7 @@ def test_sympy_ends_at_the_gate():
 def names_of_imports(module: ast.Module) -> dict[str, str]:
     """Return what every imported name of a module stands for, inside functions and for types too."""
     names: dict[str, str] = {}
-    for node in ast.walk(module):
+    for node in nodes(module):
         if isinstance(node, ast.ImportFrom):
             names |= {alias.asname or alias.name: f"{node.module}.{alias.name}" for alias in node.names}
         elif isinstance(node, ast.Import):
@@ -191,6 +201,7 @@ def names_of_imports(module: ast.Module) -> dict[str, str]:
     return names
 
 
+@cache
 def resolved(name: str) -> str:
     """Return the name of a thing where it is defined, through all modules that pass it on."""
     module, _, rest = name.rpartition(".")
@@ -204,7 +215,7 @@ def uses(module: ast.Module) -> set[str]:
     """Return the full names of all that a module imports or reaches through what it imports."""
     names = names_of_imports(module)
     full = set(names.values())
-    for node in ast.walk(module):
+    for node in nodes(module):
         parts: list[str] = []
         while isinstance(node, ast.Attribute):
             parts.insert(0, node.attr)
@@ -262,7 +273,7 @@ def test_the_stages_of_the_rules_exist():
 
 def layouts(source: ast.Module) -> Iterator[tuple[int, str]]:
     """Yield what lays out columns in a source: alignment, padding, rows of comma-separated values, and its line."""
-    for node in ast.walk(source):
+    for node in nodes(source):
         if isinstance(node, ast.Attribute) and node.attr in ("ljust", "rjust", "writerow", "writerows"):
             yield node.lineno, node.attr
         elif isinstance(node, ast.FormattedValue) and node.format_spec is not None:
@@ -290,7 +301,7 @@ def test_only_reports_and_the_command_line_have_texts_of_results():
         f"{place(path)}:{node.lineno} {node.name}"
         for path in FILES
         if path.relative_to(PACKAGE).parts[0] not in ("reports", "cli")
-        for node in ast.walk(tree(path))
+        for node in nodes(tree(path))
         if isinstance(node, ast.FunctionDef) and node.name in ("as_text", "as_csv", "as_markdown")
     ]
     assert not offenders, "\n".join(offenders)
@@ -312,14 +323,15 @@ def test_no_module_is_named_as_a_known_one_or_says_nothing():
 def test_no_class_name_stands_twice():
     where = defaultdict(list)
     for path in FILES:
-        for node in ast.walk(tree(path)):
+        for node in nodes(tree(path)):
             if isinstance(node, ast.ClassDef):
                 where[node.name].append(place(path))
     assert not {name: places for name, places in where.items() if len(places) > 1}
 
 
-def functions(path: Path) -> Iterator[ast.FunctionDef]:
-    return (node for node in ast.walk(tree(path)) if isinstance(node, ast.FunctionDef))
+@cache
+def functions(path: Path) -> tuple[ast.FunctionDef, ...]:
+    return tuple(node for node in nodes(tree(path)) if isinstance(node, ast.FunctionDef))
 
 
 def body_lines(function: ast.FunctionDef) -> int:
@@ -328,6 +340,7 @@ def body_lines(function: ast.FunctionDef) -> int:
     return body[-1].end_lineno - body[0].lineno + 1 if body else 0
 
 
+@cache
 def commands(path: Path) -> set[str]:
     """Return the functions of a module that are commands: those whose parameters Typer reads."""
     return (
@@ -372,7 +385,7 @@ def names_of_things(path: Path) -> Iterator[tuple[int, str]]:
         if not function.name.startswith("_") or function.name == "__init__"
         for argument in (*function.args.posonlyargs, *function.args.args, *function.args.kwonlyargs)
     }
-    for node in ast.walk(tree(path)):
+    for node in nodes(tree(path)):
         if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
             yield node.lineno, node.id
         elif isinstance(node, ast.arg) and id(node) not in public:
@@ -390,14 +403,12 @@ def test_names_say_what_things_are():
     for path in FILES:
         fields = {
             id(statement.target)
-            for node in ast.walk(tree(path))
+            for node in nodes(tree(path))
             if isinstance(node, ast.ClassDef)
             for statement in node.body
             if isinstance(statement, ast.AnnAssign)
         }
-        stored = {
-            (n.lineno, n.id) for n in ast.walk(tree(path)) if isinstance(n, ast.Name) and id(n) in fields
-        }
+        stored = {(n.lineno, n.id) for n in nodes(tree(path)) if isinstance(n, ast.Name) and id(n) in fields}
         for line, name in names_of_things(path):
             if name in BANNED_IDENTIFIERS and (line, name) not in stored:
                 offenders.append(f"{place(path)}:{line} {name}")

@@ -3,14 +3,14 @@
 from functools import cache
 from random import Random
 
+import derived
 import numpy as np
 import pytest
 import sympy as sp
 from sympy.polys.ring_series import rs_integrate, rs_mul, rs_series_inversion
 from sympy.polys.rings import PolyElement
 
-from strapgen import derive
-from strapgen.catalogue import MOST_INCREMENTS, STANDARD_METHODS
+from strapgen.catalogue import MOST_INCREMENTS, STANDARD_METHODS, choose
 from strapgen.catalogue.methods.tableaux import TABLEAUX
 
 X = sp.Symbol("x", positive=True)
@@ -22,7 +22,7 @@ TERMS = 11
 @cache
 def transition(algorithm: str, method: str, axes: str, increments: int = 2) -> sp.Matrix:
     """Return the step of the identity at the angle x about each of the axes, in equal increments."""
-    step = derive(algorithm, method, increments)
+    step = derived.kernel(choose(algorithm, method, increments))
     state, d = step.inputs
     values = dict(zip(state.elements, map(RING, step.companions.identity), strict=True))
     values |= {element: x / increments if element[-1] in axes else RING(0) for element in d.elements}
@@ -142,7 +142,7 @@ def test_claim_4_at_the_rate_of_the_thesis():
 
 def parts(computed: sp.Matrix, truth: sp.Matrix) -> dict[str, list]:
     """Return the error matrix's parts, from its kernel."""
-    kernel = derive("error-matrix")
+    kernel = derived.kernel(choose("error-matrix"))
     names = [name for signal in kernel.inputs for name in signal.elements]
     return kernel.expand(dict(zip(names, [*computed, *truth], strict=True)))
 
@@ -187,7 +187,7 @@ def test_drift_is_positive_where_angle_is_lost(method):
 
 def turn_at_a_constant_rate(algorithm: str, method: str, increments: int, previous: int = 0) -> list:
     """Return the step of the identity as polynomials of the angles that it turns by, in equal increments."""
-    step = derive(algorithm, method, increments, previous=previous)
+    step = derived.kernel(choose(algorithm, method, increments, previous=previous))
     state, d = step.inputs
     ring, *angles = sp.ring("x y z", sp.QQ)
     values = dict(zip(state.elements, map(ring, step.companions.identity), strict=True))
@@ -271,7 +271,7 @@ def test_at_a_constant_rate_a_centred_step_is_two_half_exponentials_cut_off_and_
     # Rational functions of degree up to 32 that agree in exact arithmetic at arguments drawn from 10^6 of them.
     random = Random(1969)
     for increments, previous in ((3, 0), (8, 0), (2, 1)):
-        step = derive(algorithm, method, increments, previous=previous)
+        step = derived.kernel(choose(algorithm, method, increments, previous=previous))
         state, d = step.inputs
         for _ in range(3):
             angles = [sp.Rational(random.randint(-(10**6), 10**6), 10**6) for _ in "xyz"]
@@ -295,7 +295,7 @@ def test_a_centred_step_loses_the_angle_of_two_half_steps_at_a_constant_rate(alg
     loss = (x - 4 * rs_integrate(rate, x)).as_expr(X)
     assert leading(loss)[1] == order + 1 + order % 2
     angle = sp.Rational(1, 10)
-    kernel = derive(algorithm, method, 3)
+    kernel = derived.kernel(choose(algorithm, method, 3))
     values = dict(zip(kernel.inputs[0].elements, kernel.companions.identity, strict=True))
     values |= {name: angle / 3 if name[-1] == "y" else sp.Integer(0) for name in kernel.inputs[1].elements}
     turn = kernel.expand(values)["next"]

@@ -250,14 +250,15 @@ LONG_COMMANDS = (
     "strapgen two-speed euler ",
     "strapgen vibration ",
 )
-#: Pages whose commands need a file that the page shows, and a command that another test runs.
+#: Pages whose commands need a file that the page shows, and commands that other tests run: tests/cli the second.
 OWN_FILES = ("own-algorithms",)
 TABLES = "strapgen tables"
+PREDICTED = f"{TABLES} --predict"
 
 
 def page_commands() -> Iterator[str]:
     """Yield every command of the pages once, but those that the README has too."""
-    seen = {TABLES, *shown_commands(README)}
+    seen = {TABLES, PREDICTED, *shown_commands(README)}
     for page, text in DOCS.items():
         for command in shown_commands(text):
             if command not in seen and page not in OWN_FILES:

@@ -54,8 +54,10 @@ def modules_with_a_choice(*words: str) -> set[str]:
     modules: set[str] = set()
 
     def look(frame: FrameType, event: str, value: object) -> None:
+        if event not in ("call", "return"):
+            return
         name = frame.f_globals.get("__name__", "")
-        if event in ("call", "return") and name.startswith("strapgen"):
+        if name.startswith("strapgen") and name not in modules:
             values = [*frame.f_locals.values(), value]
             if any(isinstance(each, Choice) for each in values):
                 modules.add(name)

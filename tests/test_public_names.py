@@ -27,10 +27,19 @@ def in_a_new_process(code: str) -> str:
     return done.stdout
 
 
-def test_dir_shows_the_public_names_and_nothing_else():
-    shown = in_a_new_process(
-        "import strapgen.cli, strapgen; strapgen.derive('euler'); print(*dir(strapgen))"
-    ).split()
+@pytest.fixture(scope="module")
+def after_imports() -> list[str]:
+    """Return in a line each the names that `dir` shows after some modules were imported, and the names with kinds."""
+    modules = ("cli", "backends.two_speed", "experiments.conformance", "vibration.spectrum")
+    return in_a_new_process(
+        f"import {', '.join(f'strapgen.{module}' for module in modules)}, strapgen as s; s.derive('euler')\n"
+        "print(*dir(s))\n"
+        "print(*(n + ':' + type(getattr(s, n)).__name__ for n in s.__all__))"
+    ).splitlines()
+
+
+def test_dir_shows_the_public_names_and_nothing_else(after_imports):
+    shown = after_imports[0].split()
     assert shown == sorted(strapgen.__all__)
     assert [name for name in shown if name.startswith("_")] == ["__version__"]
     hidden = {"annotations", "TYPE_CHECKING", "Any", "import_module", "pipeline", "checks", "cli"}
@@ -43,13 +52,12 @@ def test_neither_numpy_nor_sympy_is_loaded_with_the_package():
     assert {"numpy", "sympy", "mpmath", "jinja2", "cffi"} & {*loaded} == set()
 
 
-def test_every_name_is_there_whatever_was_imported_before():
+def test_every_name_is_there_whatever_was_imported_before(after_imports):
     for name in strapgen.__all__:
         assert getattr(strapgen, name) is not None
-    modules = ("cli", "backends.two_speed", "experiments.conformance", "vibration.spectrum")
-    after = f"import {', '.join(f'strapgen.{module}' for module in modules)}, strapgen as s"
-    kinds = in_a_new_process(f"{after}; print(*(n + ':' + type(getattr(s, n)).__name__ for n in s.__all__))")
-    assert kinds.split() == [f"{name}:{type(getattr(strapgen, name)).__name__}" for name in strapgen.__all__]
+    assert after_imports[1].split() == [
+        f"{name}:{type(getattr(strapgen, name)).__name__}" for name in strapgen.__all__
+    ]
 
 
 def test_the_algebra_of_kernels_is_whole():

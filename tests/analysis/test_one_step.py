@@ -5,11 +5,11 @@ from __future__ import annotations
 from fractions import Fraction
 from itertools import pairwise
 
+import derived
 import mpmath
 import pytest
 import sympy as sp
 
-from strapgen import lower
 from strapgen.analysis import invariants
 from strapgen.analysis.one_step import errors, step
 from strapgen.backends import exact
@@ -65,7 +65,7 @@ def rate(number: int) -> list[list[sp.Rational]]:
 
 def one_step(choice: Choice, vectors: list[list[sp.Rational]], h: Fraction) -> list:
     """Return the error matrix of one step of length h in the digits of mpmath."""
-    program = lower(derive(choice))
+    program = derived.program(choice)
     companions = program.companions
     count = program.inputs[1].shape[0] - companions.previous
 
@@ -83,7 +83,7 @@ def one_step(choice: Choice, vectors: list[list[sp.Rational]], h: Fraction) -> l
     taken = [b - a for pair in pairwise(angles) for a, b in zip(*pair, strict=True)]
     state = exact.states(program, [taken], [exact.number(x) for x in companions.identity])[-1]
     if companions.attitude:
-        state = exact.Interpreter(lower(derive(choose(companions.attitude))))(state)
+        state = exact.Interpreter(derived.program(choose(companions.attitude)))(state)
     computed = mpmath.matrix([state[3 * i : 3 * i + 3] for i in range(3)])
 
     # The true matrix by its own Taylor series, term after term, to 40 terms.

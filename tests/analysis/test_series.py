@@ -26,9 +26,9 @@ def test_the_order_is_that_of_theory_or_better(algorithm, motion, method):
     assert order == rank if motion in ("general", "coning") else order >= rank
 
 
-@pytest.mark.parametrize("motion", ["constant", "general"])
-def test_json_is_what_was_agreed(motion):
-    data = json.loads(json.dumps(analyse(choose("euler", "rk4", 2), motion, 2).as_dict()))
+@pytest.mark.parametrize(("motion", "terms"), [("constant", 2), ("general", 1)])
+def test_json_is_what_was_agreed(motion, terms):
+    data = json.loads(json.dumps(analyse(choose("euler", "rk4", 2), motion, terms).as_dict()))
     assert data["order"] == 4
     letters = W if motion == "constant" else [sp.Symbol(f"w{j}_{axis}") for j in range(9) for axis in "xyz"]
     for part in ("drift", "scale", "skew"):
@@ -38,7 +38,7 @@ def test_json_is_what_was_agreed(motion):
     assert ("invariant" in data) == (motion == "general")
     if motion == "general":
         used = set().union(*(sp.sympify(text).free_symbols for text in data["drift"]))
-        assert {sp.Symbol("w0_x"), sp.Symbol("w4_z")} <= used
+        assert {sp.Symbol("w0_x"), sp.Symbol("w3_z")} <= used
 
 
 def test_the_vector_invariant_form_is_the_components():

@@ -60,7 +60,7 @@ def order_of(name: str) -> int:
 def test_every_method_has_its_order_with_enough_increments(algorithm, method, coning):
     increments = catalogue.enough(method)
     steps = LADDER if order_of(method) > 4 else SHORT
-    found = converge(choose(algorithm, method, increments), coning, steps, 1)
+    found = converge(choose(algorithm, method, increments), coning, steps, "1/2")
     # From three samples on a Taylor series is symmetric about the middle of the step, and odd orders gain one.
     gained = method.startswith("taylor") and increments > 2 and order_of(method) % 2
     assert found.predicted == order_of(method) + gained
@@ -84,7 +84,7 @@ def test_every_method_has_its_order_with_enough_increments(algorithm, method, co
     ],
 )
 def test_where_the_samples_limit_the_order_it_is_seen(method, increments, previous, order, coning):
-    found = converge(choose("euler", method, increments, previous=previous), coning, SHORT, 1)
+    found = converge(choose("euler", method, increments, previous=previous), coning, SHORT, "1/2")
     assert found.predicted == order
     assert found.observed == pytest.approx(order, abs=WITHIN)
 

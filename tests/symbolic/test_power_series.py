@@ -9,7 +9,7 @@ from strapgen.symbolic import evaluation
 from strapgen.symbolic.power_series import Powers, SeriesRoot, function
 
 RING, X, Y = sp.ring("x y", sp.QQ)
-TOP = 7
+TOP = 5
 H = sp.Symbol("h")
 x, y = sp.symbols("x y")
 

@@ -33,8 +33,12 @@ def files(folder: str) -> list[Path]:
 def names_of_the_file(text: str) -> set[str]:
     """Return the names that a C source defines for itself: static functions, constants and types."""
     code = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
-    static = re.findall(r"^static [^;{=]*?(\w+)\s*\(", code, re.MULTILINE)
-    assert len(static) == len(re.findall(r"\bstatic\b", code))
+    code = code.replace("__attribute__((noinline)) ", "")
+    static = list(dict.fromkeys(re.findall(r"^static [^;{=]*?(\w+)\s*\(", code, re.MULTILINE)))
+    both = code.count(
+        "#if defined(__GNUC__)"
+    )  # a product has a form for some processors, and one for all others
+    assert len(static) == len(re.findall(r"\bstatic\b", code)) - both
     constants = [
         name for body in re.findall(r"\benum\s*\{(.*?)\}", code) for name in re.findall(r"[A-Za-z_]\w*", body)
     ]
@@ -62,7 +66,8 @@ def test_no_static_name_recurs_in_two_files():
             sources = generated_sources.sources(Choice(kernel), "c-fixed", Settings(word=word))
             texts += [text for name, text in sources.files.items() if name.endswith(".c")]
     assert recurring(texts) == []
-    assert recurring([texts[0], texts[0]])
+    fixed = files("c_fixed")[0].read_text()
+    assert recurring([fixed, fixed])
 
 
 @pytest.mark.parametrize("folder", FOLDERS)

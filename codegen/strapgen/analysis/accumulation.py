@@ -16,7 +16,7 @@ import sympy as sp
 from strapgen import catalogue
 from strapgen.analysis import one_step
 from strapgen.analysis.error_rate import ErrorRate, error_rate
-from strapgen.analysis.motion_rates import TIME, is_plain
+from strapgen.analysis.motion_rates import TIME, is_plain, parameters
 from strapgen.analysis.series import MOST_TERMS, STEP
 from strapgen.catalogue import Choice
 from strapgen.support import checks
@@ -202,16 +202,38 @@ def _eigenvalue(error: ErrorRate, top: int) -> dict[int, tuple[sp.Expr, sp.Expr]
     axis = [extended.from_expr(sp.expand(x)) for x in error.axis]
     square = rotations.dot(axis, axis)
     value = Powers(extended, {0: y}, top)
-    known = 1 / (2 * square.as_expr())
     shifts: dict[int, tuple[sp.Expr, sp.Expr]] = {}
     for power in range(first, top + 1):
         cubic = ((value - trace) * value + minors) * value - determinant
         shift = cubic.parts.get(power, extended.zero).rem([y**2 + square]) * half
         value = value + Powers(extended, {power: shift}, top)
-        expression = shift.as_expr().subs(sp.Symbol("half_over_S"), known)
-        imaginary = expression.coeff(sp.Symbol("y"), 1)
-        shifts[power] = (expression.subs(sp.Symbol("y"), 0), imaginary)
+        imaginary = shift.diff(y)
+        shifts[power] = (_quotient(shift - imaginary * y, square), _quotient(imaginary, square))
     return {power: pair for power, pair in shifts.items() if any(pair)}
+
+
+def _quotient(element: Any, square: Any) -> sp.Expr:
+    """Return a polynomial in the second generator, half_over_S, as an expression with 1/(2 S) for it.
+
+    With short fractions it is one fraction in lowest terms: S is a sum of squares, which no other factor divides.
+    """
+    ring = element.ring
+    half = ring.gens[1]
+    if ring.domain != sp.QQ or not all(
+        is_plain(number) for number in map(ring.domain.to_sympy, element.coeffs())
+    ):
+        return element.as_expr().subs(half.as_expr(), 1 / (2 * square.as_expr()))
+    depth = element.degree(half)
+    above = ring.zero
+    for exponents, number in element.terms():
+        rest = ring.from_dict({(exponents[0], 0, *exponents[2:]): number})
+        above += rest * (2 * square) ** (depth - exponents[1])
+    while depth > 0:
+        lower, remainder = above.div(2 * square)
+        if remainder:
+            break
+        above, depth = lower, depth - 1
+    return above.as_expr() / (2 * square.as_expr()) ** max(depth, 0)
 
 
 def _about_an_axis(error: ErrorRate) -> RunDrift:
@@ -257,6 +279,9 @@ def antiderivative(matrix: sp.Matrix, error: ErrorRate) -> sp.Matrix:
     -------
     Matrix, 3 x 3
     """
+    if error.motion == "polynomial":
+        variables = (TIME, *parameters(error.motion))
+        return matrix.applyfunc(lambda x: sp.Poly(x, *variables).integrate(TIME).as_expr())
     mean, swing = _integrated(matrix, error)
     return mean.reshape(*matrix.shape) * TIME + swing.reshape(*matrix.shape)
 

@@ -15,7 +15,7 @@ from typing import Any
 import mpmath
 
 from strapgen.analysis.error_rate import error_rate
-from strapgen.analysis.prediction import Prediction, parts_of, predict
+from strapgen.analysis.prediction import Prediction, follow, parts_of, transfers_of
 from strapgen.backends import exact
 from strapgen.catalogue import Choice
 from strapgen.simulation.exact_attitudes import exact_attitudes, step_of_increments
@@ -129,17 +129,18 @@ def agreement(
     for length in lengths:
         checks.multiple("the longest step", longest, "step", length)
     run = exact_attitudes(choice, motion)
+    rates = error_rate(choice, motion.name, terms)
+    transfers = transfers_of(rates, motion)
     rungs = []
     for length in lengths:
         every = checks.multiple("the longest step", longest, "step", length)
-        expected = predict(choice, motion, length, total, record=longest, terms=terms)
+        expected = follow(choice, motion, transfers, length, total, record=longest)
         with mpmath.workdps(exact.DIGITS):
             split = parts_of()
             states = list(run(length, int(total / length)))[::every]
             drifts = [split(computed, true)[2] for computed, true in states]
             rungs.append(_at_step(length, expected, drifts))
-    order = error_rate(choice, motion.name, 1).order
-    return Agreement(kernel.name, motion.name, terms, order, tuple(rungs))
+    return Agreement(kernel.name, motion.name, terms, rates.order, tuple(rungs))
 
 
 def _at_step(length: Fraction, expected: Prediction, drifts: list[list[Any]]) -> StepAgreement:

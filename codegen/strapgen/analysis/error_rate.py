@@ -149,9 +149,8 @@ def _steady(attitude_step: Step, motion: str, top: int) -> ErrorRate:
     matrices = {}
     for power in range(1, top):
         parts = [[element.parts.get(power + 1, ring.zero) for element in row] for row in raw]
-        matrix = sp.Matrix([[rate.expression(x) for x in row] for row in parts])
-        if any(matrix):
-            matrices[power] = matrix
+        if any(map(any, parts)):
+            matrices[power] = sp.Matrix([[rate.expanded(x) for x in row] for row in parts])
     first = sp.Matrix([[x.parts.get(1, ring.zero).as_expr() for x in row] for row in raw])
     if not (first - skew).expand().is_zero_matrix:
         raise InputError(
@@ -167,24 +166,24 @@ def _about_an_axis(attitude_step: Step, motion: str, top: int) -> ErrorRate:
     one = Powers(rate.ring, {0: rate.ring.one}, top)
     error = _square(error_parts["error"])
     logs = _logarithm([[x + one if i == j else x for j, x in enumerate(row)] for i, row in enumerate(error)])
-    sums: dict[int, sp.Matrix] = {}
+    sums: dict[int, list[Any]] = {}
     for power in range(1, top + 1):
-        parts = [[row_element.parts.get(power, rate.ring.zero) for row_element in row] for row in logs]
-        matrix = sp.Matrix(
-            [[rate.expression(one_step.shown(attitude_step, x)) for x in row] for row in parts]
-        )
+        elements = [
+            rate.reduced(one_step.shown(attitude_step, x.parts.get(power, rate.ring.zero)))
+            for row in logs
+            for x in row
+        ]
         # Euler and Maclaurin: h sum f = integral of f - h f'/2 + h^2 f''/12 - ...
         for derivative in range(top - power + 1):
-            share = _bernoulli(derivative) / sp.factorial(derivative)
-            if share and any(matrix):
-                total = sums.get(power - 1 + derivative, sp.zeros(3))
-                sums[power - 1 + derivative] = total + share * matrix
-            matrix = matrix.diff(TIME)
+            share = rate.ring.domain.from_sympy(_bernoulli(derivative) / sp.factorial(derivative))
+            if share and any(elements):
+                total = sums.get(power - 1 + derivative, [rate.ring.zero] * 9)
+                sums[power - 1 + derivative] = [x + y * share for x, y in zip(total, elements, strict=True)]
+            elements = [rate.derivative(x) for x in elements]
     matrices = {}
-    for power, matrix in sorted(sums.items()):
-        reduced = matrix.applyfunc(sp.expand)
-        if any(reduced) and power:
-            matrices[power] = reduced
+    for power, elements in sorted(sums.items()):
+        if any(elements) and power:
+            matrices[power] = sp.Matrix(3, 3, [rate.expanded(x) for x in elements])
     symbols = motion_rates.parameters(motion)
     return ErrorRate(
         attitude_step.kernel.name, motion, motion_rates.model(motion).rate(TIME, *symbols), False, matrices

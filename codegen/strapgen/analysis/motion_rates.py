@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,11 +30,26 @@ class MotionRate:
         The rate and its derivatives at the beginning of a step.
     expression : callable
         ``expression(element)`` returns a ring element as an expression in the motion's parameters and the time.
+    reduced : callable
+        ``reduced(element)`` returns a ring element in which squares of sines are replaced by cosines.
+    expanded : callable
+        ``expanded(element)`` returns what `expression` does without factoring it, which takes long.
+    changes : mapping of ring element to ring element
+        Time derivatives of the generators of the ring that change with time.
     """
 
     ring: Any
     derivatives: list[list[Any]]
     expression: Callable[[Any], sp.Expr]
+    reduced: Callable[[Any], Any]
+    expanded: Callable[[Any], sp.Expr]
+    changes: Mapping[Any, Any]
+
+    def derivative(self, element: Any) -> Any:
+        """Return the time derivative of a ring element."""
+        return sum(
+            (element.diff(generator) * change for generator, change in self.changes.items()), self.ring.zero
+        )
 
 
 def parameters(motion: str) -> tuple[sp.Symbol, ...]:
@@ -77,12 +92,22 @@ def at_time(motion: str, count: int, domain: Any = sp.QQ) -> MotionRate:
     unity = ring.from_expr(cosine**2 + sine**2 - 1) if waves else None
     back = {wave: function for function, wave in waves.items()}
 
-    def expression(element: Any) -> sp.Expr:
-        # Squares of sines are replaced by cosines, so that equal expressions cancel.
-        reduced = element if unity is None else element.rem([unity])
-        return _factored(reduced).subs(back)
+    def reduced(element: Any) -> Any:
+        # Without squares of sines equal expressions cancel.
+        return element if unity is None else element.rem([unity])
 
-    return MotionRate(ring, rate, expression)
+    changes = {}
+    if frequency is not None:
+        b, c, s = (ring.from_expr(symbol) for symbol in (frequency, cosine, sine))
+        changes = {c: -b * s, s: b * c}
+    return MotionRate(
+        ring,
+        rate,
+        lambda element: _factored(reduced(element)).subs(back),
+        reduced,
+        lambda element: sp.expand(element.as_expr().subs(back)),
+        changes,
+    )
 
 
 def at_start(motion: str, count: int, domain: Any = sp.QQ) -> MotionRate:
@@ -107,7 +132,7 @@ def at_start(motion: str, count: int, domain: Any = sp.QQ) -> MotionRate:
     for _ in range(count):
         rate.append([ring.from_expr(sp.expand(element.subs(TIME, 0))) for element in vector])
         vector = vector.diff(TIME)
-    return MotionRate(ring, rate, _factored)
+    return MotionRate(ring, rate, _factored, _unchanged, lambda element: sp.expand(element.as_expr()), {})
 
 
 def _polynomial(count: int, domain: Any) -> MotionRate:
@@ -116,9 +141,31 @@ def _polynomial(count: int, domain: Any) -> MotionRate:
     (_, rate, _) = MOTIONS["polynomial"].rate(TIME, *symbols)
     ring, *r = sp.ring([f"r{j}" for j in range(min(count, len(symbols)))], domain)  # the others are zero
     meant = {sp.Symbol(f"r{j}"): sp.diff(rate, TIME, j) for j in range(len(r))}
+    times = sp.ring([TIME, *symbols], domain)[0]
+    inserted = [times.from_expr(sp.expand(meaning)) for meaning in meant.values()]
+
+    def expanded(element: Any) -> sp.Expr:
+        total = times.zero
+        for exponents, number in element.terms():
+            term = times.ground_new(number)
+            for meaning, exponent in zip(inserted, exponents, strict=True):
+                term = term * meaning**exponent
+            total = total + term
+        # With rational numbers it is expanded already.
+        return total.as_expr() if domain == sp.QQ else sp.expand(total.as_expr())
+
     return MotionRate(
-        ring, [[ring.zero, one, ring.zero] for one in r], lambda element: _factored(element).subs(meant)
+        ring,
+        [[ring.zero, one, ring.zero] for one in r],
+        lambda element: _factored(element).subs(meant),
+        _unchanged,
+        expanded,
+        dict(zip(r, [*r[1:], ring.zero], strict=True)),
     )
+
+
+def _unchanged(element: Any) -> Any:
+    return element
 
 
 def _factored(element: Any) -> sp.Expr:

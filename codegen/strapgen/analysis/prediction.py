@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cache
 from typing import Any
 
 import mpmath
@@ -98,13 +99,32 @@ def predict(
     >>> round(float(mpmath.degrees(prediction.drift[-1][1])), 3)
     0.286
     """
-    rates = error_rate(choice, motion.name, terms)
+    transfers = transfers_of(error_rate(choice, motion.name, terms), motion)
+    return follow(choice, motion, transfers, step, duration, orthonormalize, record)
+
+
+def transfers_of(rates: ErrorRate, motion: Motion) -> Callable[[Fraction], Transfer]:
+    """Return the growth of the error by an error rate, for steps of any length, as `follow` takes it.
+
+    Parameters
+    ----------
+    rates : ErrorRate
+    motion : Motion
+        The motion of the error rate, with its parameters.
+
+    Returns
+    -------
+    callable
+    """
+    compiled = _compiled(rates)
 
     def transfer(h: Fraction) -> Transfer:
         settings = [mpmath.mpf(value) for value in motion.parameters.values()]
-        return (_turning if rates.steady else _about_an_axis)(rates, settings, exact.number(h))
+        if rates.steady:
+            return _turning(rates, compiled, settings, exact.number(h))
+        return _about_an_axis(compiled, settings, exact.number(h))
 
-    return follow(choice, motion, transfer, step, duration, orthonormalize, record)
+    return transfer
 
 
 def follow(
@@ -204,24 +224,29 @@ def parts_of() -> Callable[[Sequence[Any], Sequence[Any]], tuple[list[Any], list
     return split
 
 
-def _sum(rates: ErrorRate, matrices: dict[int, sp.Matrix], h: Any) -> Callable[..., Matrix]:
-    """Return the sum of a series as a function of the parameters of the motion and the time."""
+def _compiled(rates: ErrorRate) -> dict[int, Callable[..., Matrix]]:
+    """Return the error rate, or about a fixed axis its integral, as functions of the motion's parameters and time."""
     symbols = [*parameters(rates.motion), TIME]
-    functions = {power: sp.lambdify(symbols, matrix, "mpmath") for power, matrix in matrices.items()}
-
-    def value(*arguments: Any) -> Matrix:
-        total = mpmath.zeros(3)
-        for power, function in functions.items():
-            total += h**power * function(*arguments)
-        return total
-
-    return value
+    matrices = rates.matrices
+    if not rates.steady:
+        matrices = {power: antiderivative(matrix, rates) for power, matrix in matrices.items()}
+    return {power: sp.lambdify(symbols, matrix, "mpmath") for power, matrix in matrices.items()}
 
 
-def _turning(rates: ErrorRate, settings: list[Any], h: Any) -> Transfer:
+def _sum(compiled: dict[int, Callable[..., Matrix]], h: Any, arguments: list[Any]) -> Matrix:
+    """Return the sum of a series."""
+    total = mpmath.zeros(3)
+    for power, function in compiled.items():
+        total += h**power * function(*arguments)
+    return total
+
+
+def _turning(
+    rates: ErrorRate, compiled: dict[int, Callable[..., Matrix]], settings: list[Any], h: Any
+) -> Transfer:
     """Return the growth of the product between two times for a frame that turns at a constant rate."""
     axis = sp.lambdify(parameters(rates.motion), rotations.skew(rates.axis), "mpmath")(*settings)
-    whole = axis + _sum(rates, rates.matrices, h)(*settings, mpmath.mpf(0))
+    whole = axis + _sum(compiled, h, [*settings, mpmath.mpf(0)])
     spans: dict[Fraction, Matrix] = {}
 
     def transfer(begin: Fraction, end: Fraction) -> Matrix:
@@ -234,13 +259,15 @@ def _turning(rates: ErrorRate, settings: list[Any], h: Any) -> Transfer:
     return transfer
 
 
-def _about_an_axis(rates: ErrorRate, settings: list[Any], h: Any) -> Transfer:
+def _about_an_axis(compiled: dict[int, Callable[..., Matrix]], settings: list[Any], h: Any) -> Transfer:
     """Return the growth of the product between two times for a motion about a fixed axis."""
-    gained = {power: antiderivative(matrix, rates) for power, matrix in rates.matrices.items()}
-    value = _sum(rates, gained, h)
+
+    @cache
+    def gained(time: Fraction) -> Matrix:
+        return _sum(compiled, h, [*settings, exact.number(time)])
 
     def transfer(begin: Fraction, end: Fraction) -> Matrix:
-        return mpmath.expm(value(*settings, exact.number(end)) - value(*settings, exact.number(begin)))
+        return mpmath.expm(gained(end) - gained(begin))
 
     return transfer
 

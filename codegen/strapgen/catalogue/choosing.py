@@ -139,7 +139,7 @@ def choose_step(
         raise InputError(
             f"algorithm {name!r} is no attitude step; allowed: {some(_algorithms())}, or {_FILE}"
         )
-    if isinstance(name, str) and not name.endswith(".py"):
+    if isinstance(name, str) and name not in ALGORITHMS and not name.endswith(".py"):
         checks.choice("algorithm", name, _algorithms(), _FILE)
     return choose(name, method, increments, rates, previous)
 

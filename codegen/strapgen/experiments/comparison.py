@@ -20,7 +20,7 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.simulation.runs import attitude, drift_between, require_finite
 from strapgen.support import checks, stages
 from strapgen.support.exceptions import InputError, InputTypeError
-from strapgen.toolchain import compiler
+from strapgen.toolchain.code_size import code_size
 
 Array = NDArray[np.float64]
 
@@ -190,7 +190,7 @@ def _compared(
         bound(steps),
         math.degrees(float(np.linalg.norm(np.abs(drifts).max(axis=0)))),
         seconds / max(1, steps) * 1e9,
-        compiler.code_size(candidate.sources),
+        code_size(candidate.sources),
         candidate.sources.operations,
         AngleHistory(angles, _bounds(bound, steps)),
     )

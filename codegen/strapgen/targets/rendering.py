@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from functools import cache
 from pathlib import Path
-from typing import Any
-
-import jinja2
+from typing import TYPE_CHECKING, Any
 
 from strapgen.support import resources
 from strapgen.targets import contract
 from strapgen.targets.contract import elements_text, operations_text, range_text
 from strapgen.targets.lines import fill, fill_arguments
+
+if TYPE_CHECKING:
+    import jinja2
 
 #: First parameters of the loop over runs and steps, in every type of number.
 PROPAGATE = ("size_t runs", "size_t steps", "size_t record_every", "size_t orthonormalize_every")
@@ -31,6 +32,8 @@ def environment(folder: Path | None = None) -> jinja2.Environment:
     jinja2.Environment
         With the filters that the templates of all targets share; an undefined name is an error.
     """
+    import jinja2  # what only reads sources from the cache does without it
+
     shared = jinja2.Environment(
         loader=jinja2.FileSystemLoader(folder or resources.folder("templates")),
         undefined=jinja2.StrictUndefined,

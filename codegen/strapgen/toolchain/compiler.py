@@ -13,13 +13,11 @@ import importlib.util
 import json
 import os
 import platform
-import re
 import shlex
 import shutil
 import subprocess
 import sys
 import sysconfig
-import tempfile
 import threading
 from collections.abc import Iterable, Sequence
 from functools import partial
@@ -46,6 +44,7 @@ _UNOPTIMIZED = '#if defined(__GNUC__) && !defined(__clang__)\n#pragma GCC optimi
 
 #: Kind of cache entry that says in which module of many a source was compiled.
 _SHARED = "shared"
+
 
 _loaded: dict[str, Any] = {}
 _modules: dict[Path, Any] = {}
@@ -91,7 +90,7 @@ def compile_together(many: Iterable[Sources]) -> None:
     missing: dict[str, Sources] = {}
     for sources in many:
         if _language(sources) == "C":
-            key = _key([sources])
+            key = build_key([sources])
             if _shared(key) is None and cache.lookup("builds", key) is None:
                 missing[key] = sources
     for group in _groups(missing):
@@ -99,7 +98,7 @@ def compile_together(many: Iterable[Sources]) -> None:
             for key, sources in group.items():
                 _alone(sources, key)
             continue
-        together = _key(group.values())
+        together = build_key(group.values())
         name = f"strapgen_{together}"
         folder = _build(list(group.values()), name, together)
         pointer = json.dumps({"name": name, "build": folder.name})
@@ -167,7 +166,7 @@ def compiler() -> str:
     CompilerError
         If there is no such program.
     """
-    chosen = _chosen_compiler() or "cc"
+    chosen = chosen_compiler() or "cc"
     try:
         command = shlex.split(chosen)[0]
     except ValueError:  # a quotation mark that is not closed
@@ -180,12 +179,13 @@ def compiler() -> str:
     return path
 
 
-def _chosen_compiler() -> str:
+def chosen_compiler() -> str:
+    """Return the command of $CC; "" if it is not set."""
     return os.environ.get("CC", "").strip()
 
 
 def _compiled(sources: Sources) -> Any:
-    key = _key([sources])
+    key = build_key([sources])
     file = _shared(key) or _alone(sources, key)
     if file not in _modules:
         _modules[file] = _import_file(file)
@@ -207,17 +207,17 @@ def _import_file(file: Path) -> ModuleType:
     return module
 
 
-def _key(many: Iterable[Sources]) -> str:
+def build_key(many: Iterable[Sources], flags: Sequence[str] | None = None) -> str:
     """Return the key of a build: compiling with another compiler, or for another Python, makes another entry."""
     executable = Path(compiler()).resolve()
     stat = executable.stat()
     return cache.digest(
         [
             *(part for sources in many for part in (*sources.files, *sources.files.values())),
-            *_flags,
+            *(_flags if flags is None else flags),
             _VISIBILITY,
             _UNOPTIMIZED,
-            _chosen_compiler(),
+            chosen_compiler(),
             f"{executable} {stat.st_size} {stat.st_mtime_ns}",
             f"{platform.machine()} {sys.platform} {sysconfig.get_config_var('SOABI')}",
             _cffi_version(),
@@ -234,40 +234,6 @@ def _build(many: Sequence[Sources], name: str, key: str) -> Path:
             _compile(many, name, compiler(), draft)
 
     return cache.entry("builds", key, fill, f"compiled {kernels}")
-
-
-def code_size(sources: Sources) -> int | None:
-    """Return the size in bytes of the code and constants of a compiled C source; None if it cannot be determined.
-
-    Parameters
-    ----------
-    sources : Sources
-        Sources of any target; those of Python have no object code.
-
-    Returns
-    -------
-    int or None
-
-    Raises
-    ------
-    CompilerError
-        If there is no C compiler.
-    """
-    if not any(name.endswith(".c") for name in sources.files):
-        return None
-    path, counter = compiler(), shutil.which("size")
-    if counter is None:
-        return None
-    with tempfile.TemporaryDirectory() as folder:
-        for name, text in sources.files.items():
-            (Path(folder) / name).write_text(text)
-        code = next(name for name in sources.files if name.endswith(".c"))
-        command = [*shlex.split(_chosen_compiler() or path), *C_FLAGS, "-c", code, "-o", "code.o"]
-        if subprocess.run(command, cwd=folder, capture_output=True, check=False).returncode:
-            return None
-        said = subprocess.run([counter, "code.o"], cwd=folder, capture_output=True, text=True, check=False)
-    match = re.match(r"\s*(\d+)\s", said.stdout.partition("\n")[2])
-    return int(match[1]) if match else None
 
 
 def _cffi_version() -> str:
@@ -299,7 +265,7 @@ def _compile(many: Sequence[Sources], name: str, path: str, draft: Path) -> None
         k: v for k, v in os.environ.items() if k not in ("CFLAGS", "CPPFLAGS", "LDFLAGS", "LDSHARED")
     }
     with _one_at_a_time:
-        answer = _service().ask(request | {"environment": environment | {"CC": _chosen_compiler() or path}})
+        answer = _service().ask(request | {"environment": environment | {"CC": chosen_compiler() or path}})
     built = Path(answer["path"] or draft)
     if not built.is_file():
         said = answer["said"].splitlines()

@@ -231,12 +231,13 @@ def true_forms(kind: str, endless: bool) -> dict[Pair, Form]:
     -------
     dict of (str, str) to Form
     """
-    t, omega = sp.Symbol("t", positive=True), sp.Symbol("omega", positive=True)
-    # beta or u over its amplitude is exp(j omega t) - 1, w or a is its derivative; the conjugate of the latter:
-    rate = -sp.I * omega * sp.exp(-sp.I * omega * t)
-    mean = sp.expand(sp.integrate(sp.expand((sp.exp(sp.I * omega * t) - 1) * rate), (t, 0, T_M)) / T_M)
-    if endless:
-        mean = sp.limit(mean.subs(sp.exp(-sp.I * omega * T_M), 0), T_M, sp.oo)
+    omega = sp.Symbol("omega", positive=True)
+    # beta or u over its amplitude is exp(j omega t) - 1, and w or a is its derivative. The mean of their product with
+    # one conjugated is (1/T_m) integral_0^T_m (exp(j omega t) - 1) (-j omega) exp(-j omega t) dt
+    # = -j omega + (1 - exp(-j omega T_m))/T_m, whose second part is lost in a very long time.
+    mean = -sp.I * omega
+    if not endless:
+        mean += (1 - sp.exp(-sp.I * omega * T_M)) / T_M
     half = sp.Rational(1, 2)  # of the mean over the phase
     turned = half * mean, half * sp.conjugate(mean)
     parts: Mapping[Pair, Any]

@@ -239,11 +239,12 @@ def vibration(
     )
 
 
-def _check_known(algorithm: str, names: tuple[str, ...], installed: tuple[str, ...]) -> None:
+def _check_known(algorithm: str, names: tuple[str, ...]) -> None:
     """Check that an algorithm is one that can be assessed: a name, or a user's."""
     from strapgen import catalogue
+    from strapgen.catalogue.user import loading
 
-    if algorithm in (*names, *installed) or algorithm.endswith(".py"):
+    if algorithm in names or algorithm.endswith(".py") or algorithm in loading.installed():
         return
     if algorithm not in catalogue.RESERVED:
         checks.choice("algorithm", algorithm, names, "a Python file")
@@ -254,11 +255,10 @@ def _check_known(algorithm: str, names: tuple[str, ...], installed: tuple[str, .
 
 def _assessed(algorithm: str, method: MethodOptions, source: VibrationSource) -> list[AssessedCase]:
     """Return a case for each quantity of an algorithm that the options ask for."""
-    from strapgen.catalogue.user import loading
     from strapgen.reports.vibration import AssessedCase
     from strapgen.vibration import assessment, systems
 
-    _check_known(algorithm, (*systems.NAMES, _TWO_SPEED), tuple(loading.installed()))
+    _check_known(algorithm, (*systems.NAMES, _TWO_SPEED))
     if algorithm == _TWO_SPEED:
         cycles = _cycles(algorithm, method, "is in two speeds")
         _check_plain(algorithm, method)
