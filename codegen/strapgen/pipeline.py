@@ -158,7 +158,7 @@ def generate(program: Program | FixedProgram, target: str, settings: Settings | 
 
     Examples
     --------
-    >>> sorted(generate(lower(derive("euler")), "c").files)
+    >>> sorted(generate(lower(derive("euler")), "c").step_files)
     ['euler_rk4_2.c', 'euler_rk4_2.h']
     """
     stages.require("generate", program, Program, FixedProgram)

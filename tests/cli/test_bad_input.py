@@ -351,6 +351,8 @@ BAD = {
     "generate euler --format csv": "format 'csv' is not known",
     "generate euler --check": "--check goes with --all",
     "generate --check": "--check goes with --all",
+    "generate euler --with-runs": "--with-runs goes with targets in C, not with numpy",
+    "generate --all --with-runs": "--with-runs does not go with it",
     "generate euler --all": "an algorithm does not go with it",
     "generate --all --method rk4": "--method does not go with it",
     "generate --all --increments 2": "--increments does not go with it",

@@ -467,7 +467,8 @@ def test_every_kernel_can_be_shown(kernel, strapgen_says):
 @pytest.mark.parametrize("target", TARGETS)
 def test_generate_json(target, strapgen_says, tmp_path):
     command = f"generate cayley-klein --method rk3 --increments 2 --target {target} --out out --format json"
-    data = json.loads(strapgen_says(command))
+    with_runs = target in ("c", "c-fixed")
+    data = json.loads(strapgen_says(command + " --with-runs" * with_runs))
     assert list(data)[:5] == ["kernel", "target", "files", "operations", "temporaries"]
     assert (data["kernel"], data["target"]) == ("cayley-klein-rk3-2", target)
     assert list(data["operations"]) == ["add", "multiply", "divide", "sqrt"]
@@ -477,8 +478,10 @@ def test_generate_json(target, strapgen_says, tmp_path):
     assert data["temporaries"] == counted.temporaries
     assert set(data) >= {"formats", "ranges", "error_bound"} if TARGETS[target].fixed else len(data) == 5
     sources = pipeline.generate(program, target)
-    assert data["files"] == [str(Path("out") / name) for name in sources.step_files]
-    assert {path.name: path.read_text() for path in (tmp_path / "out").iterdir()} == sources.files
+    files = sources.files if with_runs else sources.step_files
+    assert len(files) == (4 if with_runs else 2 if target == "c-float" else 1)
+    assert data["files"] == [str(Path("out") / name) for name in files]
+    assert {path.name: path.read_text() for path in (tmp_path / "out").iterdir()} == files
 
 
 def test_generate_fixed_point_json(strapgen_says):

@@ -71,7 +71,7 @@ def generate(
     if check and not all_:
         raise InputError("--check goes with --all")
     if all_:
-        _check_alone(algorithm, method, target, fixed)
+        _check_alone(algorithm, method, target, fixed, with_runs)
         _generate_all(out, check, format)
         return
     if algorithm is None:
@@ -88,14 +88,14 @@ def generate(
         raise InputError(
             f"the options of fixed point go with --target {' or '.join(fixed_targets())}, not with {target}"
         )
+    if with_runs and not TARGETS[target].compiled:
+        raise InputError(f"--with-runs goes with targets in C, not with {target}")
     _check_increments(choice, fixed)
     sources = generated_sources.sources(choice, target, settings)
     if fixed.carry not in (None, "none") and sources.fixed is not None and not sources.fixed.residuals:
         raise InputError(
             f"kernel {choice.kernel} rounds no state that goes on to the next step; --carry keeps nothing"
         )
-    if with_runs and not sources.runs:
-        raise InputError(f"--with-runs goes with targets of C; {target} has its loops in the one file")
     written = write_files(out or Path(), sources.files if with_runs else sources.step_files)
     if format == "json":
         print_json(_data(choice, sources, target, written))
@@ -104,7 +104,7 @@ def generate(
 
 
 def _check_alone(
-    algorithm: str | None, method: MethodOptions, target: str | None, fixed: FixedOptions
+    algorithm: str | None, method: MethodOptions, target: str | None, fixed: FixedOptions, with_runs: bool
 ) -> None:
     """Refuse options that do not go with --all."""
     for name, value in (
@@ -116,6 +116,7 @@ def _check_alone(
         ("--rates", method.rates or None),
         ("--target", target),
         ("a fixed-point option", fixed.stated or None),
+        ("--with-runs", with_runs or None),
     ):
         if value is not None:
             raise InputError(f"--all generates the whole catalogue; {name} does not go with it")
