@@ -97,17 +97,17 @@ def candidates(folder: Path) -> list[Candidate]:
     program = strapgen.lower(strapgen.derive("euler", "rk4", 2))
     sources = strapgen.generate(program, "c")
     (folder / "double").mkdir()
-    text = "\n".join(sources.files.values()).replace(f'#include "{sources.function.name}.h"', "")
-    text += _ADAPTOR.format(word="double", call=f"{sources.function.name}_one_(e, d, next);\n    return 0")
+    text = "\n".join(sources.step_files.values()).replace(f'#include "{sources.function.name}.h"', "")
+    text += _ADAPTOR.format(word="double", call=f"{sources.function.name}(e, d, next);\n    return 0")
     made.append(candidate("double, strapgen", compiled(folder / "plain", text), increments, start, none))
     for word in (32, 16):
         for carry in ("none", "state", "full"):
             fixed = strapgen.quantize(program, Settings(word, LARGEST, carry=carry))
             sources = strapgen.generate(fixed, "c-fixed")
-            text = "\n".join(sources.files.values()).replace(f'#include "{sources.function.name}.h"', "")
+            text = "\n".join(sources.step_files.values()).replace(f'#include "{sources.function.name}.h"', "")
             kept = f"(uint{word}_t *)kept, " if carry != "none" else ""
             text += _ADAPTOR.format(
-                word=f"int{word}_t", call=f"return {sources.function.name}_one_(e, d, {kept}next)"
+                word=f"int{word}_t", call=f"return {sources.function.name}(e, d, {kept}next)"
             )
             given, held = fixed.interface.inputs[1], fixed.interface.inputs[0]
             integers = np.rint(np.ldexp(increments, given.format.fraction)).astype(f"int{word}")

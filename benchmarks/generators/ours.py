@@ -13,10 +13,11 @@ from generators import Case
 LANGUAGE = "c"
 
 _ADAPTOR = """#include "{name}.c"
+#include "{name}_runs.c"
 #define HAS_LOOPS
 static inline void step(const double *state, const double *samples, double *next)
 {{
-    {name}_one_(state, samples, next);
+    {name}(state, samples, next);
 }}
 static inline void loop(size_t steps, const double *samples, const double *state, double *history)
 {{

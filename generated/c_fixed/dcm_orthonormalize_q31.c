@@ -30,7 +30,7 @@ static __attribute__((noinline)) int64_t dcm_orthonormalize_q31_mul_(int32_t a, 
 #else
 static inline int64_t dcm_orthonormalize_q31_mul_(int32_t a, int32_t b)
 {
-    return (int64_t)a * b;
+    return (int64_t)a * (int64_t)b;
 }
 #endif
 

@@ -502,7 +502,7 @@ def sources(name: str, word: int) -> Any:
 @pytest.mark.parametrize("name", [*CASES, *MOTIONS, "dcm-orthonormalize-optimal"])
 def test_c_compiles_without_a_warning(name, word, tmp_path):
     gcc = shutil.which("gcc") or pytest.skip("gcc is not on this machine")
-    for file, text in sources(name, word).files.items():
+    for file, text in sources(name, word).step_files.items():
         (tmp_path / file).write_text(text)
     files = sorted(map(str, tmp_path.glob("*.c")))
     done = subprocess.run([gcc, *STRICT, "-c", "-o", "/dev/null", *files], capture_output=True, text=True)
@@ -543,7 +543,7 @@ int main(void)
 def test_c_has_no_undefined_behaviour(name, word, tmp_path):
     gcc = shutil.which("gcc") or pytest.skip("gcc is not on this machine")
     made = sources(name, word)
-    for file, text in made.files.items():
+    for file, text in made.step_files.items():
         (tmp_path / file).write_text(text)
     inputs, results = made.fixed.inputs, made.fixed.outputs
     arguments = [f"in[{k}]" for k in range(len(inputs))] + [f"out[{k}]" for k in range(len(results))]

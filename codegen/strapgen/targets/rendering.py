@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -82,6 +83,14 @@ def render_c(folder: str, name: str, **values: Any) -> dict[str, str]:
         zip(runs_of(name), ("runs.h", "runs.c"), strict=True)
     )
     return {file: render(f"{folder}/{template}.j2", name=name, **values) for file, template in files.items()}
+
+
+@cache
+def words_of_runs(folder: str) -> frozenset[str]:
+    """Return the words in the template of the loops of a folder: the names of its variables among them."""
+    loader = environment().loader
+    assert loader is not None
+    return frozenset(re.findall(r"\w+", loader.get_source(environment(), f"{folder}/runs.c.j2")[0]))
 
 
 def runs_of(name: str) -> tuple[str, str]:

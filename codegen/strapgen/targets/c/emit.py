@@ -14,7 +14,8 @@ from strapgen.targets.lines import fill_expression
 from strapgen.targets.names import C, external, printed
 from strapgen.targets.printer import Printer
 from strapgen.targets.registry import TARGETS
-from strapgen.targets.rendering import PROPAGATE, render_c, runs_of
+from strapgen.targets.renaming import keys
+from strapgen.targets.rendering import PROPAGATE, render_c, runs_of, words_of_runs
 
 
 @dataclass(frozen=True)
@@ -108,7 +109,8 @@ def emit(program: Program, target: str) -> Sources:
         ``<name>_propagate`` there too, the loop over runs and steps.
     """
     real = real_of(target)
-    name = external(program.name, real.infix)
+    local = words_of_runs("c") | {key.name for key in keys(program) if key.kind != "function"}
+    name = external(program.name, real.infix, local)
     # A scalar input has one name, which is that of its argument and of its element.
     scalars = [signal.name for signal in program.inputs if not signal.shape]
     _, files = printed(program, lambda named, _: _files(named, name, target), C, scalars)

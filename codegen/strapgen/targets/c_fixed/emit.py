@@ -10,7 +10,8 @@ from strapgen.ir.sources import Function, Sources
 from strapgen.targets.c_fixed.statements import StatementPrinter
 from strapgen.targets.c_fixed.words import WORDS
 from strapgen.targets.names import C, external, printed
-from strapgen.targets.rendering import PROPAGATE, render_c, runs_of
+from strapgen.targets.renaming import keys
+from strapgen.targets.rendering import PROPAGATE, render_c, runs_of, words_of_runs
 
 
 def emit(fixed: FixedProgram, target: str) -> Sources:
@@ -29,7 +30,9 @@ def emit(fixed: FixedProgram, target: str) -> Sources:
         Two files with the function ``<name>`` on one sample, and two with ``<name>_array`` on many; a step has
         ``<name>_propagate`` there too, the loop over runs and steps.
     """
-    interface, name = fixed.interface, external(fixed.program.name, f"_q{fixed.word - 1}")
+    interface = fixed.interface
+    local = words_of_runs("c_fixed") | {key.name for key in keys(fixed) if key.kind != "function"}
+    name = external(fixed.program.name, f"_q{fixed.word - 1}", local)
     arguments = (*interface.inputs, *interface.outputs)
     scalars = [argument.signal.name for argument in arguments if not argument.signal.shape]
     _, files = printed(fixed, lambda named, _: _files(named, name, target), C, scalars)

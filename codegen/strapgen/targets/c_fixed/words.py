@@ -37,7 +37,7 @@ class Word:
 
 
 WORDS = {
-    16: Word(16, "int16_t", "uint16_t", "int_fast16_t", "int32_t", "uint32_t", "uint_fast16_t"),
+    16: Word(16, "int16_t", "uint16_t", "int", "int32_t", "uint32_t", "unsigned int"),
     32: Word(32, "int32_t", "uint32_t", "int32_t", "int64_t", "uint64_t", "uint32_t"),
     64: Word(64, "int64_t", "uint64_t", "int64_t", "{}_wide_", "{}_magnitude_", "uint64_t"),
 }
