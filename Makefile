@@ -8,7 +8,7 @@ TOOLS := .venv/.ready-to-test
 BENCH := .venv-bench/.ready
 
 .PHONY: help demo test test-long test-modules mutants check bench generate clean \
-  check-generated check-style check-layout check-types
+  check-generated check-style check-layout check-types firmware-tools
 
 help:
 	@echo "make demo      set up, then a short tour: formulas, their C, a table on every back end"
@@ -19,6 +19,7 @@ help:
 	@echo "make check     generated code in step, ruff, mypy"
 	@echo "make bench     measure against other code generators, and the back ends; about a quarter of an hour"
 	@echo "make generate  rebuild generated/"
+	@echo "make firmware-tools  on Debian: cross compilers and QEMU, for strapgen cost and its tests"
 	@echo "make clean     remove .venv and what tools left behind"
 
 $(READY): pyproject.toml
@@ -51,6 +52,13 @@ demo: $(READY)
 	@echo "  strapgen --help    all commands, each with an example in its own --help"
 	@echo "  strapgen tables    all five tables"
 	@echo "docs/command-line.md shows all commands; docs/README.md answers questions."
+
+FIRMWARE := gcc-arm-none-eabi picolibc-arm-none-eabi qemu-system-arm gcc-riscv64-unknown-elf \
+  picolibc-riscv64-unknown-elf qemu-system-misc gcc-avr avr-libc clang
+
+firmware-tools:
+	apt-get update -qq
+	apt-get install -y -qq --no-install-recommends $(FIRMWARE)
 
 test: $(TOOLS)
 	$(BIN)/python -m pytest -n auto --dist worksteal -m "not long"

@@ -15,6 +15,7 @@ from strapgen.cli.commands import (
     compare,
     coning,
     converge,
+    cost,
     derive,
     generate,
     listing,
@@ -48,6 +49,7 @@ COMMANDS: dict[str, dict[str, Any]] = {
         "stability": stability.stability,
         "converge": converge.converge,
         "check": check.check,
+        "cost": cost.cost,
     },
     "Reproduce": {"tables": tables.tables, "rate-table": rate_table.rate_table, "study": study.app},
 }

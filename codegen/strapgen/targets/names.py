@@ -10,7 +10,7 @@ from __future__ import annotations
 import keyword
 import re
 import symtable
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import count
 from typing import TypeVar
@@ -140,7 +140,7 @@ def _marked(name: str) -> str:
     return marked if len(longest) > _MOST else name
 
 
-def external(name: str, ending: str = "", local: Collection[str] = ()) -> str:
+def external(name: str, ending: str = "") -> str:
     """Return the name of a kernel's function in C: shortened if too long, changed if a library or a keyword has it.
 
     A name that has a short word itself, and could be what a longer name is shortened to, is marked.
@@ -151,8 +151,6 @@ def external(name: str, ending: str = "", local: Collection[str] = ()) -> str:
         Name of the kernel, with underscores.
     ending : str, optional
         What the target puts behind it.
-    local : collection of str, optional
-        Names that variables have where the function is called; the function's must be another.
 
     Examples
     --------
@@ -166,7 +164,7 @@ def external(name: str, ending: str = "", local: Collection[str] = ()) -> str:
         if len(name) > _MOST:
             name = _replaced(name, word, short)
     name += ending
-    free = _c_allows(name) and name not in LIBRARY and name not in local and not name.endswith("_t")
+    free = _c_allows(name) and name not in LIBRARY and not name.endswith("_t")
     return name if free else f"{name}_Kernel"  # a capital letter stands in no other kernel's name
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import re
+from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -85,12 +85,18 @@ def render_c(folder: str, name: str, **values: Any) -> dict[str, str]:
     return {file: render(f"{folder}/{template}.j2", name=name, **values) for file, template in files.items()}
 
 
-@cache
-def words_of_runs(folder: str) -> frozenset[str]:
-    """Return the words in the template of the loops of a folder: the names of its variables among them."""
-    loader = environment().loader
-    assert loader is not None
-    return frozenset(re.findall(r"\w+", loader.get_source(environment(), f"{folder}/runs.c.j2")[0]))
+def own_call(parameters: Iterable[str], function: str) -> dict[str, str]:
+    """Return parameters under names that no kernel has, and a call with them, as C text.
+
+    Loops call a function so, since one of their variables may have the function's name.
+    """
+    kinds = [parameter.rpartition(" ")[0] + " *" * parameter.endswith("]") for parameter in parameters]
+    names = [f"a{number}_" for number in range(len(kinds))]
+    declared = [
+        f"{kind}{name}" if kind.endswith("*") else f"{kind} {name}"
+        for kind, name in zip(kinds, names, strict=True)
+    ]
+    return {"parameters": ", ".join(declared), "call": f"{function}({', '.join(names)})"}
 
 
 def runs_of(name: str) -> tuple[str, str]:

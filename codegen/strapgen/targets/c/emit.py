@@ -14,8 +14,7 @@ from strapgen.targets.lines import fill_expression
 from strapgen.targets.names import C, external, printed
 from strapgen.targets.printer import Printer
 from strapgen.targets.registry import TARGETS
-from strapgen.targets.renaming import keys
-from strapgen.targets.rendering import PROPAGATE, render_c, runs_of, words_of_runs
+from strapgen.targets.rendering import PROPAGATE, own_call, render_c, runs_of
 
 
 @dataclass(frozen=True)
@@ -109,8 +108,7 @@ def emit(program: Program, target: str) -> Sources:
         ``<name>_propagate`` there too, the loop over runs and steps.
     """
     real = real_of(target)
-    local = words_of_runs("c") | {key.name for key in keys(program) if key.kind != "function"}
-    name = external(program.name, real.infix, local)
+    name = external(program.name, real.infix)
     # A scalar input has one name, which is that of its argument and of its element.
     scalars = [signal.name for signal in program.inputs if not signal.shape]
     _, files = printed(program, lambda named, _: _files(named, name, target), C, scalars)
@@ -141,7 +139,8 @@ def _files(program: Program, name: str, target: str) -> dict[str, str]:
         "state": program.inputs[0],
         "samples": program.inputs[-1],
         "result": program.outputs[0].signal,
-        "parameters": _parameters(program, real),
+        "parameters": ", ".join(_parameters(program, real)),
+        "own": own_call(_parameters(program, real), name),
         "propagate_parameters": ", ".join(
             [
                 *PROPAGATE,
@@ -229,13 +228,13 @@ def _loop(program: Program, printer: CPrinter) -> dict[str, object]:
     }
 
 
-def _parameters(program: Program, real: Real) -> str:
+def _parameters(program: Program, real: Real) -> list[str]:
     inputs = [
         f"const {real.name} {s.name}[{s.size}]" if s.shape else f"{real.name} {s.name}"
         for s in program.inputs
     ]
     outputs = [f"{real.name} {r.signal.name}[{r.signal.size}]" for r in program.outputs]
-    return ", ".join(inputs + outputs)
+    return inputs + outputs
 
 
 def _arrays(program: Program, real: Real) -> str:

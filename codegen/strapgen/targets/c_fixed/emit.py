@@ -10,8 +10,7 @@ from strapgen.ir.sources import Function, Sources
 from strapgen.targets.c_fixed.statements import StatementPrinter
 from strapgen.targets.c_fixed.words import WORDS
 from strapgen.targets.names import C, external, printed
-from strapgen.targets.renaming import keys
-from strapgen.targets.rendering import PROPAGATE, render_c, runs_of, words_of_runs
+from strapgen.targets.rendering import PROPAGATE, own_call, render_c, runs_of
 
 
 def emit(fixed: FixedProgram, target: str) -> Sources:
@@ -31,8 +30,7 @@ def emit(fixed: FixedProgram, target: str) -> Sources:
         ``<name>_propagate`` there too, the loop over runs and steps.
     """
     interface = fixed.interface
-    local = words_of_runs("c_fixed") | {key.name for key in keys(fixed) if key.kind != "function"}
-    name = external(fixed.program.name, f"_q{fixed.word - 1}", local)
+    name = external(fixed.program.name, f"_q{fixed.word - 1}")
     arguments = (*interface.inputs, *interface.outputs)
     scalars = [argument.signal.name for argument in arguments if not argument.signal.shape]
     _, files = printed(fixed, lambda named, _: _files(named, name, target), C, scalars)
@@ -78,6 +76,7 @@ def _files(fixed: FixedProgram, name: str, target: str) -> dict[str, str]:
         "samples": interface.inputs[-1].signal,
         "residuals": feedback_words,
         "parameters": ", ".join(pieces),
+        "own": own_call(pieces, name),
         "propagate_parameters": ", ".join(
             [
                 *PROPAGATE,

@@ -1,0 +1,210 @@
+"""Measures what generated C costs on a microcontroller: instructions, memory, and instructions executed in a call."""
+
+from __future__ import annotations
+
+import math
+import re
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from strapgen.ir.signals import Signal
+from strapgen.ir.sources import Sources
+from strapgen.support import checks
+from strapgen.support.exceptions import CompilerError, InputError
+from strapgen.targets import TARGETS
+from strapgen.toolchain import emulation
+from strapgen.toolchain.processors import PROCESSORS, Processor
+
+#: Flags of the compiler beside those of the processor.
+FLAGS = ("-std=c99", "-O2", "-ffreestanding", "-ffp-contract=off")
+_MULTIPLICATION = re.compile(r"f?mul\w*|ml[as]|[su]ml?a?[ls]?\w*l|[su]mul\w*|smm\w*")
+#: Part of its range that an argument of a measured call has.
+_PART = 3
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What a kernel costs on a processor.
+
+    Parameters
+    ----------
+    kernel, cpu : str
+    instructions : int
+        Instructions of the object code.
+    executed : int or None
+        Instructions from the entry of the function to its return, for input inside its range; None without emulator.
+    multiplications : int
+        Those of the instructions that multiply.
+    code_bytes, constant_bytes : int
+    stack_bytes : int
+        Stack of the function and of the deepest of the file's own functions that it calls, in bytes.
+    compiler : str
+        Compiler and version.
+    """
+
+    kernel: str
+    cpu: str
+    instructions: int
+    executed: int | None
+    multiplications: int
+    code_bytes: int
+    constant_bytes: int
+    stack_bytes: int
+    compiler: str
+
+
+def processors(cross: str | None = None, cpus: Sequence[str] = ()) -> list[str]:
+    """Return the names of the processors that are asked for, or of all whose compiler is installed.
+
+    Parameters
+    ----------
+    cross : str, optional
+        A cross compiler; by default all.
+    cpus : sequence of str, optional
+        Names from `PROCESSORS`; by default all.
+
+    Raises
+    ------
+    InputError
+        If a processor is not known, another compiler compiles for it, or its compiler is not installed.
+    """
+    for cpu in cpus:
+        checks.choice("cpu", cpu, PROCESSORS)
+    if cross is not None:
+        checks.choice("cross compiler", cross, dict.fromkeys(p.compiler for p in PROCESSORS.values()))
+    names = [name for name in cpus or PROCESSORS if cross in (None, PROCESSORS[name].compiler)]
+    if cpus and len(names) < len(cpus):
+        other = next(name for name in cpus if name not in names)
+        raise InputError(f"{cross} does not compile for {other}; {PROCESSORS[other].compiler} does")
+    present = [name for name in names if shutil.which(PROCESSORS[name].compiler)]
+    if not present or (cpus and present != names):
+        needed = ", ".join(dict.fromkeys(PROCESSORS[name].compiler for name in names))
+        raise InputError(f"no cross compiler for {', '.join(names)}: install {needed}")
+    return present
+
+
+def cost(sources: Sources, cpu: str) -> Cost:
+    """Compile the files of a step for a processor and measure them.
+
+    Parameters
+    ----------
+    sources : Sources
+        Of a target in C.
+    cpu : str
+        A key of `PROCESSORS`.
+
+    Returns
+    -------
+    Cost
+
+    Raises
+    ------
+    InputError
+        If the sources are not in C.
+    CompilerError
+        If the cross compiler or the emulator fails.
+    """
+    if not TARGETS[sources.target].compiled:
+        raise InputError(f"sources for {sources.target} are not in C, which cost measures")
+    processor = PROCESSORS[cpu]
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for file, text in sources.step_files.items():
+            (folder / file).write_text(text)
+        source = folder / next(file for file in sources.step_files if file.endswith(".c"))
+        flags = [*FLAGS, *_library(processor)]
+        _run(
+            processor,
+            [processor.compiler, *processor.flags, *flags, "-fstack-usage", "-c", source.name],
+            folder,
+        )
+        binary = f"{source.stem}.o"
+        listing = _run(processor, [processor.tool("objdump"), "-d", "--no-show-raw-insn", binary], folder)
+        mnemonics = re.findall(r"^\s+[0-9a-f]+:\s+([a-z][\w.]*)", listing, flags=re.MULTILINE)
+        sizes = _run(processor, [processor.tool("size"), "-A", binary], folder)
+        return Cost(
+            sources.kernel,
+            cpu,
+            len(mnemonics),
+            emulation.executed(processor, flags, source, sources.function.name, *_call(sources)),
+            sum(bool(_MULTIPLICATION.fullmatch(word.partition(".")[0])) for word in mnemonics),
+            _section_bytes(sizes, ".text"),
+            _section_bytes(sizes, ".rodata"),
+            _stack(folder / f"{source.stem}.su", sources.function.name),
+            _version(processor, folder),
+        )
+
+
+def _library(processor: Processor) -> list[str]:
+    """Return the flags that find the headers of a C library, if there is one for the processor."""
+    command = [processor.compiler, "-print-file-name=picolibc.specs"]
+    place = subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip()
+    return ["--specs=picolibc.specs"] if Path(place).is_absolute() else []
+
+
+def _run(processor: Processor, command: Sequence[str], folder: Path) -> str:
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    if done.returncode:
+        errors = [line for line in done.stderr.splitlines() if "error" in line] or [done.stderr.strip()]
+        raise CompilerError(f"{command[0]} failed: {errors[0]}")
+    return done.stdout
+
+
+def _version(processor: Processor, folder: Path) -> str:
+    said = _run(processor, [processor.compiler, "--version"], folder)
+    match = re.match(r".*\) (\S+)", said)
+    return f"{processor.compiler} {match[1]}" if match else processor.compiler
+
+
+def _section_bytes(sizes: str, section: str) -> int:
+    """Return the bytes of a section and of its parts."""
+    rows = re.findall(rf"^{re.escape(section)}(?:\.\S*)?\s+(\d+)", sizes, flags=re.MULTILINE)
+    return sum(map(int, rows))
+
+
+def _stack(usage: Path, function: str) -> int:
+    """Return the stack of a function and the deepest of the others in its file, which it calls."""
+    rows = [line.split("\t") for line in usage.read_text().splitlines()]
+    depths = {row[0].rpartition(":")[2]: int(row[1]) for row in rows}
+    depth = depths.pop(function)
+    return depth + max(depths.values(), default=0)
+
+
+def _call(sources: Sources) -> tuple[str, str]:
+    """Return declarations of arguments inside their ranges, and a call with them, as C text."""
+    lines = [f'#include "{sources.function.name}.h"']
+    names = []
+    fixed = {} if sources.fixed is None else {a.signal.name: a for a in sources.fixed.inputs}
+    word = 0 if sources.fixed is None else sources.fixed.settings.word
+    kind = f"int{word}_t" if word else TARGETS[sources.target].number
+    for number, signal in enumerate(sources.function.inputs):
+        values = _values(signal)
+        if fixed:
+            argument = fixed[signal.name]
+            scaled = [round(value * 2.0**argument.format.fraction) for value in values]
+            values = [max(argument.low, min(argument.high, integer)) for integer in scaled]
+        text = ", ".join(map(str, values))
+        lines.append(f"{kind} argument_{number}[{signal.size}] = {{{text}}};")
+        names.append(f"argument_{number}" + ("" if signal.shape or fixed else "[0]"))
+    if sources.fixed is not None and sources.fixed.residuals:
+        fresh = ", ".join(f"{feedback.fresh}u" for feedback in sources.fixed.residuals)
+        lines.append(f"uint{word}_t feedback[{len(sources.fixed.residuals)}] = {{{fresh}}};")
+        names.append("feedback")
+    for number, signal in enumerate(sources.function.outputs):
+        lines.append(f"{kind} result_{number}[{signal.size}];")
+        names.append(f"result_{number}")
+    return "\n".join(lines), f"(void){sources.function.name}({', '.join(names)})"
+
+
+def _values(signal: Signal) -> list[float]:
+    """Return numbers that a signal may have: an attitude, or a part of its bound with changing signs."""
+    if signal.constraint == "unit":
+        return [1 / math.sqrt(signal.size)] * signal.size
+    if signal.constraint == "rotation":
+        return [float(place % 4 == 0) for place in range(signal.size)]
+    size = 0.01 if signal.bound is None else float(signal.bound) / _PART
+    return [size * (-1) ** place / (1 + place % 3) for place in range(signal.size)]

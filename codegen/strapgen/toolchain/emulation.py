@@ -1,0 +1,154 @@
+"""Counts the instructions that a processor executes in a call of a function, one by one under QEMU."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+
+from strapgen.support.exceptions import CompilerError
+from strapgen.toolchain.processors import Processor
+
+#: Longest time in s that a call may take in the emulator.
+_PATIENCE = 60
+
+_VECTORS = """
+extern char stack_top[];
+void start(void);
+__attribute__((section(".start"), used)) void *const vectors[2] = {(void *)stack_top, (void *)start};
+"""
+_ENTRY = """
+__asm__(".section .start,\\"ax\\"\\n.globl entry\\nentry: la sp, stack_top\\n call start\\n1: j 1b\\n.text\\n");
+"""
+_MAIN = """
+#include <stddef.h>
+#include <stdint.h>
+{start}
+/* What compilers call even where there is no library. */
+void *memcpy(void *to, const void *from, size_t count)
+{{
+    for (size_t k = 0; k < count; ++k)
+        ((volatile char *)to)[k] = ((const char *)from)[k];
+    return to;
+}}
+{declarations}
+__attribute__((noinline, used)) void stop(void)
+{{
+    *(volatile uint32_t *)(uintptr_t){address}u = {word}u;
+    for (;;) {{
+    }}
+}}
+__attribute__((noinline, used)) void start(void)
+{{
+    {call};
+    stop();
+}}
+"""
+_LAYOUT = """
+SECTIONS
+{{
+    . = {code};
+    .start : {{ KEEP(*(.start)) }}
+    .text : {{ *(.text*) *(.rodata*) *(.srodata*) }}
+    .ARM.exidx : {{ *(.ARM*) }}
+    . = {data};
+    .data : {{ *(.data*) *(.sdata*) *(.bss*) *(.sbss*) *(COMMON) }}
+    . = ALIGN(16);
+    . += 0x1800;
+    stack_top = .;
+}}
+"""
+
+
+def executed(
+    processor: Processor, flags: Sequence[str], source: Path, function: str, declarations: str, call: str
+) -> int | None:
+    """Return the number of instructions from the entry of a function to its return.
+
+    Parameters
+    ----------
+    processor : Processor
+    flags : sequence of str
+        Flags of the compiler, beside those of the processor.
+    source : Path
+        The C source of the function.
+    function : str
+        Its name.
+    declarations : str
+        C text with what the call needs: the header, and arrays for arguments.
+    call : str
+        The call as C text.
+
+    Returns
+    -------
+    int or None
+        None if the processor has no emulator here.
+
+    Raises
+    ------
+    CompilerError
+        If the program cannot be linked, or does not come back from the call.
+    """
+    if not processor.emulator or shutil.which(processor.emulator[0]) is None:
+        return None
+    folder = source.parent
+    address, word = processor.stop
+    start = _VECTORS if processor.start == "vectors" else _ENTRY
+    main = _MAIN.format(start=start, declarations=declarations, call=call, address=address, word=word)
+    (folder / "main.c").write_text(main)
+    (folder / "layout.ld").write_text(_LAYOUT.format(code=processor.code, data=processor.data))
+    command = [processor.compiler, *processor.flags, *flags, "-nostartfiles", "-nostdlib", "-T", "layout.ld"]
+    command += ["-Wl,--no-warn-rwx-segments", "main.c", source.name, "-lgcc", "-o", "program.elf"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise CompilerError(f"{processor.compiler} cannot link {source.name}: {_first_error(done.stderr)}")
+    log = folder / "trace.log"
+    one_by_one = ["-singlestep"] if _major_version(processor.emulator[0]) < 8 else ["-one-insn-per-tb"]
+    command = [*processor.emulator, "-display", "none", "-serial", "none", "-monitor", "none", "-no-reboot"]
+    command += ["-kernel", "program.elf", *one_by_one, "-d", "exec,nochain", "-D", log.name]
+    try:
+        subprocess.run(command, cwd=folder, capture_output=True, check=False, timeout=_PATIENCE)
+    except subprocess.TimeoutExpired:
+        raise CompilerError(
+            f"{processor.emulator[0]}: {function} has not returned in {_PATIENCE} s"
+        ) from None
+    return _counted(log, _addresses(processor, folder / "program.elf"), function)
+
+
+def _counted(log: Path, places: dict[str, tuple[int, int]], function: str) -> int:
+    """Return how many instructions of a trace lie between the entry of a function and the next one of its caller."""
+    (entry, _), (first, size) = places[function], places["start"]
+    count, inside = 0, False
+    with log.open() as lines:
+        for line in lines:
+            match = re.match(r"Trace \d+: \S+ \[[0-9a-f]+/([0-9a-f]+)/", line)
+            if match is None:
+                continue
+            place = int(match[1], 16)
+            inside = inside or place == entry
+            if inside and first <= place < first + size:
+                return count
+            count += inside
+    raise CompilerError(f"the emulated processor did not come back from {function}")
+
+
+def _addresses(processor: Processor, program: Path) -> dict[str, tuple[int, int]]:
+    """Return address and size of every function of a program."""
+    command = [processor.tool("nm"), "-S", program.name]
+    listing = subprocess.run(command, cwd=program.parent, capture_output=True, text=True, check=True).stdout
+    rows = [line.split() for line in listing.splitlines()]
+    return {row[3]: (int(row[0], 16), int(row[1], 16)) for row in rows if len(row) == 4}
+
+
+def _major_version(program: str) -> int:
+    said = subprocess.run([program, "--version"], capture_output=True, text=True, check=True).stdout
+    match = re.search(r"version (\d+)", said)
+    return int(match[1]) if match else 0
+
+
+def _first_error(said: str) -> str:
+    return next(
+        (line for line in said.splitlines() if "error" in line or "undefined" in line), said.strip()[:200]
+    )
