@@ -54,7 +54,7 @@ demo: $(READY)
 	@echo "docs/command-line.md shows all commands; docs/README.md answers questions."
 
 FIRMWARE := gcc-arm-none-eabi picolibc-arm-none-eabi qemu-system-arm gcc-riscv64-unknown-elf \
-  picolibc-riscv64-unknown-elf qemu-system-misc gcc-avr avr-libc clang
+  picolibc-riscv64-unknown-elf qemu-system-misc gcc-avr avr-libc clang cppcheck
 
 firmware-tools:
 	apt-get update -qq

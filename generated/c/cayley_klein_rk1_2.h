@@ -8,8 +8,8 @@
  *     method: thesis, chapter 3 B.
  * Operations of one call: 15 add, 18 multiply; 3 temporaries.
  *
- * No heap, no global state, reentrant. In one call every input is read before any output is written:
- * an output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is
+ * written: an output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef CAYLEY_KLEIN_RK1_2_H
 #define CAYLEY_KLEIN_RK1_2_H

@@ -7,7 +7,7 @@
 #include <math.h>
 
 /* sin(x)/x, 1 at 0. */
-static double coning_increments_sinc_(double x)
+static double coning_increments_sc_(double x)
 {
     return x >= 0.0 && x <= 0.0 ? 1.0 : sin(x) / x;
 }
@@ -17,7 +17,7 @@ void coning_increments(double middle, double width, double a, double b, double g
     double increment[3])
 {
     const double shared_1 = b * middle;
-    const double shared_2 = a * width * coning_increments_sinc_(0.5 * (b * width));
+    const double shared_2 = a * width * coning_increments_sc_(0.5 * (b * width));
     /* angle increment over the interval, body axes */
     const double increment_x = shared_2 * sin(shared_1);
     const double increment_y = g * width;

@@ -7,8 +7,8 @@
  *     4 B.
  * Operations of one call: 8 multiply, 3 function; 2 temporaries.
  *
- * No heap, no global state, reentrant. In one call every input is read before any output is written:
- * an output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is
+ * written: an output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef CONING_INCREMENTS_H
 #define CONING_INCREMENTS_H

@@ -7,7 +7,7 @@
 #include <math.h>
 
 /* sin(x)/x, 1 at 0. */
-static double coning_truth_sinc_(double x)
+static double coning_truth_sc_(double x)
 {
     return x >= 0.0 && x <= 0.0 ? 1.0 : sin(x) / x;
 }
@@ -29,10 +29,10 @@ void coning_truth(double time, double a, double b, double g, double rate[3], dou
     const double shared_21 = shared_6 * shared_7;
     const double shared_9 = shared_21 * shared_6;
     const double shared_10 = sqrt(shared_8 + shared_9);
-    const double shared_11 = time * coning_truth_sinc_(shared_10);
+    const double shared_11 = time * coning_truth_sc_(shared_10);
     const double shared_12 = shared_11 * shared_6;
     const double shared_13 = shared_12 * shared_2;
-    const double factor_1 = coning_truth_sinc_(0.5 * shared_10);
+    const double factor_1 = coning_truth_sc_(0.5 * shared_10);
     const double shared_14 = 0.5 * (factor_1 * factor_1);
     const double shared_15 = shared_14 * shared_9;
     const double shared_16 = shared_14 * shared_8 - 1.0;

@@ -7,7 +7,7 @@
 #include <math.h>
 
 /* sin(x)/x, 1 at 0. */
-static double constant_truth_sinc_(double x)
+static double constant_truth_sc_(double x)
 {
     return x >= 0.0 && x <= 0.0 ? 1.0 : sin(x) / x;
 }
@@ -20,13 +20,13 @@ void constant_truth(double time, double x, double y, double z, double rate[3], d
     const double shared_3 = shared_1 * (x * x);
     const double shared_4 = shared_1 * (z * z);
     const double shared_5 = sqrt(shared_2 + shared_3 + shared_4);
-    const double factor_1 = constant_truth_sinc_(0.5 * shared_5);
+    const double factor_1 = constant_truth_sc_(0.5 * shared_5);
     const double shared_6 = 0.5 * (factor_1 * factor_1);
     const double shared_7 = shared_2 * shared_6;
     const double shared_8 = shared_4 * shared_6 - 1.0;
     /* direction cosine matrix, body to reference */
     const double C_11 = -(shared_7 + shared_8);
-    const double shared_9 = time * constant_truth_sinc_(shared_5);
+    const double shared_9 = time * constant_truth_sc_(shared_5);
     const double shared_10 = shared_9 * z;
     const double shared_18 = shared_1 * shared_6;
     const double shared_11 = shared_18 * x;

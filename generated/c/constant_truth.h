@@ -7,8 +7,8 @@
  *     4 B and appendix A.
  * Operations of one call: 13 add, 23 multiply, 1 sqrt, 2 negate, 2 function; 19 temporaries.
  *
- * No heap, no global state, reentrant. In one call every input is read before any output is written:
- * an output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is
+ * written: an output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef CONSTANT_TRUTH_H
 #define CONSTANT_TRUTH_H

@@ -8,8 +8,8 @@
  * The result is |state|^2 times a rotation: a rotation for a state of length 1.
  * Operations of one call: 13 add, 13 multiply; 14 temporaries.
  *
- * No heap, no global state, reentrant. In one call every input is read before any output is written:
- * an output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is
+ * written: an output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef DCM_FROM_EULER_H
 #define DCM_FROM_EULER_H

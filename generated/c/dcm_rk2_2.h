@@ -8,8 +8,8 @@
  *     thesis, chapter 3 B.
  * Operations of one call: 39 add, 49 multiply; 26 temporaries.
  *
- * No heap, no global state, reentrant. In one call every input is read before any output is written:
- * an output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is
+ * written: an output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef DCM_RK2_2_H
 #define DCM_RK2_2_H

@@ -9,8 +9,8 @@
  *     fourth-order Runge-Kutta method: thesis, chapter 3 B.
  * Operations of one call: 63 add, 74 multiply; 36 temporaries.
  *
- * No heap, no global state, reentrant. In one call every input is read before any output is written:
- * an output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is
+ * written: an output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef DCM_RK4_2_H
 #define DCM_RK4_2_H

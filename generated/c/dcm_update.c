@@ -7,7 +7,7 @@
 #include <math.h>
 
 /* sin(x)/x, 1 at 0. */
-static double dcm_update_sinc_(double x)
+static double dcm_update_sc_(double x)
 {
     return x >= 0.0 && x <= 0.0 ? 1.0 : sin(x) / x;
 }
@@ -33,13 +33,13 @@ void dcm_update(const double state[9], const double rotation_vector[3], double n
     /* square of the angle */
     const double angle_squared = shared_1 + shared_2 + shared_3;
     const double shared_4 = sqrt(angle_squared);
-    const double factor_1 = dcm_update_sinc_(0.5 * shared_4);
+    const double factor_1 = dcm_update_sc_(0.5 * shared_4);
     const double shared_18 = 0.5 * (factor_1 * factor_1);
     const double shared_7 = shared_2 * shared_18;
     const double shared_8 = shared_3 * shared_18 - 1.0;
     /* the step applied to the identity */
     const double A_11 = -(shared_7 + shared_8);
-    const double shared_9 = dcm_update_sinc_(shared_4);
+    const double shared_9 = dcm_update_sc_(shared_4);
     const double shared_10 = phi_z * shared_9;
     const double shared_11 = phi_x * shared_18;
     const double shared_12 = phi_y * shared_11;

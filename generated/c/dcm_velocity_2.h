@@ -7,8 +7,8 @@
  *     equation (52).
  * Operations of one call: 15 add, 18 multiply; 5 temporaries.
  *
- * No heap, no global state, reentrant. In one call every input is read before any output is written:
- * an output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is
+ * written: an output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef DCM_VELOCITY_2_H
 #define DCM_VELOCITY_2_H

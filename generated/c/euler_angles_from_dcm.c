@@ -7,9 +7,10 @@
 #include <math.h>
 
 /* An angle of up to a turn and a half, brought to -pi to pi by a whole turn. */
-static double euler_angles_from_dcm_wrap_(double x)
+static double euler_angles_from_dcm_wr_(double x)
 {
-    return x > 3.141592653589793 ? x - 6.283185307179586 : x < -3.141592653589793 ? x + 6.283185307179586 : x;
+    return x > 3.141592653589793 ? x - 6.283185307179586
+        : x < -3.141592653589793 ? x + 6.283185307179586 : x;
 }
 
 
@@ -39,7 +40,7 @@ void euler_angles_from_dcm(const double state[9], const double previous[3], doub
     const double apart = atan2(steep_sine, steep_cosine);
     /* heading */
     const double next_heading = (cosine_squared >= 0.25 ? atan2(C_21, C_11)
-        : euler_angles_from_dcm_wrap_(apart + (0.0 >= C_31 ? next_roll : -next_roll)));
+        : euler_angles_from_dcm_wr_(apart + (0.0 >= C_31 ? next_roll : -next_roll)));
     next[0] = next_roll;
     next[1] = next_pitch;
     next[2] = next_heading;

@@ -7,8 +7,8 @@
  *     2: de/dt = 1/2 e (w, 0), quaternion product.
  * Operations of one call: 12 add, 16 multiply; 0 temporaries.
  *
- * No heap, no global state, reentrant. In one call every input is read before any output is written:
- * an output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is
+ * written: an output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef EULER_PRODUCT_H
 #define EULER_PRODUCT_H

@@ -7,8 +7,8 @@
  *     4 B and appendix A.
  * Operations of one call: 8 add, 14 multiply, 1 negate, 2 function; 4 temporaries.
  *
- * No heap, no global state, reentrant. In one call every input is read before any output is written:
- * an output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is
+ * written: an output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef POLYNOMIAL_TRUTH_H
 #define POLYNOMIAL_TRUTH_H

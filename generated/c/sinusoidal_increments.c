@@ -7,7 +7,7 @@
 #include <math.h>
 
 /* sin(x)/x, 1 at 0. */
-static double sinusoidal_increments_sinc_(double x)
+static double sinusoidal_increments_sc_(double x)
 {
     return x >= 0.0 && x <= 0.0 ? 1.0 : sin(x) / x;
 }
@@ -16,7 +16,7 @@ static double sinusoidal_increments_sinc_(double x)
 void sinusoidal_increments(double middle, double width, double a, double b, double increment[3])
 {
     /* angle increment over the interval, body axes */
-    const double increment_y = a * width * cos(b * middle) * sinusoidal_increments_sinc_(0.5 * (b
+    const double increment_y = a * width * cos(b * middle) * sinusoidal_increments_sc_(0.5 * (b
         * width));
     increment[0] = 0.0;
     increment[1] = increment_y;

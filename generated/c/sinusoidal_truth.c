@@ -7,7 +7,7 @@
 #include <math.h>
 
 /* sin(x)/x, 1 at 0. */
-static double sinusoidal_truth_sinc_(double x)
+static double sinusoidal_truth_sc_(double x)
 {
     return x >= 0.0 && x <= 0.0 ? 1.0 : sin(x) / x;
 }
@@ -18,7 +18,7 @@ void sinusoidal_truth(double time, double a, double b, double rate[3], double at
     const double shared_1 = b * time;
     /* body rate, body axes */
     const double rate_y = a * cos(shared_1);
-    const double shared_2 = a * time * sinusoidal_truth_sinc_(shared_1);
+    const double shared_2 = a * time * sinusoidal_truth_sc_(shared_1);
     const double shared_3 = cos(shared_2);
     /* direction cosine matrix, body to reference */
     const double C_11 = shared_3;

@@ -5,7 +5,7 @@
 #include "cayley_klein_from_dcm_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int cayley_klein_from_dcm_q31_out_(int32_t x, int32_t limit)
+static inline int cayley_klein_from_dcm_q31_out(int32_t x, int32_t limit)
 {
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
@@ -13,7 +13,7 @@ static inline int cayley_klein_from_dcm_q31_out_(int32_t x, int32_t limit)
 /* The exact product of two words. */
 #if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
 /* These processors have no instruction for it: the high word takes four products of half words. */
-static __attribute__((noinline)) int64_t cayley_klein_from_dcm_q31_mul_(int32_t a, int32_t b)
+static __attribute__((noinline)) int64_t cayley_klein_from_dcm_q31_mul(int32_t a, int32_t b)
 {
     const uint32_t a_low = (uint32_t)a & 0xFFFFu;
     const uint32_t b_low = (uint32_t)b & 0xFFFFu;
@@ -28,7 +28,7 @@ static __attribute__((noinline)) int64_t cayley_klein_from_dcm_q31_mul_(int32_t 
     return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
 }
 #else
-static inline int64_t cayley_klein_from_dcm_q31_mul_(int32_t a, int32_t b)
+static inline int64_t cayley_klein_from_dcm_q31_mul(int32_t a, int32_t b)
 {
     return (int64_t)a * (int64_t)b;
 }
@@ -39,7 +39,7 @@ static inline int64_t cayley_klein_from_dcm_q31_mul_(int32_t a, int32_t b)
  * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
  * number and no conversion of a number out of range.
  */
-static inline int32_t cayley_klein_from_dcm_q31_narrow_(int64_t x, int n)
+static inline int32_t cayley_klein_from_dcm_q31_fit(int64_t x, int n)
 {
 #ifdef __FRAMAC__
     return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
@@ -53,13 +53,13 @@ static inline int32_t cayley_klein_from_dcm_q31_narrow_(int64_t x, int n)
 }
 
 /* x / 2^n, rounded down, as a wide number. */
-static inline int64_t cayley_klein_from_dcm_q31_shr_(int64_t x, int n)
+static inline int64_t cayley_klein_from_dcm_q31_shr(int64_t x, int n)
 {
     return (x < 0) ? ~(~x >> n) : (x >> n);
 }
 
 /* numerator / denominator of their magnitudes, to the nearest; the sign comes last. */
-static int64_t cayley_klein_from_dcm_q31_div_(int64_t numerator, int64_t denominator)
+static int64_t cayley_klein_from_dcm_q31_div(int64_t numerator, int64_t denominator)
 {
     const int64_t top = (numerator < 0) ? -numerator : numerator;
     const int64_t below = (denominator < 0) ? -denominator : denominator;
@@ -68,7 +68,7 @@ static int64_t cayley_klein_from_dcm_q31_div_(int64_t numerator, int64_t denomin
 }
 
 /* Square root bit by bit, to the nearest. */
-static int32_t cayley_klein_from_dcm_q31_sqrt_(uint64_t square)
+static int32_t cayley_klein_from_dcm_q31_rt(uint64_t square)
 {
     uint64_t rest = square;
     uint64_t root = 0;
@@ -96,16 +96,17 @@ int cayley_klein_from_dcm_q31(const int32_t state[9], int32_t converted[4])
     const int32_t C_31 = state[6];
     const int32_t C_32 = state[7];
     const int32_t C_33 = state[8];
-    if (cayley_klein_from_dcm_q31_out_(C_11, INT32_C(1140850688))
-        || cayley_klein_from_dcm_q31_out_(C_12, INT32_C(1140850688))
-        || cayley_klein_from_dcm_q31_out_(C_13, INT32_C(1140850688))
-        || cayley_klein_from_dcm_q31_out_(C_21, INT32_C(1140850688))
-        || cayley_klein_from_dcm_q31_out_(C_22, INT32_C(1140850688))
-        || cayley_klein_from_dcm_q31_out_(C_23, INT32_C(1140850688))
-        || cayley_klein_from_dcm_q31_out_(C_31, INT32_C(1140850688))
-        || cayley_klein_from_dcm_q31_out_(C_32, INT32_C(1140850688))
-        || cayley_klein_from_dcm_q31_out_(C_33, INT32_C(1140850688)))
+    if (cayley_klein_from_dcm_q31_out(C_11, INT32_C(1140850688))
+        || cayley_klein_from_dcm_q31_out(C_12, INT32_C(1140850688))
+        || cayley_klein_from_dcm_q31_out(C_13, INT32_C(1140850688))
+        || cayley_klein_from_dcm_q31_out(C_21, INT32_C(1140850688))
+        || cayley_klein_from_dcm_q31_out(C_22, INT32_C(1140850688))
+        || cayley_klein_from_dcm_q31_out(C_23, INT32_C(1140850688))
+        || cayley_klein_from_dcm_q31_out(C_31, INT32_C(1140850688))
+        || cayley_klein_from_dcm_q31_out(C_32, INT32_C(1140850688))
+        || cayley_klein_from_dcm_q31_out(C_33, INT32_C(1140850688))) {
         return 1;
+    }
     /* trace of C */
     const int64_t trace = (int64_t)C_11 + (int64_t)C_22 + (int64_t)C_33;
         /* Q33.30, -3.19 .. 3.19, exact */
@@ -175,62 +176,53 @@ int cayley_klein_from_dcm_q31(const int32_t state[9], int32_t converted[4])
     }
     int32_t factor_quotient_choice; /* Q31.0, -1 .. 1, exact */
     if (column_s >= 0) {
-        factor_quotient_choice = cayley_klein_from_dcm_q31_narrow_(1, 0);
+        factor_quotient_choice = cayley_klein_from_dcm_q31_fit(1, 0);
     } else {
-        factor_quotient_choice = cayley_klein_from_dcm_q31_narrow_((-1), 0);
+        factor_quotient_choice = cayley_klein_from_dcm_q31_fit((-1), 0);
     }
-    const int32_t factor_quotient_root = cayley_klein_from_dcm_q31_sqrt_((uint64_t)(largest
+    const int32_t factor_quotient_root = cayley_klein_from_dcm_q31_rt((uint64_t)(largest
         * (INT32_C(1) << 28))); /* Q2.29, 0.999 .. 2.05, error 9.4e-10 */
-    const int32_t factor_quotient =
-        cayley_klein_from_dcm_q31_narrow_(cayley_klein_from_dcm_q31_div_((int64_t)factor_quotient_choice
-        * (INT64_C(1) << 59), factor_quotient_root), 0);
+    const int32_t factor_quotient = cayley_klein_from_dcm_q31_fit(cayley_klein_from_dcm_q31_div(
+        (int64_t)factor_quotient_choice * (INT64_C(1) << 59), factor_quotient_root), 0);
         /* Q1.30, -1.01 .. 1.01, error 1.4e-09 */
     /* makes the scalar part positive */
     const int32_t factor = factor_quotient; /* Q0.31, -0.501 .. 0.501, error 7e-10 */
-    const int32_t column_s_word = cayley_klein_from_dcm_q31_narrow_(column_s + 2, 2);
+    const int32_t column_s_word = cayley_klein_from_dcm_q31_fit(column_s + 2, 2);
         /* Q3.28, -2.19 .. 4.19, error 1.9e-09 */
     /* Cayley-Klein parameters, body to reference, scalar first */
-    const int64_t next_s_unchecked =
-        cayley_klein_from_dcm_q31_shr_(cayley_klein_from_dcm_q31_mul_(column_s_word, factor)
-        + (INT32_C(1) << 28), 29);
-    if ((next_s_unchecked < (-INT32_C(1140850688)))
-        || (next_s_unchecked > INT32_C(1140850688))) {
+    const int64_t next_s_raw = cayley_klein_from_dcm_q31_shr(cayley_klein_from_dcm_q31_mul(
+        column_s_word, factor) + (INT32_C(1) << 28), 29);
+    if ((next_s_raw < (-INT32_C(1140850688))) || (next_s_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_s = cayley_klein_from_dcm_q31_narrow_(next_s_unchecked, 0);
+    const int32_t next_s = cayley_klein_from_dcm_q31_fit(next_s_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 4.4e-09 */
-    const int32_t column_x_word = cayley_klein_from_dcm_q31_narrow_(column_x + 2, 2);
+    const int32_t column_x_word = cayley_klein_from_dcm_q31_fit(column_x + 2, 2);
         /* Q3.28, -2.19 .. 4.19, error 1.9e-09 */
-    const int64_t next_x_unchecked =
-        cayley_klein_from_dcm_q31_shr_(cayley_klein_from_dcm_q31_mul_(column_x_word, factor)
-        + (INT32_C(1) << 28), 29);
-    if ((next_x_unchecked < (-INT32_C(1140850688)))
-        || (next_x_unchecked > INT32_C(1140850688))) {
+    const int64_t next_x_raw = cayley_klein_from_dcm_q31_shr(cayley_klein_from_dcm_q31_mul(
+        column_x_word, factor) + (INT32_C(1) << 28), 29);
+    if ((next_x_raw < (-INT32_C(1140850688))) || (next_x_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_x = cayley_klein_from_dcm_q31_narrow_(next_x_unchecked, 0);
+    const int32_t next_x = cayley_klein_from_dcm_q31_fit(next_x_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 4.4e-09 */
-    const int32_t column_y_word = cayley_klein_from_dcm_q31_narrow_(column_y + 2, 2);
+    const int32_t column_y_word = cayley_klein_from_dcm_q31_fit(column_y + 2, 2);
         /* Q3.28, -2.19 .. 4.19, error 1.9e-09 */
-    const int64_t next_y_unchecked =
-        cayley_klein_from_dcm_q31_shr_(cayley_klein_from_dcm_q31_mul_(column_y_word, factor)
-        + (INT32_C(1) << 28), 29);
-    if ((next_y_unchecked < (-INT32_C(1140850688)))
-        || (next_y_unchecked > INT32_C(1140850688))) {
+    const int64_t next_y_raw = cayley_klein_from_dcm_q31_shr(cayley_klein_from_dcm_q31_mul(
+        column_y_word, factor) + (INT32_C(1) << 28), 29);
+    if ((next_y_raw < (-INT32_C(1140850688))) || (next_y_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_y = cayley_klein_from_dcm_q31_narrow_(next_y_unchecked, 0);
+    const int32_t next_y = cayley_klein_from_dcm_q31_fit(next_y_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 4.4e-09 */
-    const int32_t column_z_word = cayley_klein_from_dcm_q31_narrow_(column_z + 2, 2);
+    const int32_t column_z_word = cayley_klein_from_dcm_q31_fit(column_z + 2, 2);
         /* Q3.28, -2.19 .. 4.19, error 1.9e-09 */
-    const int64_t next_z_unchecked =
-        cayley_klein_from_dcm_q31_shr_(cayley_klein_from_dcm_q31_mul_(column_z_word, factor)
-        + (INT32_C(1) << 28), 29);
-    if ((next_z_unchecked < (-INT32_C(1140850688)))
-        || (next_z_unchecked > INT32_C(1140850688))) {
+    const int64_t next_z_raw = cayley_klein_from_dcm_q31_shr(cayley_klein_from_dcm_q31_mul(
+        column_z_word, factor) + (INT32_C(1) << 28), 29);
+    if ((next_z_raw < (-INT32_C(1140850688))) || (next_z_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_z = cayley_klein_from_dcm_q31_narrow_(next_z_unchecked, 0);
+    const int32_t next_z = cayley_klein_from_dcm_q31_fit(next_z_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 4.4e-09 */
     converted[0] = next_s;
     converted[1] = next_x;

@@ -5,7 +5,7 @@
 #include "cayley_klein_from_euler_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int cayley_klein_from_euler_q31_out_(int32_t x, int32_t limit)
+static inline int cayley_klein_from_euler_q31_out(int32_t x, int32_t limit)
 {
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
@@ -16,11 +16,12 @@ int cayley_klein_from_euler_q31(const int32_t state[4], int32_t converted[4])
     const int32_t e_y = state[1];
     const int32_t e_z = state[2];
     const int32_t e_s = state[3];
-    if (cayley_klein_from_euler_q31_out_(e_x, INT32_C(1140850688))
-        || cayley_klein_from_euler_q31_out_(e_y, INT32_C(1140850688))
-        || cayley_klein_from_euler_q31_out_(e_z, INT32_C(1140850688))
-        || cayley_klein_from_euler_q31_out_(e_s, INT32_C(1140850688)))
+    if (cayley_klein_from_euler_q31_out(e_x, INT32_C(1140850688))
+        || cayley_klein_from_euler_q31_out(e_y, INT32_C(1140850688))
+        || cayley_klein_from_euler_q31_out(e_z, INT32_C(1140850688))
+        || cayley_klein_from_euler_q31_out(e_s, INT32_C(1140850688))) {
         return 1;
+    }
     const int32_t next_s = e_s; /* Q1.30, -1.07 .. 1.07, exact */
     const int32_t next_x = e_x; /* Q1.30, -1.07 .. 1.07, exact */
     const int32_t next_y = e_y; /* Q1.30, -1.07 .. 1.07, exact */

@@ -5,7 +5,7 @@
 #include "cayley_klein_normalize_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int cayley_klein_normalize_q31_out_(int32_t x, int32_t limit)
+static inline int cayley_klein_normalize_q31_out(int32_t x, int32_t limit)
 {
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
@@ -13,7 +13,7 @@ static inline int cayley_klein_normalize_q31_out_(int32_t x, int32_t limit)
 /* The exact product of two words. */
 #if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
 /* These processors have no instruction for it: the high word takes four products of half words. */
-static __attribute__((noinline)) int64_t cayley_klein_normalize_q31_mul_(int32_t a, int32_t b)
+static __attribute__((noinline)) int64_t cayley_klein_normalize_q31_mul(int32_t a, int32_t b)
 {
     const uint32_t a_low = (uint32_t)a & 0xFFFFu;
     const uint32_t b_low = (uint32_t)b & 0xFFFFu;
@@ -28,7 +28,7 @@ static __attribute__((noinline)) int64_t cayley_klein_normalize_q31_mul_(int32_t
     return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
 }
 #else
-static inline int64_t cayley_klein_normalize_q31_mul_(int32_t a, int32_t b)
+static inline int64_t cayley_klein_normalize_q31_mul(int32_t a, int32_t b)
 {
     return (int64_t)a * (int64_t)b;
 }
@@ -39,7 +39,7 @@ static inline int64_t cayley_klein_normalize_q31_mul_(int32_t a, int32_t b)
  * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
  * number and no conversion of a number out of range.
  */
-static inline int32_t cayley_klein_normalize_q31_narrow_(int64_t x, int n)
+static inline int32_t cayley_klein_normalize_q31_fit(int64_t x, int n)
 {
 #ifdef __FRAMAC__
     return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
@@ -53,13 +53,13 @@ static inline int32_t cayley_klein_normalize_q31_narrow_(int64_t x, int n)
 }
 
 /* x / 2^n, rounded down, as a wide number. */
-static inline int64_t cayley_klein_normalize_q31_shr_(int64_t x, int n)
+static inline int64_t cayley_klein_normalize_q31_shr(int64_t x, int n)
 {
     return (x < 0) ? ~(~x >> n) : (x >> n);
 }
 
 /* numerator / denominator of their magnitudes, to the nearest; the sign comes last. */
-static int64_t cayley_klein_normalize_q31_div_(int64_t numerator, int64_t denominator)
+static int64_t cayley_klein_normalize_q31_div(int64_t numerator, int64_t denominator)
 {
     const int64_t top = (numerator < 0) ? -numerator : numerator;
     const int64_t below = (denominator < 0) ? -denominator : denominator;
@@ -68,7 +68,7 @@ static int64_t cayley_klein_normalize_q31_div_(int64_t numerator, int64_t denomi
 }
 
 /* Square root bit by bit, to the nearest. */
-static int32_t cayley_klein_normalize_q31_sqrt_(uint64_t square)
+static int32_t cayley_klein_normalize_q31_rt(uint64_t square)
 {
     uint64_t rest = square;
     uint64_t root = 0;
@@ -91,39 +91,35 @@ int cayley_klein_normalize_q31(const int32_t state[4], int32_t next[4])
     const int32_t a_x = state[1];
     const int32_t a_y = state[2];
     const int32_t a_z = state[3];
-    if (cayley_klein_normalize_q31_out_(a_s, INT32_C(1140850688))
-        || cayley_klein_normalize_q31_out_(a_x, INT32_C(1140850688))
-        || cayley_klein_normalize_q31_out_(a_y, INT32_C(1140850688))
-        || cayley_klein_normalize_q31_out_(a_z, INT32_C(1140850688)))
+    if (cayley_klein_normalize_q31_out(a_s, INT32_C(1140850688))
+        || cayley_klein_normalize_q31_out(a_x, INT32_C(1140850688))
+        || cayley_klein_normalize_q31_out(a_y, INT32_C(1140850688))
+        || cayley_klein_normalize_q31_out(a_z, INT32_C(1140850688))) {
         return 1;
-    const int64_t inverse_norm_radicand = cayley_klein_normalize_q31_mul_(a_s, a_s)
-        + cayley_klein_normalize_q31_mul_(a_x, a_x)
-        + cayley_klein_normalize_q31_mul_(a_y, a_y)
-        + cayley_klein_normalize_q31_mul_(a_z, a_z); /* Q3.60, 0.5 .. 2, exact */
+    }
+    const int64_t inverse_norm_radicand = cayley_klein_normalize_q31_mul(a_s, a_s)
+        + cayley_klein_normalize_q31_mul(a_x, a_x)
+        + cayley_klein_normalize_q31_mul(a_y, a_y)
+        + cayley_klein_normalize_q31_mul(a_z, a_z); /* Q3.60, 0.5 .. 2, exact */
     if ((inverse_norm_radicand < (INT64_C(1) << 59))
         || (inverse_norm_radicand > (INT64_C(1) << 61))) {
         return 2;
     }
-    const int32_t inverse_norm_root =
-        cayley_klein_normalize_q31_sqrt_((uint64_t)(cayley_klein_normalize_q31_shr_(inverse_norm_radicand, 2)));
+    const int32_t inverse_norm_root = cayley_klein_normalize_q31_rt((uint64_t)(
+        cayley_klein_normalize_q31_shr(inverse_norm_radicand, 2)));
         /* Q2.29, 0.707 .. 1.42, error 9.4e-10 */
     /* 1/|state| */
-    const int32_t inverse_norm =
-        cayley_klein_normalize_q31_narrow_(cayley_klein_normalize_q31_div_((INT64_C(1) << 59), inverse_norm_root), 0);
-        /* Q1.30, 0.707 .. 1.42, error 2.4e-09 */
+    const int32_t inverse_norm = cayley_klein_normalize_q31_fit(cayley_klein_normalize_q31_div(
+        (INT64_C(1) << 59), inverse_norm_root), 0); /* Q1.30, 0.707 .. 1.42, error 2.4e-09 */
     /* Cayley-Klein parameters, body to reference, scalar first, after the step */
-    const int32_t next_s =
-        cayley_klein_normalize_q31_narrow_(cayley_klein_normalize_q31_mul_(a_s, inverse_norm)
-        + (INT32_C(1) << 29), 30); /* Q1.30, -1.51 .. 1.51, error 3e-09 */
-    const int32_t next_x =
-        cayley_klein_normalize_q31_narrow_(cayley_klein_normalize_q31_mul_(a_x, inverse_norm)
-        + (INT32_C(1) << 29), 30); /* Q1.30, -1.51 .. 1.51, error 3e-09 */
-    const int32_t next_y =
-        cayley_klein_normalize_q31_narrow_(cayley_klein_normalize_q31_mul_(a_y, inverse_norm)
-        + (INT32_C(1) << 29), 30); /* Q1.30, -1.51 .. 1.51, error 3e-09 */
-    const int32_t next_z =
-        cayley_klein_normalize_q31_narrow_(cayley_klein_normalize_q31_mul_(a_z, inverse_norm)
-        + (INT32_C(1) << 29), 30); /* Q1.30, -1.51 .. 1.51, error 3e-09 */
+    const int32_t next_s = cayley_klein_normalize_q31_fit(cayley_klein_normalize_q31_mul(a_s,
+        inverse_norm) + (INT32_C(1) << 29), 30); /* Q1.30, -1.51 .. 1.51, error 3e-09 */
+    const int32_t next_x = cayley_klein_normalize_q31_fit(cayley_klein_normalize_q31_mul(a_x,
+        inverse_norm) + (INT32_C(1) << 29), 30); /* Q1.30, -1.51 .. 1.51, error 3e-09 */
+    const int32_t next_y = cayley_klein_normalize_q31_fit(cayley_klein_normalize_q31_mul(a_y,
+        inverse_norm) + (INT32_C(1) << 29), 30); /* Q1.30, -1.51 .. 1.51, error 3e-09 */
+    const int32_t next_z = cayley_klein_normalize_q31_fit(cayley_klein_normalize_q31_mul(a_z,
+        inverse_norm) + (INT32_C(1) << 29), 30); /* Q1.30, -1.51 .. 1.51, error 3e-09 */
     next[0] = next_s;
     next[1] = next_x;
     next[2] = next_y;

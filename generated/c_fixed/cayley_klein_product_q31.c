@@ -5,7 +5,7 @@
 #include "cayley_klein_product_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int cayley_klein_product_q31_out_(int32_t x, int32_t limit)
+static inline int cayley_klein_product_q31_out(int32_t x, int32_t limit)
 {
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
@@ -13,7 +13,7 @@ static inline int cayley_klein_product_q31_out_(int32_t x, int32_t limit)
 /* The exact product of two words. */
 #if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
 /* These processors have no instruction for it: the high word takes four products of half words. */
-static __attribute__((noinline)) int64_t cayley_klein_product_q31_mul_(int32_t a, int32_t b)
+static __attribute__((noinline)) int64_t cayley_klein_product_q31_mul(int32_t a, int32_t b)
 {
     const uint32_t a_low = (uint32_t)a & 0xFFFFu;
     const uint32_t b_low = (uint32_t)b & 0xFFFFu;
@@ -28,7 +28,7 @@ static __attribute__((noinline)) int64_t cayley_klein_product_q31_mul_(int32_t a
     return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
 }
 #else
-static inline int64_t cayley_klein_product_q31_mul_(int32_t a, int32_t b)
+static inline int64_t cayley_klein_product_q31_mul(int32_t a, int32_t b)
 {
     return (int64_t)a * (int64_t)b;
 }
@@ -39,7 +39,7 @@ static inline int64_t cayley_klein_product_q31_mul_(int32_t a, int32_t b)
  * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
  * number and no conversion of a number out of range.
  */
-static inline int32_t cayley_klein_product_q31_narrow_(int64_t x, int n)
+static inline int32_t cayley_klein_product_q31_fit(int64_t x, int n)
 {
 #ifdef __FRAMAC__
     return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
@@ -53,7 +53,7 @@ static inline int32_t cayley_klein_product_q31_narrow_(int64_t x, int n)
 }
 
 /* x / 2^n, rounded down, as a wide number. */
-static inline int64_t cayley_klein_product_q31_shr_(int64_t x, int n)
+static inline int64_t cayley_klein_product_q31_shr(int64_t x, int n)
 {
     return (x < 0) ? ~(~x >> n) : (x >> n);
 }
@@ -68,55 +68,52 @@ int cayley_klein_product_q31(const int32_t state[4], const int32_t transition[4]
     const int32_t p_x = transition[1];
     const int32_t p_y = transition[2];
     const int32_t p_z = transition[3];
-    if (cayley_klein_product_q31_out_(a_s, INT32_C(1140850688))
-        || cayley_klein_product_q31_out_(a_x, INT32_C(1140850688))
-        || cayley_klein_product_q31_out_(a_y, INT32_C(1140850688))
-        || cayley_klein_product_q31_out_(a_z, INT32_C(1140850688))
-        || cayley_klein_product_q31_out_(p_s, INT32_C(1140850688))
-        || cayley_klein_product_q31_out_(p_x, INT32_C(1140850688))
-        || cayley_klein_product_q31_out_(p_y, INT32_C(1140850688))
-        || cayley_klein_product_q31_out_(p_z, INT32_C(1140850688)))
+    if (cayley_klein_product_q31_out(a_s, INT32_C(1140850688))
+        || cayley_klein_product_q31_out(a_x, INT32_C(1140850688))
+        || cayley_klein_product_q31_out(a_y, INT32_C(1140850688))
+        || cayley_klein_product_q31_out(a_z, INT32_C(1140850688))
+        || cayley_klein_product_q31_out(p_s, INT32_C(1140850688))
+        || cayley_klein_product_q31_out(p_x, INT32_C(1140850688))
+        || cayley_klein_product_q31_out(p_y, INT32_C(1140850688))
+        || cayley_klein_product_q31_out(p_z, INT32_C(1140850688))) {
         return 1;
+    }
     /* Cayley-Klein parameters, body to reference, scalar first, after the step */
-    const int64_t next_s_unchecked =
-        cayley_klein_product_q31_shr_(cayley_klein_product_q31_mul_(a_s, p_s)
-        - cayley_klein_product_q31_mul_(a_x, p_x) - cayley_klein_product_q31_mul_(a_y, p_y)
-        - cayley_klein_product_q31_mul_(a_z, p_z) + (INT32_C(1) << 29), 30);
-    if ((next_s_unchecked < (-INT32_C(1140850688)))
-        || (next_s_unchecked > INT32_C(1140850688))) {
+    const int64_t next_s_raw = cayley_klein_product_q31_shr(cayley_klein_product_q31_mul(a_s,
+        p_s) - cayley_klein_product_q31_mul(a_x, p_x)
+        - cayley_klein_product_q31_mul(a_y, p_y) - cayley_klein_product_q31_mul(a_z, p_z)
+        + (INT32_C(1) << 29), 30);
+    if ((next_s_raw < (-INT32_C(1140850688))) || (next_s_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_s = cayley_klein_product_q31_narrow_(next_s_unchecked, 0);
+    const int32_t next_s = cayley_klein_product_q31_fit(next_s_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
-    const int64_t next_x_unchecked =
-        cayley_klein_product_q31_shr_(cayley_klein_product_q31_mul_(a_s, p_x)
-        + cayley_klein_product_q31_mul_(a_x, p_s) + cayley_klein_product_q31_mul_(a_y, p_z)
-        - cayley_klein_product_q31_mul_(a_z, p_y) + (INT32_C(1) << 29), 30);
-    if ((next_x_unchecked < (-INT32_C(1140850688)))
-        || (next_x_unchecked > INT32_C(1140850688))) {
+    const int64_t next_x_raw = cayley_klein_product_q31_shr(cayley_klein_product_q31_mul(a_s,
+        p_x) + cayley_klein_product_q31_mul(a_x, p_s)
+        + cayley_klein_product_q31_mul(a_y, p_z) - cayley_klein_product_q31_mul(a_z, p_y)
+        + (INT32_C(1) << 29), 30);
+    if ((next_x_raw < (-INT32_C(1140850688))) || (next_x_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_x = cayley_klein_product_q31_narrow_(next_x_unchecked, 0);
+    const int32_t next_x = cayley_klein_product_q31_fit(next_x_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
-    const int64_t next_y_unchecked =
-        cayley_klein_product_q31_shr_(cayley_klein_product_q31_mul_(a_s, p_y)
-        - cayley_klein_product_q31_mul_(a_x, p_z) + cayley_klein_product_q31_mul_(a_y, p_s)
-        + cayley_klein_product_q31_mul_(a_z, p_x) + (INT32_C(1) << 29), 30);
-    if ((next_y_unchecked < (-INT32_C(1140850688)))
-        || (next_y_unchecked > INT32_C(1140850688))) {
+    const int64_t next_y_raw = cayley_klein_product_q31_shr(cayley_klein_product_q31_mul(a_s,
+        p_y) - cayley_klein_product_q31_mul(a_x, p_z)
+        + cayley_klein_product_q31_mul(a_y, p_s) + cayley_klein_product_q31_mul(a_z, p_x)
+        + (INT32_C(1) << 29), 30);
+    if ((next_y_raw < (-INT32_C(1140850688))) || (next_y_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_y = cayley_klein_product_q31_narrow_(next_y_unchecked, 0);
+    const int32_t next_y = cayley_klein_product_q31_fit(next_y_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
-    const int64_t next_z_unchecked =
-        cayley_klein_product_q31_shr_(cayley_klein_product_q31_mul_(a_s, p_z)
-        + cayley_klein_product_q31_mul_(a_x, p_y) - cayley_klein_product_q31_mul_(a_y, p_x)
-        + cayley_klein_product_q31_mul_(a_z, p_s) + (INT32_C(1) << 29), 30);
-    if ((next_z_unchecked < (-INT32_C(1140850688)))
-        || (next_z_unchecked > INT32_C(1140850688))) {
+    const int64_t next_z_raw = cayley_klein_product_q31_shr(cayley_klein_product_q31_mul(a_s,
+        p_z) + cayley_klein_product_q31_mul(a_x, p_y)
+        - cayley_klein_product_q31_mul(a_y, p_x) + cayley_klein_product_q31_mul(a_z, p_s)
+        + (INT32_C(1) << 29), 30);
+    if ((next_z_raw < (-INT32_C(1140850688))) || (next_z_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_z = cayley_klein_product_q31_narrow_(next_z_unchecked, 0);
+    const int32_t next_z = cayley_klein_product_q31_fit(next_z_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
     next[0] = next_s;
     next[1] = next_x;

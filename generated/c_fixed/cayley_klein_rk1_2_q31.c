@@ -6,7 +6,7 @@
 #include "cayley_klein_rk1_2_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int cayley_klein_rk1_2_q31_out_(int32_t x, int32_t limit)
+static inline int cayley_klein_rk1_2_q31_out(int32_t x, int32_t limit)
 {
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
@@ -14,7 +14,7 @@ static inline int cayley_klein_rk1_2_q31_out_(int32_t x, int32_t limit)
 /* The exact product of two words. */
 #if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
 /* These processors have no instruction for it: the high word takes four products of half words. */
-static __attribute__((noinline)) int64_t cayley_klein_rk1_2_q31_mul_(int32_t a, int32_t b)
+static __attribute__((noinline)) int64_t cayley_klein_rk1_2_q31_mul(int32_t a, int32_t b)
 {
     const uint32_t a_low = (uint32_t)a & 0xFFFFu;
     const uint32_t b_low = (uint32_t)b & 0xFFFFu;
@@ -29,7 +29,7 @@ static __attribute__((noinline)) int64_t cayley_klein_rk1_2_q31_mul_(int32_t a, 
     return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
 }
 #else
-static inline int64_t cayley_klein_rk1_2_q31_mul_(int32_t a, int32_t b)
+static inline int64_t cayley_klein_rk1_2_q31_mul(int32_t a, int32_t b)
 {
     return (int64_t)a * (int64_t)b;
 }
@@ -40,7 +40,7 @@ static inline int64_t cayley_klein_rk1_2_q31_mul_(int32_t a, int32_t b)
  * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
  * number and no conversion of a number out of range.
  */
-static inline int32_t cayley_klein_rk1_2_q31_narrow_(int64_t x, int n)
+static inline int32_t cayley_klein_rk1_2_q31_fit(int64_t x, int n)
 {
 #ifdef __FRAMAC__
     return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
@@ -65,47 +65,45 @@ int cayley_klein_rk1_2_q31(const int32_t state[4], const int32_t increments[6], 
     const int32_t d2_x = increments[3];
     const int32_t d2_y = increments[4];
     const int32_t d2_z = increments[5];
-    if (cayley_klein_rk1_2_q31_out_(a_s, INT32_C(1140850688))
-        || cayley_klein_rk1_2_q31_out_(a_x, INT32_C(1140850688))
-        || cayley_klein_rk1_2_q31_out_(a_y, INT32_C(1140850688))
-        || cayley_klein_rk1_2_q31_out_(a_z, INT32_C(1140850688))
-        || cayley_klein_rk1_2_q31_out_(d1_x, (INT32_C(1) << 30))
-        || cayley_klein_rk1_2_q31_out_(d1_y, (INT32_C(1) << 30))
-        || cayley_klein_rk1_2_q31_out_(d1_z, (INT32_C(1) << 30))
-        || cayley_klein_rk1_2_q31_out_(d2_x, (INT32_C(1) << 30))
-        || cayley_klein_rk1_2_q31_out_(d2_y, (INT32_C(1) << 30))
-        || cayley_klein_rk1_2_q31_out_(d2_z, (INT32_C(1) << 30)))
+    if (cayley_klein_rk1_2_q31_out(a_s, INT32_C(1140850688))
+        || cayley_klein_rk1_2_q31_out(a_x, INT32_C(1140850688))
+        || cayley_klein_rk1_2_q31_out(a_y, INT32_C(1140850688))
+        || cayley_klein_rk1_2_q31_out(a_z, INT32_C(1140850688))
+        || cayley_klein_rk1_2_q31_out(d1_x, (INT32_C(1) << 30))
+        || cayley_klein_rk1_2_q31_out(d1_y, (INT32_C(1) << 30))
+        || cayley_klein_rk1_2_q31_out(d1_z, (INT32_C(1) << 30))
+        || cayley_klein_rk1_2_q31_out(d2_x, (INT32_C(1) << 30))
+        || cayley_klein_rk1_2_q31_out(d2_y, (INT32_C(1) << 30))
+        || cayley_klein_rk1_2_q31_out(d2_z, (INT32_C(1) << 30))) {
         return 1;
+    }
     /* half the rate times the step, at node 0 */
-    const int32_t half_turn_0_x =
-        cayley_klein_rk1_2_q31_narrow_(cayley_klein_rk1_2_q31_mul_(d1_x, 3) - (int64_t)d2_x
-        + 2, 2); /* Q-1.32, -0.251 .. 0.251, error 1.2e-10 */
-    const int32_t half_turn_0_y =
-        cayley_klein_rk1_2_q31_narrow_(cayley_klein_rk1_2_q31_mul_(d1_y, 3) - (int64_t)d2_y
-        + 2, 2); /* Q-1.32, -0.251 .. 0.251, error 1.2e-10 */
-    const int32_t half_turn_0_z =
-        cayley_klein_rk1_2_q31_narrow_(cayley_klein_rk1_2_q31_mul_(d1_z, 3) - (int64_t)d2_z
-        + 2, 2); /* Q-1.32, -0.251 .. 0.251, error 1.2e-10 */
+    const int32_t half_turn_0_x = cayley_klein_rk1_2_q31_fit(cayley_klein_rk1_2_q31_mul(d1_x, 3)
+        - (int64_t)d2_x + 2, 2); /* Q-1.32, -0.251 .. 0.251, error 1.2e-10 */
+    const int32_t half_turn_0_y = cayley_klein_rk1_2_q31_fit(cayley_klein_rk1_2_q31_mul(d1_y, 3)
+        - (int64_t)d2_y + 2, 2); /* Q-1.32, -0.251 .. 0.251, error 1.2e-10 */
+    const int32_t half_turn_0_z = cayley_klein_rk1_2_q31_fit(cayley_klein_rk1_2_q31_mul(d1_z, 3)
+        - (int64_t)d2_z + 2, 2); /* Q-1.32, -0.251 .. 0.251, error 1.2e-10 */
     /* Cayley-Klein parameters, body to reference, scalar first, after the step */
     const int32_t next_s = a_s
-        + cayley_klein_rk1_2_q31_narrow_(-cayley_klein_rk1_2_q31_mul_(a_x, half_turn_0_x)
-        - cayley_klein_rk1_2_q31_mul_(a_y, half_turn_0_y)
-        - cayley_klein_rk1_2_q31_mul_(a_z, half_turn_0_z) + (INT64_C(1) << 31), 32);
+        + cayley_klein_rk1_2_q31_fit(-cayley_klein_rk1_2_q31_mul(a_x, half_turn_0_x)
+        - cayley_klein_rk1_2_q31_mul(a_y, half_turn_0_y)
+        - cayley_klein_rk1_2_q31_mul(a_z, half_turn_0_z) + (INT64_C(1) << 31), 32);
         /* Q1.30, -1.86 .. 1.86, error 8.4e-10 */
     const int32_t next_x = a_x
-        + cayley_klein_rk1_2_q31_narrow_(cayley_klein_rk1_2_q31_mul_(a_s, half_turn_0_x)
-        + cayley_klein_rk1_2_q31_mul_(a_y, half_turn_0_z)
-        - cayley_klein_rk1_2_q31_mul_(a_z, half_turn_0_y) + (INT64_C(1) << 31), 32);
+        + cayley_klein_rk1_2_q31_fit(cayley_klein_rk1_2_q31_mul(a_s, half_turn_0_x)
+        + cayley_klein_rk1_2_q31_mul(a_y, half_turn_0_z)
+        - cayley_klein_rk1_2_q31_mul(a_z, half_turn_0_y) + (INT64_C(1) << 31), 32);
         /* Q1.30, -1.86 .. 1.86, error 8.4e-10 */
     const int32_t next_y = a_y
-        + cayley_klein_rk1_2_q31_narrow_(cayley_klein_rk1_2_q31_mul_(a_s, half_turn_0_y)
-        - cayley_klein_rk1_2_q31_mul_(a_x, half_turn_0_z)
-        + cayley_klein_rk1_2_q31_mul_(a_z, half_turn_0_x) + (INT64_C(1) << 31), 32);
+        + cayley_klein_rk1_2_q31_fit(cayley_klein_rk1_2_q31_mul(a_s, half_turn_0_y)
+        - cayley_klein_rk1_2_q31_mul(a_x, half_turn_0_z)
+        + cayley_klein_rk1_2_q31_mul(a_z, half_turn_0_x) + (INT64_C(1) << 31), 32);
         /* Q1.30, -1.86 .. 1.86, error 8.4e-10 */
     const int32_t next_z = a_z
-        + cayley_klein_rk1_2_q31_narrow_(cayley_klein_rk1_2_q31_mul_(a_s, half_turn_0_z)
-        + cayley_klein_rk1_2_q31_mul_(a_x, half_turn_0_y)
-        - cayley_klein_rk1_2_q31_mul_(a_y, half_turn_0_x) + (INT64_C(1) << 31), 32);
+        + cayley_klein_rk1_2_q31_fit(cayley_klein_rk1_2_q31_mul(a_s, half_turn_0_z)
+        + cayley_klein_rk1_2_q31_mul(a_x, half_turn_0_y)
+        - cayley_klein_rk1_2_q31_mul(a_y, half_turn_0_x) + (INT64_C(1) << 31), 32);
         /* Q1.30, -1.86 .. 1.86, error 8.4e-10 */
     next[0] = next_s;
     next[1] = next_x;

@@ -6,7 +6,7 @@
 #include "cayley_klein_rk2_2_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int cayley_klein_rk2_2_q31_out_(int32_t x, int32_t limit)
+static inline int cayley_klein_rk2_2_q31_out(int32_t x, int32_t limit)
 {
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
@@ -14,7 +14,7 @@ static inline int cayley_klein_rk2_2_q31_out_(int32_t x, int32_t limit)
 /* The exact product of two words. */
 #if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
 /* These processors have no instruction for it: the high word takes four products of half words. */
-static __attribute__((noinline)) int64_t cayley_klein_rk2_2_q31_mul_(int32_t a, int32_t b)
+static __attribute__((noinline)) int64_t cayley_klein_rk2_2_q31_mul(int32_t a, int32_t b)
 {
     const uint32_t a_low = (uint32_t)a & 0xFFFFu;
     const uint32_t b_low = (uint32_t)b & 0xFFFFu;
@@ -29,7 +29,7 @@ static __attribute__((noinline)) int64_t cayley_klein_rk2_2_q31_mul_(int32_t a, 
     return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
 }
 #else
-static inline int64_t cayley_klein_rk2_2_q31_mul_(int32_t a, int32_t b)
+static inline int64_t cayley_klein_rk2_2_q31_mul(int32_t a, int32_t b)
 {
     return (int64_t)a * (int64_t)b;
 }
@@ -40,7 +40,7 @@ static inline int64_t cayley_klein_rk2_2_q31_mul_(int32_t a, int32_t b)
  * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
  * number and no conversion of a number out of range.
  */
-static inline int32_t cayley_klein_rk2_2_q31_narrow_(int64_t x, int n)
+static inline int32_t cayley_klein_rk2_2_q31_fit(int64_t x, int n)
 {
 #ifdef __FRAMAC__
     return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
@@ -65,67 +65,62 @@ int cayley_klein_rk2_2_q31(const int32_t state[4], const int32_t increments[6], 
     const int32_t d2_x = increments[3];
     const int32_t d2_y = increments[4];
     const int32_t d2_z = increments[5];
-    if (cayley_klein_rk2_2_q31_out_(a_s, INT32_C(1140850688))
-        || cayley_klein_rk2_2_q31_out_(a_x, INT32_C(1140850688))
-        || cayley_klein_rk2_2_q31_out_(a_y, INT32_C(1140850688))
-        || cayley_klein_rk2_2_q31_out_(a_z, INT32_C(1140850688))
-        || cayley_klein_rk2_2_q31_out_(d1_x, (INT32_C(1) << 29))
-        || cayley_klein_rk2_2_q31_out_(d1_y, (INT32_C(1) << 29))
-        || cayley_klein_rk2_2_q31_out_(d1_z, (INT32_C(1) << 29))
-        || cayley_klein_rk2_2_q31_out_(d2_x, (INT32_C(1) << 29))
-        || cayley_klein_rk2_2_q31_out_(d2_y, (INT32_C(1) << 29))
-        || cayley_klein_rk2_2_q31_out_(d2_z, (INT32_C(1) << 29)))
+    if (cayley_klein_rk2_2_q31_out(a_s, INT32_C(1140850688))
+        || cayley_klein_rk2_2_q31_out(a_x, INT32_C(1140850688))
+        || cayley_klein_rk2_2_q31_out(a_y, INT32_C(1140850688))
+        || cayley_klein_rk2_2_q31_out(a_z, INT32_C(1140850688))
+        || cayley_klein_rk2_2_q31_out(d1_x, (INT32_C(1) << 29))
+        || cayley_klein_rk2_2_q31_out(d1_y, (INT32_C(1) << 29))
+        || cayley_klein_rk2_2_q31_out(d1_z, (INT32_C(1) << 29))
+        || cayley_klein_rk2_2_q31_out(d2_x, (INT32_C(1) << 29))
+        || cayley_klein_rk2_2_q31_out(d2_y, (INT32_C(1) << 29))
+        || cayley_klein_rk2_2_q31_out(d2_z, (INT32_C(1) << 29))) {
         return 1;
+    }
     /* the angle increment of the whole step */
     const int32_t sigma_x = d1_x + d2_x; /* Q-1.32, -0.25 .. 0.25, exact */
     const int32_t sigma_y = d1_y + d2_y; /* Q-1.32, -0.25 .. 0.25, exact */
     const int32_t sigma_z = d1_z + d2_z; /* Q-1.32, -0.25 .. 0.25, exact */
-    const int64_t sigma_cross_d1_x = cayley_klein_rk2_2_q31_mul_(d1_z, sigma_y)
-        - cayley_klein_rk2_2_q31_mul_(d1_y, sigma_z); /* Q-1.64, -0.0313 .. 0.0313, exact */
-    const int64_t sigma_cross_d1_y = cayley_klein_rk2_2_q31_mul_(d1_x, sigma_z)
-        - cayley_klein_rk2_2_q31_mul_(d1_z, sigma_x); /* Q-1.64, -0.0313 .. 0.0313, exact */
-    const int64_t sigma_cross_d1_z = cayley_klein_rk2_2_q31_mul_(d1_y, sigma_x)
-        - cayley_klein_rk2_2_q31_mul_(d1_x, sigma_y); /* Q-1.64, -0.0313 .. 0.0313, exact */
+    const int64_t sigma_cross_d1_x = cayley_klein_rk2_2_q31_mul(d1_z, sigma_y)
+        - cayley_klein_rk2_2_q31_mul(d1_y, sigma_z); /* Q-1.64, -0.0313 .. 0.0313, exact */
+    const int64_t sigma_cross_d1_y = cayley_klein_rk2_2_q31_mul(d1_x, sigma_z)
+        - cayley_klein_rk2_2_q31_mul(d1_z, sigma_x); /* Q-1.64, -0.0313 .. 0.0313, exact */
+    const int64_t sigma_cross_d1_z = cayley_klein_rk2_2_q31_mul(d1_y, sigma_x)
+        - cayley_klein_rk2_2_q31_mul(d1_x, sigma_y); /* Q-1.64, -0.0313 .. 0.0313, exact */
     /* the step applied to the identity: its vector part */
-    const int32_t p_x = sigma_x + cayley_klein_rk2_2_q31_narrow_(-sigma_cross_d1_x
+    const int32_t p_x = sigma_x + cayley_klein_rk2_2_q31_fit(-sigma_cross_d1_x
         + (INT32_C(1) << 30), 31); /* Q-2.33, -0.157 .. 0.157, error 5.9e-11 */
-    const int32_t p_y = sigma_y + cayley_klein_rk2_2_q31_narrow_(-sigma_cross_d1_y
+    const int32_t p_y = sigma_y + cayley_klein_rk2_2_q31_fit(-sigma_cross_d1_y
         + (INT32_C(1) << 30), 31); /* Q-2.33, -0.157 .. 0.157, error 5.9e-11 */
-    const int32_t p_z = sigma_z + cayley_klein_rk2_2_q31_narrow_(-sigma_cross_d1_z
+    const int32_t p_z = sigma_z + cayley_klein_rk2_2_q31_fit(-sigma_cross_d1_z
         + (INT32_C(1) << 30), 31); /* Q-2.33, -0.157 .. 0.157, error 5.9e-11 */
-    const int64_t d1_dot_d2 = cayley_klein_rk2_2_q31_mul_(d1_x, d2_x)
-        + cayley_klein_rk2_2_q31_mul_(d1_y, d2_y) + cayley_klein_rk2_2_q31_mul_(d1_z, d2_z);
+    const int64_t d1_dot_d2 = cayley_klein_rk2_2_q31_mul(d1_x, d2_x)
+        + cayley_klein_rk2_2_q31_mul(d1_y, d2_y) + cayley_klein_rk2_2_q31_mul(d1_z, d2_z);
         /* Q-1.64, -0.0469 .. 0.0469, exact */
-    const int32_t sigma_dot_sigma =
-        cayley_klein_rk2_2_q31_narrow_(cayley_klein_rk2_2_q31_mul_(sigma_x, sigma_x)
-        + cayley_klein_rk2_2_q31_mul_(sigma_y, sigma_y)
-        + cayley_klein_rk2_2_q31_mul_(sigma_z, sigma_z) + (INT32_C(1) << 30), 31);
+    const int32_t sigma_dot_sigma = cayley_klein_rk2_2_q31_fit(cayley_klein_rk2_2_q31_mul(
+        sigma_x, sigma_x) + cayley_klein_rk2_2_q31_mul(sigma_y, sigma_y)
+        + cayley_klein_rk2_2_q31_mul(sigma_z, sigma_z) + (INT32_C(1) << 30), 31);
         /* Q-2.33, -1.17e-10 .. 0.188, error 5.9e-11 */
     /* its scalar part */
-    const int32_t p_s =
-        cayley_klein_rk2_2_q31_narrow_(cayley_klein_rk2_2_q31_mul_(sigma_dot_sigma, 3)
-        * (INT32_C(1) << 27) - d1_dot_d2 + (INT32_C(1) << 29), 30);
+    const int32_t p_s = cayley_klein_rk2_2_q31_fit(cayley_klein_rk2_2_q31_mul(sigma_dot_sigma,
+        3) * (INT32_C(1) << 27) - d1_dot_d2 + (INT32_C(1) << 29), 30);
         /* Q-2.33, -0.0586 .. 0.0938, error 8.1e-11; stands for p_s - 1 */
     /* Cayley-Klein parameters, body to reference, scalar first, after the step */
-    const int32_t next_s = a_s
-        + cayley_klein_rk2_2_q31_narrow_(cayley_klein_rk2_2_q31_mul_(a_s, p_s)
-        - cayley_klein_rk2_2_q31_mul_(a_x, p_x) - cayley_klein_rk2_2_q31_mul_(a_y, p_y)
-        - cayley_klein_rk2_2_q31_mul_(a_z, p_z) + (INT64_C(1) << 32), 33);
+    const int32_t next_s = a_s + cayley_klein_rk2_2_q31_fit(cayley_klein_rk2_2_q31_mul(a_s, p_s)
+        - cayley_klein_rk2_2_q31_mul(a_x, p_x) - cayley_klein_rk2_2_q31_mul(a_y, p_y)
+        - cayley_klein_rk2_2_q31_mul(a_z, p_z) + (INT64_C(1) << 32), 33);
         /* Q1.30, -1.67 .. 1.67, error 7.4e-10 */
-    const int32_t next_x = a_x
-        + cayley_klein_rk2_2_q31_narrow_(cayley_klein_rk2_2_q31_mul_(a_s, p_x)
-        + cayley_klein_rk2_2_q31_mul_(a_x, p_s) + cayley_klein_rk2_2_q31_mul_(a_y, p_z)
-        - cayley_klein_rk2_2_q31_mul_(a_z, p_y) + (INT64_C(1) << 32), 33);
+    const int32_t next_x = a_x + cayley_klein_rk2_2_q31_fit(cayley_klein_rk2_2_q31_mul(a_s, p_x)
+        + cayley_klein_rk2_2_q31_mul(a_x, p_s) + cayley_klein_rk2_2_q31_mul(a_y, p_z)
+        - cayley_klein_rk2_2_q31_mul(a_z, p_y) + (INT64_C(1) << 32), 33);
         /* Q1.30, -1.67 .. 1.67, error 7.4e-10 */
-    const int32_t next_y = a_y
-        + cayley_klein_rk2_2_q31_narrow_(cayley_klein_rk2_2_q31_mul_(a_s, p_y)
-        - cayley_klein_rk2_2_q31_mul_(a_x, p_z) + cayley_klein_rk2_2_q31_mul_(a_y, p_s)
-        + cayley_klein_rk2_2_q31_mul_(a_z, p_x) + (INT64_C(1) << 32), 33);
+    const int32_t next_y = a_y + cayley_klein_rk2_2_q31_fit(cayley_klein_rk2_2_q31_mul(a_s, p_y)
+        - cayley_klein_rk2_2_q31_mul(a_x, p_z) + cayley_klein_rk2_2_q31_mul(a_y, p_s)
+        + cayley_klein_rk2_2_q31_mul(a_z, p_x) + (INT64_C(1) << 32), 33);
         /* Q1.30, -1.67 .. 1.67, error 7.4e-10 */
-    const int32_t next_z = a_z
-        + cayley_klein_rk2_2_q31_narrow_(cayley_klein_rk2_2_q31_mul_(a_s, p_z)
-        + cayley_klein_rk2_2_q31_mul_(a_x, p_y) - cayley_klein_rk2_2_q31_mul_(a_y, p_x)
-        + cayley_klein_rk2_2_q31_mul_(a_z, p_s) + (INT64_C(1) << 32), 33);
+    const int32_t next_z = a_z + cayley_klein_rk2_2_q31_fit(cayley_klein_rk2_2_q31_mul(a_s, p_z)
+        + cayley_klein_rk2_2_q31_mul(a_x, p_y) - cayley_klein_rk2_2_q31_mul(a_y, p_x)
+        + cayley_klein_rk2_2_q31_mul(a_z, p_s) + (INT64_C(1) << 32), 33);
         /* Q1.30, -1.67 .. 1.67, error 7.4e-10 */
     next[0] = next_s;
     next[1] = next_x;

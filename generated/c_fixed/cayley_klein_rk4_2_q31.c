@@ -7,7 +7,7 @@
 #include "cayley_klein_rk4_2_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int cayley_klein_rk4_2_q31_out_(int32_t x, int32_t limit)
+static inline int cayley_klein_rk4_2_q31_out(int32_t x, int32_t limit)
 {
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
@@ -15,7 +15,7 @@ static inline int cayley_klein_rk4_2_q31_out_(int32_t x, int32_t limit)
 /* The exact product of two words. */
 #if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
 /* These processors have no instruction for it: the high word takes four products of half words. */
-static __attribute__((noinline)) int64_t cayley_klein_rk4_2_q31_mul_(int32_t a, int32_t b)
+static __attribute__((noinline)) int64_t cayley_klein_rk4_2_q31_mul(int32_t a, int32_t b)
 {
     const uint32_t a_low = (uint32_t)a & 0xFFFFu;
     const uint32_t b_low = (uint32_t)b & 0xFFFFu;
@@ -30,7 +30,7 @@ static __attribute__((noinline)) int64_t cayley_klein_rk4_2_q31_mul_(int32_t a, 
     return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
 }
 #else
-static inline int64_t cayley_klein_rk4_2_q31_mul_(int32_t a, int32_t b)
+static inline int64_t cayley_klein_rk4_2_q31_mul(int32_t a, int32_t b)
 {
     return (int64_t)a * (int64_t)b;
 }
@@ -41,7 +41,7 @@ static inline int64_t cayley_klein_rk4_2_q31_mul_(int32_t a, int32_t b)
  * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
  * number and no conversion of a number out of range.
  */
-static inline int32_t cayley_klein_rk4_2_q31_narrow_(int64_t x, int n)
+static inline int32_t cayley_klein_rk4_2_q31_fit(int64_t x, int n)
 {
 #ifdef __FRAMAC__
     return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
@@ -55,7 +55,7 @@ static inline int32_t cayley_klein_rk4_2_q31_narrow_(int64_t x, int n)
 }
 
 /* x / 2^n, rounded down, as a wide number. */
-static inline int64_t cayley_klein_rk4_2_q31_shr_(int64_t x, int n)
+static inline int64_t cayley_klein_rk4_2_q31_shr(int64_t x, int n)
 {
     return (x < 0) ? ~(~x >> n) : (x >> n);
 }
@@ -72,93 +72,84 @@ int cayley_klein_rk4_2_q31(const int32_t state[4], const int32_t increments[6], 
     const int32_t d2_x = increments[3];
     const int32_t d2_y = increments[4];
     const int32_t d2_z = increments[5];
-    if (cayley_klein_rk4_2_q31_out_(a_s, INT32_C(1140850688))
-        || cayley_klein_rk4_2_q31_out_(a_x, INT32_C(1140850688))
-        || cayley_klein_rk4_2_q31_out_(a_y, INT32_C(1140850688))
-        || cayley_klein_rk4_2_q31_out_(a_z, INT32_C(1140850688))
-        || cayley_klein_rk4_2_q31_out_(d1_x, (INT32_C(1) << 29))
-        || cayley_klein_rk4_2_q31_out_(d1_y, (INT32_C(1) << 29))
-        || cayley_klein_rk4_2_q31_out_(d1_z, (INT32_C(1) << 29))
-        || cayley_klein_rk4_2_q31_out_(d2_x, (INT32_C(1) << 29))
-        || cayley_klein_rk4_2_q31_out_(d2_y, (INT32_C(1) << 29))
-        || cayley_klein_rk4_2_q31_out_(d2_z, (INT32_C(1) << 29)))
+    if (cayley_klein_rk4_2_q31_out(a_s, INT32_C(1140850688))
+        || cayley_klein_rk4_2_q31_out(a_x, INT32_C(1140850688))
+        || cayley_klein_rk4_2_q31_out(a_y, INT32_C(1140850688))
+        || cayley_klein_rk4_2_q31_out(a_z, INT32_C(1140850688))
+        || cayley_klein_rk4_2_q31_out(d1_x, (INT32_C(1) << 29))
+        || cayley_klein_rk4_2_q31_out(d1_y, (INT32_C(1) << 29))
+        || cayley_klein_rk4_2_q31_out(d1_z, (INT32_C(1) << 29))
+        || cayley_klein_rk4_2_q31_out(d2_x, (INT32_C(1) << 29))
+        || cayley_klein_rk4_2_q31_out(d2_y, (INT32_C(1) << 29))
+        || cayley_klein_rk4_2_q31_out(d2_z, (INT32_C(1) << 29))) {
         return 1;
+    }
     /* the angle increment of the whole step */
     const int32_t sigma_x = d1_x + d2_x; /* Q-1.32, -0.25 .. 0.25, exact */
     const int32_t sigma_y = d1_y + d2_y; /* Q-1.32, -0.25 .. 0.25, exact */
     const int32_t sigma_z = d1_z + d2_z; /* Q-1.32, -0.25 .. 0.25, exact */
-    const int32_t sigma_cross_d1_x =
-        cayley_klein_rk4_2_q31_narrow_(cayley_klein_rk4_2_q31_mul_(d1_z, sigma_y)
-        - cayley_klein_rk4_2_q31_mul_(d1_y, sigma_z) + (INT32_C(1) << 28), 29);
+    const int32_t sigma_cross_d1_x = cayley_klein_rk4_2_q31_fit(cayley_klein_rk4_2_q31_mul(d1_z,
+        sigma_y) - cayley_klein_rk4_2_q31_mul(d1_y, sigma_z) + (INT32_C(1) << 28), 29);
         /* Q-4.35, -0.0313 .. 0.0313, error 1.5e-11 */
-    const int32_t sigma_cross_d1_y =
-        cayley_klein_rk4_2_q31_narrow_(cayley_klein_rk4_2_q31_mul_(d1_x, sigma_z)
-        - cayley_klein_rk4_2_q31_mul_(d1_z, sigma_x) + (INT32_C(1) << 28), 29);
+    const int32_t sigma_cross_d1_y = cayley_klein_rk4_2_q31_fit(cayley_klein_rk4_2_q31_mul(d1_x,
+        sigma_z) - cayley_klein_rk4_2_q31_mul(d1_z, sigma_x) + (INT32_C(1) << 28), 29);
         /* Q-4.35, -0.0313 .. 0.0313, error 1.5e-11 */
-    const int32_t sigma_cross_d1_z =
-        cayley_klein_rk4_2_q31_narrow_(cayley_klein_rk4_2_q31_mul_(d1_y, sigma_x)
-        - cayley_klein_rk4_2_q31_mul_(d1_x, sigma_y) + (INT32_C(1) << 28), 29);
+    const int32_t sigma_cross_d1_z = cayley_klein_rk4_2_q31_fit(cayley_klein_rk4_2_q31_mul(d1_y,
+        sigma_x) - cayley_klein_rk4_2_q31_mul(d1_x, sigma_y) + (INT32_C(1) << 28), 29);
         /* Q-4.35, -0.0313 .. 0.0313, error 1.5e-11 */
-    const int32_t sigma_dot_sigma =
-        cayley_klein_rk4_2_q31_narrow_(cayley_klein_rk4_2_q31_mul_(sigma_x, sigma_x)
-        + cayley_klein_rk4_2_q31_mul_(sigma_y, sigma_y)
-        + cayley_klein_rk4_2_q31_mul_(sigma_z, sigma_z) + (INT32_C(1) << 30), 31);
+    const int32_t sigma_dot_sigma = cayley_klein_rk4_2_q31_fit(cayley_klein_rk4_2_q31_mul(
+        sigma_x, sigma_x) + cayley_klein_rk4_2_q31_mul(sigma_y, sigma_y)
+        + cayley_klein_rk4_2_q31_mul(sigma_z, sigma_z) + (INT32_C(1) << 30), 31);
         /* Q-2.33, -1.17e-10 .. 0.188, error 5.9e-11 */
     /* weight of sigma in p */
-    const int32_t p_sigma =
-        cayley_klein_rk4_2_q31_narrow_(-cayley_klein_rk4_2_q31_mul_(sigma_dot_sigma, INT32_C(1431655765) /* 1/48 in Q36 */)
-        + (INT32_C(1) << 30), 31);
+    const int32_t p_sigma = cayley_klein_rk4_2_q31_fit(-cayley_klein_rk4_2_q31_mul(
+        sigma_dot_sigma, INT32_C(1431655765) /* 1/48 in Q36 */) + (INT32_C(1) << 30), 31);
         /* Q-7.38, -0.00391 .. 7.28e-12, error 4e-12; stands for p_sigma - 1/2 */
     /* weight of sigma_cross_d1 in p */
-    const int32_t p_sigma_cross_d1 = cayley_klein_rk4_2_q31_narrow_(-(int64_t)p_sigma
+    const int32_t p_sigma_cross_d1 = cayley_klein_rk4_2_q31_fit(-(int64_t)p_sigma
         * (INT32_C(1) << 22) - INT64_C(384307168202282325) /* 1/3 in Q60 */
         + (INT32_C(1) << 27), 28); /* Q-1.32, -0.334 .. -0.329, error 1.3e-10 */
     /* the step applied to the identity: its vector part */
-    const int32_t p_x = sigma_x
-        + cayley_klein_rk4_2_q31_narrow_(cayley_klein_rk4_2_q31_shr_(cayley_klein_rk4_2_q31_mul_(p_sigma, sigma_x), 1)
-        + cayley_klein_rk4_2_q31_mul_(p_sigma_cross_d1, sigma_cross_d1_x) * 4
+    const int32_t p_x = sigma_x + cayley_klein_rk4_2_q31_fit(cayley_klein_rk4_2_q31_shr(
+        cayley_klein_rk4_2_q31_mul(p_sigma, sigma_x), 1)
+        + cayley_klein_rk4_2_q31_mul(p_sigma_cross_d1, sigma_cross_d1_x) * 4
         + (INT64_C(1) << 35), 36); /* Q-2.33, -0.137 .. 0.137, error 6.8e-11 */
-    const int32_t p_y = sigma_y
-        + cayley_klein_rk4_2_q31_narrow_(cayley_klein_rk4_2_q31_shr_(cayley_klein_rk4_2_q31_mul_(p_sigma, sigma_y), 1)
-        + cayley_klein_rk4_2_q31_mul_(p_sigma_cross_d1, sigma_cross_d1_y) * 4
+    const int32_t p_y = sigma_y + cayley_klein_rk4_2_q31_fit(cayley_klein_rk4_2_q31_shr(
+        cayley_klein_rk4_2_q31_mul(p_sigma, sigma_y), 1)
+        + cayley_klein_rk4_2_q31_mul(p_sigma_cross_d1, sigma_cross_d1_y) * 4
         + (INT64_C(1) << 35), 36); /* Q-2.33, -0.137 .. 0.137, error 6.8e-11 */
-    const int32_t p_z = sigma_z
-        + cayley_klein_rk4_2_q31_narrow_(cayley_klein_rk4_2_q31_shr_(cayley_klein_rk4_2_q31_mul_(p_sigma, sigma_z), 1)
-        + cayley_klein_rk4_2_q31_mul_(p_sigma_cross_d1, sigma_cross_d1_z) * 4
+    const int32_t p_z = sigma_z + cayley_klein_rk4_2_q31_fit(cayley_klein_rk4_2_q31_shr(
+        cayley_klein_rk4_2_q31_mul(p_sigma, sigma_z), 1)
+        + cayley_klein_rk4_2_q31_mul(p_sigma_cross_d1, sigma_cross_d1_z) * 4
         + (INT64_C(1) << 35), 36); /* Q-2.33, -0.137 .. 0.137, error 6.8e-11 */
-    const int32_t d1_dot_d2 =
-        cayley_klein_rk4_2_q31_narrow_(cayley_klein_rk4_2_q31_mul_(d1_x, d2_x)
-        + cayley_klein_rk4_2_q31_mul_(d1_y, d2_y) + cayley_klein_rk4_2_q31_mul_(d1_z, d2_z)
+    const int32_t d1_dot_d2 = cayley_klein_rk4_2_q31_fit(cayley_klein_rk4_2_q31_mul(d1_x, d2_x)
+        + cayley_klein_rk4_2_q31_mul(d1_y, d2_y) + cayley_klein_rk4_2_q31_mul(d1_z, d2_z)
         + (INT32_C(1) << 28), 29); /* Q-4.35, -0.0469 .. 0.0469, error 1.5e-11 */
-    const int32_t p_s_factor =
-        cayley_klein_rk4_2_q31_narrow_(cayley_klein_rk4_2_q31_mul_(d1_dot_d2, INT32_C(1431655765) /* 1/24 in Q35 */)
+    const int32_t p_s_factor = cayley_klein_rk4_2_q31_fit(cayley_klein_rk4_2_q31_mul(d1_dot_d2,
+        INT32_C(1431655765) /* 1/24 in Q35 */)
         - (int64_t)sigma_dot_sigma * (INT32_C(1) << 30) + (INT64_C(1) << 34), 35);
         /* Q-4.35, -0.00196 .. 0.00123, error 1.7e-11; stands for p_s_factor + 1/8 */
     /* its scalar part */
-    const int32_t p_s = cayley_klein_rk4_2_q31_narrow_(-(int64_t)sigma_dot_sigma
-        * (INT64_C(1) << 32) + cayley_klein_rk4_2_q31_mul_(p_s_factor, sigma_dot_sigma)
+    const int32_t p_s = cayley_klein_rk4_2_q31_fit(-(int64_t)sigma_dot_sigma
+        * (INT64_C(1) << 32) + cayley_klein_rk4_2_q31_mul(p_s_factor, sigma_dot_sigma)
         + (INT64_C(1) << 34), 35);
         /* Q-2.33, -0.0239 .. 0.000229, error 6.9e-11; stands for p_s - 1 */
     /* Cayley-Klein parameters, body to reference, scalar first, after the step */
-    const int32_t next_s = a_s
-        + cayley_klein_rk4_2_q31_narrow_(cayley_klein_rk4_2_q31_mul_(a_s, p_s)
-        - cayley_klein_rk4_2_q31_mul_(a_x, p_x) - cayley_klein_rk4_2_q31_mul_(a_y, p_y)
-        - cayley_klein_rk4_2_q31_mul_(a_z, p_z) + (INT64_C(1) << 32), 33);
+    const int32_t next_s = a_s + cayley_klein_rk4_2_q31_fit(cayley_klein_rk4_2_q31_mul(a_s, p_s)
+        - cayley_klein_rk4_2_q31_mul(a_x, p_x) - cayley_klein_rk4_2_q31_mul(a_y, p_y)
+        - cayley_klein_rk4_2_q31_mul(a_z, p_z) + (INT64_C(1) << 32), 33);
         /* Q1.30, -1.53 .. 1.53, error 7.6e-10 */
-    const int32_t next_x = a_x
-        + cayley_klein_rk4_2_q31_narrow_(cayley_klein_rk4_2_q31_mul_(a_s, p_x)
-        + cayley_klein_rk4_2_q31_mul_(a_x, p_s) + cayley_klein_rk4_2_q31_mul_(a_y, p_z)
-        - cayley_klein_rk4_2_q31_mul_(a_z, p_y) + (INT64_C(1) << 32), 33);
+    const int32_t next_x = a_x + cayley_klein_rk4_2_q31_fit(cayley_klein_rk4_2_q31_mul(a_s, p_x)
+        + cayley_klein_rk4_2_q31_mul(a_x, p_s) + cayley_klein_rk4_2_q31_mul(a_y, p_z)
+        - cayley_klein_rk4_2_q31_mul(a_z, p_y) + (INT64_C(1) << 32), 33);
         /* Q1.30, -1.53 .. 1.53, error 7.6e-10 */
-    const int32_t next_y = a_y
-        + cayley_klein_rk4_2_q31_narrow_(cayley_klein_rk4_2_q31_mul_(a_s, p_y)
-        - cayley_klein_rk4_2_q31_mul_(a_x, p_z) + cayley_klein_rk4_2_q31_mul_(a_y, p_s)
-        + cayley_klein_rk4_2_q31_mul_(a_z, p_x) + (INT64_C(1) << 32), 33);
+    const int32_t next_y = a_y + cayley_klein_rk4_2_q31_fit(cayley_klein_rk4_2_q31_mul(a_s, p_y)
+        - cayley_klein_rk4_2_q31_mul(a_x, p_z) + cayley_klein_rk4_2_q31_mul(a_y, p_s)
+        + cayley_klein_rk4_2_q31_mul(a_z, p_x) + (INT64_C(1) << 32), 33);
         /* Q1.30, -1.53 .. 1.53, error 7.6e-10 */
-    const int32_t next_z = a_z
-        + cayley_klein_rk4_2_q31_narrow_(cayley_klein_rk4_2_q31_mul_(a_s, p_z)
-        + cayley_klein_rk4_2_q31_mul_(a_x, p_y) - cayley_klein_rk4_2_q31_mul_(a_y, p_x)
-        + cayley_klein_rk4_2_q31_mul_(a_z, p_s) + (INT64_C(1) << 32), 33);
+    const int32_t next_z = a_z + cayley_klein_rk4_2_q31_fit(cayley_klein_rk4_2_q31_mul(a_s, p_z)
+        + cayley_klein_rk4_2_q31_mul(a_x, p_y) - cayley_klein_rk4_2_q31_mul(a_y, p_x)
+        + cayley_klein_rk4_2_q31_mul(a_z, p_s) + (INT64_C(1) << 32), 33);
         /* Q1.30, -1.53 .. 1.53, error 7.6e-10 */
     next[0] = next_s;
     next[1] = next_x;

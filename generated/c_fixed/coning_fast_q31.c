@@ -5,7 +5,7 @@
 #include "coning_fast_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int coning_fast_q31_out_(int32_t x, int32_t limit)
+static inline int coning_fast_q31_out(int32_t x, int32_t limit)
 {
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
@@ -13,7 +13,7 @@ static inline int coning_fast_q31_out_(int32_t x, int32_t limit)
 /* The exact product of two words. */
 #if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
 /* These processors have no instruction for it: the high word takes four products of half words. */
-static __attribute__((noinline)) int64_t coning_fast_q31_mul_(int32_t a, int32_t b)
+static __attribute__((noinline)) int64_t coning_fast_q31_mul(int32_t a, int32_t b)
 {
     const uint32_t a_low = (uint32_t)a & 0xFFFFu;
     const uint32_t b_low = (uint32_t)b & 0xFFFFu;
@@ -28,7 +28,7 @@ static __attribute__((noinline)) int64_t coning_fast_q31_mul_(int32_t a, int32_t
     return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
 }
 #else
-static inline int64_t coning_fast_q31_mul_(int32_t a, int32_t b)
+static inline int64_t coning_fast_q31_mul(int32_t a, int32_t b)
 {
     return (int64_t)a * (int64_t)b;
 }
@@ -39,7 +39,7 @@ static inline int64_t coning_fast_q31_mul_(int32_t a, int32_t b)
  * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
  * number and no conversion of a number out of range.
  */
-static inline int32_t coning_fast_q31_narrow_(int64_t x, int n)
+static inline int32_t coning_fast_q31_fit(int64_t x, int n)
 {
 #ifdef __FRAMAC__
     return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
@@ -53,7 +53,7 @@ static inline int32_t coning_fast_q31_narrow_(int64_t x, int n)
 }
 
 /* x / 2^n, rounded down, as a wide number. */
-static inline int64_t coning_fast_q31_shr_(int64_t x, int n)
+static inline int64_t coning_fast_q31_shr(int64_t x, int n)
 {
     return (x < 0) ? ~(~x >> n) : (x >> n);
 }
@@ -74,66 +74,67 @@ int coning_fast_q31(const int32_t angle_sum[3], const int32_t coning[3],
     const int32_t d_x = increment[0];
     const int32_t d_y = increment[1];
     const int32_t d_z = increment[2];
-    if (coning_fast_q31_out_(beta_x, (INT32_C(1) << 30))
-        || coning_fast_q31_out_(beta_y, (INT32_C(1) << 30))
-        || coning_fast_q31_out_(beta_z, (INT32_C(1) << 30))
-        || coning_fast_q31_out_(coning_x, (INT32_C(1) << 30))
-        || coning_fast_q31_out_(coning_y, (INT32_C(1) << 30))
-        || coning_fast_q31_out_(coning_z, (INT32_C(1) << 30))
-        || coning_fast_q31_out_(past_x, (INT32_C(1) << 30))
-        || coning_fast_q31_out_(past_y, (INT32_C(1) << 30))
-        || coning_fast_q31_out_(past_z, (INT32_C(1) << 30))
-        || coning_fast_q31_out_(d_x, (INT32_C(1) << 30))
-        || coning_fast_q31_out_(d_y, (INT32_C(1) << 30))
-        || coning_fast_q31_out_(d_z, (INT32_C(1) << 30)))
+    if (coning_fast_q31_out(beta_x, (INT32_C(1) << 30))
+        || coning_fast_q31_out(beta_y, (INT32_C(1) << 30))
+        || coning_fast_q31_out(beta_z, (INT32_C(1) << 30))
+        || coning_fast_q31_out(coning_x, (INT32_C(1) << 30))
+        || coning_fast_q31_out(coning_y, (INT32_C(1) << 30))
+        || coning_fast_q31_out(coning_z, (INT32_C(1) << 30))
+        || coning_fast_q31_out(past_x, (INT32_C(1) << 30))
+        || coning_fast_q31_out(past_y, (INT32_C(1) << 30))
+        || coning_fast_q31_out(past_z, (INT32_C(1) << 30))
+        || coning_fast_q31_out(d_x, (INT32_C(1) << 30))
+        || coning_fast_q31_out(d_y, (INT32_C(1) << 30))
+        || coning_fast_q31_out(d_z, (INT32_C(1) << 30))) {
         return 1;
+    }
     /* angle at the middle of the cycle, for coning */
-    const int32_t arm_x = beta_x
-        + coning_fast_q31_narrow_(coning_fast_q31_mul_(past_x, INT32_C(1431655765) /* 1/6 in Q33 */)
-        + (INT64_C(1) << 35), 36); /* Q1.30, -1.03 .. 1.03, error 4.8e-10 */
-    const int32_t arm_y = beta_y
-        + coning_fast_q31_narrow_(coning_fast_q31_mul_(past_y, INT32_C(1431655765) /* 1/6 in Q33 */)
-        + (INT64_C(1) << 35), 36); /* Q1.30, -1.03 .. 1.03, error 4.8e-10 */
+    const int32_t arm_x = beta_x + coning_fast_q31_fit(coning_fast_q31_mul(past_x,
+        INT32_C(1431655765) /* 1/6 in Q33 */) + (INT64_C(1) << 35), 36);
+        /* Q1.30, -1.03 .. 1.03, error 4.8e-10 */
+    const int32_t arm_y = beta_y + coning_fast_q31_fit(coning_fast_q31_mul(past_y,
+        INT32_C(1431655765) /* 1/6 in Q33 */) + (INT64_C(1) << 35), 36);
+        /* Q1.30, -1.03 .. 1.03, error 4.8e-10 */
     const int64_t arm_z = (int64_t)beta_z * (INT64_C(1) << 32)
-        + coning_fast_q31_shr_(coning_fast_q31_mul_(past_z, INT32_C(1431655765) /* 1/6 in Q33 */), 4);
-        /* Q1.62, -1.03 .. 1.03, error 4.9e-12 */
+        + coning_fast_q31_shr(coning_fast_q31_mul(past_z,
+        INT32_C(1431655765) /* 1/6 in Q33 */), 4); /* Q1.62, -1.03 .. 1.03, error 4.9e-12 */
     /* sum of the angle increments since the slow cycle began, after the call */
-    const int32_t next_beta_x = beta_x + coning_fast_q31_narrow_((int64_t)d_x + 4, 3);
+    const int32_t next_beta_x = beta_x + coning_fast_q31_fit((int64_t)d_x + 4, 3);
         /* Q1.30, -1.13 .. 1.13, error 4.7e-10 */
-    const int32_t next_beta_y = beta_y + coning_fast_q31_narrow_((int64_t)d_y + 4, 3);
+    const int32_t next_beta_y = beta_y + coning_fast_q31_fit((int64_t)d_y + 4, 3);
         /* Q1.30, -1.13 .. 1.13, error 4.7e-10 */
-    const int32_t next_beta_z = beta_z + coning_fast_q31_narrow_((int64_t)d_z + 4, 3);
+    const int32_t next_beta_z = beta_z + coning_fast_q31_fit((int64_t)d_z + 4, 3);
         /* Q1.30, -1.13 .. 1.13, error 4.7e-10 */
     const int32_t shared_1 = d_z; /* Q-3.34, -0.0625 .. 0.0625, exact */
-    const int32_t shared_2 = coning_fast_q31_narrow_(arm_z + (INT64_C(1) << 31), 32);
+    const int32_t shared_2 = coning_fast_q31_fit(arm_z + (INT64_C(1) << 31), 32);
         /* Q0.31, -0.511 .. 0.511, error 2.4e-10 */
     /* coning correction since the slow cycle began, after the call */
-    const int64_t next_coning_x_unchecked = (int64_t)coning_x
-        + coning_fast_q31_shr_(coning_fast_q31_mul_(arm_y, shared_1)
-        - coning_fast_q31_mul_(d_y, shared_2) + (INT32_C(1) << 30), 31);
-    if ((next_coning_x_unchecked < (-(INT32_C(1) << 30)))
-        || (next_coning_x_unchecked > (INT32_C(1) << 30))) {
+    const int64_t next_coning_x_raw = (int64_t)coning_x
+        + coning_fast_q31_shr(coning_fast_q31_mul(arm_y, shared_1)
+        - coning_fast_q31_mul(d_y, shared_2) + (INT32_C(1) << 30), 31);
+    if ((next_coning_x_raw < (-(INT32_C(1) << 30)))
+        || (next_coning_x_raw > (INT32_C(1) << 30))) {
         return 2;
     }
-    const int32_t next_coning_x = coning_fast_q31_narrow_(next_coning_x_unchecked, 0);
+    const int32_t next_coning_x = coning_fast_q31_fit(next_coning_x_raw, 0);
         /* Q-2.33, -0.125 .. 0.125, error 1.2e-10 */
-    const int64_t next_coning_y_unchecked = (int64_t)coning_y
-        + coning_fast_q31_shr_(-coning_fast_q31_mul_(arm_x, shared_1)
-        + coning_fast_q31_mul_(d_x, shared_2) + (INT32_C(1) << 30), 31);
-    if ((next_coning_y_unchecked < (-(INT32_C(1) << 30)))
-        || (next_coning_y_unchecked > (INT32_C(1) << 30))) {
+    const int64_t next_coning_y_raw = (int64_t)coning_y
+        + coning_fast_q31_shr(-coning_fast_q31_mul(arm_x, shared_1)
+        + coning_fast_q31_mul(d_x, shared_2) + (INT32_C(1) << 30), 31);
+    if ((next_coning_y_raw < (-(INT32_C(1) << 30)))
+        || (next_coning_y_raw > (INT32_C(1) << 30))) {
         return 2;
     }
-    const int32_t next_coning_y = coning_fast_q31_narrow_(next_coning_y_unchecked, 0);
+    const int32_t next_coning_y = coning_fast_q31_fit(next_coning_y_raw, 0);
         /* Q-2.33, -0.125 .. 0.125, error 1.2e-10 */
-    const int64_t next_coning_z_unchecked = (int64_t)coning_z
-        + coning_fast_q31_shr_(coning_fast_q31_mul_(arm_x, d_y)
-        - coning_fast_q31_mul_(arm_y, d_x) + (INT32_C(1) << 30), 31);
-    if ((next_coning_z_unchecked < (-(INT32_C(1) << 30)))
-        || (next_coning_z_unchecked > (INT32_C(1) << 30))) {
+    const int64_t next_coning_z_raw = (int64_t)coning_z
+        + coning_fast_q31_shr(coning_fast_q31_mul(arm_x, d_y)
+        - coning_fast_q31_mul(arm_y, d_x) + (INT32_C(1) << 30), 31);
+    if ((next_coning_z_raw < (-(INT32_C(1) << 30)))
+        || (next_coning_z_raw > (INT32_C(1) << 30))) {
         return 2;
     }
-    const int32_t next_coning_z = coning_fast_q31_narrow_(next_coning_z_unchecked, 0);
+    const int32_t next_coning_z = coning_fast_q31_fit(next_coning_z_raw, 0);
         /* Q-2.33, -0.125 .. 0.125, error 1.2e-10 */
     const int32_t next_past_x = d_x; /* Q-2.33, -0.125 .. 0.125, exact */
     const int32_t next_past_y = d_y; /* Q-2.33, -0.125 .. 0.125, exact */

@@ -5,7 +5,7 @@
 #include "dcm_from_cayley_klein_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int dcm_from_cayley_klein_q31_out_(int32_t x, int32_t limit)
+static inline int dcm_from_cayley_klein_q31_out(int32_t x, int32_t limit)
 {
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
@@ -13,7 +13,7 @@ static inline int dcm_from_cayley_klein_q31_out_(int32_t x, int32_t limit)
 /* The exact product of two words. */
 #if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
 /* These processors have no instruction for it: the high word takes four products of half words. */
-static __attribute__((noinline)) int64_t dcm_from_cayley_klein_q31_mul_(int32_t a, int32_t b)
+static __attribute__((noinline)) int64_t dcm_from_cayley_klein_q31_mul(int32_t a, int32_t b)
 {
     const uint32_t a_low = (uint32_t)a & 0xFFFFu;
     const uint32_t b_low = (uint32_t)b & 0xFFFFu;
@@ -28,7 +28,7 @@ static __attribute__((noinline)) int64_t dcm_from_cayley_klein_q31_mul_(int32_t 
     return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
 }
 #else
-static inline int64_t dcm_from_cayley_klein_q31_mul_(int32_t a, int32_t b)
+static inline int64_t dcm_from_cayley_klein_q31_mul(int32_t a, int32_t b)
 {
     return (int64_t)a * (int64_t)b;
 }
@@ -39,7 +39,7 @@ static inline int64_t dcm_from_cayley_klein_q31_mul_(int32_t a, int32_t b)
  * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
  * number and no conversion of a number out of range.
  */
-static inline int32_t dcm_from_cayley_klein_q31_narrow_(int64_t x, int n)
+static inline int32_t dcm_from_cayley_klein_q31_fit(int64_t x, int n)
 {
 #ifdef __FRAMAC__
     return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
@@ -53,7 +53,7 @@ static inline int32_t dcm_from_cayley_klein_q31_narrow_(int64_t x, int n)
 }
 
 /* x / 2^n, rounded down, as a wide number. */
-static inline int64_t dcm_from_cayley_klein_q31_shr_(int64_t x, int n)
+static inline int64_t dcm_from_cayley_klein_q31_shr(int64_t x, int n)
 {
     return (x < 0) ? ~(~x >> n) : (x >> n);
 }
@@ -64,98 +64,95 @@ int dcm_from_cayley_klein_q31(const int32_t state[4], int32_t attitude[9])
     const int32_t a_x = state[1];
     const int32_t a_y = state[2];
     const int32_t a_z = state[3];
-    if (dcm_from_cayley_klein_q31_out_(a_s, INT32_C(1140850688))
-        || dcm_from_cayley_klein_q31_out_(a_x, INT32_C(1140850688))
-        || dcm_from_cayley_klein_q31_out_(a_y, INT32_C(1140850688))
-        || dcm_from_cayley_klein_q31_out_(a_z, INT32_C(1140850688)))
+    if (dcm_from_cayley_klein_q31_out(a_s, INT32_C(1140850688))
+        || dcm_from_cayley_klein_q31_out(a_x, INT32_C(1140850688))
+        || dcm_from_cayley_klein_q31_out(a_y, INT32_C(1140850688))
+        || dcm_from_cayley_klein_q31_out(a_z, INT32_C(1140850688))) {
         return 1;
-    const int64_t shared_1 = dcm_from_cayley_klein_q31_mul_(a_x, a_x);
-        /* Q3.60, 0 .. 1.13, exact */
-    const int64_t shared_2 = dcm_from_cayley_klein_q31_mul_(a_y, a_y);
-        /* Q3.60, 0 .. 1.13, exact */
-    const int64_t shared_4 = dcm_from_cayley_klein_q31_mul_(a_s, a_s);
-        /* Q3.60, 0 .. 1.13, exact */
-    const int64_t shared_5 = dcm_from_cayley_klein_q31_mul_(a_z, a_z);
-        /* Q3.60, 0 .. 1.13, exact */
+    }
+    const int64_t shared_1 = dcm_from_cayley_klein_q31_mul(a_x, a_x); /* Q3.60, 0 .. 1.13, exact */
+    const int64_t shared_2 = dcm_from_cayley_klein_q31_mul(a_y, a_y); /* Q3.60, 0 .. 1.13, exact */
+    const int64_t shared_4 = dcm_from_cayley_klein_q31_mul(a_s, a_s); /* Q3.60, 0 .. 1.13, exact */
+    const int64_t shared_5 = dcm_from_cayley_klein_q31_mul(a_z, a_z); /* Q3.60, 0 .. 1.13, exact */
     const int64_t shared_6 = shared_4 - shared_5; /* Q3.60, -1.13 .. 1.13, exact */
     const int64_t shared_13 = shared_1 - shared_2; /* Q3.60, -1.13 .. 1.13, exact */
     /* direction cosine matrix, body to reference */
-    const int64_t C_11_unchecked = dcm_from_cayley_klein_q31_shr_(shared_13 + shared_6
+    const int64_t C_11_raw = dcm_from_cayley_klein_q31_shr(shared_13 + shared_6
         + (INT32_C(1) << 29), 30);
-    if ((C_11_unchecked < (-INT32_C(1140850688))) || (C_11_unchecked > INT32_C(1140850688))) {
+    if ((C_11_raw < (-INT32_C(1140850688))) || (C_11_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t C_11 = dcm_from_cayley_klein_q31_narrow_(C_11_unchecked, 0);
+    const int32_t C_11 = dcm_from_cayley_klein_q31_fit(C_11_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
     const int32_t shared_7 = a_s; /* Q2.29, -2.13 .. 2.13, exact */
-    const int64_t shared_8 = dcm_from_cayley_klein_q31_mul_(a_z, shared_7);
+    const int64_t shared_8 = dcm_from_cayley_klein_q31_mul(a_z, shared_7);
         /* Q4.59, -2.26 .. 2.26, exact */
     const int32_t shared_11 = a_x; /* Q2.29, -2.13 .. 2.13, exact */
-    const int64_t shared_10 = dcm_from_cayley_klein_q31_mul_(a_y, shared_11);
+    const int64_t shared_10 = dcm_from_cayley_klein_q31_mul(a_y, shared_11);
         /* Q4.59, -2.26 .. 2.26, exact */
-    const int64_t C_12_unchecked = dcm_from_cayley_klein_q31_shr_(shared_10 - shared_8
+    const int64_t C_12_raw = dcm_from_cayley_klein_q31_shr(shared_10 - shared_8
         + (INT32_C(1) << 28), 29);
-    if ((C_12_unchecked < (-INT32_C(1140850688))) || (C_12_unchecked > INT32_C(1140850688))) {
+    if ((C_12_raw < (-INT32_C(1140850688))) || (C_12_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t C_12 = dcm_from_cayley_klein_q31_narrow_(C_12_unchecked, 0);
+    const int32_t C_12 = dcm_from_cayley_klein_q31_fit(C_12_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
-    const int64_t shared_9 = dcm_from_cayley_klein_q31_mul_(a_y, shared_7);
+    const int64_t shared_9 = dcm_from_cayley_klein_q31_mul(a_y, shared_7);
         /* Q4.59, -2.26 .. 2.26, exact */
-    const int64_t shared_14 = dcm_from_cayley_klein_q31_mul_(a_z, shared_11);
+    const int64_t shared_14 = dcm_from_cayley_klein_q31_mul(a_z, shared_11);
         /* Q4.59, -2.26 .. 2.26, exact */
-    const int64_t C_13_unchecked = dcm_from_cayley_klein_q31_shr_(shared_9 + shared_14
+    const int64_t C_13_raw = dcm_from_cayley_klein_q31_shr(shared_9 + shared_14
         + (INT32_C(1) << 28), 29);
-    if ((C_13_unchecked < (-INT32_C(1140850688))) || (C_13_unchecked > INT32_C(1140850688))) {
+    if ((C_13_raw < (-INT32_C(1140850688))) || (C_13_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t C_13 = dcm_from_cayley_klein_q31_narrow_(C_13_unchecked, 0);
+    const int32_t C_13 = dcm_from_cayley_klein_q31_fit(C_13_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
-    const int64_t C_21_unchecked = dcm_from_cayley_klein_q31_shr_(shared_8 + shared_10
+    const int64_t C_21_raw = dcm_from_cayley_klein_q31_shr(shared_8 + shared_10
         + (INT32_C(1) << 28), 29);
-    if ((C_21_unchecked < (-INT32_C(1140850688))) || (C_21_unchecked > INT32_C(1140850688))) {
+    if ((C_21_raw < (-INT32_C(1140850688))) || (C_21_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t C_21 = dcm_from_cayley_klein_q31_narrow_(C_21_unchecked, 0);
+    const int32_t C_21 = dcm_from_cayley_klein_q31_fit(C_21_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
-    const int64_t C_22_unchecked = dcm_from_cayley_klein_q31_shr_(shared_6 - shared_13
+    const int64_t C_22_raw = dcm_from_cayley_klein_q31_shr(shared_6 - shared_13
         + (INT32_C(1) << 29), 30);
-    if ((C_22_unchecked < (-INT32_C(1140850688))) || (C_22_unchecked > INT32_C(1140850688))) {
+    if ((C_22_raw < (-INT32_C(1140850688))) || (C_22_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t C_22 = dcm_from_cayley_klein_q31_narrow_(C_22_unchecked, 0);
+    const int32_t C_22 = dcm_from_cayley_klein_q31_fit(C_22_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
-    const int64_t shared_12 = dcm_from_cayley_klein_q31_mul_(a_x, shared_7);
+    const int64_t shared_12 = dcm_from_cayley_klein_q31_mul(a_x, shared_7);
         /* Q4.59, -2.26 .. 2.26, exact */
-    const int64_t shared_3 = dcm_from_cayley_klein_q31_mul_(a_y, a_z);
+    const int64_t shared_3 = dcm_from_cayley_klein_q31_mul(a_y, a_z);
         /* Q4.59, -2.26 .. 2.26, exact */
-    const int64_t C_23_unchecked = dcm_from_cayley_klein_q31_shr_(shared_3 - shared_12
+    const int64_t C_23_raw = dcm_from_cayley_klein_q31_shr(shared_3 - shared_12
         + (INT32_C(1) << 28), 29);
-    if ((C_23_unchecked < (-INT32_C(1140850688))) || (C_23_unchecked > INT32_C(1140850688))) {
+    if ((C_23_raw < (-INT32_C(1140850688))) || (C_23_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t C_23 = dcm_from_cayley_klein_q31_narrow_(C_23_unchecked, 0);
+    const int32_t C_23 = dcm_from_cayley_klein_q31_fit(C_23_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
-    const int64_t C_31_unchecked = dcm_from_cayley_klein_q31_shr_(shared_14 - shared_9
+    const int64_t C_31_raw = dcm_from_cayley_klein_q31_shr(shared_14 - shared_9
         + (INT32_C(1) << 28), 29);
-    if ((C_31_unchecked < (-INT32_C(1140850688))) || (C_31_unchecked > INT32_C(1140850688))) {
+    if ((C_31_raw < (-INT32_C(1140850688))) || (C_31_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t C_31 = dcm_from_cayley_klein_q31_narrow_(C_31_unchecked, 0);
+    const int32_t C_31 = dcm_from_cayley_klein_q31_fit(C_31_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
-    const int64_t C_32_unchecked = dcm_from_cayley_klein_q31_shr_(shared_12 + shared_3
+    const int64_t C_32_raw = dcm_from_cayley_klein_q31_shr(shared_12 + shared_3
         + (INT32_C(1) << 28), 29);
-    if ((C_32_unchecked < (-INT32_C(1140850688))) || (C_32_unchecked > INT32_C(1140850688))) {
+    if ((C_32_raw < (-INT32_C(1140850688))) || (C_32_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t C_32 = dcm_from_cayley_klein_q31_narrow_(C_32_unchecked, 0);
+    const int32_t C_32 = dcm_from_cayley_klein_q31_fit(C_32_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
-    const int64_t C_33_unchecked = dcm_from_cayley_klein_q31_shr_(shared_4 - shared_1 - shared_2
+    const int64_t C_33_raw = dcm_from_cayley_klein_q31_shr(shared_4 - shared_1 - shared_2
         + shared_5 + (INT32_C(1) << 29), 30);
-    if ((C_33_unchecked < (-INT32_C(1140850688))) || (C_33_unchecked > INT32_C(1140850688))) {
+    if ((C_33_raw < (-INT32_C(1140850688))) || (C_33_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t C_33 = dcm_from_cayley_klein_q31_narrow_(C_33_unchecked, 0);
+    const int32_t C_33 = dcm_from_cayley_klein_q31_fit(C_33_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
     attitude[0] = C_11;
     attitude[1] = C_12;

@@ -5,7 +5,7 @@
 #include "dcm_from_euler_angles_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int dcm_from_euler_angles_q31_out_(int32_t x, int32_t limit)
+static inline int dcm_from_euler_angles_q31_out(int32_t x, int32_t limit)
 {
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
@@ -13,7 +13,7 @@ static inline int dcm_from_euler_angles_q31_out_(int32_t x, int32_t limit)
 /* The exact product of two words. */
 #if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
 /* These processors have no instruction for it: the high word takes four products of half words. */
-static __attribute__((noinline)) int64_t dcm_from_euler_angles_q31_mul_(int32_t a, int32_t b)
+static __attribute__((noinline)) int64_t dcm_from_euler_angles_q31_mul(int32_t a, int32_t b)
 {
     const uint32_t a_low = (uint32_t)a & 0xFFFFu;
     const uint32_t b_low = (uint32_t)b & 0xFFFFu;
@@ -28,7 +28,7 @@ static __attribute__((noinline)) int64_t dcm_from_euler_angles_q31_mul_(int32_t 
     return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
 }
 #else
-static inline int64_t dcm_from_euler_angles_q31_mul_(int32_t a, int32_t b)
+static inline int64_t dcm_from_euler_angles_q31_mul(int32_t a, int32_t b)
 {
     return (int64_t)a * (int64_t)b;
 }
@@ -39,7 +39,7 @@ static inline int64_t dcm_from_euler_angles_q31_mul_(int32_t a, int32_t b)
  * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
  * number and no conversion of a number out of range.
  */
-static inline int32_t dcm_from_euler_angles_q31_narrow_(int64_t x, int n)
+static inline int32_t dcm_from_euler_angles_q31_fit(int64_t x, int n)
 {
 #ifdef __FRAMAC__
     return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
@@ -53,7 +53,7 @@ static inline int32_t dcm_from_euler_angles_q31_narrow_(int64_t x, int n)
 }
 
 /* x / 2^n, rounded down, as a wide number. */
-static inline int64_t dcm_from_euler_angles_q31_shr_(int64_t x, int n)
+static inline int64_t dcm_from_euler_angles_q31_shr(int64_t x, int n)
 {
     return (x < 0) ? ~(~x >> n) : (x >> n);
 }
@@ -63,317 +63,319 @@ int dcm_from_euler_angles_q31(const int32_t angles[3], int32_t attitude[9])
     const int32_t roll = angles[0];
     const int32_t pitch = angles[1];
     const int32_t heading = angles[2];
-    if (dcm_from_euler_angles_q31_out_(roll, INT32_C(1686629857))
-        || dcm_from_euler_angles_q31_out_(pitch, INT32_C(1686629857))
-        || dcm_from_euler_angles_q31_out_(heading, INT32_C(1686629857)))
+    if (dcm_from_euler_angles_q31_out(roll, INT32_C(1686629857))
+        || dcm_from_euler_angles_q31_out(pitch, INT32_C(1686629857))
+        || dcm_from_euler_angles_q31_out(heading, INT32_C(1686629857))) {
         return 1;
-    const int32_t cos_heading_quarters =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_mul_(heading, INT32_C(1367130551))
+    }
+    const int32_t cos_heading_quarters = dcm_from_euler_angles_q31_fit(
+        dcm_from_euler_angles_q31_mul(heading, INT32_C(1367130551))
         + (INT64_C(1) << 59), 60); /* Q31.0, -2 .. 2, exact */
-    const int32_t cos_heading_rest = dcm_from_euler_angles_q31_narrow_((int64_t)heading * 4
-        + dcm_from_euler_angles_q31_shr_(-dcm_from_euler_angles_q31_mul_(cos_heading_quarters, INT32_C(560513589))
-        + (INT64_C(1) << 31), 32)
-        - dcm_from_euler_angles_q31_mul_(cos_heading_quarters, INT32_C(1686629713)) * 2, 0);
+    const int32_t cos_heading_rest = dcm_from_euler_angles_q31_fit((int64_t)heading * 4
+        + dcm_from_euler_angles_q31_shr(-dcm_from_euler_angles_q31_mul(cos_heading_quarters,
+        INT32_C(560513589)) + (INT64_C(1) << 31), 32)
+        - dcm_from_euler_angles_q31_mul(cos_heading_quarters, INT32_C(1686629713)) * 2, 0);
         /* Q0.31, -0.786 .. 0.786, error 2.4e-10 */
-    const int32_t cos_heading_turns =
-        dcm_from_euler_angles_q31_narrow_((int64_t)cos_heading_quarters + 2, 2);
-        /* Q31.0, 0 .. 1, exact */
+    const int32_t cos_heading_turns = dcm_from_euler_angles_q31_fit(
+        (int64_t)cos_heading_quarters + 2, 2); /* Q31.0, 0 .. 1, exact */
     const int64_t cos_heading_quarter_turns = (int64_t)cos_heading_quarters
         - (int64_t)cos_heading_turns * 4; /* Q63.0, -2 .. 1, exact */
-    const int32_t cos_heading_square =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_mul_(cos_heading_rest, cos_heading_rest)
+    const int32_t cos_heading_square = dcm_from_euler_angles_q31_fit(
+        dcm_from_euler_angles_q31_mul(cos_heading_rest, cos_heading_rest)
         + (INT32_C(1) << 30), 31); /* Q0.31, -9.32e-10 .. 0.617, error 6e-10 */
-    const int32_t cos_heading_series =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(-dcm_from_euler_angles_q31_mul_(cos_heading_square, INT32_C(56412333) /* 1/39916800 in Q51 */), 1)
+    const int32_t cos_heading_series = dcm_from_euler_angles_q31_fit(
+        dcm_from_euler_angles_q31_shr(-dcm_from_euler_angles_q31_mul(cos_heading_square,
+        INT32_C(56412333) /* 1/39916800 in Q51 */), 1)
         + INT64_C(6662950945848033280) /* 1/362880 in Q60 */ + (INT64_C(1) << 31), 32);
         /* 2.74e-06 .. 2.76e-06, error 9.1e-16 */
-    const int32_t cos_heading_series_2 =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_heading_square, cos_heading_series), 5)
-        - INT64_C(7495819814078808064) /* 1/5040 in Q60 */ + (INT64_C(1) << 31), 32);
-        /* Q-12.43, -0.000199 .. -0.000196, error 6e-14 */
-    const int32_t cos_heading_series_3 =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_heading_square, cos_heading_series_2), 5)
-        + INT64_C(4919131752989213696) /* 1/120 in Q60 */ + (INT64_C(1) << 31), 32);
-        /* 0.00821 .. 0.00834, error 3.8e-12 */
-    const int32_t cos_heading_series_4 =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_heading_square, cos_heading_series_3), 3)
-        - INT64_C(6148914691236517216) /* 1/6 in Q60 */ + (INT64_C(1) << 31), 32);
-        /* Q-2.33, -0.167 .. -0.161, error 6.6e-11 */
-    const int32_t cos_heading_bend =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_mul_(cos_heading_square, cos_heading_series_4)
+    const int32_t cos_heading_series_2 = dcm_from_euler_angles_q31_fit(
+        dcm_from_euler_angles_q31_shr(dcm_from_euler_angles_q31_mul(cos_heading_square,
+        cos_heading_series), 5) - INT64_C(7495819814078808064) /* 1/5040 in Q60 */
+        + (INT64_C(1) << 31), 32); /* Q-12.43, -0.000199 .. -0.000196, error 6e-14 */
+    const int32_t cos_heading_series_3 = dcm_from_euler_angles_q31_fit(
+        dcm_from_euler_angles_q31_shr(dcm_from_euler_angles_q31_mul(cos_heading_square,
+        cos_heading_series_2), 5) + INT64_C(4919131752989213696) /* 1/120 in Q60 */
+        + (INT64_C(1) << 31), 32); /* 0.00821 .. 0.00834, error 3.8e-12 */
+    const int32_t cos_heading_series_4 = dcm_from_euler_angles_q31_fit(
+        dcm_from_euler_angles_q31_shr(dcm_from_euler_angles_q31_mul(cos_heading_square,
+        cos_heading_series_3), 3) - INT64_C(6148914691236517216) /* 1/6 in Q60 */
+        + (INT64_C(1) << 31), 32); /* Q-2.33, -0.167 .. -0.161, error 6.6e-11 */
+    const int32_t cos_heading_bend = dcm_from_euler_angles_q31_fit(
+        dcm_from_euler_angles_q31_mul(cos_heading_square, cos_heading_series_4)
         + (INT32_C(1) << 29), 30); /* Q-3.34, -0.103 .. 1.75e-10, error 1.7e-10 */
     const int64_t cos_heading_sine = (int64_t)cos_heading_rest * (INT64_C(1) << 32)
-        + dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_heading_rest, cos_heading_bend), 2);
-        /* Q0.63, -0.786 .. 0.786, error 4e-10 */
-    const int32_t cos_heading_series_5 =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(-dcm_from_euler_angles_q31_mul_(cos_heading_square, INT32_C(620535663) /* 1/3628800 in Q51 */), 4)
+        + dcm_from_euler_angles_q31_shr(dcm_from_euler_angles_q31_mul(cos_heading_rest,
+        cos_heading_bend), 2); /* Q0.63, -0.786 .. 0.786, error 4e-10 */
+    const int32_t cos_heading_series_5 = dcm_from_euler_angles_q31_fit(
+        dcm_from_euler_angles_q31_shr(-dcm_from_euler_angles_q31_mul(cos_heading_square,
+        INT32_C(620535663) /* 1/3628800 in Q51 */), 4)
         + INT64_C(7495819814078775296) /* 1/40320 in Q60 */ + (INT64_C(1) << 31), 32);
         /* 2.46e-05 .. 2.49e-05, error 7.3e-15 */
-    const int32_t cos_heading_series_6 =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_heading_square, cos_heading_series_5), 5)
-        - INT64_C(6558842337318952960) /* 1/720 in Q60 */ + (INT64_C(1) << 31), 32);
-        /* Q-9.40, -0.00139 .. -0.00137, error 4.8e-13 */
-    const int32_t cos_heading_series_7 =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_heading_square, cos_heading_series_6), 4)
-        + INT64_C(6148914691236517248) /* 1/24 in Q60 */ + (INT64_C(1) << 31), 32);
-        /* 0.0408 .. 0.0417, error 1.6e-11 */
-    const int32_t cos_heading_bend_2 =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_mul_(cos_heading_square, cos_heading_series_7)
+    const int32_t cos_heading_series_6 = dcm_from_euler_angles_q31_fit(
+        dcm_from_euler_angles_q31_shr(dcm_from_euler_angles_q31_mul(cos_heading_square,
+        cos_heading_series_5), 5) - INT64_C(6558842337318952960) /* 1/720 in Q60 */
+        + (INT64_C(1) << 31), 32); /* Q-9.40, -0.00139 .. -0.00137, error 4.8e-13 */
+    const int32_t cos_heading_series_7 = dcm_from_euler_angles_q31_fit(
+        dcm_from_euler_angles_q31_shr(dcm_from_euler_angles_q31_mul(cos_heading_square,
+        cos_heading_series_6), 4) + INT64_C(6148914691236517248) /* 1/24 in Q60 */
+        + (INT64_C(1) << 31), 32); /* 0.0408 .. 0.0417, error 1.6e-11 */
+    const int32_t cos_heading_bend_2 = dcm_from_euler_angles_q31_fit(
+        dcm_from_euler_angles_q31_mul(cos_heading_square, cos_heading_series_7)
         + (INT32_C(1) << 29), 30); /* Q-5.36, -4.37e-11 .. 0.0258, error 4.2e-11 */
     const int64_t cos_heading_cosine = -(int64_t)cos_heading_square * (INT32_C(1) << 30)
-        + dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_heading_square, cos_heading_bend_2), 5)
-        + (INT64_C(1) << 62); /* Q1.62, 0.691 .. 1.01, error 4.6e-10 */
+        + dcm_from_euler_angles_q31_shr(dcm_from_euler_angles_q31_mul(cos_heading_square,
+        cos_heading_bend_2), 5) + (INT64_C(1) << 62); /* Q1.62, 0.691 .. 1.01, error 4.6e-10 */
     const int64_t cos_heading_opposite = -cos_heading_sine;
         /* Q0.63, -0.786 .. 0.786, error 4e-10 */
     const int64_t cos_heading_opposite_2 = -cos_heading_cosine;
         /* Q1.62, -1.01 .. -0.691, error 4.6e-10 */
     int64_t cos_heading_quarter; /* Q1.62, -1.01 .. 1.01, error 4.6e-10 */
     if (cos_heading_quarter_turns >= 1) {
-        cos_heading_quarter = dcm_from_euler_angles_q31_shr_(cos_heading_opposite, 1);
+        cos_heading_quarter = dcm_from_euler_angles_q31_shr(cos_heading_opposite, 1);
     } else if (cos_heading_quarter_turns >= 0) {
         cos_heading_quarter = cos_heading_cosine;
     } else if (cos_heading_quarter_turns >= (-1)) {
-        cos_heading_quarter = dcm_from_euler_angles_q31_shr_(cos_heading_sine, 1);
+        cos_heading_quarter = dcm_from_euler_angles_q31_shr(cos_heading_sine, 1);
     } else {
         cos_heading_quarter = cos_heading_opposite_2;
     }
-    const int32_t cos_heading = dcm_from_euler_angles_q31_narrow_(cos_heading_quarter
+    const int32_t cos_heading = dcm_from_euler_angles_q31_fit(cos_heading_quarter
         + (INT64_C(1) << 31), 32); /* Q1.30, -1.01 .. 1.01, error 9.3e-10 */
     int64_t sin_heading_quarter; /* Q1.62, -1.01 .. 1.01, error 4.6e-10 */
     if (cos_heading_quarter_turns >= 1) {
         sin_heading_quarter = cos_heading_cosine;
     } else if (cos_heading_quarter_turns >= 0) {
-        sin_heading_quarter = dcm_from_euler_angles_q31_shr_(cos_heading_sine, 1);
+        sin_heading_quarter = dcm_from_euler_angles_q31_shr(cos_heading_sine, 1);
     } else if (cos_heading_quarter_turns >= (-1)) {
         sin_heading_quarter = cos_heading_opposite_2;
     } else {
-        sin_heading_quarter = dcm_from_euler_angles_q31_shr_(cos_heading_opposite, 1);
+        sin_heading_quarter = dcm_from_euler_angles_q31_shr(cos_heading_opposite, 1);
     }
-    const int32_t sin_heading = dcm_from_euler_angles_q31_narrow_(sin_heading_quarter
+    const int32_t sin_heading = dcm_from_euler_angles_q31_fit(sin_heading_quarter
         + (INT64_C(1) << 31), 32); /* Q1.30, -1.01 .. 1.01, error 9.3e-10 */
-    const int32_t cos_pitch_quarters =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_mul_(pitch, INT32_C(1367130551))
-        + (INT64_C(1) << 59), 60); /* Q31.0, -2 .. 2, exact */
-    const int32_t cos_pitch_rest = dcm_from_euler_angles_q31_narrow_((int64_t)pitch * 4
-        + dcm_from_euler_angles_q31_shr_(-dcm_from_euler_angles_q31_mul_(cos_pitch_quarters, INT32_C(560513589))
-        + (INT64_C(1) << 31), 32)
-        - dcm_from_euler_angles_q31_mul_(cos_pitch_quarters, INT32_C(1686629713)) * 2, 0);
+    const int32_t cos_pitch_quarters = dcm_from_euler_angles_q31_fit(
+        dcm_from_euler_angles_q31_mul(pitch, INT32_C(1367130551)) + (INT64_C(1) << 59), 60);
+        /* Q31.0, -2 .. 2, exact */
+    const int32_t cos_pitch_rest = dcm_from_euler_angles_q31_fit((int64_t)pitch * 4
+        + dcm_from_euler_angles_q31_shr(-dcm_from_euler_angles_q31_mul(cos_pitch_quarters,
+        INT32_C(560513589)) + (INT64_C(1) << 31), 32)
+        - dcm_from_euler_angles_q31_mul(cos_pitch_quarters, INT32_C(1686629713)) * 2, 0);
         /* Q0.31, -0.786 .. 0.786, error 2.4e-10 */
-    const int32_t cos_pitch_turns =
-        dcm_from_euler_angles_q31_narrow_((int64_t)cos_pitch_quarters + 2, 2);
-        /* Q31.0, 0 .. 1, exact */
+    const int32_t cos_pitch_turns = dcm_from_euler_angles_q31_fit((int64_t)cos_pitch_quarters
+        + 2, 2); /* Q31.0, 0 .. 1, exact */
     const int64_t cos_pitch_quarter_turns = (int64_t)cos_pitch_quarters
         - (int64_t)cos_pitch_turns * 4; /* Q63.0, -2 .. 1, exact */
-    const int32_t cos_pitch_square =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_mul_(cos_pitch_rest, cos_pitch_rest)
+    const int32_t cos_pitch_square = dcm_from_euler_angles_q31_fit(
+        dcm_from_euler_angles_q31_mul(cos_pitch_rest, cos_pitch_rest)
         + (INT32_C(1) << 30), 31); /* Q0.31, -9.32e-10 .. 0.617, error 6e-10 */
-    const int32_t cos_pitch_series =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(-dcm_from_euler_angles_q31_mul_(cos_pitch_square, INT32_C(56412333) /* 1/39916800 in Q51 */), 1)
+    const int32_t cos_pitch_series = dcm_from_euler_angles_q31_fit(
+        dcm_from_euler_angles_q31_shr(-dcm_from_euler_angles_q31_mul(cos_pitch_square,
+        INT32_C(56412333) /* 1/39916800 in Q51 */), 1)
         + INT64_C(6662950945848033280) /* 1/362880 in Q60 */ + (INT64_C(1) << 31), 32);
         /* 2.74e-06 .. 2.76e-06, error 9.1e-16 */
-    const int32_t cos_pitch_series_2 =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_pitch_square, cos_pitch_series), 5)
-        - INT64_C(7495819814078808064) /* 1/5040 in Q60 */ + (INT64_C(1) << 31), 32);
-        /* Q-12.43, -0.000199 .. -0.000196, error 6e-14 */
-    const int32_t cos_pitch_series_3 =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_pitch_square, cos_pitch_series_2), 5)
-        + INT64_C(4919131752989213696) /* 1/120 in Q60 */ + (INT64_C(1) << 31), 32);
-        /* 0.00821 .. 0.00834, error 3.8e-12 */
-    const int32_t cos_pitch_series_4 =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_pitch_square, cos_pitch_series_3), 3)
-        - INT64_C(6148914691236517216) /* 1/6 in Q60 */ + (INT64_C(1) << 31), 32);
-        /* Q-2.33, -0.167 .. -0.161, error 6.6e-11 */
-    const int32_t cos_pitch_bend =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_mul_(cos_pitch_square, cos_pitch_series_4)
-        + (INT32_C(1) << 29), 30); /* Q-3.34, -0.103 .. 1.75e-10, error 1.7e-10 */
+    const int32_t cos_pitch_series_2 = dcm_from_euler_angles_q31_fit(
+        dcm_from_euler_angles_q31_shr(dcm_from_euler_angles_q31_mul(cos_pitch_square,
+        cos_pitch_series), 5) - INT64_C(7495819814078808064) /* 1/5040 in Q60 */
+        + (INT64_C(1) << 31), 32); /* Q-12.43, -0.000199 .. -0.000196, error 6e-14 */
+    const int32_t cos_pitch_series_3 = dcm_from_euler_angles_q31_fit(
+        dcm_from_euler_angles_q31_shr(dcm_from_euler_angles_q31_mul(cos_pitch_square,
+        cos_pitch_series_2), 5) + INT64_C(4919131752989213696) /* 1/120 in Q60 */
+        + (INT64_C(1) << 31), 32); /* 0.00821 .. 0.00834, error 3.8e-12 */
+    const int32_t cos_pitch_series_4 = dcm_from_euler_angles_q31_fit(
+        dcm_from_euler_angles_q31_shr(dcm_from_euler_angles_q31_mul(cos_pitch_square,
+        cos_pitch_series_3), 3) - INT64_C(6148914691236517216) /* 1/6 in Q60 */
+        + (INT64_C(1) << 31), 32); /* Q-2.33, -0.167 .. -0.161, error 6.6e-11 */
+    const int32_t cos_pitch_bend = dcm_from_euler_angles_q31_fit(dcm_from_euler_angles_q31_mul(
+        cos_pitch_square, cos_pitch_series_4) + (INT32_C(1) << 29), 30);
+        /* Q-3.34, -0.103 .. 1.75e-10, error 1.7e-10 */
     const int64_t cos_pitch_sine = (int64_t)cos_pitch_rest * (INT64_C(1) << 32)
-        + dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_pitch_rest, cos_pitch_bend), 2);
-        /* Q0.63, -0.786 .. 0.786, error 4e-10 */
-    const int32_t cos_pitch_series_5 =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(-dcm_from_euler_angles_q31_mul_(cos_pitch_square, INT32_C(620535663) /* 1/3628800 in Q51 */), 4)
+        + dcm_from_euler_angles_q31_shr(dcm_from_euler_angles_q31_mul(cos_pitch_rest,
+        cos_pitch_bend), 2); /* Q0.63, -0.786 .. 0.786, error 4e-10 */
+    const int32_t cos_pitch_series_5 = dcm_from_euler_angles_q31_fit(
+        dcm_from_euler_angles_q31_shr(-dcm_from_euler_angles_q31_mul(cos_pitch_square,
+        INT32_C(620535663) /* 1/3628800 in Q51 */), 4)
         + INT64_C(7495819814078775296) /* 1/40320 in Q60 */ + (INT64_C(1) << 31), 32);
         /* 2.46e-05 .. 2.49e-05, error 7.3e-15 */
-    const int32_t cos_pitch_series_6 =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_pitch_square, cos_pitch_series_5), 5)
-        - INT64_C(6558842337318952960) /* 1/720 in Q60 */ + (INT64_C(1) << 31), 32);
-        /* Q-9.40, -0.00139 .. -0.00137, error 4.8e-13 */
-    const int32_t cos_pitch_series_7 =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_pitch_square, cos_pitch_series_6), 4)
-        + INT64_C(6148914691236517248) /* 1/24 in Q60 */ + (INT64_C(1) << 31), 32);
-        /* 0.0408 .. 0.0417, error 1.6e-11 */
-    const int32_t cos_pitch_bend_2 =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_mul_(cos_pitch_square, cos_pitch_series_7)
+    const int32_t cos_pitch_series_6 = dcm_from_euler_angles_q31_fit(
+        dcm_from_euler_angles_q31_shr(dcm_from_euler_angles_q31_mul(cos_pitch_square,
+        cos_pitch_series_5), 5) - INT64_C(6558842337318952960) /* 1/720 in Q60 */
+        + (INT64_C(1) << 31), 32); /* Q-9.40, -0.00139 .. -0.00137, error 4.8e-13 */
+    const int32_t cos_pitch_series_7 = dcm_from_euler_angles_q31_fit(
+        dcm_from_euler_angles_q31_shr(dcm_from_euler_angles_q31_mul(cos_pitch_square,
+        cos_pitch_series_6), 4) + INT64_C(6148914691236517248) /* 1/24 in Q60 */
+        + (INT64_C(1) << 31), 32); /* 0.0408 .. 0.0417, error 1.6e-11 */
+    const int32_t cos_pitch_bend_2 = dcm_from_euler_angles_q31_fit(
+        dcm_from_euler_angles_q31_mul(cos_pitch_square, cos_pitch_series_7)
         + (INT32_C(1) << 29), 30); /* Q-5.36, -4.37e-11 .. 0.0258, error 4.2e-11 */
     const int64_t cos_pitch_cosine = -(int64_t)cos_pitch_square * (INT32_C(1) << 30)
-        + dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_pitch_square, cos_pitch_bend_2), 5)
-        + (INT64_C(1) << 62); /* Q1.62, 0.691 .. 1.01, error 4.6e-10 */
+        + dcm_from_euler_angles_q31_shr(dcm_from_euler_angles_q31_mul(cos_pitch_square,
+        cos_pitch_bend_2), 5) + (INT64_C(1) << 62); /* Q1.62, 0.691 .. 1.01, error 4.6e-10 */
     const int64_t cos_pitch_opposite = -cos_pitch_sine; /* Q0.63, -0.786 .. 0.786, error 4e-10 */
     const int64_t cos_pitch_opposite_2 = -cos_pitch_cosine;
         /* Q1.62, -1.01 .. -0.691, error 4.6e-10 */
     int64_t cos_pitch_quarter; /* Q1.62, -1.01 .. 1.01, error 4.6e-10 */
     if (cos_pitch_quarter_turns >= 1) {
-        cos_pitch_quarter = dcm_from_euler_angles_q31_shr_(cos_pitch_opposite, 1);
+        cos_pitch_quarter = dcm_from_euler_angles_q31_shr(cos_pitch_opposite, 1);
     } else if (cos_pitch_quarter_turns >= 0) {
         cos_pitch_quarter = cos_pitch_cosine;
     } else if (cos_pitch_quarter_turns >= (-1)) {
-        cos_pitch_quarter = dcm_from_euler_angles_q31_shr_(cos_pitch_sine, 1);
+        cos_pitch_quarter = dcm_from_euler_angles_q31_shr(cos_pitch_sine, 1);
     } else {
         cos_pitch_quarter = cos_pitch_opposite_2;
     }
-    const int32_t cos_pitch = dcm_from_euler_angles_q31_narrow_(cos_pitch_quarter
+    const int32_t cos_pitch = dcm_from_euler_angles_q31_fit(cos_pitch_quarter
         + (INT64_C(1) << 31), 32); /* Q1.30, -1.01 .. 1.01, error 9.3e-10 */
     int64_t sin_pitch_quarter; /* Q1.62, -1.01 .. 1.01, error 4.6e-10 */
     if (cos_pitch_quarter_turns >= 1) {
         sin_pitch_quarter = cos_pitch_cosine;
     } else if (cos_pitch_quarter_turns >= 0) {
-        sin_pitch_quarter = dcm_from_euler_angles_q31_shr_(cos_pitch_sine, 1);
+        sin_pitch_quarter = dcm_from_euler_angles_q31_shr(cos_pitch_sine, 1);
     } else if (cos_pitch_quarter_turns >= (-1)) {
         sin_pitch_quarter = cos_pitch_opposite_2;
     } else {
-        sin_pitch_quarter = dcm_from_euler_angles_q31_shr_(cos_pitch_opposite, 1);
+        sin_pitch_quarter = dcm_from_euler_angles_q31_shr(cos_pitch_opposite, 1);
     }
-    const int32_t sin_pitch = dcm_from_euler_angles_q31_narrow_(sin_pitch_quarter
+    const int32_t sin_pitch = dcm_from_euler_angles_q31_fit(sin_pitch_quarter
         + (INT64_C(1) << 31), 32); /* Q1.30, -1.01 .. 1.01, error 9.3e-10 */
-    const int32_t cos_roll_quarters =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_mul_(roll, INT32_C(1367130551))
-        + (INT64_C(1) << 59), 60); /* Q31.0, -2 .. 2, exact */
-    const int32_t cos_roll_rest = dcm_from_euler_angles_q31_narrow_((int64_t)roll * 4
-        + dcm_from_euler_angles_q31_shr_(-dcm_from_euler_angles_q31_mul_(cos_roll_quarters, INT32_C(560513589))
-        + (INT64_C(1) << 31), 32)
-        - dcm_from_euler_angles_q31_mul_(cos_roll_quarters, INT32_C(1686629713)) * 2, 0);
+    const int32_t cos_roll_quarters = dcm_from_euler_angles_q31_fit(
+        dcm_from_euler_angles_q31_mul(roll, INT32_C(1367130551)) + (INT64_C(1) << 59), 60);
+        /* Q31.0, -2 .. 2, exact */
+    const int32_t cos_roll_rest = dcm_from_euler_angles_q31_fit((int64_t)roll * 4
+        + dcm_from_euler_angles_q31_shr(-dcm_from_euler_angles_q31_mul(cos_roll_quarters,
+        INT32_C(560513589)) + (INT64_C(1) << 31), 32)
+        - dcm_from_euler_angles_q31_mul(cos_roll_quarters, INT32_C(1686629713)) * 2, 0);
         /* Q0.31, -0.786 .. 0.786, error 2.4e-10 */
-    const int32_t cos_roll_turns = dcm_from_euler_angles_q31_narrow_((int64_t)cos_roll_quarters
+    const int32_t cos_roll_turns = dcm_from_euler_angles_q31_fit((int64_t)cos_roll_quarters
         + 2, 2); /* Q31.0, 0 .. 1, exact */
     const int64_t cos_roll_quarter_turns = (int64_t)cos_roll_quarters
         - (int64_t)cos_roll_turns * 4; /* Q63.0, -2 .. 1, exact */
-    const int32_t cos_roll_square =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_mul_(cos_roll_rest, cos_roll_rest)
-        + (INT32_C(1) << 30), 31); /* Q0.31, -9.32e-10 .. 0.617, error 6e-10 */
-    const int32_t cos_roll_series =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(-dcm_from_euler_angles_q31_mul_(cos_roll_square, INT32_C(56412333) /* 1/39916800 in Q51 */), 1)
+    const int32_t cos_roll_square = dcm_from_euler_angles_q31_fit(dcm_from_euler_angles_q31_mul(
+        cos_roll_rest, cos_roll_rest) + (INT32_C(1) << 30), 31);
+        /* Q0.31, -9.32e-10 .. 0.617, error 6e-10 */
+    const int32_t cos_roll_series = dcm_from_euler_angles_q31_fit(dcm_from_euler_angles_q31_shr(
+        -dcm_from_euler_angles_q31_mul(cos_roll_square,
+        INT32_C(56412333) /* 1/39916800 in Q51 */), 1)
         + INT64_C(6662950945848033280) /* 1/362880 in Q60 */ + (INT64_C(1) << 31), 32);
         /* 2.74e-06 .. 2.76e-06, error 9.1e-16 */
-    const int32_t cos_roll_series_2 =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_roll_square, cos_roll_series), 5)
-        - INT64_C(7495819814078808064) /* 1/5040 in Q60 */ + (INT64_C(1) << 31), 32);
-        /* Q-12.43, -0.000199 .. -0.000196, error 6e-14 */
-    const int32_t cos_roll_series_3 =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_roll_square, cos_roll_series_2), 5)
-        + INT64_C(4919131752989213696) /* 1/120 in Q60 */ + (INT64_C(1) << 31), 32);
-        /* 0.00821 .. 0.00834, error 3.8e-12 */
-    const int32_t cos_roll_series_4 =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_roll_square, cos_roll_series_3), 3)
-        - INT64_C(6148914691236517216) /* 1/6 in Q60 */ + (INT64_C(1) << 31), 32);
-        /* Q-2.33, -0.167 .. -0.161, error 6.6e-11 */
-    const int32_t cos_roll_bend =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_mul_(cos_roll_square, cos_roll_series_4)
-        + (INT32_C(1) << 29), 30); /* Q-3.34, -0.103 .. 1.75e-10, error 1.7e-10 */
+    const int32_t cos_roll_series_2 = dcm_from_euler_angles_q31_fit(
+        dcm_from_euler_angles_q31_shr(dcm_from_euler_angles_q31_mul(cos_roll_square,
+        cos_roll_series), 5) - INT64_C(7495819814078808064) /* 1/5040 in Q60 */
+        + (INT64_C(1) << 31), 32); /* Q-12.43, -0.000199 .. -0.000196, error 6e-14 */
+    const int32_t cos_roll_series_3 = dcm_from_euler_angles_q31_fit(
+        dcm_from_euler_angles_q31_shr(dcm_from_euler_angles_q31_mul(cos_roll_square,
+        cos_roll_series_2), 5) + INT64_C(4919131752989213696) /* 1/120 in Q60 */
+        + (INT64_C(1) << 31), 32); /* 0.00821 .. 0.00834, error 3.8e-12 */
+    const int32_t cos_roll_series_4 = dcm_from_euler_angles_q31_fit(
+        dcm_from_euler_angles_q31_shr(dcm_from_euler_angles_q31_mul(cos_roll_square,
+        cos_roll_series_3), 3) - INT64_C(6148914691236517216) /* 1/6 in Q60 */
+        + (INT64_C(1) << 31), 32); /* Q-2.33, -0.167 .. -0.161, error 6.6e-11 */
+    const int32_t cos_roll_bend = dcm_from_euler_angles_q31_fit(dcm_from_euler_angles_q31_mul(
+        cos_roll_square, cos_roll_series_4) + (INT32_C(1) << 29), 30);
+        /* Q-3.34, -0.103 .. 1.75e-10, error 1.7e-10 */
     const int64_t cos_roll_sine = (int64_t)cos_roll_rest * (INT64_C(1) << 32)
-        + dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_roll_rest, cos_roll_bend), 2);
-        /* Q0.63, -0.786 .. 0.786, error 4e-10 */
-    const int32_t cos_roll_series_5 =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(-dcm_from_euler_angles_q31_mul_(cos_roll_square, INT32_C(620535663) /* 1/3628800 in Q51 */), 4)
+        + dcm_from_euler_angles_q31_shr(dcm_from_euler_angles_q31_mul(cos_roll_rest,
+        cos_roll_bend), 2); /* Q0.63, -0.786 .. 0.786, error 4e-10 */
+    const int32_t cos_roll_series_5 = dcm_from_euler_angles_q31_fit(
+        dcm_from_euler_angles_q31_shr(-dcm_from_euler_angles_q31_mul(cos_roll_square,
+        INT32_C(620535663) /* 1/3628800 in Q51 */), 4)
         + INT64_C(7495819814078775296) /* 1/40320 in Q60 */ + (INT64_C(1) << 31), 32);
         /* 2.46e-05 .. 2.49e-05, error 7.3e-15 */
-    const int32_t cos_roll_series_6 =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_roll_square, cos_roll_series_5), 5)
-        - INT64_C(6558842337318952960) /* 1/720 in Q60 */ + (INT64_C(1) << 31), 32);
-        /* Q-9.40, -0.00139 .. -0.00137, error 4.8e-13 */
-    const int32_t cos_roll_series_7 =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_roll_square, cos_roll_series_6), 4)
-        + INT64_C(6148914691236517248) /* 1/24 in Q60 */ + (INT64_C(1) << 31), 32);
-        /* 0.0408 .. 0.0417, error 1.6e-11 */
-    const int32_t cos_roll_bend_2 =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_mul_(cos_roll_square, cos_roll_series_7)
-        + (INT32_C(1) << 29), 30); /* Q-5.36, -4.37e-11 .. 0.0258, error 4.2e-11 */
+    const int32_t cos_roll_series_6 = dcm_from_euler_angles_q31_fit(
+        dcm_from_euler_angles_q31_shr(dcm_from_euler_angles_q31_mul(cos_roll_square,
+        cos_roll_series_5), 5) - INT64_C(6558842337318952960) /* 1/720 in Q60 */
+        + (INT64_C(1) << 31), 32); /* Q-9.40, -0.00139 .. -0.00137, error 4.8e-13 */
+    const int32_t cos_roll_series_7 = dcm_from_euler_angles_q31_fit(
+        dcm_from_euler_angles_q31_shr(dcm_from_euler_angles_q31_mul(cos_roll_square,
+        cos_roll_series_6), 4) + INT64_C(6148914691236517248) /* 1/24 in Q60 */
+        + (INT64_C(1) << 31), 32); /* 0.0408 .. 0.0417, error 1.6e-11 */
+    const int32_t cos_roll_bend_2 = dcm_from_euler_angles_q31_fit(dcm_from_euler_angles_q31_mul(
+        cos_roll_square, cos_roll_series_7) + (INT32_C(1) << 29), 30);
+        /* Q-5.36, -4.37e-11 .. 0.0258, error 4.2e-11 */
     const int64_t cos_roll_cosine = -(int64_t)cos_roll_square * (INT32_C(1) << 30)
-        + dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(cos_roll_square, cos_roll_bend_2), 5)
-        + (INT64_C(1) << 62); /* Q1.62, 0.691 .. 1.01, error 4.6e-10 */
+        + dcm_from_euler_angles_q31_shr(dcm_from_euler_angles_q31_mul(cos_roll_square,
+        cos_roll_bend_2), 5) + (INT64_C(1) << 62); /* Q1.62, 0.691 .. 1.01, error 4.6e-10 */
     const int64_t cos_roll_opposite = -cos_roll_sine; /* Q0.63, -0.786 .. 0.786, error 4e-10 */
     const int64_t cos_roll_opposite_2 = -cos_roll_cosine;
         /* Q1.62, -1.01 .. -0.691, error 4.6e-10 */
     int64_t cos_roll_quarter; /* Q1.62, -1.01 .. 1.01, error 4.6e-10 */
     if (cos_roll_quarter_turns >= 1) {
-        cos_roll_quarter = dcm_from_euler_angles_q31_shr_(cos_roll_opposite, 1);
+        cos_roll_quarter = dcm_from_euler_angles_q31_shr(cos_roll_opposite, 1);
     } else if (cos_roll_quarter_turns >= 0) {
         cos_roll_quarter = cos_roll_cosine;
     } else if (cos_roll_quarter_turns >= (-1)) {
-        cos_roll_quarter = dcm_from_euler_angles_q31_shr_(cos_roll_sine, 1);
+        cos_roll_quarter = dcm_from_euler_angles_q31_shr(cos_roll_sine, 1);
     } else {
         cos_roll_quarter = cos_roll_opposite_2;
     }
-    const int32_t cos_roll = dcm_from_euler_angles_q31_narrow_(cos_roll_quarter
+    const int32_t cos_roll = dcm_from_euler_angles_q31_fit(cos_roll_quarter
         + (INT64_C(1) << 31), 32); /* Q1.30, -1.01 .. 1.01, error 9.3e-10 */
     int64_t sin_roll_quarter; /* Q1.62, -1.01 .. 1.01, error 4.6e-10 */
     if (cos_roll_quarter_turns >= 1) {
         sin_roll_quarter = cos_roll_cosine;
     } else if (cos_roll_quarter_turns >= 0) {
-        sin_roll_quarter = dcm_from_euler_angles_q31_shr_(cos_roll_sine, 1);
+        sin_roll_quarter = dcm_from_euler_angles_q31_shr(cos_roll_sine, 1);
     } else if (cos_roll_quarter_turns >= (-1)) {
         sin_roll_quarter = cos_roll_opposite_2;
     } else {
-        sin_roll_quarter = dcm_from_euler_angles_q31_shr_(cos_roll_opposite, 1);
+        sin_roll_quarter = dcm_from_euler_angles_q31_shr(cos_roll_opposite, 1);
     }
-    const int32_t sin_roll = dcm_from_euler_angles_q31_narrow_(sin_roll_quarter
+    const int32_t sin_roll = dcm_from_euler_angles_q31_fit(sin_roll_quarter
         + (INT64_C(1) << 31), 32); /* Q1.30, -1.01 .. 1.01, error 9.3e-10 */
     /* direction cosine matrix, body to reference */
-    const int32_t C_11 =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_mul_(cos_heading, cos_pitch)
-        + (INT32_C(1) << 29), 30); /* Q1.30, -1.01 .. 1.01, error 2.4e-09 */
-    const int32_t shared_1 =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_mul_(cos_heading, sin_roll)
-        + (INT32_C(1) << 29), 30); /* Q1.30, -1.01 .. 1.01, error 2.4e-09 */
-    const int32_t shared_4 =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_mul_(cos_roll, sin_heading)
-        + (INT32_C(1) << 29), 30); /* Q1.30, -1.01 .. 1.01, error 2.4e-09 */
-    const int64_t C_12_unchecked = -(int64_t)shared_4
-        + dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(shared_1, sin_pitch)
+    const int32_t C_11 = dcm_from_euler_angles_q31_fit(dcm_from_euler_angles_q31_mul(
+        cos_heading, cos_pitch) + (INT32_C(1) << 29), 30);
+        /* Q1.30, -1.01 .. 1.01, error 2.4e-09 */
+    const int32_t shared_1 = dcm_from_euler_angles_q31_fit(dcm_from_euler_angles_q31_mul(
+        cos_heading, sin_roll) + (INT32_C(1) << 29), 30);
+        /* Q1.30, -1.01 .. 1.01, error 2.4e-09 */
+    const int32_t shared_4 = dcm_from_euler_angles_q31_fit(dcm_from_euler_angles_q31_mul(
+        cos_roll, sin_heading) + (INT32_C(1) << 29), 30);
+        /* Q1.30, -1.01 .. 1.01, error 2.4e-09 */
+    const int64_t C_12_raw = -(int64_t)shared_4
+        + dcm_from_euler_angles_q31_shr(dcm_from_euler_angles_q31_mul(shared_1, sin_pitch)
         + (INT32_C(1) << 29), 30);
-    if ((C_12_unchecked < (-INT32_C(1140850688))) || (C_12_unchecked > INT32_C(1140850688))) {
+    if ((C_12_raw < (-INT32_C(1140850688))) || (C_12_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t C_12 = dcm_from_euler_angles_q31_narrow_(C_12_unchecked, 0);
+    const int32_t C_12 = dcm_from_euler_angles_q31_fit(C_12_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 6.1e-09 */
-    const int32_t shared_2 =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_mul_(sin_heading, sin_roll)
-        + (INT32_C(1) << 29), 30); /* Q1.30, -1.01 .. 1.01, error 2.4e-09 */
-    const int32_t shared_3 =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_mul_(cos_heading, cos_roll)
-        + (INT32_C(1) << 29), 30); /* Q1.30, -1.01 .. 1.01, error 2.4e-09 */
-    const int64_t C_13_unchecked = (int64_t)shared_2
-        + dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(shared_3, sin_pitch)
+    const int32_t shared_2 = dcm_from_euler_angles_q31_fit(dcm_from_euler_angles_q31_mul(
+        sin_heading, sin_roll) + (INT32_C(1) << 29), 30);
+        /* Q1.30, -1.01 .. 1.01, error 2.4e-09 */
+    const int32_t shared_3 = dcm_from_euler_angles_q31_fit(dcm_from_euler_angles_q31_mul(
+        cos_heading, cos_roll) + (INT32_C(1) << 29), 30);
+        /* Q1.30, -1.01 .. 1.01, error 2.4e-09 */
+    const int64_t C_13_raw = (int64_t)shared_2
+        + dcm_from_euler_angles_q31_shr(dcm_from_euler_angles_q31_mul(shared_3, sin_pitch)
         + (INT32_C(1) << 29), 30);
-    if ((C_13_unchecked < (-INT32_C(1140850688))) || (C_13_unchecked > INT32_C(1140850688))) {
+    if ((C_13_raw < (-INT32_C(1140850688))) || (C_13_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t C_13 = dcm_from_euler_angles_q31_narrow_(C_13_unchecked, 0);
+    const int32_t C_13 = dcm_from_euler_angles_q31_fit(C_13_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 6.1e-09 */
-    const int32_t C_21 =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_mul_(cos_pitch, sin_heading)
-        + (INT32_C(1) << 29), 30); /* Q1.30, -1.01 .. 1.01, error 2.4e-09 */
-    const int64_t C_22_unchecked = (int64_t)shared_3
-        + dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(shared_2, sin_pitch)
+    const int32_t C_21 = dcm_from_euler_angles_q31_fit(dcm_from_euler_angles_q31_mul(cos_pitch,
+        sin_heading) + (INT32_C(1) << 29), 30); /* Q1.30, -1.01 .. 1.01, error 2.4e-09 */
+    const int64_t C_22_raw = (int64_t)shared_3
+        + dcm_from_euler_angles_q31_shr(dcm_from_euler_angles_q31_mul(shared_2, sin_pitch)
         + (INT32_C(1) << 29), 30);
-    if ((C_22_unchecked < (-INT32_C(1140850688))) || (C_22_unchecked > INT32_C(1140850688))) {
+    if ((C_22_raw < (-INT32_C(1140850688))) || (C_22_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t C_22 = dcm_from_euler_angles_q31_narrow_(C_22_unchecked, 0);
+    const int32_t C_22 = dcm_from_euler_angles_q31_fit(C_22_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 6.1e-09 */
-    const int64_t C_23_unchecked = -(int64_t)shared_1
-        + dcm_from_euler_angles_q31_shr_(dcm_from_euler_angles_q31_mul_(shared_4, sin_pitch)
+    const int64_t C_23_raw = -(int64_t)shared_1
+        + dcm_from_euler_angles_q31_shr(dcm_from_euler_angles_q31_mul(shared_4, sin_pitch)
         + (INT32_C(1) << 29), 30);
-    if ((C_23_unchecked < (-INT32_C(1140850688))) || (C_23_unchecked > INT32_C(1140850688))) {
+    if ((C_23_raw < (-INT32_C(1140850688))) || (C_23_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t C_23 = dcm_from_euler_angles_q31_narrow_(C_23_unchecked, 0);
+    const int32_t C_23 = dcm_from_euler_angles_q31_fit(C_23_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 6.1e-09 */
     const int32_t C_31 = -sin_pitch; /* Q1.30, -1.01 .. 1.01, error 9.3e-10 */
-    const int32_t C_32 =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_mul_(cos_pitch, sin_roll)
-        + (INT32_C(1) << 29), 30); /* Q1.30, -1.01 .. 1.01, error 2.4e-09 */
-    const int32_t C_33 =
-        dcm_from_euler_angles_q31_narrow_(dcm_from_euler_angles_q31_mul_(cos_pitch, cos_roll)
-        + (INT32_C(1) << 29), 30); /* Q1.30, -1.01 .. 1.01, error 2.4e-09 */
+    const int32_t C_32 = dcm_from_euler_angles_q31_fit(dcm_from_euler_angles_q31_mul(cos_pitch,
+        sin_roll) + (INT32_C(1) << 29), 30); /* Q1.30, -1.01 .. 1.01, error 2.4e-09 */
+    const int32_t C_33 = dcm_from_euler_angles_q31_fit(dcm_from_euler_angles_q31_mul(cos_pitch,
+        cos_roll) + (INT32_C(1) << 29), 30); /* Q1.30, -1.01 .. 1.01, error 2.4e-09 */
     attitude[0] = C_11;
     attitude[1] = C_12;
     attitude[2] = C_13;

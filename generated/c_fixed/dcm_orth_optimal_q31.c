@@ -6,7 +6,7 @@
 #include "dcm_orth_optimal_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int dcm_orth_optimal_q31_out_(int32_t x, int32_t limit)
+static inline int dcm_orth_optimal_q31_out(int32_t x, int32_t limit)
 {
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
@@ -14,7 +14,7 @@ static inline int dcm_orth_optimal_q31_out_(int32_t x, int32_t limit)
 /* The exact product of two words. */
 #if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
 /* These processors have no instruction for it: the high word takes four products of half words. */
-static __attribute__((noinline)) int64_t dcm_orth_optimal_q31_mul_(int32_t a, int32_t b)
+static __attribute__((noinline)) int64_t dcm_orth_optimal_q31_mul(int32_t a, int32_t b)
 {
     const uint32_t a_low = (uint32_t)a & 0xFFFFu;
     const uint32_t b_low = (uint32_t)b & 0xFFFFu;
@@ -29,7 +29,7 @@ static __attribute__((noinline)) int64_t dcm_orth_optimal_q31_mul_(int32_t a, in
     return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
 }
 #else
-static inline int64_t dcm_orth_optimal_q31_mul_(int32_t a, int32_t b)
+static inline int64_t dcm_orth_optimal_q31_mul(int32_t a, int32_t b)
 {
     return (int64_t)a * (int64_t)b;
 }
@@ -40,7 +40,7 @@ static inline int64_t dcm_orth_optimal_q31_mul_(int32_t a, int32_t b)
  * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
  * number and no conversion of a number out of range.
  */
-static inline int32_t dcm_orth_optimal_q31_narrow_(int64_t x, int n)
+static inline int32_t dcm_orth_optimal_q31_fit(int64_t x, int n)
 {
 #ifdef __FRAMAC__
     return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
@@ -54,13 +54,13 @@ static inline int32_t dcm_orth_optimal_q31_narrow_(int64_t x, int n)
 }
 
 /* x / 2^n, rounded down, as a wide number. */
-static inline int64_t dcm_orth_optimal_q31_shr_(int64_t x, int n)
+static inline int64_t dcm_orth_optimal_q31_shr(int64_t x, int n)
 {
     return (x < 0) ? ~(~x >> n) : (x >> n);
 }
 
 /* numerator / denominator of their magnitudes, to the nearest; the sign comes last. */
-static int64_t dcm_orth_optimal_q31_div_(int64_t numerator, int64_t denominator)
+static int64_t dcm_orth_optimal_q31_div(int64_t numerator, int64_t denominator)
 {
     const int64_t top = (numerator < 0) ? -numerator : numerator;
     const int64_t below = (denominator < 0) ? -denominator : denominator;
@@ -69,7 +69,7 @@ static int64_t dcm_orth_optimal_q31_div_(int64_t numerator, int64_t denominator)
 }
 
 /* Square root bit by bit, to the nearest. */
-static int32_t dcm_orth_optimal_q31_sqrt_(uint64_t square)
+static int32_t dcm_orth_optimal_q31_rt(uint64_t square)
 {
     uint64_t rest = square;
     uint64_t root = 0;
@@ -97,121 +97,117 @@ int dcm_orth_optimal_q31(const int32_t computed[9], int32_t orthonormalized[9])
     const int32_t C_31 = computed[6];
     const int32_t C_32 = computed[7];
     const int32_t C_33 = computed[8];
-    if (dcm_orth_optimal_q31_out_(C_11, INT32_C(1140850688))
-        || dcm_orth_optimal_q31_out_(C_12, INT32_C(1140850688))
-        || dcm_orth_optimal_q31_out_(C_13, INT32_C(1140850688))
-        || dcm_orth_optimal_q31_out_(C_21, INT32_C(1140850688))
-        || dcm_orth_optimal_q31_out_(C_22, INT32_C(1140850688))
-        || dcm_orth_optimal_q31_out_(C_23, INT32_C(1140850688))
-        || dcm_orth_optimal_q31_out_(C_31, INT32_C(1140850688))
-        || dcm_orth_optimal_q31_out_(C_32, INT32_C(1140850688))
-        || dcm_orth_optimal_q31_out_(C_33, INT32_C(1140850688)))
+    if (dcm_orth_optimal_q31_out(C_11, INT32_C(1140850688))
+        || dcm_orth_optimal_q31_out(C_12, INT32_C(1140850688))
+        || dcm_orth_optimal_q31_out(C_13, INT32_C(1140850688))
+        || dcm_orth_optimal_q31_out(C_21, INT32_C(1140850688))
+        || dcm_orth_optimal_q31_out(C_22, INT32_C(1140850688))
+        || dcm_orth_optimal_q31_out(C_23, INT32_C(1140850688))
+        || dcm_orth_optimal_q31_out(C_31, INT32_C(1140850688))
+        || dcm_orth_optimal_q31_out(C_32, INT32_C(1140850688))
+        || dcm_orth_optimal_q31_out(C_33, INT32_C(1140850688))) {
         return 1;
+    }
     /* C' C */
-    const int32_t gram_11 = dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(C_11, C_11)
-        + dcm_orth_optimal_q31_mul_(C_21, C_21) + dcm_orth_optimal_q31_mul_(C_31, C_31)
+    const int32_t gram_11 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(C_11, C_11)
+        + dcm_orth_optimal_q31_mul(C_21, C_21) + dcm_orth_optimal_q31_mul(C_31, C_31)
         + (INT32_C(1) << 30), 31); /* Q2.29, -1.87e-09 .. 3.39, error 9.4e-10 */
-    const int32_t gram_12 = dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(C_11, C_12)
-        + dcm_orth_optimal_q31_mul_(C_21, C_22) + dcm_orth_optimal_q31_mul_(C_31, C_32)
+    const int32_t gram_12 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(C_11, C_12)
+        + dcm_orth_optimal_q31_mul(C_21, C_22) + dcm_orth_optimal_q31_mul(C_31, C_32)
         + (INT32_C(1) << 30), 31); /* Q2.29, -3.39 .. 3.39, error 9.4e-10 */
-    const int32_t gram_13 = dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(C_11, C_13)
-        + dcm_orth_optimal_q31_mul_(C_21, C_23) + dcm_orth_optimal_q31_mul_(C_31, C_33)
+    const int32_t gram_13 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(C_11, C_13)
+        + dcm_orth_optimal_q31_mul(C_21, C_23) + dcm_orth_optimal_q31_mul(C_31, C_33)
         + (INT32_C(1) << 30), 31); /* Q2.29, -3.39 .. 3.39, error 9.4e-10 */
-    const int32_t gram_22 = dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(C_12, C_12)
-        + dcm_orth_optimal_q31_mul_(C_22, C_22) + dcm_orth_optimal_q31_mul_(C_32, C_32)
+    const int32_t gram_22 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(C_12, C_12)
+        + dcm_orth_optimal_q31_mul(C_22, C_22) + dcm_orth_optimal_q31_mul(C_32, C_32)
         + (INT32_C(1) << 30), 31); /* Q2.29, -1.87e-09 .. 3.39, error 9.4e-10 */
-    const int32_t gram_23 = dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(C_12, C_13)
-        + dcm_orth_optimal_q31_mul_(C_22, C_23) + dcm_orth_optimal_q31_mul_(C_32, C_33)
+    const int32_t gram_23 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(C_12, C_13)
+        + dcm_orth_optimal_q31_mul(C_22, C_23) + dcm_orth_optimal_q31_mul(C_32, C_33)
         + (INT32_C(1) << 30), 31); /* Q2.29, -3.39 .. 3.39, error 9.4e-10 */
-    const int32_t gram_33 = dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(C_13, C_13)
-        + dcm_orth_optimal_q31_mul_(C_23, C_23) + dcm_orth_optimal_q31_mul_(C_33, C_33)
+    const int32_t gram_33 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(C_13, C_13)
+        + dcm_orth_optimal_q31_mul(C_23, C_23) + dcm_orth_optimal_q31_mul(C_33, C_33)
         + (INT32_C(1) << 30), 31); /* Q2.29, -1.87e-09 .. 3.39, error 9.4e-10 */
     /* mean of the eigenvalues of C' C */
-    const int64_t mean =
-        dcm_orth_optimal_q31_mul_(gram_11, INT32_C(1431655765) /* 1/3 in Q32 */)
-        + dcm_orth_optimal_q31_mul_(gram_22, INT32_C(1431655765) /* 1/3 in Q32 */)
-        + dcm_orth_optimal_q31_mul_(gram_33, INT32_C(1431655765) /* 1/3 in Q32 */);
+    const int64_t mean = dcm_orth_optimal_q31_mul(gram_11, INT32_C(1431655765) /* 1/3 in Q32 */)
+        + dcm_orth_optimal_q31_mul(gram_22, INT32_C(1431655765) /* 1/3 in Q32 */)
+        + dcm_orth_optimal_q31_mul(gram_33, INT32_C(1431655765) /* 1/3 in Q32 */);
         /* Q2.61, -1.72e-09 .. 3.39, error 1.8e-09 */
     /* C' C less its mean */
-    const int32_t deviator_11 = dcm_orth_optimal_q31_narrow_((int64_t)gram_11
-        + dcm_orth_optimal_q31_shr_(-mean + (INT64_C(1) << 31), 32), 0);
+    const int32_t deviator_11 = dcm_orth_optimal_q31_fit((int64_t)gram_11
+        + dcm_orth_optimal_q31_shr(-mean + (INT64_C(1) << 31), 32), 0);
         /* Q2.29, -2.26 .. 2.26, error 3.6e-09 */
-    const int32_t deviator_22 = dcm_orth_optimal_q31_narrow_((int64_t)gram_22
-        + dcm_orth_optimal_q31_shr_(-mean + (INT64_C(1) << 31), 32), 0);
+    const int32_t deviator_22 = dcm_orth_optimal_q31_fit((int64_t)gram_22
+        + dcm_orth_optimal_q31_shr(-mean + (INT64_C(1) << 31), 32), 0);
         /* Q2.29, -2.26 .. 2.26, error 3.6e-09 */
-    const int32_t deviator_33 = dcm_orth_optimal_q31_narrow_((int64_t)gram_33
-        + dcm_orth_optimal_q31_shr_(-mean + (INT64_C(1) << 31), 32), 0);
+    const int32_t deviator_33 = dcm_orth_optimal_q31_fit((int64_t)gram_33
+        + dcm_orth_optimal_q31_shr(-mean + (INT64_C(1) << 31), 32), 0);
         /* Q2.29, -2.26 .. 2.26, error 3.6e-09 */
-    const int32_t shared_2 =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(gram_23, gram_23)
+    const int32_t shared_2 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(gram_23, gram_23)
         + (INT32_C(1) << 30), 31); /* Q4.27, -1.5e-08 .. 11.5, error 1.1e-08 */
-    const int32_t spread_product =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(deviator_11, deviator_11)
-        + (INT32_C(1) << 29), 30); /* Q3.28, -1.87e-08 .. 5.1, error 1.9e-08 */
-    const int32_t spread_product_2 =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(deviator_22, deviator_22)
-        + (INT32_C(1) << 29), 30); /* Q3.28, -1.87e-08 .. 5.1, error 1.9e-08 */
-    const int32_t spread_product_3 =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(deviator_33, deviator_33)
-        + (INT32_C(1) << 29), 30); /* Q3.28, -1.87e-08 .. 5.1, error 1.9e-08 */
-    const int32_t spread_product_4 =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(gram_12, gram_12)
-        + (INT32_C(1) << 30), 31); /* Q4.27, -1.5e-08 .. 11.5, error 1.1e-08 */
-    const int32_t spread_product_5 =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(gram_13, gram_13)
-        + (INT32_C(1) << 30), 31); /* Q4.27, -1.5e-08 .. 11.5, error 1.1e-08 */
+    const int32_t spread_product = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(
+        deviator_11, deviator_11) + (INT32_C(1) << 29), 30);
+        /* Q3.28, -1.87e-08 .. 5.1, error 1.9e-08 */
+    const int32_t spread_product_2 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(
+        deviator_22, deviator_22) + (INT32_C(1) << 29), 30);
+        /* Q3.28, -1.87e-08 .. 5.1, error 1.9e-08 */
+    const int32_t spread_product_3 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(
+        deviator_33, deviator_33) + (INT32_C(1) << 29), 30);
+        /* Q3.28, -1.87e-08 .. 5.1, error 1.9e-08 */
+    const int32_t spread_product_4 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(gram_12,
+        gram_12) + (INT32_C(1) << 30), 31); /* Q4.27, -1.5e-08 .. 11.5, error 1.1e-08 */
+    const int32_t spread_product_5 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(gram_13,
+        gram_13) + (INT32_C(1) << 30), 31); /* Q4.27, -1.5e-08 .. 11.5, error 1.1e-08 */
     /* mean square spread of the eigenvalues, halved */
-    const int32_t spread =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(shared_2, INT32_C(1431655765) /* 1/3 in Q32 */)
-        + dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(spread_product, INT32_C(1431655765) /* 1/6 in Q33 */), 2)
-        + dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(spread_product_2, INT32_C(1431655765) /* 1/6 in Q33 */), 2)
-        + dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(spread_product_3, INT32_C(1431655765) /* 1/6 in Q33 */), 2)
-        + dcm_orth_optimal_q31_mul_(spread_product_4, INT32_C(1431655765) /* 1/3 in Q32 */)
-        + dcm_orth_optimal_q31_mul_(spread_product_5, INT32_C(1431655765) /* 1/3 in Q32 */)
+    const int32_t spread = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(shared_2,
+        INT32_C(1431655765) /* 1/3 in Q32 */)
+        + dcm_orth_optimal_q31_shr(dcm_orth_optimal_q31_mul(spread_product,
+        INT32_C(1431655765) /* 1/6 in Q33 */), 2)
+        + dcm_orth_optimal_q31_shr(dcm_orth_optimal_q31_mul(spread_product_2,
+        INT32_C(1431655765) /* 1/6 in Q33 */), 2)
+        + dcm_orth_optimal_q31_shr(dcm_orth_optimal_q31_mul(spread_product_3,
+        INT32_C(1431655765) /* 1/6 in Q33 */), 2)
+        + dcm_orth_optimal_q31_mul(spread_product_4, INT32_C(1431655765) /* 1/3 in Q32 */)
+        + dcm_orth_optimal_q31_mul(spread_product_5, INT32_C(1431655765) /* 1/3 in Q32 */)
         + (INT64_C(1) << 31), 32); /* Q4.27, -2.99e-08 .. 14.1, error 2.7e-08 */
-    const int32_t half_determinant_factor =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(deviator_22, deviator_33)
-        - (int64_t)shared_2 * (INT64_C(1) << 31) + (INT64_C(1) << 31), 32);
-        /* Q5.26, -16.6 .. 5.1, error 3.4e-08 */
-    const int32_t half_determinant_factor_2 =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(gram_13, gram_23)
-        - dcm_orth_optimal_q31_mul_(deviator_33, gram_12) + (INT64_C(1) << 31), 32);
-        /* Q5.26, -19.2 .. 19.2, error 2.8e-08 */
-    const int32_t half_determinant_factor_3 =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(gram_12, gram_23)
-        - dcm_orth_optimal_q31_mul_(deviator_22, gram_13) + (INT64_C(1) << 31), 32);
-        /* Q5.26, -19.2 .. 19.2, error 2.8e-08 */
-    const int32_t half_determinant =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(deviator_11, half_determinant_factor)
-        + dcm_orth_optimal_q31_mul_(gram_12, half_determinant_factor_2)
-        + dcm_orth_optimal_q31_mul_(gram_13, half_determinant_factor_3)
+    const int32_t half_determinant_factor = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(
+        deviator_22, deviator_33) - (int64_t)shared_2 * (INT64_C(1) << 31)
+        + (INT64_C(1) << 31), 32); /* Q5.26, -16.6 .. 5.1, error 3.4e-08 */
+    const int32_t half_determinant_factor_2 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(
+        gram_13, gram_23) - dcm_orth_optimal_q31_mul(deviator_33, gram_12)
+        + (INT64_C(1) << 31), 32); /* Q5.26, -19.2 .. 19.2, error 2.8e-08 */
+    const int32_t half_determinant_factor_3 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(
+        gram_12, gram_23) - dcm_orth_optimal_q31_mul(deviator_22, gram_13)
+        + (INT64_C(1) << 31), 32); /* Q5.26, -19.2 .. 19.2, error 2.8e-08 */
+    const int32_t half_determinant = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(
+        deviator_11, half_determinant_factor)
+        + dcm_orth_optimal_q31_mul(gram_12, half_determinant_factor_2)
+        + dcm_orth_optimal_q31_mul(gram_13, half_determinant_factor_3)
         + (INT64_C(1) << 31), 32); /* Q7.24, -83.5 .. 83.5, error 2.2e-07 */
-    const int32_t angle_angle_argument_radicand_largest_argument_factor =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(spread, spread)
-        + (INT32_C(1) << 30), 31); /* Q8.23, -8.35e-07 .. 197, error 7.9e-07 */
-    const int64_t angle_angle_argument_radicand_largest_argument =
-        dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(angle_angle_argument_radicand_largest_argument_factor, spread), 1)
-        - dcm_orth_optimal_q31_mul_(half_determinant, half_determinant) * 2;
+    const int32_t angle_angle_arg_rad_max_arg_fac = dcm_orth_optimal_q31_fit(
+        dcm_orth_optimal_q31_mul(spread, spread) + (INT32_C(1) << 30), 31);
+        /* Q8.23, -8.35e-07 .. 197, error 7.9e-07 */
+    const int64_t angle_angle_arg_rad_max_arg = dcm_orth_optimal_q31_shr(
+        dcm_orth_optimal_q31_mul(angle_angle_arg_rad_max_arg_fac, spread), 1)
+        - dcm_orth_optimal_q31_mul(half_determinant, half_determinant) * 2;
         /* Q14.49, -6.97e+03 .. 2.76e+03, error 5.2e-05 */
-    int64_t angle_angle_argument_radicand_largest = 0;
-        /* Q14.49, -5.13e-05 .. 2.76e+03, error 5.2e-05 */
-    if (angle_angle_argument_radicand_largest_argument > angle_angle_argument_radicand_largest) {
-        angle_angle_argument_radicand_largest = angle_angle_argument_radicand_largest_argument;
+    int64_t angle_angle_arg_rad_largest = 0; /* Q14.49, -5.13e-05 .. 2.76e+03, error 5.2e-05 */
+    if (angle_angle_arg_rad_max_arg > angle_angle_arg_rad_largest) {
+        angle_angle_arg_rad_largest = angle_angle_arg_rad_max_arg;
     }
-    const int32_t angle_angle_argument_root =
-        dcm_orth_optimal_q31_sqrt_((uint64_t)(dcm_orth_optimal_q31_shr_(angle_angle_argument_radicand_largest, 1)));
+    const int32_t angle_angle_argument_root = dcm_orth_optimal_q31_rt((uint64_t)(
+        dcm_orth_optimal_q31_shr(angle_angle_arg_rad_largest, 1)));
         /* Q7.24, 0 .. 52.5, error 0.0072 */
     int32_t angle_angle_taken; /* Q7.24, 0 .. 52.5, exact */
     if ((int64_t)angle_angle_argument_root >= INT32_C(880607856)) {
-        angle_angle_taken = dcm_orth_optimal_q31_narrow_(INT32_C(880607856), 0);
+        angle_angle_taken = dcm_orth_optimal_q31_fit(INT32_C(880607856), 0);
     } else {
         angle_angle_taken = angle_angle_argument_root;
     }
     int32_t angle_angle_taken_2; /* Q7.24, -83.5 .. 83.5, exact */
     if ((int64_t)half_determinant >= INT32_C(1399979002)) {
-        angle_angle_taken_2 = dcm_orth_optimal_q31_narrow_(INT32_C(1399979002), 0);
+        angle_angle_taken_2 = dcm_orth_optimal_q31_fit(INT32_C(1399979002), 0);
     } else if ((-INT32_C(1399979002)) >= (int64_t)half_determinant) {
-        angle_angle_taken_2 = dcm_orth_optimal_q31_narrow_((-INT32_C(1399979002)), 0);
+        angle_angle_taken_2 = dcm_orth_optimal_q31_fit((-INT32_C(1399979002)), 0);
     } else {
         angle_angle_taken_2 = half_determinant;
     }
@@ -219,7 +215,7 @@ int dcm_orth_optimal_q31(const int32_t computed[9], int32_t orthonormalized[9])
         /* Q39.24, -83.5 .. 83.5, exact */
     int32_t angle_angle_width = angle_angle_taken_2; /* Q7.24, 0 .. 83.5, exact */
     if (angle_angle_negative > angle_angle_width) {
-        angle_angle_width = dcm_orth_optimal_q31_narrow_(angle_angle_negative, 0);
+        angle_angle_width = dcm_orth_optimal_q31_fit(angle_angle_negative, 0);
     }
     int32_t angle_angle_smaller; /* Q7.24, 0 .. 52.5, exact */
     if ((int64_t)angle_angle_width >= (int64_t)angle_angle_taken) {
@@ -243,9 +239,9 @@ int dcm_orth_optimal_q31(const int32_t computed[9], int32_t orthonormalized[9])
         /* Q38.25, 2.98e-08 .. 136, exact */
     int32_t angle_angle_numerator; /* Q6.25, -47 .. 36.6, exact */
     if (angle_angle_beyond >= 0) {
-        angle_angle_numerator = dcm_orth_optimal_q31_narrow_(angle_angle_below, 0);
+        angle_angle_numerator = dcm_orth_optimal_q31_fit(angle_angle_below, 0);
     } else {
-        angle_angle_numerator = dcm_orth_optimal_q31_narrow_((int64_t)angle_angle_smaller * 2, 0);
+        angle_angle_numerator = dcm_orth_optimal_q31_fit((int64_t)angle_angle_smaller * 2, 0);
     }
     int64_t angle_angle_denominator; /* Q38.25, 2.98e-08 .. 136, exact */
     if (angle_angle_beyond >= 0) {
@@ -253,49 +249,49 @@ int dcm_orth_optimal_q31(const int32_t computed[9], int32_t orthonormalized[9])
     } else {
         angle_angle_denominator = angle_angle_larger;
     }
-    const int32_t angle_angle_tangent =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_div_((int64_t)angle_angle_numerator
-        * (INT64_C(1) << 32), angle_angle_denominator), 0);
+    const int32_t angle_angle_tangent = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_div(
+        (int64_t)angle_angle_numerator * (INT64_C(1) << 32), angle_angle_denominator), 0);
         /* Q-1.32, -0.392 .. 0.438, error 1.2e-10 */
-    const int32_t angle_angle_square =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(angle_angle_tangent, angle_angle_tangent)
-        + (INT32_C(1) << 30), 31); /* Q-2.33, -2.33e-10 .. 0.192, error 1.7e-10 */
-    const int32_t angle_angle_series =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(angle_angle_square, INT32_C(735255871) /* 0.042797524437051732 in Q34 */), 1)
+    const int32_t angle_angle_square = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(
+        angle_angle_tangent, angle_angle_tangent) + (INT32_C(1) << 30), 31);
+        /* Q-2.33, -2.33e-10 .. 0.192, error 1.7e-10 */
+    const int32_t angle_angle_series = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_shr(
+        dcm_orth_optimal_q31_mul(angle_angle_square,
+        INT32_C(735255871) /* 0.042797524437051732 in Q34 */), 1)
         - INT64_C(6065684321545150080) /* 0.08220535148788144 in Q60 */
         + (INT64_C(1) << 31), 32); /* Q-3.34, -0.0823 .. -0.074, error 3.9e-11 */
-    const int32_t angle_angle_series_2 =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(angle_angle_square, angle_angle_series), 2)
+    const int32_t angle_angle_series_2 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_shr(
+        dcm_orth_optimal_q31_mul(angle_angle_square, angle_angle_series), 2)
         + INT64_C(4054853067505913472) /* 0.10990701262248558 in Q60 */
         + (INT32_C(1) << 30), 31); /* 0.0941 .. 0.11, error 5e-11 */
-    const int32_t angle_angle_series_3 =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(angle_angle_square, angle_angle_series_2), 2)
+    const int32_t angle_angle_series_3 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_shr(
+        dcm_orth_optimal_q31_mul(angle_angle_square, angle_angle_series_2), 2)
         - INT64_C(5267120772635892064) /* 0.14276559461088406 in Q60 */
         + (INT64_C(1) << 31), 32); /* Q-2.33, -0.143 .. -0.121, error 8.6e-11 */
-    const int32_t angle_angle_series_4 =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(angle_angle_square, angle_angle_series_3), 1)
+    const int32_t angle_angle_series_4 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_shr(
+        dcm_orth_optimal_q31_mul(angle_angle_square, angle_angle_series_3), 1)
         + INT64_C(7378564090463267680) /* 0.19999638041759513 in Q60 */
         + (INT64_C(1) << 31), 32); /* 0.172 .. 0.2, error 9.8e-11 */
-    const int32_t angle_angle_series_5 =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(angle_angle_square, angle_angle_series_4), 2)
+    const int32_t angle_angle_series_5 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_shr(
+        dcm_orth_optimal_q31_mul(angle_angle_square, angle_angle_series_4), 2)
         - INT64_C(6148913518682917232) /* 0.33333326976907529 in Q60 */
         + (INT64_C(1) << 31), 32); /* Q-1.32, -0.334 .. -0.295, error 1.7e-10 */
-    const int32_t angle_angle_bend =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(angle_angle_square, angle_angle_series_5)
-        - INT64_C(11967952160) /* 3.2439199325215087e-10 in Q60 */ + (INT32_C(1) << 30), 31);
-        /* Q-3.34, -0.0639 .. -1.74e-10, error 1.2e-10 */
+    const int32_t angle_angle_bend = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(
+        angle_angle_square, angle_angle_series_5)
+        - INT64_C(11967952160) /* 3.2439199325215087e-10 in Q60 */
+        + (INT32_C(1) << 30), 31); /* Q-3.34, -0.0639 .. -1.74e-10, error 1.2e-10 */
     const int64_t angle_angle_arctangent = (int64_t)angle_angle_tangent * (INT64_C(1) << 32)
-        + dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(angle_angle_tangent, angle_angle_bend), 2);
-        /* Q-1.64, -0.392 .. 0.438, error 1.9e-10 */
-    const int64_t angle_angle_angle = dcm_orth_optimal_q31_shr_(angle_angle_arctangent, 2)
+        + dcm_orth_optimal_q31_shr(dcm_orth_optimal_q31_mul(angle_angle_tangent,
+        angle_angle_bend), 2); /* Q-1.64, -0.392 .. 0.438, error 1.9e-10 */
+    const int64_t angle_angle_angle = dcm_orth_optimal_q31_shr(angle_angle_arctangent, 2)
         + INT64_C(3622009729038561420); /* Q1.62, 0.394 .. 1.23, error 1.9e-10 */
     int64_t angle_angle_octant; /* Q1.62, -1.84e-10 .. 0.786, error 1.9e-10 */
     if (angle_angle_beyond >= 0) {
         angle_angle_octant = angle_angle_angle;
     } else {
-        angle_angle_octant = dcm_orth_optimal_q31_shr_(angle_angle_arctangent, 2);
+        angle_angle_octant = dcm_orth_optimal_q31_shr(angle_angle_arctangent, 2);
     }
-    const int64_t angle_angle_angle_2 = dcm_orth_optimal_q31_shr_(-angle_angle_octant, 1)
+    const int64_t angle_angle_angle_2 = dcm_orth_optimal_q31_shr(-angle_angle_octant, 1)
         + INT64_C(3622009729038561420); /* Q2.61, 0.785 .. 1.58, error 1.9e-10 */
     int64_t angle_angle_quadrant; /* Q1.62, -1.84e-10 .. 1.58, error 1.9e-10 */
     if ((int64_t)angle_angle_width >= (int64_t)angle_angle_taken) {
@@ -303,361 +299,338 @@ int dcm_orth_optimal_q31(const int32_t computed[9], int32_t orthonormalized[9])
     } else {
         angle_angle_quadrant = angle_angle_angle_2 * 2;
     }
-    const int64_t angle_angle_angle_3 = dcm_orth_optimal_q31_shr_(-angle_angle_quadrant, 2)
+    const int64_t angle_angle_angle_3 = dcm_orth_optimal_q31_shr(-angle_angle_quadrant, 2)
         + INT64_C(3622009729038561420); /* Q3.60, 1.57 .. 3.15, error 1.9e-10 */
     int64_t angle_angle_half; /* Q2.61, -1.84e-10 .. 3.15, error 1.9e-10 */
     if ((int64_t)angle_angle_taken_2 >= 0) {
-        angle_angle_half = dcm_orth_optimal_q31_shr_(angle_angle_quadrant, 1);
+        angle_angle_half = dcm_orth_optimal_q31_shr(angle_angle_quadrant, 1);
     } else {
         angle_angle_half = angle_angle_angle_3 * 2;
     }
-    const int32_t angle_angle = dcm_orth_optimal_q31_narrow_(angle_angle_half
+    const int32_t angle_angle = dcm_orth_optimal_q31_fit(angle_angle_half
         + (INT64_C(1) << 31), 32); /* Q2.29, -1.87e-09 .. 3.15, error 3.2 */
     /* angle of the cubic */
-    const int32_t angle =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(angle_angle, INT32_C(1431655765) /* 1/3 in Q32 */)
-        + (INT64_C(1) << 31), 32); /* Q2.29, -1.05 .. 2.1, error 1.1 */
-    const int32_t radius = dcm_orth_optimal_q31_sqrt_((uint64_t)((int64_t)spread
+    const int32_t angle = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(angle_angle,
+        INT32_C(1431655765) /* 1/3 in Q32 */) + (INT64_C(1) << 31), 32);
+        /* Q2.29, -1.05 .. 2.1, error 1.1 */
+    const int32_t radius = dcm_orth_optimal_q31_rt((uint64_t)((int64_t)spread
         * (INT32_C(1) << 29))); /* Q3.28, 0 .. 3.75, error 0.00017 */
     int32_t along_cosine_taken; /* Q2.29, 0 .. 1.05, exact */
     if ((int64_t)angle >= INT32_C(562209904)) {
-        along_cosine_taken = dcm_orth_optimal_q31_narrow_(INT32_C(562209904), 0);
+        along_cosine_taken = dcm_orth_optimal_q31_fit(INT32_C(562209904), 0);
     } else if (0 >= (int64_t)angle) {
-        along_cosine_taken = dcm_orth_optimal_q31_narrow_(0, 0);
+        along_cosine_taken = dcm_orth_optimal_q31_fit(0, 0);
     } else {
         along_cosine_taken = angle;
     }
-    const int32_t along_cosine_square =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(along_cosine_taken, along_cosine_taken)
-        + (INT32_C(1) << 27), 28); /* Q1.30, -9.32e-10 .. 1.1, error 4.7e-10 */
-    const int32_t along_cosine_series =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(along_cosine_square, INT32_C(18804111) /* 1/479001600 in Q53 */)
+    const int32_t along_cosine_square = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(
+        along_cosine_taken, along_cosine_taken) + (INT32_C(1) << 27), 28);
+        /* Q1.30, -9.32e-10 .. 1.1, error 4.7e-10 */
+    const int32_t along_cosine_series = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(
+        along_cosine_square, INT32_C(18804111) /* 1/479001600 in Q53 */)
         - INT64_C(2665180378335019008) /* 1/3628800 in Q60 */ + (INT32_C(1) << 30), 31);
         /* Q-21.52, -2.76e-07 .. -2.73e-07, error 1.2e-16 */
-    const int32_t along_cosine_series_2 =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(along_cosine_square, along_cosine_series), 4)
+    const int32_t along_cosine_series_2 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_shr(
+        dcm_orth_optimal_q31_mul(along_cosine_square, along_cosine_series), 4)
         + INT64_C(7495819814078775296) /* 1/40320 in Q60 */ + (INT64_C(1) << 31), 32);
         /* 2.44e-05 .. 2.49e-05, error 7.4e-15 */
-    const int32_t along_cosine_series_3 =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(along_cosine_square, along_cosine_series_2), 4)
+    const int32_t along_cosine_series_3 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_shr(
+        dcm_orth_optimal_q31_mul(along_cosine_square, along_cosine_series_2), 4)
         - INT64_C(6558842337318952960) /* 1/720 in Q60 */ + (INT64_C(1) << 31), 32);
         /* Q-9.40, -0.00139 .. -0.00136, error 4.8e-13 */
-    const int32_t along_cosine_series_4 =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(along_cosine_square, along_cosine_series_3), 3)
+    const int32_t along_cosine_series_4 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_shr(
+        dcm_orth_optimal_q31_mul(along_cosine_square, along_cosine_series_3), 3)
         + INT64_C(6148914691236517248) /* 1/24 in Q60 */ + (INT64_C(1) << 31), 32);
         /* 0.0401 .. 0.0417, error 1.6e-11 */
-    const int32_t along_cosine_bend =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(along_cosine_square, along_cosine_series_4)
-        + (INT32_C(1) << 29), 30); /* Q-4.35, -5.83e-11 .. 0.0457, error 5.2e-11 */
+    const int32_t along_cosine_bend = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(
+        along_cosine_square, along_cosine_series_4) + (INT32_C(1) << 29), 30);
+        /* Q-4.35, -5.83e-11 .. 0.0457, error 5.2e-11 */
     const int32_t along_cosine = (INT32_C(1) << 30)
-        + dcm_orth_optimal_q31_narrow_(-(int64_t)along_cosine_square * (INT64_C(1) << 32)
-        + dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(along_cosine_square, along_cosine_bend), 2)
-        + (INT64_C(1) << 32), 33); /* Q1.30, 0.451 .. 1.01, error 0.55 */
-    const int64_t along = dcm_orth_optimal_q31_mul_(along_cosine, radius);
+        + dcm_orth_optimal_q31_fit(-(int64_t)along_cosine_square * (INT64_C(1) << 32)
+        + dcm_orth_optimal_q31_shr(dcm_orth_optimal_q31_mul(along_cosine_square,
+        along_cosine_bend), 2) + (INT64_C(1) << 32), 33);
+        /* Q1.30, 0.451 .. 1.01, error 0.55 */
+    const int64_t along = dcm_orth_optimal_q31_mul(along_cosine, radius);
         /* Q5.58, -2.06 .. 5.8, error 2.1 */
-    const int32_t across_sine_series =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(along_cosine_square, INT32_C(1481185359) /* 1/6227020800 in Q63 */), 5)
+    const int32_t across_sine_series = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_shr(
+        dcm_orth_optimal_q31_mul(along_cosine_square,
+        INT32_C(1481185359) /* 1/6227020800 in Q63 */), 5)
         - INT64_C(7753252009628663808) /* 1/39916800 in Q60 */ + (INT64_C(1) << 31), 32);
         /* Q-25.56, -2.51e-08 .. -2.48e-08, error 7.4e-18 */
-    const int32_t across_sine_series_2 =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(along_cosine_square, across_sine_series), 5)
+    const int32_t across_sine_series_2 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_shr(
+        dcm_orth_optimal_q31_mul(along_cosine_square, across_sine_series), 5)
         + INT64_C(6662950945848033280) /* 1/362880 in Q60 */ + (INT64_C(1) << 31), 32);
         /* 2.72e-06 .. 2.76e-06, error 9.1e-16 */
-    const int32_t across_sine_series_3 =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(along_cosine_square, across_sine_series_2), 4)
+    const int32_t across_sine_series_3 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_shr(
+        dcm_orth_optimal_q31_mul(along_cosine_square, across_sine_series_2), 4)
         - INT64_C(7495819814078808064) /* 1/5040 in Q60 */ + (INT64_C(1) << 31), 32);
         /* Q-12.43, -0.000199 .. -0.000195, error 6e-14 */
-    const int32_t across_sine_series_4 =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(along_cosine_square, across_sine_series_3), 4)
+    const int32_t across_sine_series_4 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_shr(
+        dcm_orth_optimal_q31_mul(along_cosine_square, across_sine_series_3), 4)
         + INT64_C(4919131752989213696) /* 1/120 in Q60 */ + (INT64_C(1) << 31), 32);
         /* 0.00811 .. 0.00834, error 3.8e-12 */
-    const int32_t across_sine_series_5 =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(along_cosine_square, across_sine_series_4), 2)
+    const int32_t across_sine_series_5 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_shr(
+        dcm_orth_optimal_q31_mul(along_cosine_square, across_sine_series_4), 2)
         - INT64_C(6148914691236517216) /* 1/6 in Q60 */ + (INT64_C(1) << 31), 32);
         /* Q-2.33, -0.167 .. -0.157, error 6.7e-11 */
-    const int32_t across_sine_bend =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(along_cosine_square, across_sine_series_5)
-        + (INT32_C(1) << 29), 30); /* Q-2.33, -0.183 .. 2.33e-10, error 2.1e-10 */
+    const int32_t across_sine_bend = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(
+        along_cosine_square, across_sine_series_5) + (INT32_C(1) << 29), 30);
+        /* Q-2.33, -0.183 .. 2.33e-10, error 2.1e-10 */
     const int32_t across_sine = along_cosine_taken * 2
-        + dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(along_cosine_taken, across_sine_bend)
-        + (INT64_C(1) << 31), 32); /* Q1.30, -9.32e-10 .. 1.01, error 1.1 */
-    const int32_t across_product =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(across_sine, radius)
-        + (INT32_C(1) << 29), 30); /* Q3.28, -3.75 .. 7.49, error 3.8 */
-    const int64_t across = dcm_orth_optimal_q31_mul_(across_product, INT32_C(1859775393));
+        + dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(along_cosine_taken,
+        across_sine_bend) + (INT64_C(1) << 31), 32); /* Q1.30, -9.32e-10 .. 1.01, error 1.1 */
+    const int32_t across_product = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(
+        across_sine, radius) + (INT32_C(1) << 29), 30); /* Q3.28, -3.75 .. 7.49, error 3.8 */
+    const int64_t across = dcm_orth_optimal_q31_mul(across_product, INT32_C(1859775393));
         /* Q5.58, -6.49 .. 13, error 6.5 */
-    const int64_t stretch_1_radicand = along * 4 + dcm_orth_optimal_q31_shr_(mean, 2);
+    const int64_t stretch_1_radicand = along * 4 + dcm_orth_optimal_q31_shr(mean, 2);
         /* Q4.59, 0.5 .. 2, exact */
     if ((stretch_1_radicand < (INT64_C(1) << 58))
         || (stretch_1_radicand > (INT64_C(1) << 60))) {
         return 2;
     }
     /* singular value 1 of C */
-    const int32_t stretch_1 =
-        dcm_orth_optimal_q31_sqrt_((uint64_t)(dcm_orth_optimal_q31_shr_(stretch_1_radicand, 1)));
-        /* Q2.29, 0.707 .. 1.42, error 9.4e-10 */
-    const int64_t shared_10 = along * 2 + dcm_orth_optimal_q31_shr_(-mean, 2);
+    const int32_t stretch_1 = dcm_orth_optimal_q31_rt((uint64_t)(dcm_orth_optimal_q31_shr(
+        stretch_1_radicand, 1))); /* Q2.29, 0.707 .. 1.42, error 9.4e-10 */
+    const int64_t shared_10 = along * 2 + dcm_orth_optimal_q31_shr(-mean, 2);
         /* Q4.59, -5.44 .. 5.8, error 2.1 */
-    const int64_t stretch_2_radicand = across + dcm_orth_optimal_q31_shr_(-shared_10, 1);
+    const int64_t stretch_2_radicand = across + dcm_orth_optimal_q31_shr(-shared_10, 1);
         /* Q5.58, 0.5 .. 2, exact */
     if ((stretch_2_radicand < (INT64_C(1) << 57))
         || (stretch_2_radicand > (INT64_C(1) << 59))) {
         return 2;
     }
     /* singular value 2 of C */
-    const int32_t stretch_2 = dcm_orth_optimal_q31_sqrt_((uint64_t)(stretch_2_radicand));
+    const int32_t stretch_2 = dcm_orth_optimal_q31_rt((uint64_t)(stretch_2_radicand));
         /* Q2.29, 0.707 .. 1.42, error 9.4e-10 */
-    const int64_t stretch_3_radicand = -across + dcm_orth_optimal_q31_shr_(-shared_10, 1);
+    const int64_t stretch_3_radicand = -across + dcm_orth_optimal_q31_shr(-shared_10, 1);
         /* Q5.58, 0.5 .. 2, exact */
     if ((stretch_3_radicand < (INT64_C(1) << 57))
         || (stretch_3_radicand > (INT64_C(1) << 59))) {
         return 2;
     }
     /* singular value 3 of C */
-    const int32_t stretch_3 = dcm_orth_optimal_q31_sqrt_((uint64_t)(stretch_3_radicand));
+    const int32_t stretch_3 = dcm_orth_optimal_q31_rt((uint64_t)(stretch_3_radicand));
         /* Q2.29, 0.707 .. 1.42, error 9.4e-10 */
     const int32_t shared_1 = stretch_1 + stretch_2; /* Q2.29, 1.41 .. 2.83, error 1.9e-09 */
     /* invariants of (C' C)^(1/2) */
-    const int32_t invariant_1 = dcm_orth_optimal_q31_narrow_((int64_t)shared_1
-        + (int64_t)stretch_3 + 1, 1); /* Q3.28, 2.12 .. 4.25, error 4.7e-09 */
-    const int32_t shared_3 =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(stretch_1, stretch_2)
-        + (INT32_C(1) << 28), 29); /* Q2.29, 0.499 .. 2.01, error 3.6e-09 */
-    const int64_t invariant_2 = dcm_orth_optimal_q31_mul_(shared_1, stretch_3)
+    const int32_t invariant_1 = dcm_orth_optimal_q31_fit((int64_t)shared_1 + (int64_t)stretch_3
+        + 1, 1); /* Q3.28, 2.12 .. 4.25, error 4.7e-09 */
+    const int32_t shared_3 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(stretch_1,
+        stretch_2) + (INT32_C(1) << 28), 29); /* Q2.29, 0.499 .. 2.01, error 3.6e-09 */
+    const int64_t invariant_2 = dcm_orth_optimal_q31_mul(shared_1, stretch_3)
         + (int64_t)shared_3 * (INT32_C(1) << 29); /* Q5.58, 1.49 .. 6.01, error 8.9e-09 */
-    const int64_t invariant_3 = dcm_orth_optimal_q31_mul_(shared_3, stretch_3);
+    const int64_t invariant_3 = dcm_orth_optimal_q31_mul(shared_3, stretch_3);
         /* Q5.58, 0.353 .. 2.83, error 7e-09 */
     /* i1 C' C + i3 I */
-    const int32_t denominator_11 = dcm_orth_optimal_q31_narrow_(invariant_3
-        + dcm_orth_optimal_q31_mul_(gram_11, invariant_1) * 2 + (INT64_C(1) << 31), 32);
+    const int32_t denominator_11 = dcm_orth_optimal_q31_fit(invariant_3
+        + dcm_orth_optimal_q31_mul(gram_11, invariant_1) * 2 + (INT64_C(1) << 31), 32);
         /* Q5.26, 0.353 .. 17.2, error 3.5e-08 */
-    const int32_t denominator_12 =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(gram_12, invariant_1)
-        + (INT32_C(1) << 29), 30); /* Q4.27, -14.4 .. 14.4, error 2.4e-08 */
-    const int32_t denominator_13 =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(gram_13, invariant_1)
-        + (INT32_C(1) << 29), 30); /* Q4.27, -14.4 .. 14.4, error 2.4e-08 */
-    const int32_t denominator_22 = dcm_orth_optimal_q31_narrow_(invariant_3
-        + dcm_orth_optimal_q31_mul_(gram_22, invariant_1) * 2 + (INT64_C(1) << 31), 32);
+    const int32_t denominator_12 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(gram_12,
+        invariant_1) + (INT32_C(1) << 29), 30); /* Q4.27, -14.4 .. 14.4, error 2.4e-08 */
+    const int32_t denominator_13 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(gram_13,
+        invariant_1) + (INT32_C(1) << 29), 30); /* Q4.27, -14.4 .. 14.4, error 2.4e-08 */
+    const int32_t denominator_22 = dcm_orth_optimal_q31_fit(invariant_3
+        + dcm_orth_optimal_q31_mul(gram_22, invariant_1) * 2 + (INT64_C(1) << 31), 32);
         /* Q5.26, 0.353 .. 17.2, error 3.5e-08 */
-    const int32_t denominator_23 =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(gram_23, invariant_1)
-        + (INT32_C(1) << 29), 30); /* Q4.27, -14.4 .. 14.4, error 2.4e-08 */
-    const int32_t denominator_33 = dcm_orth_optimal_q31_narrow_(invariant_3
-        + dcm_orth_optimal_q31_mul_(gram_33, invariant_1) * 2 + (INT64_C(1) << 31), 32);
+    const int32_t denominator_23 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(gram_23,
+        invariant_1) + (INT32_C(1) << 29), 30); /* Q4.27, -14.4 .. 14.4, error 2.4e-08 */
+    const int32_t denominator_33 = dcm_orth_optimal_q31_fit(invariant_3
+        + dcm_orth_optimal_q31_mul(gram_33, invariant_1) * 2 + (INT64_C(1) << 31), 32);
         /* Q5.26, 0.353 .. 17.2, error 3.5e-08 */
     /* adjugate of the denominator */
-    const int32_t adjugate_11 =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(denominator_22, denominator_33)
-        * 4 - dcm_orth_optimal_q31_mul_(denominator_23, denominator_23)
+    const int32_t adjugate_11 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(
+        denominator_22, denominator_33) * 4
+        - dcm_orth_optimal_q31_mul(denominator_23, denominator_23)
         + (INT64_C(1) << 31), 32); /* Q9.22, -207 .. 296, error 2e-06 */
-    const int32_t adjugate_12 =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(denominator_13, denominator_23)
-        - dcm_orth_optimal_q31_mul_(denominator_12, denominator_33) * 2
+    const int32_t adjugate_12 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(
+        denominator_13, denominator_23)
+        - dcm_orth_optimal_q31_mul(denominator_12, denominator_33) * 2
         + (INT64_C(1) << 31), 32); /* Q9.22, -454 .. 454, error 1.7e-06 */
-    const int32_t adjugate_13 =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(denominator_12, denominator_23)
-        - dcm_orth_optimal_q31_mul_(denominator_13, denominator_22) * 2
+    const int32_t adjugate_13 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(
+        denominator_12, denominator_23)
+        - dcm_orth_optimal_q31_mul(denominator_13, denominator_22) * 2
         + (INT64_C(1) << 31), 32); /* Q9.22, -454 .. 454, error 1.7e-06 */
-    const int32_t adjugate_22 =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(denominator_11, denominator_33)
-        * 4 - dcm_orth_optimal_q31_mul_(denominator_13, denominator_13)
+    const int32_t adjugate_22 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(
+        denominator_11, denominator_33) * 4
+        - dcm_orth_optimal_q31_mul(denominator_13, denominator_13)
         + (INT64_C(1) << 31), 32); /* Q9.22, -207 .. 296, error 2e-06 */
-    const int32_t adjugate_23 =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(denominator_12, denominator_13)
-        - dcm_orth_optimal_q31_mul_(denominator_11, denominator_23) * 2
+    const int32_t adjugate_23 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(
+        denominator_12, denominator_13)
+        - dcm_orth_optimal_q31_mul(denominator_11, denominator_23) * 2
         + (INT64_C(1) << 31), 32); /* Q9.22, -454 .. 454, error 1.7e-06 */
-    const int32_t adjugate_33 =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(denominator_11, denominator_22)
-        * 4 - dcm_orth_optimal_q31_mul_(denominator_12, denominator_12)
+    const int32_t adjugate_33 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(
+        denominator_11, denominator_22) * 4
+        - dcm_orth_optimal_q31_mul(denominator_12, denominator_12)
         + (INT64_C(1) << 31), 32); /* Q9.22, -207 .. 296, error 2e-06 */
-    const int64_t inverse_determinant_denominator_unchecked =
-        dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(adjugate_11, denominator_11)
-        + dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(adjugate_12, denominator_12), 1)
-        + dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(adjugate_13, denominator_13), 1)
+    const int64_t inverse_determinant_den_raw = dcm_orth_optimal_q31_shr(
+        dcm_orth_optimal_q31_mul(adjugate_11, denominator_11)
+        + dcm_orth_optimal_q31_shr(dcm_orth_optimal_q31_mul(adjugate_12, denominator_12), 1)
+        + dcm_orth_optimal_q31_shr(dcm_orth_optimal_q31_mul(adjugate_13, denominator_13), 1)
         + (INT32_C(1) << 24), 25);
-    if ((inverse_determinant_denominator_unchecked < INT32_C(268436410))
-        || (inverse_determinant_denominator_unchecked > INT32_C(1073740870))) {
+    if ((inverse_determinant_den_raw < INT32_C(268436410))
+        || (inverse_determinant_den_raw > INT32_C(1073740870))) {
         return 2;
     }
-    const int32_t inverse_determinant_denominator =
-        dcm_orth_optimal_q31_narrow_(inverse_determinant_denominator_unchecked, 0);
-        /* Q8.23, 32 .. 128, error 0.00012 */
-    const int32_t inverse_determinant =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_div_((INT64_C(1) << 58), inverse_determinant_denominator), 0);
+    const int32_t inverse_determinant_den = dcm_orth_optimal_q31_fit(
+        inverse_determinant_den_raw, 0); /* Q8.23, 32 .. 128, error 0.00012 */
+    const int32_t inverse_determinant = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_div(
+        (INT64_C(1) << 58), inverse_determinant_den), 0);
         /* 0.00781 .. 0.0313, error 1.2e-07 */
-    const int64_t shared_4 = dcm_orth_optimal_q31_mul_(adjugate_12, gram_12);
+    const int64_t shared_4 = dcm_orth_optimal_q31_mul(adjugate_12, gram_12);
         /* Q12.51, -1.54e+03 .. 1.54e+03, error 6.2e-06 */
-    const int64_t shared_5 = dcm_orth_optimal_q31_mul_(adjugate_13, gram_13);
+    const int64_t shared_5 = dcm_orth_optimal_q31_mul(adjugate_13, gram_13);
         /* Q12.51, -1.54e+03 .. 1.54e+03, error 6.2e-06 */
-    const int32_t shared_6 = dcm_orth_optimal_q31_narrow_((int64_t)gram_11 * (INT32_C(1) << 29)
+    const int32_t shared_6 = dcm_orth_optimal_q31_fit((int64_t)gram_11 * (INT32_C(1) << 29)
         + invariant_2 + (INT32_C(1) << 30), 31); /* Q4.27, 1.49 .. 9.39, error 1.4e-08 */
     /* inverse root of C' C, times the determinant */
-    const int32_t root_11 = dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_shr_(shared_4, 1)
-        + dcm_orth_optimal_q31_shr_(shared_5, 1)
-        + dcm_orth_optimal_q31_mul_(adjugate_11, shared_6) * 2 + (INT64_C(1) << 31), 32);
+    const int32_t root_11 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_shr(shared_4, 1)
+        + dcm_orth_optimal_q31_shr(shared_5, 1)
+        + dcm_orth_optimal_q31_mul(adjugate_11, shared_6) * 2 + (INT64_C(1) << 31), 32);
         /* Q13.18, -5.01e+03 .. 5.85e+03, error 3.7e-05 */
-    const int32_t root_12 =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(adjugate_12, shared_6) * 2
-        + dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(adjugate_22, gram_12), 1)
-        + dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(adjugate_23, gram_13), 1)
+    const int32_t root_12 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(adjugate_12,
+        shared_6) * 2
+        + dcm_orth_optimal_q31_shr(dcm_orth_optimal_q31_mul(adjugate_22, gram_12), 1)
+        + dcm_orth_optimal_q31_shr(dcm_orth_optimal_q31_mul(adjugate_23, gram_13), 1)
         + (INT64_C(1) << 31), 32); /* Q13.18, -6.8e+03 .. 6.8e+03, error 3.7e-05 */
-    const int32_t root_13 =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(adjugate_13, shared_6) * 2
-        + dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(adjugate_23, gram_12), 1)
-        + dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(adjugate_33, gram_13), 1)
+    const int32_t root_13 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(adjugate_13,
+        shared_6) * 2
+        + dcm_orth_optimal_q31_shr(dcm_orth_optimal_q31_mul(adjugate_23, gram_12), 1)
+        + dcm_orth_optimal_q31_shr(dcm_orth_optimal_q31_mul(adjugate_33, gram_13), 1)
         + (INT64_C(1) << 31), 32); /* Q13.18, -6.8e+03 .. 6.8e+03, error 3.7e-05 */
-    const int32_t shared_7 = dcm_orth_optimal_q31_narrow_((int64_t)gram_22 * (INT32_C(1) << 29)
+    const int32_t shared_7 = dcm_orth_optimal_q31_fit((int64_t)gram_22 * (INT32_C(1) << 29)
         + invariant_2 + (INT32_C(1) << 30), 31); /* Q4.27, 1.49 .. 9.39, error 1.4e-08 */
-    const int32_t root_21 =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(adjugate_11, gram_12), 1)
-        + dcm_orth_optimal_q31_mul_(adjugate_12, shared_7) * 2
-        + dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(adjugate_13, gram_23), 1)
+    const int32_t root_21 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_shr(
+        dcm_orth_optimal_q31_mul(adjugate_11, gram_12), 1)
+        + dcm_orth_optimal_q31_mul(adjugate_12, shared_7) * 2
+        + dcm_orth_optimal_q31_shr(dcm_orth_optimal_q31_mul(adjugate_13, gram_23), 1)
         + (INT64_C(1) << 31), 32); /* Q13.18, -6.8e+03 .. 6.8e+03, error 3.7e-05 */
-    const int64_t shared_8 = dcm_orth_optimal_q31_mul_(adjugate_23, gram_23);
+    const int64_t shared_8 = dcm_orth_optimal_q31_mul(adjugate_23, gram_23);
         /* Q12.51, -1.54e+03 .. 1.54e+03, error 6.2e-06 */
-    const int32_t root_22 = dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_shr_(shared_4, 1)
-        + dcm_orth_optimal_q31_shr_(shared_8, 1)
-        + dcm_orth_optimal_q31_mul_(adjugate_22, shared_7) * 2 + (INT64_C(1) << 31), 32);
+    const int32_t root_22 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_shr(shared_4, 1)
+        + dcm_orth_optimal_q31_shr(shared_8, 1)
+        + dcm_orth_optimal_q31_mul(adjugate_22, shared_7) * 2 + (INT64_C(1) << 31), 32);
         /* Q13.18, -5.01e+03 .. 5.85e+03, error 3.7e-05 */
-    const int32_t root_23 =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(adjugate_13, gram_12), 1)
-        + dcm_orth_optimal_q31_mul_(adjugate_23, shared_7) * 2
-        + dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(adjugate_33, gram_23), 1)
+    const int32_t root_23 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_shr(
+        dcm_orth_optimal_q31_mul(adjugate_13, gram_12), 1)
+        + dcm_orth_optimal_q31_mul(adjugate_23, shared_7) * 2
+        + dcm_orth_optimal_q31_shr(dcm_orth_optimal_q31_mul(adjugate_33, gram_23), 1)
         + (INT64_C(1) << 31), 32); /* Q13.18, -6.8e+03 .. 6.8e+03, error 3.7e-05 */
-    const int32_t shared_9 = dcm_orth_optimal_q31_narrow_((int64_t)gram_33 * (INT32_C(1) << 29)
+    const int32_t shared_9 = dcm_orth_optimal_q31_fit((int64_t)gram_33 * (INT32_C(1) << 29)
         + invariant_2 + (INT32_C(1) << 30), 31); /* Q4.27, 1.49 .. 9.39, error 1.4e-08 */
-    const int32_t root_31 =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(adjugate_11, gram_13), 1)
-        + dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(adjugate_12, gram_23), 1)
-        + dcm_orth_optimal_q31_mul_(adjugate_13, shared_9) * 2 + (INT64_C(1) << 31), 32);
+    const int32_t root_31 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_shr(
+        dcm_orth_optimal_q31_mul(adjugate_11, gram_13), 1)
+        + dcm_orth_optimal_q31_shr(dcm_orth_optimal_q31_mul(adjugate_12, gram_23), 1)
+        + dcm_orth_optimal_q31_mul(adjugate_13, shared_9) * 2 + (INT64_C(1) << 31), 32);
         /* Q13.18, -6.8e+03 .. 6.8e+03, error 3.7e-05 */
-    const int32_t root_32 =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(adjugate_12, gram_13), 1)
-        + dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(adjugate_22, gram_23), 1)
-        + dcm_orth_optimal_q31_mul_(adjugate_23, shared_9) * 2 + (INT64_C(1) << 31), 32);
+    const int32_t root_32 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_shr(
+        dcm_orth_optimal_q31_mul(adjugate_12, gram_13), 1)
+        + dcm_orth_optimal_q31_shr(dcm_orth_optimal_q31_mul(adjugate_22, gram_23), 1)
+        + dcm_orth_optimal_q31_mul(adjugate_23, shared_9) * 2 + (INT64_C(1) << 31), 32);
         /* Q13.18, -6.8e+03 .. 6.8e+03, error 3.7e-05 */
-    const int32_t root_33 = dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_shr_(shared_5, 1)
-        + dcm_orth_optimal_q31_shr_(shared_8, 1)
-        + dcm_orth_optimal_q31_mul_(adjugate_33, shared_9) * 2 + (INT64_C(1) << 31), 32);
+    const int32_t root_33 = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_shr(shared_5, 1)
+        + dcm_orth_optimal_q31_shr(shared_8, 1)
+        + dcm_orth_optimal_q31_mul(adjugate_33, shared_9) * 2 + (INT64_C(1) << 31), 32);
         /* Q13.18, -5.01e+03 .. 5.85e+03, error 3.7e-05 */
-    const int32_t next_11_factor =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(C_11, root_11)
-        + dcm_orth_optimal_q31_mul_(C_12, root_21) + dcm_orth_optimal_q31_mul_(C_13, root_31)
-        + (INT64_C(1) << 31), 32); /* Q15.16, -2.07e+04 .. 2.07e+04, error 0.00013 */
+    const int32_t next_11_factor = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(C_11,
+        root_11) + dcm_orth_optimal_q31_mul(C_12, root_21)
+        + dcm_orth_optimal_q31_mul(C_13, root_31) + (INT64_C(1) << 31), 32);
+        /* Q15.16, -2.07e+04 .. 2.07e+04, error 0.00013 */
     /* direction cosine matrix, body to reference, orthonormalized */
-    const int64_t next_11_unchecked =
-        dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(inverse_determinant, next_11_factor)
-        + (INT32_C(1) << 20), 21);
-    if ((next_11_unchecked < (-INT32_C(1140850688)))
-        || (next_11_unchecked > INT32_C(1140850688))) {
+    const int64_t next_11_raw = dcm_orth_optimal_q31_shr(dcm_orth_optimal_q31_mul(
+        inverse_determinant, next_11_factor) + (INT32_C(1) << 20), 21);
+    if ((next_11_raw < (-INT32_C(1140850688))) || (next_11_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_11 = dcm_orth_optimal_q31_narrow_(next_11_unchecked, 0);
+    const int32_t next_11 = dcm_orth_optimal_q31_fit(next_11_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 0.0023 */
-    const int32_t next_12_factor =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(C_11, root_12)
-        + dcm_orth_optimal_q31_mul_(C_12, root_22) + dcm_orth_optimal_q31_mul_(C_13, root_32)
-        + (INT64_C(1) << 31), 32); /* Q15.16, -2.07e+04 .. 2.07e+04, error 0.00013 */
-    const int64_t next_12_unchecked =
-        dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(inverse_determinant, next_12_factor)
-        + (INT32_C(1) << 20), 21);
-    if ((next_12_unchecked < (-INT32_C(1140850688)))
-        || (next_12_unchecked > INT32_C(1140850688))) {
+    const int32_t next_12_factor = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(C_11,
+        root_12) + dcm_orth_optimal_q31_mul(C_12, root_22)
+        + dcm_orth_optimal_q31_mul(C_13, root_32) + (INT64_C(1) << 31), 32);
+        /* Q15.16, -2.07e+04 .. 2.07e+04, error 0.00013 */
+    const int64_t next_12_raw = dcm_orth_optimal_q31_shr(dcm_orth_optimal_q31_mul(
+        inverse_determinant, next_12_factor) + (INT32_C(1) << 20), 21);
+    if ((next_12_raw < (-INT32_C(1140850688))) || (next_12_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_12 = dcm_orth_optimal_q31_narrow_(next_12_unchecked, 0);
+    const int32_t next_12 = dcm_orth_optimal_q31_fit(next_12_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 0.0023 */
-    const int32_t next_13_factor =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(C_11, root_13)
-        + dcm_orth_optimal_q31_mul_(C_12, root_23) + dcm_orth_optimal_q31_mul_(C_13, root_33)
-        + (INT64_C(1) << 31), 32); /* Q15.16, -2.07e+04 .. 2.07e+04, error 0.00013 */
-    const int64_t next_13_unchecked =
-        dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(inverse_determinant, next_13_factor)
-        + (INT32_C(1) << 20), 21);
-    if ((next_13_unchecked < (-INT32_C(1140850688)))
-        || (next_13_unchecked > INT32_C(1140850688))) {
+    const int32_t next_13_factor = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(C_11,
+        root_13) + dcm_orth_optimal_q31_mul(C_12, root_23)
+        + dcm_orth_optimal_q31_mul(C_13, root_33) + (INT64_C(1) << 31), 32);
+        /* Q15.16, -2.07e+04 .. 2.07e+04, error 0.00013 */
+    const int64_t next_13_raw = dcm_orth_optimal_q31_shr(dcm_orth_optimal_q31_mul(
+        inverse_determinant, next_13_factor) + (INT32_C(1) << 20), 21);
+    if ((next_13_raw < (-INT32_C(1140850688))) || (next_13_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_13 = dcm_orth_optimal_q31_narrow_(next_13_unchecked, 0);
+    const int32_t next_13 = dcm_orth_optimal_q31_fit(next_13_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 0.0023 */
-    const int32_t next_21_factor =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(C_21, root_11)
-        + dcm_orth_optimal_q31_mul_(C_22, root_21) + dcm_orth_optimal_q31_mul_(C_23, root_31)
-        + (INT64_C(1) << 31), 32); /* Q15.16, -2.07e+04 .. 2.07e+04, error 0.00013 */
-    const int64_t next_21_unchecked =
-        dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(inverse_determinant, next_21_factor)
-        + (INT32_C(1) << 20), 21);
-    if ((next_21_unchecked < (-INT32_C(1140850688)))
-        || (next_21_unchecked > INT32_C(1140850688))) {
+    const int32_t next_21_factor = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(C_21,
+        root_11) + dcm_orth_optimal_q31_mul(C_22, root_21)
+        + dcm_orth_optimal_q31_mul(C_23, root_31) + (INT64_C(1) << 31), 32);
+        /* Q15.16, -2.07e+04 .. 2.07e+04, error 0.00013 */
+    const int64_t next_21_raw = dcm_orth_optimal_q31_shr(dcm_orth_optimal_q31_mul(
+        inverse_determinant, next_21_factor) + (INT32_C(1) << 20), 21);
+    if ((next_21_raw < (-INT32_C(1140850688))) || (next_21_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_21 = dcm_orth_optimal_q31_narrow_(next_21_unchecked, 0);
+    const int32_t next_21 = dcm_orth_optimal_q31_fit(next_21_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 0.0023 */
-    const int32_t next_22_factor =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(C_21, root_12)
-        + dcm_orth_optimal_q31_mul_(C_22, root_22) + dcm_orth_optimal_q31_mul_(C_23, root_32)
-        + (INT64_C(1) << 31), 32); /* Q15.16, -2.07e+04 .. 2.07e+04, error 0.00013 */
-    const int64_t next_22_unchecked =
-        dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(inverse_determinant, next_22_factor)
-        + (INT32_C(1) << 20), 21);
-    if ((next_22_unchecked < (-INT32_C(1140850688)))
-        || (next_22_unchecked > INT32_C(1140850688))) {
+    const int32_t next_22_factor = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(C_21,
+        root_12) + dcm_orth_optimal_q31_mul(C_22, root_22)
+        + dcm_orth_optimal_q31_mul(C_23, root_32) + (INT64_C(1) << 31), 32);
+        /* Q15.16, -2.07e+04 .. 2.07e+04, error 0.00013 */
+    const int64_t next_22_raw = dcm_orth_optimal_q31_shr(dcm_orth_optimal_q31_mul(
+        inverse_determinant, next_22_factor) + (INT32_C(1) << 20), 21);
+    if ((next_22_raw < (-INT32_C(1140850688))) || (next_22_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_22 = dcm_orth_optimal_q31_narrow_(next_22_unchecked, 0);
+    const int32_t next_22 = dcm_orth_optimal_q31_fit(next_22_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 0.0023 */
-    const int32_t next_23_factor =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(C_21, root_13)
-        + dcm_orth_optimal_q31_mul_(C_22, root_23) + dcm_orth_optimal_q31_mul_(C_23, root_33)
-        + (INT64_C(1) << 31), 32); /* Q15.16, -2.07e+04 .. 2.07e+04, error 0.00013 */
-    const int64_t next_23_unchecked =
-        dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(inverse_determinant, next_23_factor)
-        + (INT32_C(1) << 20), 21);
-    if ((next_23_unchecked < (-INT32_C(1140850688)))
-        || (next_23_unchecked > INT32_C(1140850688))) {
+    const int32_t next_23_factor = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(C_21,
+        root_13) + dcm_orth_optimal_q31_mul(C_22, root_23)
+        + dcm_orth_optimal_q31_mul(C_23, root_33) + (INT64_C(1) << 31), 32);
+        /* Q15.16, -2.07e+04 .. 2.07e+04, error 0.00013 */
+    const int64_t next_23_raw = dcm_orth_optimal_q31_shr(dcm_orth_optimal_q31_mul(
+        inverse_determinant, next_23_factor) + (INT32_C(1) << 20), 21);
+    if ((next_23_raw < (-INT32_C(1140850688))) || (next_23_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_23 = dcm_orth_optimal_q31_narrow_(next_23_unchecked, 0);
+    const int32_t next_23 = dcm_orth_optimal_q31_fit(next_23_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 0.0023 */
-    const int32_t next_31_factor =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(C_31, root_11)
-        + dcm_orth_optimal_q31_mul_(C_32, root_21) + dcm_orth_optimal_q31_mul_(C_33, root_31)
-        + (INT64_C(1) << 31), 32); /* Q15.16, -2.07e+04 .. 2.07e+04, error 0.00013 */
-    const int64_t next_31_unchecked =
-        dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(inverse_determinant, next_31_factor)
-        + (INT32_C(1) << 20), 21);
-    if ((next_31_unchecked < (-INT32_C(1140850688)))
-        || (next_31_unchecked > INT32_C(1140850688))) {
+    const int32_t next_31_factor = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(C_31,
+        root_11) + dcm_orth_optimal_q31_mul(C_32, root_21)
+        + dcm_orth_optimal_q31_mul(C_33, root_31) + (INT64_C(1) << 31), 32);
+        /* Q15.16, -2.07e+04 .. 2.07e+04, error 0.00013 */
+    const int64_t next_31_raw = dcm_orth_optimal_q31_shr(dcm_orth_optimal_q31_mul(
+        inverse_determinant, next_31_factor) + (INT32_C(1) << 20), 21);
+    if ((next_31_raw < (-INT32_C(1140850688))) || (next_31_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_31 = dcm_orth_optimal_q31_narrow_(next_31_unchecked, 0);
+    const int32_t next_31 = dcm_orth_optimal_q31_fit(next_31_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 0.0023 */
-    const int32_t next_32_factor =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(C_31, root_12)
-        + dcm_orth_optimal_q31_mul_(C_32, root_22) + dcm_orth_optimal_q31_mul_(C_33, root_32)
-        + (INT64_C(1) << 31), 32); /* Q15.16, -2.07e+04 .. 2.07e+04, error 0.00013 */
-    const int64_t next_32_unchecked =
-        dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(inverse_determinant, next_32_factor)
-        + (INT32_C(1) << 20), 21);
-    if ((next_32_unchecked < (-INT32_C(1140850688)))
-        || (next_32_unchecked > INT32_C(1140850688))) {
+    const int32_t next_32_factor = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(C_31,
+        root_12) + dcm_orth_optimal_q31_mul(C_32, root_22)
+        + dcm_orth_optimal_q31_mul(C_33, root_32) + (INT64_C(1) << 31), 32);
+        /* Q15.16, -2.07e+04 .. 2.07e+04, error 0.00013 */
+    const int64_t next_32_raw = dcm_orth_optimal_q31_shr(dcm_orth_optimal_q31_mul(
+        inverse_determinant, next_32_factor) + (INT32_C(1) << 20), 21);
+    if ((next_32_raw < (-INT32_C(1140850688))) || (next_32_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_32 = dcm_orth_optimal_q31_narrow_(next_32_unchecked, 0);
+    const int32_t next_32 = dcm_orth_optimal_q31_fit(next_32_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 0.0023 */
-    const int32_t next_33_factor =
-        dcm_orth_optimal_q31_narrow_(dcm_orth_optimal_q31_mul_(C_31, root_13)
-        + dcm_orth_optimal_q31_mul_(C_32, root_23) + dcm_orth_optimal_q31_mul_(C_33, root_33)
-        + (INT64_C(1) << 31), 32); /* Q15.16, -2.07e+04 .. 2.07e+04, error 0.00013 */
-    const int64_t next_33_unchecked =
-        dcm_orth_optimal_q31_shr_(dcm_orth_optimal_q31_mul_(inverse_determinant, next_33_factor)
-        + (INT32_C(1) << 20), 21);
-    if ((next_33_unchecked < (-INT32_C(1140850688)))
-        || (next_33_unchecked > INT32_C(1140850688))) {
+    const int32_t next_33_factor = dcm_orth_optimal_q31_fit(dcm_orth_optimal_q31_mul(C_31,
+        root_13) + dcm_orth_optimal_q31_mul(C_32, root_23)
+        + dcm_orth_optimal_q31_mul(C_33, root_33) + (INT64_C(1) << 31), 32);
+        /* Q15.16, -2.07e+04 .. 2.07e+04, error 0.00013 */
+    const int64_t next_33_raw = dcm_orth_optimal_q31_shr(dcm_orth_optimal_q31_mul(
+        inverse_determinant, next_33_factor) + (INT32_C(1) << 20), 21);
+    if ((next_33_raw < (-INT32_C(1140850688))) || (next_33_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_33 = dcm_orth_optimal_q31_narrow_(next_33_unchecked, 0);
+    const int32_t next_33 = dcm_orth_optimal_q31_fit(next_33_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 0.0023 */
     orthonormalized[0] = next_11;
     orthonormalized[1] = next_12;

@@ -36,9 +36,9 @@ extern "C" {
  *         (-1.0625 to 1.0625); error at most 2.0625, 2214592512.0000 of the last place.
  * Returns 0; or, with the outputs left alone, 1 if an input lies outside its range,
  * 2 if it is too far from a proper one, so that something leaves its limits: stretch_1_radicand,
- *   stretch_2_radicand, stretch_3_radicand from 0.5 to 2; inverse_determinant_denominator from
- *   32.0001 to 128; next_11, next_12, next_13, next_21, next_22, next_23, next_31, next_32,
- *   next_33 from -1.0625 to 1.0625.
+ *   stretch_2_radicand, stretch_3_radicand from 0.5 to 2; inverse_determinant_den from 32.0001
+ *   to 128; next_11, next_12, next_13, next_21, next_22, next_23, next_31, next_32, next_33
+ *   from -1.0625 to 1.0625.
  */
 int dcm_orth_optimal_q31(const int32_t computed[9], int32_t orthonormalized[9]);
 

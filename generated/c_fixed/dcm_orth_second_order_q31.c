@@ -5,7 +5,7 @@
 #include "dcm_orth_second_order_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int dcm_orth_second_order_q31_out_(int32_t x, int32_t limit)
+static inline int dcm_orth_second_order_q31_out(int32_t x, int32_t limit)
 {
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
@@ -13,7 +13,7 @@ static inline int dcm_orth_second_order_q31_out_(int32_t x, int32_t limit)
 /* The exact product of two words. */
 #if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
 /* These processors have no instruction for it: the high word takes four products of half words. */
-static __attribute__((noinline)) int64_t dcm_orth_second_order_q31_mul_(int32_t a, int32_t b)
+static __attribute__((noinline)) int64_t dcm_orth_second_order_q31_mul(int32_t a, int32_t b)
 {
     const uint32_t a_low = (uint32_t)a & 0xFFFFu;
     const uint32_t b_low = (uint32_t)b & 0xFFFFu;
@@ -28,7 +28,7 @@ static __attribute__((noinline)) int64_t dcm_orth_second_order_q31_mul_(int32_t 
     return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
 }
 #else
-static inline int64_t dcm_orth_second_order_q31_mul_(int32_t a, int32_t b)
+static inline int64_t dcm_orth_second_order_q31_mul(int32_t a, int32_t b)
 {
     return (int64_t)a * (int64_t)b;
 }
@@ -39,7 +39,7 @@ static inline int64_t dcm_orth_second_order_q31_mul_(int32_t a, int32_t b)
  * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
  * number and no conversion of a number out of range.
  */
-static inline int32_t dcm_orth_second_order_q31_narrow_(int64_t x, int n)
+static inline int32_t dcm_orth_second_order_q31_fit(int64_t x, int n)
 {
 #ifdef __FRAMAC__
     return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
@@ -53,7 +53,7 @@ static inline int32_t dcm_orth_second_order_q31_narrow_(int64_t x, int n)
 }
 
 /* x / 2^n, rounded down, as a wide number. */
-static inline int64_t dcm_orth_second_order_q31_shr_(int64_t x, int n)
+static inline int64_t dcm_orth_second_order_q31_shr(int64_t x, int n)
 {
     return (x < 0) ? ~(~x >> n) : (x >> n);
 }
@@ -69,196 +69,170 @@ int dcm_orth_second_order_q31(const int32_t computed[9], int32_t orthonormalized
     const int32_t C_31 = computed[6];
     const int32_t C_32 = computed[7];
     const int32_t C_33 = computed[8];
-    if (dcm_orth_second_order_q31_out_(C_11, INT32_C(1140850688))
-        || dcm_orth_second_order_q31_out_(C_12, INT32_C(1140850688))
-        || dcm_orth_second_order_q31_out_(C_13, INT32_C(1140850688))
-        || dcm_orth_second_order_q31_out_(C_21, INT32_C(1140850688))
-        || dcm_orth_second_order_q31_out_(C_22, INT32_C(1140850688))
-        || dcm_orth_second_order_q31_out_(C_23, INT32_C(1140850688))
-        || dcm_orth_second_order_q31_out_(C_31, INT32_C(1140850688))
-        || dcm_orth_second_order_q31_out_(C_32, INT32_C(1140850688))
-        || dcm_orth_second_order_q31_out_(C_33, INT32_C(1140850688)))
+    if (dcm_orth_second_order_q31_out(C_11, INT32_C(1140850688))
+        || dcm_orth_second_order_q31_out(C_12, INT32_C(1140850688))
+        || dcm_orth_second_order_q31_out(C_13, INT32_C(1140850688))
+        || dcm_orth_second_order_q31_out(C_21, INT32_C(1140850688))
+        || dcm_orth_second_order_q31_out(C_22, INT32_C(1140850688))
+        || dcm_orth_second_order_q31_out(C_23, INT32_C(1140850688))
+        || dcm_orth_second_order_q31_out(C_31, INT32_C(1140850688))
+        || dcm_orth_second_order_q31_out(C_32, INT32_C(1140850688))
+        || dcm_orth_second_order_q31_out(C_33, INT32_C(1140850688))) {
         return 1;
+    }
     /* C' C - I */
-    const int32_t excess_11 = dcm_orth_second_order_q31_narrow_(-(INT32_C(1) << 29)
-        + dcm_orth_second_order_q31_shr_(dcm_orth_second_order_q31_mul_(C_11, C_11)
-        + dcm_orth_second_order_q31_mul_(C_21, C_21)
-        + dcm_orth_second_order_q31_mul_(C_31, C_31) + (INT32_C(1) << 30), 31), 0);
+    const int32_t excess_11 = dcm_orth_second_order_q31_fit(-(INT32_C(1) << 29)
+        + dcm_orth_second_order_q31_shr(dcm_orth_second_order_q31_mul(C_11, C_11)
+        + dcm_orth_second_order_q31_mul(C_21, C_21)
+        + dcm_orth_second_order_q31_mul(C_31, C_31) + (INT32_C(1) << 30), 31), 0);
         /* Q2.29, -1.01 .. 2.39, error 9.4e-10 */
-    const int32_t excess_12 =
-        dcm_orth_second_order_q31_narrow_(dcm_orth_second_order_q31_mul_(C_11, C_12)
-        + dcm_orth_second_order_q31_mul_(C_21, C_22)
-        + dcm_orth_second_order_q31_mul_(C_31, C_32) + (INT32_C(1) << 30), 31);
+    const int32_t excess_12 = dcm_orth_second_order_q31_fit(dcm_orth_second_order_q31_mul(C_11,
+        C_12) + dcm_orth_second_order_q31_mul(C_21, C_22)
+        + dcm_orth_second_order_q31_mul(C_31, C_32) + (INT32_C(1) << 30), 31);
         /* Q2.29, -3.39 .. 3.39, error 9.4e-10 */
-    const int32_t excess_13 =
-        dcm_orth_second_order_q31_narrow_(dcm_orth_second_order_q31_mul_(C_11, C_13)
-        + dcm_orth_second_order_q31_mul_(C_21, C_23)
-        + dcm_orth_second_order_q31_mul_(C_31, C_33) + (INT32_C(1) << 30), 31);
+    const int32_t excess_13 = dcm_orth_second_order_q31_fit(dcm_orth_second_order_q31_mul(C_11,
+        C_13) + dcm_orth_second_order_q31_mul(C_21, C_23)
+        + dcm_orth_second_order_q31_mul(C_31, C_33) + (INT32_C(1) << 30), 31);
         /* Q2.29, -3.39 .. 3.39, error 9.4e-10 */
-    const int32_t excess_22 = dcm_orth_second_order_q31_narrow_(-(INT32_C(1) << 29)
-        + dcm_orth_second_order_q31_shr_(dcm_orth_second_order_q31_mul_(C_12, C_12)
-        + dcm_orth_second_order_q31_mul_(C_22, C_22)
-        + dcm_orth_second_order_q31_mul_(C_32, C_32) + (INT32_C(1) << 30), 31), 0);
+    const int32_t excess_22 = dcm_orth_second_order_q31_fit(-(INT32_C(1) << 29)
+        + dcm_orth_second_order_q31_shr(dcm_orth_second_order_q31_mul(C_12, C_12)
+        + dcm_orth_second_order_q31_mul(C_22, C_22)
+        + dcm_orth_second_order_q31_mul(C_32, C_32) + (INT32_C(1) << 30), 31), 0);
         /* Q2.29, -1.01 .. 2.39, error 9.4e-10 */
-    const int32_t excess_23 =
-        dcm_orth_second_order_q31_narrow_(dcm_orth_second_order_q31_mul_(C_12, C_13)
-        + dcm_orth_second_order_q31_mul_(C_22, C_23)
-        + dcm_orth_second_order_q31_mul_(C_32, C_33) + (INT32_C(1) << 30), 31);
+    const int32_t excess_23 = dcm_orth_second_order_q31_fit(dcm_orth_second_order_q31_mul(C_12,
+        C_13) + dcm_orth_second_order_q31_mul(C_22, C_23)
+        + dcm_orth_second_order_q31_mul(C_32, C_33) + (INT32_C(1) << 30), 31);
         /* Q2.29, -3.39 .. 3.39, error 9.4e-10 */
-    const int32_t excess_33 = dcm_orth_second_order_q31_narrow_(-(INT32_C(1) << 29)
-        + dcm_orth_second_order_q31_shr_(dcm_orth_second_order_q31_mul_(C_13, C_13)
-        + dcm_orth_second_order_q31_mul_(C_23, C_23)
-        + dcm_orth_second_order_q31_mul_(C_33, C_33) + (INT32_C(1) << 30), 31), 0);
+    const int32_t excess_33 = dcm_orth_second_order_q31_fit(-(INT32_C(1) << 29)
+        + dcm_orth_second_order_q31_shr(dcm_orth_second_order_q31_mul(C_13, C_13)
+        + dcm_orth_second_order_q31_mul(C_23, C_23)
+        + dcm_orth_second_order_q31_mul(C_33, C_33) + (INT32_C(1) << 30), 31), 0);
         /* Q2.29, -1.01 .. 2.39, error 9.4e-10 */
-    const int64_t shared_1 = dcm_orth_second_order_q31_mul_(excess_12, excess_12);
+    const int64_t shared_1 = dcm_orth_second_order_q31_mul(excess_12, excess_12);
         /* Q5.58, -6.31e-09 .. 11.5, error 6.4e-09 */
-    const int64_t shared_2 = dcm_orth_second_order_q31_mul_(excess_13, excess_13);
+    const int64_t shared_2 = dcm_orth_second_order_q31_mul(excess_13, excess_13);
         /* Q5.58, -6.31e-09 .. 11.5, error 6.4e-09 */
     /* (C' C - I)^2 */
-    const int32_t excess_squared_11 =
-        dcm_orth_second_order_q31_narrow_(dcm_orth_second_order_q31_mul_(excess_11, excess_11)
-        + shared_1 + shared_2 + (INT64_C(1) << 31), 32);
-        /* Q5.26, -2.99e-08 .. 28.7, error 2.5e-08 */
-    const int32_t excess_squared_12_factor =
-        dcm_orth_second_order_q31_narrow_((int64_t)excess_11 + (int64_t)excess_22 + 1, 1);
-        /* Q3.28, -2.01 .. 4.78, error 3.8e-09 */
-    const int32_t excess_squared_12 =
-        dcm_orth_second_order_q31_narrow_(dcm_orth_second_order_q31_mul_(excess_12, excess_squared_12_factor)
-        * 2 + dcm_orth_second_order_q31_mul_(excess_13, excess_23) + (INT64_C(1) << 31), 32);
+    const int32_t excess_squared_11 = dcm_orth_second_order_q31_fit(
+        dcm_orth_second_order_q31_mul(excess_11, excess_11) + shared_1 + shared_2
+        + (INT64_C(1) << 31), 32); /* Q5.26, -2.99e-08 .. 28.7, error 2.5e-08 */
+    const int32_t excess_squared_12_factor = dcm_orth_second_order_q31_fit((int64_t)excess_11
+        + (int64_t)excess_22 + 1, 1); /* Q3.28, -2.01 .. 4.78, error 3.8e-09 */
+    const int32_t excess_squared_12 = dcm_orth_second_order_q31_fit(
+        dcm_orth_second_order_q31_mul(excess_12, excess_squared_12_factor) * 2
+        + dcm_orth_second_order_q31_mul(excess_13, excess_23) + (INT64_C(1) << 31), 32);
         /* Q5.26, -27.7 .. 27.7, error 3.1e-08 */
-    const int32_t excess_squared_13_factor =
-        dcm_orth_second_order_q31_narrow_((int64_t)excess_11 + (int64_t)excess_33 + 1, 1);
-        /* Q3.28, -2.01 .. 4.78, error 3.8e-09 */
-    const int32_t excess_squared_13 =
-        dcm_orth_second_order_q31_narrow_(dcm_orth_second_order_q31_mul_(excess_13, excess_squared_13_factor)
-        * 2 + dcm_orth_second_order_q31_mul_(excess_12, excess_23) + (INT64_C(1) << 31), 32);
+    const int32_t excess_squared_13_factor = dcm_orth_second_order_q31_fit((int64_t)excess_11
+        + (int64_t)excess_33 + 1, 1); /* Q3.28, -2.01 .. 4.78, error 3.8e-09 */
+    const int32_t excess_squared_13 = dcm_orth_second_order_q31_fit(
+        dcm_orth_second_order_q31_mul(excess_13, excess_squared_13_factor) * 2
+        + dcm_orth_second_order_q31_mul(excess_12, excess_23) + (INT64_C(1) << 31), 32);
         /* Q5.26, -27.7 .. 27.7, error 3.1e-08 */
-    const int64_t shared_3 = dcm_orth_second_order_q31_mul_(excess_23, excess_23);
+    const int64_t shared_3 = dcm_orth_second_order_q31_mul(excess_23, excess_23);
         /* Q5.58, -6.31e-09 .. 11.5, error 6.4e-09 */
-    const int32_t excess_squared_22 =
-        dcm_orth_second_order_q31_narrow_(dcm_orth_second_order_q31_mul_(excess_22, excess_22)
-        + shared_1 + shared_3 + (INT64_C(1) << 31), 32);
-        /* Q5.26, -2.99e-08 .. 28.7, error 2.5e-08 */
-    const int32_t excess_squared_23_factor =
-        dcm_orth_second_order_q31_narrow_((int64_t)excess_22 + (int64_t)excess_33 + 1, 1);
-        /* Q3.28, -2.01 .. 4.78, error 3.8e-09 */
-    const int32_t excess_squared_23 =
-        dcm_orth_second_order_q31_narrow_(dcm_orth_second_order_q31_mul_(excess_23, excess_squared_23_factor)
-        * 2 + dcm_orth_second_order_q31_mul_(excess_12, excess_13) + (INT64_C(1) << 31), 32);
+    const int32_t excess_squared_22 = dcm_orth_second_order_q31_fit(
+        dcm_orth_second_order_q31_mul(excess_22, excess_22) + shared_1 + shared_3
+        + (INT64_C(1) << 31), 32); /* Q5.26, -2.99e-08 .. 28.7, error 2.5e-08 */
+    const int32_t excess_squared_23_factor = dcm_orth_second_order_q31_fit((int64_t)excess_22
+        + (int64_t)excess_33 + 1, 1); /* Q3.28, -2.01 .. 4.78, error 3.8e-09 */
+    const int32_t excess_squared_23 = dcm_orth_second_order_q31_fit(
+        dcm_orth_second_order_q31_mul(excess_23, excess_squared_23_factor) * 2
+        + dcm_orth_second_order_q31_mul(excess_12, excess_13) + (INT64_C(1) << 31), 32);
         /* Q5.26, -27.7 .. 27.7, error 3.1e-08 */
-    const int32_t excess_squared_33 =
-        dcm_orth_second_order_q31_narrow_(dcm_orth_second_order_q31_mul_(excess_33, excess_33)
-        + shared_2 + shared_3 + (INT64_C(1) << 31), 32);
-        /* Q5.26, -2.99e-08 .. 28.7, error 2.5e-08 */
+    const int32_t excess_squared_33 = dcm_orth_second_order_q31_fit(
+        dcm_orth_second_order_q31_mul(excess_33, excess_33) + shared_2 + shared_3
+        + (INT64_C(1) << 31), 32); /* Q5.26, -2.99e-08 .. 28.7, error 2.5e-08 */
     /* inverse root of C' C to second order */
     const int32_t root_11 = (INT32_C(1) << 27)
-        + dcm_orth_second_order_q31_narrow_(dcm_orth_second_order_q31_mul_(excess_squared_11, 3)
+        + dcm_orth_second_order_q31_fit(dcm_orth_second_order_q31_mul(excess_squared_11, 3)
         * 2 - (int64_t)excess_11 + 4, 3); /* Q4.27, -0.194 .. 12.3, error 1.4e-08 */
-    const int32_t root_12 =
-        dcm_orth_second_order_q31_narrow_(dcm_orth_second_order_q31_mul_(excess_squared_12, 3)
-        * 2 - (int64_t)excess_12 + 4, 3); /* Q4.27, -12.1 .. 12.1, error 1.6e-08 */
-    const int32_t root_13 =
-        dcm_orth_second_order_q31_narrow_(dcm_orth_second_order_q31_mul_(excess_squared_13, 3)
-        * 2 - (int64_t)excess_13 + 4, 3); /* Q4.27, -12.1 .. 12.1, error 1.6e-08 */
+    const int32_t root_12 = dcm_orth_second_order_q31_fit(dcm_orth_second_order_q31_mul(
+        excess_squared_12, 3) * 2 - (int64_t)excess_12 + 4, 3);
+        /* Q4.27, -12.1 .. 12.1, error 1.6e-08 */
+    const int32_t root_13 = dcm_orth_second_order_q31_fit(dcm_orth_second_order_q31_mul(
+        excess_squared_13, 3) * 2 - (int64_t)excess_13 + 4, 3);
+        /* Q4.27, -12.1 .. 12.1, error 1.6e-08 */
     const int32_t root_22 = (INT32_C(1) << 27)
-        + dcm_orth_second_order_q31_narrow_(dcm_orth_second_order_q31_mul_(excess_squared_22, 3)
+        + dcm_orth_second_order_q31_fit(dcm_orth_second_order_q31_mul(excess_squared_22, 3)
         * 2 - (int64_t)excess_22 + 4, 3); /* Q4.27, -0.194 .. 12.3, error 1.4e-08 */
-    const int32_t root_23 =
-        dcm_orth_second_order_q31_narrow_(dcm_orth_second_order_q31_mul_(excess_squared_23, 3)
-        * 2 - (int64_t)excess_23 + 4, 3); /* Q4.27, -12.1 .. 12.1, error 1.6e-08 */
+    const int32_t root_23 = dcm_orth_second_order_q31_fit(dcm_orth_second_order_q31_mul(
+        excess_squared_23, 3) * 2 - (int64_t)excess_23 + 4, 3);
+        /* Q4.27, -12.1 .. 12.1, error 1.6e-08 */
     const int32_t root_33 = (INT32_C(1) << 27)
-        + dcm_orth_second_order_q31_narrow_(dcm_orth_second_order_q31_mul_(excess_squared_33, 3)
+        + dcm_orth_second_order_q31_fit(dcm_orth_second_order_q31_mul(excess_squared_33, 3)
         * 2 - (int64_t)excess_33 + 4, 3); /* Q4.27, -0.194 .. 12.3, error 1.4e-08 */
     /* direction cosine matrix, body to reference, orthonormalized */
-    const int64_t next_11_unchecked =
-        dcm_orth_second_order_q31_shr_(dcm_orth_second_order_q31_mul_(C_11, root_11)
-        + dcm_orth_second_order_q31_mul_(C_12, root_12)
-        + dcm_orth_second_order_q31_mul_(C_13, root_13) + (INT32_C(1) << 26), 27);
-    if ((next_11_unchecked < (-INT32_C(1140850688)))
-        || (next_11_unchecked > INT32_C(1140850688))) {
+    const int64_t next_11_raw = dcm_orth_second_order_q31_shr(dcm_orth_second_order_q31_mul(
+        C_11, root_11) + dcm_orth_second_order_q31_mul(C_12, root_12)
+        + dcm_orth_second_order_q31_mul(C_13, root_13) + (INT32_C(1) << 26), 27);
+    if ((next_11_raw < (-INT32_C(1140850688))) || (next_11_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_11 = dcm_orth_second_order_q31_narrow_(next_11_unchecked, 0);
+    const int32_t next_11 = dcm_orth_second_order_q31_fit(next_11_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 4.9e-08 */
-    const int64_t next_12_unchecked =
-        dcm_orth_second_order_q31_shr_(dcm_orth_second_order_q31_mul_(C_11, root_12)
-        + dcm_orth_second_order_q31_mul_(C_12, root_22)
-        + dcm_orth_second_order_q31_mul_(C_13, root_23) + (INT32_C(1) << 26), 27);
-    if ((next_12_unchecked < (-INT32_C(1140850688)))
-        || (next_12_unchecked > INT32_C(1140850688))) {
+    const int64_t next_12_raw = dcm_orth_second_order_q31_shr(dcm_orth_second_order_q31_mul(
+        C_11, root_12) + dcm_orth_second_order_q31_mul(C_12, root_22)
+        + dcm_orth_second_order_q31_mul(C_13, root_23) + (INT32_C(1) << 26), 27);
+    if ((next_12_raw < (-INT32_C(1140850688))) || (next_12_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_12 = dcm_orth_second_order_q31_narrow_(next_12_unchecked, 0);
+    const int32_t next_12 = dcm_orth_second_order_q31_fit(next_12_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 4.9e-08 */
-    const int64_t next_13_unchecked =
-        dcm_orth_second_order_q31_shr_(dcm_orth_second_order_q31_mul_(C_11, root_13)
-        + dcm_orth_second_order_q31_mul_(C_12, root_23)
-        + dcm_orth_second_order_q31_mul_(C_13, root_33) + (INT32_C(1) << 26), 27);
-    if ((next_13_unchecked < (-INT32_C(1140850688)))
-        || (next_13_unchecked > INT32_C(1140850688))) {
+    const int64_t next_13_raw = dcm_orth_second_order_q31_shr(dcm_orth_second_order_q31_mul(
+        C_11, root_13) + dcm_orth_second_order_q31_mul(C_12, root_23)
+        + dcm_orth_second_order_q31_mul(C_13, root_33) + (INT32_C(1) << 26), 27);
+    if ((next_13_raw < (-INT32_C(1140850688))) || (next_13_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_13 = dcm_orth_second_order_q31_narrow_(next_13_unchecked, 0);
+    const int32_t next_13 = dcm_orth_second_order_q31_fit(next_13_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 4.9e-08 */
-    const int64_t next_21_unchecked =
-        dcm_orth_second_order_q31_shr_(dcm_orth_second_order_q31_mul_(C_21, root_11)
-        + dcm_orth_second_order_q31_mul_(C_22, root_12)
-        + dcm_orth_second_order_q31_mul_(C_23, root_13) + (INT32_C(1) << 26), 27);
-    if ((next_21_unchecked < (-INT32_C(1140850688)))
-        || (next_21_unchecked > INT32_C(1140850688))) {
+    const int64_t next_21_raw = dcm_orth_second_order_q31_shr(dcm_orth_second_order_q31_mul(
+        C_21, root_11) + dcm_orth_second_order_q31_mul(C_22, root_12)
+        + dcm_orth_second_order_q31_mul(C_23, root_13) + (INT32_C(1) << 26), 27);
+    if ((next_21_raw < (-INT32_C(1140850688))) || (next_21_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_21 = dcm_orth_second_order_q31_narrow_(next_21_unchecked, 0);
+    const int32_t next_21 = dcm_orth_second_order_q31_fit(next_21_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 4.9e-08 */
-    const int64_t next_22_unchecked =
-        dcm_orth_second_order_q31_shr_(dcm_orth_second_order_q31_mul_(C_21, root_12)
-        + dcm_orth_second_order_q31_mul_(C_22, root_22)
-        + dcm_orth_second_order_q31_mul_(C_23, root_23) + (INT32_C(1) << 26), 27);
-    if ((next_22_unchecked < (-INT32_C(1140850688)))
-        || (next_22_unchecked > INT32_C(1140850688))) {
+    const int64_t next_22_raw = dcm_orth_second_order_q31_shr(dcm_orth_second_order_q31_mul(
+        C_21, root_12) + dcm_orth_second_order_q31_mul(C_22, root_22)
+        + dcm_orth_second_order_q31_mul(C_23, root_23) + (INT32_C(1) << 26), 27);
+    if ((next_22_raw < (-INT32_C(1140850688))) || (next_22_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_22 = dcm_orth_second_order_q31_narrow_(next_22_unchecked, 0);
+    const int32_t next_22 = dcm_orth_second_order_q31_fit(next_22_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 4.9e-08 */
-    const int64_t next_23_unchecked =
-        dcm_orth_second_order_q31_shr_(dcm_orth_second_order_q31_mul_(C_21, root_13)
-        + dcm_orth_second_order_q31_mul_(C_22, root_23)
-        + dcm_orth_second_order_q31_mul_(C_23, root_33) + (INT32_C(1) << 26), 27);
-    if ((next_23_unchecked < (-INT32_C(1140850688)))
-        || (next_23_unchecked > INT32_C(1140850688))) {
+    const int64_t next_23_raw = dcm_orth_second_order_q31_shr(dcm_orth_second_order_q31_mul(
+        C_21, root_13) + dcm_orth_second_order_q31_mul(C_22, root_23)
+        + dcm_orth_second_order_q31_mul(C_23, root_33) + (INT32_C(1) << 26), 27);
+    if ((next_23_raw < (-INT32_C(1140850688))) || (next_23_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_23 = dcm_orth_second_order_q31_narrow_(next_23_unchecked, 0);
+    const int32_t next_23 = dcm_orth_second_order_q31_fit(next_23_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 4.9e-08 */
-    const int64_t next_31_unchecked =
-        dcm_orth_second_order_q31_shr_(dcm_orth_second_order_q31_mul_(C_31, root_11)
-        + dcm_orth_second_order_q31_mul_(C_32, root_12)
-        + dcm_orth_second_order_q31_mul_(C_33, root_13) + (INT32_C(1) << 26), 27);
-    if ((next_31_unchecked < (-INT32_C(1140850688)))
-        || (next_31_unchecked > INT32_C(1140850688))) {
+    const int64_t next_31_raw = dcm_orth_second_order_q31_shr(dcm_orth_second_order_q31_mul(
+        C_31, root_11) + dcm_orth_second_order_q31_mul(C_32, root_12)
+        + dcm_orth_second_order_q31_mul(C_33, root_13) + (INT32_C(1) << 26), 27);
+    if ((next_31_raw < (-INT32_C(1140850688))) || (next_31_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_31 = dcm_orth_second_order_q31_narrow_(next_31_unchecked, 0);
+    const int32_t next_31 = dcm_orth_second_order_q31_fit(next_31_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 4.9e-08 */
-    const int64_t next_32_unchecked =
-        dcm_orth_second_order_q31_shr_(dcm_orth_second_order_q31_mul_(C_31, root_12)
-        + dcm_orth_second_order_q31_mul_(C_32, root_22)
-        + dcm_orth_second_order_q31_mul_(C_33, root_23) + (INT32_C(1) << 26), 27);
-    if ((next_32_unchecked < (-INT32_C(1140850688)))
-        || (next_32_unchecked > INT32_C(1140850688))) {
+    const int64_t next_32_raw = dcm_orth_second_order_q31_shr(dcm_orth_second_order_q31_mul(
+        C_31, root_12) + dcm_orth_second_order_q31_mul(C_32, root_22)
+        + dcm_orth_second_order_q31_mul(C_33, root_23) + (INT32_C(1) << 26), 27);
+    if ((next_32_raw < (-INT32_C(1140850688))) || (next_32_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_32 = dcm_orth_second_order_q31_narrow_(next_32_unchecked, 0);
+    const int32_t next_32 = dcm_orth_second_order_q31_fit(next_32_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 4.9e-08 */
-    const int64_t next_33_unchecked =
-        dcm_orth_second_order_q31_shr_(dcm_orth_second_order_q31_mul_(C_31, root_13)
-        + dcm_orth_second_order_q31_mul_(C_32, root_23)
-        + dcm_orth_second_order_q31_mul_(C_33, root_33) + (INT32_C(1) << 26), 27);
-    if ((next_33_unchecked < (-INT32_C(1140850688)))
-        || (next_33_unchecked > INT32_C(1140850688))) {
+    const int64_t next_33_raw = dcm_orth_second_order_q31_shr(dcm_orth_second_order_q31_mul(
+        C_31, root_13) + dcm_orth_second_order_q31_mul(C_32, root_23)
+        + dcm_orth_second_order_q31_mul(C_33, root_33) + (INT32_C(1) << 26), 27);
+    if ((next_33_raw < (-INT32_C(1140850688))) || (next_33_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_33 = dcm_orth_second_order_q31_narrow_(next_33_unchecked, 0);
+    const int32_t next_33 = dcm_orth_second_order_q31_fit(next_33_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 4.9e-08 */
     orthonormalized[0] = next_11;
     orthonormalized[1] = next_12;

@@ -5,7 +5,7 @@
 #include "dcm_orthonormalize_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int dcm_orthonormalize_q31_out_(int32_t x, int32_t limit)
+static inline int dcm_orthonormalize_q31_out(int32_t x, int32_t limit)
 {
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
@@ -13,7 +13,7 @@ static inline int dcm_orthonormalize_q31_out_(int32_t x, int32_t limit)
 /* The exact product of two words. */
 #if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
 /* These processors have no instruction for it: the high word takes four products of half words. */
-static __attribute__((noinline)) int64_t dcm_orthonormalize_q31_mul_(int32_t a, int32_t b)
+static __attribute__((noinline)) int64_t dcm_orthonormalize_q31_mul(int32_t a, int32_t b)
 {
     const uint32_t a_low = (uint32_t)a & 0xFFFFu;
     const uint32_t b_low = (uint32_t)b & 0xFFFFu;
@@ -28,7 +28,7 @@ static __attribute__((noinline)) int64_t dcm_orthonormalize_q31_mul_(int32_t a, 
     return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
 }
 #else
-static inline int64_t dcm_orthonormalize_q31_mul_(int32_t a, int32_t b)
+static inline int64_t dcm_orthonormalize_q31_mul(int32_t a, int32_t b)
 {
     return (int64_t)a * (int64_t)b;
 }
@@ -39,7 +39,7 @@ static inline int64_t dcm_orthonormalize_q31_mul_(int32_t a, int32_t b)
  * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
  * number and no conversion of a number out of range.
  */
-static inline int32_t dcm_orthonormalize_q31_narrow_(int64_t x, int n)
+static inline int32_t dcm_orthonormalize_q31_fit(int64_t x, int n)
 {
 #ifdef __FRAMAC__
     return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
@@ -53,13 +53,13 @@ static inline int32_t dcm_orthonormalize_q31_narrow_(int64_t x, int n)
 }
 
 /* x / 2^n, rounded down, as a wide number. */
-static inline int64_t dcm_orthonormalize_q31_shr_(int64_t x, int n)
+static inline int64_t dcm_orthonormalize_q31_shr(int64_t x, int n)
 {
     return (x < 0) ? ~(~x >> n) : (x >> n);
 }
 
 /* numerator / denominator of their magnitudes, to the nearest; the sign comes last. */
-static int64_t dcm_orthonormalize_q31_div_(int64_t numerator, int64_t denominator)
+static int64_t dcm_orthonormalize_q31_div(int64_t numerator, int64_t denominator)
 {
     const int64_t top = (numerator < 0) ? -numerator : numerator;
     const int64_t below = (denominator < 0) ? -denominator : denominator;
@@ -68,7 +68,7 @@ static int64_t dcm_orthonormalize_q31_div_(int64_t numerator, int64_t denominato
 }
 
 /* Square root bit by bit, to the nearest. */
-static int32_t dcm_orthonormalize_q31_sqrt_(uint64_t square)
+static int32_t dcm_orthonormalize_q31_rt(uint64_t square)
 {
     uint64_t rest = square;
     uint64_t root = 0;
@@ -96,175 +96,155 @@ int dcm_orthonormalize_q31(const int32_t computed[9], int32_t orthonormalized[9]
     const int32_t C_31 = computed[6];
     const int32_t C_32 = computed[7];
     const int32_t C_33 = computed[8];
-    if (dcm_orthonormalize_q31_out_(C_11, INT32_C(1140850688))
-        || dcm_orthonormalize_q31_out_(C_12, INT32_C(1140850688))
-        || dcm_orthonormalize_q31_out_(C_13, INT32_C(1140850688))
-        || dcm_orthonormalize_q31_out_(C_21, INT32_C(1140850688))
-        || dcm_orthonormalize_q31_out_(C_22, INT32_C(1140850688))
-        || dcm_orthonormalize_q31_out_(C_23, INT32_C(1140850688))
-        || dcm_orthonormalize_q31_out_(C_31, INT32_C(1140850688))
-        || dcm_orthonormalize_q31_out_(C_32, INT32_C(1140850688))
-        || dcm_orthonormalize_q31_out_(C_33, INT32_C(1140850688)))
+    if (dcm_orthonormalize_q31_out(C_11, INT32_C(1140850688))
+        || dcm_orthonormalize_q31_out(C_12, INT32_C(1140850688))
+        || dcm_orthonormalize_q31_out(C_13, INT32_C(1140850688))
+        || dcm_orthonormalize_q31_out(C_21, INT32_C(1140850688))
+        || dcm_orthonormalize_q31_out(C_22, INT32_C(1140850688))
+        || dcm_orthonormalize_q31_out(C_23, INT32_C(1140850688))
+        || dcm_orthonormalize_q31_out(C_31, INT32_C(1140850688))
+        || dcm_orthonormalize_q31_out(C_32, INT32_C(1140850688))
+        || dcm_orthonormalize_q31_out(C_33, INT32_C(1140850688))) {
         return 1;
+    }
     /* row 1 and its dual, added */
-    const int32_t row_1_x = dcm_orthonormalize_q31_narrow_((int64_t)C_11 * (INT32_C(1) << 30)
-        + dcm_orthonormalize_q31_mul_(C_22, C_33) - dcm_orthonormalize_q31_mul_(C_23, C_32)
+    const int32_t row_1_x = dcm_orthonormalize_q31_fit((int64_t)C_11 * (INT32_C(1) << 30)
+        + dcm_orthonormalize_q31_mul(C_22, C_33) - dcm_orthonormalize_q31_mul(C_23, C_32)
         + (INT32_C(1) << 30), 31); /* Q2.29, -3.33 .. 3.33, error 9.4e-10 */
-    const int32_t row_1_y = dcm_orthonormalize_q31_narrow_((int64_t)C_12 * (INT32_C(1) << 30)
-        - dcm_orthonormalize_q31_mul_(C_21, C_33) + dcm_orthonormalize_q31_mul_(C_23, C_31)
+    const int32_t row_1_y = dcm_orthonormalize_q31_fit((int64_t)C_12 * (INT32_C(1) << 30)
+        - dcm_orthonormalize_q31_mul(C_21, C_33) + dcm_orthonormalize_q31_mul(C_23, C_31)
         + (INT32_C(1) << 30), 31); /* Q2.29, -3.33 .. 3.33, error 9.4e-10 */
-    const int32_t row_1_z = dcm_orthonormalize_q31_narrow_((int64_t)C_13 * (INT32_C(1) << 30)
-        + dcm_orthonormalize_q31_mul_(C_21, C_32) - dcm_orthonormalize_q31_mul_(C_22, C_31)
+    const int32_t row_1_z = dcm_orthonormalize_q31_fit((int64_t)C_13 * (INT32_C(1) << 30)
+        + dcm_orthonormalize_q31_mul(C_21, C_32) - dcm_orthonormalize_q31_mul(C_22, C_31)
         + (INT32_C(1) << 30), 31); /* Q2.29, -3.33 .. 3.33, error 9.4e-10 */
-    const int64_t inverse_length_1_radicand =
-        dcm_orthonormalize_q31_shr_(dcm_orthonormalize_q31_mul_(row_1_x, row_1_x), 1)
-        + dcm_orthonormalize_q31_shr_(dcm_orthonormalize_q31_mul_(row_1_y, row_1_y), 1)
-        + dcm_orthonormalize_q31_shr_(dcm_orthonormalize_q31_mul_(row_1_z, row_1_z), 1);
+    const int64_t inverse_length_1_radicand = dcm_orthonormalize_q31_shr(
+        dcm_orthonormalize_q31_mul(row_1_x, row_1_x), 1)
+        + dcm_orthonormalize_q31_shr(dcm_orthonormalize_q31_mul(row_1_y, row_1_y), 1)
+        + dcm_orthonormalize_q31_shr(dcm_orthonormalize_q31_mul(row_1_z, row_1_z), 1);
         /* Q6.57, 2 .. 8, error 1.9e-08 */
     if ((inverse_length_1_radicand < INT64_C(288230378825580548))
         || (inverse_length_1_radicand > INT64_C(1152921501932978172))) {
         return 2;
     }
-    const int32_t inverse_length_1_root =
-        dcm_orthonormalize_q31_sqrt_((uint64_t)(inverse_length_1_radicand * 2));
-        /* Q2.29, 1.41 .. 2.83, error 7.5e-09 */
+    const int32_t inverse_length_1_root = dcm_orthonormalize_q31_rt((uint64_t)(
+        inverse_length_1_radicand * 2)); /* Q2.29, 1.41 .. 2.83, error 7.5e-09 */
     /* 1/|row 1| */
-    const int32_t inverse_length_1 =
-        dcm_orthonormalize_q31_narrow_(dcm_orthonormalize_q31_div_((INT64_C(1) << 60), inverse_length_1_root), 0);
+    const int32_t inverse_length_1 = dcm_orthonormalize_q31_fit(dcm_orthonormalize_q31_div(
+        (INT64_C(1) << 60), inverse_length_1_root), 0);
         /* Q0.31, 0.353 .. 0.708, error 4e-09 */
     /* row 2 and its dual, added */
-    const int32_t row_2_x = dcm_orthonormalize_q31_narrow_((int64_t)C_21 * (INT32_C(1) << 30)
-        - dcm_orthonormalize_q31_mul_(C_12, C_33) + dcm_orthonormalize_q31_mul_(C_13, C_32)
+    const int32_t row_2_x = dcm_orthonormalize_q31_fit((int64_t)C_21 * (INT32_C(1) << 30)
+        - dcm_orthonormalize_q31_mul(C_12, C_33) + dcm_orthonormalize_q31_mul(C_13, C_32)
         + (INT32_C(1) << 30), 31); /* Q2.29, -3.33 .. 3.33, error 9.4e-10 */
-    const int32_t row_2_y = dcm_orthonormalize_q31_narrow_((int64_t)C_22 * (INT32_C(1) << 30)
-        + dcm_orthonormalize_q31_mul_(C_11, C_33) - dcm_orthonormalize_q31_mul_(C_13, C_31)
+    const int32_t row_2_y = dcm_orthonormalize_q31_fit((int64_t)C_22 * (INT32_C(1) << 30)
+        + dcm_orthonormalize_q31_mul(C_11, C_33) - dcm_orthonormalize_q31_mul(C_13, C_31)
         + (INT32_C(1) << 30), 31); /* Q2.29, -3.33 .. 3.33, error 9.4e-10 */
-    const int32_t row_2_z = dcm_orthonormalize_q31_narrow_((int64_t)C_23 * (INT32_C(1) << 30)
-        - dcm_orthonormalize_q31_mul_(C_11, C_32) + dcm_orthonormalize_q31_mul_(C_12, C_31)
+    const int32_t row_2_z = dcm_orthonormalize_q31_fit((int64_t)C_23 * (INT32_C(1) << 30)
+        - dcm_orthonormalize_q31_mul(C_11, C_32) + dcm_orthonormalize_q31_mul(C_12, C_31)
         + (INT32_C(1) << 30), 31); /* Q2.29, -3.33 .. 3.33, error 9.4e-10 */
-    const int64_t inverse_length_2_radicand =
-        dcm_orthonormalize_q31_shr_(dcm_orthonormalize_q31_mul_(row_2_x, row_2_x), 1)
-        + dcm_orthonormalize_q31_shr_(dcm_orthonormalize_q31_mul_(row_2_y, row_2_y), 1)
-        + dcm_orthonormalize_q31_shr_(dcm_orthonormalize_q31_mul_(row_2_z, row_2_z), 1);
+    const int64_t inverse_length_2_radicand = dcm_orthonormalize_q31_shr(
+        dcm_orthonormalize_q31_mul(row_2_x, row_2_x), 1)
+        + dcm_orthonormalize_q31_shr(dcm_orthonormalize_q31_mul(row_2_y, row_2_y), 1)
+        + dcm_orthonormalize_q31_shr(dcm_orthonormalize_q31_mul(row_2_z, row_2_z), 1);
         /* Q6.57, 2 .. 8, error 1.9e-08 */
     if ((inverse_length_2_radicand < INT64_C(288230378825580548))
         || (inverse_length_2_radicand > INT64_C(1152921501932978172))) {
         return 2;
     }
-    const int32_t inverse_length_2_root =
-        dcm_orthonormalize_q31_sqrt_((uint64_t)(inverse_length_2_radicand * 2));
-        /* Q2.29, 1.41 .. 2.83, error 7.5e-09 */
+    const int32_t inverse_length_2_root = dcm_orthonormalize_q31_rt((uint64_t)(
+        inverse_length_2_radicand * 2)); /* Q2.29, 1.41 .. 2.83, error 7.5e-09 */
     /* 1/|row 2| */
-    const int32_t inverse_length_2 =
-        dcm_orthonormalize_q31_narrow_(dcm_orthonormalize_q31_div_((INT64_C(1) << 60), inverse_length_2_root), 0);
+    const int32_t inverse_length_2 = dcm_orthonormalize_q31_fit(dcm_orthonormalize_q31_div(
+        (INT64_C(1) << 60), inverse_length_2_root), 0);
         /* Q0.31, 0.353 .. 0.708, error 4e-09 */
     /* row 3 and its dual, added */
-    const int32_t row_3_x = dcm_orthonormalize_q31_narrow_((int64_t)C_31 * (INT32_C(1) << 30)
-        + dcm_orthonormalize_q31_mul_(C_12, C_23) - dcm_orthonormalize_q31_mul_(C_13, C_22)
+    const int32_t row_3_x = dcm_orthonormalize_q31_fit((int64_t)C_31 * (INT32_C(1) << 30)
+        + dcm_orthonormalize_q31_mul(C_12, C_23) - dcm_orthonormalize_q31_mul(C_13, C_22)
         + (INT32_C(1) << 30), 31); /* Q2.29, -3.33 .. 3.33, error 9.4e-10 */
-    const int32_t row_3_y = dcm_orthonormalize_q31_narrow_((int64_t)C_32 * (INT32_C(1) << 30)
-        - dcm_orthonormalize_q31_mul_(C_11, C_23) + dcm_orthonormalize_q31_mul_(C_13, C_21)
+    const int32_t row_3_y = dcm_orthonormalize_q31_fit((int64_t)C_32 * (INT32_C(1) << 30)
+        - dcm_orthonormalize_q31_mul(C_11, C_23) + dcm_orthonormalize_q31_mul(C_13, C_21)
         + (INT32_C(1) << 30), 31); /* Q2.29, -3.33 .. 3.33, error 9.4e-10 */
-    const int32_t row_3_z = dcm_orthonormalize_q31_narrow_((int64_t)C_33 * (INT32_C(1) << 30)
-        + dcm_orthonormalize_q31_mul_(C_11, C_22) - dcm_orthonormalize_q31_mul_(C_12, C_21)
+    const int32_t row_3_z = dcm_orthonormalize_q31_fit((int64_t)C_33 * (INT32_C(1) << 30)
+        + dcm_orthonormalize_q31_mul(C_11, C_22) - dcm_orthonormalize_q31_mul(C_12, C_21)
         + (INT32_C(1) << 30), 31); /* Q2.29, -3.33 .. 3.33, error 9.4e-10 */
-    const int64_t inverse_length_3_radicand =
-        dcm_orthonormalize_q31_shr_(dcm_orthonormalize_q31_mul_(row_3_x, row_3_x), 1)
-        + dcm_orthonormalize_q31_shr_(dcm_orthonormalize_q31_mul_(row_3_y, row_3_y), 1)
-        + dcm_orthonormalize_q31_shr_(dcm_orthonormalize_q31_mul_(row_3_z, row_3_z), 1);
+    const int64_t inverse_length_3_radicand = dcm_orthonormalize_q31_shr(
+        dcm_orthonormalize_q31_mul(row_3_x, row_3_x), 1)
+        + dcm_orthonormalize_q31_shr(dcm_orthonormalize_q31_mul(row_3_y, row_3_y), 1)
+        + dcm_orthonormalize_q31_shr(dcm_orthonormalize_q31_mul(row_3_z, row_3_z), 1);
         /* Q6.57, 2 .. 8, error 1.9e-08 */
     if ((inverse_length_3_radicand < INT64_C(288230378825580548))
         || (inverse_length_3_radicand > INT64_C(1152921501932978172))) {
         return 2;
     }
-    const int32_t inverse_length_3_root =
-        dcm_orthonormalize_q31_sqrt_((uint64_t)(inverse_length_3_radicand * 2));
-        /* Q2.29, 1.41 .. 2.83, error 7.5e-09 */
+    const int32_t inverse_length_3_root = dcm_orthonormalize_q31_rt((uint64_t)(
+        inverse_length_3_radicand * 2)); /* Q2.29, 1.41 .. 2.83, error 7.5e-09 */
     /* 1/|row 3| */
-    const int32_t inverse_length_3 =
-        dcm_orthonormalize_q31_narrow_(dcm_orthonormalize_q31_div_((INT64_C(1) << 60), inverse_length_3_root), 0);
+    const int32_t inverse_length_3 = dcm_orthonormalize_q31_fit(dcm_orthonormalize_q31_div(
+        (INT64_C(1) << 60), inverse_length_3_root), 0);
         /* Q0.31, 0.353 .. 0.708, error 4e-09 */
     /* direction cosine matrix, body to reference, orthonormalized */
-    const int64_t next_11_unchecked =
-        dcm_orthonormalize_q31_shr_(dcm_orthonormalize_q31_mul_(inverse_length_1, row_1_x)
-        + (INT32_C(1) << 29), 30);
-    if ((next_11_unchecked < (-INT32_C(1140850688)))
-        || (next_11_unchecked > INT32_C(1140850688))) {
+    const int64_t next_11_raw = dcm_orthonormalize_q31_shr(dcm_orthonormalize_q31_mul(
+        inverse_length_1, row_1_x) + (INT32_C(1) << 29), 30);
+    if ((next_11_raw < (-INT32_C(1140850688))) || (next_11_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_11 = dcm_orthonormalize_q31_narrow_(next_11_unchecked, 0);
+    const int32_t next_11 = dcm_orthonormalize_q31_fit(next_11_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 1.5e-08 */
-    const int64_t next_12_unchecked =
-        dcm_orthonormalize_q31_shr_(dcm_orthonormalize_q31_mul_(inverse_length_1, row_1_y)
-        + (INT32_C(1) << 29), 30);
-    if ((next_12_unchecked < (-INT32_C(1140850688)))
-        || (next_12_unchecked > INT32_C(1140850688))) {
+    const int64_t next_12_raw = dcm_orthonormalize_q31_shr(dcm_orthonormalize_q31_mul(
+        inverse_length_1, row_1_y) + (INT32_C(1) << 29), 30);
+    if ((next_12_raw < (-INT32_C(1140850688))) || (next_12_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_12 = dcm_orthonormalize_q31_narrow_(next_12_unchecked, 0);
+    const int32_t next_12 = dcm_orthonormalize_q31_fit(next_12_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 1.5e-08 */
-    const int64_t next_13_unchecked =
-        dcm_orthonormalize_q31_shr_(dcm_orthonormalize_q31_mul_(inverse_length_1, row_1_z)
-        + (INT32_C(1) << 29), 30);
-    if ((next_13_unchecked < (-INT32_C(1140850688)))
-        || (next_13_unchecked > INT32_C(1140850688))) {
+    const int64_t next_13_raw = dcm_orthonormalize_q31_shr(dcm_orthonormalize_q31_mul(
+        inverse_length_1, row_1_z) + (INT32_C(1) << 29), 30);
+    if ((next_13_raw < (-INT32_C(1140850688))) || (next_13_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_13 = dcm_orthonormalize_q31_narrow_(next_13_unchecked, 0);
+    const int32_t next_13 = dcm_orthonormalize_q31_fit(next_13_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 1.5e-08 */
-    const int64_t next_21_unchecked =
-        dcm_orthonormalize_q31_shr_(dcm_orthonormalize_q31_mul_(inverse_length_2, row_2_x)
-        + (INT32_C(1) << 29), 30);
-    if ((next_21_unchecked < (-INT32_C(1140850688)))
-        || (next_21_unchecked > INT32_C(1140850688))) {
+    const int64_t next_21_raw = dcm_orthonormalize_q31_shr(dcm_orthonormalize_q31_mul(
+        inverse_length_2, row_2_x) + (INT32_C(1) << 29), 30);
+    if ((next_21_raw < (-INT32_C(1140850688))) || (next_21_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_21 = dcm_orthonormalize_q31_narrow_(next_21_unchecked, 0);
+    const int32_t next_21 = dcm_orthonormalize_q31_fit(next_21_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 1.5e-08 */
-    const int64_t next_22_unchecked =
-        dcm_orthonormalize_q31_shr_(dcm_orthonormalize_q31_mul_(inverse_length_2, row_2_y)
-        + (INT32_C(1) << 29), 30);
-    if ((next_22_unchecked < (-INT32_C(1140850688)))
-        || (next_22_unchecked > INT32_C(1140850688))) {
+    const int64_t next_22_raw = dcm_orthonormalize_q31_shr(dcm_orthonormalize_q31_mul(
+        inverse_length_2, row_2_y) + (INT32_C(1) << 29), 30);
+    if ((next_22_raw < (-INT32_C(1140850688))) || (next_22_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_22 = dcm_orthonormalize_q31_narrow_(next_22_unchecked, 0);
+    const int32_t next_22 = dcm_orthonormalize_q31_fit(next_22_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 1.5e-08 */
-    const int64_t next_23_unchecked =
-        dcm_orthonormalize_q31_shr_(dcm_orthonormalize_q31_mul_(inverse_length_2, row_2_z)
-        + (INT32_C(1) << 29), 30);
-    if ((next_23_unchecked < (-INT32_C(1140850688)))
-        || (next_23_unchecked > INT32_C(1140850688))) {
+    const int64_t next_23_raw = dcm_orthonormalize_q31_shr(dcm_orthonormalize_q31_mul(
+        inverse_length_2, row_2_z) + (INT32_C(1) << 29), 30);
+    if ((next_23_raw < (-INT32_C(1140850688))) || (next_23_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_23 = dcm_orthonormalize_q31_narrow_(next_23_unchecked, 0);
+    const int32_t next_23 = dcm_orthonormalize_q31_fit(next_23_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 1.5e-08 */
-    const int64_t next_31_unchecked =
-        dcm_orthonormalize_q31_shr_(dcm_orthonormalize_q31_mul_(inverse_length_3, row_3_x)
-        + (INT32_C(1) << 29), 30);
-    if ((next_31_unchecked < (-INT32_C(1140850688)))
-        || (next_31_unchecked > INT32_C(1140850688))) {
+    const int64_t next_31_raw = dcm_orthonormalize_q31_shr(dcm_orthonormalize_q31_mul(
+        inverse_length_3, row_3_x) + (INT32_C(1) << 29), 30);
+    if ((next_31_raw < (-INT32_C(1140850688))) || (next_31_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_31 = dcm_orthonormalize_q31_narrow_(next_31_unchecked, 0);
+    const int32_t next_31 = dcm_orthonormalize_q31_fit(next_31_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 1.5e-08 */
-    const int64_t next_32_unchecked =
-        dcm_orthonormalize_q31_shr_(dcm_orthonormalize_q31_mul_(inverse_length_3, row_3_y)
-        + (INT32_C(1) << 29), 30);
-    if ((next_32_unchecked < (-INT32_C(1140850688)))
-        || (next_32_unchecked > INT32_C(1140850688))) {
+    const int64_t next_32_raw = dcm_orthonormalize_q31_shr(dcm_orthonormalize_q31_mul(
+        inverse_length_3, row_3_y) + (INT32_C(1) << 29), 30);
+    if ((next_32_raw < (-INT32_C(1140850688))) || (next_32_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_32 = dcm_orthonormalize_q31_narrow_(next_32_unchecked, 0);
+    const int32_t next_32 = dcm_orthonormalize_q31_fit(next_32_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 1.5e-08 */
-    const int64_t next_33_unchecked =
-        dcm_orthonormalize_q31_shr_(dcm_orthonormalize_q31_mul_(inverse_length_3, row_3_z)
-        + (INT32_C(1) << 29), 30);
-    if ((next_33_unchecked < (-INT32_C(1140850688)))
-        || (next_33_unchecked > INT32_C(1140850688))) {
+    const int64_t next_33_raw = dcm_orthonormalize_q31_shr(dcm_orthonormalize_q31_mul(
+        inverse_length_3, row_3_z) + (INT32_C(1) << 29), 30);
+    if ((next_33_raw < (-INT32_C(1140850688))) || (next_33_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_33 = dcm_orthonormalize_q31_narrow_(next_33_unchecked, 0);
+    const int32_t next_33 = dcm_orthonormalize_q31_fit(next_33_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 1.5e-08 */
     orthonormalized[0] = next_11;
     orthonormalized[1] = next_12;

@@ -5,7 +5,7 @@
 #include "dcm_product_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int dcm_product_q31_out_(int32_t x, int32_t limit)
+static inline int dcm_product_q31_out(int32_t x, int32_t limit)
 {
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
@@ -13,7 +13,7 @@ static inline int dcm_product_q31_out_(int32_t x, int32_t limit)
 /* The exact product of two words. */
 #if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
 /* These processors have no instruction for it: the high word takes four products of half words. */
-static __attribute__((noinline)) int64_t dcm_product_q31_mul_(int32_t a, int32_t b)
+static __attribute__((noinline)) int64_t dcm_product_q31_mul(int32_t a, int32_t b)
 {
     const uint32_t a_low = (uint32_t)a & 0xFFFFu;
     const uint32_t b_low = (uint32_t)b & 0xFFFFu;
@@ -28,7 +28,7 @@ static __attribute__((noinline)) int64_t dcm_product_q31_mul_(int32_t a, int32_t
     return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
 }
 #else
-static inline int64_t dcm_product_q31_mul_(int32_t a, int32_t b)
+static inline int64_t dcm_product_q31_mul(int32_t a, int32_t b)
 {
     return (int64_t)a * (int64_t)b;
 }
@@ -39,7 +39,7 @@ static inline int64_t dcm_product_q31_mul_(int32_t a, int32_t b)
  * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
  * number and no conversion of a number out of range.
  */
-static inline int32_t dcm_product_q31_narrow_(int64_t x, int n)
+static inline int32_t dcm_product_q31_fit(int64_t x, int n)
 {
 #ifdef __FRAMAC__
     return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
@@ -53,7 +53,7 @@ static inline int32_t dcm_product_q31_narrow_(int64_t x, int n)
 }
 
 /* x / 2^n, rounded down, as a wide number. */
-static inline int64_t dcm_product_q31_shr_(int64_t x, int n)
+static inline int64_t dcm_product_q31_shr(int64_t x, int n)
 {
     return (x < 0) ? ~(~x >> n) : (x >> n);
 }
@@ -78,106 +78,98 @@ int dcm_product_q31(const int32_t state[9], const int32_t transition[9], int32_t
     const int32_t A_31 = transition[6];
     const int32_t A_32 = transition[7];
     const int32_t A_33 = transition[8];
-    if (dcm_product_q31_out_(C_11, INT32_C(1140850688))
-        || dcm_product_q31_out_(C_12, INT32_C(1140850688))
-        || dcm_product_q31_out_(C_13, INT32_C(1140850688))
-        || dcm_product_q31_out_(C_21, INT32_C(1140850688))
-        || dcm_product_q31_out_(C_22, INT32_C(1140850688))
-        || dcm_product_q31_out_(C_23, INT32_C(1140850688))
-        || dcm_product_q31_out_(C_31, INT32_C(1140850688))
-        || dcm_product_q31_out_(C_32, INT32_C(1140850688))
-        || dcm_product_q31_out_(C_33, INT32_C(1140850688))
-        || dcm_product_q31_out_(A_11, INT32_C(1140850688))
-        || dcm_product_q31_out_(A_12, INT32_C(1140850688))
-        || dcm_product_q31_out_(A_13, INT32_C(1140850688))
-        || dcm_product_q31_out_(A_21, INT32_C(1140850688))
-        || dcm_product_q31_out_(A_22, INT32_C(1140850688))
-        || dcm_product_q31_out_(A_23, INT32_C(1140850688))
-        || dcm_product_q31_out_(A_31, INT32_C(1140850688))
-        || dcm_product_q31_out_(A_32, INT32_C(1140850688))
-        || dcm_product_q31_out_(A_33, INT32_C(1140850688)))
+    if (dcm_product_q31_out(C_11, INT32_C(1140850688))
+        || dcm_product_q31_out(C_12, INT32_C(1140850688))
+        || dcm_product_q31_out(C_13, INT32_C(1140850688))
+        || dcm_product_q31_out(C_21, INT32_C(1140850688))
+        || dcm_product_q31_out(C_22, INT32_C(1140850688))
+        || dcm_product_q31_out(C_23, INT32_C(1140850688))
+        || dcm_product_q31_out(C_31, INT32_C(1140850688))
+        || dcm_product_q31_out(C_32, INT32_C(1140850688))
+        || dcm_product_q31_out(C_33, INT32_C(1140850688))
+        || dcm_product_q31_out(A_11, INT32_C(1140850688))
+        || dcm_product_q31_out(A_12, INT32_C(1140850688))
+        || dcm_product_q31_out(A_13, INT32_C(1140850688))
+        || dcm_product_q31_out(A_21, INT32_C(1140850688))
+        || dcm_product_q31_out(A_22, INT32_C(1140850688))
+        || dcm_product_q31_out(A_23, INT32_C(1140850688))
+        || dcm_product_q31_out(A_31, INT32_C(1140850688))
+        || dcm_product_q31_out(A_32, INT32_C(1140850688))
+        || dcm_product_q31_out(A_33, INT32_C(1140850688))) {
         return 1;
+    }
     /* direction cosine matrix, body to reference, after the step */
-    const int64_t next_11_unchecked = dcm_product_q31_shr_(dcm_product_q31_mul_(A_11, C_11)
-        + dcm_product_q31_mul_(A_21, C_12) + dcm_product_q31_mul_(A_31, C_13)
+    const int64_t next_11_raw = dcm_product_q31_shr(dcm_product_q31_mul(A_11, C_11)
+        + dcm_product_q31_mul(A_21, C_12) + dcm_product_q31_mul(A_31, C_13)
         + (INT32_C(1) << 29), 30);
-    if ((next_11_unchecked < (-INT32_C(1140850688)))
-        || (next_11_unchecked > INT32_C(1140850688))) {
+    if ((next_11_raw < (-INT32_C(1140850688))) || (next_11_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_11 = dcm_product_q31_narrow_(next_11_unchecked, 0);
+    const int32_t next_11 = dcm_product_q31_fit(next_11_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
-    const int64_t next_12_unchecked = dcm_product_q31_shr_(dcm_product_q31_mul_(A_12, C_11)
-        + dcm_product_q31_mul_(A_22, C_12) + dcm_product_q31_mul_(A_32, C_13)
+    const int64_t next_12_raw = dcm_product_q31_shr(dcm_product_q31_mul(A_12, C_11)
+        + dcm_product_q31_mul(A_22, C_12) + dcm_product_q31_mul(A_32, C_13)
         + (INT32_C(1) << 29), 30);
-    if ((next_12_unchecked < (-INT32_C(1140850688)))
-        || (next_12_unchecked > INT32_C(1140850688))) {
+    if ((next_12_raw < (-INT32_C(1140850688))) || (next_12_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_12 = dcm_product_q31_narrow_(next_12_unchecked, 0);
+    const int32_t next_12 = dcm_product_q31_fit(next_12_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
-    const int64_t next_13_unchecked = dcm_product_q31_shr_(dcm_product_q31_mul_(A_13, C_11)
-        + dcm_product_q31_mul_(A_23, C_12) + dcm_product_q31_mul_(A_33, C_13)
+    const int64_t next_13_raw = dcm_product_q31_shr(dcm_product_q31_mul(A_13, C_11)
+        + dcm_product_q31_mul(A_23, C_12) + dcm_product_q31_mul(A_33, C_13)
         + (INT32_C(1) << 29), 30);
-    if ((next_13_unchecked < (-INT32_C(1140850688)))
-        || (next_13_unchecked > INT32_C(1140850688))) {
+    if ((next_13_raw < (-INT32_C(1140850688))) || (next_13_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_13 = dcm_product_q31_narrow_(next_13_unchecked, 0);
+    const int32_t next_13 = dcm_product_q31_fit(next_13_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
-    const int64_t next_21_unchecked = dcm_product_q31_shr_(dcm_product_q31_mul_(A_11, C_21)
-        + dcm_product_q31_mul_(A_21, C_22) + dcm_product_q31_mul_(A_31, C_23)
+    const int64_t next_21_raw = dcm_product_q31_shr(dcm_product_q31_mul(A_11, C_21)
+        + dcm_product_q31_mul(A_21, C_22) + dcm_product_q31_mul(A_31, C_23)
         + (INT32_C(1) << 29), 30);
-    if ((next_21_unchecked < (-INT32_C(1140850688)))
-        || (next_21_unchecked > INT32_C(1140850688))) {
+    if ((next_21_raw < (-INT32_C(1140850688))) || (next_21_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_21 = dcm_product_q31_narrow_(next_21_unchecked, 0);
+    const int32_t next_21 = dcm_product_q31_fit(next_21_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
-    const int64_t next_22_unchecked = dcm_product_q31_shr_(dcm_product_q31_mul_(A_12, C_21)
-        + dcm_product_q31_mul_(A_22, C_22) + dcm_product_q31_mul_(A_32, C_23)
+    const int64_t next_22_raw = dcm_product_q31_shr(dcm_product_q31_mul(A_12, C_21)
+        + dcm_product_q31_mul(A_22, C_22) + dcm_product_q31_mul(A_32, C_23)
         + (INT32_C(1) << 29), 30);
-    if ((next_22_unchecked < (-INT32_C(1140850688)))
-        || (next_22_unchecked > INT32_C(1140850688))) {
+    if ((next_22_raw < (-INT32_C(1140850688))) || (next_22_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_22 = dcm_product_q31_narrow_(next_22_unchecked, 0);
+    const int32_t next_22 = dcm_product_q31_fit(next_22_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
-    const int64_t next_23_unchecked = dcm_product_q31_shr_(dcm_product_q31_mul_(A_13, C_21)
-        + dcm_product_q31_mul_(A_23, C_22) + dcm_product_q31_mul_(A_33, C_23)
+    const int64_t next_23_raw = dcm_product_q31_shr(dcm_product_q31_mul(A_13, C_21)
+        + dcm_product_q31_mul(A_23, C_22) + dcm_product_q31_mul(A_33, C_23)
         + (INT32_C(1) << 29), 30);
-    if ((next_23_unchecked < (-INT32_C(1140850688)))
-        || (next_23_unchecked > INT32_C(1140850688))) {
+    if ((next_23_raw < (-INT32_C(1140850688))) || (next_23_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_23 = dcm_product_q31_narrow_(next_23_unchecked, 0);
+    const int32_t next_23 = dcm_product_q31_fit(next_23_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
-    const int64_t next_31_unchecked = dcm_product_q31_shr_(dcm_product_q31_mul_(A_11, C_31)
-        + dcm_product_q31_mul_(A_21, C_32) + dcm_product_q31_mul_(A_31, C_33)
+    const int64_t next_31_raw = dcm_product_q31_shr(dcm_product_q31_mul(A_11, C_31)
+        + dcm_product_q31_mul(A_21, C_32) + dcm_product_q31_mul(A_31, C_33)
         + (INT32_C(1) << 29), 30);
-    if ((next_31_unchecked < (-INT32_C(1140850688)))
-        || (next_31_unchecked > INT32_C(1140850688))) {
+    if ((next_31_raw < (-INT32_C(1140850688))) || (next_31_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_31 = dcm_product_q31_narrow_(next_31_unchecked, 0);
+    const int32_t next_31 = dcm_product_q31_fit(next_31_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
-    const int64_t next_32_unchecked = dcm_product_q31_shr_(dcm_product_q31_mul_(A_12, C_31)
-        + dcm_product_q31_mul_(A_22, C_32) + dcm_product_q31_mul_(A_32, C_33)
+    const int64_t next_32_raw = dcm_product_q31_shr(dcm_product_q31_mul(A_12, C_31)
+        + dcm_product_q31_mul(A_22, C_32) + dcm_product_q31_mul(A_32, C_33)
         + (INT32_C(1) << 29), 30);
-    if ((next_32_unchecked < (-INT32_C(1140850688)))
-        || (next_32_unchecked > INT32_C(1140850688))) {
+    if ((next_32_raw < (-INT32_C(1140850688))) || (next_32_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_32 = dcm_product_q31_narrow_(next_32_unchecked, 0);
+    const int32_t next_32 = dcm_product_q31_fit(next_32_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
-    const int64_t next_33_unchecked = dcm_product_q31_shr_(dcm_product_q31_mul_(A_13, C_31)
-        + dcm_product_q31_mul_(A_23, C_32) + dcm_product_q31_mul_(A_33, C_33)
+    const int64_t next_33_raw = dcm_product_q31_shr(dcm_product_q31_mul(A_13, C_31)
+        + dcm_product_q31_mul(A_23, C_32) + dcm_product_q31_mul(A_33, C_33)
         + (INT32_C(1) << 29), 30);
-    if ((next_33_unchecked < (-INT32_C(1140850688)))
-        || (next_33_unchecked > INT32_C(1140850688))) {
+    if ((next_33_raw < (-INT32_C(1140850688))) || (next_33_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_33 = dcm_product_q31_narrow_(next_33_unchecked, 0);
+    const int32_t next_33 = dcm_product_q31_fit(next_33_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
     next[0] = next_11;
     next[1] = next_12;

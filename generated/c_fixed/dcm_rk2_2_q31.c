@@ -5,7 +5,7 @@
 #include "dcm_rk2_2_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int dcm_rk2_2_q31_out_(int32_t x, int32_t limit)
+static inline int dcm_rk2_2_q31_out(int32_t x, int32_t limit)
 {
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
@@ -13,7 +13,7 @@ static inline int dcm_rk2_2_q31_out_(int32_t x, int32_t limit)
 /* The exact product of two words. */
 #if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
 /* These processors have no instruction for it: the high word takes four products of half words. */
-static __attribute__((noinline)) int64_t dcm_rk2_2_q31_mul_(int32_t a, int32_t b)
+static __attribute__((noinline)) int64_t dcm_rk2_2_q31_mul(int32_t a, int32_t b)
 {
     const uint32_t a_low = (uint32_t)a & 0xFFFFu;
     const uint32_t b_low = (uint32_t)b & 0xFFFFu;
@@ -28,7 +28,7 @@ static __attribute__((noinline)) int64_t dcm_rk2_2_q31_mul_(int32_t a, int32_t b
     return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
 }
 #else
-static inline int64_t dcm_rk2_2_q31_mul_(int32_t a, int32_t b)
+static inline int64_t dcm_rk2_2_q31_mul(int32_t a, int32_t b)
 {
     return (int64_t)a * (int64_t)b;
 }
@@ -39,7 +39,7 @@ static inline int64_t dcm_rk2_2_q31_mul_(int32_t a, int32_t b)
  * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
  * number and no conversion of a number out of range.
  */
-static inline int32_t dcm_rk2_2_q31_narrow_(int64_t x, int n)
+static inline int32_t dcm_rk2_2_q31_fit(int64_t x, int n)
 {
 #ifdef __FRAMAC__
     return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
@@ -53,7 +53,7 @@ static inline int32_t dcm_rk2_2_q31_narrow_(int64_t x, int n)
 }
 
 /* x / 2^n, rounded down, as a wide number. */
-static inline int64_t dcm_rk2_2_q31_shr_(int64_t x, int n)
+static inline int64_t dcm_rk2_2_q31_shr(int64_t x, int n)
 {
     return (x < 0) ? ~(~x >> n) : (x >> n);
 }
@@ -75,41 +75,42 @@ int dcm_rk2_2_q31(const int32_t state[9], const int32_t increments[6], int32_t n
     const int32_t d2_x = increments[3];
     const int32_t d2_y = increments[4];
     const int32_t d2_z = increments[5];
-    if (dcm_rk2_2_q31_out_(C_11, INT32_C(1140850688))
-        || dcm_rk2_2_q31_out_(C_12, INT32_C(1140850688))
-        || dcm_rk2_2_q31_out_(C_13, INT32_C(1140850688))
-        || dcm_rk2_2_q31_out_(C_21, INT32_C(1140850688))
-        || dcm_rk2_2_q31_out_(C_22, INT32_C(1140850688))
-        || dcm_rk2_2_q31_out_(C_23, INT32_C(1140850688))
-        || dcm_rk2_2_q31_out_(C_31, INT32_C(1140850688))
-        || dcm_rk2_2_q31_out_(C_32, INT32_C(1140850688))
-        || dcm_rk2_2_q31_out_(C_33, INT32_C(1140850688))
-        || dcm_rk2_2_q31_out_(d1_x, (INT32_C(1) << 30))
-        || dcm_rk2_2_q31_out_(d1_y, (INT32_C(1) << 30))
-        || dcm_rk2_2_q31_out_(d1_z, (INT32_C(1) << 30))
-        || dcm_rk2_2_q31_out_(d2_x, (INT32_C(1) << 30))
-        || dcm_rk2_2_q31_out_(d2_y, (INT32_C(1) << 30))
-        || dcm_rk2_2_q31_out_(d2_z, (INT32_C(1) << 30)))
+    if (dcm_rk2_2_q31_out(C_11, INT32_C(1140850688))
+        || dcm_rk2_2_q31_out(C_12, INT32_C(1140850688))
+        || dcm_rk2_2_q31_out(C_13, INT32_C(1140850688))
+        || dcm_rk2_2_q31_out(C_21, INT32_C(1140850688))
+        || dcm_rk2_2_q31_out(C_22, INT32_C(1140850688))
+        || dcm_rk2_2_q31_out(C_23, INT32_C(1140850688))
+        || dcm_rk2_2_q31_out(C_31, INT32_C(1140850688))
+        || dcm_rk2_2_q31_out(C_32, INT32_C(1140850688))
+        || dcm_rk2_2_q31_out(C_33, INT32_C(1140850688))
+        || dcm_rk2_2_q31_out(d1_x, (INT32_C(1) << 30))
+        || dcm_rk2_2_q31_out(d1_y, (INT32_C(1) << 30))
+        || dcm_rk2_2_q31_out(d1_z, (INT32_C(1) << 30))
+        || dcm_rk2_2_q31_out(d2_x, (INT32_C(1) << 30))
+        || dcm_rk2_2_q31_out(d2_y, (INT32_C(1) << 30))
+        || dcm_rk2_2_q31_out(d2_z, (INT32_C(1) << 30))) {
         return 1;
+    }
     /* rate times the step, at node 0, times 1/3 */
     const int32_t turn_0_scaled_x = d1_x
-        + dcm_rk2_2_q31_narrow_(-dcm_rk2_2_q31_mul_(d2_x, INT32_C(1431655765) /* 1/3 in Q32 */)
+        + dcm_rk2_2_q31_fit(-dcm_rk2_2_q31_mul(d2_x, INT32_C(1431655765) /* 1/3 in Q32 */)
         + (INT64_C(1) << 31), 32); /* Q-2.33, -0.167 .. 0.167, error 6.8e-11 */
     const int32_t turn_0_scaled_y = d1_y
-        + dcm_rk2_2_q31_narrow_(-dcm_rk2_2_q31_mul_(d2_y, INT32_C(1431655765) /* 1/3 in Q32 */)
+        + dcm_rk2_2_q31_fit(-dcm_rk2_2_q31_mul(d2_y, INT32_C(1431655765) /* 1/3 in Q32 */)
         + (INT64_C(1) << 31), 32); /* Q-2.33, -0.167 .. 0.167, error 6.8e-11 */
     const int32_t turn_0_scaled_z = d1_z
-        + dcm_rk2_2_q31_narrow_(-dcm_rk2_2_q31_mul_(d2_z, INT32_C(1431655765) /* 1/3 in Q32 */)
+        + dcm_rk2_2_q31_fit(-dcm_rk2_2_q31_mul(d2_z, INT32_C(1431655765) /* 1/3 in Q32 */)
         + (INT64_C(1) << 31), 32); /* Q-2.33, -0.167 .. 0.167, error 6.8e-11 */
     /* rate times the step, at node 1, times -1/3 */
     const int32_t turn_1_scaled_x = -d2_x
-        + dcm_rk2_2_q31_narrow_(dcm_rk2_2_q31_mul_(d1_x, INT32_C(1431655765) /* 1/3 in Q32 */)
+        + dcm_rk2_2_q31_fit(dcm_rk2_2_q31_mul(d1_x, INT32_C(1431655765) /* 1/3 in Q32 */)
         + (INT64_C(1) << 31), 32); /* Q-2.33, -0.167 .. 0.167, error 6.8e-11 */
     const int32_t turn_1_scaled_y = -d2_y
-        + dcm_rk2_2_q31_narrow_(dcm_rk2_2_q31_mul_(d1_y, INT32_C(1431655765) /* 1/3 in Q32 */)
+        + dcm_rk2_2_q31_fit(dcm_rk2_2_q31_mul(d1_y, INT32_C(1431655765) /* 1/3 in Q32 */)
         + (INT64_C(1) << 31), 32); /* Q-2.33, -0.167 .. 0.167, error 6.8e-11 */
     const int32_t turn_1_scaled_z = -d2_z
-        + dcm_rk2_2_q31_narrow_(dcm_rk2_2_q31_mul_(d1_z, INT32_C(1431655765) /* 1/3 in Q32 */)
+        + dcm_rk2_2_q31_fit(dcm_rk2_2_q31_mul(d1_z, INT32_C(1431655765) /* 1/3 in Q32 */)
         + (INT64_C(1) << 31), 32); /* Q-2.33, -0.167 .. 0.167, error 6.8e-11 */
     /* the angle increment of the whole step */
     const int64_t sigma_x = (int64_t)d1_x + (int64_t)d2_x; /* Q30.33, -0.25 .. 0.25, exact */
@@ -120,137 +121,122 @@ int dcm_rk2_2_q31(const int32_t state[9], const int32_t increments[6], int32_t n
     const int64_t skew_y = sigma_y; /* Q30.33, -0.25 .. 0.25, exact */
     const int64_t skew_z = sigma_z; /* Q30.33, -0.25 .. 0.25, exact */
     /* left of turn_0_scaled in an outer product */
-    const int32_t partner_left_x = dcm_rk2_2_q31_narrow_(-dcm_rk2_2_q31_mul_(turn_1_scaled_x, 9)
+    const int32_t partner_left_x = dcm_rk2_2_q31_fit(-dcm_rk2_2_q31_mul(turn_1_scaled_x, 9)
         + 4, 3); /* Q0.31, -0.751 .. 0.751, error 5.4e-10 */
-    const int32_t partner_left_y = dcm_rk2_2_q31_narrow_(-dcm_rk2_2_q31_mul_(turn_1_scaled_y, 9)
+    const int32_t partner_left_y = dcm_rk2_2_q31_fit(-dcm_rk2_2_q31_mul(turn_1_scaled_y, 9)
         + 4, 3); /* Q0.31, -0.751 .. 0.751, error 5.4e-10 */
-    const int32_t partner_left_z = dcm_rk2_2_q31_narrow_(-dcm_rk2_2_q31_mul_(turn_1_scaled_z, 9)
+    const int32_t partner_left_z = dcm_rk2_2_q31_fit(-dcm_rk2_2_q31_mul(turn_1_scaled_z, 9)
         + 4, 3); /* Q0.31, -0.751 .. 0.751, error 5.4e-10 */
-    const int32_t turn_0_scaled_dot_turn_1_scaled =
-        dcm_rk2_2_q31_narrow_(dcm_rk2_2_q31_mul_(turn_0_scaled_x, turn_1_scaled_x)
-        + dcm_rk2_2_q31_mul_(turn_0_scaled_y, turn_1_scaled_y)
-        + dcm_rk2_2_q31_mul_(turn_0_scaled_z, turn_1_scaled_z) + (INT64_C(1) << 31), 32);
+    const int32_t turn_0_scaled_dot_turn_1_scaled = dcm_rk2_2_q31_fit(dcm_rk2_2_q31_mul(
+        turn_0_scaled_x, turn_1_scaled_x)
+        + dcm_rk2_2_q31_mul(turn_0_scaled_y, turn_1_scaled_y)
+        + dcm_rk2_2_q31_mul(turn_0_scaled_z, turn_1_scaled_z) + (INT64_C(1) << 31), 32);
         /* Q-3.34, -0.0521 .. 0.0834, error 9.8e-11 */
     /* multiple of the unit matrix */
-    const int64_t diagonal = dcm_rk2_2_q31_mul_(turn_0_scaled_dot_turn_1_scaled, 9);
+    const int64_t diagonal = dcm_rk2_2_q31_mul(turn_0_scaled_dot_turn_1_scaled, 9);
         /* Q28.35, -0.235 .. 0.376, error 4.4e-10; stands for diagonal - 1 */
     const int32_t A_11 = (INT32_C(1) << 30)
-        + dcm_rk2_2_q31_narrow_(dcm_rk2_2_q31_shr_(dcm_rk2_2_q31_mul_(partner_left_x, turn_0_scaled_x), 1)
-        + diagonal * (INT32_C(1) << 28) + (INT64_C(1) << 32), 33);
+        + dcm_rk2_2_q31_fit(dcm_rk2_2_q31_shr(dcm_rk2_2_q31_mul(partner_left_x,
+        turn_0_scaled_x), 1) + diagonal * (INT32_C(1) << 28) + (INT64_C(1) << 32), 33);
         /* Q1.30, 0.843 .. 1.26, error 1.1e-09 */
     const int32_t A_22 = (INT32_C(1) << 30)
-        + dcm_rk2_2_q31_narrow_(dcm_rk2_2_q31_shr_(dcm_rk2_2_q31_mul_(partner_left_y, turn_0_scaled_y), 1)
-        + diagonal * (INT32_C(1) << 28) + (INT64_C(1) << 32), 33);
+        + dcm_rk2_2_q31_fit(dcm_rk2_2_q31_shr(dcm_rk2_2_q31_mul(partner_left_y,
+        turn_0_scaled_y), 1) + diagonal * (INT32_C(1) << 28) + (INT64_C(1) << 32), 33);
         /* Q1.30, 0.843 .. 1.26, error 1.1e-09 */
     const int32_t A_33 = (INT32_C(1) << 30)
-        + dcm_rk2_2_q31_narrow_(dcm_rk2_2_q31_shr_(dcm_rk2_2_q31_mul_(partner_left_z, turn_0_scaled_z), 1)
-        + diagonal * (INT32_C(1) << 28) + (INT64_C(1) << 32), 33);
+        + dcm_rk2_2_q31_fit(dcm_rk2_2_q31_shr(dcm_rk2_2_q31_mul(partner_left_z,
+        turn_0_scaled_z), 1) + diagonal * (INT32_C(1) << 28) + (INT64_C(1) << 32), 33);
         /* Q1.30, 0.843 .. 1.26, error 1.1e-09 */
-    const int32_t A_12 =
-        dcm_rk2_2_q31_narrow_(dcm_rk2_2_q31_mul_(partner_left_x, turn_0_scaled_y)
+    const int32_t A_12 = dcm_rk2_2_q31_fit(dcm_rk2_2_q31_mul(partner_left_x, turn_0_scaled_y)
         - skew_z * (INT64_C(1) << 31) + (INT64_C(1) << 33), 34);
         /* Q1.30, -0.376 .. 0.376, error 6.1e-10 */
-    const int32_t A_21 =
-        dcm_rk2_2_q31_narrow_(dcm_rk2_2_q31_mul_(partner_left_y, turn_0_scaled_x)
+    const int32_t A_21 = dcm_rk2_2_q31_fit(dcm_rk2_2_q31_mul(partner_left_y, turn_0_scaled_x)
         + skew_z * (INT64_C(1) << 31) + (INT64_C(1) << 33), 34);
         /* Q1.30, -0.376 .. 0.376, error 6.1e-10 */
-    const int32_t A_23 =
-        dcm_rk2_2_q31_narrow_(dcm_rk2_2_q31_mul_(partner_left_y, turn_0_scaled_z)
+    const int32_t A_23 = dcm_rk2_2_q31_fit(dcm_rk2_2_q31_mul(partner_left_y, turn_0_scaled_z)
         - skew_x * (INT64_C(1) << 31) + (INT64_C(1) << 33), 34);
         /* Q1.30, -0.376 .. 0.376, error 6.1e-10 */
-    const int32_t A_32 =
-        dcm_rk2_2_q31_narrow_(dcm_rk2_2_q31_mul_(partner_left_z, turn_0_scaled_y)
+    const int32_t A_32 = dcm_rk2_2_q31_fit(dcm_rk2_2_q31_mul(partner_left_z, turn_0_scaled_y)
         + skew_x * (INT64_C(1) << 31) + (INT64_C(1) << 33), 34);
         /* Q1.30, -0.376 .. 0.376, error 6.1e-10 */
-    const int32_t A_31 =
-        dcm_rk2_2_q31_narrow_(dcm_rk2_2_q31_mul_(partner_left_z, turn_0_scaled_x)
+    const int32_t A_31 = dcm_rk2_2_q31_fit(dcm_rk2_2_q31_mul(partner_left_z, turn_0_scaled_x)
         - skew_y * (INT64_C(1) << 31) + (INT64_C(1) << 33), 34);
         /* Q1.30, -0.376 .. 0.376, error 6.1e-10 */
-    const int32_t A_13 =
-        dcm_rk2_2_q31_narrow_(dcm_rk2_2_q31_mul_(partner_left_x, turn_0_scaled_z)
+    const int32_t A_13 = dcm_rk2_2_q31_fit(dcm_rk2_2_q31_mul(partner_left_x, turn_0_scaled_z)
         + skew_y * (INT64_C(1) << 31) + (INT64_C(1) << 33), 34);
         /* Q1.30, -0.376 .. 0.376, error 6.1e-10 */
     /* direction cosine matrix, body to reference, after the step */
-    const int64_t next_11_unchecked = dcm_rk2_2_q31_shr_(dcm_rk2_2_q31_mul_(A_11, C_11)
-        + dcm_rk2_2_q31_mul_(A_21, C_12) + dcm_rk2_2_q31_mul_(A_31, C_13)
+    const int64_t next_11_raw = dcm_rk2_2_q31_shr(dcm_rk2_2_q31_mul(A_11, C_11)
+        + dcm_rk2_2_q31_mul(A_21, C_12) + dcm_rk2_2_q31_mul(A_31, C_13)
         + (INT32_C(1) << 29), 30);
-    if ((next_11_unchecked < (-INT32_C(1140850688)))
-        || (next_11_unchecked > INT32_C(1140850688))) {
+    if ((next_11_raw < (-INT32_C(1140850688))) || (next_11_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_11 = dcm_rk2_2_q31_narrow_(next_11_unchecked, 0);
+    const int32_t next_11 = dcm_rk2_2_q31_fit(next_11_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 2.9e-09 */
-    const int64_t next_12_unchecked = dcm_rk2_2_q31_shr_(dcm_rk2_2_q31_mul_(A_12, C_11)
-        + dcm_rk2_2_q31_mul_(A_22, C_12) + dcm_rk2_2_q31_mul_(A_32, C_13)
+    const int64_t next_12_raw = dcm_rk2_2_q31_shr(dcm_rk2_2_q31_mul(A_12, C_11)
+        + dcm_rk2_2_q31_mul(A_22, C_12) + dcm_rk2_2_q31_mul(A_32, C_13)
         + (INT32_C(1) << 29), 30);
-    if ((next_12_unchecked < (-INT32_C(1140850688)))
-        || (next_12_unchecked > INT32_C(1140850688))) {
+    if ((next_12_raw < (-INT32_C(1140850688))) || (next_12_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_12 = dcm_rk2_2_q31_narrow_(next_12_unchecked, 0);
+    const int32_t next_12 = dcm_rk2_2_q31_fit(next_12_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 2.9e-09 */
-    const int64_t next_13_unchecked = dcm_rk2_2_q31_shr_(dcm_rk2_2_q31_mul_(A_13, C_11)
-        + dcm_rk2_2_q31_mul_(A_23, C_12) + dcm_rk2_2_q31_mul_(A_33, C_13)
+    const int64_t next_13_raw = dcm_rk2_2_q31_shr(dcm_rk2_2_q31_mul(A_13, C_11)
+        + dcm_rk2_2_q31_mul(A_23, C_12) + dcm_rk2_2_q31_mul(A_33, C_13)
         + (INT32_C(1) << 29), 30);
-    if ((next_13_unchecked < (-INT32_C(1140850688)))
-        || (next_13_unchecked > INT32_C(1140850688))) {
+    if ((next_13_raw < (-INT32_C(1140850688))) || (next_13_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_13 = dcm_rk2_2_q31_narrow_(next_13_unchecked, 0);
+    const int32_t next_13 = dcm_rk2_2_q31_fit(next_13_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 2.9e-09 */
-    const int64_t next_21_unchecked = dcm_rk2_2_q31_shr_(dcm_rk2_2_q31_mul_(A_11, C_21)
-        + dcm_rk2_2_q31_mul_(A_21, C_22) + dcm_rk2_2_q31_mul_(A_31, C_23)
+    const int64_t next_21_raw = dcm_rk2_2_q31_shr(dcm_rk2_2_q31_mul(A_11, C_21)
+        + dcm_rk2_2_q31_mul(A_21, C_22) + dcm_rk2_2_q31_mul(A_31, C_23)
         + (INT32_C(1) << 29), 30);
-    if ((next_21_unchecked < (-INT32_C(1140850688)))
-        || (next_21_unchecked > INT32_C(1140850688))) {
+    if ((next_21_raw < (-INT32_C(1140850688))) || (next_21_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_21 = dcm_rk2_2_q31_narrow_(next_21_unchecked, 0);
+    const int32_t next_21 = dcm_rk2_2_q31_fit(next_21_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 2.9e-09 */
-    const int64_t next_22_unchecked = dcm_rk2_2_q31_shr_(dcm_rk2_2_q31_mul_(A_12, C_21)
-        + dcm_rk2_2_q31_mul_(A_22, C_22) + dcm_rk2_2_q31_mul_(A_32, C_23)
+    const int64_t next_22_raw = dcm_rk2_2_q31_shr(dcm_rk2_2_q31_mul(A_12, C_21)
+        + dcm_rk2_2_q31_mul(A_22, C_22) + dcm_rk2_2_q31_mul(A_32, C_23)
         + (INT32_C(1) << 29), 30);
-    if ((next_22_unchecked < (-INT32_C(1140850688)))
-        || (next_22_unchecked > INT32_C(1140850688))) {
+    if ((next_22_raw < (-INT32_C(1140850688))) || (next_22_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_22 = dcm_rk2_2_q31_narrow_(next_22_unchecked, 0);
+    const int32_t next_22 = dcm_rk2_2_q31_fit(next_22_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 2.9e-09 */
-    const int64_t next_23_unchecked = dcm_rk2_2_q31_shr_(dcm_rk2_2_q31_mul_(A_13, C_21)
-        + dcm_rk2_2_q31_mul_(A_23, C_22) + dcm_rk2_2_q31_mul_(A_33, C_23)
+    const int64_t next_23_raw = dcm_rk2_2_q31_shr(dcm_rk2_2_q31_mul(A_13, C_21)
+        + dcm_rk2_2_q31_mul(A_23, C_22) + dcm_rk2_2_q31_mul(A_33, C_23)
         + (INT32_C(1) << 29), 30);
-    if ((next_23_unchecked < (-INT32_C(1140850688)))
-        || (next_23_unchecked > INT32_C(1140850688))) {
+    if ((next_23_raw < (-INT32_C(1140850688))) || (next_23_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_23 = dcm_rk2_2_q31_narrow_(next_23_unchecked, 0);
+    const int32_t next_23 = dcm_rk2_2_q31_fit(next_23_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 2.9e-09 */
-    const int64_t next_31_unchecked = dcm_rk2_2_q31_shr_(dcm_rk2_2_q31_mul_(A_11, C_31)
-        + dcm_rk2_2_q31_mul_(A_21, C_32) + dcm_rk2_2_q31_mul_(A_31, C_33)
+    const int64_t next_31_raw = dcm_rk2_2_q31_shr(dcm_rk2_2_q31_mul(A_11, C_31)
+        + dcm_rk2_2_q31_mul(A_21, C_32) + dcm_rk2_2_q31_mul(A_31, C_33)
         + (INT32_C(1) << 29), 30);
-    if ((next_31_unchecked < (-INT32_C(1140850688)))
-        || (next_31_unchecked > INT32_C(1140850688))) {
+    if ((next_31_raw < (-INT32_C(1140850688))) || (next_31_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_31 = dcm_rk2_2_q31_narrow_(next_31_unchecked, 0);
+    const int32_t next_31 = dcm_rk2_2_q31_fit(next_31_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 2.9e-09 */
-    const int64_t next_32_unchecked = dcm_rk2_2_q31_shr_(dcm_rk2_2_q31_mul_(A_12, C_31)
-        + dcm_rk2_2_q31_mul_(A_22, C_32) + dcm_rk2_2_q31_mul_(A_32, C_33)
+    const int64_t next_32_raw = dcm_rk2_2_q31_shr(dcm_rk2_2_q31_mul(A_12, C_31)
+        + dcm_rk2_2_q31_mul(A_22, C_32) + dcm_rk2_2_q31_mul(A_32, C_33)
         + (INT32_C(1) << 29), 30);
-    if ((next_32_unchecked < (-INT32_C(1140850688)))
-        || (next_32_unchecked > INT32_C(1140850688))) {
+    if ((next_32_raw < (-INT32_C(1140850688))) || (next_32_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_32 = dcm_rk2_2_q31_narrow_(next_32_unchecked, 0);
+    const int32_t next_32 = dcm_rk2_2_q31_fit(next_32_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 2.9e-09 */
-    const int64_t next_33_unchecked = dcm_rk2_2_q31_shr_(dcm_rk2_2_q31_mul_(A_13, C_31)
-        + dcm_rk2_2_q31_mul_(A_23, C_32) + dcm_rk2_2_q31_mul_(A_33, C_33)
+    const int64_t next_33_raw = dcm_rk2_2_q31_shr(dcm_rk2_2_q31_mul(A_13, C_31)
+        + dcm_rk2_2_q31_mul(A_23, C_32) + dcm_rk2_2_q31_mul(A_33, C_33)
         + (INT32_C(1) << 29), 30);
-    if ((next_33_unchecked < (-INT32_C(1140850688)))
-        || (next_33_unchecked > INT32_C(1140850688))) {
+    if ((next_33_raw < (-INT32_C(1140850688))) || (next_33_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_33 = dcm_rk2_2_q31_narrow_(next_33_unchecked, 0);
+    const int32_t next_33 = dcm_rk2_2_q31_fit(next_33_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 2.9e-09 */
     next[0] = next_11;
     next[1] = next_12;

@@ -6,7 +6,7 @@
 #include "dcm_rk3_2_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int dcm_rk3_2_q31_out_(int32_t x, int32_t limit)
+static inline int dcm_rk3_2_q31_out(int32_t x, int32_t limit)
 {
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
@@ -14,7 +14,7 @@ static inline int dcm_rk3_2_q31_out_(int32_t x, int32_t limit)
 /* The exact product of two words. */
 #if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
 /* These processors have no instruction for it: the high word takes four products of half words. */
-static __attribute__((noinline)) int64_t dcm_rk3_2_q31_mul_(int32_t a, int32_t b)
+static __attribute__((noinline)) int64_t dcm_rk3_2_q31_mul(int32_t a, int32_t b)
 {
     const uint32_t a_low = (uint32_t)a & 0xFFFFu;
     const uint32_t b_low = (uint32_t)b & 0xFFFFu;
@@ -29,7 +29,7 @@ static __attribute__((noinline)) int64_t dcm_rk3_2_q31_mul_(int32_t a, int32_t b
     return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
 }
 #else
-static inline int64_t dcm_rk3_2_q31_mul_(int32_t a, int32_t b)
+static inline int64_t dcm_rk3_2_q31_mul(int32_t a, int32_t b)
 {
     return (int64_t)a * (int64_t)b;
 }
@@ -40,7 +40,7 @@ static inline int64_t dcm_rk3_2_q31_mul_(int32_t a, int32_t b)
  * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
  * number and no conversion of a number out of range.
  */
-static inline int32_t dcm_rk3_2_q31_narrow_(int64_t x, int n)
+static inline int32_t dcm_rk3_2_q31_fit(int64_t x, int n)
 {
 #ifdef __FRAMAC__
     return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
@@ -54,7 +54,7 @@ static inline int32_t dcm_rk3_2_q31_narrow_(int64_t x, int n)
 }
 
 /* x / 2^n, rounded down, as a wide number. */
-static inline int64_t dcm_rk3_2_q31_shr_(int64_t x, int n)
+static inline int64_t dcm_rk3_2_q31_shr(int64_t x, int n)
 {
     return (x < 0) ? ~(~x >> n) : (x >> n);
 }
@@ -76,22 +76,23 @@ int dcm_rk3_2_q31(const int32_t state[9], const int32_t increments[6], int32_t n
     const int32_t d2_x = increments[3];
     const int32_t d2_y = increments[4];
     const int32_t d2_z = increments[5];
-    if (dcm_rk3_2_q31_out_(C_11, INT32_C(1140850688))
-        || dcm_rk3_2_q31_out_(C_12, INT32_C(1140850688))
-        || dcm_rk3_2_q31_out_(C_13, INT32_C(1140850688))
-        || dcm_rk3_2_q31_out_(C_21, INT32_C(1140850688))
-        || dcm_rk3_2_q31_out_(C_22, INT32_C(1140850688))
-        || dcm_rk3_2_q31_out_(C_23, INT32_C(1140850688))
-        || dcm_rk3_2_q31_out_(C_31, INT32_C(1140850688))
-        || dcm_rk3_2_q31_out_(C_32, INT32_C(1140850688))
-        || dcm_rk3_2_q31_out_(C_33, INT32_C(1140850688))
-        || dcm_rk3_2_q31_out_(d1_x, (INT32_C(1) << 29))
-        || dcm_rk3_2_q31_out_(d1_y, (INT32_C(1) << 29))
-        || dcm_rk3_2_q31_out_(d1_z, (INT32_C(1) << 29))
-        || dcm_rk3_2_q31_out_(d2_x, (INT32_C(1) << 29))
-        || dcm_rk3_2_q31_out_(d2_y, (INT32_C(1) << 29))
-        || dcm_rk3_2_q31_out_(d2_z, (INT32_C(1) << 29)))
+    if (dcm_rk3_2_q31_out(C_11, INT32_C(1140850688))
+        || dcm_rk3_2_q31_out(C_12, INT32_C(1140850688))
+        || dcm_rk3_2_q31_out(C_13, INT32_C(1140850688))
+        || dcm_rk3_2_q31_out(C_21, INT32_C(1140850688))
+        || dcm_rk3_2_q31_out(C_22, INT32_C(1140850688))
+        || dcm_rk3_2_q31_out(C_23, INT32_C(1140850688))
+        || dcm_rk3_2_q31_out(C_31, INT32_C(1140850688))
+        || dcm_rk3_2_q31_out(C_32, INT32_C(1140850688))
+        || dcm_rk3_2_q31_out(C_33, INT32_C(1140850688))
+        || dcm_rk3_2_q31_out(d1_x, (INT32_C(1) << 29))
+        || dcm_rk3_2_q31_out(d1_y, (INT32_C(1) << 29))
+        || dcm_rk3_2_q31_out(d1_z, (INT32_C(1) << 29))
+        || dcm_rk3_2_q31_out(d2_x, (INT32_C(1) << 29))
+        || dcm_rk3_2_q31_out(d2_y, (INT32_C(1) << 29))
+        || dcm_rk3_2_q31_out(d2_z, (INT32_C(1) << 29))) {
         return 1;
+    }
     /* the angle increment of the whole step */
     const int32_t sigma_x = d1_x + d2_x; /* Q-1.32, -0.25 .. 0.25, exact */
     const int32_t sigma_y = d1_y + d2_y; /* Q-1.32, -0.25 .. 0.25, exact */
@@ -100,201 +101,185 @@ int dcm_rk3_2_q31(const int32_t state[9], const int32_t increments[6], int32_t n
     const int32_t delta_x = d1_x - d2_x; /* Q-1.32, -0.25 .. 0.25, exact */
     const int32_t delta_y = d1_y - d2_y; /* Q-1.32, -0.25 .. 0.25, exact */
     const int32_t delta_z = d1_z - d2_z; /* Q-1.32, -0.25 .. 0.25, exact */
-    const int32_t delta_cross_sigma_x =
-        dcm_rk3_2_q31_narrow_(dcm_rk3_2_q31_mul_(delta_y, sigma_z)
-        - dcm_rk3_2_q31_mul_(delta_z, sigma_y) + (INT32_C(1) << 29), 30);
+    const int32_t delta_cross_sigma_x = dcm_rk3_2_q31_fit(dcm_rk3_2_q31_mul(delta_y, sigma_z)
+        - dcm_rk3_2_q31_mul(delta_z, sigma_y) + (INT32_C(1) << 29), 30);
         /* Q-3.34, -0.0626 .. 0.0626, error 3e-11 */
-    const int32_t delta_cross_sigma_y =
-        dcm_rk3_2_q31_narrow_(dcm_rk3_2_q31_mul_(delta_z, sigma_x)
-        - dcm_rk3_2_q31_mul_(delta_x, sigma_z) + (INT32_C(1) << 29), 30);
+    const int32_t delta_cross_sigma_y = dcm_rk3_2_q31_fit(dcm_rk3_2_q31_mul(delta_z, sigma_x)
+        - dcm_rk3_2_q31_mul(delta_x, sigma_z) + (INT32_C(1) << 29), 30);
         /* Q-3.34, -0.0626 .. 0.0626, error 3e-11 */
-    const int32_t delta_cross_sigma_z =
-        dcm_rk3_2_q31_narrow_(dcm_rk3_2_q31_mul_(delta_x, sigma_y)
-        - dcm_rk3_2_q31_mul_(delta_y, sigma_x) + (INT32_C(1) << 29), 30);
+    const int32_t delta_cross_sigma_z = dcm_rk3_2_q31_fit(dcm_rk3_2_q31_mul(delta_x, sigma_y)
+        - dcm_rk3_2_q31_mul(delta_y, sigma_x) + (INT32_C(1) << 29), 30);
         /* Q-3.34, -0.0626 .. 0.0626, error 3e-11 */
-    const int32_t sigma_dot_sigma = dcm_rk3_2_q31_narrow_(dcm_rk3_2_q31_mul_(sigma_x, sigma_x)
-        + dcm_rk3_2_q31_mul_(sigma_y, sigma_y) + dcm_rk3_2_q31_mul_(sigma_z, sigma_z)
+    const int32_t sigma_dot_sigma = dcm_rk3_2_q31_fit(dcm_rk3_2_q31_mul(sigma_x, sigma_x)
+        + dcm_rk3_2_q31_mul(sigma_y, sigma_y) + dcm_rk3_2_q31_mul(sigma_z, sigma_z)
         + (INT32_C(1) << 30), 31); /* Q-2.33, -1.17e-10 .. 0.188, error 5.9e-11 */
     /* weight of sigma in skew */
-    const int32_t skew_sigma =
-        dcm_rk3_2_q31_narrow_(-dcm_rk3_2_q31_mul_(sigma_dot_sigma, INT32_C(1431655765) /* 1/6 in Q33 */)
-        + (INT32_C(1) << 30), 31);
+    const int32_t skew_sigma = dcm_rk3_2_q31_fit(-dcm_rk3_2_q31_mul(sigma_dot_sigma,
+        INT32_C(1431655765) /* 1/6 in Q33 */) + (INT32_C(1) << 30), 31);
         /* Q-4.35, -0.0313 .. 5.83e-11, error 3.2e-11; stands for skew_sigma - 1 */
-    const int32_t sigma_dot_delta = dcm_rk3_2_q31_narrow_(dcm_rk3_2_q31_mul_(delta_x, sigma_x)
-        + dcm_rk3_2_q31_mul_(delta_y, sigma_y) + dcm_rk3_2_q31_mul_(delta_z, sigma_z)
+    const int32_t sigma_dot_delta = dcm_rk3_2_q31_fit(dcm_rk3_2_q31_mul(delta_x, sigma_x)
+        + dcm_rk3_2_q31_mul(delta_y, sigma_y) + dcm_rk3_2_q31_mul(delta_z, sigma_z)
         + (INT32_C(1) << 28), 29); /* Q-4.35, -0.0469 .. 0.0469, error 1.5e-11 */
     /* weight of delta in skew */
-    const int32_t skew_delta =
-        dcm_rk3_2_q31_narrow_(dcm_rk3_2_q31_mul_(sigma_dot_delta, INT32_C(1431655765) /* 2/3 in Q31 */)
-        + (INT32_C(1) << 30), 31); /* Q-4.35, -0.0313 .. 0.0313, error 3.2e-11 */
-    const int64_t shared_1 =
-        dcm_rk3_2_q31_mul_(delta_cross_sigma_x, INT32_C(1431655765) /* 1/3 in Q32 */);
-        /* Q-3.66, -0.0209 .. 0.0209, error 1.5e-11 */
+    const int32_t skew_delta = dcm_rk3_2_q31_fit(dcm_rk3_2_q31_mul(sigma_dot_delta,
+        INT32_C(1431655765) /* 2/3 in Q31 */) + (INT32_C(1) << 30), 31);
+        /* Q-4.35, -0.0313 .. 0.0313, error 3.2e-11 */
+    const int64_t shared_1 = dcm_rk3_2_q31_mul(delta_cross_sigma_x,
+        INT32_C(1431655765) /* 1/3 in Q32 */); /* Q-3.66, -0.0209 .. 0.0209, error 1.5e-11 */
     /* vector of the skew part */
     const int64_t skew_x = (int64_t)sigma_x * (INT64_C(1) << 32)
-        + dcm_rk3_2_q31_shr_(dcm_rk3_2_q31_mul_(sigma_x, skew_sigma), 3)
-        + dcm_rk3_2_q31_shr_(dcm_rk3_2_q31_mul_(delta_x, skew_delta), 3)
-        + dcm_rk3_2_q31_shr_(shared_1, 2); /* Q-1.64, -0.287 .. 0.287, error 3.1e-11 */
-    const int64_t shared_2 =
-        dcm_rk3_2_q31_mul_(delta_cross_sigma_y, INT32_C(1431655765) /* 1/3 in Q32 */);
-        /* Q-3.66, -0.0209 .. 0.0209, error 1.5e-11 */
+        + dcm_rk3_2_q31_shr(dcm_rk3_2_q31_mul(sigma_x, skew_sigma), 3)
+        + dcm_rk3_2_q31_shr(dcm_rk3_2_q31_mul(delta_x, skew_delta), 3)
+        + dcm_rk3_2_q31_shr(shared_1, 2); /* Q-1.64, -0.287 .. 0.287, error 3.1e-11 */
+    const int64_t shared_2 = dcm_rk3_2_q31_mul(delta_cross_sigma_y,
+        INT32_C(1431655765) /* 1/3 in Q32 */); /* Q-3.66, -0.0209 .. 0.0209, error 1.5e-11 */
     const int64_t skew_y = (int64_t)sigma_y * (INT64_C(1) << 32)
-        + dcm_rk3_2_q31_shr_(dcm_rk3_2_q31_mul_(sigma_y, skew_sigma), 3)
-        + dcm_rk3_2_q31_shr_(dcm_rk3_2_q31_mul_(delta_y, skew_delta), 3)
-        + dcm_rk3_2_q31_shr_(shared_2, 2); /* Q-1.64, -0.287 .. 0.287, error 3.1e-11 */
-    const int64_t shared_3 =
-        dcm_rk3_2_q31_mul_(delta_cross_sigma_z, INT32_C(1431655765) /* 1/3 in Q32 */);
-        /* Q-3.66, -0.0209 .. 0.0209, error 1.5e-11 */
+        + dcm_rk3_2_q31_shr(dcm_rk3_2_q31_mul(sigma_y, skew_sigma), 3)
+        + dcm_rk3_2_q31_shr(dcm_rk3_2_q31_mul(delta_y, skew_delta), 3)
+        + dcm_rk3_2_q31_shr(shared_2, 2); /* Q-1.64, -0.287 .. 0.287, error 3.1e-11 */
+    const int64_t shared_3 = dcm_rk3_2_q31_mul(delta_cross_sigma_z,
+        INT32_C(1431655765) /* 1/3 in Q32 */); /* Q-3.66, -0.0209 .. 0.0209, error 1.5e-11 */
     const int64_t skew_z = (int64_t)sigma_z * (INT64_C(1) << 32)
-        + dcm_rk3_2_q31_shr_(dcm_rk3_2_q31_mul_(sigma_z, skew_sigma), 3)
-        + dcm_rk3_2_q31_shr_(dcm_rk3_2_q31_mul_(delta_z, skew_delta), 3)
-        + dcm_rk3_2_q31_shr_(shared_3, 2); /* Q-1.64, -0.287 .. 0.287, error 3.1e-11 */
+        + dcm_rk3_2_q31_shr(dcm_rk3_2_q31_mul(sigma_z, skew_sigma), 3)
+        + dcm_rk3_2_q31_shr(dcm_rk3_2_q31_mul(delta_z, skew_delta), 3)
+        + dcm_rk3_2_q31_shr(shared_3, 2); /* Q-1.64, -0.287 .. 0.287, error 3.1e-11 */
     /* of sigma in outer products */
-    const int32_t partner_sigma_x = sigma_x + dcm_rk3_2_q31_narrow_(shared_1
+    const int32_t partner_sigma_x = sigma_x + dcm_rk3_2_q31_fit(shared_1
         + (INT64_C(1) << 31), 32); /* Q-3.34, -0.0834 .. 0.0834, error 4.4e-11 */
-    const int32_t partner_sigma_y = sigma_y + dcm_rk3_2_q31_narrow_(shared_2
+    const int32_t partner_sigma_y = sigma_y + dcm_rk3_2_q31_fit(shared_2
         + (INT64_C(1) << 31), 32); /* Q-3.34, -0.0834 .. 0.0834, error 4.4e-11 */
-    const int32_t partner_sigma_z = sigma_z + dcm_rk3_2_q31_narrow_(shared_3
+    const int32_t partner_sigma_z = sigma_z + dcm_rk3_2_q31_fit(shared_3
         + (INT64_C(1) << 31), 32); /* Q-3.34, -0.0834 .. 0.0834, error 4.4e-11 */
     /* of delta in outer products */
-    const int32_t partner_delta_x =
-        dcm_rk3_2_q31_narrow_(dcm_rk3_2_q31_mul_(delta_x, INT32_C(1431655765) /* 2/3 in Q31 */)
-        + (INT32_C(1) << 29), 30); /* Q-2.33, -0.167 .. 0.167, error 9.8e-11 */
-    const int32_t partner_delta_y =
-        dcm_rk3_2_q31_narrow_(dcm_rk3_2_q31_mul_(delta_y, INT32_C(1431655765) /* 2/3 in Q31 */)
-        + (INT32_C(1) << 29), 30); /* Q-2.33, -0.167 .. 0.167, error 9.8e-11 */
-    const int32_t partner_delta_z =
-        dcm_rk3_2_q31_narrow_(dcm_rk3_2_q31_mul_(delta_z, INT32_C(1431655765) /* 2/3 in Q31 */)
-        + (INT32_C(1) << 29), 30); /* Q-2.33, -0.167 .. 0.167, error 9.8e-11 */
-    const int32_t delta_dot_delta = dcm_rk3_2_q31_narrow_(dcm_rk3_2_q31_mul_(delta_x, delta_x)
-        + dcm_rk3_2_q31_mul_(delta_y, delta_y) + dcm_rk3_2_q31_mul_(delta_z, delta_z)
+    const int32_t partner_delta_x = dcm_rk3_2_q31_fit(dcm_rk3_2_q31_mul(delta_x,
+        INT32_C(1431655765) /* 2/3 in Q31 */) + (INT32_C(1) << 29), 30);
+        /* Q-2.33, -0.167 .. 0.167, error 9.8e-11 */
+    const int32_t partner_delta_y = dcm_rk3_2_q31_fit(dcm_rk3_2_q31_mul(delta_y,
+        INT32_C(1431655765) /* 2/3 in Q31 */) + (INT32_C(1) << 29), 30);
+        /* Q-2.33, -0.167 .. 0.167, error 9.8e-11 */
+    const int32_t partner_delta_z = dcm_rk3_2_q31_fit(dcm_rk3_2_q31_mul(delta_z,
+        INT32_C(1431655765) /* 2/3 in Q31 */) + (INT32_C(1) << 29), 30);
+        /* Q-2.33, -0.167 .. 0.167, error 9.8e-11 */
+    const int32_t delta_dot_delta = dcm_rk3_2_q31_fit(dcm_rk3_2_q31_mul(delta_x, delta_x)
+        + dcm_rk3_2_q31_mul(delta_y, delta_y) + dcm_rk3_2_q31_mul(delta_z, delta_z)
         + (INT32_C(1) << 30), 31); /* Q-2.33, -1.17e-10 .. 0.188, error 5.9e-11 */
     /* multiple of the unit matrix */
-    const int64_t diagonal =
-        -dcm_rk3_2_q31_mul_(delta_dot_delta, INT32_C(1431655765) /* 2/3 in Q31 */)
+    const int64_t diagonal = -dcm_rk3_2_q31_mul(delta_dot_delta,
+        INT32_C(1431655765) /* 2/3 in Q31 */)
         - (int64_t)sigma_dot_sigma * (INT32_C(1) << 30);
         /* Q-1.64, -0.126 .. 9.71e-11, error 9.8e-11; stands for diagonal - 1 */
     /* half of u y' + y u' on the diagonal */
-    const int64_t half_xx = dcm_rk3_2_q31_mul_(partner_sigma_x, sigma_x);
+    const int64_t half_xx = dcm_rk3_2_q31_mul(partner_sigma_x, sigma_x);
         /* Q-3.66, -0.0209 .. 0.0209, error 1.1e-11 */
-    const int32_t A_11 = dcm_rk3_2_q31_narrow_(dcm_rk3_2_q31_mul_(delta_x, partner_delta_x)
-        + half_xx + diagonal * 2 + (INT64_C(1) << 32), 33);
+    const int32_t A_11 = dcm_rk3_2_q31_fit(dcm_rk3_2_q31_mul(delta_x, partner_delta_x) + half_xx
+        + diagonal * 2 + (INT64_C(1) << 32), 33);
         /* Q-1.32, -0.209 .. 0.0834, error 2.6e-10; stands for A_11 - 1 */
-    const int64_t half_yy = dcm_rk3_2_q31_mul_(partner_sigma_y, sigma_y);
+    const int64_t half_yy = dcm_rk3_2_q31_mul(partner_sigma_y, sigma_y);
         /* Q-3.66, -0.0209 .. 0.0209, error 1.1e-11 */
-    const int32_t A_22 = dcm_rk3_2_q31_narrow_(dcm_rk3_2_q31_mul_(delta_y, partner_delta_y)
-        + half_yy + diagonal * 2 + (INT64_C(1) << 32), 33);
+    const int32_t A_22 = dcm_rk3_2_q31_fit(dcm_rk3_2_q31_mul(delta_y, partner_delta_y) + half_yy
+        + diagonal * 2 + (INT64_C(1) << 32), 33);
         /* Q-1.32, -0.209 .. 0.0834, error 2.6e-10; stands for A_22 - 1 */
-    const int64_t half_zz = dcm_rk3_2_q31_mul_(partner_sigma_z, sigma_z);
+    const int64_t half_zz = dcm_rk3_2_q31_mul(partner_sigma_z, sigma_z);
         /* Q-3.66, -0.0209 .. 0.0209, error 1.1e-11 */
-    const int32_t A_33 = dcm_rk3_2_q31_narrow_(dcm_rk3_2_q31_mul_(delta_z, partner_delta_z)
-        + half_zz + diagonal * 2 + (INT64_C(1) << 32), 33);
+    const int32_t A_33 = dcm_rk3_2_q31_fit(dcm_rk3_2_q31_mul(delta_z, partner_delta_z) + half_zz
+        + diagonal * 2 + (INT64_C(1) << 32), 33);
         /* Q-1.32, -0.209 .. 0.0834, error 2.6e-10; stands for A_33 - 1 */
-    const int64_t symmetric_xy = dcm_rk3_2_q31_mul_(partner_sigma_y, sigma_x)
-        + dcm_rk3_2_q31_mul_(delta_x, partner_delta_y) * 2
-        + dcm_rk3_2_q31_mul_(partner_sigma_x, sigma_y);
+    const int64_t symmetric_xy = dcm_rk3_2_q31_mul(partner_sigma_y, sigma_x)
+        + dcm_rk3_2_q31_mul(delta_x, partner_delta_y) * 2
+        + dcm_rk3_2_q31_mul(partner_sigma_x, sigma_y);
         /* Q-3.66, -0.0547 .. 0.0547, error 4.7e-11 */
-    const int32_t A_12 = dcm_rk3_2_q31_narrow_(dcm_rk3_2_q31_shr_(symmetric_xy, 2) - skew_z
+    const int32_t A_12 = dcm_rk3_2_q31_fit(dcm_rk3_2_q31_shr(symmetric_xy, 2) - skew_z
         + (INT64_C(1) << 31), 32); /* Q-1.32, -0.342 .. 0.342, error 2e-10 */
-    const int32_t A_21 = dcm_rk3_2_q31_narrow_(dcm_rk3_2_q31_shr_(symmetric_xy, 2) + skew_z
+    const int32_t A_21 = dcm_rk3_2_q31_fit(dcm_rk3_2_q31_shr(symmetric_xy, 2) + skew_z
         + (INT64_C(1) << 31), 32); /* Q-1.32, -0.342 .. 0.342, error 2e-10 */
-    const int64_t symmetric_yz = dcm_rk3_2_q31_mul_(partner_sigma_z, sigma_y)
-        + dcm_rk3_2_q31_mul_(delta_y, partner_delta_z) * 2
-        + dcm_rk3_2_q31_mul_(partner_sigma_y, sigma_z);
+    const int64_t symmetric_yz = dcm_rk3_2_q31_mul(partner_sigma_z, sigma_y)
+        + dcm_rk3_2_q31_mul(delta_y, partner_delta_z) * 2
+        + dcm_rk3_2_q31_mul(partner_sigma_y, sigma_z);
         /* Q-3.66, -0.0586 .. 0.0586, error 4.7e-11 */
-    const int32_t A_23 = dcm_rk3_2_q31_narrow_(dcm_rk3_2_q31_shr_(symmetric_yz, 2) - skew_x
+    const int32_t A_23 = dcm_rk3_2_q31_fit(dcm_rk3_2_q31_shr(symmetric_yz, 2) - skew_x
         + (INT64_C(1) << 31), 32); /* Q-1.32, -0.346 .. 0.346, error 2e-10 */
-    const int32_t A_32 = dcm_rk3_2_q31_narrow_(dcm_rk3_2_q31_shr_(symmetric_yz, 2) + skew_x
+    const int32_t A_32 = dcm_rk3_2_q31_fit(dcm_rk3_2_q31_shr(symmetric_yz, 2) + skew_x
         + (INT64_C(1) << 31), 32); /* Q-1.32, -0.346 .. 0.346, error 2e-10 */
-    const int64_t symmetric_zx = dcm_rk3_2_q31_mul_(partner_sigma_x, sigma_z)
-        + dcm_rk3_2_q31_mul_(delta_z, partner_delta_x) * 2
-        + dcm_rk3_2_q31_mul_(partner_sigma_z, sigma_x);
+    const int64_t symmetric_zx = dcm_rk3_2_q31_mul(partner_sigma_x, sigma_z)
+        + dcm_rk3_2_q31_mul(delta_z, partner_delta_x) * 2
+        + dcm_rk3_2_q31_mul(partner_sigma_z, sigma_x);
         /* Q-3.66, -0.0586 .. 0.0586, error 4.7e-11 */
-    const int32_t A_31 = dcm_rk3_2_q31_narrow_(dcm_rk3_2_q31_shr_(symmetric_zx, 2) - skew_y
+    const int32_t A_31 = dcm_rk3_2_q31_fit(dcm_rk3_2_q31_shr(symmetric_zx, 2) - skew_y
         + (INT64_C(1) << 31), 32); /* Q-1.32, -0.346 .. 0.346, error 2e-10 */
-    const int32_t A_13 = dcm_rk3_2_q31_narrow_(dcm_rk3_2_q31_shr_(symmetric_zx, 2) + skew_y
+    const int32_t A_13 = dcm_rk3_2_q31_fit(dcm_rk3_2_q31_shr(symmetric_zx, 2) + skew_y
         + (INT64_C(1) << 31), 32); /* Q-1.32, -0.346 .. 0.346, error 2e-10 */
     /* direction cosine matrix, body to reference, after the step */
-    const int64_t next_11_unchecked = (int64_t)C_11
-        + dcm_rk3_2_q31_shr_(dcm_rk3_2_q31_mul_(A_11, C_11) + dcm_rk3_2_q31_mul_(A_21, C_12)
-        + dcm_rk3_2_q31_mul_(A_31, C_13) + (INT64_C(1) << 31), 32);
-    if ((next_11_unchecked < (-INT32_C(1140850688)))
-        || (next_11_unchecked > INT32_C(1140850688))) {
+    const int64_t next_11_raw = (int64_t)C_11 + dcm_rk3_2_q31_shr(dcm_rk3_2_q31_mul(A_11, C_11)
+        + dcm_rk3_2_q31_mul(A_21, C_12) + dcm_rk3_2_q31_mul(A_31, C_13)
+        + (INT64_C(1) << 31), 32);
+    if ((next_11_raw < (-INT32_C(1140850688))) || (next_11_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_11 = dcm_rk3_2_q31_narrow_(next_11_unchecked, 0);
+    const int32_t next_11 = dcm_rk3_2_q31_fit(next_11_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 1.2e-09 */
-    const int64_t next_12_unchecked = (int64_t)C_12
-        + dcm_rk3_2_q31_shr_(dcm_rk3_2_q31_mul_(A_12, C_11) + dcm_rk3_2_q31_mul_(A_22, C_12)
-        + dcm_rk3_2_q31_mul_(A_32, C_13) + (INT64_C(1) << 31), 32);
-    if ((next_12_unchecked < (-INT32_C(1140850688)))
-        || (next_12_unchecked > INT32_C(1140850688))) {
+    const int64_t next_12_raw = (int64_t)C_12 + dcm_rk3_2_q31_shr(dcm_rk3_2_q31_mul(A_12, C_11)
+        + dcm_rk3_2_q31_mul(A_22, C_12) + dcm_rk3_2_q31_mul(A_32, C_13)
+        + (INT64_C(1) << 31), 32);
+    if ((next_12_raw < (-INT32_C(1140850688))) || (next_12_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_12 = dcm_rk3_2_q31_narrow_(next_12_unchecked, 0);
+    const int32_t next_12 = dcm_rk3_2_q31_fit(next_12_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 1.2e-09 */
-    const int64_t next_13_unchecked = (int64_t)C_13
-        + dcm_rk3_2_q31_shr_(dcm_rk3_2_q31_mul_(A_13, C_11) + dcm_rk3_2_q31_mul_(A_23, C_12)
-        + dcm_rk3_2_q31_mul_(A_33, C_13) + (INT64_C(1) << 31), 32);
-    if ((next_13_unchecked < (-INT32_C(1140850688)))
-        || (next_13_unchecked > INT32_C(1140850688))) {
+    const int64_t next_13_raw = (int64_t)C_13 + dcm_rk3_2_q31_shr(dcm_rk3_2_q31_mul(A_13, C_11)
+        + dcm_rk3_2_q31_mul(A_23, C_12) + dcm_rk3_2_q31_mul(A_33, C_13)
+        + (INT64_C(1) << 31), 32);
+    if ((next_13_raw < (-INT32_C(1140850688))) || (next_13_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_13 = dcm_rk3_2_q31_narrow_(next_13_unchecked, 0);
+    const int32_t next_13 = dcm_rk3_2_q31_fit(next_13_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 1.2e-09 */
-    const int64_t next_21_unchecked = (int64_t)C_21
-        + dcm_rk3_2_q31_shr_(dcm_rk3_2_q31_mul_(A_11, C_21) + dcm_rk3_2_q31_mul_(A_21, C_22)
-        + dcm_rk3_2_q31_mul_(A_31, C_23) + (INT64_C(1) << 31), 32);
-    if ((next_21_unchecked < (-INT32_C(1140850688)))
-        || (next_21_unchecked > INT32_C(1140850688))) {
+    const int64_t next_21_raw = (int64_t)C_21 + dcm_rk3_2_q31_shr(dcm_rk3_2_q31_mul(A_11, C_21)
+        + dcm_rk3_2_q31_mul(A_21, C_22) + dcm_rk3_2_q31_mul(A_31, C_23)
+        + (INT64_C(1) << 31), 32);
+    if ((next_21_raw < (-INT32_C(1140850688))) || (next_21_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_21 = dcm_rk3_2_q31_narrow_(next_21_unchecked, 0);
+    const int32_t next_21 = dcm_rk3_2_q31_fit(next_21_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 1.2e-09 */
-    const int64_t next_22_unchecked = (int64_t)C_22
-        + dcm_rk3_2_q31_shr_(dcm_rk3_2_q31_mul_(A_12, C_21) + dcm_rk3_2_q31_mul_(A_22, C_22)
-        + dcm_rk3_2_q31_mul_(A_32, C_23) + (INT64_C(1) << 31), 32);
-    if ((next_22_unchecked < (-INT32_C(1140850688)))
-        || (next_22_unchecked > INT32_C(1140850688))) {
+    const int64_t next_22_raw = (int64_t)C_22 + dcm_rk3_2_q31_shr(dcm_rk3_2_q31_mul(A_12, C_21)
+        + dcm_rk3_2_q31_mul(A_22, C_22) + dcm_rk3_2_q31_mul(A_32, C_23)
+        + (INT64_C(1) << 31), 32);
+    if ((next_22_raw < (-INT32_C(1140850688))) || (next_22_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_22 = dcm_rk3_2_q31_narrow_(next_22_unchecked, 0);
+    const int32_t next_22 = dcm_rk3_2_q31_fit(next_22_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 1.2e-09 */
-    const int64_t next_23_unchecked = (int64_t)C_23
-        + dcm_rk3_2_q31_shr_(dcm_rk3_2_q31_mul_(A_13, C_21) + dcm_rk3_2_q31_mul_(A_23, C_22)
-        + dcm_rk3_2_q31_mul_(A_33, C_23) + (INT64_C(1) << 31), 32);
-    if ((next_23_unchecked < (-INT32_C(1140850688)))
-        || (next_23_unchecked > INT32_C(1140850688))) {
+    const int64_t next_23_raw = (int64_t)C_23 + dcm_rk3_2_q31_shr(dcm_rk3_2_q31_mul(A_13, C_21)
+        + dcm_rk3_2_q31_mul(A_23, C_22) + dcm_rk3_2_q31_mul(A_33, C_23)
+        + (INT64_C(1) << 31), 32);
+    if ((next_23_raw < (-INT32_C(1140850688))) || (next_23_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_23 = dcm_rk3_2_q31_narrow_(next_23_unchecked, 0);
+    const int32_t next_23 = dcm_rk3_2_q31_fit(next_23_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 1.2e-09 */
-    const int64_t next_31_unchecked = (int64_t)C_31
-        + dcm_rk3_2_q31_shr_(dcm_rk3_2_q31_mul_(A_11, C_31) + dcm_rk3_2_q31_mul_(A_21, C_32)
-        + dcm_rk3_2_q31_mul_(A_31, C_33) + (INT64_C(1) << 31), 32);
-    if ((next_31_unchecked < (-INT32_C(1140850688)))
-        || (next_31_unchecked > INT32_C(1140850688))) {
+    const int64_t next_31_raw = (int64_t)C_31 + dcm_rk3_2_q31_shr(dcm_rk3_2_q31_mul(A_11, C_31)
+        + dcm_rk3_2_q31_mul(A_21, C_32) + dcm_rk3_2_q31_mul(A_31, C_33)
+        + (INT64_C(1) << 31), 32);
+    if ((next_31_raw < (-INT32_C(1140850688))) || (next_31_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_31 = dcm_rk3_2_q31_narrow_(next_31_unchecked, 0);
+    const int32_t next_31 = dcm_rk3_2_q31_fit(next_31_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 1.2e-09 */
-    const int64_t next_32_unchecked = (int64_t)C_32
-        + dcm_rk3_2_q31_shr_(dcm_rk3_2_q31_mul_(A_12, C_31) + dcm_rk3_2_q31_mul_(A_22, C_32)
-        + dcm_rk3_2_q31_mul_(A_32, C_33) + (INT64_C(1) << 31), 32);
-    if ((next_32_unchecked < (-INT32_C(1140850688)))
-        || (next_32_unchecked > INT32_C(1140850688))) {
+    const int64_t next_32_raw = (int64_t)C_32 + dcm_rk3_2_q31_shr(dcm_rk3_2_q31_mul(A_12, C_31)
+        + dcm_rk3_2_q31_mul(A_22, C_32) + dcm_rk3_2_q31_mul(A_32, C_33)
+        + (INT64_C(1) << 31), 32);
+    if ((next_32_raw < (-INT32_C(1140850688))) || (next_32_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_32 = dcm_rk3_2_q31_narrow_(next_32_unchecked, 0);
+    const int32_t next_32 = dcm_rk3_2_q31_fit(next_32_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 1.2e-09 */
-    const int64_t next_33_unchecked = (int64_t)C_33
-        + dcm_rk3_2_q31_shr_(dcm_rk3_2_q31_mul_(A_13, C_31) + dcm_rk3_2_q31_mul_(A_23, C_32)
-        + dcm_rk3_2_q31_mul_(A_33, C_33) + (INT64_C(1) << 31), 32);
-    if ((next_33_unchecked < (-INT32_C(1140850688)))
-        || (next_33_unchecked > INT32_C(1140850688))) {
+    const int64_t next_33_raw = (int64_t)C_33 + dcm_rk3_2_q31_shr(dcm_rk3_2_q31_mul(A_13, C_31)
+        + dcm_rk3_2_q31_mul(A_23, C_32) + dcm_rk3_2_q31_mul(A_33, C_33)
+        + (INT64_C(1) << 31), 32);
+    if ((next_33_raw < (-INT32_C(1140850688))) || (next_33_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_33 = dcm_rk3_2_q31_narrow_(next_33_unchecked, 0);
+    const int32_t next_33 = dcm_rk3_2_q31_fit(next_33_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 1.2e-09 */
     next[0] = next_11;
     next[1] = next_12;

@@ -6,7 +6,7 @@
 #include "dcm_rk4_2_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int dcm_rk4_2_q31_out_(int32_t x, int32_t limit)
+static inline int dcm_rk4_2_q31_out(int32_t x, int32_t limit)
 {
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
@@ -14,7 +14,7 @@ static inline int dcm_rk4_2_q31_out_(int32_t x, int32_t limit)
 /* The exact product of two words. */
 #if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
 /* These processors have no instruction for it: the high word takes four products of half words. */
-static __attribute__((noinline)) int64_t dcm_rk4_2_q31_mul_(int32_t a, int32_t b)
+static __attribute__((noinline)) int64_t dcm_rk4_2_q31_mul(int32_t a, int32_t b)
 {
     const uint32_t a_low = (uint32_t)a & 0xFFFFu;
     const uint32_t b_low = (uint32_t)b & 0xFFFFu;
@@ -29,7 +29,7 @@ static __attribute__((noinline)) int64_t dcm_rk4_2_q31_mul_(int32_t a, int32_t b
     return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
 }
 #else
-static inline int64_t dcm_rk4_2_q31_mul_(int32_t a, int32_t b)
+static inline int64_t dcm_rk4_2_q31_mul(int32_t a, int32_t b)
 {
     return (int64_t)a * (int64_t)b;
 }
@@ -40,7 +40,7 @@ static inline int64_t dcm_rk4_2_q31_mul_(int32_t a, int32_t b)
  * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
  * number and no conversion of a number out of range.
  */
-static inline int32_t dcm_rk4_2_q31_narrow_(int64_t x, int n)
+static inline int32_t dcm_rk4_2_q31_fit(int64_t x, int n)
 {
 #ifdef __FRAMAC__
     return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
@@ -54,7 +54,7 @@ static inline int32_t dcm_rk4_2_q31_narrow_(int64_t x, int n)
 }
 
 /* x / 2^n, rounded down, as a wide number. */
-static inline int64_t dcm_rk4_2_q31_shr_(int64_t x, int n)
+static inline int64_t dcm_rk4_2_q31_shr(int64_t x, int n)
 {
     return (x < 0) ? ~(~x >> n) : (x >> n);
 }
@@ -76,167 +76,165 @@ int dcm_rk4_2_q31(const int32_t state[9], const int32_t increments[6], int32_t n
     const int32_t d2_x = increments[3];
     const int32_t d2_y = increments[4];
     const int32_t d2_z = increments[5];
-    if (dcm_rk4_2_q31_out_(C_11, INT32_C(1140850688))
-        || dcm_rk4_2_q31_out_(C_12, INT32_C(1140850688))
-        || dcm_rk4_2_q31_out_(C_13, INT32_C(1140850688))
-        || dcm_rk4_2_q31_out_(C_21, INT32_C(1140850688))
-        || dcm_rk4_2_q31_out_(C_22, INT32_C(1140850688))
-        || dcm_rk4_2_q31_out_(C_23, INT32_C(1140850688))
-        || dcm_rk4_2_q31_out_(C_31, INT32_C(1140850688))
-        || dcm_rk4_2_q31_out_(C_32, INT32_C(1140850688))
-        || dcm_rk4_2_q31_out_(C_33, INT32_C(1140850688))
-        || dcm_rk4_2_q31_out_(d1_x, (INT32_C(1) << 29))
-        || dcm_rk4_2_q31_out_(d1_y, (INT32_C(1) << 29))
-        || dcm_rk4_2_q31_out_(d1_z, (INT32_C(1) << 29))
-        || dcm_rk4_2_q31_out_(d2_x, (INT32_C(1) << 29))
-        || dcm_rk4_2_q31_out_(d2_y, (INT32_C(1) << 29))
-        || dcm_rk4_2_q31_out_(d2_z, (INT32_C(1) << 29)))
+    if (dcm_rk4_2_q31_out(C_11, INT32_C(1140850688))
+        || dcm_rk4_2_q31_out(C_12, INT32_C(1140850688))
+        || dcm_rk4_2_q31_out(C_13, INT32_C(1140850688))
+        || dcm_rk4_2_q31_out(C_21, INT32_C(1140850688))
+        || dcm_rk4_2_q31_out(C_22, INT32_C(1140850688))
+        || dcm_rk4_2_q31_out(C_23, INT32_C(1140850688))
+        || dcm_rk4_2_q31_out(C_31, INT32_C(1140850688))
+        || dcm_rk4_2_q31_out(C_32, INT32_C(1140850688))
+        || dcm_rk4_2_q31_out(C_33, INT32_C(1140850688))
+        || dcm_rk4_2_q31_out(d1_x, (INT32_C(1) << 29))
+        || dcm_rk4_2_q31_out(d1_y, (INT32_C(1) << 29))
+        || dcm_rk4_2_q31_out(d1_z, (INT32_C(1) << 29))
+        || dcm_rk4_2_q31_out(d2_x, (INT32_C(1) << 29))
+        || dcm_rk4_2_q31_out(d2_y, (INT32_C(1) << 29))
+        || dcm_rk4_2_q31_out(d2_z, (INT32_C(1) << 29))) {
         return 1;
+    }
     /* the angle increment of the whole step */
     const int32_t sigma_x = d1_x + d2_x; /* Q-1.32, -0.25 .. 0.25, exact */
     const int32_t sigma_y = d1_y + d2_y; /* Q-1.32, -0.25 .. 0.25, exact */
     const int32_t sigma_z = d1_z + d2_z; /* Q-1.32, -0.25 .. 0.25, exact */
-    const int32_t sigma_cross_d1_x = dcm_rk4_2_q31_narrow_(dcm_rk4_2_q31_mul_(d1_z, sigma_y)
-        - dcm_rk4_2_q31_mul_(d1_y, sigma_z) + (INT32_C(1) << 28), 29);
+    const int32_t sigma_cross_d1_x = dcm_rk4_2_q31_fit(dcm_rk4_2_q31_mul(d1_z, sigma_y)
+        - dcm_rk4_2_q31_mul(d1_y, sigma_z) + (INT32_C(1) << 28), 29);
         /* Q-4.35, -0.0313 .. 0.0313, error 1.5e-11 */
-    const int32_t sigma_cross_d1_y = dcm_rk4_2_q31_narrow_(dcm_rk4_2_q31_mul_(d1_x, sigma_z)
-        - dcm_rk4_2_q31_mul_(d1_z, sigma_x) + (INT32_C(1) << 28), 29);
+    const int32_t sigma_cross_d1_y = dcm_rk4_2_q31_fit(dcm_rk4_2_q31_mul(d1_x, sigma_z)
+        - dcm_rk4_2_q31_mul(d1_z, sigma_x) + (INT32_C(1) << 28), 29);
         /* Q-4.35, -0.0313 .. 0.0313, error 1.5e-11 */
-    const int32_t sigma_cross_d1_z = dcm_rk4_2_q31_narrow_(dcm_rk4_2_q31_mul_(d1_y, sigma_x)
-        - dcm_rk4_2_q31_mul_(d1_x, sigma_y) + (INT32_C(1) << 28), 29);
+    const int32_t sigma_cross_d1_z = dcm_rk4_2_q31_fit(dcm_rk4_2_q31_mul(d1_y, sigma_x)
+        - dcm_rk4_2_q31_mul(d1_x, sigma_y) + (INT32_C(1) << 28), 29);
         /* Q-4.35, -0.0313 .. 0.0313, error 1.5e-11 */
-    const int32_t sigma_dot_sigma = dcm_rk4_2_q31_narrow_(dcm_rk4_2_q31_mul_(sigma_x, sigma_x)
-        + dcm_rk4_2_q31_mul_(sigma_y, sigma_y) + dcm_rk4_2_q31_mul_(sigma_z, sigma_z)
+    const int32_t sigma_dot_sigma = dcm_rk4_2_q31_fit(dcm_rk4_2_q31_mul(sigma_x, sigma_x)
+        + dcm_rk4_2_q31_mul(sigma_y, sigma_y) + dcm_rk4_2_q31_mul(sigma_z, sigma_z)
         + (INT32_C(1) << 30), 31); /* Q-2.33, -1.17e-10 .. 0.188, error 5.9e-11 */
     /* weight of sigma in skew */
-    const int32_t skew_sigma =
-        dcm_rk4_2_q31_narrow_(-dcm_rk4_2_q31_mul_(sigma_dot_sigma, INT32_C(1431655765) /* 1/6 in Q33 */)
-        + (INT32_C(1) << 30), 31);
+    const int32_t skew_sigma = dcm_rk4_2_q31_fit(-dcm_rk4_2_q31_mul(sigma_dot_sigma,
+        INT32_C(1431655765) /* 1/6 in Q33 */) + (INT32_C(1) << 30), 31);
         /* Q-4.35, -0.0313 .. 5.83e-11, error 3.2e-11; stands for skew_sigma - 1 */
     /* weight of sigma_cross_d1 in skew */
-    const int32_t skew_sigma_cross_d1 = dcm_rk4_2_q31_narrow_(-(int64_t)skew_sigma
+    const int32_t skew_sigma_cross_d1 = dcm_rk4_2_q31_fit(-(int64_t)skew_sigma
         * (INT32_C(1) << 25) - INT64_C(768614336404564651) /* 2/3 in Q60 */
         + (INT32_C(1) << 28), 29); /* Q0.31, -0.667 .. -0.635, error 2.7e-10 */
     /* vector of the skew part */
     const int64_t skew_x = (int64_t)sigma_x * (INT64_C(1) << 32)
-        + dcm_rk4_2_q31_shr_(dcm_rk4_2_q31_mul_(sigma_x, skew_sigma), 3)
-        + dcm_rk4_2_q31_shr_(dcm_rk4_2_q31_mul_(sigma_cross_d1_x, skew_sigma_cross_d1), 2);
+        + dcm_rk4_2_q31_shr(dcm_rk4_2_q31_mul(sigma_x, skew_sigma), 3)
+        + dcm_rk4_2_q31_shr(dcm_rk4_2_q31_mul(sigma_cross_d1_x, skew_sigma_cross_d1), 2);
         /* Q-1.64, -0.279 .. 0.279, error 2.6e-11 */
     const int64_t skew_y = (int64_t)sigma_y * (INT64_C(1) << 32)
-        + dcm_rk4_2_q31_shr_(dcm_rk4_2_q31_mul_(sigma_y, skew_sigma), 3)
-        + dcm_rk4_2_q31_shr_(dcm_rk4_2_q31_mul_(sigma_cross_d1_y, skew_sigma_cross_d1), 2);
+        + dcm_rk4_2_q31_shr(dcm_rk4_2_q31_mul(sigma_y, skew_sigma), 3)
+        + dcm_rk4_2_q31_shr(dcm_rk4_2_q31_mul(sigma_cross_d1_y, skew_sigma_cross_d1), 2);
         /* Q-1.64, -0.279 .. 0.279, error 2.6e-11 */
     const int64_t skew_z = (int64_t)sigma_z * (INT64_C(1) << 32)
-        + dcm_rk4_2_q31_shr_(dcm_rk4_2_q31_mul_(sigma_z, skew_sigma), 3)
-        + dcm_rk4_2_q31_shr_(dcm_rk4_2_q31_mul_(sigma_cross_d1_z, skew_sigma_cross_d1), 2);
+        + dcm_rk4_2_q31_shr(dcm_rk4_2_q31_mul(sigma_z, skew_sigma), 3)
+        + dcm_rk4_2_q31_shr(dcm_rk4_2_q31_mul(sigma_cross_d1_z, skew_sigma_cross_d1), 2);
         /* Q-1.64, -0.279 .. 0.279, error 2.6e-11 */
-    const int32_t d1_dot_d1 = dcm_rk4_2_q31_narrow_(dcm_rk4_2_q31_mul_(d1_x, d1_x)
-        + dcm_rk4_2_q31_mul_(d1_y, d1_y) + dcm_rk4_2_q31_mul_(d1_z, d1_z)
+    const int32_t d1_dot_d1 = dcm_rk4_2_q31_fit(dcm_rk4_2_q31_mul(d1_x, d1_x)
+        + dcm_rk4_2_q31_mul(d1_y, d1_y) + dcm_rk4_2_q31_mul(d1_z, d1_z)
         + (INT32_C(1) << 28), 29); /* Q-4.35, -2.92e-11 .. 0.0469, error 1.5e-11 */
     /* weight of sigma in partner */
-    const int32_t partner_sigma = dcm_rk4_2_q31_narrow_((int64_t)sigma_dot_sigma
+    const int32_t partner_sigma = dcm_rk4_2_q31_fit((int64_t)sigma_dot_sigma
         * (INT32_C(1) << 30)
-        - dcm_rk4_2_q31_mul_(d1_dot_d1, INT32_C(1431655765) /* 1/3 in Q32 */)
+        - dcm_rk4_2_q31_mul(d1_dot_d1, INT32_C(1431655765) /* 1/3 in Q32 */)
         + (INT32_C(1) << 30), 31);
         /* Q-5.36, -0.0157 .. 0.00879, error 2e-11; stands for partner_sigma - 1/4 */
-    const int32_t d1_dot_sigma = dcm_rk4_2_q31_narrow_(dcm_rk4_2_q31_mul_(d1_x, sigma_x)
-        + dcm_rk4_2_q31_mul_(d1_y, sigma_y) + dcm_rk4_2_q31_mul_(d1_z, sigma_z)
+    const int32_t d1_dot_sigma = dcm_rk4_2_q31_fit(dcm_rk4_2_q31_mul(d1_x, sigma_x)
+        + dcm_rk4_2_q31_mul(d1_y, sigma_y) + dcm_rk4_2_q31_mul(d1_z, sigma_z)
         + (INT32_C(1) << 29), 30); /* Q-3.34, -0.0469 .. 0.0938, error 3e-11 */
-    const int32_t shared_1 =
-        dcm_rk4_2_q31_narrow_(dcm_rk4_2_q31_mul_(d1_dot_sigma, INT32_C(1431655765) /* 2/3 in Q31 */)
-        + (INT32_C(1) << 30), 31); /* Q-3.34, -0.0313 .. 0.0626, error 6.4e-11 */
+    const int32_t shared_1 = dcm_rk4_2_q31_fit(dcm_rk4_2_q31_mul(d1_dot_sigma,
+        INT32_C(1431655765) /* 2/3 in Q31 */) + (INT32_C(1) << 30), 31);
+        /* Q-3.34, -0.0313 .. 0.0626, error 6.4e-11 */
     /* weight of d1 in partner */
-    const int32_t partner_d1 = dcm_rk4_2_q31_narrow_((int64_t)shared_1 * 2
-        + dcm_rk4_2_q31_shr_(-dcm_rk4_2_q31_mul_(sigma_dot_sigma, INT32_C(1431655765) /* 1/3 in Q32 */)
-        + (INT32_C(1) << 29), 30), 0); /* Q-4.35, -0.0157 .. 0.0157, error 1.2e-10 */
+    const int32_t partner_d1 = dcm_rk4_2_q31_fit((int64_t)shared_1 * 2
+        + dcm_rk4_2_q31_shr(-dcm_rk4_2_q31_mul(sigma_dot_sigma,
+        INT32_C(1431655765) /* 1/3 in Q32 */) + (INT32_C(1) << 29), 30), 0);
+        /* Q-4.35, -0.0157 .. 0.0157, error 1.2e-10 */
     /* of sigma in outer products */
     const int32_t partner_x = sigma_x
-        + dcm_rk4_2_q31_narrow_(dcm_rk4_2_q31_mul_(partner_sigma, sigma_x)
-        + dcm_rk4_2_q31_mul_(d1_x, partner_d1) * 2
-        - dcm_rk4_2_q31_mul_(sigma_cross_d1_x, INT32_C(1431655765) /* 1/3 in Q32 */) * 2
+        + dcm_rk4_2_q31_fit(dcm_rk4_2_q31_mul(partner_sigma, sigma_x)
+        + dcm_rk4_2_q31_mul(d1_x, partner_d1) * 2
+        - dcm_rk4_2_q31_mul(sigma_cross_d1_x, INT32_C(1431655765) /* 1/3 in Q32 */) * 2
         + (INT64_C(1) << 33), 34); /* Q-3.34, -0.0788 .. 0.0788, error 5.6e-11 */
     const int32_t partner_y = sigma_y
-        + dcm_rk4_2_q31_narrow_(dcm_rk4_2_q31_mul_(partner_sigma, sigma_y)
-        + dcm_rk4_2_q31_mul_(d1_y, partner_d1) * 2
-        - dcm_rk4_2_q31_mul_(sigma_cross_d1_y, INT32_C(1431655765) /* 1/3 in Q32 */) * 2
+        + dcm_rk4_2_q31_fit(dcm_rk4_2_q31_mul(partner_sigma, sigma_y)
+        + dcm_rk4_2_q31_mul(d1_y, partner_d1) * 2
+        - dcm_rk4_2_q31_mul(sigma_cross_d1_y, INT32_C(1431655765) /* 1/3 in Q32 */) * 2
         + (INT64_C(1) << 33), 34); /* Q-3.34, -0.0788 .. 0.0788, error 5.6e-11 */
     const int32_t partner_z = sigma_z
-        + dcm_rk4_2_q31_narrow_(dcm_rk4_2_q31_mul_(partner_sigma, sigma_z)
-        + dcm_rk4_2_q31_mul_(d1_z, partner_d1) * 2
-        - dcm_rk4_2_q31_mul_(sigma_cross_d1_z, INT32_C(1431655765) /* 1/3 in Q32 */) * 2
+        + dcm_rk4_2_q31_fit(dcm_rk4_2_q31_mul(partner_sigma, sigma_z)
+        + dcm_rk4_2_q31_mul(d1_z, partner_d1) * 2
+        - dcm_rk4_2_q31_mul(sigma_cross_d1_z, INT32_C(1431655765) /* 1/3 in Q32 */) * 2
         + (INT64_C(1) << 33), 34); /* Q-3.34, -0.0788 .. 0.0788, error 5.6e-11 */
-    const int32_t diagonal_factor = dcm_rk4_2_q31_narrow_((int64_t)shared_1 * 2
-        + dcm_rk4_2_q31_shr_(-(int64_t)sigma_dot_sigma + 1, 1), 0);
+    const int32_t diagonal_factor = dcm_rk4_2_q31_fit((int64_t)shared_1 * 2
+        + dcm_rk4_2_q31_shr(-(int64_t)sigma_dot_sigma + 1, 1), 0);
         /* Q-4.35, -0.0254 .. 0.045, error 8.5e-11; stands for diagonal_factor + 1/2 */
     /* multiple of the unit matrix */
     const int64_t diagonal = -(int64_t)sigma_dot_sigma * (INT64_C(1) << 32)
-        + dcm_rk4_2_q31_shr_(dcm_rk4_2_q31_mul_(diagonal_factor, sigma_dot_sigma), 2)
-        + dcm_rk4_2_q31_shr_(-dcm_rk4_2_q31_mul_(d1_dot_sigma, shared_1), 2);
+        + dcm_rk4_2_q31_shr(dcm_rk4_2_q31_mul(diagonal_factor, sigma_dot_sigma), 2)
+        + dcm_rk4_2_q31_shr(-dcm_rk4_2_q31_mul(d1_dot_sigma, shared_1), 2);
         /* Q-3.66, -0.105 .. 0.0114, error 5.6e-11; stands for diagonal - 1 */
     /* half of u y' + y u' on the diagonal */
-    const int64_t half_xx = dcm_rk4_2_q31_mul_(partner_x, sigma_x);
+    const int64_t half_xx = dcm_rk4_2_q31_mul(partner_x, sigma_x);
         /* Q-3.66, -0.0197 .. 0.0197, error 1.4e-11 */
-    const int32_t A_11 = dcm_rk4_2_q31_narrow_(half_xx + dcm_rk4_2_q31_shr_(diagonal, 1)
+    const int32_t A_11 = dcm_rk4_2_q31_fit(half_xx + dcm_rk4_2_q31_shr(diagonal, 1)
         + (INT64_C(1) << 32), 33);
         /* Q-1.32, -0.144 .. 0.0508, error 2e-10; stands for A_11 - 1 */
-    const int64_t half_yy = dcm_rk4_2_q31_mul_(partner_y, sigma_y);
+    const int64_t half_yy = dcm_rk4_2_q31_mul(partner_y, sigma_y);
         /* Q-3.66, -0.0197 .. 0.0197, error 1.4e-11 */
-    const int32_t A_22 = dcm_rk4_2_q31_narrow_(half_yy + dcm_rk4_2_q31_shr_(diagonal, 1)
+    const int32_t A_22 = dcm_rk4_2_q31_fit(half_yy + dcm_rk4_2_q31_shr(diagonal, 1)
         + (INT64_C(1) << 32), 33);
         /* Q-1.32, -0.144 .. 0.0508, error 2e-10; stands for A_22 - 1 */
-    const int64_t half_zz = dcm_rk4_2_q31_mul_(partner_z, sigma_z);
+    const int64_t half_zz = dcm_rk4_2_q31_mul(partner_z, sigma_z);
         /* Q-3.66, -0.0197 .. 0.0197, error 1.4e-11 */
-    const int32_t A_33 = dcm_rk4_2_q31_narrow_(half_zz + dcm_rk4_2_q31_shr_(diagonal, 1)
+    const int32_t A_33 = dcm_rk4_2_q31_fit(half_zz + dcm_rk4_2_q31_shr(diagonal, 1)
         + (INT64_C(1) << 32), 33);
         /* Q-1.32, -0.144 .. 0.0508, error 2e-10; stands for A_33 - 1 */
-    const int64_t symmetric_xy = dcm_rk4_2_q31_mul_(partner_y, sigma_x)
-        + dcm_rk4_2_q31_mul_(partner_x, sigma_y);
-        /* Q-3.66, -0.0394 .. 0.0394, error 2.8e-11 */
-    const int32_t A_12 = dcm_rk4_2_q31_narrow_(dcm_rk4_2_q31_shr_(symmetric_xy, 2) - skew_z
+    const int64_t symmetric_xy = dcm_rk4_2_q31_mul(partner_y, sigma_x)
+        + dcm_rk4_2_q31_mul(partner_x, sigma_y); /* Q-3.66, -0.0394 .. 0.0394, error 2.8e-11 */
+    const int32_t A_12 = dcm_rk4_2_q31_fit(dcm_rk4_2_q31_shr(symmetric_xy, 2) - skew_z
         + (INT64_C(1) << 31), 32); /* Q-1.32, -0.319 .. 0.319, error 1.7e-10 */
-    const int32_t A_21 = dcm_rk4_2_q31_narrow_(dcm_rk4_2_q31_shr_(symmetric_xy, 2) + skew_z
+    const int32_t A_21 = dcm_rk4_2_q31_fit(dcm_rk4_2_q31_shr(symmetric_xy, 2) + skew_z
         + (INT64_C(1) << 31), 32); /* Q-1.32, -0.319 .. 0.319, error 1.7e-10 */
-    const int64_t symmetric_yz = dcm_rk4_2_q31_mul_(partner_z, sigma_y)
-        + dcm_rk4_2_q31_mul_(partner_y, sigma_z);
-        /* Q-3.66, -0.0394 .. 0.0394, error 2.8e-11 */
-    const int32_t A_23 = dcm_rk4_2_q31_narrow_(dcm_rk4_2_q31_shr_(symmetric_yz, 2) - skew_x
+    const int64_t symmetric_yz = dcm_rk4_2_q31_mul(partner_z, sigma_y)
+        + dcm_rk4_2_q31_mul(partner_y, sigma_z); /* Q-3.66, -0.0394 .. 0.0394, error 2.8e-11 */
+    const int32_t A_23 = dcm_rk4_2_q31_fit(dcm_rk4_2_q31_shr(symmetric_yz, 2) - skew_x
         + (INT64_C(1) << 31), 32); /* Q-1.32, -0.319 .. 0.319, error 1.7e-10 */
-    const int32_t A_32 = dcm_rk4_2_q31_narrow_(dcm_rk4_2_q31_shr_(symmetric_yz, 2) + skew_x
+    const int32_t A_32 = dcm_rk4_2_q31_fit(dcm_rk4_2_q31_shr(symmetric_yz, 2) + skew_x
         + (INT64_C(1) << 31), 32); /* Q-1.32, -0.319 .. 0.319, error 1.7e-10 */
-    const int64_t symmetric_zx = dcm_rk4_2_q31_mul_(partner_x, sigma_z)
-        + dcm_rk4_2_q31_mul_(partner_z, sigma_x);
-        /* Q-3.66, -0.0394 .. 0.0394, error 2.8e-11 */
-    const int32_t A_31 = dcm_rk4_2_q31_narrow_(dcm_rk4_2_q31_shr_(symmetric_zx, 2) - skew_y
+    const int64_t symmetric_zx = dcm_rk4_2_q31_mul(partner_x, sigma_z)
+        + dcm_rk4_2_q31_mul(partner_z, sigma_x); /* Q-3.66, -0.0394 .. 0.0394, error 2.8e-11 */
+    const int32_t A_31 = dcm_rk4_2_q31_fit(dcm_rk4_2_q31_shr(symmetric_zx, 2) - skew_y
         + (INT64_C(1) << 31), 32); /* Q-1.32, -0.319 .. 0.319, error 1.7e-10 */
-    const int32_t A_13 = dcm_rk4_2_q31_narrow_(dcm_rk4_2_q31_shr_(symmetric_zx, 2) + skew_y
+    const int32_t A_13 = dcm_rk4_2_q31_fit(dcm_rk4_2_q31_shr(symmetric_zx, 2) + skew_y
         + (INT64_C(1) << 31), 32); /* Q-1.32, -0.319 .. 0.319, error 1.7e-10 */
     /* direction cosine matrix, body to reference, after the step */
-    const int32_t next_11 = C_11 + dcm_rk4_2_q31_narrow_(dcm_rk4_2_q31_mul_(A_11, C_11)
-        + dcm_rk4_2_q31_mul_(A_21, C_12) + dcm_rk4_2_q31_mul_(A_31, C_13)
+    const int32_t next_11 = C_11 + dcm_rk4_2_q31_fit(dcm_rk4_2_q31_mul(A_11, C_11)
+        + dcm_rk4_2_q31_mul(A_21, C_12) + dcm_rk4_2_q31_mul(A_31, C_13)
         + (INT64_C(1) << 31), 32); /* Q1.30, -1.9 .. 1.9, error 1.1e-09 */
-    const int32_t next_12 = C_12 + dcm_rk4_2_q31_narrow_(dcm_rk4_2_q31_mul_(A_12, C_11)
-        + dcm_rk4_2_q31_mul_(A_22, C_12) + dcm_rk4_2_q31_mul_(A_32, C_13)
+    const int32_t next_12 = C_12 + dcm_rk4_2_q31_fit(dcm_rk4_2_q31_mul(A_12, C_11)
+        + dcm_rk4_2_q31_mul(A_22, C_12) + dcm_rk4_2_q31_mul(A_32, C_13)
         + (INT64_C(1) << 31), 32); /* Q1.30, -1.9 .. 1.9, error 1.1e-09 */
-    const int32_t next_13 = C_13 + dcm_rk4_2_q31_narrow_(dcm_rk4_2_q31_mul_(A_13, C_11)
-        + dcm_rk4_2_q31_mul_(A_23, C_12) + dcm_rk4_2_q31_mul_(A_33, C_13)
+    const int32_t next_13 = C_13 + dcm_rk4_2_q31_fit(dcm_rk4_2_q31_mul(A_13, C_11)
+        + dcm_rk4_2_q31_mul(A_23, C_12) + dcm_rk4_2_q31_mul(A_33, C_13)
         + (INT64_C(1) << 31), 32); /* Q1.30, -1.9 .. 1.9, error 1.1e-09 */
-    const int32_t next_21 = C_21 + dcm_rk4_2_q31_narrow_(dcm_rk4_2_q31_mul_(A_11, C_21)
-        + dcm_rk4_2_q31_mul_(A_21, C_22) + dcm_rk4_2_q31_mul_(A_31, C_23)
+    const int32_t next_21 = C_21 + dcm_rk4_2_q31_fit(dcm_rk4_2_q31_mul(A_11, C_21)
+        + dcm_rk4_2_q31_mul(A_21, C_22) + dcm_rk4_2_q31_mul(A_31, C_23)
         + (INT64_C(1) << 31), 32); /* Q1.30, -1.9 .. 1.9, error 1.1e-09 */
-    const int32_t next_22 = C_22 + dcm_rk4_2_q31_narrow_(dcm_rk4_2_q31_mul_(A_12, C_21)
-        + dcm_rk4_2_q31_mul_(A_22, C_22) + dcm_rk4_2_q31_mul_(A_32, C_23)
+    const int32_t next_22 = C_22 + dcm_rk4_2_q31_fit(dcm_rk4_2_q31_mul(A_12, C_21)
+        + dcm_rk4_2_q31_mul(A_22, C_22) + dcm_rk4_2_q31_mul(A_32, C_23)
         + (INT64_C(1) << 31), 32); /* Q1.30, -1.9 .. 1.9, error 1.1e-09 */
-    const int32_t next_23 = C_23 + dcm_rk4_2_q31_narrow_(dcm_rk4_2_q31_mul_(A_13, C_21)
-        + dcm_rk4_2_q31_mul_(A_23, C_22) + dcm_rk4_2_q31_mul_(A_33, C_23)
+    const int32_t next_23 = C_23 + dcm_rk4_2_q31_fit(dcm_rk4_2_q31_mul(A_13, C_21)
+        + dcm_rk4_2_q31_mul(A_23, C_22) + dcm_rk4_2_q31_mul(A_33, C_23)
         + (INT64_C(1) << 31), 32); /* Q1.30, -1.9 .. 1.9, error 1.1e-09 */
-    const int32_t next_31 = C_31 + dcm_rk4_2_q31_narrow_(dcm_rk4_2_q31_mul_(A_11, C_31)
-        + dcm_rk4_2_q31_mul_(A_21, C_32) + dcm_rk4_2_q31_mul_(A_31, C_33)
+    const int32_t next_31 = C_31 + dcm_rk4_2_q31_fit(dcm_rk4_2_q31_mul(A_11, C_31)
+        + dcm_rk4_2_q31_mul(A_21, C_32) + dcm_rk4_2_q31_mul(A_31, C_33)
         + (INT64_C(1) << 31), 32); /* Q1.30, -1.9 .. 1.9, error 1.1e-09 */
-    const int32_t next_32 = C_32 + dcm_rk4_2_q31_narrow_(dcm_rk4_2_q31_mul_(A_12, C_31)
-        + dcm_rk4_2_q31_mul_(A_22, C_32) + dcm_rk4_2_q31_mul_(A_32, C_33)
+    const int32_t next_32 = C_32 + dcm_rk4_2_q31_fit(dcm_rk4_2_q31_mul(A_12, C_31)
+        + dcm_rk4_2_q31_mul(A_22, C_32) + dcm_rk4_2_q31_mul(A_32, C_33)
         + (INT64_C(1) << 31), 32); /* Q1.30, -1.9 .. 1.9, error 1.1e-09 */
-    const int32_t next_33 = C_33 + dcm_rk4_2_q31_narrow_(dcm_rk4_2_q31_mul_(A_13, C_31)
-        + dcm_rk4_2_q31_mul_(A_23, C_32) + dcm_rk4_2_q31_mul_(A_33, C_33)
+    const int32_t next_33 = C_33 + dcm_rk4_2_q31_fit(dcm_rk4_2_q31_mul(A_13, C_31)
+        + dcm_rk4_2_q31_mul(A_23, C_32) + dcm_rk4_2_q31_mul(A_33, C_33)
         + (INT64_C(1) << 31), 32); /* Q1.30, -1.9 .. 1.9, error 1.1e-09 */
     next[0] = next_11;
     next[1] = next_12;

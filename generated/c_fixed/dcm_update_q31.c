@@ -5,7 +5,7 @@
 #include "dcm_update_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int dcm_update_q31_out_(int32_t x, int32_t limit)
+static inline int dcm_update_q31_out(int32_t x, int32_t limit)
 {
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
@@ -13,7 +13,7 @@ static inline int dcm_update_q31_out_(int32_t x, int32_t limit)
 /* The exact product of two words. */
 #if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
 /* These processors have no instruction for it: the high word takes four products of half words. */
-static __attribute__((noinline)) int64_t dcm_update_q31_mul_(int32_t a, int32_t b)
+static __attribute__((noinline)) int64_t dcm_update_q31_mul(int32_t a, int32_t b)
 {
     const uint32_t a_low = (uint32_t)a & 0xFFFFu;
     const uint32_t b_low = (uint32_t)b & 0xFFFFu;
@@ -28,7 +28,7 @@ static __attribute__((noinline)) int64_t dcm_update_q31_mul_(int32_t a, int32_t 
     return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
 }
 #else
-static inline int64_t dcm_update_q31_mul_(int32_t a, int32_t b)
+static inline int64_t dcm_update_q31_mul(int32_t a, int32_t b)
 {
     return (int64_t)a * (int64_t)b;
 }
@@ -39,7 +39,7 @@ static inline int64_t dcm_update_q31_mul_(int32_t a, int32_t b)
  * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
  * number and no conversion of a number out of range.
  */
-static inline int32_t dcm_update_q31_narrow_(int64_t x, int n)
+static inline int32_t dcm_update_q31_fit(int64_t x, int n)
 {
 #ifdef __FRAMAC__
     return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
@@ -53,7 +53,7 @@ static inline int32_t dcm_update_q31_narrow_(int64_t x, int n)
 }
 
 /* x / 2^n, rounded down, as a wide number. */
-static inline int64_t dcm_update_q31_shr_(int64_t x, int n)
+static inline int64_t dcm_update_q31_shr(int64_t x, int n)
 {
     return (x < 0) ? ~(~x >> n) : (x >> n);
 }
@@ -72,218 +72,210 @@ int dcm_update_q31(const int32_t state[9], const int32_t rotation_vector[3], int
     const int32_t phi_x = rotation_vector[0];
     const int32_t phi_y = rotation_vector[1];
     const int32_t phi_z = rotation_vector[2];
-    if (dcm_update_q31_out_(C_11, INT32_C(1140850688))
-        || dcm_update_q31_out_(C_12, INT32_C(1140850688))
-        || dcm_update_q31_out_(C_13, INT32_C(1140850688))
-        || dcm_update_q31_out_(C_21, INT32_C(1140850688))
-        || dcm_update_q31_out_(C_22, INT32_C(1140850688))
-        || dcm_update_q31_out_(C_23, INT32_C(1140850688))
-        || dcm_update_q31_out_(C_31, INT32_C(1140850688))
-        || dcm_update_q31_out_(C_32, INT32_C(1140850688))
-        || dcm_update_q31_out_(C_33, INT32_C(1140850688))
-        || dcm_update_q31_out_(phi_x, (INT32_C(1) << 30))
-        || dcm_update_q31_out_(phi_y, (INT32_C(1) << 30))
-        || dcm_update_q31_out_(phi_z, (INT32_C(1) << 30)))
+    if (dcm_update_q31_out(C_11, INT32_C(1140850688))
+        || dcm_update_q31_out(C_12, INT32_C(1140850688))
+        || dcm_update_q31_out(C_13, INT32_C(1140850688))
+        || dcm_update_q31_out(C_21, INT32_C(1140850688))
+        || dcm_update_q31_out(C_22, INT32_C(1140850688))
+        || dcm_update_q31_out(C_23, INT32_C(1140850688))
+        || dcm_update_q31_out(C_31, INT32_C(1140850688))
+        || dcm_update_q31_out(C_32, INT32_C(1140850688))
+        || dcm_update_q31_out(C_33, INT32_C(1140850688))
+        || dcm_update_q31_out(phi_x, (INT32_C(1) << 30))
+        || dcm_update_q31_out(phi_y, (INT32_C(1) << 30))
+        || dcm_update_q31_out(phi_z, (INT32_C(1) << 30))) {
         return 1;
-    const int32_t shared_1 = dcm_update_q31_narrow_(dcm_update_q31_mul_(phi_x, phi_x)
+    }
+    const int32_t shared_1 = dcm_update_q31_fit(dcm_update_q31_mul(phi_x, phi_x)
         + (INT32_C(1) << 29), 30); /* Q1.30, -9.32e-10 .. 1.01, error 4.7e-10 */
-    const int32_t shared_2 = dcm_update_q31_narrow_(dcm_update_q31_mul_(phi_y, phi_y)
+    const int32_t shared_2 = dcm_update_q31_fit(dcm_update_q31_mul(phi_y, phi_y)
         + (INT32_C(1) << 29), 30); /* Q1.30, -9.32e-10 .. 1.01, error 4.7e-10 */
-    const int32_t shared_3 = dcm_update_q31_narrow_(dcm_update_q31_mul_(phi_z, phi_z)
+    const int32_t shared_3 = dcm_update_q31_fit(dcm_update_q31_mul(phi_z, phi_z)
         + (INT32_C(1) << 29), 30); /* Q1.30, -9.32e-10 .. 1.01, error 4.7e-10 */
     /* square of the angle */
-    const int32_t angle_squared = dcm_update_q31_narrow_((int64_t)shared_1 + (int64_t)shared_2
+    const int32_t angle_squared = dcm_update_q31_fit((int64_t)shared_1 + (int64_t)shared_2
         + (int64_t)shared_3 + 1, 1); /* Q2.29, -3.73e-09 .. 3.01, error 2.4e-09 */
     const int32_t factor_1_under_root = angle_squared;
         /* Q0.31, -9.32e-10 .. 0.751, error 5.9e-10 */
     int32_t factor_1_taken; /* Q0.31, 0 .. 0.75, exact */
     if ((int64_t)factor_1_under_root >= INT32_C(1610612736)) {
-        factor_1_taken = dcm_update_q31_narrow_(INT32_C(1610612736), 0);
+        factor_1_taken = dcm_update_q31_fit(INT32_C(1610612736), 0);
     } else if (0 >= (int64_t)factor_1_under_root) {
-        factor_1_taken = dcm_update_q31_narrow_(0, 0);
+        factor_1_taken = dcm_update_q31_fit(0, 0);
     } else {
         factor_1_taken = factor_1_under_root;
     }
-    const int32_t factor_1_series =
-        dcm_update_q31_narrow_(dcm_update_q31_shr_(-dcm_update_q31_mul_(factor_1_taken, INT32_C(56412333) /* 1/39916800 in Q51 */), 1)
+    const int32_t factor_1_series = dcm_update_q31_fit(dcm_update_q31_shr(-dcm_update_q31_mul(
+        factor_1_taken, INT32_C(56412333) /* 1/39916800 in Q51 */), 1)
         + INT64_C(6662950945848033280) /* 1/362880 in Q60 */ + (INT64_C(1) << 31), 32);
         /* 2.73e-06 .. 2.76e-06, error 9e-16 */
-    const int32_t factor_1_series_2 =
-        dcm_update_q31_narrow_(dcm_update_q31_shr_(dcm_update_q31_mul_(factor_1_taken, factor_1_series), 5)
+    const int32_t factor_1_series_2 = dcm_update_q31_fit(dcm_update_q31_shr(dcm_update_q31_mul(
+        factor_1_taken, factor_1_series), 5)
         - INT64_C(7495819814078808064) /* 1/5040 in Q60 */ + (INT64_C(1) << 31), 32);
         /* Q-12.43, -0.000199 .. -0.000196, error 5.8e-14 */
-    const int32_t factor_1_series_3 =
-        dcm_update_q31_narrow_(dcm_update_q31_shr_(dcm_update_q31_mul_(factor_1_taken, factor_1_series_2), 5)
+    const int32_t factor_1_series_3 = dcm_update_q31_fit(dcm_update_q31_shr(dcm_update_q31_mul(
+        factor_1_taken, factor_1_series_2), 5)
         + INT64_C(4919131752989213696) /* 1/120 in Q60 */ + (INT64_C(1) << 31), 32);
         /* 0.00818 .. 0.00834, error 3.7e-12 */
-    const int32_t factor_1_bend =
-        dcm_update_q31_narrow_(dcm_update_q31_mul_(factor_1_taken, factor_1_series_3)
-        + (INT64_C(1) << 33), 34); /* Q-3.34, -5.83e-11 .. 0.00626, error 3.2e-11 */
+    const int32_t factor_1_bend = dcm_update_q31_fit(dcm_update_q31_mul(factor_1_taken,
+        factor_1_series_3) + (INT64_C(1) << 33), 34);
+        /* Q-3.34, -5.83e-11 .. 0.00626, error 3.2e-11 */
     const int32_t factor_1 = (INT32_C(1) << 30)
-        + dcm_update_q31_narrow_(-dcm_update_q31_mul_(factor_1_taken, INT32_C(1431655765) /* 1/6 in Q33 */)
-        * 2 + dcm_update_q31_mul_(factor_1_taken, factor_1_bend) + (INT64_C(1) << 34), 35);
+        + dcm_update_q31_fit(-dcm_update_q31_mul(factor_1_taken,
+        INT32_C(1431655765) /* 1/6 in Q33 */) * 2
+        + dcm_update_q31_mul(factor_1_taken, factor_1_bend) + (INT64_C(1) << 34), 35);
         /* Q1.30, 0.874 .. 1.01, error 6.5e-10 */
-    const int32_t shared_18 = dcm_update_q31_narrow_(dcm_update_q31_mul_(factor_1, factor_1)
+    const int32_t shared_18 = dcm_update_q31_fit(dcm_update_q31_mul(factor_1, factor_1)
         + (INT32_C(1) << 29), 30); /* Q0.31, 0.382 .. 0.501, error 8.8e-10 */
-    const int64_t shared_7 = dcm_update_q31_mul_(shared_18, shared_2);
+    const int64_t shared_7 = dcm_update_q31_mul(shared_18, shared_2);
         /* Q2.61, -1.11e-09 .. 0.501, error 1.2e-09 */
-    const int64_t shared_8 = dcm_update_q31_mul_(shared_18, shared_3);
+    const int64_t shared_8 = dcm_update_q31_mul(shared_18, shared_3);
         /* Q2.61, -1.11e-09 .. 0.501, error 1.2e-09; stands for shared_8 + 1 */
     /* the step applied to the identity */
-    const int32_t A_11 = dcm_update_q31_narrow_((INT32_C(1) << 30)
-        + dcm_update_q31_shr_(-shared_7 - shared_8 + (INT32_C(1) << 30), 31), 0);
-        /* Q1.30, -2.8e-09 .. 1.01, error 2.7e-09 */
+    const int32_t A_11 = dcm_update_q31_fit((INT32_C(1) << 30) + dcm_update_q31_shr(-shared_7
+        - shared_8 + (INT32_C(1) << 30), 31), 0); /* Q1.30, -2.8e-09 .. 1.01, error 2.7e-09 */
     int32_t shared_9_taken; /* Q2.29, 0 .. 3, exact */
     if ((int64_t)angle_squared >= INT32_C(1610612736)) {
-        shared_9_taken = dcm_update_q31_narrow_(INT32_C(1610612736), 0);
+        shared_9_taken = dcm_update_q31_fit(INT32_C(1610612736), 0);
     } else if (0 >= (int64_t)angle_squared) {
-        shared_9_taken = dcm_update_q31_narrow_(0, 0);
+        shared_9_taken = dcm_update_q31_fit(0, 0);
     } else {
         shared_9_taken = angle_squared;
     }
     const int32_t shared_9_series = INT32_C(1481185360) /* 1/6227020800 in Q60 */
-        + dcm_update_q31_narrow_(-dcm_update_q31_mul_(shared_9_taken, INT32_C(1805635485) /* 1/1307674368000 in Q71 */)
-        + (INT64_C(1) << 36), 37); /* 1.58e-10 .. 1.61e-10, error 2.1e-19 */
-    const int32_t shared_9_series_2 =
-        dcm_update_q31_narrow_(dcm_update_q31_shr_(dcm_update_q31_mul_(shared_9_taken, shared_9_series), 4)
+        + dcm_update_q31_fit(-dcm_update_q31_mul(shared_9_taken,
+        INT32_C(1805635485) /* 1/1307674368000 in Q71 */) + (INT64_C(1) << 36), 37);
+        /* 1.58e-10 .. 1.61e-10, error 2.1e-19 */
+    const int32_t shared_9_series_2 = dcm_update_q31_fit(dcm_update_q31_shr(dcm_update_q31_mul(
+        shared_9_taken, shared_9_series), 4)
         - INT64_C(7753252009628663808) /* 1/39916800 in Q60 */ + (INT64_C(1) << 31), 32);
         /* Q-25.56, -2.51e-08 .. -2.45e-08, error 7.9e-18 */
-    const int32_t shared_9_series_3 =
-        dcm_update_q31_narrow_(dcm_update_q31_shr_(dcm_update_q31_mul_(shared_9_taken, shared_9_series_2), 4)
+    const int32_t shared_9_series_3 = dcm_update_q31_fit(dcm_update_q31_shr(dcm_update_q31_mul(
+        shared_9_taken, shared_9_series_2), 4)
         + INT64_C(6662950945848033280) /* 1/362880 in Q60 */ + (INT64_C(1) << 31), 32);
         /* 2.68e-06 .. 2.76e-06, error 9.2e-16 */
-    const int32_t shared_9_series_4 =
-        dcm_update_q31_narrow_(dcm_update_q31_shr_(dcm_update_q31_mul_(shared_9_taken, shared_9_series_3), 3)
+    const int32_t shared_9_series_4 = dcm_update_q31_fit(dcm_update_q31_shr(dcm_update_q31_mul(
+        shared_9_taken, shared_9_series_3), 3)
         - INT64_C(7495819814078808064) /* 1/5040 in Q60 */ + (INT64_C(1) << 31), 32);
         /* Q-12.43, -0.000199 .. -0.00019, error 6e-14 */
-    const int32_t shared_9_series_5 =
-        dcm_update_q31_narrow_(dcm_update_q31_shr_(dcm_update_q31_mul_(shared_9_taken, shared_9_series_4), 3)
+    const int32_t shared_9_series_5 = dcm_update_q31_fit(dcm_update_q31_shr(dcm_update_q31_mul(
+        shared_9_taken, shared_9_series_4), 3)
         + INT64_C(4919131752989213696) /* 1/120 in Q60 */ + (INT64_C(1) << 31), 32);
         /* 0.00773 .. 0.00834, error 3.9e-12 */
-    const int32_t shared_9_bend =
-        dcm_update_q31_narrow_(dcm_update_q31_mul_(shared_9_taken, shared_9_series_5)
-        + (INT32_C(1) << 29), 30); /* Q-5.36, -2.92e-11 .. 0.0251, error 1.9e-11 */
+    const int32_t shared_9_bend = dcm_update_q31_fit(dcm_update_q31_mul(shared_9_taken,
+        shared_9_series_5) + (INT32_C(1) << 29), 30);
+        /* Q-5.36, -2.92e-11 .. 0.0251, error 1.9e-11 */
     const int32_t shared_9 = (INT32_C(1) << 30)
-        + dcm_update_q31_narrow_(-dcm_update_q31_mul_(shared_9_taken, INT32_C(1431655765) /* 1/6 in Q33 */)
-        * 2 + dcm_update_q31_shr_(dcm_update_q31_mul_(shared_9_taken, shared_9_bend), 2)
+        + dcm_update_q31_fit(-dcm_update_q31_mul(shared_9_taken,
+        INT32_C(1431655765) /* 1/6 in Q33 */) * 2
+        + dcm_update_q31_shr(dcm_update_q31_mul(shared_9_taken, shared_9_bend), 2)
         + (INT64_C(1) << 32), 33); /* Q1.30, 0.499 .. 1.01, error 1.1e-09 */
-    const int64_t shared_10 = dcm_update_q31_mul_(phi_z, shared_9);
+    const int64_t shared_10 = dcm_update_q31_mul(phi_z, shared_9);
         /* Q3.60, -1.01 .. 1.01, error 1.1e-09 */
-    const int32_t shared_11 = dcm_update_q31_narrow_(dcm_update_q31_mul_(phi_x, shared_18)
+    const int32_t shared_11 = dcm_update_q31_fit(dcm_update_q31_mul(phi_x, shared_18)
         + (INT32_C(1) << 29), 30); /* Q0.31, -0.501 .. 0.501, error 1.2e-09 */
-    const int64_t shared_12 = dcm_update_q31_mul_(phi_y, shared_11);
+    const int64_t shared_12 = dcm_update_q31_mul(phi_y, shared_11);
         /* Q2.61, -0.501 .. 0.501, error 1.2e-09 */
-    const int32_t A_12 = dcm_update_q31_narrow_(shared_12 - shared_10 * 2
-        + (INT32_C(1) << 30), 31); /* Q1.30, -1.51 .. 1.51, error 2.7e-09 */
-    const int64_t shared_13 = dcm_update_q31_mul_(phi_y, shared_9);
+    const int32_t A_12 = dcm_update_q31_fit(shared_12 - shared_10 * 2 + (INT32_C(1) << 30), 31);
+        /* Q1.30, -1.51 .. 1.51, error 2.7e-09 */
+    const int64_t shared_13 = dcm_update_q31_mul(phi_y, shared_9);
         /* Q3.60, -1.01 .. 1.01, error 1.1e-09 */
-    const int64_t shared_14 = dcm_update_q31_mul_(phi_z, shared_11);
+    const int64_t shared_14 = dcm_update_q31_mul(phi_z, shared_11);
         /* Q2.61, -0.501 .. 0.501, error 1.2e-09 */
-    const int32_t A_13 = dcm_update_q31_narrow_(shared_13 * 2 + shared_14
-        + (INT32_C(1) << 30), 31); /* Q1.30, -1.51 .. 1.51, error 2.7e-09 */
-    const int32_t A_21 = dcm_update_q31_narrow_(shared_10 * 2 + shared_12
-        + (INT32_C(1) << 30), 31); /* Q1.30, -1.51 .. 1.51, error 2.7e-09 */
-    const int64_t shared_15 = dcm_update_q31_mul_(shared_1, shared_18);
+    const int32_t A_13 = dcm_update_q31_fit(shared_13 * 2 + shared_14 + (INT32_C(1) << 30), 31);
+        /* Q1.30, -1.51 .. 1.51, error 2.7e-09 */
+    const int32_t A_21 = dcm_update_q31_fit(shared_10 * 2 + shared_12 + (INT32_C(1) << 30), 31);
+        /* Q1.30, -1.51 .. 1.51, error 2.7e-09 */
+    const int64_t shared_15 = dcm_update_q31_mul(shared_1, shared_18);
         /* Q2.61, -1.11e-09 .. 0.501, error 1.2e-09 */
-    const int32_t A_22 = dcm_update_q31_narrow_((INT32_C(1) << 30)
-        + dcm_update_q31_shr_(-shared_15 - shared_8 + (INT32_C(1) << 30), 31), 0);
-        /* Q1.30, -2.8e-09 .. 1.01, error 2.7e-09 */
-    const int64_t shared_16 = dcm_update_q31_mul_(phi_x, shared_9);
+    const int32_t A_22 = dcm_update_q31_fit((INT32_C(1) << 30) + dcm_update_q31_shr(-shared_15
+        - shared_8 + (INT32_C(1) << 30), 31), 0); /* Q1.30, -2.8e-09 .. 1.01, error 2.7e-09 */
+    const int64_t shared_16 = dcm_update_q31_mul(phi_x, shared_9);
         /* Q3.60, -1.01 .. 1.01, error 1.1e-09 */
-    const int32_t shared_17 = dcm_update_q31_narrow_(dcm_update_q31_mul_(phi_y, phi_z)
+    const int32_t shared_17 = dcm_update_q31_fit(dcm_update_q31_mul(phi_y, phi_z)
         + (INT32_C(1) << 29), 30); /* Q1.30, -1.01 .. 1.01, error 4.7e-10 */
-    const int64_t shared_5 = dcm_update_q31_mul_(shared_17, shared_18);
+    const int64_t shared_5 = dcm_update_q31_mul(shared_17, shared_18);
         /* Q2.61, -0.501 .. 0.501, error 1.2e-09 */
-    const int32_t A_23 = dcm_update_q31_narrow_(shared_5 - shared_16 * 2
-        + (INT32_C(1) << 30), 31); /* Q1.30, -1.51 .. 1.51, error 2.7e-09 */
-    const int32_t A_31 = dcm_update_q31_narrow_(shared_14 - shared_13 * 2
-        + (INT32_C(1) << 30), 31); /* Q1.30, -1.51 .. 1.51, error 2.7e-09 */
-    const int32_t A_32 = dcm_update_q31_narrow_(shared_16 * 2 + shared_5
-        + (INT32_C(1) << 30), 31); /* Q1.30, -1.51 .. 1.51, error 2.7e-09 */
-    const int32_t A_33 = dcm_update_q31_narrow_((INT32_C(1) << 30)
-        + dcm_update_q31_shr_(-shared_15 - shared_7 + (INT32_C(1) << 30), 31), 0);
-        /* Q1.30, -2.8e-09 .. 1.01, error 2.7e-09 */
+    const int32_t A_23 = dcm_update_q31_fit(shared_5 - shared_16 * 2 + (INT32_C(1) << 30), 31);
+        /* Q1.30, -1.51 .. 1.51, error 2.7e-09 */
+    const int32_t A_31 = dcm_update_q31_fit(shared_14 - shared_13 * 2 + (INT32_C(1) << 30), 31);
+        /* Q1.30, -1.51 .. 1.51, error 2.7e-09 */
+    const int32_t A_32 = dcm_update_q31_fit(shared_16 * 2 + shared_5 + (INT32_C(1) << 30), 31);
+        /* Q1.30, -1.51 .. 1.51, error 2.7e-09 */
+    const int32_t A_33 = dcm_update_q31_fit((INT32_C(1) << 30) + dcm_update_q31_shr(-shared_15
+        - shared_7 + (INT32_C(1) << 30), 31), 0); /* Q1.30, -2.8e-09 .. 1.01, error 2.7e-09 */
     /* direction cosine matrix, body to reference, after the step */
-    const int64_t next_11_unchecked = dcm_update_q31_shr_(dcm_update_q31_mul_(A_11, C_11)
-        + dcm_update_q31_mul_(A_21, C_12) + dcm_update_q31_mul_(A_31, C_13)
+    const int64_t next_11_raw = dcm_update_q31_shr(dcm_update_q31_mul(A_11, C_11)
+        + dcm_update_q31_mul(A_21, C_12) + dcm_update_q31_mul(A_31, C_13)
         + (INT32_C(1) << 29), 30);
-    if ((next_11_unchecked < (-INT32_C(1140850688)))
-        || (next_11_unchecked > INT32_C(1140850688))) {
+    if ((next_11_raw < (-INT32_C(1140850688))) || (next_11_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_11 = dcm_update_q31_narrow_(next_11_unchecked, 0);
+    const int32_t next_11 = dcm_update_q31_fit(next_11_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 8.9e-09 */
-    const int64_t next_12_unchecked = dcm_update_q31_shr_(dcm_update_q31_mul_(A_12, C_11)
-        + dcm_update_q31_mul_(A_22, C_12) + dcm_update_q31_mul_(A_32, C_13)
+    const int64_t next_12_raw = dcm_update_q31_shr(dcm_update_q31_mul(A_12, C_11)
+        + dcm_update_q31_mul(A_22, C_12) + dcm_update_q31_mul(A_32, C_13)
         + (INT32_C(1) << 29), 30);
-    if ((next_12_unchecked < (-INT32_C(1140850688)))
-        || (next_12_unchecked > INT32_C(1140850688))) {
+    if ((next_12_raw < (-INT32_C(1140850688))) || (next_12_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_12 = dcm_update_q31_narrow_(next_12_unchecked, 0);
+    const int32_t next_12 = dcm_update_q31_fit(next_12_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 8.9e-09 */
-    const int64_t next_13_unchecked = dcm_update_q31_shr_(dcm_update_q31_mul_(A_13, C_11)
-        + dcm_update_q31_mul_(A_23, C_12) + dcm_update_q31_mul_(A_33, C_13)
+    const int64_t next_13_raw = dcm_update_q31_shr(dcm_update_q31_mul(A_13, C_11)
+        + dcm_update_q31_mul(A_23, C_12) + dcm_update_q31_mul(A_33, C_13)
         + (INT32_C(1) << 29), 30);
-    if ((next_13_unchecked < (-INT32_C(1140850688)))
-        || (next_13_unchecked > INT32_C(1140850688))) {
+    if ((next_13_raw < (-INT32_C(1140850688))) || (next_13_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_13 = dcm_update_q31_narrow_(next_13_unchecked, 0);
+    const int32_t next_13 = dcm_update_q31_fit(next_13_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 8.9e-09 */
-    const int64_t next_21_unchecked = dcm_update_q31_shr_(dcm_update_q31_mul_(A_11, C_21)
-        + dcm_update_q31_mul_(A_21, C_22) + dcm_update_q31_mul_(A_31, C_23)
+    const int64_t next_21_raw = dcm_update_q31_shr(dcm_update_q31_mul(A_11, C_21)
+        + dcm_update_q31_mul(A_21, C_22) + dcm_update_q31_mul(A_31, C_23)
         + (INT32_C(1) << 29), 30);
-    if ((next_21_unchecked < (-INT32_C(1140850688)))
-        || (next_21_unchecked > INT32_C(1140850688))) {
+    if ((next_21_raw < (-INT32_C(1140850688))) || (next_21_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_21 = dcm_update_q31_narrow_(next_21_unchecked, 0);
+    const int32_t next_21 = dcm_update_q31_fit(next_21_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 8.9e-09 */
-    const int64_t next_22_unchecked = dcm_update_q31_shr_(dcm_update_q31_mul_(A_12, C_21)
-        + dcm_update_q31_mul_(A_22, C_22) + dcm_update_q31_mul_(A_32, C_23)
+    const int64_t next_22_raw = dcm_update_q31_shr(dcm_update_q31_mul(A_12, C_21)
+        + dcm_update_q31_mul(A_22, C_22) + dcm_update_q31_mul(A_32, C_23)
         + (INT32_C(1) << 29), 30);
-    if ((next_22_unchecked < (-INT32_C(1140850688)))
-        || (next_22_unchecked > INT32_C(1140850688))) {
+    if ((next_22_raw < (-INT32_C(1140850688))) || (next_22_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_22 = dcm_update_q31_narrow_(next_22_unchecked, 0);
+    const int32_t next_22 = dcm_update_q31_fit(next_22_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 8.9e-09 */
-    const int64_t next_23_unchecked = dcm_update_q31_shr_(dcm_update_q31_mul_(A_13, C_21)
-        + dcm_update_q31_mul_(A_23, C_22) + dcm_update_q31_mul_(A_33, C_23)
+    const int64_t next_23_raw = dcm_update_q31_shr(dcm_update_q31_mul(A_13, C_21)
+        + dcm_update_q31_mul(A_23, C_22) + dcm_update_q31_mul(A_33, C_23)
         + (INT32_C(1) << 29), 30);
-    if ((next_23_unchecked < (-INT32_C(1140850688)))
-        || (next_23_unchecked > INT32_C(1140850688))) {
+    if ((next_23_raw < (-INT32_C(1140850688))) || (next_23_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_23 = dcm_update_q31_narrow_(next_23_unchecked, 0);
+    const int32_t next_23 = dcm_update_q31_fit(next_23_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 8.9e-09 */
-    const int64_t next_31_unchecked = dcm_update_q31_shr_(dcm_update_q31_mul_(A_11, C_31)
-        + dcm_update_q31_mul_(A_21, C_32) + dcm_update_q31_mul_(A_31, C_33)
+    const int64_t next_31_raw = dcm_update_q31_shr(dcm_update_q31_mul(A_11, C_31)
+        + dcm_update_q31_mul(A_21, C_32) + dcm_update_q31_mul(A_31, C_33)
         + (INT32_C(1) << 29), 30);
-    if ((next_31_unchecked < (-INT32_C(1140850688)))
-        || (next_31_unchecked > INT32_C(1140850688))) {
+    if ((next_31_raw < (-INT32_C(1140850688))) || (next_31_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_31 = dcm_update_q31_narrow_(next_31_unchecked, 0);
+    const int32_t next_31 = dcm_update_q31_fit(next_31_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 8.9e-09 */
-    const int64_t next_32_unchecked = dcm_update_q31_shr_(dcm_update_q31_mul_(A_12, C_31)
-        + dcm_update_q31_mul_(A_22, C_32) + dcm_update_q31_mul_(A_32, C_33)
+    const int64_t next_32_raw = dcm_update_q31_shr(dcm_update_q31_mul(A_12, C_31)
+        + dcm_update_q31_mul(A_22, C_32) + dcm_update_q31_mul(A_32, C_33)
         + (INT32_C(1) << 29), 30);
-    if ((next_32_unchecked < (-INT32_C(1140850688)))
-        || (next_32_unchecked > INT32_C(1140850688))) {
+    if ((next_32_raw < (-INT32_C(1140850688))) || (next_32_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_32 = dcm_update_q31_narrow_(next_32_unchecked, 0);
+    const int32_t next_32 = dcm_update_q31_fit(next_32_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 8.9e-09 */
-    const int64_t next_33_unchecked = dcm_update_q31_shr_(dcm_update_q31_mul_(A_13, C_31)
-        + dcm_update_q31_mul_(A_23, C_32) + dcm_update_q31_mul_(A_33, C_33)
+    const int64_t next_33_raw = dcm_update_q31_shr(dcm_update_q31_mul(A_13, C_31)
+        + dcm_update_q31_mul(A_23, C_32) + dcm_update_q31_mul(A_33, C_33)
         + (INT32_C(1) << 29), 30);
-    if ((next_33_unchecked < (-INT32_C(1140850688)))
-        || (next_33_unchecked > INT32_C(1140850688))) {
+    if ((next_33_raw < (-INT32_C(1140850688))) || (next_33_raw > INT32_C(1140850688))) {
         return 2;
     }
-    const int32_t next_33 = dcm_update_q31_narrow_(next_33_unchecked, 0);
+    const int32_t next_33 = dcm_update_q31_fit(next_33_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 8.9e-09 */
     next[0] = next_11;
     next[1] = next_12;

@@ -5,7 +5,7 @@
 #include "dcm_velocity_2_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int dcm_velocity_2_q31_out_(int32_t x, int32_t limit)
+static inline int dcm_velocity_2_q31_out(int32_t x, int32_t limit)
 {
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
@@ -13,7 +13,7 @@ static inline int dcm_velocity_2_q31_out_(int32_t x, int32_t limit)
 /* The exact product of two words. */
 #if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
 /* These processors have no instruction for it: the high word takes four products of half words. */
-static __attribute__((noinline)) int64_t dcm_velocity_2_q31_mul_(int32_t a, int32_t b)
+static __attribute__((noinline)) int64_t dcm_velocity_2_q31_mul(int32_t a, int32_t b)
 {
     const uint32_t a_low = (uint32_t)a & 0xFFFFu;
     const uint32_t b_low = (uint32_t)b & 0xFFFFu;
@@ -28,7 +28,7 @@ static __attribute__((noinline)) int64_t dcm_velocity_2_q31_mul_(int32_t a, int3
     return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
 }
 #else
-static inline int64_t dcm_velocity_2_q31_mul_(int32_t a, int32_t b)
+static inline int64_t dcm_velocity_2_q31_mul(int32_t a, int32_t b)
 {
     return (int64_t)a * (int64_t)b;
 }
@@ -39,7 +39,7 @@ static inline int64_t dcm_velocity_2_q31_mul_(int32_t a, int32_t b)
  * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
  * number and no conversion of a number out of range.
  */
-static inline int32_t dcm_velocity_2_q31_narrow_(int64_t x, int n)
+static inline int32_t dcm_velocity_2_q31_fit(int64_t x, int n)
 {
 #ifdef __FRAMAC__
     return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
@@ -73,49 +73,50 @@ int dcm_velocity_2_q31(const int32_t state[9], const int32_t velocity_sum[3],
     const int32_t beta_x = angle_sum[0];
     const int32_t beta_y = angle_sum[1];
     const int32_t beta_z = angle_sum[2];
-    if (dcm_velocity_2_q31_out_(C_11, INT32_C(1140850688))
-        || dcm_velocity_2_q31_out_(C_12, INT32_C(1140850688))
-        || dcm_velocity_2_q31_out_(C_13, INT32_C(1140850688))
-        || dcm_velocity_2_q31_out_(C_21, INT32_C(1140850688))
-        || dcm_velocity_2_q31_out_(C_22, INT32_C(1140850688))
-        || dcm_velocity_2_q31_out_(C_23, INT32_C(1140850688))
-        || dcm_velocity_2_q31_out_(C_31, INT32_C(1140850688))
-        || dcm_velocity_2_q31_out_(C_32, INT32_C(1140850688))
-        || dcm_velocity_2_q31_out_(C_33, INT32_C(1140850688))
-        || dcm_velocity_2_q31_out_(u_x, (INT32_C(1) << 30))
-        || dcm_velocity_2_q31_out_(u_y, (INT32_C(1) << 30))
-        || dcm_velocity_2_q31_out_(u_z, (INT32_C(1) << 30))
-        || dcm_velocity_2_q31_out_(eta_x, (INT32_C(1) << 30))
-        || dcm_velocity_2_q31_out_(eta_y, (INT32_C(1) << 30))
-        || dcm_velocity_2_q31_out_(eta_z, (INT32_C(1) << 30))
-        || dcm_velocity_2_q31_out_(beta_x, (INT32_C(1) << 30))
-        || dcm_velocity_2_q31_out_(beta_y, (INT32_C(1) << 30))
-        || dcm_velocity_2_q31_out_(beta_z, (INT32_C(1) << 30)))
+    if (dcm_velocity_2_q31_out(C_11, INT32_C(1140850688))
+        || dcm_velocity_2_q31_out(C_12, INT32_C(1140850688))
+        || dcm_velocity_2_q31_out(C_13, INT32_C(1140850688))
+        || dcm_velocity_2_q31_out(C_21, INT32_C(1140850688))
+        || dcm_velocity_2_q31_out(C_22, INT32_C(1140850688))
+        || dcm_velocity_2_q31_out(C_23, INT32_C(1140850688))
+        || dcm_velocity_2_q31_out(C_31, INT32_C(1140850688))
+        || dcm_velocity_2_q31_out(C_32, INT32_C(1140850688))
+        || dcm_velocity_2_q31_out(C_33, INT32_C(1140850688))
+        || dcm_velocity_2_q31_out(u_x, (INT32_C(1) << 30))
+        || dcm_velocity_2_q31_out(u_y, (INT32_C(1) << 30))
+        || dcm_velocity_2_q31_out(u_z, (INT32_C(1) << 30))
+        || dcm_velocity_2_q31_out(eta_x, (INT32_C(1) << 30))
+        || dcm_velocity_2_q31_out(eta_y, (INT32_C(1) << 30))
+        || dcm_velocity_2_q31_out(eta_z, (INT32_C(1) << 30))
+        || dcm_velocity_2_q31_out(beta_x, (INT32_C(1) << 30))
+        || dcm_velocity_2_q31_out(beta_y, (INT32_C(1) << 30))
+        || dcm_velocity_2_q31_out(beta_z, (INT32_C(1) << 30))) {
         return 1;
+    }
     const int32_t shared_1 = u_z; /* Q3.28, -4 .. 4, exact */
     const int32_t shared_2 = beta_z; /* Q0.31, -0.5 .. 0.5, exact */
     /* velocity increment, body axes at the start of the slow cycle */
-    const int32_t w_x = dcm_velocity_2_q31_narrow_((int64_t)eta_x * (INT32_C(1) << 30)
-        + (int64_t)u_x * (INT64_C(1) << 31) + dcm_velocity_2_q31_mul_(beta_y, shared_1)
-        - dcm_velocity_2_q31_mul_(shared_2, u_y) + (INT64_C(1) << 31), 32);
+    const int32_t w_x = dcm_velocity_2_q31_fit((int64_t)eta_x * (INT32_C(1) << 30)
+        + (int64_t)u_x * (INT64_C(1) << 31) + dcm_velocity_2_q31_mul(beta_y, shared_1)
+        - dcm_velocity_2_q31_mul(shared_2, u_y) + (INT64_C(1) << 31), 32);
         /* Q5.26, -20.1 .. 20.1, error 7.5e-09 */
-    const int32_t w_y = dcm_velocity_2_q31_narrow_((int64_t)eta_y * (INT32_C(1) << 30)
-        + (int64_t)u_y * (INT64_C(1) << 31) - dcm_velocity_2_q31_mul_(beta_x, shared_1)
-        + dcm_velocity_2_q31_mul_(shared_2, u_x) + (INT64_C(1) << 31), 32);
+    const int32_t w_y = dcm_velocity_2_q31_fit((int64_t)eta_y * (INT32_C(1) << 30)
+        + (int64_t)u_y * (INT64_C(1) << 31) - dcm_velocity_2_q31_mul(beta_x, shared_1)
+        + dcm_velocity_2_q31_mul(shared_2, u_x) + (INT64_C(1) << 31), 32);
         /* Q5.26, -20.1 .. 20.1, error 7.5e-09 */
-    const int32_t w_z = dcm_velocity_2_q31_narrow_((int64_t)eta_z * (INT32_C(1) << 30)
-        + (int64_t)u_z * (INT64_C(1) << 31) + dcm_velocity_2_q31_mul_(beta_x, u_y)
-        - dcm_velocity_2_q31_mul_(beta_y, u_x) + (INT64_C(1) << 31), 32);
+    const int32_t w_z = dcm_velocity_2_q31_fit((int64_t)eta_z * (INT32_C(1) << 30)
+        + (int64_t)u_z * (INT64_C(1) << 31) + dcm_velocity_2_q31_mul(beta_x, u_y)
+        - dcm_velocity_2_q31_mul(beta_y, u_x) + (INT64_C(1) << 31), 32);
         /* Q5.26, -20.1 .. 20.1, error 7.5e-09 */
     /* velocity increment of the slow cycle, navigation axes */
-    const int32_t v_x = dcm_velocity_2_q31_narrow_(dcm_velocity_2_q31_mul_(C_11, w_x)
-        + dcm_velocity_2_q31_mul_(C_12, w_y) + dcm_velocity_2_q31_mul_(C_13, w_z)
+    const int32_t v_x = dcm_velocity_2_q31_fit(dcm_velocity_2_q31_mul(C_11, w_x)
+        + dcm_velocity_2_q31_mul(C_12, w_y) + dcm_velocity_2_q31_mul(C_13, w_z)
         + (INT32_C(1) << 30), 31); /* Q6.25, -63.8 .. 63.8, error 3.9e-08 */
-    const int32_t v_y = dcm_velocity_2_q31_narrow_(dcm_velocity_2_q31_mul_(C_21, w_x)
-        + dcm_velocity_2_q31_mul_(C_22, w_y) + dcm_velocity_2_q31_mul_(C_23, w_z)
+    const int32_t v_y = dcm_velocity_2_q31_fit(dcm_velocity_2_q31_mul(C_21, w_x)
+        + dcm_velocity_2_q31_mul(C_22, w_y) + dcm_velocity_2_q31_mul(C_23, w_z)
         + (INT32_C(1) << 30), 31); /* Q6.25, -63.8 .. 63.8, error 3.9e-08 */
-    const int32_t v_z = dcm_velocity_2_q31_narrow_(dcm_velocity_2_q31_mul_(C_31, w_x)
-        + dcm_velocity_2_q31_mul_(C_32, w_y) + dcm_velocity_2_q31_mul_(C_33, w_z)
+    const int32_t v_z = dcm_velocity_2_q31_fit(dcm_velocity_2_q31_mul(C_31, w_x)
+        + dcm_velocity_2_q31_mul(C_32, w_y) + dcm_velocity_2_q31_mul(C_33, w_z)
         + (INT32_C(1) << 30), 31); /* Q6.25, -63.8 .. 63.8, error 3.9e-08 */
     transformed[0] = v_x;
     transformed[1] = v_y;

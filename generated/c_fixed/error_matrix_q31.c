@@ -5,7 +5,7 @@
 #include "error_matrix_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int error_matrix_q31_out_(int32_t x, int32_t limit)
+static inline int error_matrix_q31_out(int32_t x, int32_t limit)
 {
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
@@ -13,7 +13,7 @@ static inline int error_matrix_q31_out_(int32_t x, int32_t limit)
 /* The exact product of two words. */
 #if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
 /* These processors have no instruction for it: the high word takes four products of half words. */
-static __attribute__((noinline)) int64_t error_matrix_q31_mul_(int32_t a, int32_t b)
+static __attribute__((noinline)) int64_t error_matrix_q31_mul(int32_t a, int32_t b)
 {
     const uint32_t a_low = (uint32_t)a & 0xFFFFu;
     const uint32_t b_low = (uint32_t)b & 0xFFFFu;
@@ -28,7 +28,7 @@ static __attribute__((noinline)) int64_t error_matrix_q31_mul_(int32_t a, int32_
     return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
 }
 #else
-static inline int64_t error_matrix_q31_mul_(int32_t a, int32_t b)
+static inline int64_t error_matrix_q31_mul(int32_t a, int32_t b)
 {
     return (int64_t)a * (int64_t)b;
 }
@@ -39,7 +39,7 @@ static inline int64_t error_matrix_q31_mul_(int32_t a, int32_t b)
  * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
  * number and no conversion of a number out of range.
  */
-static inline int32_t error_matrix_q31_narrow_(int64_t x, int n)
+static inline int32_t error_matrix_q31_fit(int64_t x, int n)
 {
 #ifdef __FRAMAC__
     return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
@@ -73,75 +73,76 @@ int error_matrix_q31(const int32_t computed[9], const int32_t truth[9], int32_t 
     const int32_t T_31 = truth[6];
     const int32_t T_32 = truth[7];
     const int32_t T_33 = truth[8];
-    if (error_matrix_q31_out_(C_11, INT32_C(1140850688))
-        || error_matrix_q31_out_(C_12, INT32_C(1140850688))
-        || error_matrix_q31_out_(C_13, INT32_C(1140850688))
-        || error_matrix_q31_out_(C_21, INT32_C(1140850688))
-        || error_matrix_q31_out_(C_22, INT32_C(1140850688))
-        || error_matrix_q31_out_(C_23, INT32_C(1140850688))
-        || error_matrix_q31_out_(C_31, INT32_C(1140850688))
-        || error_matrix_q31_out_(C_32, INT32_C(1140850688))
-        || error_matrix_q31_out_(C_33, INT32_C(1140850688))
-        || error_matrix_q31_out_(T_11, INT32_C(1140850688))
-        || error_matrix_q31_out_(T_12, INT32_C(1140850688))
-        || error_matrix_q31_out_(T_13, INT32_C(1140850688))
-        || error_matrix_q31_out_(T_21, INT32_C(1140850688))
-        || error_matrix_q31_out_(T_22, INT32_C(1140850688))
-        || error_matrix_q31_out_(T_23, INT32_C(1140850688))
-        || error_matrix_q31_out_(T_31, INT32_C(1140850688))
-        || error_matrix_q31_out_(T_32, INT32_C(1140850688))
-        || error_matrix_q31_out_(T_33, INT32_C(1140850688)))
+    if (error_matrix_q31_out(C_11, INT32_C(1140850688))
+        || error_matrix_q31_out(C_12, INT32_C(1140850688))
+        || error_matrix_q31_out(C_13, INT32_C(1140850688))
+        || error_matrix_q31_out(C_21, INT32_C(1140850688))
+        || error_matrix_q31_out(C_22, INT32_C(1140850688))
+        || error_matrix_q31_out(C_23, INT32_C(1140850688))
+        || error_matrix_q31_out(C_31, INT32_C(1140850688))
+        || error_matrix_q31_out(C_32, INT32_C(1140850688))
+        || error_matrix_q31_out(C_33, INT32_C(1140850688))
+        || error_matrix_q31_out(T_11, INT32_C(1140850688))
+        || error_matrix_q31_out(T_12, INT32_C(1140850688))
+        || error_matrix_q31_out(T_13, INT32_C(1140850688))
+        || error_matrix_q31_out(T_21, INT32_C(1140850688))
+        || error_matrix_q31_out(T_22, INT32_C(1140850688))
+        || error_matrix_q31_out(T_23, INT32_C(1140850688))
+        || error_matrix_q31_out(T_31, INT32_C(1140850688))
+        || error_matrix_q31_out(T_32, INT32_C(1140850688))
+        || error_matrix_q31_out(T_33, INT32_C(1140850688))) {
         return 1;
+    }
     /* error matrix, reference axes */
     const int32_t E_11 = -(INT32_C(1) << 28)
-        + error_matrix_q31_narrow_(error_matrix_q31_mul_(C_11, T_11)
-        + error_matrix_q31_mul_(C_12, T_12) + error_matrix_q31_mul_(C_13, T_13)
+        + error_matrix_q31_fit(error_matrix_q31_mul(C_11, T_11)
+        + error_matrix_q31_mul(C_12, T_12) + error_matrix_q31_mul(C_13, T_13)
         + (INT64_C(1) << 31), 32); /* Q3.28, -4.39 .. 2.39, error 1.9e-09 */
-    const int32_t E_12 = error_matrix_q31_narrow_(error_matrix_q31_mul_(C_11, T_21)
-        + error_matrix_q31_mul_(C_12, T_22) + error_matrix_q31_mul_(C_13, T_23)
+    const int32_t E_12 = error_matrix_q31_fit(error_matrix_q31_mul(C_11, T_21)
+        + error_matrix_q31_mul(C_12, T_22) + error_matrix_q31_mul(C_13, T_23)
         + (INT64_C(1) << 31), 32); /* Q3.28, -3.39 .. 3.39, error 1.9e-09 */
-    const int32_t E_13 = error_matrix_q31_narrow_(error_matrix_q31_mul_(C_11, T_31)
-        + error_matrix_q31_mul_(C_12, T_32) + error_matrix_q31_mul_(C_13, T_33)
+    const int32_t E_13 = error_matrix_q31_fit(error_matrix_q31_mul(C_11, T_31)
+        + error_matrix_q31_mul(C_12, T_32) + error_matrix_q31_mul(C_13, T_33)
         + (INT64_C(1) << 31), 32); /* Q3.28, -3.39 .. 3.39, error 1.9e-09 */
-    const int32_t E_21 = error_matrix_q31_narrow_(error_matrix_q31_mul_(C_21, T_11)
-        + error_matrix_q31_mul_(C_22, T_12) + error_matrix_q31_mul_(C_23, T_13)
+    const int32_t E_21 = error_matrix_q31_fit(error_matrix_q31_mul(C_21, T_11)
+        + error_matrix_q31_mul(C_22, T_12) + error_matrix_q31_mul(C_23, T_13)
         + (INT64_C(1) << 31), 32); /* Q3.28, -3.39 .. 3.39, error 1.9e-09 */
     const int32_t E_22 = -(INT32_C(1) << 28)
-        + error_matrix_q31_narrow_(error_matrix_q31_mul_(C_21, T_21)
-        + error_matrix_q31_mul_(C_22, T_22) + error_matrix_q31_mul_(C_23, T_23)
+        + error_matrix_q31_fit(error_matrix_q31_mul(C_21, T_21)
+        + error_matrix_q31_mul(C_22, T_22) + error_matrix_q31_mul(C_23, T_23)
         + (INT64_C(1) << 31), 32); /* Q3.28, -4.39 .. 2.39, error 1.9e-09 */
-    const int32_t E_23 = error_matrix_q31_narrow_(error_matrix_q31_mul_(C_21, T_31)
-        + error_matrix_q31_mul_(C_22, T_32) + error_matrix_q31_mul_(C_23, T_33)
+    const int32_t E_23 = error_matrix_q31_fit(error_matrix_q31_mul(C_21, T_31)
+        + error_matrix_q31_mul(C_22, T_32) + error_matrix_q31_mul(C_23, T_33)
         + (INT64_C(1) << 31), 32); /* Q3.28, -3.39 .. 3.39, error 1.9e-09 */
-    const int32_t E_31 = error_matrix_q31_narrow_(error_matrix_q31_mul_(C_31, T_11)
-        + error_matrix_q31_mul_(C_32, T_12) + error_matrix_q31_mul_(C_33, T_13)
+    const int32_t E_31 = error_matrix_q31_fit(error_matrix_q31_mul(C_31, T_11)
+        + error_matrix_q31_mul(C_32, T_12) + error_matrix_q31_mul(C_33, T_13)
         + (INT64_C(1) << 31), 32); /* Q3.28, -3.39 .. 3.39, error 1.9e-09 */
-    const int32_t E_32 = error_matrix_q31_narrow_(error_matrix_q31_mul_(C_31, T_21)
-        + error_matrix_q31_mul_(C_32, T_22) + error_matrix_q31_mul_(C_33, T_23)
+    const int32_t E_32 = error_matrix_q31_fit(error_matrix_q31_mul(C_31, T_21)
+        + error_matrix_q31_mul(C_32, T_22) + error_matrix_q31_mul(C_33, T_23)
         + (INT64_C(1) << 31), 32); /* Q3.28, -3.39 .. 3.39, error 1.9e-09 */
     const int32_t E_33 = -(INT32_C(1) << 28)
-        + error_matrix_q31_narrow_(error_matrix_q31_mul_(C_31, T_31)
-        + error_matrix_q31_mul_(C_32, T_32) + error_matrix_q31_mul_(C_33, T_33)
+        + error_matrix_q31_fit(error_matrix_q31_mul(C_31, T_31)
+        + error_matrix_q31_mul(C_32, T_32) + error_matrix_q31_mul(C_33, T_33)
         + (INT64_C(1) << 31), 32); /* Q3.28, -4.39 .. 2.39, error 1.9e-09 */
     const int64_t shared_1 = (int64_t)E_23; /* Q34.29, -1.7 .. 1.7, error 9.4e-10 */
     const int64_t shared_2 = (int64_t)E_32; /* Q34.29, -1.7 .. 1.7, error 9.4e-10 */
     /* skew errors, reference axes */
-    const int32_t skew_x = error_matrix_q31_narrow_(shared_1 + shared_2, 0);
+    const int32_t skew_x = error_matrix_q31_fit(shared_1 + shared_2, 0);
         /* Q2.29, -3.39 .. 3.39, error 1.9e-09 */
     const int64_t shared_3 = (int64_t)E_13; /* Q34.29, -1.7 .. 1.7, error 9.4e-10 */
     const int64_t shared_6 = (int64_t)E_31; /* Q34.29, -1.7 .. 1.7, error 9.4e-10 */
-    const int32_t skew_y = error_matrix_q31_narrow_(shared_6 + shared_3, 0);
+    const int32_t skew_y = error_matrix_q31_fit(shared_6 + shared_3, 0);
         /* Q2.29, -3.39 .. 3.39, error 1.9e-09 */
     const int64_t shared_4 = (int64_t)E_12; /* Q34.29, -1.7 .. 1.7, error 9.4e-10 */
     const int64_t shared_5 = (int64_t)E_21; /* Q34.29, -1.7 .. 1.7, error 9.4e-10 */
-    const int32_t skew_z = error_matrix_q31_narrow_(shared_4 + shared_5, 0);
+    const int32_t skew_z = error_matrix_q31_fit(shared_4 + shared_5, 0);
         /* Q2.29, -3.39 .. 3.39, error 1.9e-09 */
     /* drift errors, reference axes: the rotation from the computed frame to the true one */
-    const int32_t drift_x = error_matrix_q31_narrow_(shared_1 - shared_2, 0);
+    const int32_t drift_x = error_matrix_q31_fit(shared_1 - shared_2, 0);
         /* Q2.29, -3.39 .. 3.39, error 1.9e-09 */
-    const int32_t drift_y = error_matrix_q31_narrow_(shared_6 - shared_3, 0);
+    const int32_t drift_y = error_matrix_q31_fit(shared_6 - shared_3, 0);
         /* Q2.29, -3.39 .. 3.39, error 1.9e-09 */
-    const int32_t drift_z = error_matrix_q31_narrow_(shared_4 - shared_5, 0);
+    const int32_t drift_z = error_matrix_q31_fit(shared_4 - shared_5, 0);
         /* Q2.29, -3.39 .. 3.39, error 1.9e-09 */
     error[0] = E_11;
     error[1] = E_12;

@@ -5,7 +5,7 @@
 #include "euler_angles_from_dcm_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int euler_angles_from_dcm_q31_out_(int32_t x, int32_t limit)
+static inline int euler_angles_from_dcm_q31_out(int32_t x, int32_t limit)
 {
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
@@ -13,7 +13,7 @@ static inline int euler_angles_from_dcm_q31_out_(int32_t x, int32_t limit)
 /* The exact product of two words. */
 #if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
 /* These processors have no instruction for it: the high word takes four products of half words. */
-static __attribute__((noinline)) int64_t euler_angles_from_dcm_q31_mul_(int32_t a, int32_t b)
+static __attribute__((noinline)) int64_t euler_angles_from_dcm_q31_mul(int32_t a, int32_t b)
 {
     const uint32_t a_low = (uint32_t)a & 0xFFFFu;
     const uint32_t b_low = (uint32_t)b & 0xFFFFu;
@@ -28,7 +28,7 @@ static __attribute__((noinline)) int64_t euler_angles_from_dcm_q31_mul_(int32_t 
     return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
 }
 #else
-static inline int64_t euler_angles_from_dcm_q31_mul_(int32_t a, int32_t b)
+static inline int64_t euler_angles_from_dcm_q31_mul(int32_t a, int32_t b)
 {
     return (int64_t)a * (int64_t)b;
 }
@@ -39,7 +39,7 @@ static inline int64_t euler_angles_from_dcm_q31_mul_(int32_t a, int32_t b)
  * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
  * number and no conversion of a number out of range.
  */
-static inline int32_t euler_angles_from_dcm_q31_narrow_(int64_t x, int n)
+static inline int32_t euler_angles_from_dcm_q31_fit(int64_t x, int n)
 {
 #ifdef __FRAMAC__
     return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
@@ -53,13 +53,13 @@ static inline int32_t euler_angles_from_dcm_q31_narrow_(int64_t x, int n)
 }
 
 /* x / 2^n, rounded down, as a wide number. */
-static inline int64_t euler_angles_from_dcm_q31_shr_(int64_t x, int n)
+static inline int64_t euler_angles_from_dcm_q31_shr(int64_t x, int n)
 {
     return (x < 0) ? ~(~x >> n) : (x >> n);
 }
 
 /* numerator / denominator of their magnitudes, to the nearest; the sign comes last. */
-static int64_t euler_angles_from_dcm_q31_div_(int64_t numerator, int64_t denominator)
+static int64_t euler_angles_from_dcm_q31_div(int64_t numerator, int64_t denominator)
 {
     const int64_t top = (numerator < 0) ? -numerator : numerator;
     const int64_t below = (denominator < 0) ? -denominator : denominator;
@@ -68,7 +68,7 @@ static int64_t euler_angles_from_dcm_q31_div_(int64_t numerator, int64_t denomin
 }
 
 /* Square root bit by bit, to the nearest. */
-static int32_t euler_angles_from_dcm_q31_sqrt_(uint64_t square)
+static int32_t euler_angles_from_dcm_q31_rt(uint64_t square)
 {
     uint64_t rest = square;
     uint64_t root = 0;
@@ -97,39 +97,38 @@ int euler_angles_from_dcm_q31(const int32_t state[9], const int32_t previous[3],
     const int32_t C_32 = state[7];
     const int32_t C_33 = state[8];
     const int32_t last_roll = previous[0];
-    if (euler_angles_from_dcm_q31_out_(C_11, INT32_C(1140850688))
-        || euler_angles_from_dcm_q31_out_(C_12, INT32_C(1140850688))
-        || euler_angles_from_dcm_q31_out_(C_13, INT32_C(1140850688))
-        || euler_angles_from_dcm_q31_out_(C_21, INT32_C(1140850688))
-        || euler_angles_from_dcm_q31_out_(C_22, INT32_C(1140850688))
-        || euler_angles_from_dcm_q31_out_(C_23, INT32_C(1140850688))
-        || euler_angles_from_dcm_q31_out_(C_31, INT32_C(1140850688))
-        || euler_angles_from_dcm_q31_out_(C_32, INT32_C(1140850688))
-        || euler_angles_from_dcm_q31_out_(C_33, INT32_C(1140850688))
-        || euler_angles_from_dcm_q31_out_(last_roll, INT32_C(1686629857))
-        || euler_angles_from_dcm_q31_out_(previous[1], INT32_C(1686629857))
-        || euler_angles_from_dcm_q31_out_(previous[2], INT32_C(1686629857)))
+    if (euler_angles_from_dcm_q31_out(C_11, INT32_C(1140850688))
+        || euler_angles_from_dcm_q31_out(C_12, INT32_C(1140850688))
+        || euler_angles_from_dcm_q31_out(C_13, INT32_C(1140850688))
+        || euler_angles_from_dcm_q31_out(C_21, INT32_C(1140850688))
+        || euler_angles_from_dcm_q31_out(C_22, INT32_C(1140850688))
+        || euler_angles_from_dcm_q31_out(C_23, INT32_C(1140850688))
+        || euler_angles_from_dcm_q31_out(C_31, INT32_C(1140850688))
+        || euler_angles_from_dcm_q31_out(C_32, INT32_C(1140850688))
+        || euler_angles_from_dcm_q31_out(C_33, INT32_C(1140850688))
+        || euler_angles_from_dcm_q31_out(last_roll, INT32_C(1686629857))
+        || euler_angles_from_dcm_q31_out(previous[1], INT32_C(1686629857))
+        || euler_angles_from_dcm_q31_out(previous[2], INT32_C(1686629857))) {
         return 1;
+    }
     /* square of the cosine of pitch */
-    const int64_t cosine_squared = euler_angles_from_dcm_q31_mul_(C_11, C_11)
-        + euler_angles_from_dcm_q31_mul_(C_21, C_21); /* Q3.60, 0 .. 2.26, exact */
+    const int64_t cosine_squared = euler_angles_from_dcm_q31_mul(C_11, C_11)
+        + euler_angles_from_dcm_q31_mul(C_21, C_21); /* Q3.60, 0 .. 2.26, exact */
     const int32_t next_pitch_argument = -C_31; /* Q1.30, -1.07 .. 1.07, exact */
-    const int32_t next_pitch_argument_root =
-        euler_angles_from_dcm_q31_sqrt_((uint64_t)(euler_angles_from_dcm_q31_shr_(cosine_squared, 2)));
+    const int32_t next_pitch_argument_root = euler_angles_from_dcm_q31_rt((uint64_t)(
+        euler_angles_from_dcm_q31_shr(cosine_squared, 2)));
         /* Q2.29, 0 .. 1.51, error 2.8e-09 */
-    const int64_t next_pitch_distance =
-        euler_angles_from_dcm_q31_mul_(next_pitch_argument, next_pitch_argument)
-        + cosine_squared; /* Q3.60, 0.5 .. 2, exact */
+    const int64_t next_pitch_distance = euler_angles_from_dcm_q31_mul(next_pitch_argument,
+        next_pitch_argument) + cosine_squared; /* Q3.60, 0.5 .. 2, exact */
     if ((next_pitch_distance < (INT64_C(1) << 59))
         || (next_pitch_distance > (INT64_C(1) << 61))) {
         return 2;
     }
-    const int32_t next_pitch_taken =
-        euler_angles_from_dcm_q31_narrow_((int64_t)next_pitch_argument, 0);
-        /* Q1.30, -1.07 .. 1.07, exact */
+    const int32_t next_pitch_taken = euler_angles_from_dcm_q31_fit((int64_t)next_pitch_argument,
+        0); /* Q1.30, -1.07 .. 1.07, exact */
     int32_t next_pitch_taken_2; /* Q2.29, 0 .. 1.51, exact */
     if ((int64_t)next_pitch_argument_root >= INT32_C(806703257)) {
-        next_pitch_taken_2 = euler_angles_from_dcm_q31_narrow_(INT32_C(806703257), 0);
+        next_pitch_taken_2 = euler_angles_from_dcm_q31_fit(INT32_C(806703257), 0);
     } else {
         next_pitch_taken_2 = next_pitch_argument_root;
     }
@@ -137,21 +136,21 @@ int euler_angles_from_dcm_q31(const int32_t state[9], const int32_t previous[3],
         /* Q33.30, -1.07 .. 1.07, exact */
     int32_t next_pitch_height = next_pitch_taken; /* Q1.30, 0 .. 1.07, exact */
     if (next_pitch_negative > next_pitch_height) {
-        next_pitch_height = euler_angles_from_dcm_q31_narrow_(next_pitch_negative, 0);
+        next_pitch_height = euler_angles_from_dcm_q31_fit(next_pitch_negative, 0);
     }
     int32_t next_pitch_smaller; /* Q1.30, 0 .. 1.07, exact */
     if ((int64_t)next_pitch_taken_2 * 2 >= (int64_t)next_pitch_height) {
         next_pitch_smaller = next_pitch_height;
     } else {
-        next_pitch_smaller = euler_angles_from_dcm_q31_narrow_((int64_t)next_pitch_taken_2 * 2, 0);
+        next_pitch_smaller = euler_angles_from_dcm_q31_fit((int64_t)next_pitch_taken_2 * 2, 0);
     }
-    int32_t next_pitch_larger = euler_angles_from_dcm_q31_narrow_((int64_t)next_pitch_taken_2
+    int32_t next_pitch_larger = euler_angles_from_dcm_q31_fit((int64_t)next_pitch_taken_2
         * 2, 0); /* Q1.30, 9.31e-10 .. 1.51, exact */
     if ((int64_t)next_pitch_height > next_pitch_larger) {
         next_pitch_larger = next_pitch_height;
     }
     if (1 > next_pitch_larger) {
-        next_pitch_larger = euler_angles_from_dcm_q31_narrow_(1, 0);
+        next_pitch_larger = euler_angles_from_dcm_q31_fit(1, 0);
     }
     const int64_t next_pitch_beyond = (int64_t)next_pitch_smaller * (1 << 4)
         - (int64_t)next_pitch_larger * 8 + (int64_t)next_pitch_larger;
@@ -162,7 +161,7 @@ int euler_angles_from_dcm_q31(const int32_t state[9], const int32_t previous[3],
         /* Q33.30, 9.31e-10 .. 2.57, exact */
     int32_t next_pitch_numerator; /* Q1.30, -0.846 .. 0.658, exact */
     if (next_pitch_beyond >= 0) {
-        next_pitch_numerator = euler_angles_from_dcm_q31_narrow_(next_pitch_below, 0);
+        next_pitch_numerator = euler_angles_from_dcm_q31_fit(next_pitch_below, 0);
     } else {
         next_pitch_numerator = next_pitch_smaller;
     }
@@ -172,49 +171,54 @@ int euler_angles_from_dcm_q31(const int32_t state[9], const int32_t previous[3],
     } else {
         next_pitch_denominator = (int64_t)next_pitch_larger;
     }
-    const int32_t next_pitch_tangent =
-        euler_angles_from_dcm_q31_narrow_(euler_angles_from_dcm_q31_div_((int64_t)next_pitch_numerator
+    const int32_t next_pitch_tangent = euler_angles_from_dcm_q31_fit(
+        euler_angles_from_dcm_q31_div((int64_t)next_pitch_numerator
         * (INT64_C(1) << 32), next_pitch_denominator), 0);
         /* Q-1.32, -0.392 .. 0.438, error 1.2e-10 */
-    const int32_t next_pitch_square =
-        euler_angles_from_dcm_q31_narrow_(euler_angles_from_dcm_q31_mul_(next_pitch_tangent, next_pitch_tangent)
+    const int32_t next_pitch_square = euler_angles_from_dcm_q31_fit(
+        euler_angles_from_dcm_q31_mul(next_pitch_tangent, next_pitch_tangent)
         + (INT32_C(1) << 30), 31); /* Q-2.33, -2.33e-10 .. 0.192, error 1.7e-10 */
-    const int32_t next_pitch_series =
-        euler_angles_from_dcm_q31_narrow_(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_mul_(next_pitch_square, INT32_C(735255871) /* 0.042797524437051732 in Q34 */), 1)
+    const int32_t next_pitch_series = euler_angles_from_dcm_q31_fit(
+        euler_angles_from_dcm_q31_shr(euler_angles_from_dcm_q31_mul(next_pitch_square,
+        INT32_C(735255871) /* 0.042797524437051732 in Q34 */), 1)
         - INT64_C(6065684321545150080) /* 0.08220535148788144 in Q60 */
         + (INT64_C(1) << 31), 32); /* Q-3.34, -0.0823 .. -0.074, error 3.9e-11 */
-    const int32_t next_pitch_series_2 =
-        euler_angles_from_dcm_q31_narrow_(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_mul_(next_pitch_square, next_pitch_series), 2)
+    const int32_t next_pitch_series_2 = euler_angles_from_dcm_q31_fit(
+        euler_angles_from_dcm_q31_shr(euler_angles_from_dcm_q31_mul(next_pitch_square,
+        next_pitch_series), 2)
         + INT64_C(4054853067505913472) /* 0.10990701262248558 in Q60 */
         + (INT32_C(1) << 30), 31); /* 0.0941 .. 0.11, error 5e-11 */
-    const int32_t next_pitch_series_3 =
-        euler_angles_from_dcm_q31_narrow_(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_mul_(next_pitch_square, next_pitch_series_2), 2)
+    const int32_t next_pitch_series_3 = euler_angles_from_dcm_q31_fit(
+        euler_angles_from_dcm_q31_shr(euler_angles_from_dcm_q31_mul(next_pitch_square,
+        next_pitch_series_2), 2)
         - INT64_C(5267120772635892064) /* 0.14276559461088406 in Q60 */
         + (INT64_C(1) << 31), 32); /* Q-2.33, -0.143 .. -0.121, error 8.6e-11 */
-    const int32_t next_pitch_series_4 =
-        euler_angles_from_dcm_q31_narrow_(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_mul_(next_pitch_square, next_pitch_series_3), 1)
+    const int32_t next_pitch_series_4 = euler_angles_from_dcm_q31_fit(
+        euler_angles_from_dcm_q31_shr(euler_angles_from_dcm_q31_mul(next_pitch_square,
+        next_pitch_series_3), 1)
         + INT64_C(7378564090463267680) /* 0.19999638041759513 in Q60 */
         + (INT64_C(1) << 31), 32); /* 0.172 .. 0.2, error 9.8e-11 */
-    const int32_t next_pitch_series_5 =
-        euler_angles_from_dcm_q31_narrow_(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_mul_(next_pitch_square, next_pitch_series_4), 2)
+    const int32_t next_pitch_series_5 = euler_angles_from_dcm_q31_fit(
+        euler_angles_from_dcm_q31_shr(euler_angles_from_dcm_q31_mul(next_pitch_square,
+        next_pitch_series_4), 2)
         - INT64_C(6148913518682917232) /* 0.33333326976907529 in Q60 */
         + (INT64_C(1) << 31), 32); /* Q-1.32, -0.334 .. -0.295, error 1.7e-10 */
-    const int32_t next_pitch_bend =
-        euler_angles_from_dcm_q31_narrow_(euler_angles_from_dcm_q31_mul_(next_pitch_square, next_pitch_series_5)
-        - INT64_C(11967952160) /* 3.2439199325215087e-10 in Q60 */ + (INT32_C(1) << 30), 31);
-        /* Q-3.34, -0.0639 .. -1.74e-10, error 1.2e-10 */
+    const int32_t next_pitch_bend = euler_angles_from_dcm_q31_fit(euler_angles_from_dcm_q31_mul(
+        next_pitch_square, next_pitch_series_5)
+        - INT64_C(11967952160) /* 3.2439199325215087e-10 in Q60 */
+        + (INT32_C(1) << 30), 31); /* Q-3.34, -0.0639 .. -1.74e-10, error 1.2e-10 */
     const int64_t next_pitch_arctangent = (int64_t)next_pitch_tangent * (INT64_C(1) << 32)
-        + euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_mul_(next_pitch_tangent, next_pitch_bend), 2);
-        /* Q-1.64, -0.392 .. 0.438, error 1.9e-10 */
-    const int64_t next_pitch_angle = euler_angles_from_dcm_q31_shr_(next_pitch_arctangent, 2)
+        + euler_angles_from_dcm_q31_shr(euler_angles_from_dcm_q31_mul(next_pitch_tangent,
+        next_pitch_bend), 2); /* Q-1.64, -0.392 .. 0.438, error 1.9e-10 */
+    const int64_t next_pitch_angle = euler_angles_from_dcm_q31_shr(next_pitch_arctangent, 2)
         + INT64_C(3622009729038561420); /* Q1.62, 0.394 .. 1.23, error 1.9e-10 */
     int64_t next_pitch_octant; /* Q1.62, -1.84e-10 .. 0.786, error 1.9e-10 */
     if (next_pitch_beyond >= 0) {
         next_pitch_octant = next_pitch_angle;
     } else {
-        next_pitch_octant = euler_angles_from_dcm_q31_shr_(next_pitch_arctangent, 2);
+        next_pitch_octant = euler_angles_from_dcm_q31_shr(next_pitch_arctangent, 2);
     }
-    const int64_t next_pitch_angle_2 = euler_angles_from_dcm_q31_shr_(-next_pitch_octant, 1)
+    const int64_t next_pitch_angle_2 = euler_angles_from_dcm_q31_shr(-next_pitch_octant, 1)
         + INT64_C(3622009729038561420); /* Q2.61, 0.785 .. 1.58, error 1.9e-10 */
     int64_t next_pitch_quadrant; /* Q1.62, -1.84e-10 .. 1.58, error 1.9e-10 */
     if ((int64_t)next_pitch_taken_2 * 2 >= (int64_t)next_pitch_height) {
@@ -231,19 +235,17 @@ int euler_angles_from_dcm_q31(const int32_t state[9], const int32_t previous[3],
         next_pitch_side = next_pitch_angle_3;
     }
     /* pitch */
-    const int32_t next_pitch = euler_angles_from_dcm_q31_narrow_(next_pitch_side
+    const int32_t next_pitch = euler_angles_from_dcm_q31_fit(next_pitch_side
         + (INT64_C(1) << 32), 33); /* Q2.29, -1.58 .. 1.58, error 5.6e-09 */
-    const int64_t next_roll_case_angle_negative = -(int64_t)C_32;
-        /* Q33.30, -1.07 .. 1.07, exact */
+    const int64_t next_roll_case_angle_neg = -(int64_t)C_32; /* Q33.30, -1.07 .. 1.07, exact */
     int32_t next_roll_case_angle_height = C_32; /* Q1.30, 0 .. 1.07, exact */
-    if (next_roll_case_angle_negative > next_roll_case_angle_height) {
-        next_roll_case_angle_height = euler_angles_from_dcm_q31_narrow_(next_roll_case_angle_negative, 0);
+    if (next_roll_case_angle_neg > next_roll_case_angle_height) {
+        next_roll_case_angle_height = euler_angles_from_dcm_q31_fit(next_roll_case_angle_neg, 0);
     }
-    const int64_t next_roll_case_angle_negative_2 = -(int64_t)C_33;
-        /* Q33.30, -1.07 .. 1.07, exact */
+    const int64_t next_roll_case_angle_neg_2 = -(int64_t)C_33; /* Q33.30, -1.07 .. 1.07, exact */
     int32_t next_roll_case_angle_width = C_33; /* Q1.30, 0 .. 1.07, exact */
-    if (next_roll_case_angle_negative_2 > next_roll_case_angle_width) {
-        next_roll_case_angle_width = euler_angles_from_dcm_q31_narrow_(next_roll_case_angle_negative_2, 0);
+    if (next_roll_case_angle_neg_2 > next_roll_case_angle_width) {
+        next_roll_case_angle_width = euler_angles_from_dcm_q31_fit(next_roll_case_angle_neg_2, 0);
     }
     int32_t next_roll_case_angle_smaller; /* Q1.30, 0 .. 1.07, exact */
     if ((int64_t)next_roll_case_angle_width >= (int64_t)next_roll_case_angle_height) {
@@ -257,7 +259,7 @@ int euler_angles_from_dcm_q31(const int32_t state[9], const int32_t previous[3],
         next_roll_case_angle_larger = next_roll_case_angle_height;
     }
     if (1 > next_roll_case_angle_larger) {
-        next_roll_case_angle_larger = euler_angles_from_dcm_q31_narrow_(1, 0);
+        next_roll_case_angle_larger = euler_angles_from_dcm_q31_fit(1, 0);
     }
     const int64_t next_roll_case_angle_beyond = (int64_t)next_roll_case_angle_smaller * (1 << 4)
         - (int64_t)next_roll_case_angle_larger * 8 + (int64_t)next_roll_case_angle_larger;
@@ -266,77 +268,84 @@ int euler_angles_from_dcm_q31(const int32_t state[9], const int32_t previous[3],
         - (int64_t)next_roll_case_angle_larger; /* Q33.30, -1.07 .. 0, exact */
     const int64_t next_roll_case_angle_both = (int64_t)next_roll_case_angle_smaller
         + (int64_t)next_roll_case_angle_larger; /* Q33.30, 9.31e-10 .. 2.13, exact */
-    int32_t next_roll_case_angle_numerator; /* Q1.30, -0.598 .. 0.465, exact */
+    int32_t next_roll_case_angle_num; /* Q1.30, -0.598 .. 0.465, exact */
     if (next_roll_case_angle_beyond >= 0) {
-        next_roll_case_angle_numerator = euler_angles_from_dcm_q31_narrow_(next_roll_case_angle_below, 0);
+        next_roll_case_angle_num = euler_angles_from_dcm_q31_fit(next_roll_case_angle_below, 0);
     } else {
-        next_roll_case_angle_numerator = next_roll_case_angle_smaller;
+        next_roll_case_angle_num = next_roll_case_angle_smaller;
     }
-    int64_t next_roll_case_angle_denominator; /* Q33.30, 9.31e-10 .. 2.13, exact */
+    int64_t next_roll_case_angle_den; /* Q33.30, 9.31e-10 .. 2.13, exact */
     if (next_roll_case_angle_beyond >= 0) {
-        next_roll_case_angle_denominator = next_roll_case_angle_both;
+        next_roll_case_angle_den = next_roll_case_angle_both;
     } else {
-        next_roll_case_angle_denominator = (int64_t)next_roll_case_angle_larger;
+        next_roll_case_angle_den = (int64_t)next_roll_case_angle_larger;
     }
-    const int32_t next_roll_case_angle_tangent =
-        euler_angles_from_dcm_q31_narrow_(euler_angles_from_dcm_q31_div_((int64_t)next_roll_case_angle_numerator
-        * (INT64_C(1) << 32), next_roll_case_angle_denominator), 0);
+    const int32_t next_roll_case_angle_tangent = euler_angles_from_dcm_q31_fit(
+        euler_angles_from_dcm_q31_div((int64_t)next_roll_case_angle_num
+        * (INT64_C(1) << 32), next_roll_case_angle_den), 0);
         /* Q-1.32, -0.392 .. 0.438, error 1.2e-10 */
-    const int32_t next_roll_case_angle_square =
-        euler_angles_from_dcm_q31_narrow_(euler_angles_from_dcm_q31_mul_(next_roll_case_angle_tangent, next_roll_case_angle_tangent)
-        + (INT32_C(1) << 30), 31); /* Q-2.33, -2.33e-10 .. 0.192, error 1.7e-10 */
-    const int32_t next_roll_case_angle_series =
-        euler_angles_from_dcm_q31_narrow_(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_mul_(next_roll_case_angle_square, INT32_C(735255871) /* 0.042797524437051732 in Q34 */), 1)
-        - INT64_C(6065684321545150080) /* 0.08220535148788144 in Q60 */
+    const int32_t next_roll_case_angle_square = euler_angles_from_dcm_q31_fit(
+        euler_angles_from_dcm_q31_mul(next_roll_case_angle_tangent,
+        next_roll_case_angle_tangent) + (INT32_C(1) << 30), 31);
+        /* Q-2.33, -2.33e-10 .. 0.192, error 1.7e-10 */
+    const int32_t next_roll_case_angle_series = euler_angles_from_dcm_q31_fit(
+        euler_angles_from_dcm_q31_shr(euler_angles_from_dcm_q31_mul(
+        next_roll_case_angle_square, INT32_C(735255871) /* 0.042797524437051732 in Q34 */),
+        1) - INT64_C(6065684321545150080) /* 0.08220535148788144 in Q60 */
         + (INT64_C(1) << 31), 32); /* Q-3.34, -0.0823 .. -0.074, error 3.9e-11 */
-    const int32_t next_roll_case_angle_series_2 =
-        euler_angles_from_dcm_q31_narrow_(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_mul_(next_roll_case_angle_square, next_roll_case_angle_series), 2)
+    const int32_t next_roll_case_angle_ser_2 = euler_angles_from_dcm_q31_fit(
+        euler_angles_from_dcm_q31_shr(euler_angles_from_dcm_q31_mul(
+        next_roll_case_angle_square, next_roll_case_angle_series), 2)
         + INT64_C(4054853067505913472) /* 0.10990701262248558 in Q60 */
         + (INT32_C(1) << 30), 31); /* 0.0941 .. 0.11, error 5e-11 */
-    const int32_t next_roll_case_angle_series_3 =
-        euler_angles_from_dcm_q31_narrow_(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_mul_(next_roll_case_angle_square, next_roll_case_angle_series_2), 2)
+    const int32_t next_roll_case_angle_ser_3 = euler_angles_from_dcm_q31_fit(
+        euler_angles_from_dcm_q31_shr(euler_angles_from_dcm_q31_mul(
+        next_roll_case_angle_square, next_roll_case_angle_ser_2), 2)
         - INT64_C(5267120772635892064) /* 0.14276559461088406 in Q60 */
         + (INT64_C(1) << 31), 32); /* Q-2.33, -0.143 .. -0.121, error 8.6e-11 */
-    const int32_t next_roll_case_angle_series_4 =
-        euler_angles_from_dcm_q31_narrow_(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_mul_(next_roll_case_angle_square, next_roll_case_angle_series_3), 1)
+    const int32_t next_roll_case_angle_ser_4 = euler_angles_from_dcm_q31_fit(
+        euler_angles_from_dcm_q31_shr(euler_angles_from_dcm_q31_mul(
+        next_roll_case_angle_square, next_roll_case_angle_ser_3), 1)
         + INT64_C(7378564090463267680) /* 0.19999638041759513 in Q60 */
         + (INT64_C(1) << 31), 32); /* 0.172 .. 0.2, error 9.8e-11 */
-    const int32_t next_roll_case_angle_series_5 =
-        euler_angles_from_dcm_q31_narrow_(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_mul_(next_roll_case_angle_square, next_roll_case_angle_series_4), 2)
+    const int32_t next_roll_case_angle_ser_5 = euler_angles_from_dcm_q31_fit(
+        euler_angles_from_dcm_q31_shr(euler_angles_from_dcm_q31_mul(
+        next_roll_case_angle_square, next_roll_case_angle_ser_4), 2)
         - INT64_C(6148913518682917232) /* 0.33333326976907529 in Q60 */
         + (INT64_C(1) << 31), 32); /* Q-1.32, -0.334 .. -0.295, error 1.7e-10 */
-    const int32_t next_roll_case_angle_bend =
-        euler_angles_from_dcm_q31_narrow_(euler_angles_from_dcm_q31_mul_(next_roll_case_angle_square, next_roll_case_angle_series_5)
-        - INT64_C(11967952160) /* 3.2439199325215087e-10 in Q60 */ + (INT32_C(1) << 30), 31);
-        /* Q-3.34, -0.0639 .. -1.74e-10, error 1.2e-10 */
-    const int64_t next_roll_case_angle_arctangent = (int64_t)next_roll_case_angle_tangent
-        * (INT64_C(1) << 32)
-        + euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_mul_(next_roll_case_angle_tangent, next_roll_case_angle_bend), 2);
+    const int32_t next_roll_case_angle_bend = euler_angles_from_dcm_q31_fit(
+        euler_angles_from_dcm_q31_mul(next_roll_case_angle_square,
+        next_roll_case_angle_ser_5)
+        - INT64_C(11967952160) /* 3.2439199325215087e-10 in Q60 */
+        + (INT32_C(1) << 30), 31); /* Q-3.34, -0.0639 .. -1.74e-10, error 1.2e-10 */
+    const int64_t next_roll_case_angle_atan = (int64_t)next_roll_case_angle_tangent
+        * (INT64_C(1) << 32) + euler_angles_from_dcm_q31_shr(euler_angles_from_dcm_q31_mul(
+        next_roll_case_angle_tangent, next_roll_case_angle_bend), 2);
         /* Q-1.64, -0.392 .. 0.438, error 1.9e-10 */
-    const int64_t next_roll_case_angle_angle =
-        euler_angles_from_dcm_q31_shr_(next_roll_case_angle_arctangent, 2)
-        + INT64_C(3622009729038561420); /* Q1.62, 0.394 .. 1.23, error 1.9e-10 */
+    const int64_t next_roll_case_angle_angle = euler_angles_from_dcm_q31_shr(
+        next_roll_case_angle_atan, 2) + INT64_C(3622009729038561420);
+        /* Q1.62, 0.394 .. 1.23, error 1.9e-10 */
     int64_t next_roll_case_angle_octant; /* Q1.62, -1.84e-10 .. 0.786, error 1.9e-10 */
     if (next_roll_case_angle_beyond >= 0) {
         next_roll_case_angle_octant = next_roll_case_angle_angle;
     } else {
-        next_roll_case_angle_octant = euler_angles_from_dcm_q31_shr_(next_roll_case_angle_arctangent, 2);
+        next_roll_case_angle_octant = euler_angles_from_dcm_q31_shr(next_roll_case_angle_atan, 2);
     }
-    const int64_t next_roll_case_angle_angle_2 =
-        euler_angles_from_dcm_q31_shr_(-next_roll_case_angle_octant, 1)
-        + INT64_C(3622009729038561420); /* Q2.61, 0.785 .. 1.58, error 1.9e-10 */
-    int64_t next_roll_case_angle_quadrant; /* Q1.62, -1.84e-10 .. 1.58, error 1.9e-10 */
+    const int64_t next_roll_case_angle_angle_2 = euler_angles_from_dcm_q31_shr(
+        -next_roll_case_angle_octant, 1) + INT64_C(3622009729038561420);
+        /* Q2.61, 0.785 .. 1.58, error 1.9e-10 */
+    int64_t next_roll_case_angle_quad; /* Q1.62, -1.84e-10 .. 1.58, error 1.9e-10 */
     if ((int64_t)next_roll_case_angle_width >= (int64_t)next_roll_case_angle_height) {
-        next_roll_case_angle_quadrant = next_roll_case_angle_octant;
+        next_roll_case_angle_quad = next_roll_case_angle_octant;
     } else {
-        next_roll_case_angle_quadrant = next_roll_case_angle_angle_2 * 2;
+        next_roll_case_angle_quad = next_roll_case_angle_angle_2 * 2;
     }
-    const int64_t next_roll_case_angle_angle_3 =
-        euler_angles_from_dcm_q31_shr_(-next_roll_case_angle_quadrant, 2)
-        + INT64_C(3622009729038561420); /* Q3.60, 1.57 .. 3.15, error 1.9e-10 */
+    const int64_t next_roll_case_angle_angle_3 = euler_angles_from_dcm_q31_shr(
+        -next_roll_case_angle_quad, 2) + INT64_C(3622009729038561420);
+        /* Q3.60, 1.57 .. 3.15, error 1.9e-10 */
     int64_t next_roll_case_angle_half; /* Q2.61, -1.84e-10 .. 3.15, error 1.9e-10 */
     if ((int64_t)C_33 >= 0) {
-        next_roll_case_angle_half = euler_angles_from_dcm_q31_shr_(next_roll_case_angle_quadrant, 1);
+        next_roll_case_angle_half = euler_angles_from_dcm_q31_shr(next_roll_case_angle_quad, 1);
     } else {
         next_roll_case_angle_half = next_roll_case_angle_angle_3 * 2;
     }
@@ -378,13 +387,13 @@ int euler_angles_from_dcm_q31(const int32_t state[9], const int32_t previous[3],
     } else {
         steep_cosine = steep_cosine_case_2;
     }
-    const int32_t steep_sine_word = euler_angles_from_dcm_q31_narrow_(steep_sine + 1, 1);
+    const int32_t steep_sine_word = euler_angles_from_dcm_q31_fit(steep_sine + 1, 1);
         /* Q2.29, -2.13 .. 2.13, error 9.4e-10 */
-    const int32_t steep_cosine_word = euler_angles_from_dcm_q31_narrow_(steep_cosine + 1, 1);
+    const int32_t steep_cosine_word = euler_angles_from_dcm_q31_fit(steep_cosine + 1, 1);
         /* Q2.29, -2.13 .. 2.13, error 9.4e-10 */
-    const int64_t apart_distance =
-        euler_angles_from_dcm_q31_mul_(steep_sine_word, steep_sine_word)
-        + euler_angles_from_dcm_q31_mul_(steep_cosine_word, steep_cosine_word);
+    const int64_t apart_distance = euler_angles_from_dcm_q31_mul(steep_sine_word,
+        steep_sine_word)
+        + euler_angles_from_dcm_q31_mul(steep_cosine_word, steep_cosine_word);
         /* Q5.58, 0.5 .. 8, error 8e-09 */
     if ((apart_distance < INT64_C(144115190357557249))
         || (apart_distance > INT64_C(2305843006931992575))) {
@@ -392,29 +401,29 @@ int euler_angles_from_dcm_q31(const int32_t state[9], const int32_t previous[3],
     }
     int32_t apart_taken; /* Q2.29, -2.13 .. 2.13, exact */
     if ((int64_t)steep_sine_word >= INT32_C(1140850688)) {
-        apart_taken = euler_angles_from_dcm_q31_narrow_(INT32_C(1140850688), 0);
+        apart_taken = euler_angles_from_dcm_q31_fit(INT32_C(1140850688), 0);
     } else if ((-INT32_C(1140850688)) >= (int64_t)steep_sine_word) {
-        apart_taken = euler_angles_from_dcm_q31_narrow_((-INT32_C(1140850688)), 0);
+        apart_taken = euler_angles_from_dcm_q31_fit((-INT32_C(1140850688)), 0);
     } else {
         apart_taken = steep_sine_word;
     }
     int32_t apart_taken_2; /* Q2.29, -2.13 .. 2.13, exact */
     if ((int64_t)steep_cosine_word >= INT32_C(1140850688)) {
-        apart_taken_2 = euler_angles_from_dcm_q31_narrow_(INT32_C(1140850688), 0);
+        apart_taken_2 = euler_angles_from_dcm_q31_fit(INT32_C(1140850688), 0);
     } else if ((-INT32_C(1140850688)) >= (int64_t)steep_cosine_word) {
-        apart_taken_2 = euler_angles_from_dcm_q31_narrow_((-INT32_C(1140850688)), 0);
+        apart_taken_2 = euler_angles_from_dcm_q31_fit((-INT32_C(1140850688)), 0);
     } else {
         apart_taken_2 = steep_cosine_word;
     }
     const int64_t apart_negative = -(int64_t)apart_taken; /* Q34.29, -2.13 .. 2.13, exact */
     int32_t apart_height = apart_taken; /* Q2.29, 0 .. 2.13, exact */
     if (apart_negative > apart_height) {
-        apart_height = euler_angles_from_dcm_q31_narrow_(apart_negative, 0);
+        apart_height = euler_angles_from_dcm_q31_fit(apart_negative, 0);
     }
     const int64_t apart_negative_2 = -(int64_t)apart_taken_2; /* Q34.29, -2.13 .. 2.13, exact */
     int32_t apart_width = apart_taken_2; /* Q2.29, 0 .. 2.13, exact */
     if (apart_negative_2 > apart_width) {
-        apart_width = euler_angles_from_dcm_q31_narrow_(apart_negative_2, 0);
+        apart_width = euler_angles_from_dcm_q31_fit(apart_negative_2, 0);
     }
     int32_t apart_smaller; /* Q2.29, 0 .. 2.13, exact */
     if ((int64_t)apart_width >= (int64_t)apart_height) {
@@ -427,7 +436,7 @@ int euler_angles_from_dcm_q31(const int32_t state[9], const int32_t previous[3],
         apart_larger = apart_height;
     }
     if (1 > apart_larger) {
-        apart_larger = euler_angles_from_dcm_q31_narrow_(1, 0);
+        apart_larger = euler_angles_from_dcm_q31_fit(1, 0);
     }
     const int64_t apart_beyond = (int64_t)apart_smaller * (1 << 4) - (int64_t)apart_larger * 8
         + (int64_t)apart_larger; /* Q30.33, -1.07 .. 2.26, exact */
@@ -437,7 +446,7 @@ int euler_angles_from_dcm_q31(const int32_t state[9], const int32_t previous[3],
         /* Q34.29, 1.86e-09 .. 4.25, exact */
     int32_t apart_numerator; /* Q2.29, -1.2 .. 0.93, exact */
     if (apart_beyond >= 0) {
-        apart_numerator = euler_angles_from_dcm_q31_narrow_(apart_below, 0);
+        apart_numerator = euler_angles_from_dcm_q31_fit(apart_below, 0);
     } else {
         apart_numerator = apart_smaller;
     }
@@ -447,49 +456,49 @@ int euler_angles_from_dcm_q31(const int32_t state[9], const int32_t previous[3],
     } else {
         apart_denominator = (int64_t)apart_larger;
     }
-    const int32_t apart_tangent =
-        euler_angles_from_dcm_q31_narrow_(euler_angles_from_dcm_q31_div_((int64_t)apart_numerator
-        * (INT64_C(1) << 32), apart_denominator), 0);
+    const int32_t apart_tangent = euler_angles_from_dcm_q31_fit(euler_angles_from_dcm_q31_div(
+        (int64_t)apart_numerator * (INT64_C(1) << 32), apart_denominator), 0);
         /* Q-1.32, -0.392 .. 0.438, error 1.2e-10 */
-    const int32_t apart_square =
-        euler_angles_from_dcm_q31_narrow_(euler_angles_from_dcm_q31_mul_(apart_tangent, apart_tangent)
-        + (INT32_C(1) << 30), 31); /* Q-2.33, -2.33e-10 .. 0.192, error 1.7e-10 */
-    const int32_t apart_series =
-        euler_angles_from_dcm_q31_narrow_(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_mul_(apart_square, INT32_C(735255871) /* 0.042797524437051732 in Q34 */), 1)
+    const int32_t apart_square = euler_angles_from_dcm_q31_fit(euler_angles_from_dcm_q31_mul(
+        apart_tangent, apart_tangent) + (INT32_C(1) << 30), 31);
+        /* Q-2.33, -2.33e-10 .. 0.192, error 1.7e-10 */
+    const int32_t apart_series = euler_angles_from_dcm_q31_fit(euler_angles_from_dcm_q31_shr(
+        euler_angles_from_dcm_q31_mul(apart_square,
+        INT32_C(735255871) /* 0.042797524437051732 in Q34 */), 1)
         - INT64_C(6065684321545150080) /* 0.08220535148788144 in Q60 */
         + (INT64_C(1) << 31), 32); /* Q-3.34, -0.0823 .. -0.074, error 3.9e-11 */
-    const int32_t apart_series_2 =
-        euler_angles_from_dcm_q31_narrow_(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_mul_(apart_square, apart_series), 2)
+    const int32_t apart_series_2 = euler_angles_from_dcm_q31_fit(euler_angles_from_dcm_q31_shr(
+        euler_angles_from_dcm_q31_mul(apart_square, apart_series), 2)
         + INT64_C(4054853067505913472) /* 0.10990701262248558 in Q60 */
         + (INT32_C(1) << 30), 31); /* 0.0941 .. 0.11, error 5e-11 */
-    const int32_t apart_series_3 =
-        euler_angles_from_dcm_q31_narrow_(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_mul_(apart_square, apart_series_2), 2)
+    const int32_t apart_series_3 = euler_angles_from_dcm_q31_fit(euler_angles_from_dcm_q31_shr(
+        euler_angles_from_dcm_q31_mul(apart_square, apart_series_2), 2)
         - INT64_C(5267120772635892064) /* 0.14276559461088406 in Q60 */
         + (INT64_C(1) << 31), 32); /* Q-2.33, -0.143 .. -0.121, error 8.6e-11 */
-    const int32_t apart_series_4 =
-        euler_angles_from_dcm_q31_narrow_(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_mul_(apart_square, apart_series_3), 1)
+    const int32_t apart_series_4 = euler_angles_from_dcm_q31_fit(euler_angles_from_dcm_q31_shr(
+        euler_angles_from_dcm_q31_mul(apart_square, apart_series_3), 1)
         + INT64_C(7378564090463267680) /* 0.19999638041759513 in Q60 */
         + (INT64_C(1) << 31), 32); /* 0.172 .. 0.2, error 9.8e-11 */
-    const int32_t apart_series_5 =
-        euler_angles_from_dcm_q31_narrow_(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_mul_(apart_square, apart_series_4), 2)
+    const int32_t apart_series_5 = euler_angles_from_dcm_q31_fit(euler_angles_from_dcm_q31_shr(
+        euler_angles_from_dcm_q31_mul(apart_square, apart_series_4), 2)
         - INT64_C(6148913518682917232) /* 0.33333326976907529 in Q60 */
         + (INT64_C(1) << 31), 32); /* Q-1.32, -0.334 .. -0.295, error 1.7e-10 */
-    const int32_t apart_bend =
-        euler_angles_from_dcm_q31_narrow_(euler_angles_from_dcm_q31_mul_(apart_square, apart_series_5)
-        - INT64_C(11967952160) /* 3.2439199325215087e-10 in Q60 */ + (INT32_C(1) << 30), 31);
-        /* Q-3.34, -0.0639 .. -1.74e-10, error 1.2e-10 */
+    const int32_t apart_bend = euler_angles_from_dcm_q31_fit(euler_angles_from_dcm_q31_mul(
+        apart_square, apart_series_5)
+        - INT64_C(11967952160) /* 3.2439199325215087e-10 in Q60 */
+        + (INT32_C(1) << 30), 31); /* Q-3.34, -0.0639 .. -1.74e-10, error 1.2e-10 */
     const int64_t apart_arctangent = (int64_t)apart_tangent * (INT64_C(1) << 32)
-        + euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_mul_(apart_tangent, apart_bend), 2);
-        /* Q-1.64, -0.392 .. 0.438, error 1.9e-10 */
-    const int64_t apart_angle = euler_angles_from_dcm_q31_shr_(apart_arctangent, 2)
+        + euler_angles_from_dcm_q31_shr(euler_angles_from_dcm_q31_mul(apart_tangent,
+        apart_bend), 2); /* Q-1.64, -0.392 .. 0.438, error 1.9e-10 */
+    const int64_t apart_angle = euler_angles_from_dcm_q31_shr(apart_arctangent, 2)
         + INT64_C(3622009729038561420); /* Q1.62, 0.394 .. 1.23, error 1.9e-10 */
     int64_t apart_octant; /* Q1.62, -1.84e-10 .. 0.786, error 1.9e-10 */
     if (apart_beyond >= 0) {
         apart_octant = apart_angle;
     } else {
-        apart_octant = euler_angles_from_dcm_q31_shr_(apart_arctangent, 2);
+        apart_octant = euler_angles_from_dcm_q31_shr(apart_arctangent, 2);
     }
-    const int64_t apart_angle_2 = euler_angles_from_dcm_q31_shr_(-apart_octant, 1)
+    const int64_t apart_angle_2 = euler_angles_from_dcm_q31_shr(-apart_octant, 1)
         + INT64_C(3622009729038561420); /* Q2.61, 0.785 .. 1.58, error 1.9e-10 */
     int64_t apart_quadrant; /* Q1.62, -1.84e-10 .. 1.58, error 1.9e-10 */
     if ((int64_t)apart_width >= (int64_t)apart_height) {
@@ -497,11 +506,11 @@ int euler_angles_from_dcm_q31(const int32_t state[9], const int32_t previous[3],
     } else {
         apart_quadrant = apart_angle_2 * 2;
     }
-    const int64_t apart_angle_3 = euler_angles_from_dcm_q31_shr_(-apart_quadrant, 2)
+    const int64_t apart_angle_3 = euler_angles_from_dcm_q31_shr(-apart_quadrant, 2)
         + INT64_C(3622009729038561420); /* Q3.60, 1.57 .. 3.15, error 1.9e-10 */
     int64_t apart_half; /* Q2.61, -1.84e-10 .. 3.15, error 1.9e-10 */
     if ((int64_t)apart_taken_2 >= 0) {
-        apart_half = euler_angles_from_dcm_q31_shr_(apart_quadrant, 1);
+        apart_half = euler_angles_from_dcm_q31_shr(apart_quadrant, 1);
     } else {
         apart_half = apart_angle_3 * 2;
     }
@@ -514,169 +523,173 @@ int euler_angles_from_dcm_q31(const int32_t state[9], const int32_t previous[3],
     }
     /* the angle between or together */
     const int64_t apart = apart_side; /* Q2.61, -3.15 .. 3.15, error 3.2e-09 */
-    const int64_t next_heading_case_angle_negative = -(int64_t)C_21;
-        /* Q33.30, -1.07 .. 1.07, exact */
-    int32_t next_heading_case_angle_height = C_21; /* Q1.30, 0 .. 1.07, exact */
-    if (next_heading_case_angle_negative > next_heading_case_angle_height) {
-        next_heading_case_angle_height = euler_angles_from_dcm_q31_narrow_(next_heading_case_angle_negative, 0);
+    const int64_t next_heading_case_angle_neg = -(int64_t)C_21; /* Q33.30, -1.07 .. 1.07, exact */
+    int32_t next_hdg_case_angle_height = C_21; /* Q1.30, 0 .. 1.07, exact */
+    if (next_heading_case_angle_neg > next_hdg_case_angle_height) {
+        next_hdg_case_angle_height = euler_angles_from_dcm_q31_fit(next_heading_case_angle_neg, 0);
     }
-    const int64_t next_heading_case_angle_negative_2 = -(int64_t)C_11;
-        /* Q33.30, -1.07 .. 1.07, exact */
-    int32_t next_heading_case_angle_width = C_11; /* Q1.30, 0 .. 1.07, exact */
-    if (next_heading_case_angle_negative_2 > next_heading_case_angle_width) {
-        next_heading_case_angle_width = euler_angles_from_dcm_q31_narrow_(next_heading_case_angle_negative_2, 0);
+    const int64_t next_hdg_case_angle_neg_2 = -(int64_t)C_11; /* Q33.30, -1.07 .. 1.07, exact */
+    int32_t next_hdg_case_angle_width = C_11; /* Q1.30, 0 .. 1.07, exact */
+    if (next_hdg_case_angle_neg_2 > next_hdg_case_angle_width) {
+        next_hdg_case_angle_width = euler_angles_from_dcm_q31_fit(next_hdg_case_angle_neg_2, 0);
     }
-    int32_t next_heading_case_angle_smaller; /* Q1.30, 0 .. 1.07, exact */
-    if ((int64_t)next_heading_case_angle_width >= (int64_t)next_heading_case_angle_height) {
-        next_heading_case_angle_smaller = next_heading_case_angle_height;
+    int32_t next_hdg_case_angle_smaller; /* Q1.30, 0 .. 1.07, exact */
+    if ((int64_t)next_hdg_case_angle_width >= (int64_t)next_hdg_case_angle_height) {
+        next_hdg_case_angle_smaller = next_hdg_case_angle_height;
     } else {
-        next_heading_case_angle_smaller = next_heading_case_angle_width;
+        next_hdg_case_angle_smaller = next_hdg_case_angle_width;
     }
-    int32_t next_heading_case_angle_larger = next_heading_case_angle_width;
+    int32_t next_hdg_case_angle_larger = next_hdg_case_angle_width;
         /* Q1.30, 9.31e-10 .. 1.07, exact */
-    if ((int64_t)next_heading_case_angle_height > next_heading_case_angle_larger) {
-        next_heading_case_angle_larger = next_heading_case_angle_height;
+    if ((int64_t)next_hdg_case_angle_height > next_hdg_case_angle_larger) {
+        next_hdg_case_angle_larger = next_hdg_case_angle_height;
     }
-    if (1 > next_heading_case_angle_larger) {
-        next_heading_case_angle_larger = euler_angles_from_dcm_q31_narrow_(1, 0);
+    if (1 > next_hdg_case_angle_larger) {
+        next_hdg_case_angle_larger = euler_angles_from_dcm_q31_fit(1, 0);
     }
-    const int64_t next_heading_case_angle_beyond = (int64_t)next_heading_case_angle_smaller
-        * (1 << 4) - (int64_t)next_heading_case_angle_larger * 8
-        + (int64_t)next_heading_case_angle_larger; /* Q29.34, -0.532 .. 1.13, exact */
-    const int64_t next_heading_case_angle_below = (int64_t)next_heading_case_angle_smaller
-        - (int64_t)next_heading_case_angle_larger; /* Q33.30, -1.07 .. 0, exact */
-    const int64_t next_heading_case_angle_both = (int64_t)next_heading_case_angle_smaller
-        + (int64_t)next_heading_case_angle_larger; /* Q33.30, 9.31e-10 .. 2.13, exact */
-    int32_t next_heading_case_angle_numerator; /* Q1.30, -0.598 .. 0.465, exact */
-    if (next_heading_case_angle_beyond >= 0) {
-        next_heading_case_angle_numerator = euler_angles_from_dcm_q31_narrow_(next_heading_case_angle_below, 0);
+    const int64_t next_hdg_case_angle_beyond = (int64_t)next_hdg_case_angle_smaller * (1 << 4)
+        - (int64_t)next_hdg_case_angle_larger * 8 + (int64_t)next_hdg_case_angle_larger;
+        /* Q29.34, -0.532 .. 1.13, exact */
+    const int64_t next_hdg_case_angle_below = (int64_t)next_hdg_case_angle_smaller
+        - (int64_t)next_hdg_case_angle_larger; /* Q33.30, -1.07 .. 0, exact */
+    const int64_t next_hdg_case_angle_both = (int64_t)next_hdg_case_angle_smaller
+        + (int64_t)next_hdg_case_angle_larger; /* Q33.30, 9.31e-10 .. 2.13, exact */
+    int32_t next_heading_case_angle_num; /* Q1.30, -0.598 .. 0.465, exact */
+    if (next_hdg_case_angle_beyond >= 0) {
+        next_heading_case_angle_num = euler_angles_from_dcm_q31_fit(next_hdg_case_angle_below, 0);
     } else {
-        next_heading_case_angle_numerator = next_heading_case_angle_smaller;
+        next_heading_case_angle_num = next_hdg_case_angle_smaller;
     }
-    int64_t next_heading_case_angle_denominator; /* Q33.30, 9.31e-10 .. 2.13, exact */
-    if (next_heading_case_angle_beyond >= 0) {
-        next_heading_case_angle_denominator = next_heading_case_angle_both;
+    int64_t next_heading_case_angle_den; /* Q33.30, 9.31e-10 .. 2.13, exact */
+    if (next_hdg_case_angle_beyond >= 0) {
+        next_heading_case_angle_den = next_hdg_case_angle_both;
     } else {
-        next_heading_case_angle_denominator = (int64_t)next_heading_case_angle_larger;
+        next_heading_case_angle_den = (int64_t)next_hdg_case_angle_larger;
     }
-    const int32_t next_heading_case_angle_tangent =
-        euler_angles_from_dcm_q31_narrow_(euler_angles_from_dcm_q31_div_((int64_t)next_heading_case_angle_numerator
-        * (INT64_C(1) << 32), next_heading_case_angle_denominator), 0);
+    const int32_t next_hdg_case_angle_tangent = euler_angles_from_dcm_q31_fit(
+        euler_angles_from_dcm_q31_div((int64_t)next_heading_case_angle_num
+        * (INT64_C(1) << 32), next_heading_case_angle_den), 0);
         /* Q-1.32, -0.392 .. 0.438, error 1.2e-10 */
-    const int32_t next_heading_case_angle_square =
-        euler_angles_from_dcm_q31_narrow_(euler_angles_from_dcm_q31_mul_(next_heading_case_angle_tangent, next_heading_case_angle_tangent)
-        + (INT32_C(1) << 30), 31); /* Q-2.33, -2.33e-10 .. 0.192, error 1.7e-10 */
-    const int32_t next_heading_case_angle_series =
-        euler_angles_from_dcm_q31_narrow_(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_mul_(next_heading_case_angle_square, INT32_C(735255871) /* 0.042797524437051732 in Q34 */), 1)
-        - INT64_C(6065684321545150080) /* 0.08220535148788144 in Q60 */
+    const int32_t next_hdg_case_angle_square = euler_angles_from_dcm_q31_fit(
+        euler_angles_from_dcm_q31_mul(next_hdg_case_angle_tangent,
+        next_hdg_case_angle_tangent) + (INT32_C(1) << 30), 31);
+        /* Q-2.33, -2.33e-10 .. 0.192, error 1.7e-10 */
+    const int32_t next_heading_case_angle_ser = euler_angles_from_dcm_q31_fit(
+        euler_angles_from_dcm_q31_shr(euler_angles_from_dcm_q31_mul(
+        next_hdg_case_angle_square, INT32_C(735255871) /* 0.042797524437051732 in Q34 */),
+        1) - INT64_C(6065684321545150080) /* 0.08220535148788144 in Q60 */
         + (INT64_C(1) << 31), 32); /* Q-3.34, -0.0823 .. -0.074, error 3.9e-11 */
-    const int32_t next_heading_case_angle_series_2 =
-        euler_angles_from_dcm_q31_narrow_(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_mul_(next_heading_case_angle_square, next_heading_case_angle_series), 2)
+    const int32_t next_hdg_case_angle_ser_2 = euler_angles_from_dcm_q31_fit(
+        euler_angles_from_dcm_q31_shr(euler_angles_from_dcm_q31_mul(
+        next_hdg_case_angle_square, next_heading_case_angle_ser), 2)
         + INT64_C(4054853067505913472) /* 0.10990701262248558 in Q60 */
         + (INT32_C(1) << 30), 31); /* 0.0941 .. 0.11, error 5e-11 */
-    const int32_t next_heading_case_angle_series_3 =
-        euler_angles_from_dcm_q31_narrow_(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_mul_(next_heading_case_angle_square, next_heading_case_angle_series_2), 2)
+    const int32_t next_hdg_case_angle_ser_3 = euler_angles_from_dcm_q31_fit(
+        euler_angles_from_dcm_q31_shr(euler_angles_from_dcm_q31_mul(
+        next_hdg_case_angle_square, next_hdg_case_angle_ser_2), 2)
         - INT64_C(5267120772635892064) /* 0.14276559461088406 in Q60 */
         + (INT64_C(1) << 31), 32); /* Q-2.33, -0.143 .. -0.121, error 8.6e-11 */
-    const int32_t next_heading_case_angle_series_4 =
-        euler_angles_from_dcm_q31_narrow_(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_mul_(next_heading_case_angle_square, next_heading_case_angle_series_3), 1)
+    const int32_t next_hdg_case_angle_ser_4 = euler_angles_from_dcm_q31_fit(
+        euler_angles_from_dcm_q31_shr(euler_angles_from_dcm_q31_mul(
+        next_hdg_case_angle_square, next_hdg_case_angle_ser_3), 1)
         + INT64_C(7378564090463267680) /* 0.19999638041759513 in Q60 */
         + (INT64_C(1) << 31), 32); /* 0.172 .. 0.2, error 9.8e-11 */
-    const int32_t next_heading_case_angle_series_5 =
-        euler_angles_from_dcm_q31_narrow_(euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_mul_(next_heading_case_angle_square, next_heading_case_angle_series_4), 2)
+    const int32_t next_hdg_case_angle_ser_5 = euler_angles_from_dcm_q31_fit(
+        euler_angles_from_dcm_q31_shr(euler_angles_from_dcm_q31_mul(
+        next_hdg_case_angle_square, next_hdg_case_angle_ser_4), 2)
         - INT64_C(6148913518682917232) /* 0.33333326976907529 in Q60 */
         + (INT64_C(1) << 31), 32); /* Q-1.32, -0.334 .. -0.295, error 1.7e-10 */
-    const int32_t next_heading_case_angle_bend =
-        euler_angles_from_dcm_q31_narrow_(euler_angles_from_dcm_q31_mul_(next_heading_case_angle_square, next_heading_case_angle_series_5)
-        - INT64_C(11967952160) /* 3.2439199325215087e-10 in Q60 */ + (INT32_C(1) << 30), 31);
-        /* Q-3.34, -0.0639 .. -1.74e-10, error 1.2e-10 */
-    const int64_t next_heading_case_angle_arctangent = (int64_t)next_heading_case_angle_tangent
-        * (INT64_C(1) << 32)
-        + euler_angles_from_dcm_q31_shr_(euler_angles_from_dcm_q31_mul_(next_heading_case_angle_tangent, next_heading_case_angle_bend), 2);
+    const int32_t next_hdg_case_angle_bend = euler_angles_from_dcm_q31_fit(
+        euler_angles_from_dcm_q31_mul(next_hdg_case_angle_square, next_hdg_case_angle_ser_5)
+        - INT64_C(11967952160) /* 3.2439199325215087e-10 in Q60 */
+        + (INT32_C(1) << 30), 31); /* Q-3.34, -0.0639 .. -1.74e-10, error 1.2e-10 */
+    const int64_t next_hdg_case_angle_atan = (int64_t)next_hdg_case_angle_tangent
+        * (INT64_C(1) << 32) + euler_angles_from_dcm_q31_shr(euler_angles_from_dcm_q31_mul(
+        next_hdg_case_angle_tangent, next_hdg_case_angle_bend), 2);
         /* Q-1.64, -0.392 .. 0.438, error 1.9e-10 */
-    const int64_t next_heading_case_angle_angle =
-        euler_angles_from_dcm_q31_shr_(next_heading_case_angle_arctangent, 2)
-        + INT64_C(3622009729038561420); /* Q1.62, 0.394 .. 1.23, error 1.9e-10 */
-    int64_t next_heading_case_angle_octant; /* Q1.62, -1.84e-10 .. 0.786, error 1.9e-10 */
-    if (next_heading_case_angle_beyond >= 0) {
-        next_heading_case_angle_octant = next_heading_case_angle_angle;
+    const int64_t next_hdg_case_angle_angle = euler_angles_from_dcm_q31_shr(
+        next_hdg_case_angle_atan, 2) + INT64_C(3622009729038561420);
+        /* Q1.62, 0.394 .. 1.23, error 1.9e-10 */
+    int64_t next_hdg_case_angle_octant; /* Q1.62, -1.84e-10 .. 0.786, error 1.9e-10 */
+    if (next_hdg_case_angle_beyond >= 0) {
+        next_hdg_case_angle_octant = next_hdg_case_angle_angle;
     } else {
-        next_heading_case_angle_octant = euler_angles_from_dcm_q31_shr_(next_heading_case_angle_arctangent, 2);
+        next_hdg_case_angle_octant = euler_angles_from_dcm_q31_shr(next_hdg_case_angle_atan, 2);
     }
-    const int64_t next_heading_case_angle_angle_2 =
-        euler_angles_from_dcm_q31_shr_(-next_heading_case_angle_octant, 1)
-        + INT64_C(3622009729038561420); /* Q2.61, 0.785 .. 1.58, error 1.9e-10 */
-    int64_t next_heading_case_angle_quadrant; /* Q1.62, -1.84e-10 .. 1.58, error 1.9e-10 */
-    if ((int64_t)next_heading_case_angle_width >= (int64_t)next_heading_case_angle_height) {
-        next_heading_case_angle_quadrant = next_heading_case_angle_octant;
+    const int64_t next_hdg_case_angle_angle_2 = euler_angles_from_dcm_q31_shr(
+        -next_hdg_case_angle_octant, 1) + INT64_C(3622009729038561420);
+        /* Q2.61, 0.785 .. 1.58, error 1.9e-10 */
+    int64_t next_hdg_case_angle_quad; /* Q1.62, -1.84e-10 .. 1.58, error 1.9e-10 */
+    if ((int64_t)next_hdg_case_angle_width >= (int64_t)next_hdg_case_angle_height) {
+        next_hdg_case_angle_quad = next_hdg_case_angle_octant;
     } else {
-        next_heading_case_angle_quadrant = next_heading_case_angle_angle_2 * 2;
+        next_hdg_case_angle_quad = next_hdg_case_angle_angle_2 * 2;
     }
-    const int64_t next_heading_case_angle_angle_3 =
-        euler_angles_from_dcm_q31_shr_(-next_heading_case_angle_quadrant, 2)
-        + INT64_C(3622009729038561420); /* Q3.60, 1.57 .. 3.15, error 1.9e-10 */
-    int64_t next_heading_case_angle_half; /* Q2.61, -1.84e-10 .. 3.15, error 1.9e-10 */
+    const int64_t next_hdg_case_angle_angle_3 = euler_angles_from_dcm_q31_shr(
+        -next_hdg_case_angle_quad, 2) + INT64_C(3622009729038561420);
+        /* Q3.60, 1.57 .. 3.15, error 1.9e-10 */
+    int64_t next_hdg_case_angle_half; /* Q2.61, -1.84e-10 .. 3.15, error 1.9e-10 */
     if ((int64_t)C_11 >= 0) {
-        next_heading_case_angle_half = euler_angles_from_dcm_q31_shr_(next_heading_case_angle_quadrant, 1);
+        next_hdg_case_angle_half = euler_angles_from_dcm_q31_shr(next_hdg_case_angle_quad, 1);
     } else {
-        next_heading_case_angle_half = next_heading_case_angle_angle_3 * 2;
+        next_hdg_case_angle_half = next_hdg_case_angle_angle_3 * 2;
     }
-    const int64_t next_heading_case_angle_angle_4 = -next_heading_case_angle_half;
+    const int64_t next_hdg_case_angle_angle_4 = -next_hdg_case_angle_half;
         /* Q2.61, -3.15 .. 1.84e-10, error 1.9e-10 */
-    int64_t next_heading_case_angle_side; /* Q2.61, -3.15 .. 3.15, error 1.9e-10 */
+    int64_t next_hdg_case_angle_side; /* Q2.61, -3.15 .. 3.15, error 1.9e-10 */
     if ((int64_t)C_21 >= 0) {
-        next_heading_case_angle_side = next_heading_case_angle_half;
+        next_hdg_case_angle_side = next_hdg_case_angle_half;
     } else {
-        next_heading_case_angle_side = next_heading_case_angle_angle_4;
+        next_hdg_case_angle_side = next_hdg_case_angle_angle_4;
     }
-    const int64_t next_heading_case_angle = next_heading_case_angle_side;
+    const int64_t next_heading_case_angle = next_hdg_case_angle_side;
         /* Q2.61, -3.15 .. 3.15, error 1.9e-10 */
-    const int64_t next_heading_case_principal_argument_choice_case = -next_roll;
+    const int64_t next_hdg_case_wrap_arg_sel_case = -next_roll;
         /* Q2.61, -3.15 .. 3.15, error 1.9e-10 */
-    int64_t next_heading_case_principal_argument_choice; /* Q2.61, -3.15 .. 3.15, error 1.9e-10 */
+    int64_t next_hdg_case_wrap_arg_sel; /* Q2.61, -3.15 .. 3.15, error 1.9e-10 */
     if (0 >= (int64_t)C_31) {
-        next_heading_case_principal_argument_choice = next_roll;
+        next_hdg_case_wrap_arg_sel = next_roll;
     } else {
-        next_heading_case_principal_argument_choice = next_heading_case_principal_argument_choice_case;
+        next_hdg_case_wrap_arg_sel = next_hdg_case_wrap_arg_sel_case;
     }
-    const int32_t next_heading_case_principal_argument =
-        euler_angles_from_dcm_q31_narrow_(euler_angles_from_dcm_q31_shr_(apart, 1)
-        + euler_angles_from_dcm_q31_shr_(next_heading_case_principal_argument_choice, 1)
+    const int32_t next_heading_case_wrap_arg = euler_angles_from_dcm_q31_fit(
+        euler_angles_from_dcm_q31_shr(apart, 1)
+        + euler_angles_from_dcm_q31_shr(next_hdg_case_wrap_arg_sel, 1)
         + (INT64_C(1) << 31), 32); /* Q3.28, -6.29 .. 6.29, error 5.2e-09 */
-    int32_t next_heading_case_principal_taken; /* Q3.28, -6.29 .. 6.29, exact */
-    if ((int64_t)next_heading_case_principal_argument >= INT32_C(1686629785)) {
-        next_heading_case_principal_taken = euler_angles_from_dcm_q31_narrow_(INT32_C(1686629785), 0);
-    } else if ((-INT32_C(1686629785)) >= (int64_t)next_heading_case_principal_argument) {
-        next_heading_case_principal_taken = euler_angles_from_dcm_q31_narrow_((-INT32_C(1686629785)), 0);
+    int32_t next_hdg_case_wrap_taken; /* Q3.28, -6.29 .. 6.29, exact */
+    if ((int64_t)next_heading_case_wrap_arg >= INT32_C(1686629785)) {
+        next_hdg_case_wrap_taken = euler_angles_from_dcm_q31_fit(INT32_C(1686629785), 0);
+    } else if ((-INT32_C(1686629785)) >= (int64_t)next_heading_case_wrap_arg) {
+        next_hdg_case_wrap_taken = euler_angles_from_dcm_q31_fit((-INT32_C(1686629785)), 0);
     } else {
-        next_heading_case_principal_taken = next_heading_case_principal_argument;
+        next_hdg_case_wrap_taken = next_heading_case_wrap_arg;
     }
-    const int64_t next_heading_case_principal_turned =
-        (int64_t)next_heading_case_principal_taken * (INT32_C(1) << 30)
-        - INT64_C(1811004864519280711); /* Q5.58, -12.6 .. 2.69e-07, error 1.5e-18 */
-    const int64_t next_heading_case_principal_turned_2 =
-        (int64_t)next_heading_case_principal_taken * (INT32_C(1) << 30)
-        + INT64_C(1811004864519280711); /* Q5.58, -2.69e-07 .. 12.6, error 1.5e-18 */
-    int64_t next_heading_case_principal_principal; /* Q5.58, -3.15 .. 3.15, error 1.5e-18 */
-    if ((int64_t)next_heading_case_principal_taken >= INT32_C(843314856)) {
-        next_heading_case_principal_principal = next_heading_case_principal_turned;
-    } else if ((-INT32_C(843314856)) >= (int64_t)next_heading_case_principal_taken) {
-        next_heading_case_principal_principal = next_heading_case_principal_turned_2;
+    const int64_t next_hdg_case_wrap_turned = (int64_t)next_hdg_case_wrap_taken
+        * (INT32_C(1) << 30) - INT64_C(1811004864519280711);
+        /* Q5.58, -12.6 .. 2.69e-07, error 1.5e-18 */
+    const int64_t next_hdg_case_wrap_turned_2 = (int64_t)next_hdg_case_wrap_taken
+        * (INT32_C(1) << 30) + INT64_C(1811004864519280711);
+        /* Q5.58, -2.69e-07 .. 12.6, error 1.5e-18 */
+    int64_t next_heading_case_principal; /* Q5.58, -3.15 .. 3.15, error 1.5e-18 */
+    if ((int64_t)next_hdg_case_wrap_taken >= INT32_C(843314856)) {
+        next_heading_case_principal = next_hdg_case_wrap_turned;
+    } else if ((-INT32_C(843314856)) >= (int64_t)next_hdg_case_wrap_taken) {
+        next_heading_case_principal = next_hdg_case_wrap_turned_2;
     } else {
-        next_heading_case_principal_principal = (int64_t)next_heading_case_principal_taken * (INT32_C(1) << 30);
+        next_heading_case_principal = (int64_t)next_hdg_case_wrap_taken * (INT32_C(1) << 30);
     }
-    const int64_t next_heading_case_principal = next_heading_case_principal_principal;
+    const int64_t next_heading_case_principal_ = next_heading_case_principal;
         /* Q5.58, -3.15 .. 3.15, error 5.2e-09 */
     /* heading */
     int64_t next_heading; /* Q2.61, -3.15 .. 3.15, error 5.2e-09 */
     if (cosine_squared >= (INT64_C(1) << 58)) {
         next_heading = next_heading_case_angle;
     } else {
-        next_heading = next_heading_case_principal * 8;
+        next_heading = next_heading_case_principal_ * 8;
     }
-    const int32_t found_roll = euler_angles_from_dcm_q31_narrow_(next_roll
+    const int32_t found_roll = euler_angles_from_dcm_q31_fit(next_roll
         + (INT64_C(1) << 31), 32); /* Q2.29, -3.15 .. 3.15, error 1.2e-09 */
-    const int32_t found_heading = euler_angles_from_dcm_q31_narrow_(next_heading
+    const int32_t found_heading = euler_angles_from_dcm_q31_fit(next_heading
         + (INT64_C(1) << 31), 32); /* Q2.29, -3.15 .. 3.15, error 6.2e-09 */
     next[0] = found_roll;
     next[1] = next_pitch;

@@ -5,7 +5,7 @@
 #include "euler_from_cayley_klein_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int euler_from_cayley_klein_q31_out_(int32_t x, int32_t limit)
+static inline int euler_from_cayley_klein_q31_out(int32_t x, int32_t limit)
 {
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
@@ -16,11 +16,12 @@ int euler_from_cayley_klein_q31(const int32_t state[4], int32_t converted[4])
     const int32_t a_x = state[1];
     const int32_t a_y = state[2];
     const int32_t a_z = state[3];
-    if (euler_from_cayley_klein_q31_out_(a_s, INT32_C(1140850688))
-        || euler_from_cayley_klein_q31_out_(a_x, INT32_C(1140850688))
-        || euler_from_cayley_klein_q31_out_(a_y, INT32_C(1140850688))
-        || euler_from_cayley_klein_q31_out_(a_z, INT32_C(1140850688)))
+    if (euler_from_cayley_klein_q31_out(a_s, INT32_C(1140850688))
+        || euler_from_cayley_klein_q31_out(a_x, INT32_C(1140850688))
+        || euler_from_cayley_klein_q31_out(a_y, INT32_C(1140850688))
+        || euler_from_cayley_klein_q31_out(a_z, INT32_C(1140850688))) {
         return 1;
+    }
     const int32_t next_x = a_x; /* Q1.30, -1.07 .. 1.07, exact */
     const int32_t next_y = a_y; /* Q1.30, -1.07 .. 1.07, exact */
     const int32_t next_z = a_z; /* Q1.30, -1.07 .. 1.07, exact */

@@ -5,7 +5,7 @@
 #include "euler_rk1_2_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int euler_rk1_2_q31_out_(int32_t x, int32_t limit)
+static inline int euler_rk1_2_q31_out(int32_t x, int32_t limit)
 {
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
@@ -13,7 +13,7 @@ static inline int euler_rk1_2_q31_out_(int32_t x, int32_t limit)
 /* The exact product of two words. */
 #if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
 /* These processors have no instruction for it: the high word takes four products of half words. */
-static __attribute__((noinline)) int64_t euler_rk1_2_q31_mul_(int32_t a, int32_t b)
+static __attribute__((noinline)) int64_t euler_rk1_2_q31_mul(int32_t a, int32_t b)
 {
     const uint32_t a_low = (uint32_t)a & 0xFFFFu;
     const uint32_t b_low = (uint32_t)b & 0xFFFFu;
@@ -28,7 +28,7 @@ static __attribute__((noinline)) int64_t euler_rk1_2_q31_mul_(int32_t a, int32_t
     return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
 }
 #else
-static inline int64_t euler_rk1_2_q31_mul_(int32_t a, int32_t b)
+static inline int64_t euler_rk1_2_q31_mul(int32_t a, int32_t b)
 {
     return (int64_t)a * (int64_t)b;
 }
@@ -39,7 +39,7 @@ static inline int64_t euler_rk1_2_q31_mul_(int32_t a, int32_t b)
  * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
  * number and no conversion of a number out of range.
  */
-static inline int32_t euler_rk1_2_q31_narrow_(int64_t x, int n)
+static inline int32_t euler_rk1_2_q31_fit(int64_t x, int n)
 {
 #ifdef __FRAMAC__
     return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
@@ -64,45 +64,38 @@ int euler_rk1_2_q31(const int32_t state[4], const int32_t increments[6], int32_t
     const int32_t d2_x = increments[3];
     const int32_t d2_y = increments[4];
     const int32_t d2_z = increments[5];
-    if (euler_rk1_2_q31_out_(e_x, INT32_C(1140850688))
-        || euler_rk1_2_q31_out_(e_y, INT32_C(1140850688))
-        || euler_rk1_2_q31_out_(e_z, INT32_C(1140850688))
-        || euler_rk1_2_q31_out_(e_s, INT32_C(1140850688))
-        || euler_rk1_2_q31_out_(d1_x, (INT32_C(1) << 30))
-        || euler_rk1_2_q31_out_(d1_y, (INT32_C(1) << 30))
-        || euler_rk1_2_q31_out_(d1_z, (INT32_C(1) << 30))
-        || euler_rk1_2_q31_out_(d2_x, (INT32_C(1) << 30))
-        || euler_rk1_2_q31_out_(d2_y, (INT32_C(1) << 30))
-        || euler_rk1_2_q31_out_(d2_z, (INT32_C(1) << 30)))
+    if (euler_rk1_2_q31_out(e_x, INT32_C(1140850688))
+        || euler_rk1_2_q31_out(e_y, INT32_C(1140850688))
+        || euler_rk1_2_q31_out(e_z, INT32_C(1140850688))
+        || euler_rk1_2_q31_out(e_s, INT32_C(1140850688))
+        || euler_rk1_2_q31_out(d1_x, (INT32_C(1) << 30))
+        || euler_rk1_2_q31_out(d1_y, (INT32_C(1) << 30))
+        || euler_rk1_2_q31_out(d1_z, (INT32_C(1) << 30))
+        || euler_rk1_2_q31_out(d2_x, (INT32_C(1) << 30))
+        || euler_rk1_2_q31_out(d2_y, (INT32_C(1) << 30))
+        || euler_rk1_2_q31_out(d2_z, (INT32_C(1) << 30))) {
         return 1;
+    }
     /* half the rate times the step, at node 0 */
-    const int32_t half_turn_0_x = euler_rk1_2_q31_narrow_(euler_rk1_2_q31_mul_(d1_x, 3)
+    const int32_t half_turn_0_x = euler_rk1_2_q31_fit(euler_rk1_2_q31_mul(d1_x, 3)
         - (int64_t)d2_x + 2, 2); /* Q-1.32, -0.251 .. 0.251, error 1.2e-10 */
-    const int32_t half_turn_0_y = euler_rk1_2_q31_narrow_(euler_rk1_2_q31_mul_(d1_y, 3)
+    const int32_t half_turn_0_y = euler_rk1_2_q31_fit(euler_rk1_2_q31_mul(d1_y, 3)
         - (int64_t)d2_y + 2, 2); /* Q-1.32, -0.251 .. 0.251, error 1.2e-10 */
-    const int32_t half_turn_0_z = euler_rk1_2_q31_narrow_(euler_rk1_2_q31_mul_(d1_z, 3)
+    const int32_t half_turn_0_z = euler_rk1_2_q31_fit(euler_rk1_2_q31_mul(d1_z, 3)
         - (int64_t)d2_z + 2, 2); /* Q-1.32, -0.251 .. 0.251, error 1.2e-10 */
     /* Euler parameters, body to reference, scalar last, after the step */
-    const int32_t next_s = e_s
-        + euler_rk1_2_q31_narrow_(-euler_rk1_2_q31_mul_(e_x, half_turn_0_x)
-        - euler_rk1_2_q31_mul_(e_y, half_turn_0_y)
-        - euler_rk1_2_q31_mul_(e_z, half_turn_0_z) + (INT64_C(1) << 31), 32);
-        /* Q1.30, -1.86 .. 1.86, error 8.4e-10 */
-    const int32_t next_x = e_x
-        + euler_rk1_2_q31_narrow_(euler_rk1_2_q31_mul_(e_s, half_turn_0_x)
-        + euler_rk1_2_q31_mul_(e_y, half_turn_0_z)
-        - euler_rk1_2_q31_mul_(e_z, half_turn_0_y) + (INT64_C(1) << 31), 32);
-        /* Q1.30, -1.86 .. 1.86, error 8.4e-10 */
-    const int32_t next_y = e_y
-        + euler_rk1_2_q31_narrow_(euler_rk1_2_q31_mul_(e_s, half_turn_0_y)
-        - euler_rk1_2_q31_mul_(e_x, half_turn_0_z)
-        + euler_rk1_2_q31_mul_(e_z, half_turn_0_x) + (INT64_C(1) << 31), 32);
-        /* Q1.30, -1.86 .. 1.86, error 8.4e-10 */
-    const int32_t next_z = e_z
-        + euler_rk1_2_q31_narrow_(euler_rk1_2_q31_mul_(e_s, half_turn_0_z)
-        + euler_rk1_2_q31_mul_(e_x, half_turn_0_y)
-        - euler_rk1_2_q31_mul_(e_y, half_turn_0_x) + (INT64_C(1) << 31), 32);
-        /* Q1.30, -1.86 .. 1.86, error 8.4e-10 */
+    const int32_t next_s = e_s + euler_rk1_2_q31_fit(-euler_rk1_2_q31_mul(e_x, half_turn_0_x)
+        - euler_rk1_2_q31_mul(e_y, half_turn_0_y) - euler_rk1_2_q31_mul(e_z, half_turn_0_z)
+        + (INT64_C(1) << 31), 32); /* Q1.30, -1.86 .. 1.86, error 8.4e-10 */
+    const int32_t next_x = e_x + euler_rk1_2_q31_fit(euler_rk1_2_q31_mul(e_s, half_turn_0_x)
+        + euler_rk1_2_q31_mul(e_y, half_turn_0_z) - euler_rk1_2_q31_mul(e_z, half_turn_0_y)
+        + (INT64_C(1) << 31), 32); /* Q1.30, -1.86 .. 1.86, error 8.4e-10 */
+    const int32_t next_y = e_y + euler_rk1_2_q31_fit(euler_rk1_2_q31_mul(e_s, half_turn_0_y)
+        - euler_rk1_2_q31_mul(e_x, half_turn_0_z) + euler_rk1_2_q31_mul(e_z, half_turn_0_x)
+        + (INT64_C(1) << 31), 32); /* Q1.30, -1.86 .. 1.86, error 8.4e-10 */
+    const int32_t next_z = e_z + euler_rk1_2_q31_fit(euler_rk1_2_q31_mul(e_s, half_turn_0_z)
+        + euler_rk1_2_q31_mul(e_x, half_turn_0_y) - euler_rk1_2_q31_mul(e_y, half_turn_0_x)
+        + (INT64_C(1) << 31), 32); /* Q1.30, -1.86 .. 1.86, error 8.4e-10 */
     next[0] = next_x;
     next[1] = next_y;
     next[2] = next_z;

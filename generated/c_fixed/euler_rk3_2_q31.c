@@ -6,7 +6,7 @@
 #include "euler_rk3_2_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int euler_rk3_2_q31_out_(int32_t x, int32_t limit)
+static inline int euler_rk3_2_q31_out(int32_t x, int32_t limit)
 {
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
@@ -14,7 +14,7 @@ static inline int euler_rk3_2_q31_out_(int32_t x, int32_t limit)
 /* The exact product of two words. */
 #if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
 /* These processors have no instruction for it: the high word takes four products of half words. */
-static __attribute__((noinline)) int64_t euler_rk3_2_q31_mul_(int32_t a, int32_t b)
+static __attribute__((noinline)) int64_t euler_rk3_2_q31_mul(int32_t a, int32_t b)
 {
     const uint32_t a_low = (uint32_t)a & 0xFFFFu;
     const uint32_t b_low = (uint32_t)b & 0xFFFFu;
@@ -29,7 +29,7 @@ static __attribute__((noinline)) int64_t euler_rk3_2_q31_mul_(int32_t a, int32_t
     return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
 }
 #else
-static inline int64_t euler_rk3_2_q31_mul_(int32_t a, int32_t b)
+static inline int64_t euler_rk3_2_q31_mul(int32_t a, int32_t b)
 {
     return (int64_t)a * (int64_t)b;
 }
@@ -40,7 +40,7 @@ static inline int64_t euler_rk3_2_q31_mul_(int32_t a, int32_t b)
  * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
  * number and no conversion of a number out of range.
  */
-static inline int32_t euler_rk3_2_q31_narrow_(int64_t x, int n)
+static inline int32_t euler_rk3_2_q31_fit(int64_t x, int n)
 {
 #ifdef __FRAMAC__
     return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
@@ -54,7 +54,7 @@ static inline int32_t euler_rk3_2_q31_narrow_(int64_t x, int n)
 }
 
 /* x / 2^n, rounded down, as a wide number. */
-static inline int64_t euler_rk3_2_q31_shr_(int64_t x, int n)
+static inline int64_t euler_rk3_2_q31_shr(int64_t x, int n)
 {
     return (x < 0) ? ~(~x >> n) : (x >> n);
 }
@@ -71,17 +71,18 @@ int euler_rk3_2_q31(const int32_t state[4], const int32_t increments[6], int32_t
     const int32_t d2_x = increments[3];
     const int32_t d2_y = increments[4];
     const int32_t d2_z = increments[5];
-    if (euler_rk3_2_q31_out_(e_x, INT32_C(1140850688))
-        || euler_rk3_2_q31_out_(e_y, INT32_C(1140850688))
-        || euler_rk3_2_q31_out_(e_z, INT32_C(1140850688))
-        || euler_rk3_2_q31_out_(e_s, INT32_C(1140850688))
-        || euler_rk3_2_q31_out_(d1_x, (INT32_C(1) << 29))
-        || euler_rk3_2_q31_out_(d1_y, (INT32_C(1) << 29))
-        || euler_rk3_2_q31_out_(d1_z, (INT32_C(1) << 29))
-        || euler_rk3_2_q31_out_(d2_x, (INT32_C(1) << 29))
-        || euler_rk3_2_q31_out_(d2_y, (INT32_C(1) << 29))
-        || euler_rk3_2_q31_out_(d2_z, (INT32_C(1) << 29)))
+    if (euler_rk3_2_q31_out(e_x, INT32_C(1140850688))
+        || euler_rk3_2_q31_out(e_y, INT32_C(1140850688))
+        || euler_rk3_2_q31_out(e_z, INT32_C(1140850688))
+        || euler_rk3_2_q31_out(e_s, INT32_C(1140850688))
+        || euler_rk3_2_q31_out(d1_x, (INT32_C(1) << 29))
+        || euler_rk3_2_q31_out(d1_y, (INT32_C(1) << 29))
+        || euler_rk3_2_q31_out(d1_z, (INT32_C(1) << 29))
+        || euler_rk3_2_q31_out(d2_x, (INT32_C(1) << 29))
+        || euler_rk3_2_q31_out(d2_y, (INT32_C(1) << 29))
+        || euler_rk3_2_q31_out(d2_z, (INT32_C(1) << 29))) {
         return 1;
+    }
     /* the angle increment of the whole step */
     const int32_t sigma_x = d1_x + d2_x; /* Q-1.32, -0.25 .. 0.25, exact */
     const int32_t sigma_y = d1_y + d2_y; /* Q-1.32, -0.25 .. 0.25, exact */
@@ -90,75 +91,68 @@ int euler_rk3_2_q31(const int32_t state[4], const int32_t increments[6], int32_t
     const int32_t delta_x = d1_x - d2_x; /* Q-1.32, -0.25 .. 0.25, exact */
     const int32_t delta_y = d1_y - d2_y; /* Q-1.32, -0.25 .. 0.25, exact */
     const int32_t delta_z = d1_z - d2_z; /* Q-1.32, -0.25 .. 0.25, exact */
-    const int32_t delta_cross_sigma_x =
-        euler_rk3_2_q31_narrow_(euler_rk3_2_q31_mul_(delta_y, sigma_z)
-        - euler_rk3_2_q31_mul_(delta_z, sigma_y) + (INT32_C(1) << 29), 30);
+    const int32_t delta_cross_sigma_x = euler_rk3_2_q31_fit(euler_rk3_2_q31_mul(delta_y,
+        sigma_z) - euler_rk3_2_q31_mul(delta_z, sigma_y) + (INT32_C(1) << 29), 30);
         /* Q-3.34, -0.0626 .. 0.0626, error 3e-11 */
-    const int32_t delta_cross_sigma_y =
-        euler_rk3_2_q31_narrow_(euler_rk3_2_q31_mul_(delta_z, sigma_x)
-        - euler_rk3_2_q31_mul_(delta_x, sigma_z) + (INT32_C(1) << 29), 30);
+    const int32_t delta_cross_sigma_y = euler_rk3_2_q31_fit(euler_rk3_2_q31_mul(delta_z,
+        sigma_x) - euler_rk3_2_q31_mul(delta_x, sigma_z) + (INT32_C(1) << 29), 30);
         /* Q-3.34, -0.0626 .. 0.0626, error 3e-11 */
-    const int32_t delta_cross_sigma_z =
-        euler_rk3_2_q31_narrow_(euler_rk3_2_q31_mul_(delta_x, sigma_y)
-        - euler_rk3_2_q31_mul_(delta_y, sigma_x) + (INT32_C(1) << 29), 30);
+    const int32_t delta_cross_sigma_z = euler_rk3_2_q31_fit(euler_rk3_2_q31_mul(delta_x,
+        sigma_y) - euler_rk3_2_q31_mul(delta_y, sigma_x) + (INT32_C(1) << 29), 30);
         /* Q-3.34, -0.0626 .. 0.0626, error 3e-11 */
-    const int32_t delta_dot_delta =
-        euler_rk3_2_q31_narrow_(euler_rk3_2_q31_mul_(delta_x, delta_x)
-        + euler_rk3_2_q31_mul_(delta_y, delta_y) + euler_rk3_2_q31_mul_(delta_z, delta_z)
+    const int32_t delta_dot_delta = euler_rk3_2_q31_fit(euler_rk3_2_q31_mul(delta_x, delta_x)
+        + euler_rk3_2_q31_mul(delta_y, delta_y) + euler_rk3_2_q31_mul(delta_z, delta_z)
         + (INT32_C(1) << 30), 31); /* Q-2.33, -1.17e-10 .. 0.188, error 5.9e-11 */
-    const int32_t sigma_dot_sigma =
-        euler_rk3_2_q31_narrow_(euler_rk3_2_q31_mul_(sigma_x, sigma_x)
-        + euler_rk3_2_q31_mul_(sigma_y, sigma_y) + euler_rk3_2_q31_mul_(sigma_z, sigma_z)
+    const int32_t sigma_dot_sigma = euler_rk3_2_q31_fit(euler_rk3_2_q31_mul(sigma_x, sigma_x)
+        + euler_rk3_2_q31_mul(sigma_y, sigma_y) + euler_rk3_2_q31_mul(sigma_z, sigma_z)
         + (INT32_C(1) << 30), 31); /* Q-2.33, -1.17e-10 .. 0.188, error 5.9e-11 */
     /* weight of sigma in p */
-    const int32_t p_sigma =
-        euler_rk3_2_q31_narrow_(-euler_rk3_2_q31_mul_(delta_dot_delta, INT32_C(1431655765) /* 1/12 in Q34 */)
-        * 2
-        + euler_rk3_2_q31_shr_(-euler_rk3_2_q31_mul_(sigma_dot_sigma, INT32_C(1431655765) /* 1/48 in Q36 */), 1)
-        + (INT64_C(1) << 31), 32);
+    const int32_t p_sigma = euler_rk3_2_q31_fit(-euler_rk3_2_q31_mul(delta_dot_delta,
+        INT32_C(1431655765) /* 1/12 in Q34 */) * 2
+        + euler_rk3_2_q31_shr(-euler_rk3_2_q31_mul(sigma_dot_sigma,
+        INT32_C(1431655765) /* 1/48 in Q36 */), 1) + (INT64_C(1) << 31), 32);
         /* Q-5.36, -0.0157 .. 2.92e-11, error 1.8e-11; stands for p_sigma - 1/2 */
-    const int32_t sigma_dot_delta =
-        euler_rk3_2_q31_narrow_(euler_rk3_2_q31_mul_(delta_x, sigma_x)
-        + euler_rk3_2_q31_mul_(delta_y, sigma_y) + euler_rk3_2_q31_mul_(delta_z, sigma_z)
+    const int32_t sigma_dot_delta = euler_rk3_2_q31_fit(euler_rk3_2_q31_mul(delta_x, sigma_x)
+        + euler_rk3_2_q31_mul(delta_y, sigma_y) + euler_rk3_2_q31_mul(delta_z, sigma_z)
         + (INT32_C(1) << 28), 29); /* Q-4.35, -0.0469 .. 0.0469, error 1.5e-11 */
     /* weight of delta in p */
-    const int32_t p_delta =
-        euler_rk3_2_q31_narrow_(euler_rk3_2_q31_mul_(sigma_dot_delta, INT32_C(1431655765) /* 1/6 in Q33 */)
-        + (INT32_C(1) << 30), 31); /* Q-6.37, -0.00782 .. 0.00782, error 7.9e-12 */
+    const int32_t p_delta = euler_rk3_2_q31_fit(euler_rk3_2_q31_mul(sigma_dot_delta,
+        INT32_C(1431655765) /* 1/6 in Q33 */) + (INT32_C(1) << 30), 31);
+        /* Q-6.37, -0.00782 .. 0.00782, error 7.9e-12 */
     /* the step applied to the identity: its vector part */
-    const int32_t p_x = sigma_x + euler_rk3_2_q31_narrow_(euler_rk3_2_q31_mul_(p_sigma, sigma_x)
-        + euler_rk3_2_q31_shr_(euler_rk3_2_q31_mul_(delta_x, p_delta), 1)
-        + euler_rk3_2_q31_mul_(delta_cross_sigma_x, INT32_C(1431655765) /* 1/6 in Q33 */)
-        * 2 + (INT64_C(1) << 34), 35); /* Q-2.33, -0.142 .. 0.142, error 7.2e-11 */
-    const int32_t p_y = sigma_y + euler_rk3_2_q31_narrow_(euler_rk3_2_q31_mul_(p_sigma, sigma_y)
-        + euler_rk3_2_q31_shr_(euler_rk3_2_q31_mul_(delta_y, p_delta), 1)
-        + euler_rk3_2_q31_mul_(delta_cross_sigma_y, INT32_C(1431655765) /* 1/6 in Q33 */)
-        * 2 + (INT64_C(1) << 34), 35); /* Q-2.33, -0.142 .. 0.142, error 7.2e-11 */
-    const int32_t p_z = sigma_z + euler_rk3_2_q31_narrow_(euler_rk3_2_q31_mul_(p_sigma, sigma_z)
-        + euler_rk3_2_q31_shr_(euler_rk3_2_q31_mul_(delta_z, p_delta), 1)
-        + euler_rk3_2_q31_mul_(delta_cross_sigma_z, INT32_C(1431655765) /* 1/6 in Q33 */)
-        * 2 + (INT64_C(1) << 34), 35); /* Q-2.33, -0.142 .. 0.142, error 7.2e-11 */
+    const int32_t p_x = sigma_x + euler_rk3_2_q31_fit(euler_rk3_2_q31_mul(p_sigma, sigma_x)
+        + euler_rk3_2_q31_shr(euler_rk3_2_q31_mul(delta_x, p_delta), 1)
+        + euler_rk3_2_q31_mul(delta_cross_sigma_x, INT32_C(1431655765) /* 1/6 in Q33 */) * 2
+        + (INT64_C(1) << 34), 35); /* Q-2.33, -0.142 .. 0.142, error 7.2e-11 */
+    const int32_t p_y = sigma_y + euler_rk3_2_q31_fit(euler_rk3_2_q31_mul(p_sigma, sigma_y)
+        + euler_rk3_2_q31_shr(euler_rk3_2_q31_mul(delta_y, p_delta), 1)
+        + euler_rk3_2_q31_mul(delta_cross_sigma_y, INT32_C(1431655765) /* 1/6 in Q33 */) * 2
+        + (INT64_C(1) << 34), 35); /* Q-2.33, -0.142 .. 0.142, error 7.2e-11 */
+    const int32_t p_z = sigma_z + euler_rk3_2_q31_fit(euler_rk3_2_q31_mul(p_sigma, sigma_z)
+        + euler_rk3_2_q31_shr(euler_rk3_2_q31_mul(delta_z, p_delta), 1)
+        + euler_rk3_2_q31_mul(delta_cross_sigma_z, INT32_C(1431655765) /* 1/6 in Q33 */) * 2
+        + (INT64_C(1) << 34), 35); /* Q-2.33, -0.142 .. 0.142, error 7.2e-11 */
     /* its scalar part */
-    const int32_t p_s =
-        euler_rk3_2_q31_narrow_(-euler_rk3_2_q31_mul_(delta_dot_delta, INT32_C(1431655765) /* 1/6 in Q33 */)
+    const int32_t p_s = euler_rk3_2_q31_fit(-euler_rk3_2_q31_mul(delta_dot_delta,
+        INT32_C(1431655765) /* 1/6 in Q33 */)
         - (int64_t)sigma_dot_sigma * (INT32_C(1) << 30) + (INT64_C(1) << 32), 33);
         /* Q-2.33, -0.0313 .. 1.17e-10, error 8.3e-11; stands for p_s - 1 */
     /* Euler parameters, body to reference, scalar last, after the step */
-    const int32_t next_s = e_s + euler_rk3_2_q31_narrow_(euler_rk3_2_q31_mul_(e_s, p_s)
-        - euler_rk3_2_q31_mul_(e_x, p_x) - euler_rk3_2_q31_mul_(e_y, p_y)
-        - euler_rk3_2_q31_mul_(e_z, p_z) + (INT64_C(1) << 32), 33);
+    const int32_t next_s = e_s + euler_rk3_2_q31_fit(euler_rk3_2_q31_mul(e_s, p_s)
+        - euler_rk3_2_q31_mul(e_x, p_x) - euler_rk3_2_q31_mul(e_y, p_y)
+        - euler_rk3_2_q31_mul(e_z, p_z) + (INT64_C(1) << 32), 33);
         /* Q1.30, -1.55 .. 1.55, error 7.9e-10 */
-    const int32_t next_x = e_x + euler_rk3_2_q31_narrow_(euler_rk3_2_q31_mul_(e_s, p_x)
-        + euler_rk3_2_q31_mul_(e_x, p_s) + euler_rk3_2_q31_mul_(e_y, p_z)
-        - euler_rk3_2_q31_mul_(e_z, p_y) + (INT64_C(1) << 32), 33);
+    const int32_t next_x = e_x + euler_rk3_2_q31_fit(euler_rk3_2_q31_mul(e_s, p_x)
+        + euler_rk3_2_q31_mul(e_x, p_s) + euler_rk3_2_q31_mul(e_y, p_z)
+        - euler_rk3_2_q31_mul(e_z, p_y) + (INT64_C(1) << 32), 33);
         /* Q1.30, -1.55 .. 1.55, error 7.9e-10 */
-    const int32_t next_y = e_y + euler_rk3_2_q31_narrow_(euler_rk3_2_q31_mul_(e_s, p_y)
-        - euler_rk3_2_q31_mul_(e_x, p_z) + euler_rk3_2_q31_mul_(e_y, p_s)
-        + euler_rk3_2_q31_mul_(e_z, p_x) + (INT64_C(1) << 32), 33);
+    const int32_t next_y = e_y + euler_rk3_2_q31_fit(euler_rk3_2_q31_mul(e_s, p_y)
+        - euler_rk3_2_q31_mul(e_x, p_z) + euler_rk3_2_q31_mul(e_y, p_s)
+        + euler_rk3_2_q31_mul(e_z, p_x) + (INT64_C(1) << 32), 33);
         /* Q1.30, -1.55 .. 1.55, error 7.9e-10 */
-    const int32_t next_z = e_z + euler_rk3_2_q31_narrow_(euler_rk3_2_q31_mul_(e_s, p_z)
-        + euler_rk3_2_q31_mul_(e_x, p_y) - euler_rk3_2_q31_mul_(e_y, p_x)
-        + euler_rk3_2_q31_mul_(e_z, p_s) + (INT64_C(1) << 32), 33);
+    const int32_t next_z = e_z + euler_rk3_2_q31_fit(euler_rk3_2_q31_mul(e_s, p_z)
+        + euler_rk3_2_q31_mul(e_x, p_y) - euler_rk3_2_q31_mul(e_y, p_x)
+        + euler_rk3_2_q31_mul(e_z, p_s) + (INT64_C(1) << 32), 33);
         /* Q1.30, -1.55 .. 1.55, error 7.9e-10 */
     next[0] = next_x;
     next[1] = next_y;

@@ -5,7 +5,7 @@
 #include "sculling_fast_2_q31.h"
 
 /* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
-static inline int sculling_fast_2_q31_out_(int32_t x, int32_t limit)
+static inline int sculling_fast_2_q31_out(int32_t x, int32_t limit)
 {
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
 }
@@ -13,7 +13,7 @@ static inline int sculling_fast_2_q31_out_(int32_t x, int32_t limit)
 /* The exact product of two words. */
 #if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
 /* These processors have no instruction for it: the high word takes four products of half words. */
-static __attribute__((noinline)) int64_t sculling_fast_2_q31_mul_(int32_t a, int32_t b)
+static __attribute__((noinline)) int64_t sculling_fast_2_q31_mul(int32_t a, int32_t b)
 {
     const uint32_t a_low = (uint32_t)a & 0xFFFFu;
     const uint32_t b_low = (uint32_t)b & 0xFFFFu;
@@ -28,7 +28,7 @@ static __attribute__((noinline)) int64_t sculling_fast_2_q31_mul_(int32_t a, int
     return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
 }
 #else
-static inline int64_t sculling_fast_2_q31_mul_(int32_t a, int32_t b)
+static inline int64_t sculling_fast_2_q31_mul(int32_t a, int32_t b)
 {
     return (int64_t)a * (int64_t)b;
 }
@@ -39,7 +39,7 @@ static inline int64_t sculling_fast_2_q31_mul_(int32_t a, int32_t b)
  * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
  * number and no conversion of a number out of range.
  */
-static inline int32_t sculling_fast_2_q31_narrow_(int64_t x, int n)
+static inline int32_t sculling_fast_2_q31_fit(int64_t x, int n)
 {
 #ifdef __FRAMAC__
     return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
@@ -71,51 +71,52 @@ int sculling_fast_2_q31(const int32_t angle_sum[3], const int32_t velocity_sum[3
     const int32_t dv_x = velocity_increment[0];
     const int32_t dv_y = velocity_increment[1];
     const int32_t dv_z = velocity_increment[2];
-    if (sculling_fast_2_q31_out_(beta_x, (INT32_C(1) << 30))
-        || sculling_fast_2_q31_out_(beta_y, (INT32_C(1) << 30))
-        || sculling_fast_2_q31_out_(beta_z, (INT32_C(1) << 30))
-        || sculling_fast_2_q31_out_(u_x, (INT32_C(1) << 30))
-        || sculling_fast_2_q31_out_(u_y, (INT32_C(1) << 30))
-        || sculling_fast_2_q31_out_(u_z, (INT32_C(1) << 30))
-        || sculling_fast_2_q31_out_(eta_x, (INT32_C(1) << 30))
-        || sculling_fast_2_q31_out_(eta_y, (INT32_C(1) << 30))
-        || sculling_fast_2_q31_out_(eta_z, (INT32_C(1) << 30))
-        || sculling_fast_2_q31_out_(d_x, (INT32_C(1) << 30))
-        || sculling_fast_2_q31_out_(d_y, (INT32_C(1) << 30))
-        || sculling_fast_2_q31_out_(d_z, (INT32_C(1) << 30))
-        || sculling_fast_2_q31_out_(dv_x, (INT32_C(1) << 30))
-        || sculling_fast_2_q31_out_(dv_y, (INT32_C(1) << 30))
-        || sculling_fast_2_q31_out_(dv_z, (INT32_C(1) << 30)))
+    if (sculling_fast_2_q31_out(beta_x, (INT32_C(1) << 30))
+        || sculling_fast_2_q31_out(beta_y, (INT32_C(1) << 30))
+        || sculling_fast_2_q31_out(beta_z, (INT32_C(1) << 30))
+        || sculling_fast_2_q31_out(u_x, (INT32_C(1) << 30))
+        || sculling_fast_2_q31_out(u_y, (INT32_C(1) << 30))
+        || sculling_fast_2_q31_out(u_z, (INT32_C(1) << 30))
+        || sculling_fast_2_q31_out(eta_x, (INT32_C(1) << 30))
+        || sculling_fast_2_q31_out(eta_y, (INT32_C(1) << 30))
+        || sculling_fast_2_q31_out(eta_z, (INT32_C(1) << 30))
+        || sculling_fast_2_q31_out(d_x, (INT32_C(1) << 30))
+        || sculling_fast_2_q31_out(d_y, (INT32_C(1) << 30))
+        || sculling_fast_2_q31_out(d_z, (INT32_C(1) << 30))
+        || sculling_fast_2_q31_out(dv_x, (INT32_C(1) << 30))
+        || sculling_fast_2_q31_out(dv_y, (INT32_C(1) << 30))
+        || sculling_fast_2_q31_out(dv_z, (INT32_C(1) << 30))) {
         return 1;
+    }
     /* sum of the angle increments since the slow cycle began, after the call */
-    const int32_t next_beta_x = beta_x + sculling_fast_2_q31_narrow_((int64_t)d_x + 4, 3);
+    const int32_t next_beta_x = beta_x + sculling_fast_2_q31_fit((int64_t)d_x + 4, 3);
         /* Q1.30, -1.13 .. 1.13, error 4.7e-10 */
-    const int32_t next_beta_y = beta_y + sculling_fast_2_q31_narrow_((int64_t)d_y + 4, 3);
+    const int32_t next_beta_y = beta_y + sculling_fast_2_q31_fit((int64_t)d_y + 4, 3);
         /* Q1.30, -1.13 .. 1.13, error 4.7e-10 */
-    const int32_t next_beta_z = beta_z + sculling_fast_2_q31_narrow_((int64_t)d_z + 4, 3);
+    const int32_t next_beta_z = beta_z + sculling_fast_2_q31_fit((int64_t)d_z + 4, 3);
         /* Q1.30, -1.13 .. 1.13, error 4.7e-10 */
     /* sum of the velocity increments since the slow cycle began, after the call */
-    const int32_t next_u_x = u_x + sculling_fast_2_q31_narrow_((int64_t)dv_x + 4, 3);
+    const int32_t next_u_x = u_x + sculling_fast_2_q31_fit((int64_t)dv_x + 4, 3);
         /* Q4.27, -9.01 .. 9.01, error 3.8e-09 */
-    const int32_t next_u_y = u_y + sculling_fast_2_q31_narrow_((int64_t)dv_y + 4, 3);
+    const int32_t next_u_y = u_y + sculling_fast_2_q31_fit((int64_t)dv_y + 4, 3);
         /* Q4.27, -9.01 .. 9.01, error 3.8e-09 */
-    const int32_t next_u_z = u_z + sculling_fast_2_q31_narrow_((int64_t)dv_z + 4, 3);
+    const int32_t next_u_z = u_z + sculling_fast_2_q31_fit((int64_t)dv_z + 4, 3);
         /* Q4.27, -9.01 .. 9.01, error 3.8e-09 */
     /* sculling integral since the slow cycle began, after the call */
     const int32_t next_eta_x = eta_x
-        + sculling_fast_2_q31_narrow_(sculling_fast_2_q31_mul_(beta_y, dv_z)
-        - sculling_fast_2_q31_mul_(beta_z, dv_y) - sculling_fast_2_q31_mul_(d_y, u_z)
-        + sculling_fast_2_q31_mul_(d_z, u_y) + (INT64_C(1) << 32), 33);
+        + sculling_fast_2_q31_fit(sculling_fast_2_q31_mul(beta_y, dv_z)
+        - sculling_fast_2_q31_mul(beta_z, dv_y) - sculling_fast_2_q31_mul(d_y, u_z)
+        + sculling_fast_2_q31_mul(d_z, u_y) + (INT64_C(1) << 32), 33);
         /* Q3.28, -6.01 .. 6.01, error 1.9e-09 */
     const int32_t next_eta_y = eta_y
-        + sculling_fast_2_q31_narrow_(sculling_fast_2_q31_mul_(beta_z, dv_x)
-        - sculling_fast_2_q31_mul_(beta_x, dv_z) + sculling_fast_2_q31_mul_(d_x, u_z)
-        - sculling_fast_2_q31_mul_(d_z, u_x) + (INT64_C(1) << 32), 33);
+        + sculling_fast_2_q31_fit(sculling_fast_2_q31_mul(beta_z, dv_x)
+        - sculling_fast_2_q31_mul(beta_x, dv_z) + sculling_fast_2_q31_mul(d_x, u_z)
+        - sculling_fast_2_q31_mul(d_z, u_x) + (INT64_C(1) << 32), 33);
         /* Q3.28, -6.01 .. 6.01, error 1.9e-09 */
     const int32_t next_eta_z = eta_z
-        + sculling_fast_2_q31_narrow_(sculling_fast_2_q31_mul_(beta_x, dv_y)
-        - sculling_fast_2_q31_mul_(beta_y, dv_x) - sculling_fast_2_q31_mul_(d_x, u_y)
-        + sculling_fast_2_q31_mul_(d_y, u_x) + (INT64_C(1) << 32), 33);
+        + sculling_fast_2_q31_fit(sculling_fast_2_q31_mul(beta_x, dv_y)
+        - sculling_fast_2_q31_mul(beta_y, dv_x) - sculling_fast_2_q31_mul(d_x, u_y)
+        + sculling_fast_2_q31_mul(d_y, u_x) + (INT64_C(1) << 32), 33);
         /* Q3.28, -6.01 .. 6.01, error 1.9e-09 */
     next_angle_sum[0] = next_beta_x;
     next_angle_sum[1] = next_beta_y;

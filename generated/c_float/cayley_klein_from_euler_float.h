@@ -7,8 +7,8 @@
  *     2: a1 = e4, a2 = e1, a3 = e2, a4 = e3.
  * Operations of one call: none; 0 temporaries.
  *
- * No heap, no global state, reentrant. In one call every input is read before any output is written:
- * an output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is
+ * written: an output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef CAYLEY_KLEIN_FROM_EULER_FLOAT_H
 #define CAYLEY_KLEIN_FROM_EULER_FLOAT_H

@@ -8,8 +8,8 @@
  * The state must not be zero.
  * Operations of one call: 3 add, 8 multiply, 1 divide, 1 sqrt; 1 temporaries.
  *
- * No heap, no global state, reentrant. In one call every input is read before any output is written:
- * an output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is
+ * written: an output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef CAYLEY_KLEIN_NORMALIZE_FLOAT_H
 #define CAYLEY_KLEIN_NORMALIZE_FLOAT_H

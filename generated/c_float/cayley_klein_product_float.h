@@ -7,8 +7,8 @@
  *     2: dU/dt = (i/2) (w . s) U, s the Pauli matrices.
  * Operations of one call: 12 add, 16 multiply; 0 temporaries.
  *
- * No heap, no global state, reentrant. In one call every input is read before any output is written:
- * an output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is
+ * written: an output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef CAYLEY_KLEIN_PRODUCT_FLOAT_H
 #define CAYLEY_KLEIN_PRODUCT_FLOAT_H

@@ -9,8 +9,8 @@
  *     fourth-order Runge-Kutta method: thesis, chapter 3 B.
  * Operations of one call: 30 add, 38 multiply; 14 temporaries.
  *
- * No heap, no global state, reentrant. In one call every input is read before any output is written:
- * an output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is
+ * written: an output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef CAYLEY_KLEIN_RK4_2_FLOAT_H
 #define CAYLEY_KLEIN_RK4_2_FLOAT_H

@@ -7,8 +7,8 @@
  *     equation (26).
  * Operations of one call: 12 add, 12 multiply; 5 temporaries.
  *
- * No heap, no global state, reentrant. In one call every input is read before any output is written:
- * an output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is
+ * written: an output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef CONING_FAST_FLOAT_H
 #define CONING_FAST_FLOAT_H

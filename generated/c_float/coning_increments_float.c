@@ -7,7 +7,7 @@
 #include <math.h>
 
 /* sin(x)/x, 1 at 0. */
-static float coning_increments_float_sinc_(float x)
+static float coning_increments_float_sc_(float x)
 {
     return x >= 0.0f && x <= 0.0f ? 1.0f : sinf(x) / x;
 }
@@ -17,7 +17,7 @@ void coning_increments_float(float middle, float width, float a, float b, float 
     float increment[3])
 {
     const float shared_1 = b * middle;
-    const float shared_2 = a * width * coning_increments_float_sinc_(0.5f * (b * width));
+    const float shared_2 = a * width * coning_increments_float_sc_(0.5f * (b * width));
     /* angle increment over the interval, body axes */
     const float increment_x = shared_2 * sinf(shared_1);
     const float increment_y = g * width;

@@ -7,7 +7,7 @@
 #include <math.h>
 
 /* sin(x)/x, 1 at 0. */
-static float coning_truth_float_sinc_(float x)
+static float coning_truth_float_sc_(float x)
 {
     return x >= 0.0f && x <= 0.0f ? 1.0f : sinf(x) / x;
 }
@@ -29,10 +29,10 @@ void coning_truth_float(float time, float a, float b, float g, float rate[3], fl
     const float shared_21 = shared_6 * shared_7;
     const float shared_9 = shared_21 * shared_6;
     const float shared_10 = sqrtf(shared_8 + shared_9);
-    const float shared_11 = time * coning_truth_float_sinc_(shared_10);
+    const float shared_11 = time * coning_truth_float_sc_(shared_10);
     const float shared_12 = shared_11 * shared_6;
     const float shared_13 = shared_12 * shared_2;
-    const float factor_1 = coning_truth_float_sinc_(0.5f * shared_10);
+    const float factor_1 = coning_truth_float_sc_(0.5f * shared_10);
     const float shared_14 = 0.5f * (factor_1 * factor_1);
     const float shared_15 = shared_14 * shared_9;
     const float shared_16 = shared_14 * shared_8 - 1.0f;

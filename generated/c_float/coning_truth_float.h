@@ -7,8 +7,8 @@
  *     4 B and appendix A.
  * Operations of one call: 11 add, 28 multiply, 1 sqrt, 2 negate, 4 function; 22 temporaries.
  *
- * No heap, no global state, reentrant. In one call every input is read before any output is written:
- * an output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is
+ * written: an output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef CONING_TRUTH_FLOAT_H
 #define CONING_TRUTH_FLOAT_H

@@ -7,7 +7,7 @@
 #include <math.h>
 
 /* sin(x)/x, 1 at 0. */
-static float constant_truth_float_sinc_(float x)
+static float constant_truth_float_sc_(float x)
 {
     return x >= 0.0f && x <= 0.0f ? 1.0f : sinf(x) / x;
 }
@@ -20,13 +20,13 @@ void constant_truth_float(float time, float x, float y, float z, float rate[3], 
     const float shared_3 = shared_1 * (x * x);
     const float shared_4 = shared_1 * (z * z);
     const float shared_5 = sqrtf(shared_2 + shared_3 + shared_4);
-    const float factor_1 = constant_truth_float_sinc_(0.5f * shared_5);
+    const float factor_1 = constant_truth_float_sc_(0.5f * shared_5);
     const float shared_6 = 0.5f * (factor_1 * factor_1);
     const float shared_7 = shared_2 * shared_6;
     const float shared_8 = shared_4 * shared_6 - 1.0f;
     /* direction cosine matrix, body to reference */
     const float C_11 = -(shared_7 + shared_8);
-    const float shared_9 = time * constant_truth_float_sinc_(shared_5);
+    const float shared_9 = time * constant_truth_float_sc_(shared_5);
     const float shared_10 = shared_9 * z;
     const float shared_18 = shared_1 * shared_6;
     const float shared_11 = shared_18 * x;

@@ -7,8 +7,8 @@
  *     equation (60).
  * Operations of one call: 4 add, 12 multiply, 1 negate, 6 function; 10 temporaries.
  *
- * No heap, no global state, reentrant. In one call every input is read before any output is written:
- * an output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is
+ * written: an output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef DCM_FROM_EULER_ANGLES_FLOAT_H
 #define DCM_FROM_EULER_ANGLES_FLOAT_H

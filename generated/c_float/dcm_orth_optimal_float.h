@@ -11,8 +11,8 @@
  * Operations of one call: 85 add, 128 multiply, 1 divide, 5 sqrt, 1 negate, 1 select, 3 function;
  *     54 temporaries.
  *
- * No heap, no global state, reentrant. In one call every input is read before any output is written:
- * an output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is
+ * written: an output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef DCM_ORTH_OPTIMAL_FLOAT_H
 #define DCM_ORTH_OPTIMAL_FLOAT_H

@@ -8,8 +8,8 @@
  * Made for a matrix near a rotation: all products of its transpose and itself near the identity.
  * Operations of one call: 54 add, 69 multiply; 21 temporaries.
  *
- * No heap, no global state, reentrant. In one call every input is read before any output is written:
- * an output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is
+ * written: an output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef DCM_ORTH_SECOND_ORDER_FLOAT_H
 #define DCM_ORTH_SECOND_ORDER_FLOAT_H

@@ -7,8 +7,8 @@
  *     2, equation (2.1): dC/dt = C skew(w).
  * Operations of one call: 18 add, 27 multiply; 0 temporaries.
  *
- * No heap, no global state, reentrant. In one call every input is read before any output is written:
- * an output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is
+ * written: an output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef DCM_PRODUCT_FLOAT_H
 #define DCM_PRODUCT_FLOAT_H

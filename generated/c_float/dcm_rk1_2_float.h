@@ -8,8 +8,8 @@
  *     thesis, chapter 3 B.
  * Operations of one call: 21 add, 21 multiply, 3 negate; 6 temporaries.
  *
- * No heap, no global state, reentrant. In one call every input is read before any output is written:
- * an output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is
+ * written: an output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef DCM_RK1_2_FLOAT_H
 #define DCM_RK1_2_FLOAT_H

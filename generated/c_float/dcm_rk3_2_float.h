@@ -8,8 +8,8 @@
  *     method: W. Kutta, Z. Math. Phys. 46 (1901) 435-453.
  * Operations of one call: 66 add, 76 multiply; 42 temporaries.
  *
- * No heap, no global state, reentrant. In one call every input is read before any output is written:
- * an output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is
+ * written: an output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef DCM_RK3_2_FLOAT_H
 #define DCM_RK3_2_FLOAT_H

@@ -7,7 +7,7 @@
 #include <math.h>
 
 /* sin(x)/x, 1 at 0. */
-static float dcm_update_float_sinc_(float x)
+static float dcm_update_float_sc_(float x)
 {
     return x >= 0.0f && x <= 0.0f ? 1.0f : sinf(x) / x;
 }
@@ -33,13 +33,13 @@ void dcm_update_float(const float state[9], const float rotation_vector[3], floa
     /* square of the angle */
     const float angle_squared = shared_1 + shared_2 + shared_3;
     const float shared_4 = sqrtf(angle_squared);
-    const float factor_1 = dcm_update_float_sinc_(0.5f * shared_4);
+    const float factor_1 = dcm_update_float_sc_(0.5f * shared_4);
     const float shared_18 = 0.5f * (factor_1 * factor_1);
     const float shared_7 = shared_2 * shared_18;
     const float shared_8 = shared_3 * shared_18 - 1.0f;
     /* the step applied to the identity */
     const float A_11 = -(shared_7 + shared_8);
-    const float shared_9 = dcm_update_float_sinc_(shared_4);
+    const float shared_9 = dcm_update_float_sc_(shared_4);
     const float shared_10 = phi_z * shared_9;
     const float shared_11 = phi_x * shared_18;
     const float shared_12 = phi_y * shared_11;

@@ -7,8 +7,8 @@
  *     equations (2) to (4) with all terms.
  * Operations of one call: 31 add, 44 multiply, 1 sqrt, 2 negate, 2 function; 28 temporaries.
  *
- * No heap, no global state, reentrant. In one call every input is read before any output is written:
- * an output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is
+ * written: an output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef DCM_UPDATE_FLOAT_H
 #define DCM_UPDATE_FLOAT_H

@@ -8,8 +8,8 @@
  * The true matrix is a rotation.
  * Operations of one call: 27 add, 33 multiply; 6 temporaries.
  *
- * No heap, no global state, reentrant. In one call every input is read before any output is written:
- * an output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is
+ * written: an output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef ERROR_MATRIX_FLOAT_H
 #define ERROR_MATRIX_FLOAT_H

@@ -7,9 +7,10 @@
 #include <math.h>
 
 /* An angle of up to a turn and a half, brought to -pi to pi by a whole turn. */
-static float euler_angles_from_dcm_float_wrap_(float x)
+static float euler_angles_from_dcm_float_wr_(float x)
 {
-    return x > 3.1415927f ? x - 6.2831855f : x < -3.1415927f ? x + 6.2831855f : x;
+    return x > 3.1415927f ? x - 6.2831855f
+        : x < -3.1415927f ? x + 6.2831855f : x;
 }
 
 
@@ -39,7 +40,7 @@ void euler_angles_from_dcm_float(const float state[9], const float previous[3], 
     const float apart = atan2f(steep_sine, steep_cosine);
     /* heading */
     const float next_heading = (cosine_squared >= 0.25f ? atan2f(C_21, C_11)
-        : euler_angles_from_dcm_float_wrap_(apart + (0.0f >= C_31 ? next_roll : -next_roll)));
+        : euler_angles_from_dcm_float_wr_(apart + (0.0f >= C_31 ? next_roll : -next_roll)));
     next[0] = next_roll;
     next[1] = next_pitch;
     next[2] = next_heading;

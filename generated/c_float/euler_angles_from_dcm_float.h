@@ -11,8 +11,8 @@
  * Operations of one call: 6 add, 4 multiply, 1 sqrt, 3 negate, 5 select, 5 function; 4
  *     temporaries.
  *
- * No heap, no global state, reentrant. In one call every input is read before any output is written:
- * an output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is
+ * written: an output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef EULER_ANGLES_FROM_DCM_FLOAT_H
 #define EULER_ANGLES_FROM_DCM_FLOAT_H

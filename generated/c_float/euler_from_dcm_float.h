@@ -9,8 +9,8 @@
  * The scalar part of the result is not negative.
  * Operations of one call: 13 add, 8 multiply, 1 divide, 1 sqrt, 16 select; 18 temporaries.
  *
- * No heap, no global state, reentrant. In one call every input is read before any output is written:
- * an output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is
+ * written: an output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef EULER_FROM_DCM_FLOAT_H
 #define EULER_FROM_DCM_FLOAT_H

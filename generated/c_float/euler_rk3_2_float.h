@@ -8,8 +8,8 @@
  *     third-order method: W. Kutta, Z. Math. Phys. 46 (1901) 435-453.
  * Operations of one call: 37 add, 45 multiply; 18 temporaries.
  *
- * No heap, no global state, reentrant. In one call every input is read before any output is written:
- * an output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is
+ * written: an output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef EULER_RK3_2_FLOAT_H
 #define EULER_RK3_2_FLOAT_H

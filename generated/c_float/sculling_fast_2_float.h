@@ -7,8 +7,8 @@
  *     equation (56).
  * Operations of one call: 18 add, 15 multiply; 0 temporaries.
  *
- * No heap, no global state, reentrant. In one call every input is read before any output is written:
- * an output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is
+ * written: an output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef SCULLING_FAST_2_FLOAT_H
 #define SCULLING_FAST_2_FLOAT_H

@@ -7,7 +7,7 @@
 #include <math.h>
 
 /* sin(x)/x, 1 at 0. */
-static float sinusoidal_increments_float_sinc_(float x)
+static float sinusoidal_increments_float_sc_(float x)
 {
     return x >= 0.0f && x <= 0.0f ? 1.0f : sinf(x) / x;
 }
@@ -16,7 +16,7 @@ static float sinusoidal_increments_float_sinc_(float x)
 void sinusoidal_increments_float(float middle, float width, float a, float b, float increment[3])
 {
     /* angle increment over the interval, body axes */
-    const float increment_y = a * width * cosf(b * middle) * sinusoidal_increments_float_sinc_(0.5f
+    const float increment_y = a * width * cosf(b * middle) * sinusoidal_increments_float_sc_(0.5f
         * (b * width));
     increment[0] = 0.0f;
     increment[1] = increment_y;

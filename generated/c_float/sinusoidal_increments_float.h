@@ -7,8 +7,8 @@
  *     4 B.
  * Operations of one call: 6 multiply, 2 function; 0 temporaries.
  *
- * No heap, no global state, reentrant. In one call every input is read before any output is written:
- * an output may be the same memory as an input. Matrices are stored by rows.
+ * No heap, no global state, reentrant. In one call every input is read before any output is
+ * written: an output may be the same memory as an input. Matrices are stored by rows.
  */
 #ifndef SINUSOIDAL_INCREMENTS_FLOAT_H
 #define SINUSOIDAL_INCREMENTS_FLOAT_H

@@ -7,7 +7,7 @@
 #include <math.h>
 
 /* sin(x)/x, 1 at 0. */
-static float sinusoidal_truth_float_sinc_(float x)
+static float sinusoidal_truth_float_sc_(float x)
 {
     return x >= 0.0f && x <= 0.0f ? 1.0f : sinf(x) / x;
 }
@@ -18,7 +18,7 @@ void sinusoidal_truth_float(float time, float a, float b, float rate[3], float a
     const float shared_1 = b * time;
     /* body rate, body axes */
     const float rate_y = a * cosf(shared_1);
-    const float shared_2 = a * time * sinusoidal_truth_float_sinc_(shared_1);
+    const float shared_2 = a * time * sinusoidal_truth_float_sc_(shared_1);
     const float shared_3 = cosf(shared_2);
     /* direction cosine matrix, body to reference */
     const float C_11 = shared_3;

@@ -427,8 +427,8 @@ CALLS = {
     "sin": "function",
     "cos": "function",
     "atan2": "function",
-    "sinc_": "function",
-    "wrap_": "function",
+    "sc_": "function",
+    "wr_": "function",
 }
 
 
@@ -456,7 +456,7 @@ class Counter(c_ast.NodeVisitor):
         self.generic_visit(node)
 
     def visit_FuncCall(self, node):
-        name = re.sub(r"^\w+_(?=(sinc|wrap)_$)", "", node.name.name)  # behind the kernel's name
+        name = re.sub(r"^\w+_(?=(sc|wr)_$)", "", node.name.name)  # behind the kernel's name
         self.counts[CALLS[name if name in CALLS else name.removesuffix("f")]] += 1
         self.generic_visit(node.args)
 

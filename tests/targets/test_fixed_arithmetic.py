@@ -28,14 +28,14 @@ def exported(text: str, name: str) -> str:
     kinds = {
         "out": f"int{word}_t",
         "mul": f"int{word}_t",
-        "narrow": f"int{2 * word}_t",
+        "fit": f"int{2 * word}_t",
         "shr": f"int{2 * word}_t",
     }
     lines = [text]
     for helper, kind in kinds.items():
-        (result,) = re.findall(rf"^static inline (\w+) {name}_{helper}_\(", text, flags=re.MULTILINE)[:1]
-        second = "int" if helper in ("narrow", "shr") else kind
-        lines.append(f"{result} {helper}({kind} x, {second} y) {{ return {name}_{helper}_(x, y); }}")
+        (result,) = re.findall(rf"^static inline (\w+) {name}_{helper}\(", text, flags=re.MULTILINE)[:1]
+        second = "int" if helper in ("fit", "shr") else kind
+        lines.append(f"{result} {helper}({kind} x, {second} y) {{ return {name}_{helper}(x, y); }}")
     return "\n".join(lines)
 
 
@@ -62,7 +62,7 @@ def arithmetic(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPath
     ffi = FFI()
     ffi.cdef(
         f"int out(int{word}_t, int{word}_t); int{2 * word}_t mul(int{word}_t, int{word}_t);"
-        f"int{word}_t narrow(int{2 * word}_t, int); int{2 * word}_t shr(int{2 * word}_t, int);"
+        f"int{word}_t fit(int{2 * word}_t, int); int{2 * word}_t shr(int{2 * word}_t, int);"
     )
     return SimpleNamespace(lib=ffi.dlopen(str(folder / "its.so")), word=word, keep=ffi)
 
@@ -91,7 +91,7 @@ def test_narrowing_and_shifts_round_down(arithmetic, data):
     shift = data.draw(st.integers(0, 2 * word - 1))
     assert arithmetic.lib.shr(x, shift) == x >> shift
     if -(1 << (word - 1)) <= x >> shift < 1 << (word - 1):  # what the proof of the ranges shows
-        assert arithmetic.lib.narrow(x, shift) == x >> shift
+        assert arithmetic.lib.fit(x, shift) == x >> shift
 
 
 @given(data=st.data())

@@ -16,12 +16,17 @@ def fill(text: str, indent: str, width: int = 99) -> str:
 def fill_expression(text: str, indent: str, width: int = 99) -> str:
     """Wrap an expression before the signs of sums and choices, every line after the first with `indent`.
 
-    What is still too long is wrapped before the signs of products and comparisons.
+    What is still too long is wrapped at products and comparisons, then between arguments, then behind a parenthesis.
     """
-    pieces: list[str] = []
-    for piece in re.split(r" (?=[+?:-] )", text):
-        too_long = len(indent) + len(piece) > width
-        pieces += re.split(r" (?=(?:[*/]|>=) )", piece) if too_long else [piece]
+    pieces = [text]
+    for place in (r" (?=[+?:-] )", r" (?=(?:[*/]|>=|[|]{2}) )", r"(?<=,) ", r"(?<=[\w)]\()(?=\S)"):
+        pieces = [
+            part
+            for piece in pieces
+            for part in (
+                re.split(place, piece) if len(indent) + len(piece) > width or piece is text else [piece]
+            )
+        ]
     return _filled(pieces, indent, width)
 
 
@@ -33,8 +38,9 @@ def fill_arguments(text: str, indent: str, width: int = 99) -> str:
 def _filled(pieces: list[str], indent: str, width: int) -> str:
     lines: list[str] = []
     for piece in pieces:
-        if lines and len(lines[-1]) + 1 + len(piece) <= width:
-            lines[-1] += f" {piece}"
+        between = "" if lines and lines[-1].endswith("(") else " "
+        if lines and len(lines[-1]) + len(between) + len(piece) <= width:
+            lines[-1] += f"{between}{piece}"
         else:
             lines.append(f"{indent if lines else ''}{piece}")
     return "\n".join(lines)

@@ -58,10 +58,13 @@ class Language:
         Returns whether an identifier can name a quantity.
     scopes : callable
         Returns the identifiers of each scope of some files.
+    most : int, optional
+        Characters of a value's name above which words in it are abbreviated; None for never.
     """
 
     allows: Callable[[str], bool]
     scopes: Callable[[Iterable[str]], list[set[str]]]
+    most: int | None = None
 
 
 def _c_allows(name: str) -> bool:
@@ -110,7 +113,26 @@ def _python_scopes(texts: Iterable[str]) -> list[set[str]]:
     return scopes
 
 
-C = Language(_c_allows, _c_scopes)
+#: Abbreviations of words that lowering puts into the names of parts of a value.
+_PARTS = {
+    "principal_principal": "principal",
+    "denominator": "den",
+    "numerator": "num",
+    "arctangent": "atan",
+    "argument": "arg",
+    "radicand": "rad",
+    "principal": "wrap",
+    "negative": "neg",
+    "quadrant": "quad",
+    "quotient": "quot",
+    "series": "ser",
+    "choice": "sel",
+    "largest": "max",
+    "heading": "hdg",
+    "factor": "fac",
+}
+#: C tells names inside a file apart by 63 characters, but readers by fewer; what prints may put four behind a name.
+C = Language(_c_allows, _c_scopes, most=27)
 PYTHON = Language(_python_allows, _python_scopes)
 
 
@@ -219,10 +241,20 @@ def _chosen(marks: Mapping[Key, str], language: Language, scopes: list[set[str]]
         chosen[key] = name
         return True
 
-    waiting = [key for key in marks if not settle(key, key.name)]
+    waiting = [key for key in marks if not settle(key, _abbreviated(key, language.most))]
     for key in waiting:
         next(name for name in _alike(key) if settle(key, name))
     return chosen
+
+
+def _abbreviated(key: Key, most: int | None) -> str:
+    """Return the name of a value with abbreviated words, as many as it takes."""
+    name = key.name
+    for word, short in _PARTS.items():
+        if most is None or key.kind != "value" or len(name) <= most:
+            break
+        name = re.sub(rf"(?<![a-z]){word}(?![a-z])", short, name)
+    return name
 
 
 def _alike(key: Key) -> Iterator[str]:

@@ -68,7 +68,7 @@ class StatementPrinter:
     def _call(self, helper: str, *arguments: str) -> str:
         """Return a call of one of the file's own functions."""
         self.uses.add(helper)
-        return f"{self.name}_{helper}_({', '.join(arguments)})"
+        return f"{self.name}_{helper}({', '.join(arguments)})"
 
     def statements(self, value: Value) -> list[str]:
         """Return the statements that compute a value."""
@@ -82,13 +82,13 @@ class StatementPrinter:
                 text = self._call("div", self.scaled(numerator), denominator)
                 lines.append(_declared(kind, name, self.narrow(text, value), note))
             case IntegerRoot(argument):
-                text = self._call("sqrt", f"({self.word.magnitude})({self.scaled(argument)})")
+                text = self._call("rt", f"({self.word.magnitude})({self.scaled(argument)})")
                 lines.append(_declared(kind, name, text, note))
             case IntegerMaximum((first, *others)):
                 lines.append(_declared(kind, name, self.narrowed(first, value), note, constant=False))
                 for other in others:
                     lines.append(f"if ({self.scaled(other)} > {name}) {{")
-                    lines.append(f"    {name} = {self.narrowed(other, value)};")
+                    lines.append(_assigned(name, self.narrowed(other, value)))
                     lines.append("}")
             case IntegerSelection(cases, otherwise):
                 lines += self._selection(value, kind, cases, otherwise, note)
@@ -114,9 +114,9 @@ class StatementPrinter:
         for number, (left, right, result) in enumerate(cases):
             word = "if" if not number else "} else if"
             lines.append(f"{word} ({self.scaled(left)} >= {self.scaled(right)}) {{")
-            lines.append(f"    {value.name} = {self.narrowed(result, value)};")
+            lines.append(_assigned(value.name, self.narrowed(result, value)))
         lines.append("} else {")
-        lines.append(f"    {value.name} = {self.narrowed(otherwise, value)};")
+        lines.append(_assigned(value.name, self.narrowed(otherwise, value)))
         return [*lines, "}"]
 
     def _guard(self, name: str, value: Value) -> list[str]:
@@ -130,7 +130,7 @@ class StatementPrinter:
         """Return an expression of a wide number, shifted down, as one of the value's type."""
         if value.wide:
             return self._shifted(text, shift) if shift else text
-        return self._call("narrow", text, str(shift))
+        return self._call("fit", text, str(shift))
 
     def narrowed(self, scaled: Scaled, value: Value) -> str:
         """Return a scaled value as one of another value's type."""
@@ -168,7 +168,7 @@ class StatementPrinter:
             total = f"{name}_sum"
         if definition.in_words and all(map(self._is_word, definition.coarse)):
             words = [self.word_term(term) for term in definition.coarse]
-            rounded = f"+{self._call('narrow', total, str(shift))}"
+            rounded = f"+{self._call('fit', total, str(shift))}"
             text = self._joined([*words[:1], rounded, *words[1:]])
             return [*lines, _declared(kind, name, text, note)]
         coarse = [self.term(term) for term in definition.coarse]
@@ -180,7 +180,7 @@ class StatementPrinter:
     def _result(self, value: Value, kind: str, text: str, note: str) -> list[str]:
         """Return the statements that store a sum; a word with a range check is checked before it is narrowed."""
         if value.guarded and not value.wide:
-            name = f"{value.name}_unchecked"
+            name = f"{value.name}_raw"
             return [
                 _declared(self.word.wide, name, text),
                 *self._guard(name, value),
@@ -289,6 +289,11 @@ def _exactly(term: Term) -> str:
     ):
         return ""
     return f" /* {contract.exact_text(abs(term.coefficient.value))} in Q{term.coefficient.fraction} */"
+
+
+def _assigned(name: str, text: str) -> str:
+    """Return an assignment inside a block."""
+    return fill_expression(f"    {name} = {text};", " " * 12, 95)
 
 
 def _declared(kind: str, name: str, text: str, note: str = "", constant: bool = True) -> str:
