@@ -42,7 +42,7 @@ demo: $(READY)
 	$(BIN)/strapgen derive euler --method rk1 --show program
 	@echo
 	@echo "3. The same step in C, from generated/c/euler_rk1_2.c"
-	@sed -n '/^static inline void euler_rk1_2_one_/,/^}/p' generated/c/euler_rk1_2.c
+	@sed -n '/^void euler_rk1_2(/,/^}/p' generated/c/euler_rk1_2.c
 	@echo
 	@echo "4. Table 5 of the thesis on every back end; c-q31 has 32-bit words, c-q15 16-bit"
 	$(BIN)/strapgen tables --table 5

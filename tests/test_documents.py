@@ -408,3 +408,13 @@ def test_example(path, capsys, monkeypatch):
         return
     namespace["main"]()
     assert capsys.readouterr().out.count("\n") >= 3
+
+
+def test_the_demonstration_prints_a_function():
+    """Its command for that is a pattern in the text of a generated file, and would print nothing without a word."""
+    (command,) = re.findall(
+        r"^\t@(sed -n .* generated/\S+)$", (ROOT / "Makefile").read_text(), flags=re.MULTILINE
+    )
+    done = subprocess.run(shlex.split(command), cwd=ROOT, capture_output=True, text=True, check=True)
+    lines = done.stdout.splitlines()
+    assert lines[0].startswith("void euler_rk1_2(") and lines[-1] == "}" and len(lines) > 10

@@ -118,14 +118,13 @@ def cost(sources: Sources, cpu: str) -> Cost:
         source = folder / next(file for file in sources.step_files if file.endswith(".c"))
         flags = [*FLAGS, *_library(processor)]
         _run(
-            processor,
             [processor.compiler, *processor.flags, *flags, "-fstack-usage", "-c", source.name],
             folder,
         )
         binary = f"{source.stem}.o"
-        listing = _run(processor, [processor.tool("objdump"), "-d", "--no-show-raw-insn", binary], folder)
+        listing = _run([processor.tool("objdump"), "-d", "--no-show-raw-insn", binary], folder)
         mnemonics = re.findall(r"^\s+[0-9a-f]+:\s+([a-z][\w.]*)", listing, flags=re.MULTILINE)
-        sizes = _run(processor, [processor.tool("size"), "-A", binary], folder)
+        sizes = _run([processor.tool("size"), "-A", binary], folder)
         return Cost(
             sources.kernel,
             cpu,
@@ -146,7 +145,7 @@ def _library(processor: Processor) -> list[str]:
     return ["--specs=picolibc.specs"] if Path(place).is_absolute() else []
 
 
-def _run(processor: Processor, command: Sequence[str], folder: Path) -> str:
+def _run(command: Sequence[str], folder: Path) -> str:
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     if done.returncode:
         errors = [line for line in done.stderr.splitlines() if "error" in line] or [done.stderr.strip()]
@@ -155,7 +154,7 @@ def _run(processor: Processor, command: Sequence[str], folder: Path) -> str:
 
 
 def _version(processor: Processor, folder: Path) -> str:
-    said = _run(processor, [processor.compiler, "--version"], folder)
+    said = _run([processor.compiler, "--version"], folder)
     match = re.match(r".*\) (\S+)", said)
     return f"{processor.compiler} {match[1]}" if match else processor.compiler
 

@@ -253,7 +253,7 @@ def _abbreviated(key: Key, most: int | None) -> str:
     for word, short in _PARTS.items():
         if most is None or key.kind != "value" or len(name) <= most:
             break
-        name = re.sub(rf"(?<![a-z]){word}(?![a-z])", short, name)
+        name = _replaced(name, word, short)
     return name
 
 
