@@ -44,7 +44,7 @@ demo: $(READY)
 	@echo "3. The same step in C, from generated/c/euler_rk1_2.c"
 	@sed -n '/^void euler_rk1_2(/,/^}/p' generated/c/euler_rk1_2.c
 	@echo
-	@echo "4. Table 5 of the thesis on every back end; c-q31 has 32-bit words, c-q15 16-bit"
+	@echo "4. Table 5 of the thesis on every back end; c-fixed32 has 32-bit words, c-fixed16 16-bit"
 	$(BIN)/strapgen tables --table 5
 	@echo
 	@echo "More: source .venv/bin/activate, then"

@@ -270,7 +270,7 @@ def test_the_source_is_integers_alone():
 
 def test_the_header_states_format_unit_range_and_error():
     fixed = quantized(EULER, Settings.of(max_rate_deg_s=400, step="0.01", increments=2, carry="full"))
-    header = generate(fixed, "c-fixed").files["euler_rk4_2_q31.h"]
+    header = generate(fixed, "c-fixed").files["euler_rk4_2_w32.h"]
     text = re.sub(r"\s+\*?\s*", " ", header)
     for argument in (*fixed.interface.inputs, *fixed.interface.outputs):
         unit = f"2^-{argument.format.fraction}" + (" rad" if argument.signal.unit == "rad" else "")

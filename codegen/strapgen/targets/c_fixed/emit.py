@@ -30,7 +30,7 @@ def emit(fixed: FixedProgram, target: str) -> Sources:
         ``<name>_propagate`` there too, the loop over runs and steps.
     """
     interface = fixed.interface
-    name = external(fixed.program.name, f"_q{fixed.word - 1}")
+    name = external(fixed.program.name, f"_w{fixed.word}")
     arguments = (*interface.inputs, *interface.outputs)
     scalars = [argument.signal.name for argument in arguments if not argument.signal.shape]
     _, files = printed(fixed, lambda named, _: _files(named, name, target), C, scalars)

@@ -128,7 +128,7 @@ def _numbers(loop: Sources) -> _Numbers:
         real = real_of(loop.target)
         return _Numbers(real.infix, real.name)
     word = WORDS[loop.fixed.settings.word]
-    return _Numbers(f"_q{word.bits - 1}", word.type, word.residual, word.bits)
+    return _Numbers(f"_w{word.bits}", word.type, word.residual, word.bits)
 
 
 def _contracts(loops: Sequence[Sources]) -> dict[str, object]:
