@@ -10,8 +10,9 @@ import numpy as np
 from strapgen.ir.program import Operation, Program, walk
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Function, Sources
+from strapgen.targets import contract, contract_lines, definitions
 from strapgen.targets.lines import fill_expression
-from strapgen.targets.names import C, external, printed
+from strapgen.targets.names import C, function_name, printed
 from strapgen.targets.printer import Printer
 from strapgen.targets.registry import TARGETS
 from strapgen.targets.rendering import PROPAGATE, own_call, render_c, runs_of
@@ -108,7 +109,7 @@ def emit(program: Program, target: str) -> Sources:
         ``<name>_propagate`` there too, the loop over runs and steps.
     """
     real = real_of(target)
-    name = external(program.name, real.infix)
+    name = function_name(program, real.infix)
     # A scalar input has one name, which is that of its argument and of its element.
     scalars = [signal.name for signal in program.inputs if not signal.shape]
     _, files = printed(program, lambda named, _: _files(named, name, target), C, scalars)
@@ -130,11 +131,15 @@ def _files(program: Program, name: str, target: str) -> dict[str, str]:
     """Return the header and the source of a program with its printed names."""
     real = real_of(target)
     printer = CPrinter(real, name)
+    command = f"strapgen generate {program.arguments} --target {target}"
     nodes = [node for a in program.body for node in walk(a.value) if isinstance(node, Operation)]
     values = {
         "program": program,
         "guard": f"{name}_h".upper(),
-        "command": f"strapgen generate {program.arguments} --target {target}",
+        "command": command,
+        "contract": contract_lines.of_program(program, name, command),
+        "definitions": definitions.of_program(program, name, printer),
+        "normalizing": contract.upkeep_text(program, target=target),
         "real": real,
         "state": program.inputs[0],
         "samples": program.inputs[-1],
