@@ -21,9 +21,9 @@ from strapgen.targets.vectors_c.emit import table_files
 #: Steps of the run of a main program.
 STEPS = 200
 #: Step of that run in s where the settings state none, and part of the largest increment that it has.
-_STEP, _PART = Fraction(1, 100), 16
+_STEP, PART = Fraction(1, 100), 16
 #: Largest increment of that run where none is stated, in rad: 25 deg/s over 0.01 s, in two increments.
-_INCREMENT = Fraction(1, 458)
+LARGEST = Fraction(1, 458)
 #: What a user may have changed, and is not written over.
 YOURS = ("CMakeLists.txt", "main.c")
 
@@ -97,10 +97,10 @@ def coning_run(sources: Sources, conversion: str) -> MotionRun:
     assert sources.companions is not None
     signal = sources.function.inputs[-1]
     samples = signal.size // 3 - sources.companions.previous
-    largest, step = _INCREMENT, _STEP
+    largest, step = LARGEST, _STEP
     if sources.fixed is not None:
         argument = sources.fixed.inputs[-1]
-        largest = argument.high * argument.format.unit / _PART
+        largest = argument.high * argument.format.unit / PART
         step = stated_step(sources.fixed.settings)
     return MotionRun(decimal(largest * samples / step), decimal(step, 15), STEPS, conversion)
 

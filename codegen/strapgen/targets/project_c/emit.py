@@ -11,6 +11,8 @@ from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.sources import Sources
 from strapgen.targets.registry import BUILT_IN
 from strapgen.targets.rendering import render
+from strapgen.targets.two_speed_c.emit import wiring
+from strapgen.targets.vectors_c.cycles import loop_calls
 from strapgen.targets.vectors_c.emit import VectorTable, numbers_of
 
 #: Folder of a project with the functions in double that the main program compares with.
@@ -28,12 +30,17 @@ class MotionRun:
     steps : int
     conversion : str
         The function in double that converts a state to a direction cosine matrix; "" where the state is one.
+    fast, slow : int
+        In two speeds: fast cycles in a slow cycle, slow cycles in a navigation cycle. A step is then a slow cycle, and
+        `steps` counts navigation cycles.
     """
 
     rate: str
     step: str
     steps: int
     conversion: str = ""
+    fast: int = 1
+    slow: int = 1
 
 
 def cmake(sources: Sources, command: str, motion: Sequence[str], tests: Sequence[str]) -> str:
@@ -111,6 +118,32 @@ def _values(sources: Sources, command: str, run: MotionRun, identity: Sequence[F
         "feedback_type": numbers.feedback_type,
         "feedback": [f"{word.fresh}u" for word in feedback],
     }
+
+
+def two_speed_main(whole: Sources, loops: Sequence[Sources], command: str, run: MotionRun) -> str:
+    """Return a main program that runs an algorithm in two speeds on coning and prints the attitude and its error."""
+    fast, slow, _ = loops
+    wires = wiring(loops)
+    state = slow.function.inputs[0]
+    identity = [Fraction(place % 4 == 0 if state.size == 9 else place == 3) for place in range(state.size)]
+    increment, *others = sum(wires.samples, ())
+    formats = {a.signal.name: a.format.fraction for loop in (fast, slow) for a in _inputs(loop)}
+    values = {
+        "name": whole.function.name,
+        "fast": run.fast,
+        "slow": run.slow,
+        "samples": [increment],
+        "zeros": others,
+        "change": wires.results[2][0],
+        "calls": loop_calls(whole.function.name, wires),
+        "fraction": formats.get(increment.name, 0),
+        "state_fraction": formats.get(state.name, 0),
+    }
+    return render("project_c/main_two_speed.c.j2", **_values(slow, command, run, identity) | values)
+
+
+def _inputs(loop: Sources) -> tuple[Argument, ...]:
+    return () if loop.fixed is None else loop.fixed.inputs
 
 
 def call_main(table: VectorTable, command: str) -> str:
