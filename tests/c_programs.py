@@ -54,7 +54,7 @@ def complaints(compiler: str, folder: Path, sources: Iterable[str]) -> str:
 def said(folder: Path, sources: Iterable[str], compiler: str = "gcc") -> tuple[int, str]:
     """Compile files into a program with all warnings on, run it, and return its status and what it prints."""
     needed(compiler)
-    command = [compiler, *STRICT, *COMPILERS[compiler], "-O1", "-o", "program", *sources, "-lm"]
+    command = [compiler, *STRICT, *COMPILERS[compiler], "-O0", "-o", "program", *sources, "-lm"]
     run = ["./program"]
     if compiler in _EMULATORS:
         needed(_EMULATORS[compiler][0])

@@ -90,7 +90,7 @@ def test_the_outputs_are_within_the_bound_of_exact_fractions():
     interface = table.sources.fixed
     compared = 0
     for row in table.rows:
-        if row.status or any(row.feedback) and row.feedback != table.rows[0].feedback:
+        if row.status or row.feedback not in (table.rows[0].feedback, (0,) * 8):
             continue
         values = {
             name: number * argument.format.unit
