@@ -60,7 +60,7 @@ class ProgramEvaluator(Evaluator):
     >>> from strapgen.pipeline import derive, lower
     >>> program = lower(derive("euler-normalize"))
     >>> single = ProgramEvaluator(sources_of_program(program, "exact"), "c-float")
-    >>> single([1, 1, 1, 0])
+    >>> single(np.float32([1, 1, 1, 0]))
     array([0.57735026, 0.57735026, 0.57735026, 0.        ], dtype=float32)
     """
 
