@@ -93,12 +93,9 @@ def generate(
     for option_, chosen in (("--with-runs", with_runs), ("--project", project)):
         if chosen and not TARGETS[target].compiled:
             raise InputError(f"{option_} goes with targets in C, not with {target}")
-    _check_increments(choice, fixed)
+    fixed.check_increments(choice)
     sources = generated_sources.sources(choice, target, settings)
-    if fixed.carry not in (None, "none") and sources.fixed is not None and not sources.fixed.residuals:
-        raise InputError(
-            f"kernel {choice.kernel} rounds no state that goes on to the next step; --carry keeps nothing"
-        )
+    fixed.check_feedback(sources)
     files = sources.files if with_runs else sources.step_files
     if project:
         files = files | _project_files(out or Path(), choice, target, settings)
@@ -135,19 +132,6 @@ def _check_alone(
     ):
         if value is not None:
             raise InputError(f"--all generates the whole catalogue; {name} does not go with it")
-
-
-def _check_increments(choice: Choice, fixed: FixedOptions) -> None:
-    """Refuse a largest rate or angle for a kernel that takes neither."""
-    from strapgen.library import generated_sources
-
-    if not {*fixed.stated} & {"--max-rate-deg-s", "--step", "--max-angle-rad"}:
-        return
-    names = {signal.name for signal in generated_sources.program(choice).inputs}
-    if not names & {"increments", "turns"}:
-        raise InputError(
-            f"kernel {choice.kernel} takes no increments; a largest rate or angle does not go with it"
-        )
 
 
 def _data(choice: Choice, sources: Sources, target: str, written: list[Path]) -> dict[str, Any]:
