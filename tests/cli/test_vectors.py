@@ -62,7 +62,7 @@ def test_the_command_of_a_loop_writes_the_vectors_of_its_project(tmp_path, capsy
         ("vectors euler-from-dcm --carry full", "--carry keeps nothing"),
         ("vectors euler-product --max-angle-rad 0.1", "takes no increments"),
         ("generate euler --project", "--project goes with targets in C, not with numpy"),
-        ("generate --all --project", "--with-runs or --project does not go with it"),
+        ("generate --all --project", "--project does not go with it"),
     ],
 )
 def test_what_does_not_go_together_is_refused_in_one_line(command, message, tmp_path, monkeypatch, capsys):

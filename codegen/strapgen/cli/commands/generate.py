@@ -73,7 +73,7 @@ def generate(
     if check and not all_:
         raise InputError("--check goes with --all")
     if all_:
-        _check_alone(algorithm, method, target, fixed, with_runs or project)
+        _check_alone(algorithm, method, target, fixed, {"--with-runs": with_runs, "--project": project})
         _generate_all(out, check, format)
         return
     if algorithm is None:
@@ -116,7 +116,11 @@ def _project_files(out: Path, choice: Choice, target: str, settings: Settings | 
 
 
 def _check_alone(
-    algorithm: str | None, method: MethodOptions, target: str | None, fixed: FixedOptions, more: bool
+    algorithm: str | None,
+    method: MethodOptions,
+    target: str | None,
+    fixed: FixedOptions,
+    more: dict[str, bool],
 ) -> None:
     """Refuse options that do not go with --all."""
     for name, value in (
@@ -128,7 +132,7 @@ def _check_alone(
         ("--rates", method.rates or None),
         ("--target", target),
         ("a fixed-point option", fixed.stated or None),
-        ("--with-runs or --project", more or None),
+        *((name, chosen or None) for name, chosen in more.items()),
     ):
         if value is not None:
             raise InputError(f"--all generates the whole catalogue; {name} does not go with it")
