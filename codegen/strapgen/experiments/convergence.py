@@ -175,7 +175,7 @@ def converge(
     for length, count in zip(lengths, counts, strict=True):
         error, floor = measure(length, count)
         rungs.append((float(length), error, error is not None and floor < error < _MOST_ERROR))
-    return replace(_fitted(kernel.name, backend, kernel.order, rungs), arguments=kernel.arguments)
+    return replace(fitted(kernel.name, backend, kernel.order, rungs), arguments=kernel.arguments)
 
 
 def labels(outcomes: Sequence[Convergence]) -> list[str]:
@@ -196,10 +196,24 @@ def labels(outcomes: Sequence[Convergence]) -> list[str]:
     ]
 
 
-def _fitted(
-    kernel: str, backend: str, order: Order | None, rungs: list[tuple[float, float | None, bool]]
+def fitted(
+    kernel: str, backend: str, order: Order | None, rungs: Sequence[tuple[float, float | None, bool]]
 ) -> Convergence:
-    """Fit the slope to the finest rungs that show truncation."""
+    """Fit the slope to the finest rungs that show truncation.
+
+    Parameters
+    ----------
+    kernel, backend : str
+        Names of what was measured.
+    order : Order or None
+        Orders in theory.
+    rungs : sequence of (float, float or None, bool)
+        Step in s, error in rad, and whether the error shows truncation; from the longest step to the shortest.
+
+    Returns
+    -------
+    Convergence
+    """
     chosen = [k for k, (_, _, shows) in enumerate(rungs) if shows][-FITTED:]
     slopes: list[float | None] = [None]
     for (long, before, _), (short, after, _) in pairwise(rungs):
