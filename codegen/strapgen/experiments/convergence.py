@@ -27,7 +27,7 @@ from strapgen.support.exceptions import InputError, InputTypeError
 #: Number of steps that the slope is fitted to: the finest of those whose error is truncation.
 FITTED = 3
 #: Largest error in rad that the slope is fitted to; beyond it, the terms after the first count too.
-_MOST_ERROR = 0.3
+MOST_ERROR = 0.3
 
 
 @dataclass(frozen=True)
@@ -85,8 +85,8 @@ class Convergence:
             return ""
         if not errors:
             return "every run leaves the range of its numbers"
-        if min(errors) > _MOST_ERROR:
-            return f"the errors are over {_MOST_ERROR} rad, too large for a slope; shorter steps are needed"
+        if min(errors) > MOST_ERROR:
+            return f"the errors are over {MOST_ERROR} rad, too large for a slope; shorter steps are needed"
         if max(errors) < 1e-25:
             return "the algorithm is exact on this motion"
         return f"rounding hides the order on {self.backend}, or too few steps show it"
@@ -174,7 +174,7 @@ def converge(
     rungs = []
     for length, count in zip(lengths, counts, strict=True):
         error, floor = measure(length, count)
-        rungs.append((float(length), error, error is not None and floor < error < _MOST_ERROR))
+        rungs.append((float(length), error, error is not None and floor < error < MOST_ERROR))
     return replace(fitted(kernel.name, backend, kernel.order, rungs), arguments=kernel.arguments)
 
 

@@ -14,9 +14,9 @@ FACTOR_TWO = "correction off by a factor of 2"
 STATE_KEPT = "state kept between runs"
 
 #: Departure of a coefficient that the probes do not tell from none.
-_ALIKE = 0.01
+_ALIKE = 0.003
 #: The same for a ratio of corrections.
-_RATIO_ALIKE = 0.15
+_RATIO_ALIKE = 0.05
 #: Most samples from before a call that a published correction takes.
 _MOST_PREVIOUS = 3
 
@@ -27,7 +27,8 @@ def standard_design(products: Products) -> Design:
     """Return the published correction that a function is measured by.
 
     It has the samples of a call, and from before the call as many as the function is seen to use rightly, but for one
-    sample a call at least one, without which nothing can be corrected.
+    sample a call at least one, without which nothing can be corrected. A function that turns by every sample on its own
+    with the correction of one sample is measured by that.
 
     Parameters
     ----------
@@ -41,6 +42,9 @@ def standard_design(products: Products) -> Design:
     least = 1 if samples == 1 else 0
     if not corrects_coning(products):
         return design(samples, least)
+    ideal, base = _one_by_one(samples)
+    if _alike(_less(products.at_once, base), ideal):
+        return design(1, 1)
     used = [-older for (older, _), c in products.at_once.items() if older < 0 and abs(c) > _ALIKE]
     return design(samples, max([least, *used]))
 
@@ -82,10 +86,8 @@ def cause(products: Products) -> str | None:
     """
     if comes_late(products):
         return LATE
-    if corrects_coning(products):
-        return None
-    now, samples = products.at_once, products.samples
-    if not all(_any(_less(now, base)) for base in _bases(now, samples)):
+    now, samples, right = products.at_once, products.samples, corrects_coning(products)
+    if not right and not all(_any(_less(now, base)) for base in _bases(now, samples)):
         return ABSENT
     for ideal, base in _ideals(samples):
         correction = _less(now, base)
@@ -94,7 +96,7 @@ def cause(products: Products) -> str | None:
                 return said
         if any(_alike(correction, shifted) for shifted in _delayed(ideal, samples)):
             return LATE
-    return _by_size(products.finally_, samples)
+    return None if right else _by_size(products.finally_, samples)
 
 
 def _by_size(table: Table, samples: int) -> str:
@@ -133,10 +135,15 @@ def _ideals(samples: int) -> Iterator[tuple[Table, Table]]:
             }
             if any(table.values()):
                 yield table, {}
-    turned = {(older, newer): 0.5 for newer in range(samples) for older in range(newer)}
-    one_by_one = float(design(1, 1).pairs[0, 1])
     if samples > 1:
-        yield {(newer - 1, newer): one_by_one for newer in range(samples)}, turned
+        yield _one_by_one(samples)
+
+
+def _one_by_one(samples: int) -> tuple[Table, Table]:
+    """Return the right correction of a function that turns by each sample on its own, and what it is added to."""
+    coefficient = float(design(1, 1).pairs[0, 1])
+    turned = {(older, newer): 0.5 for newer in range(samples) for older in range(newer)}
+    return {(newer - 1, newer): coefficient for newer in range(samples)}, turned
 
 
 def _delayed(ideal: Table, samples: int) -> Iterator[Table]:

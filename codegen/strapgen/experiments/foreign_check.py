@@ -15,7 +15,7 @@ from strapgen import pipeline
 from strapgen.catalogue.methods.coning_coefficients import Design
 from strapgen.experiments import foreign_causes as causes
 from strapgen.experiments.conformance import ORDER_WITHIN, Finding
-from strapgen.experiments.convergence import Convergence, fitted
+from strapgen.experiments.convergence import MOST_ERROR, Convergence, fitted
 from strapgen.experiments.foreign_cone import (
     SAMPLES,
     SAMPLING,
@@ -34,7 +34,15 @@ from strapgen.experiments.foreign_probes import (
     product_segments,
     products,
 )
-from strapgen.experiments.foreign_runs import SCALARS, SENSES, Convention, ForeignStep, Segment, SegmentRun
+from strapgen.experiments.foreign_runs import (
+    SCALARS,
+    SENSES,
+    Convention,
+    ForeignSegments,
+    ForeignStep,
+    Segment,
+    SegmentRun,
+)
 from strapgen.simulation.motions import GENERAL, Motion, motion
 from strapgen.simulation.runs import drift_between
 
@@ -126,21 +134,24 @@ class _Check:
 
     def findings(self) -> Iterator[Finding]:
         """Yield what is seen; after a fault that hides all others there is no more."""
-        segments = direction_segments(self.count)
-        first = self.step.run(segments)
-        if first.stopped:
-            yield self.failed("calls", first.stopped)
+        first = self.step.run(direction_segments(self.count))
+        calls = self.calls(first)
+        if calls.holds is False:
+            yield calls
             return
         convention, response = self.convention(directions(first.runs))
-        yield from self.axes(convention, response)
         if convention is None:
+            yield calls
+            yield from self.axes(None, response)
             return
-        self.step = replace(self.step, convention=convention)
+        declared, self.step = self.step.convention, replace(self.step, convention=convention)
         everything = self.segments()
         done = self.step.run([segment for _, part in everything for segment in part])
-        yield self.calls(done.stopped, done.writes_beyond, done.changes_inputs)
-        if done.stopped:
+        calls = self.calls(done)
+        yield calls
+        if calls.holds is False:
             return
+        yield from self.axes(declared, response)
         runs, place = {}, 0
         for name, part in everything:
             runs[name] = done.runs[place : place + len(part)]
@@ -152,15 +163,15 @@ class _Check:
         self.causes.append(text)
         return Finding(name, False, text, measured)
 
-    def calls(self, stopped: str, beyond: bool, changes: bool) -> Finding:
-        """Return the finding on what calls do to memory."""
-        if stopped:
-            return self.failed("calls", stopped)
-        if beyond:
+    def calls(self, done: ForeignSegments) -> Finding:
+        """Return the finding on how calls end, and on what they do to memory."""
+        if done.stopped:
+            return self.failed("calls", done.stopped)
+        if done.writes_beyond:
             return self.failed("calls", "it writes beyond the ends of its arrays")
-        if changes:
+        if done.changes_inputs:
             return self.failed("calls", "it changes an argument that is no result")
-        return Finding("calls", True, "all calls return; nothing but the result is written")
+        return Finding("calls", True, "all calls return, and write nothing but the result")
 
     # Conventions
 
@@ -180,25 +191,23 @@ class _Check:
                     return other, response
         return None, declared
 
-    def axes(self, convention: Convention | None, response: Directions) -> Iterator[Finding]:
-        """Yield the findings on scalar part, sense, axes and delay."""
-        ours = self.step.convention
-        known = convention or ours
-        if self.step.source.arguments.elements == 4:
-            yield self.fits("scalar", ours.scalar, known.scalar, "the scalar part stands")
-        yield self.fits("sense", ours.sense, known.sense, "the attitude is")
+    def axes(self, declared: Convention | None, response: Directions) -> Iterator[Finding]:
+        """Yield the findings on scalar part, sense and axes; without a convention none fits."""
         off = float(np.abs(response.finally_ - np.eye(3)).max())
-        if convention is None:
+        if declared is None:
             yield self.failed("axes", _axes(response.finally_), off)
             return
-        right = response.order_of_turns < response.other_order
-        if not right:
-            text = "a rotation turns about reference axes, not about body axes: a product in the wrong order"
-            yield self.failed("axes", text, response.order_of_turns)
-        else:
+        known = self.step.convention
+        if self.step.source.arguments.elements == 4:
+            yield self.fits("scalar", declared.scalar, known.scalar, "the scalar part stands")
+        yield self.fits("sense", declared.sense, known.sense, "the attitude is")
+        if response.order_of_turns < response.other_order:
             yield Finding(
                 "axes", True, "rotations about x, y and z are those of the body", off, _DIRECTION_WITHIN
             )
+        else:
+            text = "a rotation turns about reference axes, not about body axes: a product in the wrong order"
+            yield self.failed("axes", text, response.order_of_turns)
 
     def fits(self, name: str, ours: str, known: str, what: str) -> Finding:
         """Return the finding on a declared part of the convention."""
@@ -283,14 +292,15 @@ class _Check:
             computed, true = self.aligned(run, profile, length)
             error = float((np.linalg.norm(computed - true, axis=(-2, -1)) / math.sqrt(2)).max())
             floor = 8 * self.step.unit * (calls + self.step.settling)
-            rungs.append((float(length), error, floor < error < 0.3))
+            rungs.append((float(length), error, floor < error < MOST_ERROR))
         theory = pipeline.derive(published_step("coning-compressed", standard)).order
         ladder: Convergence = fitted(self.step.source.function, self.step.source.precision, theory, rungs)
         self.order, needed = ladder.observed, ladder.predicted
         assert needed is not None
         words = f"a published correction on the same samples has {needed}"
         if self.order is None:
-            return Finding("order", None, f"{ladder.hidden}; {words}")
+            too_large = min(error for _, error, _ in rungs) > MOST_ERROR
+            return Finding("order", False if too_large else None, f"{ladder.hidden}; {words}")
         within = _ORDER_WITHIN_FLOAT if self.step.source.precision == "float" else ORDER_WITHIN
         return Finding(
             "order",

@@ -8,7 +8,7 @@ than those that take it as an argument.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +28,8 @@ SENSES = ("body-to-reference", "reference-to-body")
 INPUTS = ("increments", "rates")
 #: Samples that a function may remember; calls without rotation push so many out of its memory.
 REMEMBERED = 8
+#: Elements of an attitude that are larger are none; their products stay finite.
+_LARGEST = 1e30
 
 
 @dataclass(frozen=True)
@@ -161,9 +163,12 @@ class ForeignStep:
         rows = np.concatenate([self._rows(segment) for segment in segments])
         identity = read.identity(arguments.elements)
         done = run_foreign(self.module, identity, rows)
-        if done.stopped or not np.isfinite(done.outputs).all():
-            stopped = done.stopped or "it leaves numbers in its result that are not finite, or writes none"
-            return ForeignSegments((), stopped, done.writes_beyond, done.changes_inputs)
+        if not done.stopped and not np.abs(done.outputs).max() < _LARGEST:  # not finite: no number compares
+            done = replace(
+                done, stopped="it leaves no finite numbers in its result, or does not write all of it"
+            )
+        if done.stopped:
+            return ForeignSegments((), done.stopped, done.writes_beyond, done.changes_inputs)
         runs, place = [], 0
         for segment in segments:
             first = self.settling if segment.settled else 0
@@ -171,10 +176,8 @@ class ForeignStep:
             outputs = done.outputs[place : place + first + count]
             before = outputs[first - 1] if first else identity
             place += first + count
-            with np.errstate(over="ignore", invalid="ignore"):
-                matrices = read.matrices(np.vstack([before, outputs[first:]]))
-                relative = matrices[0].T @ matrices
-            runs.append(SegmentRun(outputs[first:], matrices[1:], relative))
+            matrices = read.matrices(np.vstack([before, outputs[first:]]))
+            runs.append(SegmentRun(outputs[first:], matrices[1:], matrices[0].T @ matrices))
         return ForeignSegments(tuple(runs), "", done.writes_beyond, done.changes_inputs)
 
     def _rows(self, segment: Segment) -> Array:

@@ -282,7 +282,10 @@ def _said(source: ForeignSource, lines: list[str]) -> str:
                 f"{option}: {source.file} has no function {name}{guess}; it has {', '.join(names) or 'none'}"
             )
     if error.startswith("--arguments:"):
-        return f"{source.function} does not take these arguments and {source.precision}: {error}"
+        reason = re.sub(r"^--arguments:[\d:]* *", "", error)
+        return (
+            f"{source.function} does not take these --arguments in --precision {source.precision}: {reason}"
+        )
     return f"{source.file} does not compile: {error}"
 
 

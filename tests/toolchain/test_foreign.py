@@ -1,0 +1,132 @@
+"""A user's function in C: it is called as its file says, and what it does wrong stays in a process of its own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from strapgen.support.exceptions import CompilerError, InputError
+from strapgen.toolchain import foreign
+from strapgen.toolchain.foreign import ForeignSource, compile_foreign, run_foreign
+from strapgen.toolchain.foreign_arguments import read_arguments
+
+#: Functions that write what they are called with, or do what they must not.
+CALLS = """
+#include <stdlib.h>
+#include <stdio.h>
+static double calls;
+void begin(void) { calls = 0; }
+void look(const double q[4], const double p[1][3], const double d[2][3], double dt, double step, double out[4])
+{
+    calls += 1;
+    printf("a function may print\\n");
+    out[0] = q[0] + calls; out[1] = p[0][0] + 10 * d[1][2]; out[2] = dt; out[3] = step;
+}
+void beyond(double q[4], const double d[3])
+{
+    if (d[0] == 1) q[4] = 1;
+    if (d[0] == 2) ((double *)d)[1] = 7;
+    if (d[0] == 3) abort();
+    if (d[0] == 4) exit(5);
+    while (d[0] == 5) ((volatile double *)q)[0] = 1;
+}
+"""
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    (tmp_path / "calls.c").write_text(CALLS)
+    return tmp_path / "calls.c"
+
+
+def test_a_function_gets_every_argument_and_a_run_begins_where_it_says(file):
+    arguments = read_arguments("state[4], previous[1][3], increments[2][3], dt, step -> next[4]")
+    module = compile_foreign(ForeignSource(file, "look", arguments, "begin"))
+    row = [0.5, 1.0, 7.0, 0, 0, *range(6)]
+    run = run_foreign(module, [100, 0, 0, 0], [[1, *row], [0, *row], [1, *row]])
+    assert not (run.stopped or run.writes_beyond or run.changes_inputs)
+    np.testing.assert_array_equal(
+        run.outputs[:, 0], [101, 103, 101]
+    )  # the second call takes the state of the first
+    np.testing.assert_array_equal(run.outputs[:, 1:], np.tile([57, 0.5, 1], (3, 1)))
+    assert compile_foreign(ForeignSource(file, "look", arguments, "begin")) == module  # from the cache
+
+
+def test_what_a_function_does_wrong_is_told(file, monkeypatch):
+    module = compile_foreign(
+        ForeignSource(file, "beyond", read_arguments("state[4], increments[3] -> state[4]"))
+    )
+
+    def run(number: float):
+        return run_foreign(module, [0, 0, 0, 1], [[1, 1, 1, number, 0, 0]])
+
+    for number, beyond, changes in ((0, False, False), (1, True, False), (2, False, True)):
+        done = run(number)
+        assert (done.writes_beyond, done.changes_inputs, done.stopped) == (beyond, changes, "")
+    assert run(3).stopped == "it ends with SIGABRT"
+    assert run(4).stopped == "it ends the program, with exit status 5"
+    monkeypatch.setattr(foreign, "PATIENCE", 0.3)
+    endless = run(5)
+    assert endless.stopped == "1 calls have not come to an end in 0.3 s" and len(endless.outputs) == 0
+
+
+IN_PLACE = "state[4], increments[3] -> state[4]"
+
+
+@pytest.mark.parametrize(
+    ("function", "init", "arguments", "precision", "says"),
+    [
+        ("lok", "", IN_PLACE, "double", r"has no function lok \(did you mean look\?\); it has begin, look"),
+        ("beyond", "", IN_PLACE, "float", "does not take these --arguments in --precision float: error: "),
+        pytest.param(
+            *("beyond", "", "dt, increments[3] -> next[4]", "double", "incompatible|too many"),
+            marks=pytest.mark.long,
+        ),
+        pytest.param(
+            *("beyond", "start", IN_PLACE, "double", "--init: .* has no function start"),
+            marks=pytest.mark.long,
+        ),
+    ],
+)
+def test_a_call_that_does_not_fit_is_an_error_of_the_compiler(
+    file, function, init, arguments, precision, says
+):
+    with pytest.raises(CompilerError, match=says) as caught:
+        compile_foreign(ForeignSource(file, function, read_arguments(arguments), init, precision))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ('#include "none.h"', r"faulty\.c:1:\d+: fatal error: .*none\.h"),
+        (
+            "void f(double q[4], const double d[3]) {\n    q[0] = d[0]\n}\n",
+            r"faulty\.c:2:\d+: error: expected",
+        ),
+    ],
+)
+def test_a_file_that_does_not_compile_gives_its_first_error(tmp_path, monkeypatch, text, says):
+    monkeypatch.chdir(tmp_path)
+    Path("faulty.c").write_text(text)
+    with pytest.raises(CompilerError, match=rf"^faulty\.c does not compile: {says}"):
+        compile_foreign(
+            ForeignSource(Path("faulty.c"), "f", read_arguments("state[4], increments[3] -> state[4]"))
+        )
+
+
+def test_names_and_files_are_looked_at_before_anything_is_compiled(file, tmp_path):
+    arguments = read_arguments("state[4], increments[3] -> state[4]")
+    (tmp_path / "a.h").write_text("")
+    with pytest.raises(InputError, match=r"a\.h is no file in C or C\+\+ by its suffix; allowed: \.c, \.cc"):
+        ForeignSource(tmp_path / "a.h", "f", arguments)
+    with pytest.raises(InputError, match="is no file"):
+        ForeignSource(tmp_path / "none.c", "f", arguments)
+    with pytest.raises(InputError, match=r"--function is 'f\(\)'; the name of a function is needed"):
+        ForeignSource(file, "f()", arguments)
+    with pytest.raises(InputError, match="--init is 'a b'"):
+        ForeignSource(file, "f", arguments, "a b")
+    with pytest.raises(InputError, match="precision 'half' is not known; allowed: double, float"):
+        ForeignSource(file, "f", arguments, "", "half")
