@@ -16,8 +16,8 @@ from strapgen.experiments.foreign_cone import closed_form_deg_h
 from strapgen.experiments.foreign_runs import Convention, ForeignStep
 from strapgen.reports.foreign_check import outcome_report
 from strapgen.support.exceptions import InputError
-from strapgen.toolchain.foreign import ForeignSource
 from strapgen.toolchain.foreign_arguments import read_arguments
+from strapgen.toolchain.foreign_bridge import ForeignSource
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "check_foreign_c"
 FAULTS = {

@@ -9,8 +9,9 @@ import pytest
 
 from strapgen.support.exceptions import CompilerError, InputError
 from strapgen.toolchain import foreign
-from strapgen.toolchain.foreign import ForeignSource, compile_foreign, run_foreign
+from strapgen.toolchain.foreign import compile_foreign, run_foreign
 from strapgen.toolchain.foreign_arguments import read_arguments
+from strapgen.toolchain.foreign_bridge import ForeignSource
 
 #: Functions that write what they are called with, or do what they must not.
 CALLS = """
@@ -130,3 +131,38 @@ def test_names_and_files_are_looked_at_before_anything_is_compiled(file, tmp_pat
         ForeignSource(file, "f", arguments, "a b")
     with pytest.raises(InputError, match="precision 'half' is not known; allowed: double, float"):
         ForeignSource(file, "f", arguments, "", "half")
+
+
+def test_a_function_that_is_defined_nowhere_is_named(tmp_path):
+    (tmp_path / "a.c").write_text(
+        "void other(double *q);\nvoid f(double q[4], const double d[3]) { other(q); }\n"
+    )
+    module = compile_foreign(ForeignSource(tmp_path / "a.c", "f", read_arguments(IN_PLACE)))
+    with pytest.raises(
+        CompilerError, match=r"cannot be linked: undefined symbol: other; include the file"
+    ) as caught:
+        run_foreign(module, [0, 0, 0, 1], [[1, 1, 1, 0, 0, 0]])
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.long
+def test_an_adapter_calls_a_class_and_the_compiler_takes_options(tmp_path, monkeypatch):
+    (tmp_path / "include").mkdir()
+    (tmp_path / "include" / "vector.hpp").write_text("struct Vector { double x, y, z; };\n")
+    (tmp_path / "integrator.hpp").write_text(
+        "#include <vector.hpp>\nclass Integrator {\n  double sum = 0;\npublic:\n"
+        "  double put(Vector d) { return sum += d.x + 2 * d.y + 3 * d.z; }\n};\n"
+    )
+    (tmp_path / "adapter.cc").write_text(
+        '#include "integrator.hpp"\nstatic Integrator integrator;\n'
+        "void begin() { integrator = Integrator(); }\n"
+        "void put(const double d[3], double next[4])\n"
+        "{\n    next[0] = next[1] = next[2] = 0;\n    next[3] = integrator.put(Vector{d[0], d[1], d[2]});\n}\n"
+    )
+    monkeypatch.setenv("CC", f"cc -I{tmp_path}/include")
+    source = ForeignSource(
+        tmp_path / "adapter.cc", "put", read_arguments("increments[3] -> next[4]"), "begin"
+    )
+    rows = [[1, 1, 1, 1, 1, 1], [0, 1, 1, 1, 0, 0], [1, 1, 1, 0, 0, 1]]
+    run = run_foreign(compile_foreign(source), [0, 0, 0, 1], rows)
+    np.testing.assert_array_equal(run.outputs[:, 3], [6, 7, 3])

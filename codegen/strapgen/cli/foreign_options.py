@@ -75,8 +75,8 @@ class ForeignOptions:
     def step(self, file: str) -> ForeignStep:
         """Return the function of a file, compiled."""
         from strapgen.experiments.foreign_runs import Convention, ForeignStep
-        from strapgen.toolchain.foreign import ForeignSource
         from strapgen.toolchain.foreign_arguments import RATES, read_arguments
+        from strapgen.toolchain.foreign_bridge import ForeignSource
 
         if self.function is None or self.arguments is None:
             missing = "--function" if self.function is None else "--arguments"

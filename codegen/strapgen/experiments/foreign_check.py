@@ -297,7 +297,7 @@ class _Check:
         ladder: Convergence = fitted(self.step.source.function, self.step.source.precision, theory, rungs)
         self.order, needed = ladder.observed, ladder.predicted
         assert needed is not None
-        words = f"a published correction on the same samples has {needed}"
+        words = f"a published correction has {needed}"
         if self.order is None:
             too_large = min(error for _, error, _ in rungs) > MOST_ERROR
             return Finding("order", False if too_large else None, f"{ladder.hidden}; {words}")
@@ -321,8 +321,8 @@ class _Check:
         rounding = math.degrees(4 * self.step.unit * float(duration / length)) / float(duration) * 3600
         allowed = _DRIFT_WITHIN * max(self.closed, *generated.values()) + rounding
         text = (
-            f"cone of 1 deg at 10 Hz, samples at 100 Hz: {self.drift:.4g} deg/h; closed form on {_samples(standard)} "
-            f"{self.closed:.4g}, generated {best} {generated[best]:.4g}"
+            f"{self.drift:.4g} deg/h; closed form on {_samples(standard)} {self.closed:.4g}, "
+            f"{best} {generated[best]:.4g}"
         )
         return Finding("drift", self.drift <= allowed, text, self.drift, allowed)
 

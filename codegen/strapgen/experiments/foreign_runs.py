@@ -18,8 +18,9 @@ from strapgen.backends import evaluator
 from strapgen.backends.increments import windows
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
-from strapgen.toolchain.foreign import ForeignSource, compile_foreign, run_foreign
+from strapgen.toolchain.foreign import compile_foreign, run_foreign
 from strapgen.toolchain.foreign_arguments import RATES
+from strapgen.toolchain.foreign_bridge import ForeignSource
 
 Array = NDArray[np.float64]
 

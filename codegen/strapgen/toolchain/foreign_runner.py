@@ -1,7 +1,8 @@
 """Runs a compiled function of a user, in a process of its own that may crash.
 
 Run as ``python -P foreign_runner.py MODULE FOLDER CALLS``. The folder holds the doubles of ``identity`` and ``input``;
-the results of all calls are written to ``output`` there, and what the calls did wrong to ``flags``, last.
+the results of all calls are written to ``output`` there, and what the calls did wrong to ``flags``, last. If the module
+cannot be loaded, ``unloaded`` says why.
 """
 
 from __future__ import annotations
@@ -16,9 +17,13 @@ def main(module_path: str, folder_name: str, calls: int) -> None:
     spec = importlib.util.spec_from_file_location("strapgen_foreign", module_path)
     assert spec is not None
     assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
     folder = Path(folder_name)
+    try:
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+    except ImportError as error:  # a function that the file calls is defined nowhere
+        (folder / "unloaded").write_text(str(error))
+        return
     identity, rows = (folder / "identity").read_bytes(), (folder / "input").read_bytes()
     output = bytearray(calls * len(identity))
     flags = module.lib.strapgen_foreign_run(
