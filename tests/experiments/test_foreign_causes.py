@@ -81,6 +81,13 @@ def test_another_size_is_told_in_numbers():
     assert causes.cause(Products(2, table, table)) == "correction 0.9 times as large as needed"
 
 
+def test_samples_of_which_one_counts_more_are_told():
+    plain = tables(2, 0, "compressed")
+    assert causes.cause(Products(2, plain.at_once, plain.finally_, (1.0, 1.0))) is None
+    said = causes.cause(Products(2, plain.at_once, plain.finally_, (3.0, -1.0)))
+    assert said == "samples weighted by 3, -1 in place of 1"
+
+
 @pytest.mark.parametrize("error", [0.0002, -0.0002])
 def test_the_error_of_a_probe_changes_no_name(error):
     for factor, cause in ((1, None), (0, causes.ABSENT), (-1, causes.WRONG_SIGN), (2, causes.FACTOR_TWO)):

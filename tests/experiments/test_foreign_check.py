@@ -9,11 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from strapgen.catalogue import choose
 from strapgen.catalogue.methods.coning_coefficients import design
 from strapgen.experiments import foreign_causes as causes
 from strapgen.experiments.foreign_check import check_foreign
 from strapgen.experiments.foreign_cone import closed_form_deg_h
 from strapgen.experiments.foreign_runs import Convention, ForeignStep
+from strapgen.library import generated_sources
 from strapgen.reports.foreign_check import outcome_report
 from strapgen.support.exceptions import InputError
 from strapgen.toolchain.foreign_arguments import read_arguments
@@ -212,6 +214,7 @@ def test_two_samples_without_memory(outcome, coefficient, cause):
     assert checked.closed_form_deg_h == pytest.approx(abs(closed_form_deg_h(design(2))))
 
 
+@pytest.mark.long
 def test_direction_cosines_from_reference_to_body_hold_and_the_wrong_sense_is_named(outcome):
     arguments = "state[3][3], increments[9] -> state[3][3]"
     checked = outcome(COSINES, arguments, Convention(sense="reference-to-body"))
@@ -352,3 +355,20 @@ def test_a_convention_reads_an_attitude(scalar, sense):
     np.testing.assert_allclose(convention.matrices(convention.identity(4)[None])[0], np.eye(3), atol=0)
     matrix = np.array(expected, float) if sense == "body-to-reference" else np.array(expected, float).T
     np.testing.assert_array_equal(convention.matrices(matrix.reshape(1, 9))[0], expected)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("algorithm", "method", "samples"),
+    [("euler", "rk4", 2), ("dcm", "rk4", 2), ("euler", "coning-uncompressed", 3), ("dcm", "magnus6", 4)],
+)
+def test_generated_steps_hold(tmp_path, algorithm, method, samples):
+    sources = generated_sources.sources(choose(algorithm, method, samples), "c")
+    for name, text in sources.step_files.items():
+        (tmp_path / name).write_text(text)
+    (file,) = tmp_path.glob("*.c")
+    elements = 4 if algorithm == "euler" else 9
+    arguments = read_arguments(f"state[{elements}], increments[{3 * samples}] -> next[{elements}]")
+    outcome = check_foreign(ForeignStep(ForeignSource(file, sources.function.name, arguments)))
+    assert (outcome.holds, outcome.cause) == (True, None)
+    assert outcome.order > 3.9

@@ -33,6 +33,7 @@ def standard_design(products: Products) -> Design:
     Parameters
     ----------
     products : Products
+        The coefficients of the function.
 
     Returns
     -------
@@ -84,6 +85,9 @@ def cause(products: Products) -> str | None:
     >>> [cause(Products(1, table, table)) for table in tables]
     [None, 'correction absent or zero', 'correction of the wrong sign', 'correction off by a factor of 2']
     """
+    if any(abs(weight - 1) > _RATIO_ALIKE for weight in products.weights):
+        weights = ", ".join(f"{weight:.3g}" for weight in products.weights)
+        return f"samples weighted by {weights} in place of 1"
     if comes_late(products):
         return LATE
     now, samples, right = products.at_once, products.samples, corrects_coning(products)

@@ -22,25 +22,72 @@ HALF_ANGLE, FREQUENCY, SAMPLING, SAMPLES = math.radians(1), 20 * math.pi, Fracti
 
 
 def cone() -> Motion:
-    """Return a coning motion whose axis stands still."""
+    """Return a coning motion whose axis stands still.
+
+    Returns
+    -------
+    Motion
+        Its axis is that of `drift_deg_h`.
+    """
     a, g = FREQUENCY * math.sin(HALF_ANGLE), -2 * FREQUENCY * math.sin(HALF_ANGLE / 2) ** 2
     return motion("coning", a_rad_s=a, b_rad_s=FREQUENCY, g_rad_s=g)
 
 
 def closed_form_deg_h(standard: Design) -> float:
-    """Return the drift on the cone that a coning correction leaves, to second order in the half-angle, in deg/h."""
+    """Return the drift on the cone that a coning correction leaves, to second order in the half-angle.
+
+    Parameters
+    ----------
+    standard : Design
+
+    Returns
+    -------
+    float
+        Computed minus true, in deg/h.
+
+    Examples
+    --------
+    >>> from strapgen.catalogue.methods.coning_coefficients import design
+    >>> [round(closed_form_deg_h(design(1, previous)), 3) for previous in (0, 1)]
+    [-127.339, -9.784]
+    """
     symbols = dict(zip(("alpha", "omega", "T"), (HALF_ANGLE, FREQUENCY, SAMPLING), strict=True))
     rate = sp.sympify(standard.residual().expression).evalf(30, subs=symbols)
     return math.degrees(float(rate)) * 3600
 
 
 def published_step(method: str, standard: Design) -> catalogue.Choice:
-    """Return the step of Euler parameters with a published correction."""
+    """Return the step of Euler parameters with a published correction.
+
+    Parameters
+    ----------
+    method : str
+        A method of the catalogue.
+    standard : Design
+        Says how many samples it takes.
+
+    Returns
+    -------
+    Choice
+    """
     return catalogue.choose("euler", method, standard.samples, previous=standard.previous)
 
 
 def drift_deg_h(drift: Array, duration: Fraction) -> float:
-    """Return the largest drift about the axis of the cone, over the duration."""
+    """Return the largest drift of a run about the axis of the cone, over its duration.
+
+    Parameters
+    ----------
+    drift : array, (N, 3)
+        In rad, reference axes.
+    duration : Fraction
+        In s.
+
+    Returns
+    -------
+    float
+        Its magnitude in deg/h.
+    """
     axis = np.array([0, math.cos(HALF_ANGLE), math.sin(HALF_ANGLE)])
     return math.degrees(float(np.abs(drift @ axis).max())) / float(duration) * 3600
 
@@ -52,6 +99,10 @@ def generated_drifts(standard: Design) -> dict[str, float]:
     ----------
     standard : Design
         Says how many samples they take.
+
+    Returns
+    -------
+    dict of str to float
     """
     length, duration = SAMPLING * standard.samples, seconds(standard.samples)
     drifts = {}
@@ -62,5 +113,5 @@ def generated_drifts(standard: Design) -> dict[str, float]:
 
 
 def seconds(samples: int) -> Fraction:
-    """Return the duration of a run on the cone: whole calls of so many samples."""
+    """Return the duration of a run on the cone in s: whole calls of so many samples."""
     return SAMPLING * (SAMPLES // samples * samples)

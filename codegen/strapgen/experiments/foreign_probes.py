@@ -103,11 +103,14 @@ class Products:
     at_once, finally_ : dict
         Coefficients after the call with the newer sample, and after more calls without rotation. Samples of the call
         have the numbers 0 to samples - 1, those before it are negative.
+    weights : tuple of float, optional
+        By how much of each sample of a call the attitude turns in the end; 1 for each is right.
     """
 
     samples: int
     at_once: dict[tuple[int, int], float]
     finally_: dict[tuple[int, int], float]
+    weights: tuple[float, ...] = ()
 
 
 def pairs(samples: int) -> list[tuple[int, int]]:
@@ -142,11 +145,14 @@ def products(runs: Sequence[SegmentRun], samples: int) -> Products:
     """
     place = -(-_BEFORE // samples) + 1
     tables: list[dict[tuple[int, int], float]] = [{}, {}]
+    weights = [0.0] * samples
     for number, pair in enumerate(pairs(samples)):
         answers = runs[4 * number : 4 * number + 4]
         of_turns = 0.5 if pair[0] < 0 else 0.0
         for table, call in zip(tables, (place, -1), strict=True):
             # Of the four signs of the two increments, only what is odd in both is left.
-            z = [_turned(run.relative[call])[2] for run in answers]
-            table[pair] = float(z[0] - z[1] - z[2] + z[3]) / (4 * _SMALL**2) - of_turns
-    return Products(samples, *tables)
+            turns = [_turned(run.relative[call]) for run in answers]
+            z = turns[0] - turns[1] - turns[2] + turns[3]
+            table[pair] = float(z[2]) / (4 * _SMALL**2) - of_turns
+            weights[pair[1]] = float((turns[0] - turns[1] + turns[2] - turns[3])[1]) / (4 * _SMALL)
+    return Products(samples, tables[0], tables[1], tuple(weights))

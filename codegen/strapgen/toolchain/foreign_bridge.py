@@ -20,6 +20,9 @@ from strapgen.toolchain.foreign_arguments import (
 )
 
 PRECISIONS = ("double", "float")
+
+#: Name of the memory of a function in the text; no other name of the file is like it.
+_MEMORY = "strapgen_memory"
 _BRIDGE = """
 #include "{file}"
 #include <math.h>
@@ -122,7 +125,7 @@ def bridge_text(source: ForeignSource) -> str:
         for argument in arrays
     ]
     if memory:
-        declarations.append(f"static {memory.type} {memory.name};")
+        declarations.append(f"static {memory.type} {_MEMORY};")
     return _BRIDGE.format(
         file=source.file.resolve().as_posix(),
         precision=source.precision,
@@ -140,7 +143,7 @@ def _shape(argument: ForeignArgument) -> str:
 
 def _passed(argument: ForeignArgument) -> str:
     if argument.type:
-        return f"&{argument.name}" if argument.reference == "*" else argument.name
+        return f"&{_MEMORY}" if argument.reference == "*" else _MEMORY
     return f"strapgen_{argument.name}" + (".of.array" if argument.shape else "")
 
 
@@ -149,9 +152,7 @@ def _reset(source: ForeignSource, memory: ForeignArgument | None) -> list[str]:
     lines = []
     if memory:
         cleared = (
-            f"{memory.name} = {memory.type}();"
-            if source.is_cpp
-            else (f"memset(&{memory.name}, 0, sizeof {memory.name});")
+            f"{_MEMORY} = {memory.type}();" if source.is_cpp else f"memset(&{_MEMORY}, 0, sizeof {_MEMORY});"
         )
         lines.append(cleared)
     if source.init:
@@ -194,7 +195,8 @@ def _after(arguments: ForeignArguments, arrays: list[ForeignArgument]) -> list[s
     result = arguments.result
     place = f"strapgen_{result.name}.of.array"
     if result.name not in (STATE, NEXT):  # a field or a global array, of any type of numbers
-        place = result.name.removeprefix("global ")
+        memory, _, field = result.name.partition(".")
+        place = f"{_MEMORY}.{field}" if field else memory.removeprefix("global ")
     element = f"({place})[k / 3][k % 3]" if len(result.shape) == 2 else f"({place})[k]"
     for_all = f"for (int k = 0; k < {arguments.elements}; ++k)"
     lines.append(f"{for_all} *output++ = (double){element};")
