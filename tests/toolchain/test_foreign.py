@@ -146,6 +146,31 @@ def test_a_function_that_is_defined_nowhere_is_named(tmp_path):
 
 
 @pytest.mark.long
+def test_the_function_of_init_gets_what_it_takes(tmp_path):
+    (tmp_path / "a.c").write_text(
+        "typedef struct { double q[4]; } memory_t;\n"
+        "void of_state(double q[4]) { q[1] = 5; }\n"
+        "void of_memory(memory_t *m) { m->q[1] = 7; }\n"
+        "void of_both(memory_t *m, double q[4]) { m->q[1] = q[1]; }\n"
+        "void step(double q[4], const double d[3]) { q[2] += d[0]; }\n"
+        "void put(memory_t *m, const double d[3]) { m->q[2] += d[0]; }\n"
+    )
+    memory = "memory_t *of_memory, increments[3] -> of_memory.q[4]"  # a name that the file has too
+    for function, arguments, init, second in (
+        ("step", IN_PLACE, "of_state", 5),
+        ("put", memory, "of_memory", 7),
+        ("put", memory, "", 0),
+    ):
+        source = ForeignSource(tmp_path / "a.c", function, read_arguments(arguments), init)
+        run = run_foreign(compile_foreign(source), [0, 0, 0, 1], [[1, 1, 1, 2, 0, 0], [0, 1, 1, 3, 0, 0]])
+        np.testing.assert_array_equal(run.outputs[:, 1:3], [[second, 2], [second, 5]])
+    with pytest.raises(
+        CompilerError, match="of_both of --init does not take the memory, the state or nothing: error"
+    ):
+        compile_foreign(ForeignSource(tmp_path / "a.c", "put", read_arguments(memory), "of_both"))
+
+
+@pytest.mark.long
 def test_an_adapter_calls_a_class_and_the_compiler_takes_options(tmp_path, monkeypatch):
     (tmp_path / "include").mkdir()
     (tmp_path / "include" / "vector.hpp").write_text("struct Vector { double x, y, z; };\n")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
 
@@ -142,16 +142,15 @@ class _Check:
         convention, response = self.convention(directions(first.runs))
         if convention is None:
             yield calls
-            yield from self.axes(None, response)
+            yield self.failed("axes", _axes(response.finally_), _off(response))
             return
-        declared, self.step = self.step.convention, replace(self.step, convention=convention)
         everything = self.segments()
-        done = self.step.run([segment for _, part in everything for segment in part])
+        done = self.step.run([segment for _, part in everything for segment in part], convention)
         calls = self.calls(done)
         yield calls
         if calls.holds is False:
             return
-        yield from self.axes(declared, response)
+        yield from self.axes(convention, response)
         runs, place = {}, 0
         for name, part in everything:
             runs[name] = done.runs[place : place + len(part)]
@@ -191,20 +190,15 @@ class _Check:
                     return other, response
         return None, declared
 
-    def axes(self, declared: Convention | None, response: Directions) -> Iterator[Finding]:
-        """Yield the findings on scalar part, sense and axes; without a convention none fits."""
-        off = float(np.abs(response.finally_ - np.eye(3)).max())
-        if declared is None:
-            yield self.failed("axes", _axes(response.finally_), off)
-            return
-        known = self.step.convention
+    def axes(self, known: Convention, response: Directions) -> Iterator[Finding]:
+        """Yield the findings on scalar part, sense and axes of a function that follows a known convention."""
+        declared = self.step.convention
         if self.step.source.arguments.elements == 4:
             yield self.fits("scalar", declared.scalar, known.scalar, "the scalar part stands")
         yield self.fits("sense", declared.sense, known.sense, "the attitude is")
         if response.order_of_turns < response.other_order:
-            yield Finding(
-                "axes", True, "rotations about x, y and z are those of the body", off, _DIRECTION_WITHIN
-            )
+            text = "rotations about x, y and z are those of the body"
+            yield Finding("axes", True, text, _off(response), _DIRECTION_WITHIN)
         else:
             text = "a rotation turns about reference axes, not about body axes: a product in the wrong order"
             yield self.failed("axes", text, response.order_of_turns)
@@ -371,6 +365,11 @@ def _frame() -> Array:
 
 def _fits(response: Array) -> bool:
     return bool(np.abs(response - np.eye(3)).max() < _DIRECTION_WITHIN)
+
+
+def _off(response: Directions) -> float:
+    """Return the largest difference of an answer to a rotation about an axis, in units of the rotation."""
+    return float(np.abs(response.finally_ - np.eye(3)).max())
 
 
 def _axes(response: Array) -> str:

@@ -24,7 +24,7 @@ from strapgen.support.exceptions import CompilerError
 from strapgen.support.suggestions import suggestions
 from strapgen.support.timing import timed
 from strapgen.toolchain import compiler
-from strapgen.toolchain.foreign_bridge import ForeignSource, bridge_text
+from strapgen.toolchain.foreign_bridge import ForeignSource, bridge_text, definitions
 
 #: Longest time in s that a run may take.
 PATIENCE = 20
@@ -193,7 +193,7 @@ def _said(source: ForeignSource, lines: list[str]) -> str:
     """Return the first error of the compiler, with the path of the file as the user wrote it."""
     errors = [line.strip() for line in lines if re.search(r"\berror\b:", line)] or lines[:1] or ["no reason"]
     error = errors[0].replace(str(source.file.resolve()), str(source.file))
-    names = _functions(source.file)
+    names = list(definitions(source.file))
     for option, name in (("--function", source.function), ("--init", source.init)):
         unknown = re.search(r"implicit declaration|undeclared|not declared|undefined|has not been", error)
         if name and unknown and name not in names and re.search(rf"\b{re.escape(name)}\b", error):
@@ -202,18 +202,12 @@ def _said(source: ForeignSource, lines: list[str]) -> str:
             return (
                 f"{option}: {source.file} has no function {name}{guess}; it has {', '.join(names) or 'none'}"
             )
+    if error.startswith("--init:"):
+        reason = re.sub(r"^--init:[\d:]* *", "", error)
+        return f"{source.init} of --init does not take the memory, the state or nothing: {reason}"
     if error.startswith("--arguments:"):
         reason = re.sub(r"^--arguments:[\d:]* *", "", error)
         return (
             f"{source.function} does not take these --arguments in --precision {source.precision}: {reason}"
         )
     return f"{source.file} does not compile: {error}"
-
-
-def _functions(file: Path) -> list[str]:
-    """Return the names of the functions that a file defines."""
-    text = re.sub(r"/\*.*?\*/|//[^\n]*", "", file.read_text(errors="replace"), flags=re.DOTALL)
-    names = re.findall(
-        r"^[A-Za-z_][\w\s*&:<>]*?[\s*&]([A-Za-z_]\w*)\s*\([^;{}()]*\)\s*\{", text, flags=re.MULTILINE
-    )
-    return [name for name in dict.fromkeys(names) if name not in ("if", "for", "while", "switch")]

@@ -52,6 +52,7 @@ __attribute__((visibility("default"))) int strapgen_foreign_run(
     int flags = 0;
     for (long call = 0; call < calls; ++call) {{
         if (*input++ != 0.0) {{
+#line 1 "--init"
             {reset}
         }}
         const strapgen_number strapgen_dt = (strapgen_number)*input++;
@@ -155,13 +156,15 @@ def _reset(source: ForeignSource, memory: ForeignArgument | None) -> list[str]:
             f"{_MEMORY} = {memory.type}();" if source.is_cpp else f"memset(&{_MEMORY}, 0, sizeof {_MEMORY});"
         )
         lines.append(cleared)
-    if source.init:
-        lines.append(f"{source.init}({_passed(memory) if memory else ''});")
     state = source.arguments.named(STATE)
     if state:
         lines.append(
             f"for (int k = 0; k < {state.size}; ++k) strapgen_state.of.all[k] = (strapgen_number)identity[k];"
         )
+    if source.init:
+        takes = definitions(source.file).get(source.init.rpartition("::")[2], "")
+        target = memory or state
+        lines.append(f"{source.init}({_passed(target) if takes and target else ''});")
     return lines
 
 
@@ -203,3 +206,23 @@ def _after(arguments: ForeignArguments, arrays: list[ForeignArgument]) -> list[s
     if arguments.named(STATE) and not arguments.in_place:
         lines.append(f"{for_all} strapgen_state.of.all[k] = (strapgen_number){element};")
     return lines
+
+
+def definitions(file: Path) -> dict[str, str]:
+    """Return the functions that a file defines, each with the text of its parameters; "" for none.
+
+    Parameters
+    ----------
+    file : Path
+    """
+    text = re.sub(r"/\*.*?\*/|//[^\n]*", "", file.read_text(errors="replace"), flags=re.DOTALL)
+    pattern = r"^[A-Za-z_][\w\s*&:<>]*?[\s*&]([A-Za-z_]\w*)\s*\(((?:[^;{}()]|\([^;{}()]*\))*)\)\s*\{"
+    functions = {
+        name: " ".join(parameters.split())
+        for name, parameters in re.findall(pattern, text, flags=re.MULTILINE)
+    }
+    return {
+        name: "" if parameters == "void" else parameters
+        for name, parameters in functions.items()
+        if name not in ("if", "for", "while", "switch")
+    }
