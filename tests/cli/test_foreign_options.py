@@ -124,7 +124,7 @@ def test_the_page_of_the_examples_names_every_fault_as_the_command_does(check):
         (f"{PLACE}/correct.c --function f --arguments ''", "--arguments '' has no single arrow"),
         (
             f"{PLACE}/correct.c --function f --arguments 'state[9], rates[3] -> state[9]' --scalar last",
-            "--scalar last goes with an attitude of four elements; this one has nine",
+            "--scalar last goes with a result of four elements; this one has 9",
         ),
         (
             f"{PLACE}/correct.c {COMMAND.replace('update', 'updat')}",

@@ -357,6 +357,57 @@ def test_a_convention_reads_an_attitude(scalar, sense):
     np.testing.assert_array_equal(convention.matrices(matrix.reshape(1, 9))[0], expected)
 
 
+#: The recursion of an integrator between a gyro at a high rate and an attitude at a low one; it corrects a delta angle.
+RECURSION = (
+    PARTS
+    + """
+typedef struct { double alpha[3], beta[3], before[3]; } integrator_t;
+void put(integrator_t *self, const double d[4][3], double rotation[3])
+{
+    for (int i = 0; i < 3; i++) self->alpha[i] = self->beta[i] = 0;
+    for (int k = 0; k < 4; k++) {
+        double left[3], c[3];
+        for (int i = 0; i < 3; i++) left[i] = self->alpha[i] + self->before[i] / 6;
+        FAULT
+        cross(left, d[k], c);
+        for (int i = 0; i < 3; i++) {
+            self->beta[i] += c[i] / 2;
+            self->alpha[i] += d[k][i];
+            self->before[i] = d[k][i];
+        }
+    }
+    for (int i = 0; i < 3; i++) rotation[i] = self->alpha[i] + self->beta[i];
+}
+"""
+)
+
+
+@pytest.mark.parametrize(
+    ("fault", "cause"),
+    [
+        ("", None),
+        pytest.param(
+            "for (int i = 0; i < 3; i++) left[i] = self->alpha[i] + d[k][i] / 6;",
+            causes.ABSENT,
+            marks=pytest.mark.long,
+        ),
+        pytest.param(
+            "for (int i = 0; i < 3; i++) left[i] += self->before[i] / 6;",
+            causes.FACTOR_TWO,
+            marks=pytest.mark.long,
+        ),
+        pytest.param("for (int i = 0; i < 3; i++) left[i] = 0;", causes.ABSENT, marks=pytest.mark.long),
+    ],
+)
+def test_a_function_that_corrects_a_delta_angle(outcome, fault, cause):
+    arguments = "integrator_t *self, increments[4][3] -> rotation[3]"
+    checked = outcome(RECURSION.replace("FAULT", fault), arguments, name="put")
+    assert (checked.holds, checked.cause) == (cause is None, cause)
+    assert checked.closed_form_deg_h == pytest.approx(
+        abs(closed_form_deg_h(design(1, 1) if cause is None else design(4))), rel=1e-9
+    )
+
+
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("algorithm", "method", "samples"),

@@ -30,7 +30,7 @@ class ForeignOptions:
         option(
             "--arguments",
             metavar="TEXT",
-            help="What it takes and returns, in the order of C, for instance "
+            help="What it takes, in the order of C, and the attitude behind an arrow, for instance "
             '"state[4], increments[2][3] -> next[4]" or "state[9], rates[3], dt -> state[9]".',
         ),
     ] = None
@@ -85,9 +85,9 @@ class ForeignOptions:
                 "is an example"
             )
         arguments = read_arguments(self.arguments)
-        if self.scalar is not None and arguments.elements == 9:
+        if self.scalar is not None and arguments.elements != 4:
             raise InputError(
-                f"--scalar {self.scalar} goes with an attitude of four elements; this one has nine"
+                f"--scalar {self.scalar} goes with a result of four elements; this one has {arguments.elements}"
             )
         convention = Convention(self.scalar or "last", self.sense or "body-to-reference")
         takes = self.input or ("rates" if arguments.named(RATES) else "increments")

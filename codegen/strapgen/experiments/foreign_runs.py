@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import accumulate
 from pathlib import Path
 
 import numpy as np
@@ -54,15 +55,21 @@ class Convention:
 
     def identity(self, elements: int) -> Array:
         """Return the elements of no rotation."""
-        if elements == 9:
-            return np.eye(3).ravel()
+        if elements != 4:
+            return np.eye(3).ravel() if elements == 9 else np.zeros(3)
         identity: Array = np.eye(4)[3 if self.scalar == "last" else 0]
         return identity
 
     def matrices(self, states: Array) -> Array:
-        """Return direction cosine matrices, body to reference, of states (N, elements)."""
+        """Return direction cosine matrices, body to reference, of states (N, elements).
+
+        Rotation vectors, which have three elements, turn the attitude one after the other.
+        """
         if states.shape[-1] == 9:
             matrices = states.reshape(-1, 3, 3)
+        elif states.shape[-1] == 3:
+            turns = evaluator("dcm-update")(np.broadcast_to(np.eye(3), (len(states), 3, 3)), states)
+            matrices = np.array(list(accumulate(turns, np.matmul)))
         else:
             matrices = evaluator("dcm-from-euler")(
                 states if self.scalar == "last" else np.roll(states, -1, axis=-1)

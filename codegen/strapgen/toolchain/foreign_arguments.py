@@ -25,6 +25,8 @@ INTERVAL, STEP = "dt", "step"
 SAMPLES = (INCREMENTS, RATES)
 #: Numbers of the shapes of an attitude.
 ATTITUDES = ((4,), (9,), (3, 3))
+#: Result of a function that computes the rotation vector of its call and leaves the attitude to others.
+ROTATION = "rotation"
 #: Most samples in a call, and most from before it.
 _MOST_SAMPLES, _MOST_PREVIOUS = 8, 3
 
@@ -120,7 +122,7 @@ class ForeignArguments:
 
     @property
     def elements(self) -> int:
-        """Number of elements of an attitude: 4 or 9."""
+        """Number of elements of the result: 4 or 9 of an attitude, or 3 of the rotation vector of a call."""
         return self.result.size
 
 
@@ -160,7 +162,7 @@ def read_arguments(text: str) -> ForeignArguments:
     parameters = [_argument(part.strip()) for part in inputs.split(",")]
     result = _result(output, parameters)
     _refuse_what_does_not_fit(parameters, result)
-    if result.name == NEXT:
+    if result.name in (NEXT, ROTATION):
         parameters.insert(0 if backwards else len(parameters), result)
     return ForeignArguments(tuple(parameters), result)
 
@@ -207,14 +209,15 @@ def _result(text: str, parameters: list[ForeignArgument]) -> ForeignArgument:
     memories = {argument.name for argument in parameters if argument.type}
     head = result.name.partition(".")[0]
     read_after = result.name.startswith("global ") or ("." in result.name and head in memories)
-    if result.name not in (STATE, NEXT) and not read_after:
+    if result.name not in (STATE, NEXT, ROTATION) and not read_after:
         raise InputError(
-            f"--arguments: the result {shown(text)} is not known; allowed: next[4], state[4], the array of a field of "
-            "memory, as name.q[4], or a global array, as global q[4]; in place of 4 also 9 and 3][3"
+            f"--arguments: the result {shown(text)} is not known; allowed: next[4], state[4], rotation[3], a field of "
+            "memory, as name.q[4], or a global array, as global q[4]; in place of [4] also [9] and [3][3]"
         )
-    if result.shape not in ATTITUDES:
+    vector = result.shape == (3,) and result.name not in (STATE, NEXT)
+    if not vector and (result.shape not in ATTITUDES or result.name == ROTATION):
         raise InputError(
-            f"--arguments: the result {shown(text)} is no attitude; its shape is [4], [9] or [3][3]"
+            f"--arguments: the result {shown(text)} has another shape; allowed: [4], [9], [3][3], or [3] of a rotation"
         )
     return result
 

@@ -13,6 +13,7 @@ from strapgen.toolchain.foreign_arguments import (
     FOREIGN_SUFFIXES,
     NEXT,
     PREVIOUS,
+    ROTATION,
     STATE,
     ForeignArgument,
     ForeignArguments,
@@ -177,8 +178,9 @@ def _before(arguments: ForeignArguments, arrays: list[ForeignArgument]) -> list[
             f"for (int k = 0; k < {argument.size}; ++k) "
             f"strapgen_{argument.name}.of.all[k] = (strapgen_number)*input++;"
         )
-    if arguments.named(NEXT):
-        lines.append(f"for (int k = 0; k < {arguments.elements}; ++k) strapgen_next.of.all[k] = NAN;")
+    if arguments.result.name in (NEXT, ROTATION):
+        name = f"strapgen_{arguments.result.name}"
+        lines.append(f"for (int k = 0; k < {arguments.elements}; ++k) {name}.of.all[k] = NAN;")
     for argument in arrays:
         name = f"strapgen_{argument.name}"
         lines.append(f"memset({name}.before, 0x5a, 64); memset({name}.after, 0x5a, 64);")
@@ -197,7 +199,7 @@ def _after(arguments: ForeignArguments, arrays: list[ForeignArgument]) -> list[s
             lines.append(f"flags |= memcmp(&{name}.of, &{name}_before.of, sizeof {name}.of) != 0 ? 2 : 0;")
     result = arguments.result
     place = f"strapgen_{result.name}.of.array"
-    if result.name not in (STATE, NEXT):  # a field or a global array, of any type of numbers
+    if result.name not in (STATE, NEXT, ROTATION):  # a field or a global array, of any type of numbers
         memory, _, field = result.name.partition(".")
         place = f"{_MEMORY}.{field}" if field else memory.removeprefix("global ")
     element = f"({place})[k / 3][k % 3]" if len(result.shape) == 2 else f"({place})[k]"
