@@ -115,7 +115,7 @@ def test_rounded_coefficients_are_the_floor(coning):
 
 def test_the_slope_is_that_of_a_power():
     rungs = [(2.0**-k, 3 * 2.0 ** (-5 * k), True) for k in range(6)]
-    found = convergence._fitted("a-step", "exact", None, rungs)
+    found = convergence.fitted("a-step", "exact", None, rungs)
     assert found.observed == pytest.approx(5, abs=1e-12)
     assert [rung.slope for rung in found.rungs[1:]] == pytest.approx([5.0] * 5)
     assert [rung.used for rung in found.rungs] == [False] * 3 + [True] * convergence.FITTED

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
@@ -44,6 +44,9 @@ OptionalAlgorithm = Annotated[
     ),
 ]
 StepAlgorithm = Annotated[str, _argument("dcm, euler or cayley-klein, or a Python file of your own.")]
+CheckedAlgorithm = Annotated[
+    str, _argument("dcm, euler or cayley-klein, or a Python file of your own, or one in C or C++.")
+]
 OptionalStepAlgorithm = Annotated[
     _Text, _argument("dcm, euler or cayley-klein, or a Python file of your own.")
 ]
@@ -131,6 +134,11 @@ class MethodOptions:
             help="Let the step take, in place of increments, body rates at the method's nodes, times the step length.",
         ),
     ] = False
+
+    @property
+    def stated(self) -> list[str]:
+        """The options that the command line has."""
+        return [f"--{part.name}" for part in fields(self) if getattr(self, part.name) not in (None, False)]
 
     def choose(self, algorithm: str, *, step: bool = True) -> Choice:
         """Return the kernel that the options choose of an algorithm; with `step` it must be an attitude step."""

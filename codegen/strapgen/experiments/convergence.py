@@ -27,7 +27,7 @@ from strapgen.support.exceptions import InputError, InputTypeError
 #: Number of steps that the slope is fitted to: the finest of those whose error is truncation.
 FITTED = 3
 #: Largest error in rad that the slope is fitted to; beyond it, the terms after the first count too.
-_MOST_ERROR = 0.3
+MOST_ERROR = 0.3
 
 
 @dataclass(frozen=True)
@@ -85,8 +85,8 @@ class Convergence:
             return ""
         if not errors:
             return "every run leaves the range of its numbers"
-        if min(errors) > _MOST_ERROR:
-            return f"the errors are over {_MOST_ERROR} rad, too large for a slope; shorter steps are needed"
+        if min(errors) > MOST_ERROR:
+            return f"the errors are over {MOST_ERROR} rad, too large for a slope; shorter steps are needed"
         if max(errors) < 1e-25:
             return "the algorithm is exact on this motion"
         return f"rounding hides the order on {self.backend}, or too few steps show it"
@@ -174,8 +174,8 @@ def converge(
     rungs = []
     for length, count in zip(lengths, counts, strict=True):
         error, floor = measure(length, count)
-        rungs.append((float(length), error, error is not None and floor < error < _MOST_ERROR))
-    return replace(_fitted(kernel.name, backend, kernel.order, rungs), arguments=kernel.arguments)
+        rungs.append((float(length), error, error is not None and floor < error < MOST_ERROR))
+    return replace(fitted(kernel.name, backend, kernel.order, rungs), arguments=kernel.arguments)
 
 
 def labels(outcomes: Sequence[Convergence]) -> list[str]:
@@ -196,10 +196,24 @@ def labels(outcomes: Sequence[Convergence]) -> list[str]:
     ]
 
 
-def _fitted(
-    kernel: str, backend: str, order: Order | None, rungs: list[tuple[float, float | None, bool]]
+def fitted(
+    kernel: str, backend: str, order: Order | None, rungs: Sequence[tuple[float, float | None, bool]]
 ) -> Convergence:
-    """Fit the slope to the finest rungs that show truncation."""
+    """Fit the slope to the finest rungs that show truncation.
+
+    Parameters
+    ----------
+    kernel, backend : str
+        Names of what was measured.
+    order : Order or None
+        Orders in theory.
+    rungs : sequence of (float, float or None, bool)
+        Step in s, error in rad, and whether the error shows truncation; from the longest step to the shortest.
+
+    Returns
+    -------
+    Convergence
+    """
     chosen = [k for k, (_, _, shows) in enumerate(rungs) if shows][-FITTED:]
     slopes: list[float | None] = [None]
     for (long, before, _), (short, after, _) in pairwise(rungs):

@@ -14,7 +14,7 @@ class InputTypeError(StrapgenError, TypeError):
 
 
 class CompilerError(StrapgenError, RuntimeError):
-    """No C compiler was found, or it refused the generated code."""
+    """No C compiler was found, or it refused the code."""
 
 
 class MissingExtraError(StrapgenError, ImportError):

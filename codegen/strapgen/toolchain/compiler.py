@@ -180,6 +180,17 @@ def compiler() -> str:
     return path
 
 
+def command() -> list[str]:
+    """Return the words of the compiler's command, its own options included.
+
+    Raises
+    ------
+    CompilerError
+        If there is no such program.
+    """
+    return [compiler(), *shlex.split(chosen_compiler())[1:]]
+
+
 def chosen_compiler() -> str:
     """Return the command of $CC; "" if it is not set."""
     return os.environ.get("CC", "").strip()
@@ -261,26 +272,64 @@ def _compile(many: Sequence[Sources], name: str, path: str, draft: Path) -> None
         "libraries": [] if sys.platform == "win32" else ["m"],
         "folder": str(draft),
     }
-    # Flags in the environment would change the bits of the result, but the key of the cache does not include them.
-    environment = {
-        k: v for k, v in os.environ.items() if k not in ("CFLAGS", "CPPFLAGS", "LDFLAGS", "LDSHARED")
-    }
-    with _one_at_a_time:
-        answer = _service().ask(request | {"environment": environment | {"CC": chosen_compiler() or path}})
-    built = Path(answer["path"] or draft)
-    if not built.is_file():
-        said = answer["said"].splitlines()
-        reasons = (
-            [line.strip() for line in said if "error" in line.lower()] or said[-1:] or ["no output file"]
-        )
+    built, reasons = run_request(request)
+    if built is None:
         raise CompilerError(f"{path} failed on {name}: {reasons[0]}")
-    library = draft / _library(name)
+    leave_only(built, draft)
+
+
+def leave_only(built: Path, draft: Path) -> None:
+    """Leave nothing in a folder but the compiled module, under the name that Python imports.
+
+    Parameters
+    ----------
+    built : Path
+        The module, anywhere.
+    draft : Path
+        The folder.
+    """
+    library = draft / _library(built.name.partition(".")[0])
     built.rename(library)
     for leftover in draft.iterdir():
         if leftover.is_dir():
             shutil.rmtree(leftover)
         elif leftover != library:
             leftover.unlink()
+
+
+def run_request(request: dict[str, Any]) -> tuple[Path | None, list[str]]:
+    """Let the process that compiles answer a request, see ``worker.py``.
+
+    Parameters
+    ----------
+    request : dict
+        Without the environment, which is that of this process.
+
+    Returns
+    -------
+    Path or None
+        The compiled module.
+    list of str
+        Where there is none, what the compiler said of it: its errors, at least one line.
+
+    Raises
+    ------
+    CompilerError
+        If there is no C compiler, or the process ends.
+    """
+    path = compiler()
+    # Flags in the environment would change the bits of the result, but the key of the cache does not include them.
+    environment = {
+        k: v for k, v in os.environ.items() if k not in ("CFLAGS", "CPPFLAGS", "LDFLAGS", "LDSHARED")
+    }
+    with _one_at_a_time:
+        answer = _service().ask(request | {"environment": environment | {"CC": chosen_compiler() or path}})
+    built = Path(answer["path"] or request["folder"])
+    if built.is_file():
+        return built, []
+    said = answer["said"].splitlines()
+    reasons = [line.strip() for line in said if "error" in line.lower()] or said[-1:] or ["no output file"]
+    return None, reasons
 
 
 class _Service:

@@ -1,0 +1,224 @@
+"""Runs a user's function along increments, segment by segment, and reads its states as attitudes.
+
+A segment begins with a reset and with calls without rotation, so that increments of the segment before are forgotten.
+Its attitudes are relative to the one before its first call: functions that hold the attitude themselves need no more
+than those that take it as an argument.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from itertools import accumulate
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapgen.backends import evaluator
+from strapgen.backends.increments import windows
+from strapgen.support import checks
+from strapgen.support.exceptions import InputError
+from strapgen.toolchain.foreign import compile_foreign, run_foreign
+from strapgen.toolchain.foreign_arguments import RATES
+from strapgen.toolchain.foreign_bridge import ForeignSource
+
+Array = NDArray[np.float64]
+
+SCALARS = ("last", "first")
+SENSES = ("body-to-reference", "reference-to-body")
+INPUTS = ("increments", "rates")
+#: Samples that a function may remember; calls without rotation push so many out of its memory.
+REMEMBERED = 8
+#: Elements of an attitude that are larger are none; their products stay finite.
+_LARGEST = 1e30
+
+
+@dataclass(frozen=True)
+class Convention:
+    """How the elements of a user's attitude are read.
+
+    Parameters
+    ----------
+    scalar : str
+        Where the scalar part of four elements stands, "last" or "first".
+    sense : str
+        "body-to-reference" or "reference-to-body".
+    """
+
+    scalar: str = "last"
+    sense: str = "body-to-reference"
+
+    def __post_init__(self) -> None:
+        checks.choice("scalar", self.scalar, SCALARS)
+        checks.choice("sense", self.sense, SENSES)
+
+    def identity(self, elements: int) -> Array:
+        """Return the elements of no rotation."""
+        if elements != 4:
+            return np.eye(3).ravel() if elements == 9 else np.zeros(3)
+        identity: Array = np.eye(4)[3 if self.scalar == "last" else 0]
+        return identity
+
+    def matrices(self, states: Array) -> Array:
+        """Return direction cosine matrices, body to reference, of states (N, elements).
+
+        Rotation vectors, which have three elements, turn the attitude one after the other.
+        """
+        if states.shape[-1] == 9:
+            matrices = states.reshape(-1, 3, 3)
+        elif states.shape[-1] == 3:
+            turns = evaluator("dcm-update")(np.broadcast_to(np.eye(3), (len(states), 3, 3)), states)
+            matrices = np.array(list(accumulate(turns, np.matmul)))
+        else:
+            matrices = evaluator("dcm-from-euler")(
+                states if self.scalar == "last" else np.roll(states, -1, axis=-1)
+            )
+        return matrices if self.sense == SENSES[0] else np.swapaxes(matrices, -1, -2)
+
+
+@dataclass(frozen=True)
+class Segment:
+    """Increments of one run.
+
+    Parameters
+    ----------
+    increments : array, (N, K, 3)
+        Of N calls, in rad.
+    width : float
+        Time between samples in s.
+    settled : bool
+        Whether calls without rotation come first, which empty a memory of samples.
+    """
+
+    increments: Array
+    width: float = 1.0
+    settled: bool = True
+
+
+@dataclass(frozen=True)
+class SegmentRun:
+    """What a function makes of a segment.
+
+    Parameters
+    ----------
+    states : array, (N, elements)
+        The results of its calls.
+    matrices : array, (N, 3, 3)
+        The same as direction cosine matrices, body to reference.
+    relative : array, (1 + N, 3, 3)
+        The attitudes relative to the one before the first call.
+    """
+
+    states: Array
+    matrices: Array
+    relative: Array
+
+
+@dataclass(frozen=True)
+class ForeignStep:
+    """A user's function that is compiled, and how it is fed.
+
+    Parameters
+    ----------
+    source : ForeignSource
+    convention : Convention
+    takes : str
+        "increments" in rad, or "rates" in rad/s, which are the means over the time between samples.
+    """
+
+    source: ForeignSource
+    convention: Convention = Convention()
+    takes: str = "increments"
+    module: Path = field(init=False)
+
+    def __post_init__(self) -> None:
+        checks.choice("input", self.takes, INPUTS)
+        if self.source.arguments.named(RATES) and self.takes != "rates":
+            raise InputError(f"--input {self.takes} contradicts the argument rates; --input rates fits it")
+        object.__setattr__(self, "module", compile_foreign(self.source))
+
+    @property
+    def samples(self) -> int:
+        """Number of samples in a call."""
+        return self.source.arguments.count
+
+    @property
+    def unit(self) -> float:
+        """The step from 1 to the next number of the function's precision."""
+        return float(np.finfo(np.float32 if self.source.precision == "float" else np.float64).eps)
+
+    @property
+    def settling(self) -> int:
+        """Number of calls that push all samples out of a memory."""
+        return -(-REMEMBERED // self.samples)
+
+    def run(self, segments: Sequence[Segment], convention: Convention | None = None) -> ForeignSegments:
+        """Run segments one after the other in one process.
+
+        Parameters
+        ----------
+        segments : sequence of Segment
+        convention : Convention, optional
+            Another one than that of the step.
+
+        Returns
+        -------
+        ForeignSegments
+        """
+        read = convention or self.convention
+        arguments = self.source.arguments
+        rows = np.concatenate([self._rows(segment) for segment in segments])
+        identity = read.identity(arguments.elements)
+        done = run_foreign(self.module, identity, rows)
+        if not done.stopped and not np.abs(done.outputs).max() < _LARGEST:  # not finite: no number compares
+            done = replace(
+                done, stopped="it leaves no finite numbers in its result, or does not write all of it"
+            )
+        if done.stopped:
+            return ForeignSegments((), done.stopped, done.writes_beyond, done.changes_inputs)
+        runs, place = [], 0
+        for segment in segments:
+            first = self.settling if segment.settled else 0
+            count = len(segment.increments)
+            outputs = done.outputs[place : place + first + count]
+            before = outputs[first - 1] if first else identity
+            place += first + count
+            matrices = read.matrices(np.vstack([before, outputs[first:]]))
+            runs.append(SegmentRun(outputs[first:], matrices[1:], matrices[0].T @ matrices))
+        return ForeignSegments(tuple(runs), "", done.writes_beyond, done.changes_inputs)
+
+    def _rows(self, segment: Segment) -> Array:
+        """Return the rows of the calls of a segment, see `run_foreign`."""
+        count, previous = self.samples, self.source.arguments.previous
+        quiet = np.zeros((self.settling if segment.settled else 0, count, 3))
+        samples = np.concatenate([quiet, segment.increments]).reshape(-1, 3)
+        numbers = windows(np.concatenate([np.zeros((previous, 3)), samples]), count, previous)
+        if self.takes == "rates":
+            numbers = numbers / segment.width
+        rows = np.empty((len(numbers), 3 + numbers[0].size))
+        rows[:, 0] = np.arange(len(numbers)) == 0
+        rows[:, 1] = segment.width
+        rows[:, 2] = segment.width * count
+        rows[:, 3:] = numbers.reshape(len(numbers), -1)
+        return rows
+
+
+@dataclass(frozen=True)
+class ForeignSegments:
+    """What came of segments.
+
+    Parameters
+    ----------
+    runs : tuple of SegmentRun
+        One for each segment; empty if the function came to no end.
+    stopped : str
+        The reason for that; "" if there is none.
+    writes_beyond, changes_inputs : bool
+        As of `ForeignRun`.
+    """
+
+    runs: tuple[SegmentRun, ...]
+    stopped: str
+    writes_beyond: bool
+    changes_inputs: bool

@@ -1,0 +1,96 @@
+"""Likely causes of a wrong coning correction, told from its coefficients: on every design, and never on a right one."""
+
+from __future__ import annotations
+
+import pytest
+from gathering import each
+
+from strapgen.catalogue.methods.coning_coefficients import FORMS, design
+from strapgen.experiments import foreign_causes as causes
+from strapgen.experiments.foreign_probes import Products, pairs
+
+DESIGNS = [
+    (samples, previous, form)
+    for samples, previous in ((1, 1), (1, 2), (1, 3), (2, 0), (2, 1), (3, 0), (4, 0), (4, 1), (5, 0))
+    for form in FORMS
+]
+
+
+def tables(samples: int, previous: int, form: str, factor: float = 1.0, delay: int = 0) -> Products:
+    """Return the coefficients of a design times a factor, its calls corrected `delay` samples late."""
+    at_once, finally_ = (dict.fromkeys(pairs(samples), 0.0) for _ in range(2))
+    for (older, newer), c in design(samples, previous, form).pairs.items():
+        i, j = older - previous - delay, newer - previous - delay
+        if (i, j) in at_once:
+            at_once[i, j] += factor * float(c)
+        # What one call leaves to a later one counts for the pair as it stands in its own call.
+        calls = 0 if j >= 0 else -(j // samples)
+        if (pair := (i + calls * samples, j + calls * samples)) in finally_:
+            finally_[pair] += factor * float(c)
+    return Products(samples, at_once, finally_)
+
+
+def one_by_one(samples: int, factor: float, distance: int = 1) -> Products:
+    """Return the coefficients of a function that turns by each sample, corrected with one from before it."""
+    table = {
+        (i, j): (0.5 if i >= 0 else 0.0) + (factor / 12 if j - i == distance else 0.0)
+        for i, j in pairs(samples)
+    }
+    return Products(samples, table, table)
+
+
+@each("chosen", DESIGNS)
+def test_a_published_correction_has_no_fault(chosen):
+    assert causes.cause(tables(*chosen)) is None
+    standard = causes.standard_design(tables(*chosen))
+    assert (standard.samples, standard.previous) == chosen[:2]
+
+
+@each(
+    ("factor", "cause"),
+    [(0, causes.ABSENT), (-1, causes.WRONG_SIGN), (2, causes.FACTOR_TWO), (0.5, causes.FACTOR_TWO)],
+)
+def test_a_factor_is_named_on_every_published_correction(factor, cause):
+    named = {chosen: causes.cause(tables(*chosen, factor)) for chosen in DESIGNS}
+    assert set(named.values()) == {cause}, named
+
+
+def test_one_sample_of_delay_is_named():
+    late = {
+        chosen: causes.cause(tables(*chosen, delay=1))
+        for chosen in DESIGNS
+        if chosen[1] == 0 or chosen[0] == 1
+    }
+    assert set(late.values()) == {causes.LATE}, late
+    assert causes.cause(one_by_one(1, 1, distance=2)) == causes.LATE
+
+
+@each("samples", [1, 2, 4])
+def test_samples_that_are_turned_one_by_one_are_known(samples):
+    assert causes.cause(one_by_one(samples, 1)) is None
+    standard = causes.standard_design(one_by_one(samples, 1))
+    assert (standard.samples, standard.previous) == (1, 1)
+    named = {factor: causes.cause(one_by_one(samples, factor)) for factor in (0, -1, 2, 0.5)}
+    wanted = [causes.ABSENT, causes.WRONG_SIGN, causes.FACTOR_TWO, causes.FACTOR_TWO]
+    assert list(named.values()) == wanted
+    assert causes.cause(one_by_one(samples, 1, distance=2)) == causes.LATE
+
+
+def test_another_size_is_told_in_numbers():
+    table = {(0, 1): 0.6} | {pair: 0.0 for pair in pairs(2) if pair != (0, 1)}
+    assert causes.cause(Products(2, table, table)) == "correction 0.9 times as large as needed"
+
+
+def test_samples_of_which_one_counts_more_are_told():
+    plain = tables(2, 0, "compressed")
+    assert causes.cause(Products(2, plain.at_once, plain.finally_, (1.0, 1.0))) is None
+    said = causes.cause(Products(2, plain.at_once, plain.finally_, (3.0, -1.0)))
+    assert said == "samples weighted by 3, -1 in place of 1"
+
+
+@pytest.mark.parametrize("error", [0.0002, -0.0002])
+def test_the_error_of_a_probe_changes_no_name(error):
+    for factor, cause in ((1, None), (0, causes.ABSENT), (-1, causes.WRONG_SIGN), (2, causes.FACTOR_TWO)):
+        exact = tables(1, 1, "compressed", factor)
+        off = {pair: c + error for pair, c in exact.at_once.items()}
+        assert causes.cause(Products(1, off, off)) == cause
