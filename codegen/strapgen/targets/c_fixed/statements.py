@@ -82,7 +82,7 @@ class StatementPrinter:
                 text = self._call("div", self.scaled(numerator), denominator)
                 lines.append(_declared(kind, name, self.narrow(text, value), note))
             case IntegerRoot(argument):
-                text = self._call("rt", f"({self.word.magnitude})({self.scaled(argument)})")
+                text = self._call("rt", self.scaled(argument))
                 lines.append(_declared(kind, name, text, note))
             case IntegerMaximum((first, *others)):
                 lines.append(_declared(kind, name, self.narrowed(first, value), note, constant=False))
@@ -273,7 +273,7 @@ class StatementPrinter:
 
     def _power_of_two(self, exponent: int) -> str:
         if exponent < 15:
-            return f"(1 << {exponent})"
+            return f"(INT16_C(1) << {exponent})"
         if exponent < 31:
             return f"(INT32_C(1) << {exponent})"
         if exponent < 63:
