@@ -7,21 +7,26 @@ import re
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
+from strapgen import catalogue, fixedpoint
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Sources
+from strapgen.library import generated_sources
 from strapgen.support import checks
 from strapgen.support.exceptions import CompilerError, InputError
 from strapgen.targets import TARGETS
 from strapgen.toolchain import emulation
-from strapgen.toolchain.processors import PROCESSORS, Processor
+from strapgen.toolchain.processors import PROCESSORS
 
 #: Flags of the compiler beside those of the processor.
 FLAGS = ("-std=c99", "-O2", "-ffreestanding", "-ffp-contract=off")
 _MULTIPLICATION = re.compile(r"f?mul\w*|ml[as]|[su]ml?a?[ls]?\w*l|[su]mul\w*|smm\w*")
+#: The processor on which the whole catalogue is measured, and the kernels that are measured on every other.
+REFERENCE, EVERYWHERE = "cortex-m3", ("euler-rk4-2", "dcm-rk4-2")
 #: Part of its range that an argument of a measured call has.
 _PART = 3
 
@@ -116,7 +121,7 @@ def cost(sources: Sources, cpu: str) -> Cost:
         for file, text in sources.step_files.items():
             (folder / file).write_text(text)
         source = folder / next(file for file in sources.step_files if file.endswith(".c"))
-        flags = [*FLAGS, *_library(processor)]
+        flags = [*FLAGS, *_library(processor.compiler)]
         _run(
             [processor.compiler, *processor.flags, *flags, "-fstack-usage", "-c", source.name],
             folder,
@@ -129,18 +134,39 @@ def cost(sources: Sources, cpu: str) -> Cost:
             sources.kernel,
             cpu,
             len(mnemonics),
-            emulation.executed(processor, flags, source, sources.function.name, *_call(sources)),
+            emulation.executed(processor, flags, folder / binary, sources.function.name, *_call(sources)),
             sum(bool(_MULTIPLICATION.fullmatch(word.partition(".")[0])) for word in mnemonics),
             _section_bytes(sizes, ".text"),
             _section_bytes(sizes, ".rodata"),
             _stack(folder / f"{source.stem}.su", sources.function.name),
-            _version(processor, folder),
+            _version(processor.compiler),
         )
 
 
-def _library(processor: Processor) -> list[str]:
-    """Return the flags that find the headers of a C library, if there is one for the processor."""
-    command = [processor.compiler, "-print-file-name=picolibc.specs"]
+def catalogue_costs(cpus: Sequence[str]) -> Iterator[Cost]:
+    """Measure the standard catalogue in 32-bit fixed point, as it stands in ``generated/c_fixed``.
+
+    Parameters
+    ----------
+    cpus : sequence of str
+        Keys of `PROCESSORS`: `REFERENCE` for all kernels, any other for those of `EVERYWHERE`.
+
+    Yields
+    ------
+    Cost
+    """
+    for cpu in sorted(cpus, key=lambda name: name != REFERENCE):
+        for choice in catalogue.standard():
+            if cpu != REFERENCE and choice.kernel not in EVERYWHERE:
+                continue
+            if fixedpoint.can_lower(generated_sources.program(choice)):
+                yield cost(generated_sources.sources(choice, "c-fixed"), cpu)
+
+
+@cache
+def _library(compiler: str) -> list[str]:
+    """Return the flags that find the headers of a C library, if there is one for the compiler."""
+    command = [compiler, "-print-file-name=picolibc.specs"]
     place = subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip()
     return ["--specs=picolibc.specs"] if Path(place).is_absolute() else []
 
@@ -153,10 +179,10 @@ def _run(command: Sequence[str], folder: Path) -> str:
     return done.stdout
 
 
-def _version(processor: Processor, folder: Path) -> str:
-    said = _run([processor.compiler, "--version"], folder)
-    match = re.match(r".*\) (\S+)", said)
-    return f"{processor.compiler} {match[1]}" if match else processor.compiler
+@cache
+def _version(compiler: str) -> str:
+    match = re.match(r".*\) (\S+)", _run([compiler, "--version"], Path()))
+    return f"{compiler} {match[1]}" if match else compiler
 
 
 def _section_bytes(sizes: str, section: str) -> int:
@@ -181,11 +207,12 @@ def _call(sources: Sources) -> tuple[str, str]:
     word = 0 if sources.fixed is None else sources.fixed.settings.word
     kind = f"int{word}_t" if word else TARGETS[sources.target].number
     for number, signal in enumerate(sources.function.inputs):
-        values = _values(signal)
         if fixed:
             argument = fixed[signal.name]
-            scaled = [round(value * 2.0**argument.format.fraction) for value in values]
-            values = [max(argument.low, min(argument.high, integer)) for integer in scaled]
+            unit = float(argument.format.unit)
+            values: Sequence[float] = [round(value / unit) for value in _values(signal, argument.high * unit)]
+        else:
+            values = _values(signal, 0.01 * _PART if signal.bound is None else float(signal.bound))
         text = ", ".join(map(str, values))
         lines.append(f"{kind} argument_{number}[{signal.size}] = {{{text}}};")
         names.append(f"argument_{number}" + ("" if signal.shape or fixed else "[0]"))
@@ -196,14 +223,14 @@ def _call(sources: Sources) -> tuple[str, str]:
     for number, signal in enumerate(sources.function.outputs):
         lines.append(f"{kind} result_{number}[{signal.size}];")
         names.append(f"result_{number}")
-    return "\n".join(lines), f"(void){sources.function.name}({', '.join(names)})"
+    call = f"{sources.function.name}({', '.join(names)})"
+    return "\n".join(lines), f"if ({call} != 0) refuse()" if fixed else call
 
 
-def _values(signal: Signal) -> list[float]:
-    """Return numbers that a signal may have: an attitude, or a part of its bound with changing signs."""
+def _values(signal: Signal, largest: float) -> list[float]:
+    """Return numbers that a signal may have: an attitude, or a part of the largest one with changing signs."""
     if signal.constraint == "unit":
         return [1 / math.sqrt(signal.size)] * signal.size
     if signal.constraint == "rotation":
         return [float(place % 4 == 0) for place in range(signal.size)]
-    size = 0.01 if signal.bound is None else float(signal.bound) / _PART
-    return [size * (-1) ** place / (1 + place % 3) for place in range(signal.size)]
+    return [largest / _PART * (-1) ** place / (1 + place % 3) for place in range(signal.size)]

@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 
 from strapgen.support.exceptions import CompilerError
@@ -40,6 +41,10 @@ __attribute__((noinline, used)) void stop(void)
     for (;;) {{
     }}
 }}
+__attribute__((noinline, used)) void refuse(void)
+{{
+    __asm__ volatile("");
+}}
 __attribute__((noinline, used)) void start(void)
 {{
     {call};
@@ -63,7 +68,7 @@ SECTIONS
 
 
 def executed(
-    processor: Processor, flags: Sequence[str], source: Path, function: str, declarations: str, call: str
+    processor: Processor, flags: Sequence[str], binary: Path, function: str, declarations: str, call: str
 ) -> int | None:
     """Return the number of instructions from the entry of a function to its return.
 
@@ -72,14 +77,14 @@ def executed(
     processor : Processor
     flags : sequence of str
         Flags of the compiler, beside those of the processor.
-    source : Path
-        The C source of the function.
+    binary : Path
+        The object code of the function; the headers of its source lie beside it.
     function : str
         Its name.
     declarations : str
         C text with what the call needs: the header, and arrays for arguments.
     call : str
-        The call as C text.
+        The call as a statement in C, which calls ``refuse()`` if the function returns an error.
 
     Returns
     -------
@@ -89,21 +94,21 @@ def executed(
     Raises
     ------
     CompilerError
-        If the program cannot be linked, or does not come back from the call.
+        If the program cannot be linked, does not come back from the call, or comes back with an error.
     """
     if not processor.emulator or shutil.which(processor.emulator[0]) is None:
         return None
-    folder = source.parent
+    folder = binary.parent
     address, word = processor.stop
     start = _VECTORS if processor.start == "vectors" else _ENTRY
     main = _MAIN.format(start=start, declarations=declarations, call=call, address=address, word=word)
     (folder / "main.c").write_text(main)
     (folder / "layout.ld").write_text(_LAYOUT.format(code=processor.code, data=processor.data))
     command = [processor.compiler, *processor.flags, *flags, "-nostartfiles", "-nostdlib", "-T", "layout.ld"]
-    command += ["-Wl,--no-warn-rwx-segments", "main.c", source.name, "-lgcc", "-o", "program.elf"]
+    command += ["-Wl,--no-warn-rwx-segments", "main.c", binary.name, "-lgcc", "-o", "program.elf"]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     if done.returncode:
-        raise CompilerError(f"{processor.compiler} cannot link {source.name}: {_first_error(done.stderr)}")
+        raise CompilerError(f"{processor.compiler} cannot link {binary.name}: {_first_error(done.stderr)}")
     log = folder / "trace.log"
     one_by_one = ["-singlestep"] if _major_version(processor.emulator[0]) < 8 else ["-one-insn-per-tb"]
     command = [*processor.emulator, "-display", "none", "-serial", "none", "-monitor", "none", "-no-reboot"]
@@ -119,18 +124,21 @@ def executed(
 
 def _counted(log: Path, places: dict[str, tuple[int, int]], function: str) -> int:
     """Return how many instructions of a trace lie between the entry of a function and the next one of its caller."""
-    (entry, _), (first, size) = places[function], places["start"]
-    count, inside = 0, False
+    (entry, _), (first, size), (refused, _) = places[function], places["start"], places["refuse"]
+    count, inside, back = 0, False, False
     with log.open() as lines:
         for line in lines:
             match = re.match(r"Trace \d+: \S+ \[[0-9a-f]+/([0-9a-f]+)/", line)
             if match is None:
                 continue
             place = int(match[1], 16)
+            if place == refused:
+                raise CompilerError(f"{function} refuses the input with which it is measured")
             inside = inside or place == entry
-            if inside and first <= place < first + size:
-                return count
-            count += inside
+            back = back or (inside and first <= place < first + size)
+            count += inside and not back
+    if back:
+        return count
     raise CompilerError(f"the emulated processor did not come back from {function}")
 
 
@@ -142,6 +150,7 @@ def _addresses(processor: Processor, program: Path) -> dict[str, tuple[int, int]
     return {row[3]: (int(row[0], 16), int(row[1], 16)) for row in rows if len(row) == 4}
 
 
+@cache
 def _major_version(program: str) -> int:
     said = subprocess.run([program, "--version"], capture_output=True, text=True, check=True).stdout
     match = re.search(r"version (\d+)", said)

@@ -10,25 +10,40 @@ from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import MethodOptions, option
 from strapgen.cli.output import TEXT_OUTPUT, Output
+from strapgen.cli.progress import waiting
 from strapgen.support.exceptions import InputError
 
 
 @grouped
 def cost(
     kernels: Annotated[
-        list[str],
+        list[str] | None,
         typer.Argument(
             metavar="NAME...",
             help="dcm, euler, cayley-klein, any other kernel that strapgen list kernels shows, or a Python file.",
             show_default=False,
         ),
-    ],
+    ] = None,
     *,
+    all_: Annotated[
+        bool,
+        option(
+            "--all",
+            help="Measure the standard catalogue in 32-bit fixed point: all of it on cortex-m3, "
+            "the steps of fourth order on every processor.",
+            panel="Algorithm",
+        ),
+    ] = False,
     method: MethodOptions,
     target: Annotated[
-        str,
-        option("--target", metavar="NAME", help="Kind of code: c-fixed, c or c-float.", panel="Algorithm"),
-    ] = "c-fixed",
+        str | None,
+        option(
+            "--target",
+            metavar="NAME",
+            help="Kind of code: c-fixed, c or c-float.  [default: c-fixed]",
+            panel="Algorithm",
+        ),
+    ] = None,
     fixed: FixedOptions,
     cross: Annotated[
         str | None,
@@ -57,19 +72,27 @@ def cost(
     that a call executes, from the entry of the function to its return.
 
     Example: strapgen cost euler dcm --cross arm-none-eabi-gcc --cpu cortex-m3 --max-rate-deg-s 400 --step 0.01
+
+    Example: strapgen cost --all --format markdown --out generated/COST.md
     """
-    output.check(*kernels)
+    output.check(*(kernels or ()))
+    _check_alone(kernels, all_, [*method.stated, *(["--target"] if target else []), *fixed.stated])
     from strapgen.experiments import cost as costs
     from strapgen.library import generated_sources
-    from strapgen.reports.cost import cost_report
+    from strapgen.reports.cost import catalogue_report, cost_report
     from strapgen.support import checks
     from strapgen.targets import TARGETS
 
+    processors = costs.processors(cross, [] if cpu is None else [name.strip() for name in cpu.split(",")])
+    if all_:
+        with waiting("measuring"):
+            rows = [*costs.catalogue_costs(processors)]
+        output.report(catalogue_report(rows))
+        return
+    target = target or "c-fixed"
     checks.choice("target", target, [name for name, entry in TARGETS.items() if entry.compiled])
-    names = [] if cpu is None else [name.strip() for name in cpu.split(",")]
-    processors = costs.processors(cross, names)
     rows = []
-    for kernel in kernels:
+    for kernel in kernels or ():
         choice = method.choose(kernel, step=False)
         settings = fixed.settings(choice.increments_per_step)
         if settings is not None and not TARGETS[target].fixed:
@@ -77,3 +100,12 @@ def cost(
         sources = generated_sources.sources(choice, target, settings)
         rows += [costs.cost(sources, name) for name in processors]
     output.report(cost_report(rows))
+
+
+def _check_alone(kernels: list[str] | None, all_: bool, stated: list[str]) -> None:
+    """Refuse kernels or options beside --all, and a command without either."""
+    if all_ and (kernels or stated):
+        name = stated[0] if stated else kernels[0] if kernels else ""
+        raise InputError(f"--all measures the whole catalogue in fixed point; {name} does not go with it")
+    if not all_ and not kernels:
+        raise InputError("a kernel is needed, or --all; strapgen list kernels shows them")
