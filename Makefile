@@ -8,7 +8,7 @@ TOOLS := .venv/.ready-to-test
 BENCH := .venv-bench/.ready
 
 .PHONY: help demo test test-long test-modules mutants check bench generate clean \
-  check-generated check-style check-layout check-types firmware-tools
+  check-generated check-style check-layout check-types firmware-tools cost
 
 help:
 	@echo "make demo      set up, then a short tour: formulas, their C, a table on every back end"
@@ -19,6 +19,7 @@ help:
 	@echo "make check     generated code in step, ruff, mypy"
 	@echo "make bench     measure against other code generators, and the back ends; about a quarter of an hour"
 	@echo "make generate  rebuild generated/"
+	@echo "make cost      measure generated/COST.md anew, with the tools of make firmware-tools"
 	@echo "make firmware-tools  on Debian: cross compilers, QEMU and CMake, for strapgen cost and tests"
 	@echo "make clean     remove .venv and what tools left behind"
 
@@ -110,6 +111,9 @@ bench: $(BENCH)
 
 generate: $(READY)
 	$(BIN)/strapgen generate --all
+
+cost: $(READY)
+	$(BIN)/strapgen cost --all --format markdown --out generated/COST.md
 
 clean:
 	rm -rf .venv .venv-bench .mypy_cache .ruff_cache .pytest_cache .hypothesis .mutants build dist

@@ -1,7 +1,7 @@
 """What a step costs on microcontrollers, beside one written by hand; prints the tables of docs/microcontrollers.md.
 
-The counts come from `strapgen.experiments.cost`, as those of ``strapgen cost``; they are the same on any machine with the
-compilers that the page names.
+The counts come from `strapgen.experiments.cost`, as those of ``strapgen cost``; they are the same on any machine
+with the compilers that the page names.
 """
 
 from __future__ import annotations
@@ -67,10 +67,13 @@ def measured(algorithm: str, column: str, cpu: str) -> Cost | None:
 def rows(cpu: str) -> Iterator[tuple[str, str]]:
     """Yield the row of a processor in each table that has it, after the table's title."""
     costs = {
-        algorithm: {column: measured(algorithm, column, cpu) for column in COLUMNS} for algorithm in ("euler", "dcm")
+        algorithm: {column: measured(algorithm, column, cpu) for column in COLUMNS}
+        for algorithm in ("euler", "dcm")
     }
     for title, (algorithm, what) in TABLES.items():
-        shown = {name: one for name, one in costs[algorithm].items() if name != BY_HAND or algorithm == "euler"}
+        shown = {
+            name: one for name, one in costs[algorithm].items() if name != BY_HAND or algorithm == "euler"
+        }
         values = [None if one is None else getattr(one, what) for one in shown.values()]
         if any(value is not None for value in values):
             cells = ["–" if value is None else f"{value:,}" for value in values]
@@ -94,7 +97,8 @@ def errors(column: str, count: int = 2000) -> tuple[float, float]:
     program = generated_sources.program(catalogue.choose_step("euler", "rk4", 2))
     apart = []
     for one, angles, result in zip(e, d, _called(sources("euler", column), e, d), strict=True):
-        exact = _exact(program, [int(x) * state.format.unit for x in one], [int(x) * increments.format.unit for x in angles])
+        numbers = ([int(x) * a.format.unit for x in row] for row, a in ((one, state), (angles, increments)))
+        exact = _exact(program, *numbers)
         apart += [float(int(x) - value / state.format.unit) for x, value in zip(result, exact, strict=True)]
     return float(np.abs(apart).max()), float(np.sqrt(np.mean(np.square(apart))))
 
@@ -131,7 +135,9 @@ def main() -> None:
     for title, table in lines.items():
         print(title, "", *table, "", sep="\n")
     for column in ("32 bits", BY_HAND):
-        print(f"{column}: error at most {errors(column)[0]:.2f}, rms {errors(column)[1]:.2f} of the last place")
+        print(
+            f"{column}: error at most {errors(column)[0]:.2f}, rms {errors(column)[1]:.2f} of the last place"
+        )
 
 
 if __name__ == "__main__":

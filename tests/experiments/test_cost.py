@@ -60,6 +60,22 @@ def test_the_command_prints_what_was_agreed(capsys):
         assert row["executed"] is None or row["executed"] > 20
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("", "a kernel is needed, or --all"),
+        ("euler --all", "--all measures the whole catalogue in fixed point; euler does not go with it"),
+        ("--all --word 16", "--word does not go with it"),
+        ("--all --target c", "--target does not go with it"),
+        ("--all --method rk2", "--method does not go with it"),
+    ],
+)
+def test_the_whole_catalogue_is_measured_alone(words, said, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(["cost", *words.split()])
+    assert stop.value.code == 2 and said in capsys.readouterr().err
+
+
 def test_without_an_emulator_nothing_is_executed(monkeypatch):
     needed("cortex-m3")
     here = shutil.which

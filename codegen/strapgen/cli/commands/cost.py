@@ -72,8 +72,6 @@ def cost(
     that a call executes, from the entry of the function to its return.
 
     Example: strapgen cost euler dcm --cross arm-none-eabi-gcc --cpu cortex-m3 --max-rate-deg-s 400 --step 0.01
-
-    Example: strapgen cost --all --format markdown --out generated/COST.md
     """
     output.check(*(kernels or ()))
     _check_alone(kernels, all_, [*method.stated, *(["--target"] if target else []), *fixed.stated])
