@@ -65,9 +65,9 @@ _README = """# The standard catalogue, generated
 Do not edit: `{command}` rebuilds this folder, `{command} --check` tells what is out of step with the derivation.
 `numpy/` holds numpy modules, `c/` C99 in double, `c_float/` the same in float; `c_fixed/` 32-bit fixed point for
 increments of up to 1/8 rad, of every kernel whose inputs have ranges that no user must state; `strapgen cost --all`
-measures what these cost on microcontrollers. C shortens long names: `orth` stands for `orthonormalize`. Every name in a
-C file begins with its function's, so that all files of a folder can be compiled as one. Operations are those of one call
-in floating point.
+measures what these cost on microcontrollers. C shortens long names: `orth` stands for `orthonormalize`. Every name in
+a C file begins with its function's, so that all files of a folder can be compiled as one. Operations are those of one
+call in floating point.
 
 | kernel | | add | multiply | divide | sqrt | temporaries |
 |---|---|---|---|---|---|---|
