@@ -1,11 +1,15 @@
-"""How rounding turns the attitude over the steps of a run: a bound that grows with their number and is not stretched."""
+"""How rounding turns the attitude over the steps of a run: a bound that is linear in their number."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from fractions import Fraction
 from typing import Any
+
+#: Largest error of an element of an orthonormalization's result for which anything is proved.
+LARGEST_ERROR = Fraction(1, 1 << 12)
 
 
 @dataclass(frozen=True)
@@ -24,9 +28,12 @@ class AngleAccumulation:
         What every step adds, in rad.
     input_rounding : Fraction
         What every step adds if increments are rounded to their format first, in rad.
-    per_normalization : Fraction or None
-        What a normalization adds that multiplies the words of the state by one factor and rounds each of them once, in
-        rad; None for a matrix, where that is no orthonormalization.
+    per_normalization : Fraction
+        What a normalization adds that multiplies the words of the state by one factor and rounds each of them once; an
+        orthonormalization of a matrix adds it too, in rad.
+    per_element : Fraction or None
+        What an orthonormalization adds beside, times the error of an element of its result; None where nothing is
+        proved. It multiplies the matrix C by a symmetric expansion of the inverse root of C'C.
     shortest : Fraction
         Length, or singular value, from which the bound holds.
     start : Fraction
@@ -36,49 +43,53 @@ class AngleAccumulation:
         Number of steps in which the state is proved to stay proper.
     beyond : Fraction
         Factor of the bound of a run of more steps in which the state stays proper all the same.
+    orthonormalized : Fraction
+        Factor of what the steps add to a run with orthonormalizations.
     """
 
     once: Fraction
     per_step: Fraction
     input_rounding: Fraction
-    per_normalization: Fraction | None
+    per_normalization: Fraction
+    per_element: Fraction | None
     shortest: Fraction
     start: Fraction
     proved_steps: int
     beyond: Fraction
+    orthonormalized: Fraction
 
-    def bound(self, steps: int, normalizations: int = 0, rounded_inputs: bool = False) -> float:
-        """Return a bound of the angle after a number of steps, in rad.
+    def bound(
+        self, steps: int, normalizations: int = 0, error: Fraction | float = 0, rounded_inputs: bool = False
+    ) -> float:
+        """Return a bound of the angle after a number of steps, in rad; inf where nothing is proved.
 
         Parameters
         ----------
         steps : int
         normalizations : int, optional
-            Number of normalizations among them.
+            Number of normalizations, or of orthonormalizations, among them; at most `proved_steps` apart.
+        error : number, optional
+            Error bound of an element of an orthonormalization's result, up to `LARGEST_ERROR`; of no effect on a vector
+            of parameters.
         rounded_inputs : bool, optional
             Whether increments are rounded to their format first.
-
-        Raises
-        ------
-        ValueError
-            If there are normalizations and nothing is proved of them.
 
         Examples
         --------
         >>> one, unit = Fraction(1), Fraction(1, 1000)
-        >>> AngleAccumulation(4 * unit, unit, unit, 2 * unit, one / 2, one, 100, one).bound(10, normalizations=1)
+        >>> run = AngleAccumulation(4 * unit, unit, unit, 2 * unit, 0 * one, one / 2, one, 100, one, one)
+        >>> run.bound(10, normalizations=1)
         0.016
         """
-        total = self.once + steps * self.per_step
-        if rounded_inputs:
-            total += steps * self.input_rounding
+        total = self.once + steps * (self.per_step + (self.input_rounding if rounded_inputs else 0))
         if normalizations:
-            if self.per_normalization is None:
-                raise ValueError("no bound is known of a run with orthonormalizations of a matrix")
-            total += normalizations * self.per_normalization
+            if self.per_element is None or (self.per_element and error > LARGEST_ERROR):
+                return math.inf
+            added = self.per_normalization + self.per_element * Fraction(error)
+            total = total * self.orthonormalized + normalizations * added
         elif steps > self.proved_steps:
             total *= self.beyond
-        return float(total)
+        return math.nextafter(float(total), math.inf)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the record as plain JSON data; fractions are text."""
@@ -89,4 +100,7 @@ class AngleAccumulation:
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> AngleAccumulation:
         """Rebuild the record from `as_dict`."""
-        return cls(**{name: Fraction(x) if isinstance(x, str) else x for name, x in data.items()})
+        fractions: dict[str, Any] = {
+            name: Fraction(value) if isinstance(value, str) else value for name, value in data.items()
+        }
+        return cls(**fractions)

@@ -11,6 +11,7 @@ from strapgen.support import resources
 from strapgen.targets import contract
 from strapgen.targets.contract import elements_text, operations_text, range_text
 from strapgen.targets.lines import fill, fill_arguments
+from strapgen.targets.run_text import run_paragraphs
 
 if TYPE_CHECKING:
     import jinja2
@@ -50,7 +51,7 @@ def environment(folder: Path | None = None) -> jinja2.Environment:
         operations=operations_text,
         argument_text=contract.argument_text,
         fixed_command=contract.command,
-        accumulation_text=contract.accumulation_text,
+        run_paragraphs=run_paragraphs,
         residuals_text=contract.residuals_text,
         guards_text=contract.guards_text,
     )

@@ -19,13 +19,15 @@ from strapgen.fixedpoint.intervals import Interval
 from strapgen.fixedpoint.quantization_context import Quantization
 from strapgen.fixedpoint.runs.accumulation import StepErrors, norm, root, stretch
 from strapgen.fixedpoint.terms import up
-from strapgen.ir.angle_accumulation import AngleAccumulation
+from strapgen.ir.angle_accumulation import LARGEST_ERROR, AngleAccumulation
 from strapgen.ir.program import Constant, Node, Program, Reference, Result
 
 #: Elements of the vectors whose attitude turns by twice their angle: Euler and Cayley-Klein parameters.
 _PARAMETERS = 4
+#: Elements of the side of a matrix.
+_SIDE = 3
 #: The state may be this part of the way to the shortest when the proved steps begin.
-_START = Fraction(1, 16)
+_START = Fraction(1, 8)
 #: Sines of angles of one step for which the bound is worth anything.
 _LARGEST_SINE = Fraction(1, 2)
 
@@ -160,9 +162,11 @@ def _parameter_angles(sizes: _Sizes, errors: StepErrors, rounding: Fraction) -> 
         up(per_step),
         up(step_angle(_with_transition_error(sizes, errors.moves)) - per_step),
         up(2 * normalized),
+        Fraction(0),
         sizes.shortest,
         start,
         _steps(start - sizes.shortest - 2 * sizes.fed_back, 1 - sizes.contraction + sizes.added),
+        Fraction(1),
         Fraction(1),
     )
 
@@ -198,7 +202,7 @@ def _matrix_angles(sizes: _Sizes, errors: StepErrors) -> AngleAccumulation:
     """
     shortest, longest = sizes.shortest, sizes.longest
     uneven = (longest - shortest) / (longest + shortest)
-    proper = root((1 + uneven * uneven) / 2)
+    proper = _turning(uneven)
 
     def step_angle(sizes: _Sizes) -> Fraction:
         smallest = shortest - sizes.fed_back - sizes.added
@@ -215,16 +219,44 @@ def _matrix_angles(sizes: _Sizes, errors: StepErrors) -> AngleAccumulation:
     lower = _steps(start - shortest - 2 * sizes.fed_back, 1 - sizes.contraction + added)
     slack = longest - _longest(start) - 2 * sizes.fed_back
     upper = _steps(slack, longest * (sizes.expansion - 1) + added)
+    unsteady = _unsteadiness(shortest, start)
+    orthonormal = None if unsteady is None else _turning((uneven + unsteady) / (1 - unsteady))
+    per_element = orthonormal and orthonormal * _SIDE / shortest
     return AngleAccumulation(
         up(2 * end),
         up(per_step),
         up(step_angle(_with_transition_error(sizes, errors.moves)) - per_step),
-        None,
+        up(2 * end * (orthonormal or proper) / proper),
+        per_element and up(per_element),
         shortest,
         start,
         min(lower, upper),
         up(1 / proper),
+        up((orthonormal or proper) / proper),
     )
+
+
+def _turning(uneven: Fraction) -> Fraction:
+    """Return the angle that the nearest rotation turns for a change of M, by its symmetric part in so small a share.
+
+    Of an element and its mirror image the axis has half the difference; sums of squares follow by Cauchy and Schwarz.
+    """
+    return root((1 + uneven * uneven) / 2)
+
+
+def _unsteadiness(shortest: Fraction, start: Fraction) -> Fraction | None:
+    """Return the part of a symmetric change of M that an orthonormalization leaves; None if it restores too little.
+
+    The expansion of first order takes a singular value s to f(s) = s (3 - s^2)/2, with a slope of at most 3/2 |1 - s^2|;
+    those of higher order are flatter. The symmetric part of a change is multiplied by a difference quotient of f, and
+    the angle of the nearest rotation stays.
+    """
+    square = shortest * shortest
+    longest = _longest(shortest)
+    restored = min(shortest * (3 - square) / 2, longest * (1 + square) / 2)
+    unsteady = Fraction(3, 2) * (1 - square) * longest / restored
+    is_restored = restored - _SIDE * LARGEST_ERROR >= start
+    return unsteady if is_restored and unsteady < Fraction(1, 2) else None
 
 
 def _steps(room: Fraction, lost: Fraction) -> int:
@@ -241,7 +273,7 @@ def _root_below(value: Fraction) -> Fraction:
 
 
 def _products(program: Program, transition: Result) -> list[_Polynomial] | None:
-    """Return the state after a step as polynomials of state "s0", "s1", ... and transition "t0", ...; None if it is none."""
+    """Return the new state as polynomials of state "s0", ... and transition "t0", ...; None if it is none."""
     state, (result, *others) = program.inputs[0], program.outputs
     names = [node.name for node in transition.nodes if isinstance(node, Reference)]
     if others or len(set(names)) < len(transition.nodes) or len(names) != state.size != 0:
@@ -314,15 +346,19 @@ def _multiplies_lengths(terms: list[_Polynomial]) -> bool:
     square: _Polynomial = {}
     for term in terms:
         square = _sum(square, _product(term, term), 1)
-    lengths = [{(f"{x}{k}", f"{x}{k}"): Fraction(1) for k in range(_PARAMETERS)} for x in "st"]
-    return square == _product(*lengths)
+    state, transition = (_square_of_length(name) for name in ("s", "t"))
+    return square == _product(state, transition)
+
+
+def _square_of_length(name: str) -> _Polynomial:
+    return {(f"{name}{k}", f"{name}{k}"): Fraction(1) for k in range(_PARAMETERS)}
 
 
 def _multiplies_matrices(program: Program, terms: list[_Polynomial]) -> bool:
     """Tell whether a step multiplies the matrix by the transition on the right."""
-    rows, columns = program.inputs[0].shape
-    return rows == columns and terms == [
-        {(f"s{rows * i + k}", f"t{rows * k + j}"): Fraction(1) for k in range(rows)}
-        for i in range(rows)
-        for j in range(rows)
+    places = range(_SIDE)
+    return program.inputs[0].shape == (_SIDE, _SIDE) and terms == [
+        {(f"s{_SIDE * i + k}", f"t{_SIDE * k + j}"): Fraction(1) for k in places}
+        for i in places
+        for j in places
     ]
