@@ -138,19 +138,22 @@ class Adversary:
             return np.zeros(3)
         left = (feedback.astype(float) - self.fresh) * self.units
         size = after.shape[-1]
-        added = left[:, :size]
-        if left.shape[-1] > size and size == 4:
+        added = left[:, :size][:, self.order]
+        transition = left[:, size:]
+        if transition.size and size == 4:
             names = [word.name[-1] for word in self.interface.residuals[size:]]
-            order = [names.index(axis) for axis in "xyzs"]
-            added = added[:, self.order] + product(before, left[:, size:][:, order])
-            return turn(after, added)
-        return turn(after, added[:, self.order] if size == 4 else added)
+            added = added + product(before, transition[:, [names.index(axis) for axis in "xyzs"]])
+        elif transition.size:
+            matrices = (array.reshape(-1, 3, 3) for array in (before, transition))
+            added = added + np.matmul(*matrices).reshape(-1, size)
+        return turn(after, added)
 
     @property
     def order(self) -> list[int]:
         """Places of the words that are fed back into the state's elements, in order."""
-        names = [word.name.removeprefix("residual_") for word in self.interface.residuals[:4]]
-        return [names.index(element) for element in self.interface.outputs[0].signal.elements]
+        elements = self.interface.outputs[0].signal.elements
+        names = [word.name.removeprefix("residual_") for word in self.interface.residuals]
+        return [names.index(element) for element in elements]
 
     def normalize(self) -> None:
         """Normalize the state, in fixed point and exactly."""

@@ -247,8 +247,8 @@ def _turning(uneven: Fraction) -> Fraction:
 def _unsteadiness(shortest: Fraction, start: Fraction) -> Fraction | None:
     """Return the part of a symmetric change of M that an orthonormalization leaves; None if it restores too little.
 
-    The expansion of first order takes a singular value s to f(s) = s (3 - s^2)/2, with a slope of at most 3/2 |1 - s^2|;
-    those of higher order are flatter. The symmetric part of a change is multiplied by a difference quotient of f, and
+    The expansion of first order takes a singular value s to f(s) = s (3 - s^2)/2, whose slope is 3/2 (1 - s^2); those
+    of higher order are flatter. The symmetric part of a change is multiplied by a difference quotient of f, and
     the angle of the nearest rotation stays.
     """
     square = shortest * shortest
