@@ -16,8 +16,12 @@ import numpy as np
 import strapgen
 from strapgen.backends.fixed import FixedBackend
 
-#: A matrix is orthonormalized, a vector normalized, by the kernel that goes with the step.
-NORMALIZATIONS = {"euler": "euler-normalize", "cayley-klein": "cayley-klein-normalize"}
+#: What restores a state.
+NORMALIZATIONS = {
+    "euler": "euler-normalize",
+    "cayley-klein": "cayley-klein-normalize",
+    "dcm": "dcm-orthonormalize-first-order",
+}
 
 
 def _quaternion_products() -> np.ndarray:
@@ -107,8 +111,8 @@ class Adversary:
         feedbacks = self.interface.residuals
         self.fresh = np.array([word.fresh for word in feedbacks], float)
         self.units = np.array([2.0**-word.fraction for word in feedbacks])
-        if algorithm in NORMALIZATIONS:
-            self.normalization = self.backend.beside(NORMALIZATIONS[algorithm])
+        self.normalization = self.backend.beside(NORMALIZATIONS[algorithm])
+        self.exact_normalization = strapgen.evaluator(NORMALIZATIONS[algorithm])
 
     def numbers(self, integers: np.ndarray) -> np.ndarray:
         """Return states as numbers, (count, elements)."""
@@ -161,7 +165,7 @@ class Adversary:
         count = len(self.normalization.interface.residuals)
         (self.state,), first = self.normalization.run([self.state], self.feedback[:, :count])
         self.feedback = np.concatenate([first, self.feedback[:, count:]], axis=1)
-        exact = before / np.linalg.norm(before)
+        exact = self.exact_normalization(before.reshape(self.backend.state_shape)).reshape(1, -1)
         after = self.numbers(self.state)
         self.sum = self.sum + turn(after, after - exact)[0]
 
@@ -180,7 +184,7 @@ class Adversary:
         """
         every = max(1, steps // records)
         counts, errors, bounds, lengths, rows = [], [], [], [], []
-        adds_up = self.interface.angle_accumulation
+        adds_up, (result,) = self.interface.angle_accumulation, self.normalization.interface.outputs
         for number in range(1, steps + 1):
             rows.append(self.step(candidates))
             normalizations = number // normalize_every if normalize_every else 0
@@ -189,7 +193,7 @@ class Adversary:
             if number % every == 0:
                 counts.append(number)
                 errors.append(float(np.linalg.norm(self.sum)))
-                bounds.append(adds_up.bound(number, normalizations))
+                bounds.append(adds_up.bound(number, normalizations, max(result.errors)))
                 state = self.numbers(self.state).reshape(self.backend.state_shape)
                 lengths.append(np.linalg.norm(state, axis=-1))
         final = self.numbers(self.state).reshape(self.backend.state_shape)

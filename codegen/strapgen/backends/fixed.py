@@ -22,7 +22,7 @@ from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.toolchain import compiler
 
 #: Orthonormalizations that leave the attitude where it is, but for rounding: one factor for all parameters, and for
-#: matrices a symmetric expansion of the inverse root of C'C. The scheme of dual rows turns it by a little.
+#: matrices a symmetric expansion of the inverse root of C'C.
 KEEP_THE_ATTITUDE = frozenset(
     (
         *("euler-normalize", "euler-normalize-first-order"),
@@ -30,6 +30,9 @@ KEEP_THE_ATTITUDE = frozenset(
         *("dcm-orthonormalize-first-order", "dcm-orthonormalize-second-order"),
     )
 )
+
+#: The orthonormalization that turns the attitude by a little: the scheme of dual rows.
+DUAL_ROWS = "dcm-orthonormalize"
 
 
 def integers(argument: Argument, values: Any, kernel: str) -> Array:
@@ -218,18 +221,21 @@ class FixedBackend(Backend):
         shortest: float = 0.0,
     ) -> float | None:
         """Return the certified bound of the angle by which rounding turns the attitude, see `Backend.angle_bound`."""
-        angles, count, error = self.interface.angle_accumulation, 0, Fraction(0)
+        angles, count, error, dual_rows = self.interface.angle_accumulation, 0, Fraction(0), False
         if angles is None:
             return None
         if (orthonormalize_every or steps) > angles.proved_steps and shortest < angles.shortest:
             return None
         if orthonormalize_every:
             kernel = self._need_orthonormalization()
-            if kernel not in KEEP_THE_ATTITUDE:
+            dual_rows = kernel == DUAL_ROWS
+            if not (
+                kernel in KEEP_THE_ATTITUDE or (dual_rows and orthonormalize_every <= angles.dual_rows_apart)
+            ):
                 return None
             count = steps // orthonormalize_every
             error = max(self.beside(kernel).interface.outputs[0].errors)
-        bound = angles.bound(steps, count, error, rounded_inputs)
+        bound = angles.bound(steps, count, error, rounded_inputs, dual_rows)
         return bound if math.isfinite(bound) else None
 
     @abstractmethod

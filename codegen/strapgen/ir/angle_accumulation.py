@@ -45,6 +45,10 @@ class AngleAccumulation:
         Factor of the bound of a run of more steps in which the state stays proper all the same.
     orthonormalized : Fraction
         Factor of what the steps add to a run with orthonormalizations.
+    dual_rows_apart : int
+        Most steps from one orthonormalization by dual rows to the next; 0 where nothing is proved of that scheme.
+    dual_rows_growth : Fraction
+        With that scheme, every orthonormalization stretches the error before it by 1 and this much at most.
     """
 
     once: Fraction
@@ -57,9 +61,26 @@ class AngleAccumulation:
     proved_steps: int
     beyond: Fraction
     orthonormalized: Fraction
+    dual_rows_apart: int
+    dual_rows_growth: Fraction
+
+    @property
+    def dual_rows_error(self) -> Fraction:
+        """Largest error of an element of an orthonormalization by dual rows for which anything is proved."""
+        return (1 - self.shortest) / 1024
+
+    @property
+    def dual_rows_start(self) -> Fraction:
+        """How far from 1 the squared singular values of a matrix may be where a run with dual rows begins."""
+        return (1 - self.shortest) / 65
 
     def bound(
-        self, steps: int, normalizations: int = 0, error: Fraction | float = 0, rounded_inputs: bool = False
+        self,
+        steps: int,
+        normalizations: int = 0,
+        error: Fraction | float = 0,
+        rounded_inputs: bool = False,
+        dual_rows: bool = False,
     ) -> float:
         """Return a bound of the angle after a number of steps, in rad; inf where nothing is proved.
 
@@ -67,29 +88,42 @@ class AngleAccumulation:
         ----------
         steps : int
         normalizations : int, optional
-            Number of normalizations, or of orthonormalizations, among them; at most `proved_steps` apart.
+            Number of normalizations, or of orthonormalizations, among them; at most `proved_steps` apart, and those by
+            dual rows `dual_rows_apart`.
         error : number, optional
             Error bound of an element of an orthonormalization's result, up to `LARGEST_ERROR`; of no effect on a vector
             of parameters.
         rounded_inputs : bool, optional
             Whether increments are rounded to their format first.
+        dual_rows : bool, optional
+            Whether the scheme of dual rows orthonormalizes.
 
         Examples
         --------
         >>> one, unit = Fraction(1), Fraction(1, 1000)
-        >>> run = AngleAccumulation(4 * unit, unit, unit, 2 * unit, 0 * one, one / 2, one, 100, one, one)
+        >>> run = AngleAccumulation(4 * unit, unit, unit, 2 * unit, 0 * one, one / 2, one, 100, one, one, 0, 0 * one)
         >>> run.bound(10, normalizations=1)
         0.016
         """
         total = self.once + steps * (self.per_step + (self.input_rounding if rounded_inputs else 0))
         if normalizations:
-            if self.per_element is None or (self.per_element and error > LARGEST_ERROR):
+            limit = self.dual_rows_error if dual_rows else LARGEST_ERROR
+            if self.per_element is None or (self.per_element and error > limit):
                 return math.inf
             added = self.per_normalization + self.per_element * Fraction(error)
             total = total * self.orthonormalized + normalizations * added
+            if dual_rows:
+                return self._stretched(total, normalizations)
         elif steps > self.proved_steps:
             total *= self.beyond
         return math.nextafter(float(total), math.inf)
+
+    def _stretched(self, total: Fraction, normalizations: int) -> float:
+        """Return a bound after so many orthonormalizations by dual rows."""
+        exponent = normalizations * float(self.dual_rows_growth)
+        if not self.dual_rows_apart or exponent > 100:
+            return math.inf
+        return float(total) * math.exp(exponent) * (1 + 1e-12)  # which covers the rounding of this line
 
     def as_dict(self) -> dict[str, Any]:
         """Return the record as plain JSON data; fractions are text."""

@@ -68,6 +68,12 @@ def _matrix_words(angles: AngleAccumulation) -> list[str]:
             f"({fixed}{_above(angles.per_element)} h) M rad, with h the error of an element that their header states, "
             f"up to {_below(LARGEST_ERROR)}."
         )
+    if angles.dual_rows_apart:
+        words.append(
+            f"With dual rows, as dcm_orthonormalize has them, at most {angles.dual_rows_apart} steps apart, h up to "
+            f"{_below(angles.dual_rows_error)}, from a C'C with eigenvalues within {_below(angles.dual_rows_start)} "
+            f"of 1, all that is exp({_above(angles.dual_rows_growth)} M) times as much."
+        )
     return words
 
 

@@ -11,7 +11,7 @@ state with what will be fed back added to it.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import product
 
@@ -134,7 +134,7 @@ def _longest(shortest: Fraction) -> Fraction:
 
 def _with_transition_error(sizes: _Sizes, moves: tuple[Fraction, ...]) -> _Sizes:
     """Return the same with increments rounded to their format: an error of the transition."""
-    return _Sizes(**{**vars(sizes), "transition": sizes.transition + norm(moves)})
+    return replace(sizes, transition=sizes.transition + norm(moves))
 
 
 # Parameters
@@ -154,6 +154,8 @@ def _parameter_angles(sizes: _Sizes, errors: StepErrors, rounding: Fraction) -> 
     per_step = step_angle(sizes)
     end = sizes.state_feedback / sizes.shortest + _length_before(sizes) * sizes.transition_feedback
     start = 1 - _START * (1 - sizes.shortest)
+    # Two steps before, a state may have been longer.
+    lost = replace(sizes, longest=max(sizes.longest, _length_before(sizes) ** 2))
     words = rounding * root(Fraction(_PARAMETERS)) / sizes.shortest
     # With error feedback: what was left before, what is left now, and what the sum itself loses.
     normalized = _arcsine(3 * words) + 2 * _arcsine(end) if sizes.fed_back else _arcsine(words)
@@ -165,9 +167,11 @@ def _parameter_angles(sizes: _Sizes, errors: StepErrors, rounding: Fraction) -> 
         Fraction(0),
         sizes.shortest,
         start,
-        _steps(start - sizes.shortest - 2 * sizes.fed_back, 1 - sizes.contraction + sizes.added),
+        _steps(start - sizes.shortest - 2 * sizes.fed_back, 1 - sizes.contraction + lost.added),
         Fraction(1),
         Fraction(1),
+        0,
+        Fraction(0),
     )
 
 
@@ -222,6 +226,7 @@ def _matrix_angles(sizes: _Sizes, errors: StepErrors) -> AngleAccumulation:
     unsteady = _unsteadiness(shortest, start)
     orthonormal = None if unsteady is None else _turning((uneven + unsteady) / (1 - unsteady))
     per_element = orthonormal and orthonormal * _SIDE / shortest
+    apart, growth = _dual_rows(sizes, unsteady)
     return AngleAccumulation(
         up(2 * end),
         up(per_step),
@@ -233,6 +238,8 @@ def _matrix_angles(sizes: _Sizes, errors: StepErrors) -> AngleAccumulation:
         min(lower, upper),
         up(1 / proper),
         up((orthonormal or proper) / proper),
+        apart,
+        up(growth),
     )
 
 
@@ -257,6 +264,29 @@ def _unsteadiness(shortest: Fraction, start: Fraction) -> Fraction | None:
     unsteady = Fraction(3, 2) * (1 - square) * longest / restored
     is_restored = restored - _SIDE * LARGEST_ERROR >= start
     return unsteady if is_restored and unsteady < Fraction(1, 2) else None
+
+
+def _dual_rows(sizes: _Sizes, unsteady: Fraction | None) -> tuple[int, Fraction]:
+    """Return the most steps between orthonormalizations by dual rows, and how much each stretches an error.
+
+    Let singular values differ from 1 by at most e. Adding dual rows makes F = Q f(S) of Q S, with f = s_i + s_j s_k:
+    F F' is a multiple of 1 + H, and H at most 9/8 e^2. A change of M has a skew part w and a symmetric one y; F turns
+    by w + K y, with K below e/(1 - e), and the rest of its change is less than 13/5 e y beside a multiple of 1. Dividing
+    rows by their lengths removes that multiple, and adds to the change at most 3/2 H times as much, to its skew part
+    H^2. So w + t y grows no faster than told, if t leaves y no share in the growth.
+    """
+    if unsteady is None:
+        return 0, Fraction(0)
+    e = (1 - sizes.shortest) / 16
+    square, turned, rest = Fraction(9, 8) * e * e, e / (1 - e), Fraction(13, 5) * e
+    from_symmetric = Fraction(101, 100) * turned + Fraction(11, 10) * rest
+    remaining = Fraction(3, 2) * square * turned + Fraction(11, 10) * rest
+    weight = from_symmetric / (1 - remaining)
+    expansion = (1 + e) * (sizes.expansion - 1)
+    lost = max(1 - sizes.contraction, expansion) + sizes.added
+    # An orthonormalization returns singular values within e/8 of 1.
+    apart = _steps(Fraction(7, 8) * e - 2 * sizes.fed_back, lost)
+    return apart if weight <= unsteady else 0, square * square + weight * Fraction(3, 2) * square
 
 
 def _steps(room: Fraction, lost: Fraction) -> int:
