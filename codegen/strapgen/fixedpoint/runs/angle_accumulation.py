@@ -271,9 +271,9 @@ def _dual_rows(sizes: _Sizes, unsteady: Fraction | None) -> tuple[int, Fraction]
 
     Let singular values differ from 1 by at most e. Adding dual rows makes F = Q f(S) of Q S, with f = s_i + s_j s_k:
     F F' is a multiple of 1 + H, and H at most 9/8 e^2. A change of M has a skew part w and a symmetric one y; F turns
-    by w + K y, with K below e/(1 - e), and the rest of its change is less than 13/5 e y beside a multiple of 1. Dividing
-    rows by their lengths removes that multiple, and adds to the change at most 3/2 H times as much, to its skew part
-    H^2. So w + t y grows no faster than told, if t leaves y no share in the growth.
+    by w + K y, with K below e/(1 - e), and the rest of its change is less than 13/5 e y beside a multiple of 1.
+    Dividing rows by their lengths removes that multiple, and adds to the change at most 3/2 H times as much, to its
+    skew part H^2. So w + t y grows no faster than told, if t leaves y no share in the growth.
     """
     if unsteady is None:
         return 0, Fraction(0)
