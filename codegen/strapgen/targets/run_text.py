@@ -87,7 +87,8 @@ def _table(interface: Interface, angles: AngleAccumulation) -> list[str]:
     apart = min(_APART, angles.proved_steps)
     is_restored = angles.per_element is not None and apart > 0
     error = _UNITS * interface.inputs[0].format.unit if angles.per_element else Fraction(0)
-    kind = f"orthonormalized, h = {_UNITS} units of the last place," if angles.per_element else "normalized"
+    to_first_order = f"orthonormalized to first order (h = {_UNITS} units of the last place)"
+    kind = to_first_order if angles.per_element else "normalized"
     lines = []
     for steps, what in _runs(interface.settings.stated):
         line = f"- N = {steps}{what}: {_angle(angles.bound(steps))}"
