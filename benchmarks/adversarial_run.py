@@ -109,7 +109,9 @@ class Adversary:
         )
         self.feedback = self.backend.evaluator.fresh(1)
         feedbacks = self.interface.residuals
-        self.fresh = np.array([word.fresh for word in feedbacks], float)
+        self.middle = 2.0 ** (
+            settings.word - 1
+        )  # whatever the rounding: a constant cancels from step to step
         self.units = np.array([2.0**-word.fraction for word in feedbacks])
         self.normalization = self.backend.beside(NORMALIZATIONS[algorithm])
         self.exact_normalization = strapgen.evaluator(NORMALIZATIONS[algorithm])
@@ -140,7 +142,7 @@ class Adversary:
         """Return by how much what will be fed back will turn the states."""
         if not feedback.size:
             return np.zeros(3)
-        left = (feedback.astype(float) - self.fresh) * self.units
+        left = (feedback.astype(float) - self.middle) * self.units
         size = after.shape[-1]
         added = left[:, :size][:, self.order]
         transition = left[:, size:]

@@ -114,11 +114,13 @@ def _sizes(context: Quantization, transition: Result, errors: StepErrors, is_mat
         contraction, expansion = _root_below(1 - stretched), root(1 + stretched)
     shortest = 1 - context.settings.allowance
     fed_back = errors.state_feedback if context.settings.carry != "none" else Fraction(0)
+    # What is left is told from half a unit, also where it was cut off: a constant in it cancels from step to step.
+    centred = Fraction(1, 2) / context.rounding_error
     return _Sizes(
         norm(errors.local),
         norm(errors.transition),
-        fed_back * root(Fraction(state.size)),
-        norm(errors.transition_feedback),
+        centred * fed_back * root(Fraction(state.size)),
+        centred * norm(errors.transition_feedback),
         away,
         shortest,
         _longest(shortest),
