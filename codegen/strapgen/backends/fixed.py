@@ -5,8 +5,10 @@ Both convert every input to integers and refuse a number outside the range that 
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -18,6 +20,19 @@ from strapgen.ir.fixed_interface import Argument, Interface
 from strapgen.ir.sources import Sources
 from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.toolchain import compiler
+
+#: Orthonormalizations that leave the attitude where it is, but for rounding: one factor for all parameters, and for
+#: matrices a symmetric expansion of the inverse root of C'C.
+KEEP_THE_ATTITUDE = frozenset(
+    (
+        *("euler-normalize", "euler-normalize-first-order"),
+        *("cayley-klein-normalize", "cayley-klein-normalize-first-order"),
+        *("dcm-orthonormalize-first-order", "dcm-orthonormalize-second-order"),
+    )
+)
+
+#: The orthonormalization that turns the attitude by a little: the scheme of dual rows.
+DUAL_ROWS = "dcm-orthonormalize"
 
 
 def integers(argument: Argument, values: Any, kernel: str) -> Array:
@@ -197,6 +212,35 @@ class FixedBackend(Backend):
         """Return the certified bound of a run's rounding, see `Backend.rounding_bound`; None without a transition."""
         accumulation = self.interface.accumulation
         return None if accumulation is None else accumulation.bound(steps, rounded_inputs)
+
+    def angle_bound(
+        self,
+        steps: int,
+        rounded_inputs: bool = False,
+        orthonormalize_every: int = 0,
+        shortest: float = 0.0,
+    ) -> float | None:
+        """Return the certified bound of the angle by which rounding turns the attitude, see `Backend.angle_bound`."""
+        angles, count, error, dual_rows = self.interface.angle_accumulation, 0, Fraction(0), False
+        if angles is None:
+            return None
+        if (orthonormalize_every or steps) > angles.proved_steps and shortest < angles.shortest:
+            return None
+        if orthonormalize_every:
+            kernel = self._need_orthonormalization()
+            dual_rows = kernel == DUAL_ROWS
+            if not (
+                kernel in KEEP_THE_ATTITUDE or (dual_rows and orthonormalize_every <= angles.dual_rows_apart)
+            ):
+                return None
+            count = steps // orthonormalize_every
+            error = max(self.beside(kernel).interface.outputs[0].errors)
+        bound = angles.bound(steps, count, error, rounded_inputs, dual_rows)
+        return bound if math.isfinite(bound) else None
+
+    @abstractmethod
+    def beside(self, kernel: str) -> FixedEvaluator:
+        """Return another kernel in fixed point, see `Backend.beside`."""
 
     def representable(self, increments: Any) -> Array:
         """Return increments rounded to the input's format."""

@@ -139,6 +139,36 @@ class Backend(ABC):
         """
         return None
 
+    def angle_bound(
+        self,
+        steps: int,
+        rounded_inputs: bool = False,
+        orthonormalize_every: int = 0,
+        shortest: float = 0.0,
+    ) -> float | None:
+        """Return a certified bound of the angle by which rounding turns the attitude over a run.
+
+        A run begins at a proper attitude. The bound holds while the state stays near one: `AngleAccumulation` says how
+        near, and for how many steps that is proved.
+
+        Parameters
+        ----------
+        steps : int
+        rounded_inputs : bool, optional
+            Whether the bound covers increments that must be rounded to the input's format first.
+        orthonormalize_every : int, optional
+            Steps from one orthonormalization to the next; 0 for none.
+        shortest : float, optional
+            Length that no state of the run falls short of, or singular value of a matrix, where more is known of it
+            than is proved of every run.
+
+        Returns
+        -------
+        float or None
+            Angle in rad from the same algorithm in exact arithmetic; None where nothing is certified.
+        """
+        return None
+
     def representable(self, increments: Any) -> Array:
         """Return increments rounded to the numbers that the step takes: in floating point, to `dtype`."""
         return np.asarray(increments, self.dtype)

@@ -28,6 +28,8 @@ Array = NDArray[np.float64]
 _TIMED = 3
 #: Number of steps, about, at which a history has the certified bound.
 _BOUNDS = 65
+#: Angle up to which a bound of an angle is taken, in rad: lengths then differ by less than a sixty-fourth.
+_SMALL_ANGLE = 1 / 32
 
 
 @dataclass(frozen=True)
@@ -201,7 +203,9 @@ def certified_angle(candidate: Backend, increments: Array, reference: Array) -> 
 
     The angle is the length of the drift vector, the skew-symmetric part of the product of one matrix and the transpose
     of the other. Where states differ by at most b in length, and reference states have at most length s, it is at most
-    sqrt(3/2) s b for rows of matrices, and 2 s b (s^2 + s b) for Euler parameters.
+    sqrt(3/2) s b for rows of matrices, and 2 s b (s^2 + s b) for Euler parameters. Where rounding turns these by an
+    angle of at most a, it changes their length by no more than a factor exp(a/2), and the drift vector is at most
+    a s^4 exp(a).
 
     Parameters
     ----------
@@ -224,12 +228,20 @@ def _angle_bound(candidate: Backend, increments: Array, reference: Array) -> Cal
     matrix = candidate.attitude is None
     norms = np.linalg.norm(reference, ord=2, axis=(-2, -1)) if matrix else np.linalg.norm(reference, axis=-1)
     size = float(norms.max())
+    # The computed state is as long as the exact one up to a factor exp(a/2).
+    shortest = float(norms.min()) * math.exp(-_SMALL_ANGLE / 2)
 
     def bound(steps: int) -> float | None:
+        known = []
         length = candidate.rounding_bound(steps, rounded)
-        if length is None or not math.isfinite(length):
-            return None
-        return math.sqrt(1.5) * size * length if matrix else 2 * size * length * (size**2 + size * length)
+        if length is not None and math.isfinite(length):
+            known.append(
+                math.sqrt(1.5) * size * length if matrix else 2 * size * length * (size**2 + size * length)
+            )
+        angle = None if matrix else candidate.angle_bound(steps, rounded, shortest=shortest)
+        if angle is not None and angle < _SMALL_ANGLE:
+            known.append(angle * size**4 * math.exp(angle))
+        return min(known, default=None)
 
     return bound
 

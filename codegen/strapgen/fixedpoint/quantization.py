@@ -8,7 +8,6 @@ from fractions import Fraction
 from typing import Any
 
 from strapgen.fixedpoint import derivation
-from strapgen.fixedpoint.accumulation import accumulation
 from strapgen.fixedpoint.alignment import aligning
 from strapgen.fixedpoint.comparisons import (
     lower_computed,
@@ -31,6 +30,8 @@ from strapgen.fixedpoint.quantities import (
 )
 from strapgen.fixedpoint.quantization_context import Quantization
 from strapgen.fixedpoint.quotients_and_roots import lower_quotient, lower_root
+from strapgen.fixedpoint.runs.accumulation import accumulation, step_errors
+from strapgen.fixedpoint.runs.angle_accumulation import angle_accumulation
 from strapgen.fixedpoint.sums import lower_sum
 from strapgen.ir.fixed_interface import Argument, ErrorFeedback, Interface
 from strapgen.ir.fixed_settings import Settings
@@ -69,8 +70,15 @@ def lowered(program: Program, settings: Settings) -> FixedProgram:
     if program.companions is None or program.transition is None:
         return fixed
     (result,) = fixed.interface.outputs
-    adds_up = accumulation(context, program.transition, result)
-    return replace(fixed, interface=replace(fixed.interface, accumulation=adds_up))
+    errors = step_errors(context, program.transition, result)
+    if errors is None:
+        return fixed
+    interface = replace(
+        fixed.interface,
+        accumulation=accumulation(context, program.transition, errors),
+        angle_accumulation=angle_accumulation(context, program.transition, errors),
+    )
+    return replace(fixed, interface=interface)
 
 
 def _planned(program: Program, settings: Settings) -> tuple[Quantities, FormatPlan]:

@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from typing import Any
 
+from strapgen.ir.angle_accumulation import AngleAccumulation
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.formats import Format
 from strapgen.ir.signals import Signal
@@ -166,6 +167,8 @@ class Interface:
         Error feedback, from call to call.
     accumulation : RoundingAccumulation or None
         How the rounding of a step adds up; None for other kernels.
+    angle_accumulation : AngleAccumulation or None
+        How it adds up as an angle; None where that is not proved.
     """
 
     settings: Settings
@@ -173,6 +176,7 @@ class Interface:
     outputs: tuple[Argument, ...]
     residuals: tuple[ErrorFeedback, ...]
     accumulation: RoundingAccumulation | None
+    angle_accumulation: AngleAccumulation | None = None
 
     @property
     def companion_settings(self) -> Settings:
@@ -188,16 +192,18 @@ class Interface:
             "outputs": [argument.as_dict() for argument in self.outputs],
             "residuals": [asdict(feedback) for feedback in self.residuals],
             "accumulation": adds_up and {name: str(value) for name, value in asdict(adds_up).items()},
+            "angle_accumulation": self.angle_accumulation and self.angle_accumulation.as_dict(),
         }
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Interface:
         """Rebuild an interface from `as_dict`."""
-        adds_up = data["accumulation"]
+        adds_up, as_angle = data["accumulation"], data["angle_accumulation"]
         return cls(
             Settings.from_dict(data["settings"]),
             tuple(map(Argument.from_dict, data["inputs"])),
             tuple(map(Argument.from_dict, data["outputs"])),
             tuple(ErrorFeedback(**feedback) for feedback in data["residuals"]),
             adds_up and RoundingAccumulation(**{name: Fraction(value) for name, value in adds_up.items()}),
+            as_angle and AngleAccumulation.from_dict(as_angle),
         )

@@ -294,7 +294,7 @@ class FixedProgram:
 
     def as_data(self) -> dict[str, Any]:
         """Return formats, ranges and error bounds as plain JSON data."""
-        adds_up = self.interface.accumulation
+        adds_up, as_angle = self.interface.accumulation, self.interface.angle_accumulation
         elements = (
             zip(argument.signal.elements, argument.errors, strict=True) for argument in self.interface.outputs
         )
@@ -306,4 +306,9 @@ class FixedProgram:
             "error_bound_by_element": {name: float(error) for pairs in elements for name, error in pairs},
             "integer_operations": self.operations,
             "accumulation": adds_up and {name: float(value) for name, value in asdict(adds_up).items()},
+            "angle_accumulation": as_angle
+            and {
+                name: float(value) if isinstance(value, Fraction) else value
+                for name, value in asdict(as_angle).items()
+            },
         }
