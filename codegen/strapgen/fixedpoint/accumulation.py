@@ -163,15 +163,36 @@ def _growth(program: Program, transition: Result, quantities: Quantities, width:
     The transition is expanded in its inputs to a degree at which it stays short, the rest bounded; in T T' - 1 the
     terms then cancel that a rotation does not have.
     """
-    if program.companions is not None and program.companions.isometry:
-        return Fraction(1)
     inputs = [name for signal in program.inputs[1:] for name in signal.elements]
     sizes = tuple(quantities.items[name].range.magnitude for name in inputs)
+    elements = quantities.results[transition.signal.name]
+    # What is added to the identity, where the transition calls functions.
+    away = _norm([quantities.distance(name) for name in elements if isinstance(name, str)])
+    return transition_growth(program, transition, sizes, width, 1 + away)
+
+
+def transition_growth(
+    program: Program, transition: Result, sizes: tuple[Fraction, ...], width: int, coarse: Fraction
+) -> Fraction:
+    """Return a number that is not below the norm of any transition.
+
+    Parameters
+    ----------
+    program : Program
+    transition : Result
+    sizes : tuple of Fraction
+        Largest magnitude of every element of the inputs behind the state.
+    width : int
+        Elements of a row of the state.
+    coarse : Fraction
+        Such a number for a transition that calls functions.
+    """
+    if program.companions is not None and program.companions.isometry:
+        return Fraction(1)
     try:
         return _expanded_growth(program, transition, sizes, width)
-    except NotImplementedError:  # it calls functions: the identity, and the length of what is added to it
-        elements = quantities.results[transition.signal.name]
-        return 1 + _norm([quantities.distance(name) for name in elements if isinstance(name, str)])
+    except NotImplementedError:
+        return coarse
 
 
 @lru_cache(maxsize=64)
