@@ -41,8 +41,8 @@ class Condition:
 class RoundingBounds:
     """Bounds of how far the generated code is from exact arithmetic on the same inputs.
 
-    They hold in arithmetic of IEEE 754 with rounding to the nearest and subnormal numbers, evaluated in its own type and
-    without contraction of products and sums.
+    They hold in arithmetic of IEEE 754 with rounding to the nearest and with subnormal numbers, where every operation
+    is rounded to the type and no product and sum are contracted.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ class RoundingBounds:
         return Fraction(2, 1 << self.precision)
 
     @property
-    def worst(self) -> Mapping[str, Fraction]:
+    def worst(self) -> dict[str, Fraction]:
         """The largest error bound of an element by the name of the output."""
         return {name: max(errors) for name, errors in self.errors.items()}
 
@@ -90,7 +90,8 @@ class RoundingBounds:
             "inputs": {condition.value: float(condition.high) for condition in self.inputs},
             "conditions": {c.value: [float(c.low), float(c.high)] for c in self.conditions},
             "functions": list(self.functions),
-            "errors": {name: [_up(error) for error in errors] for name, errors in self.errors.items()} or None,
+            "errors": {name: [_up(error) for error in errors] for name, errors in self.errors.items()}
+            or None,
             "run": adds_up and {"per_step": _up(adds_up.per_step), "growth": _up(adds_up.growth - 1)},
             "reason": self.reason or None,
         }

@@ -25,7 +25,6 @@ from strapgen.rounding.no_bound import NoBoundError
 from strapgen.rounding.number_formats import NUMBERS
 from strapgen.rounding.sensitivities import sensitivities, slopes
 from strapgen.support import checks
-from strapgen.support.exceptions import InputError
 
 #: The functions of the C library that operations call.
 _LIBRARY = {"sin": "sin", "cos": "cos", "sinc": "sin"}
@@ -104,10 +103,12 @@ def rounding_bounds(
     for name in settings.ranges:
         checks.choice(f"input of {program.kernel}", name, names)
     format_ = NUMBERS[number]
-    try:
-        limits = tuple((s.name, largest_magnitude(program, s, settings)) for s in program.inputs)
-    except InputError as error:
-        return RoundingBounds(number, format_.precision, reason=str(error))
+    known = {*settings.ranges, "increments", "turns"}
+    for signal in program.inputs:
+        if signal.bound is None and not signal.constraint and signal.name not in known:
+            reason = f"the range of {signal.name} is not known"
+            return RoundingBounds(number, format_.precision, reason=reason)
+    limits = tuple((s.name, largest_magnitude(program, s, settings)) for s in program.inputs)
     inputs = tuple(Condition(name, -largest, largest) for name, largest in limits)
     analysis = _analysis(program, limits)
     if isinstance(analysis, str):

@@ -6,7 +6,7 @@ rounding, and q, of second order, is what the derivative f' leaves out. Only r a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 
@@ -139,9 +139,7 @@ class ComputedNumbers:
         (argument,) = expression.arguments
         radicand, exact = self.items[argument], self.ranges[place]
         if radicand.range.low < 0:
-            raise NoBoundError(
-                f"the radicand in {self.expressions.labels[place]} may be computed below zero"
-            )
+            raise NoBoundError(f"the radicand in {self.expressions.labels[place]} may be computed below zero")
         least, computed = exact.lowest, radicand.range.sqrt().lowest
         if least and not computed:
             raise NoBoundError(f"the radicand in {self.expressions.labels[place]} may be computed as zero")

@@ -23,7 +23,7 @@ from strapgen.rounding.no_bound import NoBoundError
 _RESOLUTIONS = Interval.of(DOUBLE_RESOLUTION, Fraction(1, 1 << 23))
 _ONE = Interval.of(-1, 1)
 
-_Samples = NDArray[np.float64]
+_Samples = NDArray[np.float64] | np.float64
 #: The functions of operations on samples.
 _ON_SAMPLES: dict[str, Callable[..., Any]] = {
     "add": np.add,
@@ -69,7 +69,8 @@ class ExactRanges:
     def __post_init__(self) -> None:
         self._items: dict[str, Quantity] = {}
         self._proofs = Ranges(self._items, self.box)
-        self._proper, self._anywhere = [], []  # type: list[_Samples], list[_Samples]
+        self._proper: list[_Samples] = []
+        self._anywhere: list[_Samples] = []
         self._inputs = samples(self.program.inputs, self.box)
         with np.errstate(all="ignore"):  # samples are hints: what is not finite hints at nothing
             for place, expression in enumerate(self.expressions.items):
@@ -102,7 +103,7 @@ class ExactRanges:
             known = self._proofs.of_sum(name, terms, seen)
             self._items[name] = Quantity(name, Sum(tuple(terms.items())), Fraction(0), known)
             return known
-        known = self._function_range(expression)
+        known = self._function_range(place, expression)
         self._note(name, Maximum(()), known)
         return known
 
@@ -129,18 +130,21 @@ class ExactRanges:
             return {(): expression.value} if expression.value else {}
         return {(self._name(place),): Fraction(1)}
 
-    def _function_range(self, expression: Expression) -> Interval:
+    def _function_range(self, place: int, expression: Expression) -> Interval:
         """Return the range of an operation that is no sum and no product."""
         kind, places = expression.kind, expression.arguments
+        label = self.expressions.labels[place]
         if kind == "divide":
-            self._keep_from_zero(places[1], "divisor")
-        elif kind == "sqrt":
-            self._keep_from_zero(places[0], "radicand")
-        ranges = [self.ranges[k] for k in places]
-        if kind == "divide":
-            return ranges[0] * ranges[1].reciprocal()
+            divisor = self._kept_from_zero(places[1], f"the divisor in {label}")
+            if divisor.low <= 0 <= divisor.high:
+                raise NoBoundError(f"the divisor in {label} may be zero")
+            return self.ranges[places[0]] * divisor.reciprocal()
         if kind == "sqrt":
-            return ranges[0].sqrt()
+            radicand = self._kept_from_zero(places[0], f"the radicand in {label}")
+            if radicand.low < 0:
+                raise NoBoundError(f"the radicand in {label} may be below zero")
+            return radicand.sqrt()
+        ranges = [self.ranges[k] for k in places]
         if kind == "maximum":
             return maximum(ranges)
         if kind == "select":
@@ -153,20 +157,15 @@ class ExactRanges:
             return _cosine(ranges[0].magnitude, Fraction(1, 2))
         return _cosine(ranges[0].magnitude, Fraction(1, 6))  # sinc(x) >= 1 - x^2/6
 
-    def _keep_from_zero(self, place: int, what: str) -> None:
-        """Keep a divisor or a radicand near what it is on proper inputs, as a condition, where it may come near zero."""
-        known, values = self.ranges[place], self._proper[place]
-        proper = near(np.atleast_1d(values))
-        label = f"the {what} in {self.expressions.labels[place]}"
+    def _kept_from_zero(self, place: int, label: str) -> Interval:
+        """Return the range of a divisor or a radicand, by a condition near what it is on proper inputs if need be."""
+        known = self.ranges[place]
+        proper = near(np.atleast_1d(self._proper[place]))
         if proper is not None and (known.low <= 0 <= known.high or proper.low > 2 * known.low > 0):
-            self.ranges[place] = inside = known.meet(proper)
-            self.conditions.append(Condition(label, inside.lowest, inside.highest))
-            name = self._name(place)
-            self._note(name, Maximum(()), inside)
-        elif what == "divisor" and known.low <= 0 <= known.high:
-            raise NoBoundError(f"{label} may be zero")
-        elif known.low < 0 and what == "radicand":
-            raise NoBoundError(f"{label} may be below zero")
+            self.ranges[place] = known = known.meet(proper)
+            self.conditions.append(Condition(label, known.lowest, known.highest))
+            self._note(self._name(place), Maximum(()), known)
+        return known
 
 
 def _cosine(magnitude: Fraction, curvature: Fraction) -> Interval:

@@ -10,6 +10,8 @@ import numpy as np
 from strapgen.ir.program import Operation, Program, walk
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Function, Sources
+from strapgen.rounding import rounding_bounds
+from strapgen.targets.c.rounding_text import rounding_text
 from strapgen.targets.lines import fill_expression
 from strapgen.targets.names import C, external, printed
 from strapgen.targets.printer import Printer
@@ -111,7 +113,9 @@ def emit(program: Program, target: str) -> Sources:
     name = external(program.name, real.infix)
     # A scalar input has one name, which is that of its argument and of its element.
     scalars = [signal.name for signal in program.inputs if not signal.shape]
-    _, files = printed(program, lambda named, _: _files(named, name, target), C, scalars)
+    rounding = rounding_bounds(program, real.name)
+    text = rounding_text(rounding, program)
+    _, files = printed(program, lambda named, _: _files(named, name, target, text), C, scalars)
     function = Function(name, program.inputs, tuple(result.signal for result in program.outputs))
     return Sources(
         program.kernel,
@@ -123,11 +127,12 @@ def emit(program: Program, target: str) -> Sources:
         program.companions,
         recursion=program.recursion,
         runs=runs_of(name),
+        rounding=rounding,
     )
 
 
-def _files(program: Program, name: str, target: str) -> dict[str, str]:
-    """Return the header and the source of a program with its printed names."""
+def _files(program: Program, name: str, target: str, rounding: str) -> dict[str, str]:
+    """Return the header and the source of a program with its printed names, and the text on its rounding."""
     real = real_of(target)
     printer = CPrinter(real, name)
     nodes = [node for a in program.body for node in walk(a.value) if isinstance(node, Operation)]
@@ -136,6 +141,7 @@ def _files(program: Program, name: str, target: str) -> dict[str, str]:
         "guard": f"{name}_h".upper(),
         "command": f"strapgen generate {program.arguments} --target {target}",
         "real": real,
+        "rounding": rounding,
         "state": program.inputs[0],
         "samples": program.inputs[-1],
         "result": program.outputs[0].signal,
