@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from small_programs import TYPES, computed, exactly, node, program
+from small_programs import EXACT, TYPES, computed, exactly, node, program
 
 from strapgen.ir.program import Program
 from strapgen.rounding import rounding_bounds
 from strapgen.rounding.errors import ComputedNumbers
-from strapgen.rounding.number_formats import NUMBERS
+from strapgen.rounding.number_formats import NUMBERS, NumberFormat
 
 THIRD = Fraction(1, 3)
 ABOVE_ONE = node("add", node("multiply", "a", "a"), 1)
@@ -100,6 +100,14 @@ def test_a_difference_of_near_numbers_is_exact():
     assert measured(code, inputs(code, 300)) <= bound(code)
 
 
+def test_what_may_overflow_has_no_bound():
+    code = program({"y": node("multiply", "a", "a")}, {"a": Fraction(2) ** 64})
+    assert rounding_bounds(code, "float").reason == "y may overflow"
+    assert rounding_bounds(code, "double").errors
+    code = program({"y": node("multiply", "a", "a")}, {"a": Fraction(2) ** 1000})
+    assert "overflow" in rounding_bounds(code, "double").reason
+
+
 @pytest.mark.parametrize(
     ("body", "reason"),
     [
@@ -124,6 +132,65 @@ def test_a_root_that_may_be_zero_has_a_bound_by_its_relative_error():
     assert error <= bound(code) < 4 * error
     tiny = {name: values * np.float32(2**-30) for name, values in inputs(code, 50).items()}
     assert measured(code, tiny) <= bound(code)
+
+
+def test_without_the_terms_of_second_order_the_bound_would_be_exceeded(monkeypatch):
+    """Of a third of a, three times, less a, nothing is left but rounding, and of its square that of second order."""
+    rounding = node("subtract", node("multiply", node("multiply", "a", THIRD), 3), "a")
+    code = program({"x": rounding, "y": node("multiply", "x", "x")}, {"a": 1})
+    error = measured(code, inputs(code, 1000))
+    assert bound(code) / 10 < error <= bound(code)
+    propagated = ComputedNumbers._propagated
+    monkeypatch.setattr(ComputedNumbers, "_propagated", lambda *a: (propagated(*a)[0], Fraction(0)))
+    assert bound(code) < error / 1000
+
+
+FOUR_BITS = NumberFormat(4, -6, 10)
+#: Operations that round to four bits, those of the C library too.
+COARSELY = EXACT | {
+    kind: lambda *a, exact=EXACT[kind]: FOUR_BITS.rounded(exact(*a))
+    for kind in ("add", "subtract", "multiply", "divide", "sqrt", "sin", "cos")
+}
+
+
+def measured_coarsely(code: Program, values: dict[str, Fraction]) -> Fraction:
+    """Return the error of a program in numbers of four bits."""
+    got = code.run(values, FOUR_BITS.rounded, COARSELY)["out"][0]
+    return abs(got - code.run(values, operations=EXACT)["out"][0])
+
+
+#: Programs for numbers of four bits, whose errors of second order are no longer small.
+COARSE = {
+    "product": {"p": node("multiply", "a", "b"), "y": node("multiply", node("add", "p", THIRD), "p")},
+    "quotient": {
+        "d": node("add", node("multiply", "a", "a"), Fraction(4, 5)),
+        "y": node("divide", node("multiply", "b", THIRD), "d"),
+    },
+    "root": {"d": node("add", node("multiply", "a", "b"), Fraction(9, 5)), "y": node("sqrt", "d")},
+    "root at zero": {
+        "d": node("add", node("multiply", "a", "a"), node("multiply", "b", "b")),
+        "y": node("multiply", node("sqrt", "d"), THIRD),
+    },
+    "maximum": {"p": node("multiply", "a", "b"), "y": node("maximum", "p", node("multiply", "a", THIRD))},
+    "chosen": {
+        "p": node("multiply", "a", "b"),
+        "y": node("select", node("at_least", "a", "b"), "p", node("add", "p", "a")),
+    },
+    "cancelled": {
+        "d": node("subtract", node("add", "a", 3), node("add", "b", 3)),
+        "y": node("add", "d", "a"),
+    },
+}
+
+
+@pytest.mark.parametrize("body", COARSE.values(), ids=COARSE)
+def test_no_input_at_all_of_four_bits_is_rounded_by_more_than_the_bound(body, monkeypatch):
+    monkeypatch.setitem(NUMBERS, "coarse", FOUR_BITS)
+    code = program(body, {"a": 1, "b": 1})
+    numbers = sorted({FOUR_BITS.rounded(Fraction(k, 64)) for k in range(-64, 65)})
+    worst = max(measured_coarsely(code, {"a": a, "b": b}) for a in numbers for b in numbers)
+    error = bound(code, "coarse")
+    assert error / 4 < worst <= error
 
 
 NUMBER = st.sampled_from([*(Fraction(k, 8) for k in range(-12, 13)), THIRD, Fraction(-5, 7), Fraction(1, 48)])
@@ -164,3 +231,17 @@ def test_no_program_rounds_by_more_than_its_bound(made, number, scale):
     for column in values.values():
         column[:4] = [column.max(), column.min(), 0, np.nextafter(column[0], column.dtype.type(0))]
     assert measured(code, values, number) <= bound(code, number)
+
+
+@settings(max_examples=60)
+@given(made=bodies(), parts=st.lists(st.tuples(*2 * [st.integers(-64, 64)]), min_size=10, max_size=10))
+def test_no_program_rounds_by_more_than_its_bound_in_four_bits(made, parts):
+    body, last = made
+    code = program(body, {"a": 1, "b": 1}, last)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(NUMBERS, "coarse", FOUR_BITS)
+        told = rounding_bounds(code, "coarse")
+    for a, b in parts:
+        values = {"a": FOUR_BITS.rounded(Fraction(a, 64)), "b": FOUR_BITS.rounded(Fraction(b, 64))}
+        if not told.reason:
+            assert measured_coarsely(code, values) <= told.errors["out"][0]

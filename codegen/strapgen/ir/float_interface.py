@@ -38,6 +38,36 @@ class Condition:
 
 
 @dataclass(frozen=True)
+class StepRounding:
+    """What one call of an attitude step adds to the error of a run, element by element.
+
+    From the state x the code computes x T + x d + r, with T the exact transition.
+
+    Parameters
+    ----------
+    local : tuple of Fraction
+        Error bounds r of the elements of the state after the step, beside what comes from the transition.
+    transition : tuple of Fraction
+        Error bounds d of the elements of the transition.
+    away : tuple of Fraction
+        Bounds of the distance of the exact transition from the identity.
+    """
+
+    local: tuple[Fraction, ...]
+    transition: tuple[Fraction, ...]
+    away: tuple[Fraction, ...]
+
+    def as_dict(self) -> dict[str, list[str]]:
+        """Return the errors as plain JSON data."""
+        return {name: list(map(str, errors)) for name, errors in asdict(self).items()}
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, list[str]]) -> StepRounding:
+        """Rebuild the errors from `as_dict`."""
+        return cls(**{name: tuple(map(Fraction, errors)) for name, errors in data.items()})
+
+
+@dataclass(frozen=True)
 class RoundingBounds:
     """Bounds of how far the generated code is from exact arithmetic on the same inputs.
 
@@ -58,8 +88,10 @@ class RoundingBounds:
         Functions of the C library that are assumed to err by at most a unit in the last place.
     errors : mapping of str to tuple of Fraction
         Error bound of each element by the name of the output, row-major; empty where no bound is known.
+    step : StepRounding or None
+        What one call of an attitude step adds to the error of a run; None for other kernels.
     accumulation : RoundingAccumulation or None
-        How the errors of an attitude step add up over a run; None for other kernels.
+        How that adds up; None for other kernels.
     reason : str
         Why no bound is known; "" where there is one.
     """
@@ -70,6 +102,7 @@ class RoundingBounds:
     conditions: tuple[Condition, ...] = ()
     functions: tuple[str, ...] = ()
     errors: Mapping[str, tuple[Fraction, ...]] = field(default_factory=dict, hash=False)
+    step: StepRounding | None = None
     accumulation: RoundingAccumulation | None = None
     reason: str = ""
 
@@ -106,6 +139,7 @@ class RoundingBounds:
             "conditions": [condition.as_dict() for condition in self.conditions],
             "functions": list(self.functions),
             "errors": {name: list(map(str, errors)) for name, errors in self.errors.items()},
+            "step": self.step and self.step.as_dict(),
             "accumulation": adds_up and {name: str(value) for name, value in asdict(adds_up).items()},
             "reason": self.reason,
         }
@@ -121,6 +155,7 @@ class RoundingBounds:
             tuple(map(Condition.from_dict, data["conditions"])),
             tuple(data["functions"]),
             {name: tuple(map(Fraction, errors)) for name, errors in data["errors"].items()},
+            data["step"] and StepRounding.from_dict(data["step"]),
             adds_up and RoundingAccumulation(**{name: Fraction(value) for name, value in adds_up.items()}),
             data["reason"],
         )

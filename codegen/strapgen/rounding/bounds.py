@@ -6,7 +6,7 @@ result. Both are bounded over the box of the inputs, in interval arithmetic that
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from fractions import Fraction
 from functools import lru_cache
 
@@ -16,8 +16,8 @@ from strapgen.fixedpoint.limits import largest_magnitude
 from strapgen.fixedpoint.terms import up
 from strapgen.ir.fixed_interface import RoundingAccumulation
 from strapgen.ir.fixed_settings import Settings
-from strapgen.ir.float_interface import Condition, RoundingBounds
-from strapgen.ir.program import Operation, Program, walk
+from strapgen.ir.float_interface import Condition, RoundingBounds, StepRounding
+from strapgen.ir.program import Operation, Program, Result, walk
 from strapgen.rounding.errors import ComputedNumbers
 from strapgen.rounding.exact_ranges import ExactRanges
 from strapgen.rounding.expressions import Expressions
@@ -43,12 +43,12 @@ class _Analysis:
         self.expressions = Expressions.of(program)
         exact = ExactRanges(program, self.expressions, box)
         self.ranges, self.conditions = exact.ranges, tuple(exact.conditions)
-        derivatives = slopes(self.expressions, self.ranges)
-        self.sensitivities = {
-            place: sensitivities(self.expressions, derivatives, place)
-            for result in program.outputs
-            for place in self.expressions.results[result.signal.name]
-        }
+        self._slopes = slopes(self.expressions, self.ranges)
+
+    def moves(self, result: Result, held: Collection[int] = ()) -> list[dict[int, Fraction]]:
+        """Return for every element of a result how far it moves with every operation, see `sensitivities`."""
+        places = self.expressions.results[result.signal.name]
+        return [sensitivities(self.expressions, self._slopes, place, held) for place in places]
 
 
 @lru_cache(maxsize=64)
@@ -58,6 +58,8 @@ def _analysis(program: Program, limits: tuple[tuple[str, Fraction], ...]) -> _An
         return _Analysis(program, limits)
     except NoBoundError as error:
         return str(error)
+    except ArithmeticError:  # ranges beyond all numbers of the samples
+        return "its values may overflow"
 
 
 def rounding_bounds(
@@ -118,52 +120,67 @@ def rounding_bounds(
     except NoBoundError as error:
         return RoundingBounds(number, format_.precision, inputs, reason=str(error))
     added = [item.added for item in computed.items]
-    errors = {
-        result.signal.name: tuple(
-            up(sum((moved * added[k] for k, moved in analysis.sensitivities[place].items()), Fraction(0)))
-            for place in analysis.expressions.results[result.signal.name]
-        )
-        for result in program.outputs
-    }
-    nodes = [node for a in program.body for node in walk(a.value) if isinstance(node, Operation)]
-    functions = sorted({_LIBRARY[node.kind] for node in nodes if node.kind in _LIBRARY})
+    outputs = {result.signal.name: _errors(analysis.moves(result), added) for result in program.outputs}
+    step = _step_rounding(program, analysis, added)
     return RoundingBounds(
         number,
         format_.precision,
         inputs,
         analysis.conditions,
-        tuple(functions),
-        errors,
-        _accumulation(program, dict(limits), analysis, errors),
+        _library_functions(program),
+        outputs,
+        step,
+        None if step is None else _accumulation(program, dict(limits), step, *outputs.values()),
+    )
+
+
+def _errors(moves: Iterable[Mapping[int, Fraction]], added: Sequence[Fraction]) -> tuple[Fraction, ...]:
+    """Return the error bound of every element of a result from what every operation adds to it."""
+    return tuple(up(sum((move * added[k] for k, move in element.items()), Fraction(0))) for element in moves)
+
+
+def _library_functions(program: Program) -> tuple[str, ...]:
+    """Return the functions of the C library that the code calls and whose errors no standard bounds."""
+    nodes = [node for a in program.body for node in walk(a.value) if isinstance(node, Operation)]
+    return tuple(sorted({_LIBRARY[node.kind] for node in nodes if node.kind in _LIBRARY}))
+
+
+def _step_rounding(program: Program, analysis: _Analysis, added: Sequence[Fraction]) -> StepRounding | None:
+    """Return what a call of an attitude step adds to the error of a run; None for other kernels."""
+    transition = program.transition
+    if program.companions is None or transition is None or len(program.outputs) > 1:
+        return None
+    places = analysis.expressions.results[transition.signal.name]
+    away = (
+        (analysis.ranges[place] - Interval.of(one)).magnitude
+        for place, one in zip(places, program.companions.identity, strict=True)
+    )
+    return StepRounding(
+        _errors(analysis.moves(program.outputs[0], held=places), added),
+        _errors(analysis.moves(transition), added),
+        tuple(away),
     )
 
 
 def _accumulation(
-    program: Program,
-    largest: Mapping[str, Fraction],
-    analysis: _Analysis,
-    errors: Mapping[str, tuple[Fraction, ...]],
-) -> RoundingAccumulation | None:
+    program: Program, largest: Mapping[str, Fraction], step: StepRounding, errors: Sequence[Fraction]
+) -> RoundingAccumulation:
     """Return how the errors of an attitude step add up: each call adds its error, and stretches that before it.
 
     Lengths are those of a state, or of a row of a matrix.
     """
     state, transition = program.inputs[0], program.transition
-    if program.companions is None or transition is None or len(program.outputs) > 1:
-        return None
+    assert transition is not None
     width = state.size // (state.shape[0] if len(state.shape) == 2 else 1)
-    (local,) = errors.values()
-    per_step = max(_length(local[k : k + width]) for k in range(0, len(local), width))
+    length = largest[state.name] * _length([Fraction(1)] * width)
+    rows = range(0, state.size, width)
+    whole = max(_length(errors[k : k + width]) for k in rows)
+    parts = max(_length(step.local[k : k + width]) for k in rows) + length * _length(step.transition)
     sizes = tuple(largest[signal.name] for signal in program.inputs[1:] for _ in signal.elements)
-    places = analysis.expressions.results[transition.signal.name]
-    away = [
-        (analysis.ranges[place] - Interval.of(one)).magnitude
-        for place, one in zip(places, program.companions.identity, strict=True)
-    ]
-    growth = transition_growth(program, transition, sizes, width, 1 + _length(away))
-    return RoundingAccumulation(Fraction(0), per_step, Fraction(0), growth)
+    growth = transition_growth(program, transition, sizes, width, 1 + _length(step.away))
+    return RoundingAccumulation(Fraction(0), up(min(whole, parts)), Fraction(0), growth)
 
 
-def _length(values: list[Fraction] | tuple[Fraction, ...]) -> Fraction:
+def _length(values: Sequence[Fraction]) -> Fraction:
     """Return a length that is not below that of a vector."""
     return Interval.of(sum((value * value for value in values), Fraction(0))).sqrt().highest

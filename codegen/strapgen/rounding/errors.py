@@ -60,8 +60,8 @@ class ComputedNumbers:
     Raises
     ------
     NoBoundError
-        If a comparison may turn out otherwise than in exact arithmetic, or a computed number may leave the domain of an
-        operation.
+        If a comparison may turn out otherwise than in exact arithmetic, or a number may overflow or leave the domain
+        of an operation.
     """
 
     expressions: Expressions
@@ -83,6 +83,8 @@ class ComputedNumbers:
         before = self._before_rounding(expression).meet(exact.widened(carried))
         rounding = self._rounding(expression, before)
         after = before.widened(rounding).meet(self._rounded(before, expression.kind))
+        if after.magnitude >= Fraction(2) ** self.number.overflow:
+            raise NoBoundError(f"{self.expressions.labels[place]} may overflow")
         return ComputedNumber(
             after,
             up(carried + rounding),

@@ -16,6 +16,8 @@ class NumberFormat:
         Bits of the significand, the leading one included.
     smallest : int
         Exponent of the smallest positive number: 2**smallest.
+    overflow : int
+        Exponent of the power of two that all numbers are below.
 
     Examples
     --------
@@ -25,6 +27,7 @@ class NumberFormat:
 
     precision: int
     smallest: int
+    overflow: int
 
     @property
     def unit(self) -> Fraction:
@@ -67,7 +70,7 @@ class NumberFormat:
 
 
 #: The formats by the name of their type in C.
-NUMBERS = {"double": NumberFormat(53, -1074), "float": NumberFormat(24, -149)}
+NUMBERS = {"double": NumberFormat(53, -1074, 1024), "float": NumberFormat(24, -149, 128)}
 
 
 def exponent(value: Fraction) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from fractions import Fraction
 
 from strapgen.fixedpoint.intervals import Interval
@@ -66,7 +66,10 @@ def sinc_slope(magnitude: Fraction) -> Fraction:
 
 
 def sensitivities(
-    expressions: Expressions, derivatives: Sequence[tuple[Interval, ...]], place: int
+    expressions: Expressions,
+    derivatives: Sequence[tuple[Interval, ...]],
+    place: int,
+    held: Collection[int] = (),
 ) -> dict[int, Fraction]:
     """Return by how much one result moves at most when an operation moves by one, for all that it is made from.
 
@@ -80,14 +83,16 @@ def sensitivities(
         What `slopes` returned.
     place : int
         Place of the result.
+    held : collection of int, optional
+        Places of values that are taken as they are: what leads to them moves the result only by other ways.
     """
     adjoints = {place: _ONE}
     for k in range(place, -1, -1):
         adjoint = adjoints.get(k)
-        if adjoint is None or expressions.items[k].kind in (INPUT, CONSTANT):
+        if adjoint is None or k in held or expressions.items[k].kind in (INPUT, CONSTANT):
             continue
         for argument, slope in zip(expressions.items[k].arguments, derivatives[k], strict=True):
             part = slope if adjoint is _ONE else adjoint * slope
             known = adjoints.get(argument)
             adjoints[argument] = part if known is None else known + part
-    return {k: adjoint.magnitude for k, adjoint in adjoints.items()}
+    return {k: adjoint.magnitude for k, adjoint in adjoints.items() if k not in held}

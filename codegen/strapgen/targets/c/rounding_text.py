@@ -60,7 +60,7 @@ def _conditions(bounds: RoundingBounds) -> str:
     if bounds.functions:
         names = " and ".join(bounds.functions)
         parts.append(f"{names} of the C library within a unit in the last place")
-    return "; ".join([*parts, "IEEE 754 with rounding to the nearest; -ffp-contract=off"])
+    return "; ".join([*parts, "IEEE 754, each operation rounded to the nearest; -ffp-contract=off"])
 
 
 def _plain(value: Fraction) -> str:
