@@ -1181,3 +1181,17 @@ def test_strapdown_is_the_course_of_python(strapgen_says, tmp_path):
         .startswith("time_s,e_x,e_y,e_z,e_s,roll_deg,pitch_deg,heading_deg,dvx_m_s")
     )
     assert "roll, deg" in strapgen_says(command)
+
+
+def test_generate_prints_the_error_bounds_of_floating_point(strapgen_says):
+    data = json.loads(strapgen_says("generate euler --target c-float --format json"))["error_bounds"]
+    assert data["inputs"] == {"state": 1.0625, "increments": 0.125}
+    assert len(data["errors"]["next"]) == 4 and 3e-7 < max(data["errors"]["next"]) < 4e-7
+    assert 0 < data["run"]["per_step"] < 1e-6
+    assert data["reason"] is None
+    data = json.loads(strapgen_says("generate euler-from-dcm --target c --format json"))["error_bounds"]
+    assert data["errors"] is None and "comparison" in data["reason"]
+    assert "exact" in strapgen_says("generate euler-from-cayley-klein --target c")
+    assert "no error bound is known: atan2 jumps" in strapgen_says(
+        "generate euler-angles-from-dcm --target c"
+    )
