@@ -19,7 +19,7 @@ help:
 	@echo "make check     generated code in step, ruff, mypy"
 	@echo "make bench     measure against other code generators, and the back ends; about a quarter of an hour"
 	@echo "make generate  rebuild generated/"
-	@echo "make firmware-tools  on Debian: cross compilers and QEMU, for strapgen cost and its tests"
+	@echo "make firmware-tools  on Debian: cross compilers, QEMU and CMake, for strapgen cost and tests"
 	@echo "make clean     remove .venv and what tools left behind"
 
 $(READY): pyproject.toml
@@ -44,7 +44,7 @@ demo: $(READY)
 	@echo "3. The same step in C, from generated/c/euler_rk1_2.c"
 	@sed -n '/^void euler_rk1_2(/,/^}/p' generated/c/euler_rk1_2.c
 	@echo
-	@echo "4. Table 5 of the thesis on every back end; c-q31 has 32-bit words, c-q15 16-bit"
+	@echo "4. Table 5 of the thesis on every back end; c-fixed32 has 32-bit words, c-fixed16 16-bit"
 	$(BIN)/strapgen tables --table 5
 	@echo
 	@echo "More: source .venv/bin/activate, then"
@@ -54,7 +54,7 @@ demo: $(READY)
 	@echo "docs/command-line.md shows all commands; docs/README.md answers questions."
 
 FIRMWARE := gcc-arm-none-eabi picolibc-arm-none-eabi qemu-system-arm gcc-riscv64-unknown-elf \
-  picolibc-riscv64-unknown-elf qemu-system-misc gcc-avr avr-libc clang cppcheck
+  picolibc-riscv64-unknown-elf qemu-system-misc gcc-avr avr-libc clang cppcheck cmake
 
 firmware-tools:
 	apt-get update -qq

@@ -25,7 +25,7 @@ COMMANDS = {
     "strapgen --help": ["--help"],
     "strapgen tables --backend c": ["tables", "--backend", "c"],
     "strapgen tables --backend numpy": ["tables", "--backend", "numpy"],
-    "strapgen tables --backend c-q31": ["tables", "--backend", "c-q31"],
+    "strapgen tables --backend c-fixed32": ["tables", "--backend", "c-fixed32"],
     "strapgen generate --all --check": ["generate", "--all", "--check"],
 }
 

@@ -26,7 +26,7 @@ from strapgen.toolchain import compiler
 #: The back ends. Short words have the code of long ones, C in float that of double, and the integer model gives the
 #: bits of the C: they run with the long tests.
 BACKEND_NAMES = [
-    pytest.param(name, marks=pytest.mark.long) if name in ("c-float", "c-q15", "fixed-model") else name
+    pytest.param(name, marks=pytest.mark.long) if name in ("c-float", "c-fixed16", "fixed-model") else name
     for name in BACKENDS
 ]
 

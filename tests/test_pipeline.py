@@ -132,7 +132,7 @@ def stage_log(caplog: pytest.LogCaptureFixture) -> Iterator[pytest.LogCaptureFix
 
 
 def test_every_stage_is_timed(empty_cache, stage_log):
-    strapgen.backend("euler", "rk1", 1, "c-q31")
+    strapgen.backend("euler", "rk1", 1, "c-fixed32")
     records = [(r.stage, r.what) for r in stage_log.records if r.name == "strapgen" and r.seconds > 0]
     assert records == [
         *((stage, "euler-rk1-1") for stage in ("derive", "lower", "quantize")),

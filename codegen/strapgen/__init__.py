@@ -7,7 +7,7 @@ end, `simulate` it against a closed-form motion. `backend` does the first four a
 import importlib as _importlib
 import typing as _typing
 
-__version__ = "0.1.0"
+from strapgen.support.version import VERSION as __version__  # noqa: N811
 
 # For type checkers; a test holds it against the table below, from which Python loads a name when it is first used.
 if _typing.TYPE_CHECKING:

@@ -5,6 +5,15 @@
  */
 #include "cayley_klein_rk4_2.h"
 
+#include <float.h>
+
+#if (FLT_RADIX != 2) || (DBL_MANT_DIG != 53)
+#error "double must be the type of IEC 60559 with 53 bits"
+#endif
+#if (FLT_EVAL_METHOD != 0) || defined(__FAST_MATH__)
+#error "operations must round to double: -msse2 -mfpmath=sse on x86, never -ffast-math"
+#endif
+
 
 void cayley_klein_rk4_2(const double state[4], const double increments[6], double next[4])
 {

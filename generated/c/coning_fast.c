@@ -4,6 +4,15 @@
  */
 #include "coning_fast.h"
 
+#include <float.h>
+
+#if (FLT_RADIX != 2) || (DBL_MANT_DIG != 53)
+#error "double must be the type of IEC 60559 with 53 bits"
+#endif
+#if (FLT_EVAL_METHOD != 0) || defined(__FAST_MATH__)
+#error "operations must round to double: -msse2 -mfpmath=sse on x86, never -ffast-math"
+#endif
+
 
 void coning_fast(const double angle_sum[3], const double coning[3],
     const double previous_increment[3], const double increment[3], double next_angle_sum[3],

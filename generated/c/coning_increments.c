@@ -4,7 +4,15 @@
  */
 #include "coning_increments.h"
 
+#include <float.h>
 #include <math.h>
+
+#if (FLT_RADIX != 2) || (DBL_MANT_DIG != 53)
+#error "double must be the type of IEC 60559 with 53 bits"
+#endif
+#if (FLT_EVAL_METHOD != 0) || defined(__FAST_MATH__)
+#error "operations must round to double: -msse2 -mfpmath=sse on x86, never -ffast-math"
+#endif
 
 /* sin(x)/x, 1 at 0. */
 static double coning_increments_sc_(double x)

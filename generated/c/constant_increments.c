@@ -4,6 +4,15 @@
  */
 #include "constant_increments.h"
 
+#include <float.h>
+
+#if (FLT_RADIX != 2) || (DBL_MANT_DIG != 53)
+#error "double must be the type of IEC 60559 with 53 bits"
+#endif
+#if (FLT_EVAL_METHOD != 0) || defined(__FAST_MATH__)
+#error "operations must round to double: -msse2 -mfpmath=sse on x86, never -ffast-math"
+#endif
+
 
 void constant_increments(double middle, double width, double x, double y, double z,
     double increment[3])

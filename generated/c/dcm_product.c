@@ -4,6 +4,15 @@
  */
 #include "dcm_product.h"
 
+#include <float.h>
+
+#if (FLT_RADIX != 2) || (DBL_MANT_DIG != 53)
+#error "double must be the type of IEC 60559 with 53 bits"
+#endif
+#if (FLT_EVAL_METHOD != 0) || defined(__FAST_MATH__)
+#error "operations must round to double: -msse2 -mfpmath=sse on x86, never -ffast-math"
+#endif
+
 
 void dcm_product(const double state[9], const double transition[9], double next[9])
 {

@@ -4,7 +4,15 @@
  */
 #include "euler_from_dcm.h"
 
+#include <float.h>
 #include <math.h>
+
+#if (FLT_RADIX != 2) || (DBL_MANT_DIG != 53)
+#error "double must be the type of IEC 60559 with 53 bits"
+#endif
+#if (FLT_EVAL_METHOD != 0) || defined(__FAST_MATH__)
+#error "operations must round to double: -msse2 -mfpmath=sse on x86, never -ffast-math"
+#endif
 
 
 void euler_from_dcm(const double state[9], double converted[4])

@@ -4,7 +4,15 @@
  */
 #include "coning_increments_float.h"
 
+#include <float.h>
 #include <math.h>
+
+#if (FLT_RADIX != 2) || (FLT_MANT_DIG != 24)
+#error "float must be the type of IEC 60559 with 24 bits"
+#endif
+#if (FLT_EVAL_METHOD != 0) || defined(__FAST_MATH__)
+#error "operations must round to float: -msse2 -mfpmath=sse on x86, never -ffast-math"
+#endif
 
 /* sin(x)/x, 1 at 0. */
 static float coning_increments_float_sc_(float x)

@@ -4,7 +4,15 @@
  */
 #include "euler_angles_from_dcm_float.h"
 
+#include <float.h>
 #include <math.h>
+
+#if (FLT_RADIX != 2) || (FLT_MANT_DIG != 24)
+#error "float must be the type of IEC 60559 with 24 bits"
+#endif
+#if (FLT_EVAL_METHOD != 0) || defined(__FAST_MATH__)
+#error "operations must round to float: -msse2 -mfpmath=sse on x86, never -ffast-math"
+#endif
 
 /* An angle of up to a turn and a half, brought to -pi to pi by a whole turn. */
 static float euler_angles_from_dcm_float_wr_(float x)

@@ -4,6 +4,15 @@
  */
 #include "euler_rk1_2_float.h"
 
+#include <float.h>
+
+#if (FLT_RADIX != 2) || (FLT_MANT_DIG != 24)
+#error "float must be the type of IEC 60559 with 24 bits"
+#endif
+#if (FLT_EVAL_METHOD != 0) || defined(__FAST_MATH__)
+#error "operations must round to float: -msse2 -mfpmath=sse on x86, never -ffast-math"
+#endif
+
 
 void euler_rk1_2_float(const float state[4], const float increments[6], float next[4])
 {

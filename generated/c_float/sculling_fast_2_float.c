@@ -4,6 +4,15 @@
  */
 #include "sculling_fast_2_float.h"
 
+#include <float.h>
+
+#if (FLT_RADIX != 2) || (FLT_MANT_DIG != 24)
+#error "float must be the type of IEC 60559 with 24 bits"
+#endif
+#if (FLT_EVAL_METHOD != 0) || defined(__FAST_MATH__)
+#error "operations must round to float: -msse2 -mfpmath=sse on x86, never -ffast-math"
+#endif
+
 
 void sculling_fast_2_float(const float angle_sum[3], const float velocity_sum[3],
     const float sculling[3], const float increment[3], const float velocity_increment[3],

@@ -149,9 +149,9 @@ def test_back_ends_agree(algorithm, sculling, backend_name, rng):
         "c": (0, 1e-15),
         "exact": (1e-15, 1e-15),
         "c-float": (4e-6, 4e-6),
-        "c-q31": (2e-8, 1e-6),
+        "c-fixed32": (2e-8, 1e-6),
         "fixed-model": (2e-8, 1e-6),
-        "c-q15": (2e-3, 3e-2),
+        "c-fixed16": (2e-3, 3e-2),
     }[backend_name]
     assert np.abs(run.attitudes - wanted.attitudes).max() <= attitude
     assert np.abs(run.velocity_changes - wanted.velocity_changes).max() <= velocity
@@ -161,9 +161,9 @@ def test_back_ends_agree(algorithm, sculling, backend_name, rng):
     ("backend", "carry"),
     [
         ("c", "none"),
-        ("c-q31", "none"),
+        ("c-fixed32", "none"),
         pytest.param("c-float", "none", marks=pytest.mark.long),
-        pytest.param("c-q31", "full", marks=pytest.mark.long),
+        pytest.param("c-fixed32", "full", marks=pytest.mark.long),
     ],
 )
 def test_the_whole_is_its_loops_bit_for_bit(backend, carry, rng):
@@ -182,7 +182,7 @@ def test_c_and_model_agree_bit_for_bit(carry, rng):
     angles, velocities, turns = noisy(48, rng)
     runs = [
         made("dcm", 2, name, carry).run(angles, velocities, fast_cycles=4, slow_cycles=3, turns=turns)
-        for name in ("c-q31", "fixed-model")
+        for name in ("c-fixed32", "fixed-model")
     ]
     for one, other in zip(*runs, strict=True):
         np.testing.assert_array_equal(one, other)
@@ -195,7 +195,7 @@ def test_error_feedback_in_the_memory_of_the_c_is_that_of_the_model(algorithm):
     attitudes = {}
     for carry in ("none", "full"):
         settings = Settings(word=16, carry=carry, rounding="truncation")
-        runners = [TwoSpeed(algorithm, 2, name, settings) for name in ("c-q15", "fixed-model")]
+        runners = [TwoSpeed(algorithm, 2, name, settings) for name in ("c-fixed16", "fixed-model")]
         whole, parts = (
             one.run(angles[1:], velocities[1:], fast_cycles=10, slow_cycles=4, previous=angles[0])
             for one in runners
@@ -210,7 +210,8 @@ def test_generated_files_are_the_command_s_whatever_largest_angle_is_stated():
     # No loop has the increments of a step: what bounds them goes into neither the code nor its header.
     plain = sources("euler", 2, "c-fixed", Settings(carry="full")).files
     assert sources("euler", 2, "c-fixed", Settings(carry="full").fitted(0.01)).files == plain
-    assert "--word 32 --carry full\n" in plain["euler_two_speed_2_q31.h"]
+    header = " ".join(plain["euler_two_speed_2_w32.h"].replace("\n * ", " ").split())
+    assert "--word 32 --rounding nearest --carry full --drift-allowance 1/16 Do not edit" in header
     assert sources("euler", 2, "c-fixed").files == sources("euler", 2, "c-fixed", Settings()).files
 
 
@@ -233,7 +234,7 @@ def test_formats_of_loops_fit_together_and_sums_are_exact():
 
 def test_no_angle_is_lost_to_the_format_of_increments():
     # A thousand increments of a third of a unit: their sum is right to a unit.
-    runner = made("euler", 2, "c-q31")
+    runner = made("euler", 2, "c-fixed32")
     unit = float(next(a for a in runner.loops[0].fixed.inputs if a.signal.name == "increment").format.unit)
     angles = np.tile([0.0, 0.0, 1000.3 * unit], (1000, 1))
     run = runner.run(angles, np.zeros((1000, 3)), fast_cycles=1000)
@@ -242,7 +243,7 @@ def test_no_angle_is_lost_to_the_format_of_increments():
 
 
 def test_what_leaves_its_range_is_refused():
-    for name in ("c-q31", "fixed-model"):
+    for name in ("c-fixed32", "fixed-model"):
         runner = made("dcm", 2, name)
         with pytest.raises(InputError, match=r"refuses its input"):
             runner.run(np.full((12, 3), 0.1), np.zeros((12, 3)), fast_cycles=12)
@@ -406,10 +407,10 @@ def test_a_refusal_names_the_loop(backend_name):
 
 
 def test_words_that_are_not_the_back_end_s():
-    with pytest.raises(InputError, match="word is 16; backend c-q31 has words of 32 bits"):
-        TwoSpeed("dcm", 2, "c-q31", Settings(word=16))
+    with pytest.raises(InputError, match="word is 16; backend c-fixed32 has words of 32 bits"):
+        TwoSpeed("dcm", 2, "c-fixed32", Settings(word=16))
     with pytest.raises(InputTypeError, match=r"settings is 3; strapgen\.Settings is needed"):
-        TwoSpeed("dcm", 2, "c-q31", 3)
+        TwoSpeed("dcm", 2, "c-fixed32", 3)
     with pytest.raises(InputError, match="has steps larger than its range"):
         loops("dcm", 2, "c-fixed", Settings(formats={"angle_sum": "Q40.-9"}))
 

@@ -105,7 +105,7 @@ def test_each_has_the_companions_that_it_brings(chosen, rng):
     for method, scheme in (("rk1", "euler-normalize-first-order"), ("rk2", "euler-normalize")):
         mend = strapgen.evaluator(chosen[method].companion("mend"))
         np.testing.assert_array_equal(mend(state), strapgen.evaluator(scheme)(state))
-        for name in ("numpy", "c", "c-q31"):
+        for name in ("numpy", "c", "c-fixed32"):
             wanted = strapgen.backend("euler", method, backend=name, orthonormalization=scheme)
             mended = backend(chosen[method], backend=name, orthonormalization="mend")
             np.testing.assert_array_equal(mended.propagate(d, 1, 5), wanted.propagate(d, 1, 5))

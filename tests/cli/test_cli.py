@@ -153,7 +153,11 @@ def test_list(strapgen_says):
     assert list(data["motions"]) == ["constant", "sinusoidal", "coning", "polynomial"]
     assert list(data["targets"]) == list(TARGETS) == ["numpy", "c", "c-float", "c-fixed", "fixed-model"]
     floating = ["numpy", "c", "c-float"]
-    assert list(data["backends"]) == list(BACKENDS) == [*floating, "c-q31", "c-q15", "fixed-model", "exact"]
+    assert (
+        list(data["backends"])
+        == list(BACKENDS)
+        == [*floating, "c-fixed32", "c-fixed16", "fixed-model", "exact"]
+    )
     lines = strapgen_says("list").splitlines()
     for title, part in data.items():
         assert title in lines
@@ -393,7 +397,7 @@ def test_fixed_point_of_a_vector_of_a_step(strapgen_says, tmp_path):
     limits = "--target c-fixed --max-rate-deg-s 400 --step 0.01"
     said = strapgen_says(f"generate rotation-vector --method coning-compressed --increments 4 {limits}")
     assert re.search(r"^  rotation_vector: Q\S+, error at most ", said, flags=re.MULTILINE)
-    header = (tmp_path / "rotation_vector_coning_compressed_4_q31.h").read_text()
+    header = (tmp_path / "rotation_vector_coning_compressed_4_w32.h").read_text()
     assert "strapgen generate rotation-vector --method coning-compressed --increments 4" in header
     said = strapgen_says(
         f"generate sculling --method coning-compressed --increments 4 {limits} --range velocity_increments=0.5"
@@ -510,7 +514,7 @@ def test_generate_fixed_point_text(strapgen_says):
     assert re.search(r"\n  next: Q1\.30, error at most \d\.\d+e-\d+, \d\.\d{4} of the last place\n", said)
 
 
-@pytest.mark.parametrize("backend", ["c-q31", "c-q15", "fixed-model"])
+@pytest.mark.parametrize("backend", ["c-fixed32", "c-fixed16", "fixed-model"])
 def test_simulate_in_fixed_point(backend, strapgen_says):
     run = (
         f"simulate euler --backend {backend} --motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 "
@@ -560,7 +564,7 @@ def test_previous_increments_on_the_command_line(strapgen_says):
     assert "previous" not in alone
     assert data["mean_drift_deg"] < alone["mean_drift_deg"] / 100
     rows = json.loads(
-        strapgen_says(f"compare euler --increments 1 --previous 2 --backends numpy,c,c-q31 {run}")
+        strapgen_says(f"compare euler --increments 1 --previous 2 --backends numpy,c,c-fixed32 {run}")
     )
     assert rows[2]["max_abs_rad"] <= rows[2]["bound_rad"]
 
@@ -798,10 +802,10 @@ COMPARE_KEYS = [
 
 def test_compare_json(strapgen_says):
     said = strapgen_says(
-        f"compare euler --method rk4 --increments 2 --backends numpy,c,c-float,c-q31,c-q15 {CONING} --format json"
+        f"compare euler --backends numpy,c,c-float,c-fixed32,c-fixed16 {CONING} --format json"
     )
     rows = json.loads(said, parse_constant=pytest.fail)
-    assert [row["backend"] for row in rows] == ["numpy", "c", "c-float", "c-q31", "c-q15"]
+    assert [row["backend"] for row in rows] == ["numpy", "c", "c-float", "c-fixed32", "c-fixed16"]
     assert all(list(row)[:8] == COMPARE_KEYS for row in rows)
     assert [row["bound_rad"] is None for row in rows] == [True, True, True, False, False]
     assert all(row["max_abs_rad"] <= row["bound_rad"] for row in rows[3:])
@@ -811,27 +815,27 @@ def test_compare_recorded_data_as_csv_into_a_file(strapgen_says, tmp_path):
     options = (
         f"--rates-csv {DATA}/rates_uneven.csv --rate-unit deg/s --resample-hz 100 --format csv --out rows.csv"
     )
-    assert strapgen_says(f"compare dcm --method rk3 --reference exact --backends c,c-q31 {options}") == ""
+    assert strapgen_says(f"compare dcm --method rk3 --reference exact --backends c,c-fixed32 {options}") == ""
     rows = list(csv.DictReader(io.StringIO((tmp_path / "rows.csv").read_text())))
-    assert [row["backend"] for row in rows] == ["c", "c-q31"]
+    assert [row["backend"] for row in rows] == ["c", "c-fixed32"]
     assert list(rows[0])[:8] == COMPARE_KEYS
 
 
 def test_compare_recorded_increments(strapgen_says):
     said = strapgen_says(
-        f"compare euler --backends c-q15 --increments-csv {DATA}/increments.csv --carry full"
+        f"compare euler --backends c-fixed16 --increments-csv {DATA}/increments.csv --carry full"
     )
-    assert "drift from numpy" in said and "c-q15" in said
+    assert "drift from numpy" in said and "c-fixed16" in said
 
 
 def test_compare_as_a_gate(strapgen_says, capsys, monkeypatch, tmp_path):
-    command = f"compare euler --backends c,c-q15 {CONING} --format json --fail-above"
+    command = f"compare euler --backends c,c-fixed16 {CONING} --format json --fail-above"
     strapgen_says(f"{command} 0.1")
     with pytest.raises(SystemExit) as stop:
         main(shlex.split(f"{command} 1e-9"))
     said = capsys.readouterr()
     assert stop.value.code == 1
-    assert re.fullmatch(r"strapgen: further from numpy than 1e-9 rad: c-q15 \S+ rad\n", said.err)
+    assert re.fullmatch(r"strapgen: further from numpy than 1e-9 rad: c-fixed16 \S+ rad\n", said.err)
     assert len(json.loads(said.out)) == 2
 
 
@@ -897,7 +901,7 @@ TABLE_KEYS = ["table", "backend", "algorithm", "order", "drift_deg", "normalised
 
 @pytest.mark.parametrize(
     "backend",
-    [pytest.param(b, marks=() if b in ("numpy", "c", "c-q31") else pytest.mark.long) for b in BACKENDS],
+    [pytest.param(b, marks=() if b in ("numpy", "c", "c-fixed32") else pytest.mark.long) for b in BACKENDS],
 )
 def test_tables_json(backend, strapgen_says):
     entries = json.loads(
@@ -921,9 +925,9 @@ def test_tables_run_on_every_back_end_by_default(strapgen_says):
 
 
 def test_tables_in_fixed_point_mark_what_round_off_dominates(strapgen_says):
-    said = strapgen_says("tables --backend c-q31")
+    said = strapgen_says("tables --backend c-fixed32")
     assert "r round-off dominates" in said
-    rows = re.findall(r"^    c-q31 .*$", said, flags=re.MULTILINE)
+    rows = re.findall(r"^    c-fixed32 .*$", said, flags=re.MULTILINE)
     assert len(rows) == 10 and sum(row.endswith("r") for row in rows) >= 5
 
 
@@ -934,8 +938,8 @@ def test_round_off_of_table_5(strapgen_says):
         return found["drift_deg"]
 
     double = drift("numpy")
-    assert abs(drift("c-q31") - double) < 2e-6
-    assert abs(drift("c-q31", "--carry full") - double) < 1e-7
+    assert abs(drift("c-fixed32") - double) < 2e-6
+    assert abs(drift("c-fixed32", "--carry full") - double) < 1e-7
 
 
 def test_one_table_by_its_number(strapgen_says, tmp_path):

@@ -91,7 +91,7 @@ def test_where_the_samples_limit_the_order_it_is_seen(method, increments, previo
 
 def test_every_back_end_shows_the_order(backend_name, coning):
     # Words of 16 bits are off by more than a second-order method at these steps.
-    choice = choose("euler", "rk1", 1) if backend_name == "c-q15" else choose("dcm", "rk2", 2)
+    choice = choose("euler", "rk1", 1) if backend_name == "c-fixed16" else choose("dcm", "rk2", 2)
     found = converge(choice, coning, SHORT, 1, backend_name)
     assert found.observed == pytest.approx(found.predicted, abs=WITHIN)
 

@@ -26,7 +26,7 @@ ORDERS = (1, 2, 4)
 
 #: Back ends of the quick tests; a table takes arithmetic of 40 digits a quarter of a minute.
 LONG_RUNS = [
-    pytest.param(name, marks=pytest.mark.long) if entry.slow or name in ("c-float", "c-q15") else name
+    pytest.param(name, marks=pytest.mark.long) if entry.slow or name in ("c-float", "c-fixed16") else name
     for name, entry in BACKENDS.items()
 ]
 
@@ -46,7 +46,7 @@ def certify(table, rows, backend_name):
         apart = abs(row.drift_deg - double.drift_deg)
         assert apart <= allowed
         assert row.roundoff_dominates == (apart > double.drift_deg / 2)
-        if backend_name != "c-q15" and row.order < 4:
+        if backend_name != "c-fixed16" and row.order < 4:
             assert not row.roundoff_dominates and row.agrees
 
 
@@ -112,7 +112,7 @@ def test_the_kernels_of_a_back_end_are_compiled_together(monkeypatch):
     calls = []
     monkeypatch.setattr(thesis_tables, "compile_together", lambda many: calls.append(list(many)))
     kernels = [f"{algorithm}-rk{order}-2" for algorithm in ("dcm", "euler") for order in ORDERS]
-    assert list(build_all(("c", "c-q31"), tables=TABLES[4:])) == kernels * 2
+    assert list(build_all(("c", "c-fixed32"), tables=TABLES[4:])) == kernels * 2
     beside = {"dcm-orthonormalize", "euler-normalize"}
     for sources, target in zip(calls, ("c", "c-fixed"), strict=True):
         assert {each.kernel for each in sources} == {*kernels, *beside}

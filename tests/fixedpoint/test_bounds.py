@@ -149,7 +149,7 @@ def test_small_increments_keep_the_bound_in_c(angle, rounding, rng):
     # What is far below the last place is shifted out: by no more bits than a number has.
     size = float(angle)
     increments = rng.uniform(-size, size, (100, 2, 3))
-    for name, carry in (("c-q15", "full"), ("c-q31", "state"), ("c-q15", "none")):
+    for name, carry in (("c-fixed16", "full"), ("c-fixed32", "state"), ("c-fixed16", "none")):
         settings = Settings(32, angle, rounding, carry)
         made = make_backend("euler", "rk4", 2, name, settings=settings)
         given = made.representable(increments)
@@ -197,12 +197,12 @@ def angles_apart(made, increments) -> np.ndarray:
 @pytest.mark.parametrize(
     ("name", "carry", "limit"),
     [
-        ("c-q31", "none", 2e-6),
-        pytest.param("c-q31", "state", 2e-6, marks=pytest.mark.long),
-        ("c-q31", "full", 1e-7),
-        pytest.param("c-q15", "none", 0.3, marks=pytest.mark.long),
-        pytest.param("c-q15", "state", 0.04, marks=pytest.mark.long),
-        ("c-q15", "full", 0.008),
+        ("c-fixed32", "none", 2e-6),
+        pytest.param("c-fixed32", "state", 2e-6, marks=pytest.mark.long),
+        ("c-fixed32", "full", 1e-7),
+        pytest.param("c-fixed16", "none", 0.3, marks=pytest.mark.long),
+        pytest.param("c-fixed16", "state", 0.04, marks=pytest.mark.long),
+        ("c-fixed16", "full", 0.008),
     ],
 )
 def test_a_turn_about_three_axes(name, carry, limit):
@@ -280,7 +280,7 @@ def test_coning_for_long(steps, limits):
     increments, wanted = classical_coning(steps), None
     for carry, limit in limits.items():
         settings = Settings.of(max_rate_deg_s=100, step="0.002", increments=2, carry=carry)
-        made = make_backend("euler", "rk4", 2, "c-q31", settings=settings)
+        made = make_backend("euler", "rk4", 2, "c-fixed32", settings=settings)
         given = made.representable(increments)
         if wanted is None:
             wanted = in_many_places(given)
@@ -292,7 +292,7 @@ def test_coning_for_long(steps, limits):
 
 def test_the_reference_in_many_places_is_that_of_mpmath():
     made = make_backend(
-        "euler", "rk4", 2, "c-q31", settings=Settings.of(max_rate_deg_s=100, step="0.002", increments=2)
+        "euler", "rk4", 2, "c-fixed32", settings=Settings.of(max_rate_deg_s=100, step="0.002", increments=2)
     )
     given = made.representable(classical_coning(300))
     wanted = exact.propagate(program(Choice("euler", "rk4", 2)), given)

@@ -74,7 +74,7 @@ def test_the_bound_of_an_exponential_is_a_few_places(algorithm, method):
 @pytest.mark.parametrize(
     "carry", ["none", *(pytest.param(c, marks=pytest.mark.long) for c in ("state", "full"))]
 )
-@pytest.mark.parametrize("name", ["c-q31", pytest.param("c-q15", marks=pytest.mark.long)])
+@pytest.mark.parametrize("name", ["c-fixed32", pytest.param("c-fixed16", marks=pytest.mark.long)])
 @pytest.mark.parametrize(("algorithm", "method"), [("euler", "magnus4"), ("dcm", "munthe-kaas4")])
 def test_a_run_of_exponentials_is_inside_its_bound(algorithm, method, name, carry, rng):
     settings = Settings(carry=carry).fitted(0.03)
@@ -84,7 +84,7 @@ def test_a_run_of_exponentials_is_inside_its_bound(algorithm, method, name, carr
         exact = propagate(program(Choice(algorithm, method, 2)), given)
         off = np.linalg.norm(backend.propagate(given) - exact, axis=-1).max()
         bound = backend.rounding_bound(200, rounded)
-        assert off <= bound < (3e-6 if name == "c-q31" else 0.2)
+        assert off <= bound < (3e-6 if name == "c-fixed32" else 0.2)
 
 
 @pytest.mark.parametrize("largest", [Fraction(1, 100), Fraction(1, 2), 2, 4])
@@ -100,7 +100,9 @@ def test_an_exponential_for_increments_of_any_size(largest):
 def test_c_gives_the_integers_of_the_model(method, carry, rng):
     increments = rng.normal(scale=0.01, size=(200, 2, 3))
     settings = Settings(carry=carry)
-    by = [strapgen.backend("euler", method, 2, name, settings=settings) for name in ("c-q31", "fixed-model")]
+    by = [
+        strapgen.backend("euler", method, 2, name, settings=settings) for name in ("c-fixed32", "fixed-model")
+    ]
     found = [backend.propagate(increments) for backend in by]
     np.testing.assert_array_equal(*found)
     exact = strapgen.backend("euler", method, 2, "numpy").propagate(by[0].representable(increments))
@@ -116,7 +118,7 @@ def test_c_gives_the_integers_of_the_model(method, carry, rng):
 )
 def test_a_run_with_previous_increments_is_inside_its_bound(algorithm, count, previous, carry, rng):
     settings = Settings(carry=carry)
-    backend = strapgen.backend(algorithm, "rk4", count, "c-q31", settings=settings, previous=previous)
+    backend = strapgen.backend(algorithm, "rk4", count, "c-fixed32", settings=settings, previous=previous)
     row = rng.normal(scale=0.01, size=(previous + 300 * count, 3))
     increments = backend.representable(windows(row, count, previous))
     found = backend.propagate(increments)

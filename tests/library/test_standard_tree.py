@@ -77,7 +77,7 @@ def test_tree_holds_every_kernel_for_every_target():
     for folder, infix, there in (
         ("c", "", names),
         ("c_float", "_float", names),
-        ("c_fixed", "_q31", fixed),
+        ("c_fixed", "_w32", fixed),
     ):
         wanted |= {f"{folder}/{external(name, infix)}.{ending}" for name in there for ending in "ch"}
     assert files().keys() == wanted

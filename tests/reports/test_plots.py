@@ -146,8 +146,8 @@ def test_comparison_has_a_line_and_a_bound_for_each_back_end(figures):
             [
                 row("numpy", [0.0, 0.0, 0.0]),
                 row("c-float", [0.0, 1e-7, 2e-7]),
-                row("c-q15", [0.0, 1e-4, 2e-4], ((1, 2e-4), (2, 4e-4))),
-                row("c-q31", [0.0, 1e-8, 2e-8], ((1, 1.0), (2, 100.0))),
+                row("c-fixed16", [0.0, 1e-4, 2e-4], ((1, 2e-4), (2, 4e-4))),
+                row("c-fixed32", [0.0, 1e-8, 2e-8], ((1, 1.0), (2, 100.0))),
             ],
             0.125,
         ),
@@ -165,7 +165,7 @@ def test_comparison_has_a_line_and_a_bound_for_each_back_end(figures):
         np.testing.assert_allclose(line.get_xdata(), [0.125, 0.25])
     assert bound.get_color() == short.get_color() != single.get_color() and bound.get_linestyle() == ":"
     labels = {text.get_text(): text.get_position()[1] for text in first.texts}
-    assert list(labels) == ["numpy: equal", "c-q31", "c-float", "c-q15", "c-q15, certified"]
+    assert list(labels) == ["numpy: equal", "c-fixed32", "c-float", "c-fixed16", "c-fixed16, certified"]
     assert all(other - one > 0.02 for one, other in pairwise(labels.values()))
     assert first.get_ylim()[1] <= 4  # half a turn
     (line,) = second.get_lines()
@@ -198,7 +198,7 @@ def test_thesis_tables_have_a_panel_each_with_printed_and_computed_figures(figur
             factor < 2,
         )
         for table in TABLES
-        for backend, factor in (("numpy", 1.0), ("c-q15", 3.0))
+        for backend, factor in (("numpy", 1.0), ("c-fixed16", 3.0))
         for algorithm in ALGORITHMS
         for order, printed in zip(ORDERS, table.printed[algorithm], strict=True)
     ]
@@ -237,7 +237,7 @@ def test_thesis_tables_have_a_panel_each_with_printed_and_computed_figures(figur
 
 def test_rate_table_has_a_panel_a_motion_and_tells_what_is_out_of_range(figures):
     names = ("dcm-rk4-2", "euler-rk4-2", "euler two-speed")
-    drifts = {"numpy": (1e-6, 1e-8, 1e-13), "c-q15": (0.3, None, 0.1)}
+    drifts = {"numpy": (1e-6, 1e-8, 1e-13), "c-fixed16": (0.3, None, 0.1)}
     rows = [
         Row(motion, name, backend, drift, None if drift is None else 88.25)
         for motion in ("linear", "oscillating")
@@ -251,7 +251,7 @@ def test_rate_table_has_a_panel_a_motion_and_tells_what_is_out_of_range(figures)
         assert axes.get_xlabel() == "largest drift of the run, deg"
         for line, column in zip(axes.get_lines(), drifts.values(), strict=False):
             np.testing.assert_array_equal(line.get_xdata(), np.array(column, float))
-        assert "out of range: c-q15" in [text.get_text() for text in axes.texts]
+        assert "out of range: c-fixed16" in [text.get_text() for text in axes.texts]
     assert [label.get_text() for label in figure.axes[0].get_yticklabels()] == list(names)
     assert [text.get_text() for text in figure.legends[0].get_texts()] == list(drifts)
     assert "70 deg/s" in figure.get_suptitle()

@@ -24,7 +24,7 @@ from strapgen.support.exceptions import InputError
 LOG = Path(__file__).resolve().parents[2] / "examples" / "inertial_log.csv"
 GRAVITY = 9.80665
 #: What rounding may make of ten seconds of the wobble, in rad: 250 slow cycles of some last places of what is summed.
-ROUNDING = {"c-float": 2e-5, "c-q31": 1e-7, "c-q15": 2e-3, "fixed-model": 1e-7}
+ROUNDING = {"c-float": 2e-5, "c-fixed32": 1e-7, "c-fixed16": 2e-3, "fixed-model": 1e-7}
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +50,7 @@ def test_a_wobble_on_one_spot(algorithm, sculling, backend_name, wobble):
     # (47) leaves out the square of the angle of a slow cycle: up to a sixth of it, of the whole reaction to gravity.
     angle = np.linalg.norm(wobble.increments, axis=-1).max() * 4
     left_out = angle**2 / 6 * GRAVITY
-    rounding = {"c-float": 1e-4, "c-q15": 0.2}.get(backend_name, 1e-6)
+    rounding = {"c-float": 1e-4, "c-fixed16": 0.2}.get(backend_name, 1e-6)
     assert np.abs(made.velocity_changes - [0, 0, GRAVITY]).max() <= left_out + rounding
 
 
@@ -82,7 +82,7 @@ def test_increments_that_make_no_whole_cycle_are_told(wobble):
 def test_ranges_that_are_stated_hold(wobble):
     narrow = Settings(ranges={"coning": Fraction(1, 10**7)})
     with pytest.raises(InputError, match="two-speed-fast-2 refuses its input"):
-        course("dcm", wobble, fast_cycles=4, backend="c-q31", settings=narrow)
+        course("dcm", wobble, fast_cycles=4, backend="c-fixed32", settings=narrow)
 
 
 @pytest.mark.parametrize(

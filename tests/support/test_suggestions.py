@@ -38,7 +38,7 @@ def test_what_was_meant(value, meant):
 
 
 def test_a_synonym_leads_only_to_what_is_allowed():
-    assert suggestions("backend", "fixed", ["c-q15", "numpy"]) == ["c-q15"]
+    assert suggestions("backend", "fixed", ["c-fixed16", "numpy"]) == ["c-fixed16"]
 
 
 def test_a_value_that_is_no_text_or_very_long_stays_on_one_line():

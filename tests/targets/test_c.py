@@ -148,7 +148,7 @@ def test_text_has_no_heap_and_no_static_data(kernel, target):
 
 
 def declarations(header: str) -> str:
-    plain = re.sub(r"#ifdef __cplusplus.*?#endif", "", header, flags=re.DOTALL)
+    plain = re.sub(r"#ifdef __cplusplus.*?#endif", "", header, flags=re.DOTALL).replace("\\\n", "")
     return "\n".join(line for line in plain.splitlines() if not line.startswith("#"))
 
 

@@ -66,14 +66,14 @@ def test_lines_have_fewer_than_100_columns():
 
 
 def test_names_have_at_most_31_characters():
-    """But for what the loops of a host add to the name of a function."""
+    """But for what the loops of a host add to a function's name, and macros: C99 tells these apart by 63 characters."""
     names = {
         word
         for name, text in texts().items()
         if "_runs." not in name
         for word in re.findall(r"[A-Za-z_]\w*", without_comments(text))
     }
-    assert [name for name in names if len(name) > 31] == []
+    assert [name for name in names if len(name) > (63 if name.isupper() else 31)] == []
 
 
 FORMAT = r"Q-?\d+\.-?\d+, \S+ \.\. \S+, (exact|error \S+)(; stands for [^*]+)?"
@@ -82,7 +82,7 @@ FORMAT = r"Q-?\d+\.-?\d+, \S+ \.\. \S+, (exact|error \S+)(; stands for [^*]+)?"
 def test_every_fixed_point_value_has_its_format_range_and_error():
     values = 0
     for name, text in texts().items():
-        if not name.endswith("_q31.c"):
+        if not name.endswith("_w32.c"):
             continue
         body = text[text.index(f"\nint {name[:-2]}(") :]
         for declaration in re.findall(
@@ -112,7 +112,8 @@ def test_strict_compilers_of_microcontrollers_are_silent(compiler):
     )
     library = ["--specs=picolibc.specs"] if Path(place.stdout.strip()).is_absolute() else []
     folder = resources.folder("generated")
-    files = sorted(path for name in FOLDERS for path in (folder / name).glob("*.c"))
+    with_double = "c" if compiler != "avr-gcc" else ""  # AVR has no double of 53 bits, which the files refuse
+    files = sorted(p for name in FOLDERS if name != "c" or with_double for p in (folder / name).glob("*.c"))
     together = "".join(f'#include "{path}"\n' for path in files)
     command = [compiler, *STRICT, *CROSS[compiler], *library, "-x", "c", "-"]
     done = subprocess.run(command, input=together, capture_output=True, text=True, check=False)

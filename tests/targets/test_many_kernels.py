@@ -20,7 +20,7 @@ from strapgen.support import resources
 from strapgen.targets.names import external
 
 #: The folders of generated/ with the ending of their names.
-FOLDERS = {"c": "", "c_float": "_float", "c_fixed": "_q31"}
+FOLDERS = {"c": "", "c_float": "_float", "c_fixed": "_w32"}
 STRICT = ("-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror")
 
 
@@ -86,7 +86,7 @@ def test_external_names_of_the_catalogue_differ_in_the_31_characters_that_c99_pr
     kernels = dict.fromkeys([*KERNELS, *(choice.kernel for choice in catalogue.standard())])
     names = [
         name
-        for pair in product(kernels, ("", "_float", "_q15", "_q31", "_q63"))
+        for pair in product(kernels, ("", "_float", "_w16", "_w32", "_w64"))
         for name in external_names(*pair)
     ]
     assert len(names) == len(set(names))
@@ -106,5 +106,5 @@ def test_a_kernel_of_a_user_s_that_has_the_short_name_of_another_is_told_apart()
 def test_names_that_fit_are_not_shortened():
     assert external("mrp_norm") == "mrp_norm"
     assert external("dcm_orthonormalize") == "dcm_orthonormalize"
-    assert external("cayley_klein_normalize", "_q31") == "cayley_klein_normalize_q31"
+    assert external("cayley_klein_normalize", "_w32") == "cayley_klein_normalize_w32"
     assert external("normalizer_of_twenty_four") == "normalizer_of_twenty_four"

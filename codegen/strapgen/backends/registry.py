@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -56,35 +56,57 @@ class Entry(NamedTuple):
 _C = ("c.CEvaluator", "c.CBackend", "loops_in_c.LoopsInC")
 _C_FIXED = ("fixed.CFixedEvaluator", "fixed.CFixedBackend", "loops_in_c.LoopsInC")
 
+#: Other names of back ends, which every command takes too.
+ALIASES = {"c-q31": "c-fixed32", "c-q15": "c-fixed16"}
+
+
+class _Backends(Mapping[str, Entry]):
+    """Back ends by name; one can be looked up by its other name, too."""
+
+    def __init__(self, entries: Mapping[str, Entry]) -> None:
+        self._entries = entries
+
+    def __getitem__(self, name: str) -> Entry:
+        return self._entries[ALIASES.get(name, name)]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._entries)
+
+    def __len__(self) -> int:
+        return len(self._entries)
+
+
 #: Back ends by name.
-BACKENDS = {
-    "numpy": Entry(
-        "generated numpy code in double",
-        "numpy",
-        "numpy_evaluator.NumpyEvaluator",
-        "numpy_backend.NumpyBackend",
-    ),
-    "c": Entry("generated C in double, compiled", "c", *_C),
-    "c-float": Entry("generated C in float, compiled", "c-float", *_C),
-    "c-q31": Entry("generated C in 32-bit fixed point, compiled", "c-fixed", *_C_FIXED, word=32),
-    "c-q15": Entry("generated C in 16-bit fixed point, compiled", "c-fixed", *_C_FIXED, word=16),
-    "fixed-model": Entry(
-        "integer model of the fixed-point C in Python, any word",
-        "fixed-model",
-        "fixed.ModelEvaluator",
-        "fixed.ModelBackend",
-        slow=True,
-    ),
-    "exact": Entry(
-        "arithmetic of 40 digits in Python, rounded to double at the end",
-        "exact",
-        "exact.ExactEvaluator",
-        "exact.ExactBackend",
-        "exact_loops.ExactLoops",
-        slow=True,
-        many_digits=True,
-    ),
-}
+BACKENDS: Mapping[str, Entry] = _Backends(
+    {
+        "numpy": Entry(
+            "generated numpy code in double",
+            "numpy",
+            "numpy_evaluator.NumpyEvaluator",
+            "numpy_backend.NumpyBackend",
+        ),
+        "c": Entry("generated C in double, compiled", "c", *_C),
+        "c-float": Entry("generated C in float, compiled", "c-float", *_C),
+        "c-fixed32": Entry("generated C in 32-bit fixed point, compiled", "c-fixed", *_C_FIXED, word=32),
+        "c-fixed16": Entry("generated C in 16-bit fixed point, compiled", "c-fixed", *_C_FIXED, word=16),
+        "fixed-model": Entry(
+            "integer model of the fixed-point C in Python, any word",
+            "fixed-model",
+            "fixed.ModelEvaluator",
+            "fixed.ModelBackend",
+            slow=True,
+        ),
+        "exact": Entry(
+            "arithmetic of 40 digits in Python, rounded to double at the end",
+            "exact",
+            "exact.ExactEvaluator",
+            "exact.ExactBackend",
+            "exact_loops.ExactLoops",
+            slow=True,
+            many_digits=True,
+        ),
+    }
+)
 
 #: Back ends on which an experiment runs by default.
 DEFAULT_BACKENDS = tuple(name for name, entry in BACKENDS.items() if not entry.slow)

@@ -28,6 +28,7 @@ from strapgen.cli.commands import (
     tableau,
     tables,
     two_speed,
+    vectors,
     vibration,
 )
 from strapgen.cli.help import PlainCommand, PlainGroup, explanation
@@ -41,7 +42,11 @@ COMMANDS: dict[str, dict[str, Any]] = {
         "tableau": tableau.tableau,
         "coning": coning.coning,
     },
-    "Generate": {"generate": generate.generate, "two-speed": two_speed.two_speed},
+    "Generate": {
+        "generate": generate.generate,
+        "two-speed": two_speed.two_speed,
+        "vectors": vectors.vectors,
+    },
     "Run": {"simulate": simulate.simulate, "strapdown": strapdown.strapdown, "compare": compare.compare},
     "Analyse": {
         "series": series.series,

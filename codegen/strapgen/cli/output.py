@@ -55,6 +55,15 @@ WithRuns = Annotated[
         panel="Output",
     ),
 ]
+#: Files that build and test the C.
+Project = Annotated[
+    bool,
+    option(
+        "--project",
+        help="In C: write what builds and tests it too: CMakeLists.txt, main.c and a test of vectors.",
+        panel="Output",
+    ),
+]
 
 
 @dataclass(frozen=True)

@@ -303,12 +303,12 @@ def _fixed(
     exact_states: NDArray[np.float64],
     angle: Callable[[Any, Backend], float],
 ) -> Finding:
-    name = "back end c-q31"
+    name = "back end c-fixed32"
     if not fixedpoint.can_lower(program):
         return Finding(name, None, "no fixed point: an input has no stated bound, or an operation is unknown")
     try:
         settings = Settings().fitted(float(np.abs(increments).max()))
-        backend = attitude_backend(choice, backend="c-q31", settings=settings)
+        backend = attitude_backend(choice, backend="c-fixed32", settings=settings)
         off = angle(backend.propagate(increments), backend)
     except (InputError, CompilerError) as error:
         return Finding(name, None, f"no fixed point: {error}")

@@ -135,6 +135,24 @@ class RoundingAccumulation:
             stretched = stretch
         return stretched * (float(self.once) + steps * float(per_step))
 
+    def calls_within(self, allowance: Fraction) -> int:
+        """Return for how many steps at least the length of a state, 1 at first, exceeds 1 by no more than an allowance.
+
+        Examples
+        --------
+        >>> a_step = RoundingAccumulation(Fraction(0), Fraction(1, 2**10), Fraction(0), Fraction(1))
+        >>> a_step.calls_within(Fraction(1, 16))
+        63
+        """
+        # An exact step stretches the state by at most `growth`, as it does the error before it.
+        room, low, high = math.log1p(float(allowance)) * (1 - 1e-6), 0, 1 << 40
+        while high - low > 1:
+            steps = (low + high) // 2
+            rounded = float(self.once) + steps * float(self.per_step)
+            inside = math.log1p(rounded) + steps * float(self.growth - 1) <= room
+            low, high = (steps, high) if inside else (low, steps)
+        return low
+
 
 @dataclass(frozen=True)
 class Interface:

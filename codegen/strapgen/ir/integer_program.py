@@ -261,7 +261,7 @@ class FixedProgram:
     @property
     def name(self) -> str:
         """Name in generated code."""
-        return f"{self.program.name}_q{self.word - 1}"
+        return f"{self.program.name}_w{self.word}"
 
     @property
     def temporaries(self) -> int:

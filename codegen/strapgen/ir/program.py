@@ -177,6 +177,8 @@ class Program:
         The pairs of an output and the input that it becomes in the next call.
     own : tuple of Program
         Kernels that a user's step brings.
+    function : str
+        Name of the function in C if the user chooses it, with {} for the name that the target gives; "" for that name.
 
     Raises
     ------
@@ -197,6 +199,7 @@ class Program:
     companions: Companions | None = None
     recursion: Recursion | None = None
     own: tuple[Program, ...] = ()
+    function: str = ""
 
     def __post_init__(self) -> None:
         known = {element for signal in self.inputs for element in signal.elements} | {RESOLUTION}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
-from fractions import Fraction
 from typing import Any
 
 import sympy as sp
@@ -15,7 +14,7 @@ from strapgen.reports.report import Report
 from strapgen.reports.table import Column, TextTable
 from strapgen.symbolic.kernel import Kernel, Stage
 from strapgen.targets.contract import operations_text
-from strapgen.targets.printer import Printer
+from strapgen.targets.printer import ExactPrinter
 
 _PROGRAM_COLUMNS = (Column("name", "<"), Column("value", "<"))
 _OPERATION_COLUMNS = (Column("operation", "<"), Column("number"))
@@ -51,22 +50,9 @@ def as_text(kernel: Kernel, notes: Sequence[str] | None = None) -> str:
     return "\n".join(lines)
 
 
-class _ExactPrinter(Printer):
-    """Prints constants as fractions."""
-
-    def constant(self, value: Fraction) -> str:
-        return str(value) if value.denominator == 1 else f"({value})"
-
-    def reference(self, name: str) -> str:
-        return name
-
-    def function(self, kind: str, arguments: list[str]) -> str:
-        return f"{kind}({', '.join(arguments)})"
-
-
 def program_as_text(program: Program) -> str:
     """Return the straight-line code of a program with exact constants."""
-    printer = _ExactPrinter()
+    printer = ExactPrinter()
     lines = [program.title, f"operations: {operations_text(program)}"]
     for assignment in program.body:
         if assignment.meaning:
@@ -118,7 +104,7 @@ def formulas_report(kernel: Kernel, program: Program, show: str) -> Report:
 
 def program_as_data(program: Program) -> dict[str, str]:
     """Return the straight-line code of a program by the names that it assigns, in order, with exact constants."""
-    printer = _ExactPrinter()
+    printer = ExactPrinter()
     return {assignment.name: printer.text(assignment.value) for assignment in program.body}
 
 

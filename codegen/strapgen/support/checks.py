@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from fractions import Fraction
 from numbers import Integral
 from pathlib import Path
@@ -54,9 +54,9 @@ def choice(what: str, value: str, allowed: Iterable[str], also: str = "", sectio
     >>> choice("method", "rk4", ["rk1", "rk4"])
     'rk4'
     """
-    names = list(allowed)
+    names = allowed if isinstance(allowed, Container) else list(allowed)  # a mapping may know other names
     if not isinstance(value, str) or value not in names:
-        raise InputError(unknown(what, value, names, also, section))
+        raise InputError(unknown(what, value, list(names), also, section))
     return value
 
 

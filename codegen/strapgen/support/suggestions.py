@@ -71,16 +71,18 @@ SYNONYMS: dict[str, dict[str, tuple[str, ...]]] = {
         **dict.fromkeys(("python", "py"), ("numpy",)),
         **dict.fromkeys(("double", "c-double", "c99", "c64"), ("c",)),
         **dict.fromkeys(("float", "float32", "c32", "single"), ("c-float",)),
-        **dict.fromkeys(("fixed", "fixed-point", "q31", "q15", "c-q31", "c-q15"), ("c-fixed",)),
+        **dict.fromkeys(
+            ("fixed", "fixed-point", "q31", "q15", "c-fixed32", "c-fixed16", "c-q31"), ("c-fixed",)
+        ),
         **dict.fromkeys(("model", "integer-model"), ("fixed-model",)),
     },
     "backend": {
         **dict.fromkeys(("python", "py"), ("numpy",)),
         **dict.fromkeys(("double", "c-double", "c99"), ("c",)),
         **dict.fromkeys(("float", "float32", "single"), ("c-float",)),
-        **dict.fromkeys(("c-fixed", "fixed", "fixed-point"), ("c-q31", "c-q15")),
-        **dict.fromkeys(("c-fixed32", "c-w32", "q31", "fixed32"), ("c-q31",)),
-        **dict.fromkeys(("c-fixed16", "c-w16", "q15", "fixed16"), ("c-q15",)),
+        **dict.fromkeys(("c-fixed", "fixed", "fixed-point"), ("c-fixed32", "c-fixed16")),
+        **dict.fromkeys(("c-w32", "q31", "fixed32"), ("c-fixed32",)),
+        **dict.fromkeys(("c-w16", "q15", "fixed16"), ("c-fixed16",)),
         **dict.fromkeys(("model", "integer-model"), ("fixed-model",)),
         **dict.fromkeys(("mpmath", "sympy", "truth", "reference"), ("exact",)),
     },

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from fractions import Fraction
 
-from strapgen.ir.fixed_interface import Argument, ErrorFeedback, RoundingAccumulation
-from strapgen.ir.fixed_settings import DEFAULT_ALLOWANCE, DEFAULT_ANGLE, Settings
+from strapgen.ir.fixed_interface import Argument, ErrorFeedback, Interface, RoundingAccumulation
+from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.formats import Format
 from strapgen.ir.integer_program import FixedProgram, Value
 from strapgen.ir.program import Program
@@ -29,25 +29,22 @@ def argument_text(argument: Argument) -> str:
 
 
 def command(fixed: FixedProgram, target: str) -> str:
-    """Return the command that generates a fixed-point program."""
-    return (
-        f"strapgen generate {fixed.program.arguments} --target {target} {options(fixed.interface.settings)}"
-    )
+    """Return the command that generates a fixed-point program, with all options."""
+    turned = any(signal.name in ("increments", "turns") for signal in fixed.program.inputs)
+    stated = options(fixed.interface.settings, angle=turned)
+    return f"strapgen generate {fixed.program.arguments} --target {target} {stated}"
 
 
-def options(settings: Settings) -> str:
-    """Return settings as options of the command line."""
+def options(settings: Settings, angle: bool = False) -> str:
+    """Return settings as options of the command line, with the largest angle where a function has one."""
     words = [f"--word {settings.word}"]
-    if settings.stated:
-        words.append(settings.stated)
-    elif settings.largest_angle != DEFAULT_ANGLE:
-        words.append(f"--max-angle-rad {settings.largest_angle}")
-    if settings.rounding != "nearest":
-        words.append(f"--rounding {settings.rounding}")
-    if settings.carry != "none":
-        words.append(f"--carry {settings.carry}")
-    if settings.allowance != DEFAULT_ALLOWANCE:
-        words.append(f"--drift-allowance {settings.allowance}")
+    if angle:
+        words.append(settings.stated or f"--max-angle-rad {settings.largest_angle}")
+    words += [
+        f"--rounding {settings.rounding}",
+        f"--carry {settings.carry}",
+        f"--drift-allowance {settings.allowance}",
+    ]
     words += [f"--range {name}={value}" for name, value in settings.ranges.items()]
     words += [f"--fix {name}={value}" for name, value in settings.formats.items()]
     return " ".join(words)
@@ -68,6 +65,49 @@ def accumulation_text(accumulation: RoundingAccumulation, program: Program) -> s
     stretched = f", times exp({_number(growth)} N)" if growth else ""
     once = f"{_number(accumulation.once)} + " if accumulation.once else ""
     return f"({once}{_number(accumulation.per_step)} N){stretched}, {what}"
+
+
+def upkeep_text(program: Program, interface: Interface | None = None, target: str = "c") -> str:
+    """Return in words how often the state of a step is normalized, and what to do after an error code.
+
+    Parameters
+    ----------
+    program : Program
+    interface : Interface, optional
+        That of fixed-point code.
+    target : str, optional
+        Name of the target.
+
+    Returns
+    -------
+    str
+        "" for a kernel that is no step.
+    """
+    if program.companions is None or program.companions.orthonormalize is None:
+        return ""
+    kernel = program.companions.orthonormalize
+    command = f"strapgen generate {kernel} --target {target}"
+    proper = "orthogonal with rows of length 1" if len(program.inputs[0].shape) == 2 else "of length 1"
+    if interface is None:
+        return (
+            f"A proper state is {proper}. A step keeps it so but for rounding and the error of its method: now and "
+            f"then the function of `{command}` takes these out."
+        )
+    sentences = [
+        f"A proper state is {proper}; the range of the output is wider than that of the input because it holds for "
+        "every input in its range."
+    ]
+    calls = interface.accumulation and interface.accumulation.calls_within(interface.settings.allowance)
+    if calls:
+        sentences.append(
+            f"From a proper state it takes at least {calls:,} calls until one is refused for the size of the state."
+        )
+    sentences.append(
+        f"Normalize it before, with the function of `{command} {options(interface.companion_settings)}`. After an "
+        "error code, the state is that before the call: normalize it and go on, with the rotation of that step lost, "
+        "or begin again from a known attitude."
+    )
+    return " ".join(sentences)
 
 
 def residuals_text(residuals: tuple[ErrorFeedback, ...]) -> str:
@@ -121,6 +161,11 @@ def value_text(value: Value, word: int) -> str:
         else ""
     )
     return f"{format_}, {low} .. {high}, {error}{offset}"
+
+
+def decimal_above(value: Fraction) -> str:
+    """Return a decimal number of six digits that is at least a value, and hardly more."""
+    return _outward(value, up=True, digits=6)
 
 
 def _outward(value: Fraction, up: bool, digits: int = 3) -> str:

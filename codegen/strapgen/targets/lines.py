@@ -35,6 +35,15 @@ def fill_arguments(text: str, indent: str, width: int = 99) -> str:
     return _filled(re.split(r"(?<=,) ", text), indent, width)
 
 
+def fill_definition(name: str, value: str, meaning: str, width: int = 99) -> str:
+    """Return the definition of a macro with a comment, over several lines if it is too long for one."""
+    line = f"#define {name} {value} /* {meaning} */"
+    if len(line) <= width:
+        return line
+    wrapped = fill_arguments(value, "    ", width - 6)
+    return f"/* {meaning} */\n#define {name} \\\n    " + wrapped.replace("\n", " \\\n")
+
+
 def _filled(pieces: list[str], indent: str, width: int) -> str:
     lines: list[str] = []
     for piece in pieces:

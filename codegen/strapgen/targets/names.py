@@ -11,12 +11,13 @@ import keyword
 import re
 import symtable
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import count
 from typing import TypeVar
 
 from strapgen.ir.integer_program import FixedProgram
 from strapgen.ir.program import Program
+from strapgen.support.exceptions import InputError
 from strapgen.targets.c_library import LIBRARY
 from strapgen.targets.renaming import Key, keys, renamed
 
@@ -139,6 +140,8 @@ PYTHON = Language(_python_allows, _python_scopes)
 #: Most characters of a kernel's name in C. C99 tells external names apart by 31 characters, and those of one kernel,
 #: such as ``<name>_float`` and ``<name>_float_array``, differ by then.
 _MOST = 23
+#: Most characters of a function's name that a user chooses: four more tell the static functions of its file apart.
+MOST_CHOSEN = 27
 #: What C writes in longer names of the catalogue, a word after the other until the name is short enough.
 _SHORT = {
     "orthonormalize": "orth",
@@ -188,6 +191,42 @@ def external(name: str, ending: str = "") -> str:
     name += ending
     free = _c_allows(name) and name not in LIBRARY and not name.endswith("_t")
     return name if free else f"{name}_Kernel"  # a capital letter stands in no other kernel's name
+
+
+def function_name(program: Program, ending: str = "") -> str:
+    """Return the name of a program's function in C: what the user chose, or else `external`."""
+    default = external(program.name, ending)
+    return program.function.format(default) if program.function else default
+
+
+def chosen_by_user(program: Program, name: str | None, prefix: str | None) -> Program:
+    """Return a program whose function in C has a name, or begins with a prefix, that the user chose.
+
+    Raises
+    ------
+    InputError
+        If the name is no name for C, or too long.
+    """
+    if name is None and prefix is None:
+        return program
+    if name is not None and prefix is not None:
+        raise InputError("--name and --prefix are both given; one is needed")
+    option, text = ("--prefix", prefix or "") if name is None else ("--name", name)
+    if not re.fullmatch(r"[A-Za-z]\w*", text, re.ASCII):
+        raise InputError(f"{option} is {text!r}; letters, digits and underscores are needed, a letter first")
+    result = replace(
+        program,
+        function=text if prefix is None else f"{text}{{}}",
+        arguments=f"{program.arguments} {option} {text}",
+    )
+    for ending in ("", "_float", "_w32") if prefix is not None else ("",):
+        final = function_name(result, ending)
+        if len(final) > MOST_CHOSEN or not _c_allows(final) or final in LIBRARY or final.endswith("_t"):
+            raise InputError(
+                f"{option} {text} makes a function {final}; a name of at most {MOST_CHOSEN} characters is needed, "
+                "that neither C, C++ nor the C library has"
+            )
+    return result
 
 
 def printed(

@@ -65,3 +65,19 @@ class Printer:
     def _negate(self, argument: Node) -> tuple[str, int]:
         # Two signs in a row are another operator in C.
         return f"-{self._inside(argument, _ATOM)}", _UNARY
+
+
+class ExactPrinter(Printer):
+    """Prints constants as fractions, and functions by their names."""
+
+    def constant(self, value: Fraction) -> str:
+        """Return a number as an integer or a fraction in parentheses."""
+        return str(value) if value.denominator == 1 else f"({value})"
+
+    def reference(self, name: str) -> str:
+        """Return a name."""
+        return name
+
+    def function(self, kind: str, arguments: list[str]) -> str:
+        """Return a call."""
+        return f"{kind}({', '.join(arguments)})"

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from strapgen.support import resources
 from strapgen.targets import contract
 from strapgen.targets.contract import elements_text, operations_text, range_text
-from strapgen.targets.lines import fill, fill_arguments
+from strapgen.targets.lines import fill, fill_arguments, fill_definition
 
 if TYPE_CHECKING:
     import jinja2
@@ -50,6 +50,7 @@ def environment(folder: Path | None = None) -> jinja2.Environment:
         operations=operations_text,
         argument_text=contract.argument_text,
         fixed_command=contract.command,
+        defined=lambda definition: fill_definition(definition.name, definition.value, definition.meaning),
         accumulation_text=contract.accumulation_text,
         residuals_text=contract.residuals_text,
         guards_text=contract.guards_text,

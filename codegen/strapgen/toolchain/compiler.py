@@ -13,6 +13,7 @@ import importlib.util
 import json
 import os
 import platform
+import re
 import shlex
 import shutil
 import subprocess
@@ -340,7 +341,6 @@ def _library(name: str) -> str:
 
 def _declarations(header: str) -> str:
     """Return the declarations of a generated header, without its preprocessor lines."""
-    lines = [line for line in header.splitlines() if not line.startswith("#")]
-    text = "\n".join(lines).replace('extern "C" {', "")
+    text = re.sub(r"^#(?:.*\\\n)*.*$", "", header, flags=re.MULTILINE).replace('extern "C" {', "")
     head, _, tail = text.rpartition("}")
     return head + tail

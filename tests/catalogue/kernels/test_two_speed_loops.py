@@ -28,7 +28,7 @@ def test_the_names_are_there():
 @pytest.mark.long
 @pytest.mark.parametrize("name", NAMES)
 def test_every_target_computes_the_kernel(name, rng):
-    in_c, model = strapgen.evaluator(name, "c-q31"), strapgen.evaluator(name, "fixed-model", Settings())
+    in_c, model = strapgen.evaluator(name, "c-fixed32"), strapgen.evaluator(name, "fixed-model", Settings())
     integers = corners_and_random(model, 100, rng)
     done = []  # what is accepted: a range that is checked may be left at the corners
     for k in range(100):

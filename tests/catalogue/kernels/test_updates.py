@@ -156,7 +156,7 @@ def test_the_exact_form_holds_to_a_whole_turn(algorithm, backend):
 def test_the_exact_form_holds_beyond_half_a_turn_in_fixed_point(algorithm):
     # Elements of up to 3 rad: their angle goes to 5.19 rad.
     update = strapgen.evaluator(
-        f"{algorithm}-update", "c-q31", Settings(ranges={"rotation_vector": Fraction(3)})
+        f"{algorithm}-update", "c-fixed32", Settings(ranges={"rotation_vector": Fraction(3)})
     )
     directions = np.vstack([DIRECTIONS, np.array([1, -1, 1]) / np.sqrt(3)])
     phi = np.concatenate([size * directions for size in (*SIZES, *LARGE, 5.19)])
@@ -249,7 +249,7 @@ def stepped(update, state: np.ndarray, phi: np.ndarray) -> np.ndarray:
     return before if interface is None else update.numbers(interface.outputs[0], before)
 
 
-@pytest.mark.parametrize("backend", ["c", "c-q31"])
+@pytest.mark.parametrize("backend", ["c", "c-fixed32"])
 @pytest.mark.parametrize("name", ["dcm", "euler"])
 def test_exact_updates_need_no_orthonormalization(name, backend, rng):
     # C'C - I, or the square of the length less 1, is turned by a step and not stretched: what steps add is summed.

@@ -61,7 +61,7 @@ def compare(
     object code and its operations. Fixed-point formats are chosen for the increments of the run, or for
     --max-rate-deg-s if you give it. --plot draws the angle over time, and the certified bound after as many steps.
 
-    Example: strapgen compare euler --method rk4 --increments 2 --backend numpy,c,c-q31,c-q15 --carry full
+    Example: strapgen compare euler --method rk4 --increments 2 --backend numpy,c,c-fixed32,c-fixed16 --carry full
     --reference exact --motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 --step 0.125 --duration 180
     """
     output.check(algorithm, methods.tableau, source.increments_csv, source.rates_csv)

@@ -10,13 +10,14 @@ import typer
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import grouped
 from strapgen.cli.options import MethodOptions, OptionalAlgorithm, one, option
-from strapgen.cli.output import Format, WithRuns, check_format, print_json
+from strapgen.cli.output import Format, Project, WithRuns, check_format, print_json
 from strapgen.cli.progress import track
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
     from strapgen.catalogue import Choice
+    from strapgen.ir.fixed_settings import Settings
     from strapgen.ir.float_interface import RoundingBounds
     from strapgen.ir.sources import Sources
 
@@ -49,6 +50,7 @@ def generate(
         ),
     ] = None,
     with_runs: WithRuns = False,
+    project: Project = False,
     check: Annotated[
         bool,
         option(
@@ -72,7 +74,7 @@ def generate(
     if check and not all_:
         raise InputError("--check goes with --all")
     if all_:
-        _check_alone(algorithm, method, target, fixed, with_runs)
+        _check_alone(algorithm, method, target, fixed, with_runs or project)
         _generate_all(out, check, format)
         return
     if algorithm is None:
@@ -89,23 +91,36 @@ def generate(
         raise InputError(
             f"the options of fixed point go with --target {' or '.join(fixed_targets())}, not with {target}"
         )
-    if with_runs and not TARGETS[target].compiled:
-        raise InputError(f"--with-runs goes with targets in C, not with {target}")
+    for option_, chosen in (("--with-runs", with_runs), ("--project", project)):
+        if chosen and not TARGETS[target].compiled:
+            raise InputError(f"{option_} goes with targets in C, not with {target}")
     _check_increments(choice, fixed)
     sources = generated_sources.sources(choice, target, settings)
     if fixed.carry not in (None, "none") and sources.fixed is not None and not sources.fixed.residuals:
         raise InputError(
             f"kernel {choice.kernel} rounds no state that goes on to the next step; --carry keeps nothing"
         )
-    written = write_files(out or Path(), sources.files if with_runs else sources.step_files)
+    files = sources.files if with_runs else sources.step_files
+    if project:
+        files = files | _project_files(out or Path(), choice, target, settings)
+    written = write_files(out or Path(), files)
     if format == "json":
         print_json(_data(choice, sources, target, written))
     else:
         typer.echo(_text(sources, target, written))
 
 
+def _project_files(out: Path, choice: Choice, target: str, settings: Settings | None) -> dict[str, str]:
+    """Return the files that build and test the C, unless a file of the user is in their place."""
+    from strapgen.experiments import project
+
+    files = project.project_files(choice, target, settings)
+    project.refuse_changed(out, files)
+    return files
+
+
 def _check_alone(
-    algorithm: str | None, method: MethodOptions, target: str | None, fixed: FixedOptions, with_runs: bool
+    algorithm: str | None, method: MethodOptions, target: str | None, fixed: FixedOptions, more: bool
 ) -> None:
     """Refuse options that do not go with --all."""
     for name, value in (
@@ -117,7 +132,7 @@ def _check_alone(
         ("--rates", method.rates or None),
         ("--target", target),
         ("a fixed-point option", fixed.stated or None),
-        ("--with-runs", with_runs or None),
+        ("--with-runs or --project", more or None),
     ):
         if value is not None:
             raise InputError(f"--all generates the whole catalogue; {name} does not go with it")

@@ -40,7 +40,7 @@ def tables(
 ) -> None:
     """Compute the tables of the thesis beside its printed figures.
 
-    Example: strapgen tables --backend c-q31 --carry full
+    Example: strapgen tables --backend c-fixed32 --carry full
     """
     output.check()
     if predict:

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import Sculling, TwoSpeedAlgorithm, option, whole
-from strapgen.cli.output import Folder, Format, WithRuns, check_format, print_json
+from strapgen.cli.output import Folder, Format, Project, WithRuns, check_format, print_json
 from strapgen.support.exceptions import InputError
+
+if TYPE_CHECKING:
+    from strapgen.ir.fixed_settings import Settings
 
 
 @grouped
@@ -29,6 +32,7 @@ def two_speed(
     ],
     out: Folder = None,
     with_runs: WithRuns = False,
+    project: Project = False,
     format: Format = "text",
 ) -> None:
     """Generate the C code of an algorithm in two speeds.
@@ -50,7 +54,10 @@ def two_speed(
     elif settings is not None:
         raise InputError(f"the options of fixed point go with --target c-fixed, not with {target}")
     sources = two_speed_sources.sources(algorithm, form, target, settings)
-    written = write_files(out or Path(), sources.files if with_runs else sources.step_files)
+    files = sources.files if with_runs else sources.step_files
+    if project:
+        files = files | _project_files(out or Path(), algorithm, form, target, settings)
+    written = write_files(out or Path(), files)
     if format == "json":
         print_json(
             {
@@ -65,3 +72,14 @@ def two_speed(
     typer.echo(f"{sources.kernel} for {target}")
     for path in written:
         typer.echo(f"  {path}")
+
+
+def _project_files(
+    out: Path, algorithm: str, sculling: int, target: str, settings: Settings | None
+) -> dict[str, str]:
+    """Return the files that build and test the C, unless a file of the user is in their place."""
+    from strapgen.experiments import project, two_speed_project
+
+    files = two_speed_project.project_files(algorithm, sculling, target, settings)
+    project.refuse_changed(out, files)
+    return files

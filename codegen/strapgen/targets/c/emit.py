@@ -7,13 +7,15 @@ from fractions import Fraction
 
 import numpy as np
 
+from strapgen.ir.float_interface import RoundingBounds
 from strapgen.ir.program import Operation, Program, walk
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Function, Sources
 from strapgen.rounding import rounding_bounds
-from strapgen.targets.c.rounding_text import rounding_text
+from strapgen.targets import contract, contract_lines, definitions
+from strapgen.targets.c.rounding_text import rounding_text, with_names
 from strapgen.targets.lines import fill_expression
-from strapgen.targets.names import C, external, printed
+from strapgen.targets.names import C, function_name, printed
 from strapgen.targets.printer import Printer
 from strapgen.targets.registry import TARGETS
 from strapgen.targets.rendering import PROPAGATE, own_call, render_c, runs_of
@@ -110,12 +112,16 @@ def emit(program: Program, target: str) -> Sources:
         ``<name>_propagate`` there too, the loop over runs and steps.
     """
     real = real_of(target)
-    name = external(program.name, real.infix)
+    name = function_name(program, real.infix)
     # A scalar input has one name, which is that of its argument and of its element.
     scalars = [signal.name for signal in program.inputs if not signal.shape]
     rounding = rounding_bounds(program, real.name)
-    text = rounding_text(rounding, program)
-    _, files = printed(program, lambda named, _: _files(named, name, target, text), C, scalars)
+    _, files = printed(
+        program,
+        lambda named, _: _files(named, name, target, with_names(rounding, program, named)),
+        C,
+        scalars,
+    )
     function = Function(name, program.inputs, tuple(result.signal for result in program.outputs))
     return Sources(
         program.kernel,
@@ -131,17 +137,21 @@ def emit(program: Program, target: str) -> Sources:
     )
 
 
-def _files(program: Program, name: str, target: str, rounding: str) -> dict[str, str]:
-    """Return the header and the source of a program with its printed names, and the text on its rounding."""
+def _files(program: Program, name: str, target: str, rounding: RoundingBounds) -> dict[str, str]:
+    """Return the header and the source of a program with its printed names."""
     real = real_of(target)
     printer = CPrinter(real, name)
+    command = f"strapgen generate {program.arguments} --target {target}"
     nodes = [node for a in program.body for node in walk(a.value) if isinstance(node, Operation)]
     values = {
         "program": program,
         "guard": f"{name}_h".upper(),
-        "command": f"strapgen generate {program.arguments} --target {target}",
+        "command": command,
+        "contract": contract_lines.of_program(program, name, command, rounding),
+        "definitions": definitions.of_program(program, name, printer),
+        "normalizing": contract.upkeep_text(program, target=target),
         "real": real,
-        "rounding": rounding,
+        "rounding": rounding_text(rounding, program),
         "state": program.inputs[0],
         "samples": program.inputs[-1],
         "result": program.outputs[0].signal,

@@ -2,11 +2,42 @@
 
 from __future__ import annotations
 
-from decimal import ROUND_CEILING, Context, Decimal
+from collections.abc import Iterator
+from dataclasses import replace
 from fractions import Fraction
 
-from strapgen.ir.float_interface import RoundingBounds
+from strapgen.ir.float_interface import Condition, RoundingBounds
 from strapgen.ir.program import Program
+from strapgen.targets.contract import decimal_above
+
+
+def with_names(bounds: RoundingBounds, program: Program, named: Program) -> RoundingBounds:
+    """Return the bounds of a program with the names that are printed.
+
+    Parameters
+    ----------
+    bounds : RoundingBounds
+    program, named : Program
+        The program that they are of, and the same with the printed names.
+    """
+    names = dict(zip(_names(program), _names(named), strict=True))
+
+    def renamed(condition: Condition) -> Condition:
+        words, space, name = condition.value.rpartition(" ")
+        return replace(condition, value=words + space + names[name])
+
+    return replace(
+        bounds,
+        inputs=tuple(map(renamed, bounds.inputs)),
+        conditions=tuple(map(renamed, bounds.conditions)),
+        errors={names[name]: errors for name, errors in bounds.errors.items()},
+    )
+
+
+def _names(program: Program) -> Iterator[str]:
+    yield from (signal.name for signal in program.inputs)
+    yield from (assignment.name for assignment in program.body)
+    yield from (result.signal.name for result in program.outputs)
 
 
 def rounding_text(bounds: RoundingBounds, program: Program) -> str:
@@ -30,21 +61,19 @@ def rounding_text(bounds: RoundingBounds, program: Program) -> str:
     if bounds.accumulation is not None:
         row = "row of the error" if len(program.inputs[0].shape) == 2 else "error"
         growth = bounds.accumulation.growth - 1
-        stretched = f" exp({_above(growth)} N)" if growth else ""
-        text += (
-            f"; the {row} after N steps is at most {_above(bounds.accumulation.per_step)} N{stretched} long"
-        )
+        stretched = f" exp({decimal_above(growth)} N)" if growth else ""
+        text += f"; the {row} after N steps is at most {decimal_above(bounds.accumulation.per_step)} N{stretched} long"
     return f"{text}. This holds for {_conditions(bounds)}"
 
 
 def _errors(bounds: RoundingBounds) -> str:
     """Return the largest error of every output."""
     parts = [
-        f"{name} is off by at most {_above(worst)}" if worst else f"{name} is exact"
+        f"{name} is off by at most {decimal_above(worst)}" if worst else f"{name} is exact"
         for name, worst in bounds.worst.items()
     ]
     if len(parts) == 1:
-        parts[0] += f", {_above(bounds.worst.popitem()[1] / bounds.unit)} units in the last place of 1"
+        parts[0] += f", {decimal_above(bounds.worst.popitem()[1] / bounds.unit)} units in the last place of 1"
     return ", ".join(parts)
 
 
@@ -65,9 +94,3 @@ def _conditions(bounds: RoundingBounds) -> str:
 
 def _plain(value: Fraction) -> str:
     return f"{float(value):.6g}"
-
-
-def _above(value: Fraction) -> str:
-    """Return a number with three digits, rounded up."""
-    context = Context(prec=3, rounding=ROUND_CEILING)
-    return f"{float(context.divide(Decimal(value.numerator), Decimal(value.denominator))):.3g}"

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 from strapgen.ir.integer_program import FixedProgram
 from strapgen.ir.sources import Function, Sources
+from strapgen.targets import contract, contract_lines, definitions
 from strapgen.targets.c_fixed.statements import StatementPrinter
 from strapgen.targets.c_fixed.words import WORDS
-from strapgen.targets.names import C, external, printed
+from strapgen.targets.names import C, function_name, printed
 from strapgen.targets.rendering import PROPAGATE, own_call, render_c, runs_of
 
 
@@ -30,7 +31,7 @@ def emit(fixed: FixedProgram, target: str) -> Sources:
         ``<name>_propagate`` there too, the loop over runs and steps.
     """
     interface = fixed.interface
-    name = external(fixed.program.name, f"_q{fixed.word - 1}")
+    name = function_name(fixed.program, f"_w{fixed.word}")
     arguments = (*interface.inputs, *interface.outputs)
     scalars = [argument.signal.name for argument in arguments if not argument.signal.shape]
     _, files = printed(fixed, lambda named, _: _files(named, name, target), C, scalars)
@@ -65,6 +66,8 @@ def _files(fixed: FixedProgram, name: str, target: str) -> dict[str, str]:
         pieces.insert(place, f"{word.residual} residuals[{feedback_words}]")
         arrays.insert(place, f"{word.residual} *residuals")
         calls.insert(place, f"residuals + {feedback_words} * k")
+    command = contract.command(fixed, target)
+    memory = {signal.name: printer.memory(signal.name) for signal, _ in signals}
     values = {
         "fixed": fixed,
         "target": target,
@@ -95,6 +98,10 @@ def _files(fixed: FixedProgram, name: str, target: str) -> dict[str, str]:
         "nearest": interface.settings.rounding == "nearest",
         "fresh": dict.fromkeys(f"UINT{fixed.word}_C({r.fresh})" for r in interface.residuals),
         "uses": printer.uses,
+        "command": command,
+        "contract": contract_lines.of_fixed(fixed, name, command, memory),
+        "definitions": definitions.of_fixed(fixed, name),
+        "normalizing": contract.upkeep_text(fixed.program, interface, target),
         "guarded": tuple(value for value in fixed.body if value.guarded),
     }
     return render_c("c_fixed", name, **values)

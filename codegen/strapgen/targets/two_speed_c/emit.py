@@ -10,6 +10,7 @@ from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Function, Sources
+from strapgen.support.version import VERSION
 from strapgen.targets.c.emit import real_of
 from strapgen.targets.c_fixed.words import WORDS
 from strapgen.targets.rendering import render_c, runs_of
@@ -89,6 +90,7 @@ def whole(name: str, title: str, command: str, loops: Sequence[Sources]) -> Sour
     values = {
         "title": title,
         "command": command,
+        "version": VERSION,
         "guard": f"{identifier}_h".upper(),
         "headers": [next(file for file in loop.files if file.endswith(".h")) for loop in loops],
         "loops": LOOPS,
@@ -128,7 +130,7 @@ def _numbers(loop: Sources) -> _Numbers:
         real = real_of(loop.target)
         return _Numbers(real.infix, real.name)
     word = WORDS[loop.fixed.settings.word]
-    return _Numbers(f"_q{word.bits - 1}", word.type, word.residual, word.bits)
+    return _Numbers(f"_w{word.bits}", word.type, word.residual, word.bits)
 
 
 def _contracts(loops: Sequence[Sources]) -> dict[str, object]:

@@ -1,0 +1,3 @@
+"""The version of the package, which generated headers state."""
+
+VERSION = "0.1.0"

@@ -1,0 +1,103 @@
+"""The names that a generated header defines for code around it: version, formats, limits and first values."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
+from fractions import Fraction
+
+from strapgen.ir.fixed_interface import Argument
+from strapgen.ir.formats import Format
+from strapgen.ir.integer_program import FixedProgram
+from strapgen.ir.program import Program
+from strapgen.ir.signals import Signal
+from strapgen.targets.printer import Printer
+
+
+@dataclass(frozen=True)
+class Macro:
+    """A name that a header defines, its value as C text, and what it is."""
+
+    name: str
+    value: str
+    meaning: str
+
+
+def of_fixed(fixed: FixedProgram, function: str) -> list[Macro]:
+    """Return the definitions of fixed-point code."""
+    interface, bits, head = fixed.interface, fixed.word, function.upper()
+    arguments = (*interface.inputs, *interface.outputs)
+    names = _upper(argument.signal for argument in arguments)
+    result = []
+    for argument in arguments:
+        name, unit = f"{head}_{names[argument.signal.name]}", argument.format.unit
+        result.append(Macro(f"{name}_FRACTION_BITS", str(argument.format.fraction), f"{argument.format}"))
+        result.append(Macro(f"{name}_UNIT", _double(unit), _unit(argument)))
+        result += _limits(name, argument, bits)
+    step = fixed.program.companions
+    if step is not None:
+        state = interface.inputs[0].format
+        words = ", ".join(word_literal(_nearest(x, state), bits) for x in step.identity)
+        result.append(Macro(f"{head}_IDENTITY", f"{{{words}}}", "the state of zero rotation"))
+    if interface.residuals:
+        first = ", ".join(f"UINT{bits}_C({feedback.fresh})" for feedback in interface.residuals)
+        result.append(Macro(f"{head}_FIRST_RESIDUALS", f"{{{first}}}", "the residuals before the first call"))
+    return result
+
+
+def of_program(program: Program, function: str, printer: Printer) -> list[Macro]:
+    """Return the definitions of floating-point code."""
+    step, head = program.companions, function.upper()
+    if step is None:
+        return []
+    numbers = ", ".join(printer.constant(x) for x in step.identity)
+    return [Macro(f"{head}_IDENTITY", f"{{{numbers}}}", "the state of zero rotation")]
+
+
+def word_literal(value: int, bits: int) -> str:
+    """Return an integer as a constant of C that has at least so many bits on every machine.
+
+    Examples
+    --------
+    >>> word_literal(-5, 16), word_literal(-(2**31), 32)
+    ('-INT16_C(5)', '(-INT32_C(2147483647) - 1)')
+    """
+    if not value:
+        return "0"
+    if value == -(1 << (bits - 1)):
+        return f"(-INT{bits}_C({-value - 1}) - 1)"
+    return f"{'-' if value < 0 else ''}INT{bits}_C({abs(value)})"
+
+
+def _limits(name: str, argument: Argument, bits: int) -> list[Macro]:
+    """Return the range of the integers of an argument: one limit where it is symmetric."""
+    if argument.low == -argument.high:
+        return [Macro(f"{name}_LIMIT", word_literal(argument.high, bits), "largest magnitude")]
+    return [
+        Macro(f"{name}_LOW", word_literal(argument.low, bits), "smallest integer"),
+        Macro(f"{name}_HIGH", word_literal(argument.high, bits), "largest integer"),
+    ]
+
+
+def _upper(signals: Iterable[Signal]) -> dict[str, str]:
+    """Return names in capital letters where these differ, for each signal by its name."""
+    names = [signal.name for signal in signals]
+    counts = Counter(name.upper() for name in names)
+    return {name: name if counts[name.upper()] > 1 else name.upper() for name in names}
+
+
+def _unit(argument: Argument) -> str:
+    unit = "" if argument.signal.unit == "1" else f" {argument.signal.unit}"
+    return f"2^{-argument.format.fraction}{unit}"
+
+
+def _double(value: Fraction) -> str:
+    """Return the shortest literal that reads as a number that is a power of two."""
+    text = repr(float(value))
+    return text if "." in text or "e" in text else f"{text}.0"
+
+
+def _nearest(value: Fraction, format_: Format) -> int:
+    """Return the integer of a number; the largest there is where the number lies just beyond."""
+    return min(round(value / format_.unit), (1 << (format_.word - 1)) - 1)

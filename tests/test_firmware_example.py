@@ -1,0 +1,180 @@
+"""The hand-off in four commands, and the gate of a firmware's build in examples/firmware, run outside the checkout."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from c_programs import needed
+
+ROOT = Path(__file__).resolve().parents[1]
+EXAMPLE = ROOT / "examples" / "firmware"
+#: The pages that show the hand-off; the first that does is read.
+PAGES = (ROOT / "README.md", ROOT / "docs" / "command-line.md")
+#: Steps of the workflow whose commands strapgen does not have yet, and why they fail.
+MISSING = {
+    "The files are those that the options generate": "generate has --check with --all alone",
+    "Every file does what its header says": "there is no command verify yet",
+}
+#: Steps of the workflow that set the machine up.
+SETTING_UP = ("Install strapgen", "Install the cross compiler and the emulator")
+
+
+def without_the_checkout(folder: Path) -> dict[str, str]:
+    """Return an environment in which `strapgen` is this project's program; nothing else of the checkout is in reach."""
+    program = folder / "bin" / "strapgen"
+    program.parent.mkdir()
+    package = shlex.quote(str(ROOT / "codegen"))
+    program.write_text(
+        f'#!/bin/sh\nPYTHONPATH={package} exec {shlex.quote(sys.executable)} -m strapgen "$@"\n'
+    )
+    program.chmod(0o755)
+    return os.environ | {"PATH": f"{program.parent}{os.pathsep}{os.environ['PATH']}"}
+
+
+def run(script: str, folder: Path, environment: dict[str, str]) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        ["sh", "-e", "-c", script],
+        cwd=folder,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        check=False,
+    )
+
+
+def hand_off() -> list[str]:
+    """Return the commands of the hand-off as a page shows them."""
+    for page in PAGES:
+        text = re.sub(r"\\\n\s*", "", page.read_text())
+        shown = re.search(
+            r"(?:^    .*\n)*^    strapgen generate .*--project.*\n(?:^    .*\n)+", text, re.MULTILINE
+        )
+        if shown is not None:
+            return [line.strip() for line in shown[0].splitlines()]
+    raise AssertionError("no page shows the hand-off")
+
+
+def test_the_hand_off_takes_four_commands(tmp_path):
+    needed("cmake", "ctest")
+    commands = hand_off()
+    assert [command.split()[0] for command in commands] == ["strapgen", "cmake", "cmake", "ctest"]
+    environment, folder = without_the_checkout(tmp_path), tmp_path / "elsewhere"
+    folder.mkdir()
+    for command in commands:
+        done = run(command, folder, environment)
+        assert done.returncode == 0, done.stdout
+    assert "100% tests passed, 0 tests failed" in done.stdout
+
+
+def steps() -> dict[str, str]:
+    """Return the commands of the workflow's steps by name."""
+    text = (EXAMPLE / "firmware.yml").read_text()
+    found = re.findall(
+        r"^      - name: (.*)\n        run: (?:\|\n((?: {10}.*\n)+)|(.*)\n)", text, re.MULTILINE
+    )
+    assert len(found) == text.count("- name:")
+    return {
+        name: "\n".join(line.strip() for line in (several or one).splitlines())
+        for name, several, one in found
+    }
+
+
+def test_the_workflow_uses_the_targets_of_the_makefile_alone():
+    targets = {
+        name for line in re.findall(r"^\.PHONY: (.*)$", makefile(), re.MULTILINE) for name in line.split()
+    }
+    used = [command for name, command in steps().items() if name not in SETTING_UP]
+    assert {f"make -f strapgen.mk {target}" for target in targets} - {*used} == {
+        "make -f strapgen.mk attitude-generate"
+    }
+    assert len(used) == len(targets) - 1
+
+
+def makefile() -> str:
+    return (EXAMPLE / "strapgen.mk").read_text()
+
+
+@pytest.fixture(scope="module")
+def firmware(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]]:
+    """Return the folder of a firmware that has just generated its step, and the environment of its build."""
+    needed("make", "cmake")
+    folder = tmp_path_factory.mktemp("firmware")
+    environment = without_the_checkout(folder)
+    shutil.copy(EXAMPLE / "strapgen.mk", folder)
+    done = run("make -f strapgen.mk attitude-generate", folder, environment)
+    assert done.returncode == 0, done.stdout
+    return folder, environment
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(
+            name, marks=pytest.mark.xfail(strict=True, reason=MISSING[name]) if name in MISSING else ()
+        )
+        for name in steps()
+        if name not in SETTING_UP
+    ],
+)
+def test_a_step_of_the_workflow_passes(name, firmware):
+    if "M3" in name:
+        needed("arm-none-eabi-gcc", "qemu-system-arm")
+    folder, environment = firmware
+    done = run(steps()[name], folder, environment)
+    assert done.returncode == 0, done.stdout
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("target", ["attitude-vectors", "attitude-vectors-m3"])
+def test_the_gate_stops_a_build_whose_step_was_edited(target, firmware, tmp_path):
+    if target.endswith("m3"):
+        needed("arm-none-eabi-gcc", "qemu-system-arm")
+    folder, environment = firmware
+    copy = tmp_path / "copy"
+    shutil.copytree(folder, copy, ignore=shutil.ignore_patterns("build"))
+    (source,) = (
+        path for path in (copy / "firmware").glob("*.c") if path.name != "main.c" and path.name[:5] != "test_"
+    )
+    text = source.read_text()
+    assert text.count("return 1;") == 1
+    source.write_text(text.replace("return 1;", "return 3;"))
+    done = run(f"make -f strapgen.mk {target}", copy, environment)
+    assert done.returncode != 0 and re.search(r"\b[1-9]\d* failed", done.stdout)
+
+
+@pytest.mark.long
+def test_the_gate_stops_a_build_whose_arithmetic_is_too_coarse(firmware):
+    folder, environment = firmware
+    done = run("make -f strapgen.mk attitude-compare ATTITUDE_FAIL_ABOVE=1e-12", folder, environment)
+    assert done.returncode != 0 and "1e-12" in done.stdout
+
+
+def test_git_ignores_no_file_of_the_examples():
+    files = [
+        str(path.relative_to(ROOT))
+        for path in (ROOT / "examples").rglob("*")
+        if path.is_file() and "__pycache__" not in path.parts
+    ]
+    assert any("firmware" in name for name in files)
+    try:
+        done = subprocess.run(
+            ["git", "-C", ROOT, "check-ignore", "--no-index", "--stdin"],
+            input="\n".join(files),
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+    except FileNotFoundError:
+        pytest.skip("no git")
+    if done.returncode not in (0, 1):
+        pytest.skip("no checkout")
+    assert done.stdout.splitlines() == []
