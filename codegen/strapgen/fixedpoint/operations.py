@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
@@ -23,7 +24,6 @@ from strapgen.fixedpoint.derivation_context import (
     stored_terms,
 )
 from strapgen.fixedpoint.intervals import Interval, maximum
-from strapgen.fixedpoint.probes import near
 from strapgen.fixedpoint.products import operand_of, stem, store, store_temporary
 from strapgen.fixedpoint.quantities import (
     Definition,
@@ -252,11 +252,20 @@ def _check_range(context: DerivationContext, name: str) -> None:
     The limits are half the smallest and twice the largest value on proper inputs, to powers of two. Nothing is checked
     where these limits are proved, or where proper inputs come near zero.
     """
-    quantity, proper = context.items[name], near(context.proper[name])
-    if proper is None:
+    quantity, values = context.items[name], context.proper[name]
+    least, most = float(np.abs(values).min()), float(np.abs(values).max())
+    if not math.isfinite(most):
         return
+    one_sign = bool((values > 0).all() or (values < 0).all())
     low, high = quantity.range.low, quantity.range.high
-    tighter = quantity.range.meet(proper)
+    if not one_sign or least < most / 64:
+        return
+    near = Interval.of(
+        Fraction(2) ** (round(math.log2(least)) - 1),
+        Fraction(2) ** (math.ceil(math.log2(most) - 1e-6) + 1),
+    )
+    near = near if values[0] > 0 else -near
+    tighter = quantity.range.meet(near)
     if low <= 0 <= high or (tighter.low > low and abs(low) < abs(tighter.low) // 2):
         context.items[name] = replace(quantity, range=tighter, guarded=True)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,19 +51,3 @@ def samples(
             proper[name], anywhere[name] = inside[:, k], box[:, k]
     assert all(math.isfinite(float(values.max())) for values in anywhere.values())
     return proper, anywhere
-
-
-def near(values: NDArray[np.float64]) -> Interval | None:
-    """Return the range from half the smallest to twice the largest of some values, to powers of two.
-
-    None where they are not finite, have both signs or come near zero.
-    """
-    least, most = float(np.abs(values).min()), float(np.abs(values).max())
-    one_sign = bool((values > 0).all() or (values < 0).all())
-    if not math.isfinite(most) or not one_sign or least < most / 64:
-        return None
-    positive = Interval.of(
-        Fraction(2) ** (round(math.log2(least)) - 1),
-        Fraction(2) ** (math.ceil(math.log2(most) - 1e-6) + 1),
-    )
-    return positive if values[0] > 0 else -positive

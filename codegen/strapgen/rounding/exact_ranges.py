@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -11,17 +12,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapgen.fixedpoint.intervals import Interval, maximum
-from strapgen.fixedpoint.probes import near, samples
+from strapgen.fixedpoint.probes import samples
 from strapgen.fixedpoint.quantities import Definition, InputElement, Maximum, Quantity, Sum, Terms, combined
 from strapgen.fixedpoint.ranges import Ranges
 from strapgen.ir.float_interface import Condition
 from strapgen.ir.program import DOUBLE_RESOLUTION, RESOLUTION, Program
 from strapgen.rounding.expressions import CONSTANT, INPUT, Expression, Expressions
 from strapgen.rounding.no_bound import NoBoundError
+from strapgen.rounding.number_formats import exponent
 
 #: Resolutions of the two types.
 _RESOLUTIONS = Interval.of(DOUBLE_RESOLUTION, Fraction(1, 1 << 23))
 _ONE = Interval.of(-1, 1)
+#: The relative error of samples, which would make limits longer numbers.
+_NOISE = Fraction(1, 1 << 20)
 
 _Samples = NDArray[np.float64] | np.float64
 #: The functions of operations on samples.
@@ -160,14 +164,47 @@ class ExactRanges:
     def _kept_from_zero(self, place: int, label: str) -> Interval:
         """Return the range of a divisor or a radicand, by a condition near what it is on proper inputs if need be."""
         known = self.ranges[place]
-        proper = near(np.atleast_1d(self._proper[place]))
+        proper = _near(np.atleast_1d(self._proper[place]))
         if proper is not None and (known.low <= 0 <= known.high or proper.low > 2 * known.low > 0):
-            self.ranges[place] = known = known.meet(proper)
-            self.conditions.append(Condition(label, known.lowest, known.highest))
-            self._note(self._name(place), Maximum(()), known)
-        return known
+            self.conditions.append(Condition(label, proper.lowest, proper.highest))
+            self._narrow(place, proper)
+            for k in self._squared(place):  # no square is above the sum of all
+                self._narrow(k, Interval.symmetric(proper.sqrt().highest))
+        return self.ranges[place]
+
+    def _narrow(self, place: int, limits: Interval) -> None:
+        self.ranges[place] = known = self.ranges[place].meet(limits)
+        name = self._name(place)
+        definition = self._items[name].definition
+        self._note(name, definition if isinstance(definition, InputElement) else Maximum(()), known)
+
+    def _squared(self, place: int) -> list[int]:
+        """Return the places of what an operation is the sum of squares of; none if it is no such sum."""
+        expression = self.expressions.items[place]
+        if expression.kind == "add":
+            parts = [self._squared(k) for k in expression.arguments]
+            return [k for part in parts for k in part] if all(parts) else []
+        is_square = expression.kind == "multiply" and len({*expression.arguments}) == 1
+        return [expression.arguments[0]] if is_square else []
 
 
 def _cosine(magnitude: Fraction, curvature: Fraction) -> Interval:
     """Return the range of an even function of at least 1 - curvature x^2, between -1 and 1."""
     return Interval.of(max(Fraction(-1), 1 - curvature * magnitude * magnitude), 1)
+
+
+def _near(values: NDArray[np.float64]) -> Interval | None:
+    """Return the range from 3/4 of the smallest to 4/3 of the largest of some values, for short numbers a bit more.
+
+    None where they are not finite, have both signs or come near zero.
+    """
+    least, most = float(np.abs(values).min()), float(np.abs(values).max())
+    one_sign = bool((values > 0).all() or (values < 0).all())
+    if not math.isfinite(most) or not one_sign or least < most / 64:
+        return None
+    unit = Fraction(2) ** (exponent(Fraction(least)) - 5)
+    positive = Interval.of(
+        math.floor(Fraction(least) * (1 + _NOISE) * 3 / 4 / unit) * unit,
+        math.ceil(Fraction(most) * (1 - _NOISE) * 4 / 3 / unit) * unit,
+    )
+    return positive if values[0] > 0 else -positive

@@ -64,9 +64,12 @@ class NumberFormat:
         return max(half / 2, min(half, above), self.underflow)
 
     def ulp(self, largest: Fraction) -> Fraction:
-        """Return a unit in the last place of a number of this magnitude, and so of all that are smaller."""
-        power = exponent(largest) - self.precision + 1 if largest else self.smallest
-        return Fraction(2) ** max(power, self.smallest)
+        """Return a unit in the last place of numbers of at most this magnitude: of a power of two, that below it."""
+        if not largest:
+            return Fraction(2) ** self.smallest
+        power = exponent(largest)
+        unit = Fraction(2) ** max(power - self.precision + 1, self.smallest)
+        return unit if largest > Fraction(2) ** power else max(unit / 2, 2 * self.underflow)
 
 
 #: The formats by the name of their type in C.
