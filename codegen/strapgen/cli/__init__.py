@@ -29,6 +29,7 @@ from strapgen.cli.commands import (
     tables,
     two_speed,
     vectors,
+    verify,
     vibration,
 )
 from strapgen.cli.help import PlainCommand, PlainGroup, explanation
@@ -46,6 +47,7 @@ COMMANDS: dict[str, dict[str, Any]] = {
         "generate": generate.generate,
         "two-speed": two_speed.two_speed,
         "vectors": vectors.vectors,
+        "verify": verify.verify,
     },
     "Run": {"simulate": simulate.simulate, "strapdown": strapdown.strapdown, "compare": compare.compare},
     "Analyse": {

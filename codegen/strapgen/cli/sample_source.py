@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
@@ -98,6 +98,11 @@ class SampleSource:
             help="Angle of a gyro pulse in arc seconds; increments become whole pulses, the rest goes into the next.",
         ),
     ] = None
+
+    @property
+    def stated(self) -> bool:
+        """Whether any of the options is stated."""
+        return any(getattr(self, field.name) is not None for field in fields(self))
 
     def check(self) -> None:
         """Check that there is one source of increments, with the options that go with it and no others."""

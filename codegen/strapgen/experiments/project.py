@@ -15,6 +15,7 @@ from strapgen.ir.sources import Sources
 from strapgen.library import generated_sources
 from strapgen.support.exceptions import InputError
 from strapgen.targets.contract import options
+from strapgen.targets.names import UNNAMED, Naming
 from strapgen.targets.project_c.emit import MOTION, MotionRun, call_main, cmake, step_main
 from strapgen.targets.vectors_c.emit import table_files
 
@@ -28,7 +29,9 @@ LARGEST = Fraction(1, 458)
 YOURS = ("CMakeLists.txt", "main.c")
 
 
-def project_files(choice: Choice, target: str, settings: Settings | None = None) -> dict[str, str]:
+def project_files(
+    choice: Choice, target: str, settings: Settings | None = None, naming: Naming = UNNAMED
+) -> dict[str, str]:
     """Return the files that build and test the C of a kernel, without those of the kernel itself.
 
     Parameters
@@ -38,15 +41,17 @@ def project_files(choice: Choice, target: str, settings: Settings | None = None)
         "c", "c-float" or "c-fixed".
     settings : Settings or None
         Settings of fixed point.
+    naming : Naming, optional
+        The name of the function, if the user chooses it.
 
     Returns
     -------
     dict of str to str
         Text by path: CMakeLists.txt, main.c, a test of vectors, and the functions that the main program compares with.
     """
-    table = vectors_of_choice(choice, target, settings)
+    table = vectors_of_choice(choice, target, settings, naming=naming)
     sources = table.sources
-    command = f"strapgen generate {generated_sources.program(choice).arguments} --target {target}"
+    command = f"strapgen generate {naming.of(generated_sources.program(choice)).arguments} --target {target}"
     if sources.fixed is not None:
         command += f" {options(sources.fixed.settings)}"
     command += " --project"

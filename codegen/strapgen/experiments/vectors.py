@@ -28,6 +28,7 @@ from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 from strapgen.targets import BUILT_IN
 from strapgen.targets.contract import options
+from strapgen.targets.names import UNNAMED, Naming
 from strapgen.targets.vectors_c.emit import CallVector, VectorTable
 
 #: The target of the integer model.
@@ -62,7 +63,12 @@ class _Box:
 
 
 def vectors_of_choice(
-    choice: Choice, target: str, settings: Settings | None = None, count: int = COUNT, seed: int = SEED
+    choice: Choice,
+    target: str,
+    settings: Settings | None = None,
+    count: int = COUNT,
+    seed: int = SEED,
+    naming: Naming = UNNAMED,
 ) -> VectorTable:
     """Return test vectors of a chosen kernel for a target in C; other parameters are those of `call_vectors`.
 
@@ -74,6 +80,8 @@ def vectors_of_choice(
     settings : Settings, optional
         Settings of fixed point.
     count, seed : int, optional
+    naming : Naming, optional
+        The name of the function, if the user chooses it.
 
     Raises
     ------
@@ -88,9 +96,9 @@ def vectors_of_choice(
     (0, ((0, 0, 0, 1073741824),))
     """
     checks.choice("target", target, [name for name, entry in BUILT_IN.items() if entry.compiled])
-    sources = generated_sources.sources(choice, target, settings)
+    sources = generated_sources.sources(choice, target, settings, naming)
     program = generated_sources.program(choice)
-    command = f"strapgen vectors {program.arguments} --target {target}"
+    command = f"strapgen vectors {naming.of(program).arguments} --target {target}"
     if sources.fixed is not None:
         command += f" {options(sources.fixed.settings)}"
         reference = generated_sources.sources(choice, MODEL, settings)

@@ -17,6 +17,8 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
 from strapgen.support import cache
+from strapgen.support.exceptions import InputError
+from strapgen.targets.names import UNNAMED, Naming
 
 _programs: dict[str, Program] = {}
 
@@ -50,7 +52,9 @@ def program(choice: Choice) -> Program:
     return _programs[key]
 
 
-def sources(choice: Choice, target: str, settings: Settings | None = None) -> Sources:
+def sources(
+    choice: Choice, target: str, settings: Settings | None = None, naming: Naming = UNNAMED
+) -> Sources:
     """Return the generated sources of a kernel.
 
     Parameters
@@ -61,6 +65,8 @@ def sources(choice: Choice, target: str, settings: Settings | None = None) -> So
         A key of `strapgen.targets.TARGETS`.
     settings : Settings, optional
         Word, ranges and rounding of fixed point; by default 32 bits and 1/8 rad.
+    naming : Naming, optional
+        The name of the function in C, if the user chooses it.
 
     Returns
     -------
@@ -73,15 +79,27 @@ def sources(choice: Choice, target: str, settings: Settings | None = None) -> So
     """
 
     def fill(draft: Path) -> None:
-        compiled = pipeline.compile(choice, target, settings, program)
+        compiled = pipeline.compile(choice, target, settings, lambda chosen: naming.of(program(chosen)))
         for name, text in compiled.files.items():
             (draft / name).write_text(text)
         (draft / "interface.json").write_text(json.dumps(compiled.interface()))
 
     stated = json.dumps(settings.as_dict(), sort_keys=True) if settings else ""
     targets.require(target, settings)
+    if naming.option and not targets.TARGETS[target].compiled:
+        raise InputError(f"{naming.option} goes with targets in C, not with {target}")
     code = targets.registry.identity(target)
-    key = cache.digest([cache.generator_digest(), choice.identity, target, code, stated])
+    key = cache.digest(
+        [
+            cache.generator_digest(),
+            choice.identity,
+            target,
+            code,
+            stated,
+            naming.name or "",
+            naming.prefix or "",
+        ]
+    )
     folder = cache.entry("sources", key, fill, f"sources of {choice.kernel} for {target}")
     interface = json.loads((folder / "interface.json").read_text())
     return Sources.restore(interface, {name: (folder / name).read_text() for name in interface["files"]})

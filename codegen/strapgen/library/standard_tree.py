@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import contextlib
-import difflib
 import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from strapgen import catalogue, fixedpoint, pipeline
 from strapgen.ir.program import Program
+from strapgen.library import generated_files
 from strapgen.support.exceptions import InputError
 from strapgen.support.files import write_files
 from strapgen.targets import BUILT_IN
@@ -125,35 +125,13 @@ def difference(folder: Path, files: dict[str, str]) -> str:
     -------
     str
     """
-    lines: list[str] = []
-    for name, text in files.items():
-        path = folder / name
-        there = _text(path) if path.is_file() else ""
-        lines += _diff(there, text, str(path) if path.is_file() else "/dev/null", name)
+    lines = [generated_files.difference(folder, files)]
     for path in _unexpected(folder, files):
-        lines += _diff(_text(path), "", str(path), "/dev/null")
+        lines += generated_files.unified(generated_files.text_of(path), "", str(path), "/dev/null")
     return "".join(lines)
-
-
-def _text(path: Path) -> str:
-    return path.read_bytes().decode(errors="replace")  # line endings are not translated
 
 
 def _unexpected(folder: Path, files: dict[str, str]) -> list[Path]:
     """Return the files in a folder that are no part of the tree."""
     present = [path for path in folder.rglob("*") if path.is_file() and "__pycache__" not in path.parts]
     return sorted(path for path in present if path.relative_to(folder).as_posix() not in files)
-
-
-def _diff(old: str, new: str, old_name: str, new_name: str) -> Iterator[str]:
-    if old == new and "/dev/null" not in (old_name, new_name):
-        return
-    lines = difflib.unified_diff(
-        old.splitlines(keepends=True), new.splitlines(keepends=True), old_name, new_name
-    )
-    empty = True
-    for line in lines:
-        empty = False
-        yield line if line.endswith("\n") else f"{line}\n\\ No newline at end of file\n"
-    if empty:  # an empty file that is missing, or should not be there
-        yield f"--- {old_name}\n+++ {new_name}\n"

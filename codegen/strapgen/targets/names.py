@@ -199,34 +199,70 @@ def function_name(program: Program, ending: str = "") -> str:
     return program.function.format(default) if program.function else default
 
 
-def chosen_by_user(program: Program, name: str | None, prefix: str | None) -> Program:
-    """Return a program whose function in C has a name, or begins with a prefix, that the user chose.
+@dataclass(frozen=True)
+class Naming:
+    """A name that the user chooses for a function in C and for its files.
+
+    Parameters
+    ----------
+    name : str or None
+        The whole name.
+    prefix : str or None
+        What the target's name has in front.
 
     Raises
     ------
     InputError
-        If the name is no name for C, or too long.
+        If both are chosen, or one is no name.
     """
-    if name is None and prefix is None:
-        return program
-    if name is not None and prefix is not None:
-        raise InputError("--name and --prefix are both given; one is needed")
-    option, text = ("--prefix", prefix or "") if name is None else ("--name", name)
-    if not re.fullmatch(r"[A-Za-z]\w*", text, re.ASCII):
-        raise InputError(f"{option} is {text!r}; letters, digits and underscores are needed, a letter first")
-    result = replace(
-        program,
-        function=text if prefix is None else f"{text}{{}}",
-        arguments=f"{program.arguments} {option} {text}",
-    )
-    for ending in ("", "_float", "_w32") if prefix is not None else ("",):
-        final = function_name(result, ending)
-        if len(final) > MOST_CHOSEN or not _c_allows(final) or final in LIBRARY or final.endswith("_t"):
+
+    name: str | None = None
+    prefix: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.name is not None and self.prefix is not None:
+            raise InputError("--name and --prefix are both given; one is needed")
+        if self.option and not re.fullmatch(r"[A-Za-z]\w*", self._text, re.ASCII):
             raise InputError(
-                f"{option} {text} makes a function {final}; a name of at most {MOST_CHOSEN} characters is needed, "
-                "that neither C, C++ nor the C library has"
+                f"{self.option} is {self._text!r}; letters, digits and underscores are needed, a letter first"
             )
-    return result
+
+    @property
+    def option(self) -> str:
+        """The option of the command line that chooses it; "" if nothing is chosen."""
+        return "--name" if self.name is not None else "--prefix" if self.prefix is not None else ""
+
+    @property
+    def _text(self) -> str:
+        return self.name or self.prefix or ""
+
+    def of(self, program: Program) -> Program:
+        """Return a program with the name.
+
+        Raises
+        ------
+        InputError
+            If the name is too long, or C, C++ or the C library has it.
+        """
+        if not self.option:
+            return program
+        chosen = replace(
+            program,
+            function=self._text if self.prefix is None else f"{self._text}{{}}",
+            arguments=f"{program.arguments} {self.option} {self._text}",
+        )
+        for ending in ("",) if self.prefix is None else ("", "_float", "_w32"):
+            final = function_name(chosen, ending)
+            if len(final) > MOST_CHOSEN or not _c_allows(final) or final in LIBRARY or final.endswith("_t"):
+                raise InputError(
+                    f"{self.option} {self._text} makes a function {final}; a name of at most {MOST_CHOSEN} "
+                    "characters is needed, that neither C, C++ nor the C library has"
+                )
+        return chosen
+
+
+#: Nothing is chosen.
+UNNAMED = Naming()
 
 
 def printed(

@@ -10,16 +10,17 @@ import typer
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import grouped
 from strapgen.cli.options import MethodOptions, OptionalAlgorithm, one, option
-from strapgen.cli.output import Format, Project, WithRuns, check_format, print_json
+from strapgen.cli.output import Format, check_format, print_json
 from strapgen.cli.progress import track
+from strapgen.cli.source_options import SourceOptions, refuse_out_of_step
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
     from strapgen.catalogue import Choice
-    from strapgen.ir.fixed_settings import Settings
     from strapgen.ir.float_interface import RoundingBounds
     from strapgen.ir.sources import Sources
+    from strapgen.library.generation import Request
 
 
 @grouped
@@ -40,25 +41,7 @@ def generate(
         bool, option("--all", help="Generate the whole standard catalogue.", panel="Algorithm")
     ] = False,
     fixed: FixedOptions,
-    out: Annotated[
-        Path | None,
-        option(
-            "--out",
-            metavar="FOLDER",
-            help="Folder for the files.  [default: here; generated/ with --all]",
-            panel="Output",
-        ),
-    ] = None,
-    with_runs: WithRuns = False,
-    project: Project = False,
-    check: Annotated[
-        bool,
-        option(
-            "--check",
-            help="With --all: write nothing; print a diff and exit with 1 if the files in the folder differ.",
-            panel="Output",
-        ),
-    ] = False,
+    output: SourceOptions,
     format: Format = "text",
 ) -> None:
     """Generate source code for an algorithm, or for the whole catalogue.
@@ -71,16 +54,39 @@ def generate(
     Example: strapgen generate euler --target c-fixed --word 32 --max-rate-deg-s 400 --step 0.01 --out firmware
     """
     check_format(format)
-    if check and not all_:
-        raise InputError("--check goes with --all")
     if all_:
-        _check_alone(algorithm, method, target, fixed, with_runs or project)
-        _generate_all(out, check, format)
+        _check_alone(algorithm, method, target, fixed, output)
+        _generate_all(output, format)
         return
     if algorithm is None:
         raise InputError("an algorithm is needed, or --all; strapgen list kernels shows them")
-    from strapgen.library import generated_sources
-    from strapgen.support.files import write_files
+    wanted = request(algorithm, method, target, fixed, output)
+    sources = wanted.sources()
+    _check_carry(wanted, sources, fixed)
+    files = sources.files if output.with_runs else sources.step_files
+    if output.project:
+        files = files | _project_files(wanted, output)
+    if output.check:
+        _check_files(files, output, format)
+        return
+    written = output.write(files)
+    if format == "json":
+        print_json(_data(wanted.choice, sources, wanted.target, written))
+    else:
+        typer.echo(_text(sources, wanted.target, written))
+
+
+def request(
+    algorithm: str, method: MethodOptions, target: str | None, fixed: FixedOptions, output: SourceOptions
+) -> Request:
+    """Return what the options of the command ask for.
+
+    Raises
+    ------
+    InputError
+        If options do not go together.
+    """
+    from strapgen.library.generation import Request
     from strapgen.targets import TARGETS, fixed_targets
 
     choice = method.choose(algorithm, step=False)
@@ -91,36 +97,50 @@ def generate(
         raise InputError(
             f"the options of fixed point go with --target {' or '.join(fixed_targets())}, not with {target}"
         )
-    for option_, chosen in (("--with-runs", with_runs), ("--project", project)):
-        if chosen and not TARGETS[target].compiled:
-            raise InputError(f"{option_} goes with targets in C, not with {target}")
+    if output.for_c and not TARGETS[target].compiled:
+        raise InputError(f"{output.for_c} goes with targets in C, not with {target}")
     _check_increments(choice, fixed)
-    sources = generated_sources.sources(choice, target, settings)
+    return Request(choice, target, settings, output.naming)
+
+
+def _check_carry(wanted: Request, sources: Sources, fixed: FixedOptions) -> None:
+    """Refuse error feedback for a kernel that keeps nothing."""
     if fixed.carry not in (None, "none") and sources.fixed is not None and not sources.fixed.residuals:
         raise InputError(
-            f"kernel {choice.kernel} rounds no state that goes on to the next step; --carry keeps nothing"
+            f"kernel {wanted.choice.kernel} rounds no state that goes on to the next step; --carry keeps nothing"
         )
-    files = sources.files if with_runs else sources.step_files
-    if project:
-        files = files | _project_files(out or Path(), choice, target, settings)
-    written = write_files(out or Path(), files)
-    if format == "json":
-        print_json(_data(choice, sources, target, written))
-    else:
-        typer.echo(_text(sources, target, written))
 
 
-def _project_files(out: Path, choice: Choice, target: str, settings: Settings | None) -> dict[str, str]:
+def _project_files(wanted: Request, output: SourceOptions) -> dict[str, str]:
     """Return the files that build and test the C, unless a file of the user is in their place."""
     from strapgen.experiments import project
 
-    files = project.project_files(choice, target, settings)
-    project.refuse_changed(out, files)
+    files = project.project_files(wanted.choice, wanted.target, wanted.settings, wanted.naming)
+    if not output.check:
+        project.refuse_changed(output.out or Path(), files, output.force)
     return files
 
 
+def _check_files(files: dict[str, str], output: SourceOptions, format: str) -> None:
+    """Print how the files in the folder differ from generated ones; exit with 1 if they do."""
+    folder = output.out or Path()
+    difference = output.compare(files)
+    if format == "json":
+        print_json({"in_step": not difference, "difference": difference})
+    elif difference:
+        typer.echo(difference, nl=False)
+    if difference:
+        refuse_out_of_step(folder, "the same command without --check writes the files again")
+    if format == "text":
+        typer.echo(f"{folder}: {len(files)} files, in step")
+
+
 def _check_alone(
-    algorithm: str | None, method: MethodOptions, target: str | None, fixed: FixedOptions, more: bool
+    algorithm: str | None,
+    method: MethodOptions,
+    target: str | None,
+    fixed: FixedOptions,
+    output: SourceOptions,
 ) -> None:
     """Refuse options that do not go with --all."""
     for name, value in (
@@ -132,7 +152,8 @@ def _check_alone(
         ("--rates", method.rates or None),
         ("--target", target),
         ("a fixed-point option", fixed.stated or None),
-        ("--with-runs or --project", more or None),
+        (output.for_c, output.for_c),
+        ("--force", output.force or None),
     ):
         if value is not None:
             raise InputError(f"--all generates the whole catalogue; {name} does not go with it")
@@ -201,30 +222,30 @@ def _rounding_lines(rounding: RoundingBounds) -> list[str]:
     ]
 
 
-def _generate_all(out: Path | None, check: bool, format: str) -> None:
+def _generate_all(output: SourceOptions, format: str) -> None:
     from strapgen import catalogue
     from strapgen.library import standard_tree
     from strapgen.support import resources
     from strapgen.support.files import check_folder
 
+    out = output.out
     if out is None:
-        in_place = resources.checkout() is not None or check
+        in_place = resources.checkout() is not None or output.check
         out = resources.folder("generated") if in_place else Path("generated")
-    if check and not out.is_dir():
+    if output.check and not out.is_dir():
         raise InputError(f"{out} is no folder; --check needs the one to look at")
-    if not check:
+    if not output.check:
         check_folder(out)  # known before the derivation of all kernels
     total = len(catalogue.standard())
     files = standard_tree.tree(track(standard_tree.programs(), "deriving", total))
-    if check:
+    if output.check:
         difference = standard_tree.difference(out, files)
         if format == "json":
             print_json({"in_step": not difference, "difference": difference})
         elif difference:
             typer.echo(difference, nl=False)
         if difference:
-            typer.echo(f"strapgen: {out} is out of step; strapgen generate --all rebuilds it", err=True)
-            raise typer.Exit(1)
+            refuse_out_of_step(out, "strapgen generate --all rebuilds it")
         if format == "text":
             typer.echo(f"{out}: {len(files)} files, in step")
         return

@@ -1,0 +1,279 @@
+"""Holds a generated C file to what its header says: its text, and what the compiled file itself computes."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import mpmath
+import numpy as np
+from numpy.typing import NDArray
+
+from strapgen.backends.c import CEvaluator
+from strapgen.backends.exact import DIGITS, Interpreter, number
+from strapgen.backends.fixed import CFixedEvaluator, ModelEvaluator
+from strapgen.experiments.vectors import MODEL, vectors_of_choice
+from strapgen.ir.fixed_interface import Interface
+from strapgen.ir.sources import Sources
+from strapgen.library import generated_sources
+from strapgen.library.generated_files import command_of, text_of
+from strapgen.library.generation import Request
+from strapgen.support.exceptions import InputError
+from strapgen.targets.contract_lines import Contract
+from strapgen.targets.vectors_c.emit import CallVector
+
+Array = NDArray[Any]
+
+#: Calls on corners and random input, and steps of the run.
+CALLS, STEPS = 300, 300
+
+
+@dataclass(frozen=True)
+class Verification:
+    """What a generated file was found to be.
+
+    Parameters
+    ----------
+    file : Path
+    differences : tuple of str
+        What differs from the file that its command generates, a line of text each; empty if nothing does.
+    wrong : int
+        Calls that did not return what the reference returns: the integer model in fixed point.
+    calls : int
+        Calls in all.
+    max_ulp : float
+        Largest distance from arithmetic of 40 digits, in units in the last place of the output.
+    bound_ulp : float or None
+        The certified bound of that distance; None where there is none.
+    """
+
+    file: Path
+    differences: tuple[str, ...]
+    wrong: int
+    calls: int
+    max_ulp: float
+    bound_ulp: float | None
+
+    @property
+    def in_step(self) -> bool:
+        """Whether the file is what its command generates."""
+        return not self.differences
+
+    @property
+    def within(self) -> bool:
+        """Whether all calls returned what the reference returns, within the bound."""
+        return not self.wrong and (self.bound_ulp is None or self.max_ulp <= self.bound_ulp)
+
+    @property
+    def holds(self) -> bool:
+        """Whether the file is in step and computes what it promises."""
+        return self.in_step and self.within
+
+
+def paths_of(file: Path) -> tuple[Path, Path]:
+    """Return the header and the source of a generated function, given one of them.
+
+    Raises
+    ------
+    InputError
+        If one is not there, or strapgen did not generate it.
+    """
+    if file.suffix not in (".c", ".h"):
+        raise InputError(f"{file} is no C file; a source or a header that strapgen generated is needed")
+    pair = file.with_suffix(".h"), file.with_suffix(".c")
+    for path in (file, *pair):
+        if not path.is_file():
+            raise InputError(f"{path} is not there; a function has a header and a source in one folder")
+        if command_of(text_of(path)) is None:
+            raise InputError(f"{path} does not say by which command strapgen generated it")
+    return pair
+
+
+def verify(file: Path, request: Request, increments: Array | None = None) -> Verification:
+    """Compare a file with what its command generates, compile it as it stands, and run it.
+
+    Parameters
+    ----------
+    file : Path
+        The source or the header of a generated function.
+    request : Request
+        What the command in its header asks for.
+    increments : array, (N, elements), optional
+        Increments of a run in rad, for a step; by default a cone near the largest increments.
+
+    Returns
+    -------
+    Verification
+
+    Raises
+    ------
+    CompilerError
+        If the file does not compile.
+    InputError
+        If the file is not the one that its command generates, or the run leaves its range.
+    """
+    header, source = paths_of(file)
+    sources = request.sources()
+    here = {path.name: text_of(path) for path in (header, source)}
+    if not {*here} <= {*sources.step_files}:
+        names = " and ".join(sources.step_files)
+        raise InputError(f"the command in {file} generates {names}; another name goes with --name")
+    differences = tuple(_differences(header.parent, here, sources))
+    compiled = replace(sources, files={**sources.files, **here})
+    table = vectors_of_choice(request.choice, request.target, request.settings, CALLS, naming=request.naming)
+    if sources.fixed is None:
+        return Verification(file, differences, *_floating(compiled, table.rows, table.tolerances, request))
+    run = _cone(sources.fixed) if increments is None else _words(sources.fixed, increments)
+    return Verification(file, differences, *_fixed(compiled, table.rows, run, request))
+
+
+def _differences(folder: Path, here: dict[str, str], sources: Sources) -> Iterator[str]:
+    """Yield the lines of files that differ from generated ones, and why they may."""
+    for name, text in here.items():
+        new = sources.files[name]
+        reason = _reason(text, new) if name.endswith(".h") else "edited"
+        lines = text.splitlines(), new.splitlines()
+        for kind, a, b, c, d in difflib.SequenceMatcher(None, *lines, autojunk=False).get_opcodes():
+            if kind == "equal":
+                continue
+            for k in range(max(b - a, d - c)):
+                was = lines[0][a + k].strip() if a + k < b else "nothing"
+                wanted = lines[1][c + k].strip() if c + k < d else "nothing"
+                yield f"{folder / name}:{min(a + k, max(b - 1, a)) + 1}: {reason}: {was}; generated: {wanted}"
+        if text != new and lines[0] == lines[1]:
+            yield f"{folder / name}:{len(lines[0])}: edited: ends of lines; generated: ends of lines of Unix"
+
+
+def _reason(header: str, generated: str) -> str:
+    """Return why a header may differ from the generated one."""
+    old, new = Contract.read(header), Contract.read(generated)
+    if old is None or new is None:
+        return "edited"
+    if old.version != new.version:
+        return f"strapgen {old.version}, this is {new.version}"
+    return "other options" if old.digest != new.digest else "edited"
+
+
+def _fixed(
+    sources: Sources, rows: Sequence[CallVector], run: Array | None, request: Request
+) -> tuple[int, int, float, float]:
+    """Run a function on integers; return wrong calls, calls, the largest error and its bound in last places."""
+    assert sources.fixed is not None
+    of = CFixedEvaluator(sources)
+    model = ModelEvaluator(generated_sources.sources(request.choice, MODEL, request.settings))
+    exact, wrong, worst = _Exact(request, sources.fixed), 0, 0.0
+    for row in rows:
+        inputs, outputs = _called(of, row)
+        same = outputs == (row.outputs if row.status == 0 else None)
+        wrong += not same
+        if outputs is not None:
+            worst = max(worst, exact.error(inputs, outputs))
+    calls = len(rows)
+    if run is not None:
+        state = np.array([_identity(sources)])
+        feedback = of.fresh(1)
+        for increments in run:
+            arguments = [state, increments[None]]
+            after, kept = of.run(arguments, feedback)
+            wanted, wanted_kept = model.run(arguments, feedback)
+            equal = np.array_equal(after[0], wanted[0]) and np.array_equal(kept, wanted_kept)
+            wrong, calls = wrong + (not equal), calls + 1
+            values = [tuple(map(int, array.ravel())) for array in (*arguments, *after)]
+            worst = max(worst, exact.error(values[:2], values[2:]))
+            state, feedback = np.asarray(wanted[0]), wanted_kept
+    bound = max(max(a.errors) / a.format.unit for a in sources.fixed.outputs)
+    return wrong, calls, worst, float(bound)
+
+
+def _called(of: CFixedEvaluator, row: CallVector) -> tuple[list[tuple[int, ...]], Any]:
+    """Return the integers of a call and what it returns; None for a refusal."""
+    inputs = [tuple(map(int, values)) for values in row.inputs]
+    feedback = np.array([row.feedback], of.feedback_type).reshape(1, -1)
+    try:
+        outputs, _ = of.run([np.array([values]) for values in inputs], feedback)
+    except InputError:
+        return inputs, None
+    return inputs, tuple(tuple(map(int, output.ravel())) for output in outputs)
+
+
+class _Exact:
+    """Measures the error of a call in units in the last place, in arithmetic of 40 digits."""
+
+    def __init__(self, request: Request, interface: Interface) -> None:
+        self.interpreter = Interpreter(generated_sources.program(request.choice))
+        self.interface = interface
+
+    def error(self, inputs: Sequence[Sequence[int]], outputs: Sequence[Sequence[int]]) -> float:
+        """Return the largest error of the elements of all outputs."""
+        with mpmath.workdps(DIGITS):
+            numbers = [
+                [word * number(argument.format.unit) for word in words]
+                for words, argument in zip(inputs, self.interface.inputs, strict=True)
+            ]
+            results = self.interpreter.outputs(*numbers)
+            return max(
+                float(abs(word - value / number(argument.format.unit)))
+                for argument, words in zip(self.interface.outputs, outputs, strict=True)
+                for word, value in zip(words, results[argument.signal.name], strict=True)
+            )
+
+
+def _floating(
+    sources: Sources, rows: Sequence[CallVector], tolerances: Sequence[float], request: Request
+) -> tuple[int, int, float, None]:
+    """Run a function on floating-point numbers; return wrong calls, calls and the largest error in last places of 1."""
+    of = CEvaluator(sources)
+    exact = Interpreter(generated_sources.program(request.choice))
+    wrong, worst, unit = 0, 0.0, float(np.finfo(of.dtype).eps) / 2
+    for row in rows:
+        arrays = [
+            np.array(values, of.dtype).reshape(signal.shape)
+            for values, signal in zip(row.inputs, sources.function.inputs, strict=True)
+        ]
+        outputs = [output.ravel() for output in of.evaluate(arrays, ())]
+        wrong += any(
+            not np.all(np.abs(output - np.array(wanted, of.dtype)) <= tolerance)
+            for output, wanted, tolerance in zip(outputs, row.outputs, tolerances, strict=True)
+        )
+        with mpmath.workdps(DIGITS):
+            results = exact.outputs(*([mpmath.mpf(float(x)) for x in array.ravel()] for array in arrays))
+            for output, values in zip(outputs, results.values(), strict=True):
+                distances = [abs(float(x) - value) for x, value in zip(output, values, strict=True)]
+                worst = max(worst, *(float(distance) / unit for distance in distances))
+    return wrong, len(rows), worst, None
+
+
+def _identity(sources: Sources) -> list[int]:
+    """Return the integers of the state of zero rotation."""
+    assert sources.fixed is not None and sources.companions is not None
+    format_ = sources.fixed.inputs[0].format
+    top = (1 << (format_.word - 1)) - 1
+    return [min(round(x / format_.unit), top) for x in sources.companions.identity]
+
+
+def _cone(interface: Interface) -> Array | None:
+    """Return the increments of a cone whose angles are near the largest ones; None for what is no step."""
+    if len(interface.inputs) != 2 or interface.inputs[1].signal.name not in ("increments", "turns"):
+        return None
+    argument = interface.inputs[1]
+    angles = np.arange(STEPS * argument.signal.size // 3) * (math.pi / 37)
+    axes = np.stack([np.cos(angles), np.sin(angles), np.full_like(angles, 0.5)], axis=-1)
+    words = np.rint(axes * (0.95 * argument.high))
+    return words.astype(np.int64).reshape(STEPS, argument.signal.size)
+
+
+def _words(interface: Interface, increments: Array) -> Array:
+    """Return increments as the integers of the second input."""
+    argument = interface.inputs[1]
+    scaled = np.rint(increments.reshape(len(increments), -1) / float(argument.format.unit))
+    if np.abs(scaled).max() > argument.high:
+        raise InputError(
+            f"the run has increments of {float(np.abs(increments).max()):.6g} rad; the file takes at most "
+            f"{float(Fraction(argument.high) * argument.format.unit):.6g} rad"
+        )
+    return scaled.astype(np.int64)

@@ -1,0 +1,41 @@
+"""A request to generate a kernel: the choice, the target, the settings and the name, as a command states them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from strapgen.catalogue import Choice
+from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.program import Program
+from strapgen.ir.sources import Sources
+from strapgen.library import generated_sources
+from strapgen.targets.names import UNNAMED, Naming
+
+
+@dataclass(frozen=True)
+class Request:
+    """What one call of ``strapgen generate`` generates.
+
+    Parameters
+    ----------
+    choice : Choice
+    target : str
+        A key of `strapgen.targets.TARGETS`.
+    settings : Settings or None
+        Settings of fixed point, if any are stated.
+    naming : Naming
+        The name of the function in C, if the user chooses it.
+    """
+
+    choice: Choice
+    target: str
+    settings: Settings | None = None
+    naming: Naming = UNNAMED
+
+    def sources(self) -> Sources:
+        """Return the generated sources."""
+        return generated_sources.sources(self.choice, self.target, self.settings, self.naming)
+
+    def program(self) -> Program:
+        """Return the program with its name."""
+        return self.naming.of(generated_sources.program(self.choice))
