@@ -69,3 +69,44 @@ def said(folder: Path, sources: Iterable[str], compiler: str = "gcc") -> tuple[i
         run, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False, timeout=60
     )
     return done.returncode, done.stdout
+
+
+#: What prints through the serial line of an ATmega2560, where `printf` has no way out by itself.
+_SERIAL_LINE = """#include <avr/io.h>
+#include <stdio.h>
+static int put(char character, FILE *file)
+{
+    (void)file;
+    while (!(UCSR0A & (1 << UDRE0))) {
+    }
+    UDR0 = (unsigned char)character;
+    return 0;
+}
+static FILE line = FDEV_SETUP_STREAM(put, NULL, _FDEV_SETUP_WRITE);
+__attribute__((constructor)) static void begin(void)
+{
+    UCSR0B = 1 << TXEN0;
+    stdout = &line;
+}
+"""
+
+
+def line_of_avr(folder: Path, sources: Iterable[str]) -> str:
+    """Return the first line that a program prints on an emulated AVR, whose int has 16 bits."""
+    needed("avr-gcc", "qemu-system-avr")
+    (folder / "serial_line.c").write_text(_SERIAL_LINE)
+    command = ["avr-gcc", "-mmcu=atmega2560", "-std=gnu99", "-Os", "-o", "program", *sources, "serial_line.c"]
+    subprocess.run(command, cwd=folder, check=True)
+    run = ["timeout", "60", "qemu-system-avr", "-M", "mega2560", "-display", "none", "-monitor", "none"]
+    with subprocess.Popen(
+        [*run, "-serial", "stdio", "-bios", "program"],
+        cwd=folder,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    ) as emulator:
+        assert emulator.stdout is not None
+        line = emulator.stdout.readline()  # the processor never stops by itself
+        emulator.terminate()
+    return line.strip()

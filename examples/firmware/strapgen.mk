@@ -15,7 +15,7 @@ ATTITUDE_FOLDER ?= firmware
 ATTITUDE_SOURCES = $(filter-out %/main.c $(ATTITUDE_FOLDER)/test_%,$(wildcard $(ATTITUDE_FOLDER)/*.c))
 # The largest error on coning that the firmware may have, in rad, and the back end with its arithmetic.
 ATTITUDE_FAIL_ABOVE ?= 1e-7
-ATTITUDE_BACKEND ?= c-q31
+ATTITUDE_BACKEND ?= c-fixed32
 
 .PHONY: attitude-generate attitude-check attitude-verify attitude-compare attitude-vectors attitude-vectors-m3
 

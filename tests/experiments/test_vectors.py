@@ -7,7 +7,7 @@ from fractions import Fraction
 from functools import cache
 
 import pytest
-from c_programs import COMPILERS, complaints, needed, said, written
+from c_programs import COMPILERS, complaints, line_of_avr, needed, said, written
 
 from strapgen.catalogue import choose
 from strapgen.experiments.vectors import vectors_of_choice
@@ -179,6 +179,11 @@ def test_an_emulated_processor_returns_the_very_integers(compiler, tmp_path):
     table = table_of("euler", "c-fixed", SETTINGS)
     folder = written(tmp_path, files_of(table))
     assert said(folder, test_of(table), compiler) == (0, "200 passed, 0 failed\n")
+
+
+def test_a_processor_with_16_bits_returns_the_very_integers(tmp_path):
+    table = table_of("euler", "c-fixed", SETTINGS)
+    assert line_of_avr(written(tmp_path, files_of(table)), test_of(table)) == "200 passed, 0 failed"
 
 
 def test_a_double_of_other_length_is_refused_by_the_header(tmp_path):

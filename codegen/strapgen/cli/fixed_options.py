@@ -12,7 +12,9 @@ from strapgen.support.exceptions import InputError
 if TYPE_CHECKING:
     from fractions import Fraction
 
+    from strapgen.catalogue import Choice
     from strapgen.ir.fixed_settings import Settings
+    from strapgen.ir.sources import Sources
 
 _Text = str | None
 
@@ -141,6 +143,25 @@ class FixedOptions:
     def at_step(self, seconds: float) -> FixedOptions:
         """Return the options with the step of a run, by which a largest rate becomes a largest increment."""
         return replace(self, step=None if self.max_rate_deg_s is None else repr(seconds))
+
+    def check_increments(self, choice: Choice) -> None:
+        """Refuse a largest rate or angle for a kernel that takes neither."""
+        from strapgen.library import generated_sources
+
+        if not {*self.stated} & {"--max-rate-deg-s", "--step", "--max-angle-rad"}:
+            return
+        names = {signal.name for signal in generated_sources.program(choice).inputs}
+        if not names & {"increments", "turns"}:
+            raise InputError(
+                f"kernel {choice.kernel} takes no increments; a largest rate or angle does not go with it"
+            )
+
+    def check_feedback(self, sources: Sources) -> None:
+        """Refuse error feedback for a kernel that has none."""
+        if self.carry not in (None, "none") and sources.fixed is not None and not sources.fixed.residuals:
+            raise InputError(
+                f"kernel {sources.kernel} rounds no state that goes on to the next step; --carry keeps nothing"
+            )
 
     def check_backend(self, backend: str) -> None:
         """Refuse options of fixed point for a back end in floating point."""

@@ -46,13 +46,17 @@ _MOST = 10_000
 
 @dataclass(frozen=True)
 class _Box:
-    """The numbers that an input may have: limits of an element, the unit of a number, and what stands for no motion."""
+    """The numbers that an input may have: limits of an element, the unit of a number, and what stands for no motion.
+
+    `word` is the length of an integer in bits, 0 for a floating-point number.
+    """
 
     signal: Signal
     low: Any
     high: Any
     unit: float
     rest: tuple[Any, ...]
+    word: int = 0
 
     def proper(self, values: Sequence[float]) -> tuple[Any, ...]:
         """Return values in SI units as numbers of the input inside its limits."""
@@ -122,7 +126,8 @@ def call_vectors(
     command : str
         The command that generates the vectors, for the head of the files.
     count : int, optional
-        Number of vectors: corners first, then calls that are refused, then random ones.
+        Number of vectors: corners first, then calls that are refused, then random ones. Those at which an angle jumps
+        by a turn are left out.
     seed : int, optional
         Seed of the random vectors.
 
@@ -155,16 +160,16 @@ def _fixed_rows(
         scaled = [round(value / float(argument.format.unit)) for value in _rest(sources, argument.signal)]
         rest = tuple(min(max(value, argument.low), argument.high) for value in scaled)
         unit = float(argument.format.unit)
-        boxes.append(_Box(argument.signal, argument.low, argument.high, unit, rest))
-    word = sources.fixed.settings.word
+        box = _Box(argument.signal, argument.low, argument.high, unit, rest, argument.format.word)
+        boxes.append(box)
     words = [feedback.fresh for feedback in sources.fixed.residuals]
-    top = (1 << word) - 1
+    top = (1 << sources.fixed.settings.word) - 1
     ends = [tuple(words), tuple(0 for _ in words), tuple(top for _ in words)]
     before = itertools.chain(
         itertools.islice(itertools.cycle(ends), 3 * len(words)),
         (tuple(_whole(stream, 0, top) for _ in words) for _ in itertools.count()),
     )
-    inputs = itertools.chain(_corners(boxes), _outside(boxes, word), _random(boxes, stream))
+    inputs = itertools.chain(_corners(boxes), _outside(boxes), _random(boxes, stream))
     rows = [
         _called(model, row, feedback)
         for row, feedback in itertools.islice(zip(inputs, before, strict=False), count)
@@ -284,10 +289,10 @@ def _corners(boxes: Sequence[_Box]) -> Iterator[tuple[tuple[Any, ...], ...]]:
                 yield _with(boxes, box, _replaced(box.rest, place, limit))
 
 
-def _outside(boxes: Sequence[_Box], word: int) -> Iterator[tuple[tuple[int, ...], ...]]:
+def _outside(boxes: Sequence[_Box]) -> Iterator[tuple[tuple[int, ...], ...]]:
     """Yield calls that are refused: each element just outside its range, and at the ends of the word."""
-    lowest, highest = -(1 << (word - 1)), (1 << (word - 1)) - 1
     for box in boxes:
+        lowest, highest = -(1 << (box.word - 1)), (1 << (box.word - 1)) - 1
         for place in range(box.signal.size):
             limits = (box.low - 1, box.high + 1) if place else (box.low - 1, box.high + 1, lowest, highest)
             for value in limits:

@@ -29,6 +29,8 @@ def _data(result: Verification) -> dict[str, Any]:
 def _text(result: Verification) -> str:
     lines = [*result.differences]
     lines.append(f"{result.file}: {'in step' if result.in_step else 'out of step'} with its command")
+    if result.max_ulp is None:
+        return "\n".join(lines)
     right = f"{result.calls - result.wrong} of {result.calls} calls return what they must"
     bound = "" if result.bound_ulp is None else f", certified {result.bound_ulp:.4f}"
     lines.append(f"{right}; error {result.max_ulp:.4f} of the last place{bound}")

@@ -60,20 +60,20 @@ def generate(
         return
     if algorithm is None:
         raise InputError("an algorithm is needed, or --all; strapgen list kernels shows them")
-    wanted = request(algorithm, method, target, fixed, output)
-    sources = wanted.sources()
-    _check_carry(wanted, sources, fixed)
+    task = request(algorithm, method, target, fixed, output)
+    sources = task.sources()
+    fixed.check_feedback(sources)
     files = sources.files if output.with_runs else sources.step_files
     if output.project:
-        files = files | _project_files(wanted, output)
+        files = files | _project_files(task, output)
     if output.check:
         _check_files(files, output, format)
         return
     written = output.write(files)
     if format == "json":
-        print_json(_data(wanted.choice, sources, wanted.target, written))
+        print_json(_data(task.choice, sources, task.target, written))
     else:
-        typer.echo(_text(sources, wanted.target, written))
+        typer.echo(_text(sources, task.target, written))
 
 
 def request(
@@ -99,23 +99,15 @@ def request(
         )
     if output.for_c and not TARGETS[target].compiled:
         raise InputError(f"{output.for_c} goes with targets in C, not with {target}")
-    _check_increments(choice, fixed)
+    fixed.check_increments(choice)
     return Request(choice, target, settings, output.naming)
 
 
-def _check_carry(wanted: Request, sources: Sources, fixed: FixedOptions) -> None:
-    """Refuse error feedback for a kernel that keeps nothing."""
-    if fixed.carry not in (None, "none") and sources.fixed is not None and not sources.fixed.residuals:
-        raise InputError(
-            f"kernel {wanted.choice.kernel} rounds no state that goes on to the next step; --carry keeps nothing"
-        )
-
-
-def _project_files(wanted: Request, output: SourceOptions) -> dict[str, str]:
+def _project_files(task: Request, output: SourceOptions) -> dict[str, str]:
     """Return the files that build and test the C, unless a file of the user is in their place."""
     from strapgen.experiments import project
 
-    files = project.project_files(wanted.choice, wanted.target, wanted.settings, wanted.naming)
+    files = project.project_files(task.choice, task.target, task.settings, task.naming)
     if not output.check:
         project.refuse_changed(output.out or Path(), files, output.force)
     return files
@@ -157,19 +149,6 @@ def _check_alone(
     ):
         if value is not None:
             raise InputError(f"--all generates the whole catalogue; {name} does not go with it")
-
-
-def _check_increments(choice: Choice, fixed: FixedOptions) -> None:
-    """Refuse a largest rate or angle for a kernel that takes neither."""
-    from strapgen.library import generated_sources
-
-    if not {*fixed.stated} & {"--max-rate-deg-s", "--step", "--max-angle-rad"}:
-        return
-    names = {signal.name for signal in generated_sources.program(choice).inputs}
-    if not names & {"increments", "turns"}:
-        raise InputError(
-            f"kernel {choice.kernel} takes no increments; a largest rate or angle does not go with it"
-        )
 
 
 def _data(choice: Choice, sources: Sources, target: str, written: list[Path]) -> dict[str, Any]:

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import Sculling, TwoSpeedAlgorithm, option, whole
-from strapgen.cli.output import Folder, Format, Project, WithRuns, check_format, print_json
+from strapgen.cli.output import Format, check_format, print_json
+from strapgen.cli.source_options import SourceOptions
 from strapgen.support.exceptions import InputError
-
-if TYPE_CHECKING:
-    from strapgen.ir.fixed_settings import Settings
 
 
 @grouped
@@ -30,9 +28,7 @@ def two_speed(
         FixedOptions,
         Shown(only=("word", "rounding", "carry", "drift_allowance", "ranges", "formats")),
     ],
-    out: Folder = None,
-    with_runs: WithRuns = False,
-    project: Project = False,
+    output: Annotated[SourceOptions, Shown(only=("out", "with_runs", "project", "force"))],
     format: Format = "text",
 ) -> None:
     """Generate the C code of an algorithm in two speeds.
@@ -44,7 +40,6 @@ def two_speed(
     check_format(format)
     from strapgen.ir.fixed_settings import Settings
     from strapgen.library import two_speed_sources
-    from strapgen.support.files import write_files
     from strapgen.targets import fixed_targets
 
     form = whole("sculling", sculling) or 0
@@ -54,10 +49,14 @@ def two_speed(
     elif settings is not None:
         raise InputError(f"the options of fixed point go with --target c-fixed, not with {target}")
     sources = two_speed_sources.sources(algorithm, form, target, settings)
-    files = sources.files if with_runs else sources.step_files
-    if project:
-        files = files | _project_files(out or Path(), algorithm, form, target, settings)
-    written = write_files(out or Path(), files)
+    files = sources.files if output.with_runs else sources.step_files
+    if output.project:
+        from strapgen.experiments import project, two_speed_project
+
+        added = two_speed_project.project_files(algorithm, form, target, settings)
+        project.refuse_changed(output.out or Path(), added, output.force)
+        files = files | added
+    written = output.write(files)
     if format == "json":
         print_json(
             {
@@ -72,14 +71,3 @@ def two_speed(
     typer.echo(f"{sources.kernel} for {target}")
     for path in written:
         typer.echo(f"  {path}")
-
-
-def _project_files(
-    out: Path, algorithm: str, sculling: int, target: str, settings: Settings | None
-) -> dict[str, str]:
-    """Return the files that build and test the C, unless a file of the user is in their place."""
-    from strapgen.experiments import project, two_speed_project
-
-    files = two_speed_project.project_files(algorithm, sculling, target, settings)
-    project.refuse_changed(out, files)
-    return files

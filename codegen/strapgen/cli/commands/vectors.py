@@ -45,6 +45,7 @@ def vectors(
     Example: strapgen vectors euler --max-rate-deg-s 400 --step 0.01 --count 200 --out firmware
     """
     check_format(format)
+    from strapgen.experiments import project
     from strapgen.experiments.vectors import vectors_of_choice
     from strapgen.support.files import write_files
     from strapgen.targets import BUILT_IN
@@ -54,13 +55,17 @@ def vectors(
     settings = fixed.settings(choice.increments_per_step)
     if settings is not None and target in BUILT_IN and not BUILT_IN[target].fixed:
         raise InputError(f"the options of fixed point go with --target c-fixed, not with {target}")
+    fixed.check_increments(choice)
     table = vectors_of_choice(choice, target, settings, whole("count", count) or 0, whole("seed", seed) or 0)
-    written = write_files(out or Path(), table_files(table))
+    fixed.check_feedback(table.sources)
+    files = table_files(table)
+    project.refuse_changed(out or Path(), files)
+    written = write_files(out or Path(), files)
     refused = sum(row.status != 0 for row in table.rows)
     if format == "json":
-        files = [str(path) for path in written]
+        paths = [str(path) for path in written]
         function = table.sources.function.name
-        print_json({"function": function, "files": files, "vectors": len(table.rows), "refused": refused})
+        print_json({"function": function, "files": paths, "vectors": len(table.rows), "refused": refused})
         return
     typer.echo(f"{table.sources.function.name}: {len(table.rows)} vectors, {refused} of them refused")
     for path in written:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from strapgen.cli.help import PlainCommand
 from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.output import TEXT_OUTPUT, Output
 from strapgen.cli.sample_source import SampleSource
@@ -25,12 +26,12 @@ def verify(
     source: SampleSource,
     output: Annotated[Output, Shown(only=TEXT_OUTPUT)],
 ) -> None:
-    """Verify that a generated C file is what its header says; exit with 1 if it is not.
+    """Verify that a generated C file is what its header says.
 
-    The command in the header is run again, and every line that differs is shown. Then the file itself is compiled and
-    called on corners, on random input and along a run: in fixed point it must return the integers of the model, and
-    stay within the certified bound of arithmetic with 40 digits. The run is a cone, or what --motion or a recording
-    says.
+    The exit status is 1 if it is not. The command in the header is run again, and every line that differs is shown.
+    Then the file itself is compiled and called on corners, on random input and along a run: in fixed point it must
+    return the integers of the model, and stay within the certified bound of arithmetic with 40 digits. The run is a
+    cone, or what --motion or a recording says.
 
     Example: strapgen verify generated/c_fixed/euler_rk4_2_w32.c
     """
@@ -61,7 +62,6 @@ def read_command(command: str) -> Request:
     """
     from typer.main import get_command
 
-    from strapgen.cli import app
     from strapgen.cli.commands import generate
     from strapgen.cli.fixed_options import FixedOptions
     from strapgen.cli.options import MethodOptions
@@ -72,8 +72,9 @@ def read_command(command: str) -> Request:
         raise InputError(
             f"'{command}' does not generate one function; verify takes the files of strapgen generate"
         )
-    commands: Any = get_command(app)
-    stated = commands.commands["generate"].make_context("generate", words[2:]).params
+    alone = typer.Typer()
+    alone.command(cls=PlainCommand)(generate.generate)
+    stated = get_command(alone).make_context("generate", words[2:]).params
 
     def group(kind: type[Any]) -> Any:
         values = {field.name: stated[field.name] for field in fields(kind)}

@@ -13,7 +13,7 @@ from strapgen.targets.registry import BUILT_IN
 from strapgen.targets.rendering import render
 from strapgen.targets.two_speed_c.emit import wiring
 from strapgen.targets.vectors_c.cycles import loop_calls
-from strapgen.targets.vectors_c.emit import VectorTable, numbers_of
+from strapgen.targets.vectors_c.emit import VectorTable, numbers_of, types_of
 
 #: Folder of a project with the functions in double that the main program compares with.
 MOTION = "motion"
@@ -114,6 +114,7 @@ def _values(sources: Sources, command: str, run: MotionRun, identity: Sequence[F
         "state": sources.function.inputs[0],
         "identity": [numbers.literal(round(x / unit) if numbers.word else x) for x in identity],
         "type": numbers.type,
+        "types": types_of(sources),
         "word": numbers.word,
         "feedback_type": numbers.feedback_type,
         "feedback": [f"{word.fresh}u" for word in feedback],
@@ -167,6 +168,7 @@ def call_main(table: VectorTable, command: str) -> str:
         name=sources.function.name,
         command=command,
         numbers=numbers,
+        types=types_of(sources),
         inputs=inputs,
         outputs=outputs,
         feedback=feedback,

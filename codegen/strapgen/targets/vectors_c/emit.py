@@ -95,6 +95,16 @@ def numbers_of(sources: Sources) -> NumberText:
     return NumberText(word.type, word.residual, word.bits, None)
 
 
+def types_of(sources: Sources) -> dict[str, str]:
+    """Return the C type of an element of every input and output by name; arguments may have words of other lengths."""
+    signals = (*sources.function.inputs, *sources.function.outputs)
+    types = {signal.name: numbers_of(sources).type for signal in signals}
+    if sources.fixed is not None:
+        arguments = (*sources.fixed.inputs, *sources.fixed.outputs)
+        types |= {argument.signal.name: WORDS[argument.format.word].type for argument in arguments}
+    return types
+
+
 def file_names(name: str) -> tuple[str, str, str]:
     """Return the names of the header, the test and the CSV of a function's vectors."""
     return f"{name}_vectors.h", f"test_{name}.c", f"{name}_vectors.csv"
@@ -125,7 +135,7 @@ def table_files(table: VectorTable) -> dict[str, str]:
         "name": name,
         "macro": name.upper(),
         "command": table.command,
-        "kernel": sources.kernel,
+        "types": types_of(sources),
         "numbers": numbers,
         "inputs": list(zip(inputs, sources.function.inputs, strict=True)),
         "outputs": list(zip(outputs, sources.function.outputs, table.tolerances, strict=True)),
