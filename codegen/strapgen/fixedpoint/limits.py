@@ -72,7 +72,7 @@ def limits(program: Program, settings: Settings) -> list[Limit]:
     word = settings.word
     stated: list[Limit] = []
     for signal in program.inputs:
-        largest = _largest(program, signal, settings)
+        largest = largest_magnitude(program, signal, settings)
         text = stated_format(settings, signal)
         if text is not None:
             fraction = Format.parse(text, word).fraction
@@ -102,8 +102,14 @@ def state_fraction(word: int, largest: Fraction) -> int:
     return min(word - 2, finest(largest, word))
 
 
-def _largest(program: Program, signal: Signal, settings: Settings) -> Fraction:
-    """Return the largest magnitude of the elements of an input."""
+def largest_magnitude(program: Program, signal: Signal, settings: Settings) -> Fraction:
+    """Return the largest magnitude of the elements of an input.
+
+    Raises
+    ------
+    InputError
+        If it is not known.
+    """
     if signal.name in settings.ranges:
         if signal.constraint or signal.name in ("increments", "turns"):
             raise InputError(

@@ -10,9 +10,11 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import zip_longest
 from typing import ClassVar
 
 from strapgen.ir.fixed_interface import Argument
+from strapgen.ir.float_interface import RoundingBounds
 from strapgen.ir.integer_program import FixedProgram
 from strapgen.ir.program import Program
 from strapgen.ir.signals import Signal
@@ -118,8 +120,10 @@ def of_fixed(fixed: FixedProgram, function: str, command: str, memory: Mapping[s
     return _contract(function, command, [*requires, *lets], ensures, ranges)
 
 
-def of_program(program: Program, function: str, command: str) -> Contract:
-    """Return the contract of floating-point code: the exact values of its outputs, which it rounds.
+def of_program(program: Program, function: str, command: str, rounding: RoundingBounds) -> Contract:
+    """Return the contract of floating-point code: the exact values of its outputs, and how far it is from them.
+
+    Where no bound is known, or it depends on values on the way, an output is the exact value, rounded.
 
     Parameters
     ----------
@@ -127,15 +131,34 @@ def of_program(program: Program, function: str, command: str) -> Contract:
         With the names that are printed.
     function, command
         As for `of_fixed`.
+    rounding : RoundingBounds
+        Its error bounds.
     """
+    proved = rounding.errors and not rounding.conditions
+    limits = {condition.value: condition.high for condition in rounding.inputs}
+    requires = []
+    if proved and any(rounding.worst.values()):
+        for signal in program.inputs:
+            largest, place = limits[signal.name], f"[0..{signal.size - 1}]" if signal.shape else ""
+            requires.append(("requires", f"-{largest} <= {signal.name}{place} <= {largest}"))
+        requires.append(("otherwise", "the outputs have no bound"))
     lets = _loads((signal, signal.name, "") for signal in program.inputs if signal.shape)
     lets += _body(program)
-    ensures = [
-        (f"{result.signal.name}[{k}] = {text}", ", rounded")
-        for result, texts in zip(program.outputs, _results(program), strict=True)
-        for k, text in enumerate(texts)
-    ]
-    return _contract(function, command, lets, ensures, [])
+    ensures = []
+    errors = rounding.errors.values() if proved else [()] * len(program.outputs)
+    for result, texts, bounds in zip(program.outputs, _results(program), errors, strict=True):
+        for element, text, error in zip_longest(range(len(texts)), texts, bounds):
+            name = f"{result.signal.name}[{element}]"
+            if error:
+                ensures.append((f"|{name} - {_summand(text)}|", f" <= {decimal_above(error)}"))
+            else:
+                ensures.append((f"{name} = {text}", ", rounded" if error is None else ""))
+    return _contract(function, command, [*requires, *lets], ensures, [])
+
+
+def _summand(text: str) -> str:
+    """Return an expression as it stands behind a minus sign."""
+    return text if re.fullmatch(r"\w+", text) else f"({text})"
 
 
 def _contract(

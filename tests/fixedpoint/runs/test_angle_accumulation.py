@@ -75,7 +75,7 @@ def assert_holds(errors: np.ndarray, bounds: np.ndarray, carry: str) -> None:
     ],
 )
 def test_no_adversary_gets_above_the_bound_nor_far_below(adversarial_run, algorithm, carry, steps, every):
-    name, settings = "c-q31", Settings.of(**RATES, carry=carry)
+    name, settings = "c-fixed32", Settings.of(**RATES, carry=carry)
     adversary = adversarial_run.Adversary(algorithm, settings, name)
     result = adversary.run(steps, every)
     assert_holds(result.errors, result.bounds, carry)
@@ -91,7 +91,7 @@ def test_no_adversary_gets_above_the_bound_nor_far_below(adversarial_run, algori
 
 @pytest.mark.parametrize("algorithm", ["euler", "dcm"])
 def test_the_errors_of_the_adversary_are_those_of_forty_digits(adversarial_run, algorithm):
-    adversary = adversarial_run.Adversary(algorithm, Settings.of(**RATES), "c-q31")
+    adversary = adversarial_run.Adversary(algorithm, Settings.of(**RATES), "c-fixed32")
     result = adversary.run(60)
     states = exact.propagate(program(Choice(algorithm, "rk4", 2)), result.increments)
     (angle,) = angles_apart(result.final[None], states[-1:])
@@ -144,7 +144,7 @@ def test_any_run_keeps_the_bound_along_it(algorithm, orthonormalization, word, r
 @pytest.mark.parametrize("algorithm", ["euler", "dcm"])
 def test_a_state_stays_proper_for_as_many_steps_as_are_proved(algorithm):
     settings = Settings.of(**RATES)
-    backend = strapgen.backend(algorithm, "rk4", 2, "c-q31", settings=settings)
+    backend = strapgen.backend(algorithm, "rk4", 2, "c-fixed32", settings=settings)
     angles = backend.interface.angle_accumulation
     limit = backend.interface.inputs[1].high * backend.increment_unit
     signs = np.array([[[1, 1, 1], [1, 1, 1]], [[1, -1, 1], [-1, 1, 1]], [[1, 1, 0], [-1, 1, 0]]])
@@ -189,7 +189,7 @@ def test_orthonormalizations_keep_the_attitude(kernel, rng):
 
 
 def test_a_run_without_proof_has_no_bound():
-    backend = strapgen.backend("dcm", "rk4", 2, "c-q31", settings=Settings.of(**RATES))
+    backend = strapgen.backend("dcm", "rk4", 2, "c-fixed32", settings=Settings.of(**RATES))
     angles = backend.interface.angle_accumulation
     assert backend.angle_bound(1000) is not None
     # Dual rows have one where they follow upon each other soon enough.
@@ -205,7 +205,7 @@ def test_a_run_without_proof_has_no_bound():
 
 def test_a_run_with_dual_rows_keeps_the_bound(rng):
     increments = rng.uniform(-1, 1, (1000, 2, 3)) * 0.0349
-    fixed = strapgen.backend("dcm", "rk4", 2, "c-q31", settings=Settings.of(**RATES))
+    fixed = strapgen.backend("dcm", "rk4", 2, "c-fixed32", settings=Settings.of(**RATES))
     double = strapgen.backend("dcm", "rk4", 2, "numpy")
     inputs = fixed.representable(increments)
     runs = [backend.propagate(inputs, orthonormalize_every=100) for backend in (fixed, double)]

@@ -249,6 +249,30 @@ def _growth(context: Quantization, transition: Result, width: int) -> Fraction:
     return 1 + norm(_away(context, transition))
 
 
+def transition_growth(
+    program: Program, transition: Result, sizes: tuple[Fraction, ...], width: int, coarse: Fraction
+) -> Fraction:
+    """Return a number that is not below the norm of any transition.
+
+    Parameters
+    ----------
+    program : Program
+    transition : Result
+    sizes : tuple of Fraction
+        Largest magnitude of every element of the inputs behind the state.
+    width : int
+        Elements of a row of the state.
+    coarse : Fraction
+        Such a number for a transition that calls functions.
+    """
+    if program.companions is not None and program.companions.isometry:
+        return Fraction(1)
+    try:
+        return root(1 + _expanded_stretch(program, transition, sizes, width))
+    except NotImplementedError:
+        return coarse
+
+
 @lru_cache(maxsize=64)
 def _expanded_stretch(
     program: Program, transition: Result, sizes: tuple[Fraction, ...], width: int
