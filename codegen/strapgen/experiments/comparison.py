@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
@@ -102,6 +102,7 @@ def compare(
     reference: str = "numpy",
     truth: Array | None = None,
     settings: Settings | None = None,
+    others: Mapping[str, Backend] | None = None,
 ) -> list[Comparison]:
     """Run an algorithm on several back ends and compare each with a reference.
 
@@ -121,6 +122,9 @@ def compare(
         True direction cosine matrices.
     settings : Settings, optional
         Settings of fixed point; by default for increments of the size of these.
+    others : mapping of str to Backend, optional
+        More back ends of the same step, by the names under which they are shown: `verification.file_backend` makes one
+        of a file.
 
     Returns
     -------
@@ -144,7 +148,7 @@ def compare(
     for name in backends:
         checks.choice("backend", name, BACKENDS)
     checks.choice("reference", reference, BACKENDS)
-    if not backends:
+    if not backends and not others:
         raise InputError("no back end is named; at least one is needed")
     if increments is None:
         raise InputTypeError("increments is None; an array (steps, samples, 3) in rad is needed")
@@ -160,7 +164,11 @@ def compare(
     states: Array = standard.propagate(d).astype(np.float64)
     require_finite(standard, states, np.arange(len(states), dtype=np.float64))
     matrices = attitude(standard, states)
-    return [_compared(name, load(name), d, states, matrices, truth) for name in backends]
+    named = {name: load(name) for name in backends}
+    return [
+        _compared(name, candidate, d, states, matrices, truth)
+        for name, candidate in (*named.items(), *(others or {}).items())
+    ]
 
 
 def _compared(
@@ -175,7 +183,7 @@ def _compared(
     steps = len(increments)
     states = candidate.propagate(increments)
     run, seconds = candidate.prepared(increments), math.inf
-    for _ in range(1 if BACKENDS[name].slow else _TIMED):
+    for _ in range(1 if name in BACKENDS and BACKENDS[name].slow else _TIMED):
         start = time.perf_counter()
         run()
         seconds = min(seconds, time.perf_counter() - start)

@@ -201,9 +201,12 @@ def _floating_rows(
 ) -> tuple[tuple[CallVector, ...], tuple[float, ...]]:
     """Return vectors of a function on floating-point numbers; those without a finite result are left out."""
     evaluator, exact = ProgramEvaluator(reference, sources.target), ExactEvaluator(reference)
+    # The ranges for which the header bounds the rounding, where it does.
+    bounded = sources.rounding.inputs if sources.rounding is not None else ()
+    stated = {condition.value: float(condition.high) for condition in bounded}
     boxes = []
     for signal in sources.function.inputs:
-        limit = _UNBOUNDED if signal.bound is None else float(signal.bound)
+        limit = stated.get(signal.name, _UNBOUNDED if signal.bound is None else float(signal.bound))
         boxes.append(_Box(signal, -limit, limit, 1.0, tuple(_rest(sources, signal))))
     candidates = itertools.chain(_corners(boxes), _random(boxes, stream))
     rows: list[CallVector] = []

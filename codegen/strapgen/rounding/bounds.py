@@ -10,9 +10,9 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from fractions import Fraction
 from functools import lru_cache
 
-from strapgen.fixedpoint.runs.accumulation import transition_growth
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.fixedpoint.limits import largest_magnitude
+from strapgen.fixedpoint.runs.accumulation import transition_growth
 from strapgen.fixedpoint.terms import up
 from strapgen.ir.fixed_interface import RoundingAccumulation
 from strapgen.ir.fixed_settings import Settings

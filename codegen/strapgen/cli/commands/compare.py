@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from strapgen.cli.commands.verify import request_of
 from strapgen.cli.fixed_options import RUN_OPTIONS, FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import (
@@ -41,6 +43,15 @@ def compare(
             panel="Algorithm",
         ),
     ] = "numpy",
+    files: Annotated[
+        list[Path] | None,
+        option(
+            "--source",
+            metavar="FILE",
+            help="C file that strapgen generated, as one more back end, in its own formats.",
+            panel="Algorithm",
+        ),
+    ] = None,
     source: SampleSource,
     fixed: Annotated[FixedOptions, Shown(only=RUN_OPTIONS)],
     fail_above: Annotated[
@@ -66,7 +77,8 @@ def compare(
     """
     output.check(algorithm, methods.tableau, source.increments_csv, source.rates_csv)
     choices = methods.choices(algorithm)
-    names = _backends(backend, reference)
+    names = _backends(backend, reference, files)
+    requests = {path: request_of(path) for path in files or ()}
     most = limit("--fail-above", fail_above)
     source.check()
     _check_fixed(fixed, {*names, reference})
@@ -74,6 +86,7 @@ def compare(
     import numpy as np
 
     from strapgen.experiments import comparison
+    from strapgen.experiments.verification import file_backend
     from strapgen.reports import plots
     from strapgen.reports.comparison import ComparedKernel, comparison_report
 
@@ -81,6 +94,10 @@ def compare(
     with np.errstate(all="ignore"):  # numbers that overflow are refused, in one line
         for choice in choices:
             inputs = source.read(choice.increments_per_step, choice.previous)
+            others = {str(path): file_backend(path, request) for path, request in requests.items()}
+            for path, request in requests.items():
+                if request.choice.kernel != choice.kernel:
+                    raise InputError(f"{path} is {request.choice.kernel}, and {choice.kernel} is compared")
             rows = comparison.compare(
                 choice,
                 backends=names,
@@ -88,6 +105,7 @@ def compare(
                 reference=reference,
                 truth=inputs.truth,
                 settings=fixed.at_step(inputs.step).settings(choice.increments_per_step),
+                others=others,
             )
             kernels.append(
                 ComparedKernel(choice.kernel, f"{choice.kernel}: {inputs.title}", rows, inputs.step)
@@ -114,12 +132,13 @@ def _fail_above(kernels: list[ComparedKernel], most: float, said: str) -> None:
         raise typer.Exit(1)
 
 
-def _backends(text: str | None, reference: str) -> list[str]:
+def _backends(text: str | None, reference: str, files: list[Path] | None) -> list[str]:
     from strapgen.backends import BACKENDS, DEFAULT_BACKENDS
     from strapgen.support import checks
 
     one("--reference", reference)
-    names = backends("--backend", text, DEFAULT_BACKENDS)
+    # A file alone is compared with the reference.
+    names = [] if files and text is None else backends("--backend", text, DEFAULT_BACKENDS)
     checks.choice("reference", reference, BACKENDS)
     return names
 
