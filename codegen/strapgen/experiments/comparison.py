@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
@@ -96,13 +96,12 @@ def compare(
     algorithm: str | Choice,
     method: str | Tableau | None = None,
     samples: int | None = None,
-    backends: Sequence[str] = DEFAULT_BACKENDS,
+    backends: Sequence[str | Backend] = DEFAULT_BACKENDS,
     increments: Any = None,
     *,
     reference: str = "numpy",
     truth: Array | None = None,
     settings: Settings | None = None,
-    others: Mapping[str, Backend] | None = None,
 ) -> list[Comparison]:
     """Run an algorithm on several back ends and compare each with a reference.
 
@@ -112,8 +111,9 @@ def compare(
         As for `strapgen.backend`. A choice also says how many increments from before a step it takes.
     samples : int, optional
         Number of increments per step.
-    backends : sequence of str, optional
-        Keys of `BACKENDS`; by default all but the slow ones.
+    backends : sequence of str or Backend, optional
+        Keys of `BACKENDS`, by default all but the slow ones; or back ends of the same step, as
+        `verification.file_backend` makes one of a file.
     increments : array_like, (N, K, 3)
         Angle increments of N steps in rad; every back end rounds the same ones to its own format.
     reference : str, optional
@@ -122,9 +122,6 @@ def compare(
         True direction cosine matrices.
     settings : Settings, optional
         Settings of fixed point; by default for increments of the size of these.
-    others : mapping of str to Backend, optional
-        More back ends of the same step, by the names under which they are shown: `verification.file_backend` makes one
-        of a file.
 
     Returns
     -------
@@ -146,9 +143,10 @@ def compare(
     stages.require("compare", algorithm, str, os.PathLike, Choice)
     choice = chosen_step(algorithm, method, samples)
     for name in backends:
-        checks.choice("backend", name, BACKENDS)
+        if not isinstance(name, Backend):
+            checks.choice("backend", name, BACKENDS)
     checks.choice("reference", reference, BACKENDS)
-    if not backends and not others:
+    if not backends:
         raise InputError("no back end is named; at least one is needed")
     if increments is None:
         raise InputTypeError("increments is None; an array (steps, samples, 3) in rad is needed")
@@ -164,10 +162,11 @@ def compare(
     states: Array = standard.propagate(d).astype(np.float64)
     require_finite(standard, states, np.arange(len(states), dtype=np.float64))
     matrices = attitude(standard, states)
-    named = {name: load(name) for name in backends}
     return [
-        _compared(name, candidate, d, states, matrices, truth)
-        for name, candidate in (*named.items(), *(others or {}).items())
+        _compared(name, load(name), d, states, matrices, truth)
+        if isinstance(name, str)
+        else _compared(name.name, name, d, states, matrices, truth)
+        for name in backends
     ]
 
 

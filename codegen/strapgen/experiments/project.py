@@ -55,7 +55,7 @@ def project_files(
     sources = table.sources
     command = f"strapgen generate {naming.of(generated_sources.program(choice)).arguments} --target {target}"
     if sources.fixed is not None:
-        command += f" {options(sources.fixed.settings)}"
+        command += f" {options(sources.fixed.settings, sources.function.inputs)}"
     command += " --project"
     tests = table_files(table)
     motion: dict[str, str] = {}

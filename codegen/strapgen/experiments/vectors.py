@@ -104,7 +104,7 @@ def vectors_of_choice(
     program = generated_sources.program(choice)
     command = f"strapgen vectors {naming.of(program).arguments} --target {target}"
     if sources.fixed is not None:
-        command += f" {options(sources.fixed.settings)}"
+        command += f" {options(sources.fixed.settings, program.inputs)}"
         reference = generated_sources.sources(choice, MODEL, settings)
     else:
         reference = sources_of_program(program, "exact")

@@ -160,7 +160,9 @@ def file_backend(file: Path, request: Request) -> Backend:
     if sources.companions is None:
         raise InputError(f"{file} is the kernel {sources.kernel}, which is no attitude step")
     step = StepSources(replace(sources, files={**sources.files, **here}), request.choice)
-    return backend_class(sources.target)(step)
+    backend = backend_class(sources.target)(step)
+    backend.name = str(file)
+    return backend
 
 
 def _read(file: Path, request: Request) -> tuple[Sources, dict[str, str]]:

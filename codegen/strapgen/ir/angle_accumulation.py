@@ -102,7 +102,7 @@ class AngleAccumulation:
         --------
         >>> one, unit = Fraction(1), Fraction(1, 1000)
         >>> run = AngleAccumulation(4 * unit, unit, unit, 2 * unit, 0 * one, one / 2, one, 100, one, one, 0, 0 * one)
-        >>> run.bound(10, normalizations=1)
+        >>> round(run.bound(10, normalizations=1), 6)
         0.016
         """
         total = self.once + steps * (self.per_step + (self.input_rounding if rounded_inputs else 0))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from fractions import Fraction
 
 from strapgen.ir.fixed_interface import Argument, ErrorFeedback, Interface, RoundingAccumulation
@@ -30,15 +31,14 @@ def argument_text(argument: Argument) -> str:
 
 def command(fixed: FixedProgram, target: str) -> str:
     """Return the command that generates a fixed-point program, with all options."""
-    turned = any(signal.name in ("increments", "turns") for signal in fixed.program.inputs)
-    stated = options(fixed.interface.settings, angle=turned)
+    stated = options(fixed.interface.settings, fixed.program.inputs)
     return f"strapgen generate {fixed.program.arguments} --target {target} {stated}"
 
 
-def options(settings: Settings, angle: bool = False) -> str:
-    """Return settings as options of the command line, with the largest angle where a function has one."""
+def options(settings: Settings, inputs: Iterable[Signal] = ()) -> str:
+    """Return settings as options of the command line, with the largest angle if one of the inputs has it."""
     words = [f"--word {settings.word}"]
-    if angle:
+    if any(signal.name in ("increments", "turns") for signal in inputs):
         words.append(settings.stated or f"--max-angle-rad {settings.largest_angle}")
     words += [
         f"--rounding {settings.rounding}",

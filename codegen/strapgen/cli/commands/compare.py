@@ -25,6 +25,8 @@ from strapgen.cli.sample_source import SampleSource
 from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
+    from strapgen.backends import Backend
+    from strapgen.catalogue import Choice
     from strapgen.reports.comparison import ComparedKernel
 
 
@@ -78,7 +80,6 @@ def compare(
     output.check(algorithm, methods.tableau, source.increments_csv, source.rates_csv)
     choices = methods.choices(algorithm)
     names = _backends(backend, reference, files)
-    requests = {path: request_of(path) for path in files or ()}
     most = limit("--fail-above", fail_above)
     source.check()
     _check_fixed(fixed, {*names, reference})
@@ -86,7 +87,6 @@ def compare(
     import numpy as np
 
     from strapgen.experiments import comparison
-    from strapgen.experiments.verification import file_backend
     from strapgen.reports import plots
     from strapgen.reports.comparison import ComparedKernel, comparison_report
 
@@ -94,18 +94,13 @@ def compare(
     with np.errstate(all="ignore"):  # numbers that overflow are refused, in one line
         for choice in choices:
             inputs = source.read(choice.increments_per_step, choice.previous)
-            others = {str(path): file_backend(path, request) for path, request in requests.items()}
-            for path, request in requests.items():
-                if request.choice.kernel != choice.kernel:
-                    raise InputError(f"{path} is {request.choice.kernel}, and {choice.kernel} is compared")
             rows = comparison.compare(
                 choice,
-                backends=names,
+                backends=[*names, *_of_files(files, choice)],
                 increments=inputs.increments,
                 reference=reference,
                 truth=inputs.truth,
                 settings=fixed.at_step(inputs.step).settings(choice.increments_per_step),
-                others=others,
             )
             kernels.append(
                 ComparedKernel(choice.kernel, f"{choice.kernel}: {inputs.title}", rows, inputs.step)
@@ -117,6 +112,19 @@ def compare(
     )
     if most is not None:
         _fail_above(kernels, most, f"further from {reference} than {fail_above} rad")
+
+
+def _of_files(files: list[Path] | None, choice: Choice) -> list[Backend]:
+    """Return files as back ends of a step that is compared."""
+    from strapgen.experiments.verification import file_backend
+
+    result = []
+    for path in files or ():
+        request = request_of(path)
+        if request.choice.kernel != choice.kernel:
+            raise InputError(f"{path} is {request.choice.kernel}, and {choice.kernel} is compared")
+        result.append(file_backend(path, request))
+    return result
 
 
 def _fail_above(kernels: list[ComparedKernel], most: float, said: str) -> None:
