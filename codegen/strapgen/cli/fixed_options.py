@@ -17,7 +17,10 @@ if TYPE_CHECKING:
 _Text = str | None
 
 #: The options of a run: its formats are chosen for its own increments, or for a largest rate that is stated.
-RUN_OPTIONS = ("word", "max_rate_deg_s", "rounding", "carry", "drift_allowance")
+RUN_OPTIONS = (
+    *("word", "max_rate_deg_s", "lsb", "lsb_rad", "input_bits"),
+    *("state", "rounding", "carry", "drift_allowance"),
+)
 
 
 @dataclass(frozen=True)
@@ -45,6 +48,34 @@ class FixedOptions:
     step: Annotated[
         _Text, option("--step", metavar="S", help="Step length in s; it goes with --max-rate-deg-s.")
     ] = None
+    sample_hz: Annotated[
+        _Text,
+        option(
+            "--sample-hz",
+            metavar="HZ",
+            help="Samples of the gyro in a second, in place of --step: a step takes as many as it has increments.",
+        ),
+    ] = None
+    lsb: Annotated[
+        _Text,
+        option(
+            "--lsb",
+            metavar="RATE",
+            help="Rate that a count of the gyro stands for, as 0.0175dps, 17.5mdps or 3e-4rad/s: increments are counts.",
+        ),
+    ] = None
+    lsb_rad: Annotated[
+        _Text,
+        option("--lsb-rad", metavar="RAD", help="Angle that a count stands for in rad, in place of a rate."),
+    ] = None
+    input_bits: Annotated[
+        _Text,
+        option(
+            "--input-bits",
+            metavar="BITS",
+            help="Bits of an increment; up to 16 they are int16_t.  [default: those of a word; 16 with --lsb]",
+        ),
+    ] = None
     max_angle_rad: Annotated[
         _Text,
         option(
@@ -68,6 +99,15 @@ class FixedOptions:
             metavar="NAME",
             help="Error feedback, which adds the rounding errors of a step to the next one: none; state for those of "
             "the state; full for those of the transition too.  [default: none]",
+        ),
+    ] = None
+    state: Annotated[
+        _Text,
+        option(
+            "--state",
+            metavar="NAME",
+            help="State in the format of CMSIS: q31 for words of 32 bits, q15 for 16, q63 for 64. It saturates at "
+            "-1 and below 1.",
         ),
     ] = None
     drift_allowance: Annotated[
@@ -102,6 +142,11 @@ class FixedOptions:
             "--word": self.word,
             "--max-rate-deg-s": self.max_rate_deg_s,
             "--step": self.step,
+            "--sample-hz": self.sample_hz,
+            "--lsb": self.lsb,
+            "--lsb-rad": self.lsb_rad,
+            "--input-bits": self.input_bits,
+            "--state": self.state,
             "--max-angle-rad": self.max_angle_rad,
             "--rounding": self.rounding,
             "--carry": self.carry,
@@ -118,9 +163,7 @@ class FixedOptions:
         from strapgen.ir.fixed_settings import Settings
         from strapgen.support import checks
 
-        if (self.max_rate_deg_s is None) != (self.step is None):
-            missing = "--step" if self.step is None else "--max-rate-deg-s"
-            raise InputError(f"--max-rate-deg-s and --step go together; {missing} is missing")
+        self._check_pairs()
         bits = whole("word", self.word)
         allowance = {}
         if self.drift_allowance is not None:
@@ -131,6 +174,10 @@ class FixedOptions:
             step=self.step,
             increments=increments,
             largest_angle=self.max_angle_rad,
+            sample_hz=self.sample_hz,
+            lsb=self.lsb if self.lsb_rad is None else f"{self.lsb_rad}rad",
+            input_bits=whole("input bits", self.input_bits),
+            state=self.state or "",
             rounding="nearest" if self.rounding is None else self.rounding,
             carry="none" if self.carry is None else self.carry,
             **allowance,
@@ -138,9 +185,26 @@ class FixedOptions:
             formats=dict(_pair("--fix", text) for text in self.formats or ()),
         )
 
+    def _check_pairs(self) -> None:
+        """Refuse options that do not go together, or that another one is missing for."""
+        for one_option, other in (("--step", "--sample-hz"), ("--lsb", "--lsb-rad")):
+            if {one_option, other} <= {*self.stated}:
+                raise InputError(f"{one_option} and {other} are both given; one is needed")
+        timed = self.step is not None or self.sample_hz is not None
+        if self.max_rate_deg_s is not None and not timed:
+            raise InputError("--max-rate-deg-s and --step go together; --step is missing, or --sample-hz")
+        if self.lsb is not None and not timed:
+            raise InputError("--lsb is a rate a count; --sample-hz is missing, which makes it an angle")
+        if timed and self.max_rate_deg_s is None and self.lsb is None:
+            stated = "--step" if self.sample_hz is None else "--sample-hz"
+            raise InputError(f"--max-rate-deg-s and {stated} go together; --max-rate-deg-s is missing, or --lsb")
+        if self.lsb is not None and self.lsb.strip().endswith("rad"):
+            raise InputError(f"--lsb is {self.lsb}, an angle a count; --lsb-rad takes it, without its unit")
+
     def at_step(self, seconds: float) -> FixedOptions:
         """Return the options with the step of a run, by which a largest rate becomes a largest increment."""
-        return replace(self, step=None if self.max_rate_deg_s is None else repr(seconds))
+        is_needed = self.max_rate_deg_s is not None or self.lsb is not None
+        return replace(self, step=repr(seconds) if is_needed else None)
 
     def check_backend(self, backend: str) -> None:
         """Refuse options of fixed point for a back end in floating point."""

@@ -30,7 +30,10 @@ def quantize(program: Program, settings: Settings) -> FixedProgram:
     from strapgen.fixedpoint.quantization import (
         lowered,  # numpy and the proofs are loaded when they are needed
     )
+    from strapgen.fixedpoint.sensor_scale import in_counts
 
+    if settings.sensor is not None:
+        program = in_counts(program, settings.sensor)
     try:
         return lowered(program, settings)
     except InputError:

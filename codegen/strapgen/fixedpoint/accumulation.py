@@ -50,17 +50,22 @@ def accumulation(context: Quantization, transition: Result, result: Argument) ->
     length = quantities.items[state.elements[0]].range.magnitude * _root(Fraction(width))
     elements = [name for name in quantities.results[transition.signal.name] if isinstance(name, str)]
     rounded = [context.values[name] for name in elements if name in context.values]
-    feedbacks = [_feedback_rounding(context, value) for value in rounded]
+    # Where a state saturates, errors do not add up to what is fed back: it counts as any other.
+    saturates = any(context.values[name].saturated for name in result.values)
+    feedbacks = [Fraction(0) if saturates else _feedback_rounding(context, value) for value in rounded]
     errors = [value.error - 2 * fed_back for value, fed_back in zip(rounded, feedbacks, strict=True)]
     transition_feedback = _norm(feedbacks)
     away = _norm([quantities.distance(value.name) for value in rounded])
-    local, fed_back = _local_errors(context, elements, result)
+    local, fed_back = _local_errors(context, elements, result, saturates)
     state_feedback = fed_back * _root(Fraction(width))
 
     per_step = max(_norm(local[k : k + width]) for k in range(0, len(local), width))
     per_step += length * _norm(errors)
     once = Fraction(0)
-    if context.settings.carry != "none":
+    if saturates:
+        # One element of a length of 1 or less can exceed the largest number, by a unit; so can the first state.
+        once, per_step = result.format.unit, per_step + result.format.unit
+    elif context.settings.carry != "none":
         per_step += state_feedback * away
         once += 2 * state_feedback
     if any(feedbacks):
@@ -84,7 +89,7 @@ def _feedback_rounding(context: Quantization, value: Value) -> Fraction:
 
 
 def _local_errors(
-    context: Quantization, transition: Sequence[str], result: Argument
+    context: Quantization, transition: Sequence[str], result: Argument, saturates: bool
 ) -> tuple[list[Fraction], Fraction]:
     """Return what the elements of the state lose beside the errors of the transition, and what is fed back of it."""
     items, values = context.quantities.items, context.values
@@ -98,7 +103,7 @@ def _local_errors(
             for factor, other in (monomial, monomial[::-1])
             if other in transition and factor not in transition
         )
-        rounding = _feedback_rounding(context, value)
+        rounding = Fraction(0) if saturates else _feedback_rounding(context, value)
         fed_back = max(fed_back, rounding)
         local.append(value.error - through - 2 * rounding)
     return local, fed_back

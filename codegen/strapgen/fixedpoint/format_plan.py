@@ -81,8 +81,7 @@ def format_plan(
         exact = Fraction(0)
         for name in signal.elements:
             values[name] = Value(name, IntegerInput(), fraction, False, -top, top, exact, exact, top)
-        format_ = Format(settings.word, fraction)
-        inputs.append(Argument(signal, format_, signal.elements, -top, top, (exact,) * signal.size))
+        inputs.append(limit.argument(guard_bits))
     forced = _stated_formats(program, settings, quantities)
     for result in program.results:
         names = [name for name in quantities.results[result.signal.name] if isinstance(name, str)]

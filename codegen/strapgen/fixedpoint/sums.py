@@ -254,10 +254,15 @@ def _fine(context: Quantization, name: str, terms: Sequence[Placed], fraction: i
 
 def _limited(context: Quantization, quantity: Quantity, value: Value) -> Value:
     """Return a value in a fixed format that does not hold its range: it is checked if its range is otherwise known."""
+    largest = context.largest(value.fraction)
+    if context.settings.state and _is_attitude(context, quantity.name):
+        return replace(
+            value, low=max(value.low, -largest - 1), high=min(value.high, largest), saturated=True
+        )
     known = _known_limit(context, quantity.name)
     inside = quantity.range + Interval.of(quantity.offset) if known is None else Interval.symmetric(known)
     limit = None if known is None else math.floor(known * Fraction(2) ** value.fraction)
-    if limit is None or limit > context.largest(value.fraction):
+    if limit is None or limit > largest:
         if not _is_stated(context, quantity.name):  # chosen from the range, and errors go beyond it
             raise context.too_short(quantity.name)
         raise InputError(
@@ -265,6 +270,12 @@ def _limited(context: Quantization, quantity: Quantity, value: Value) -> Value:
             f"{inside.text()}{', less ' + str(quantity.offset) if quantity.offset else ''}"
         )
     return replace(value, low=max(value.low, -limit), high=min(value.high, limit), guarded=True)
+
+
+def _is_attitude(context: Quantization, name: str) -> bool:
+    """Tell whether a quantity is an element of an output that is an attitude."""
+    results = context.quantities.results
+    return any(r.signal.constraint and name in results[r.signal.name] for r in context.program.outputs)
 
 
 def _is_stated(context: Quantization, name: str) -> bool:

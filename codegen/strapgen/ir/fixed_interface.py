@@ -10,6 +10,7 @@ from typing import Any
 
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.formats import Format
+from strapgen.ir.sensor import Sensor
 from strapgen.ir.signals import Signal
 
 
@@ -52,6 +53,8 @@ class Argument:
         Range of the integers: an input outside is refused, an output is proved to lie inside.
     errors : tuple of Fraction
         Error bound of each element of an output after one call; of an input, zeros.
+    sensor : Sensor or None
+        The scale of the gyro whose counts these are.
     """
 
     signal: Signal
@@ -60,6 +63,17 @@ class Argument:
     low: int
     high: int
     errors: tuple[Fraction, ...]
+    sensor: Sensor | None = None
+
+    @property
+    def unit(self) -> Fraction:
+        """What the integer 1 stands for, in the unit of the signal."""
+        return self.format.unit if self.sensor is None else self.sensor.count
+
+    @property
+    def saturates(self) -> bool:
+        """Whether it is an attitude in -1 to 1 less a unit: what lies beyond is stored as the nearer end."""
+        return bool(self.signal.constraint) and self.format.fraction == self.format.word - 1
 
     def as_dict(self) -> dict[str, Any]:
         """Return the argument as plain JSON data."""
@@ -71,6 +85,7 @@ class Argument:
             "low": self.low,
             "high": self.high,
             "errors": [str(error) for error in self.errors],
+            "sensor": self.sensor and self.sensor.as_dict(),
         }
 
     @classmethod
@@ -83,6 +98,7 @@ class Argument:
             data["low"],
             data["high"],
             tuple(map(Fraction, data["errors"])),
+            data["sensor"] and Sensor.from_dict(data["sensor"]),
         )
 
 
@@ -159,7 +175,8 @@ class Interface:
     @property
     def companion_settings(self) -> Settings:
         """The settings of a kernel that works on the same state beside a step: an orthonormalization."""
-        return replace(self.settings, ranges={}, formats={"state": str(self.inputs[0].format)})
+        formats = {} if self.settings.state else {"state": str(self.inputs[0].format)}
+        return replace(self.settings, ranges={}, formats=formats, sensor=None, input_bits=None)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the interface as plain JSON data."""

@@ -10,22 +10,40 @@ from strapgen.ir.fixed_settings import DEFAULT_ALLOWANCE, DEFAULT_ANGLE, Setting
 from strapgen.ir.formats import Format
 from strapgen.ir.integer_program import FixedProgram, Value
 from strapgen.ir.program import Program
+from strapgen.ir.sensor import Sensor
 from strapgen.ir.signals import Signal
 
 
 def argument_text(argument: Argument) -> str:
     """Return format, unit, range and error bound of an argument in words."""
-    unit = argument.format.unit
-    parts = [
-        f"format {argument.format}, unit {_power(argument.format.fraction, argument.signal.unit)}",
-        f"range {argument.low} to {argument.high} ({_number(argument.low * unit)} to {_number(argument.high * unit)})",
-    ]
+    unit, signal = argument.unit, argument.signal
+    if argument.sensor is None:
+        parts = [f"format {argument.format}, unit {_power(argument.format.fraction, signal.unit)}"]
+    else:
+        parts = [_counts_text(argument, argument.sensor)]
+    limits = f"{_number(argument.low * unit)} to {_number(argument.high * unit)}"
+    parts.append(f"range {argument.low} to {argument.high} ({limits})")
     worst = max(argument.errors)
-    if worst:
-        parts.append(f"error at most {_number(worst)}, {float(worst / unit):.4f} of the last place")
-    elif any(name not in argument.signal.elements for name in argument.values):
+    places = f"{_number(worst)}, {float(worst / unit):.4f} of the last place"
+    if worst and argument.saturates:
+        parts.append(
+            f"saturates at both ends; error at most {places} where the exact value is at most 1 in magnitude, and at "
+            "most the larger of this and what it exceeds 1 by elsewhere"
+        )
+    elif worst:
+        parts.append(f"error at most {places}")
+    elif any(name not in signal.elements for name in argument.values):
         parts.append("exact")
     return "; ".join(parts)
+
+
+def _counts_text(argument: Argument, sensor: Sensor) -> str:
+    """Return in words what a count of a gyro is."""
+    exact = Fraction(f"{float(sensor.count):.17g}") == sensor.count
+    return (
+        f"counts of the gyro in {argument.format.word} bits; 1 count = {float(sensor.count):.{7 if exact else 17}g} "
+        f"{argument.signal.unit} = {sensor.unit}"
+    )
 
 
 def command(fixed: FixedProgram, target: str) -> str:
@@ -42,6 +60,12 @@ def options(settings: Settings) -> str:
         words.append(settings.stated)
     elif settings.largest_angle != DEFAULT_ANGLE:
         words.append(f"--max-angle-rad {settings.largest_angle}")
+    if settings.sensor is not None and settings.sensor.stated not in settings.stated:
+        words.append(settings.sensor.stated)
+    if settings.input_bits != settings.default_input_bits:
+        words.append(f"--input-bits {settings.input_bits}")
+    if settings.state:
+        words.append(f"--state {settings.state}")
     if settings.rounding != "nearest":
         words.append(f"--rounding {settings.rounding}")
     if settings.carry != "none":

@@ -126,9 +126,12 @@ def _check_increments(choice: Choice, fixed: FixedOptions) -> None:
     """Refuse a largest rate or angle for a kernel that takes neither."""
     from strapgen.library import generated_sources
 
-    if not {*fixed.stated} & {"--max-rate-deg-s", "--step", "--max-angle-rad"}:
+    counted = {*fixed.stated} & {"--sample-hz", "--lsb", "--lsb-rad", "--input-bits"}
+    if not counted and not {*fixed.stated} & {"--max-rate-deg-s", "--step", "--max-angle-rad"}:
         return
     names = {signal.name for signal in generated_sources.program(choice).inputs}
+    if counted and "increments" not in names:
+        raise InputError(f"kernel {choice.kernel} takes no increments; {min(counted)} does not go with it")
     if not names & {"increments", "turns"}:
         raise InputError(
             f"kernel {choice.kernel} takes no increments; a largest rate or angle does not go with it"
