@@ -143,7 +143,9 @@ class CFixedEvaluator(FixedEvaluator):
     def run(self, inputs: Sequence[Array], feedback: Array) -> tuple[tuple[Array, ...], Array]:
         """Call the function on integers, see `Evaluator.run`."""
         count = len(feedback)
-        words = [np.ascontiguousarray(array, kind) for array, kind in zip(inputs, self.input_types, strict=True)]
+        words = [
+            np.ascontiguousarray(array, kind) for array, kind in zip(inputs, self.input_types, strict=True)
+        ]
         feedback = np.array(feedback, self.feedback_type)
         outputs = tuple(np.empty((count, a.signal.size), self.word_type) for a in self.interface.outputs)
         status = self.module.ffi.new("int *")
@@ -207,9 +209,14 @@ class FixedBackend(Backend):
         self.interface = step.interface
         self.unit = float(self.interface.outputs[0].format.unit)
         self.increment_unit = float(self.interface.inputs[1].unit)
+        self.saturates = self.interface.outputs[0].saturates
+        self.count = None if self.interface.inputs[1].sensor is None else self.increment_unit
 
     def rounding_bound(self, steps: int, rounded_inputs: bool = False) -> float | None:
-        """Return the certified bound of a run's rounding, see `Backend.rounding_bound`; None without a transition."""
+        """Return the certified bound of a run's rounding, see `Backend.rounding_bound`; None without a transition.
+
+        Where a state saturates, it holds as long as no element of the exact state exceeds 1 in magnitude.
+        """
         accumulation = self.interface.accumulation
         return None if accumulation is None else accumulation.bound(steps, rounded_inputs)
 

@@ -61,7 +61,8 @@ class FixedOptions:
         option(
             "--lsb",
             metavar="RATE",
-            help="Rate that a count of the gyro stands for, as 0.0175dps, 17.5mdps or 3e-4rad/s: increments are counts.",
+            help="Rate that a count of the gyro stands for, as 0.0175dps, 17.5mdps or 3e-4rad/s; the increments are "
+            "then counts.",
         ),
     ] = None
     lsb_rad: Annotated[
@@ -197,7 +198,9 @@ class FixedOptions:
             raise InputError("--lsb is a rate a count; --sample-hz is missing, which makes it an angle")
         if timed and self.max_rate_deg_s is None and self.lsb is None:
             stated = "--step" if self.sample_hz is None else "--sample-hz"
-            raise InputError(f"--max-rate-deg-s and {stated} go together; --max-rate-deg-s is missing, or --lsb")
+            raise InputError(
+                f"--max-rate-deg-s and {stated} go together; --max-rate-deg-s is missing, or --lsb"
+            )
         if self.lsb is not None and self.lsb.strip().endswith("rad"):
             raise InputError(f"--lsb is {self.lsb}, an angle a count; --lsb-rad takes it, without its unit")
 
@@ -215,6 +218,12 @@ class FixedOptions:
         checks.choice("backend", backend, BACKENDS)
         if self.stated and not BACKENDS[backend].fixed:
             raise InputError(f"{next(iter(self.stated))} is for fixed-point back ends, not for {backend}")
+
+    def check_pulse(self, pulse: str | None) -> None:
+        """Refuse a gyro pulse beside the scale of a gyro that counts, which is one."""
+        scale = next((name for name in ("--lsb", "--lsb-rad") if name in self.stated), None)
+        if pulse is not None and scale is not None:
+            raise InputError(f"--pulse-arcsec and {scale} both state the angle of a count; one is needed")
 
     def settings_for_run(
         self, backend: str, increments: int | None, step: float, largest: Callable[[], float]

@@ -160,7 +160,8 @@ def _require_last(context: Quantization) -> None:
     for value in context.body:
         if saturated.intersection(used_by(value)):
             raise InputError(
-                f"{context.program.kernel} computes {value.name} from its output; state {context.settings.state} does not go with it"
+                f"{context.program.kernel} computes {value.name} from its output; state "
+                f"{context.settings.state} does not go with it"
             )
 
 

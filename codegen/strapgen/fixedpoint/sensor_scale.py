@@ -8,12 +8,22 @@ Where it takes fewer multiplications, the increments are multiplied with s first
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from strapgen.fixedpoint.quantities import is_power_of_two
-from strapgen.ir.program import Assignment, Constant, Node, Operation, Program, Reference, Result, references, walk
+from strapgen.ir.program import (
+    Assignment,
+    Constant,
+    Node,
+    Operation,
+    Program,
+    Reference,
+    Result,
+    references,
+    walk,
+)
 from strapgen.ir.sensor import Sensor
 
 #: Changes of a weight that are tried, the smallest first: none stays where no other costs less.
@@ -55,7 +65,11 @@ def in_counts(program: Program, sensor: Sensor) -> Program:
     angles = _angles(program, [*counted])
     folded = _with_assigned_results(program, angles)
     converted = _with_angles_first(program, angles)
-    candidates = [(folded, _weights(folded, counted)), (converted, counted)]
+    candidates = [(converted, counted)]
+    # Functions have series of their own, which a scale of their argument would make longer.
+    operations = (n for a in program.body for n in walk(a.value) if isinstance(n, Operation))
+    if all(node.kind in _LINEAR for node in operations):
+        candidates.insert(0, (folded, _weights(folded, counted)))
     program, weights = min(candidates, key=lambda pair: _total_cost(*pair))
     scaling = _Scaling(sensor.scale, weights)
     body = tuple(replace(a, value=scaling.assigned(a)) for a in program.body)
@@ -141,11 +155,10 @@ class _Scaling:
         if node.kind in ("add", "subtract", "negate"):
             return Operation(node.kind, tuple(self.times(n, factor, power) for n in node.arguments))
         if node.kind == "multiply":
-            return self._product(*node.arguments, factor, power)
-        exponents = _exponents(node, self.weights)
-        arguments = zip(node.arguments, exponents, strict=True)
-        plain = Operation(node.kind, tuple(self.times(n, Fraction(1), -k) for n, k in arguments))
-        return self._multiple(plain, factor, power + _weight_of(node, exponents))
+            left, right = node.arguments
+            return self._product(left, right, factor, power)
+        plain = Operation(node.kind, tuple(self.times(n, Fraction(1), 0) for n in node.arguments))
+        return self._multiple(plain, factor, power)
 
     def _product(self, left: Node, right: Node, factor: Fraction, power: int) -> Node:
         for constant, other in ((left, right), (right, left)):
@@ -163,19 +176,13 @@ class _Scaling:
             return Operation("multiply", (inner, self._bare(right)))
         splits = {-self.weights.get(n.name, 0) for n in walk(right) if isinstance(n, Reference)}
         products = [
-            Operation(
-                "multiply", (self.times(left, factor, power - k), self.times(right, Fraction(1), k))
-            )
+            Operation("multiply", (self.times(left, factor, power - k), self.times(right, Fraction(1), k)))
             for k in sorted(splits | {0})
         ]
         return min(products, key=_cost)
 
     def _weight(self, node: Node) -> int:
-        """Return the weight of a name, or of an operation that is no sum of products."""
-        if isinstance(node, Reference):
-            return self.weights.get(node.name, 0)
-        assert isinstance(node, Operation)
-        return _weight_of(node, _exponents(node, self.weights))
+        return self.weights.get(node.name, 0) if isinstance(node, Reference) else 0
 
     def _bare(self, node: Node) -> Node:
         """Return a name, or an operation that is no sum of products, without a factor."""
@@ -192,24 +199,6 @@ class _Scaling:
 def _is_linear(node: Node) -> bool:
     """Tell whether a factor can go down into a node."""
     return isinstance(node, Operation) and node.kind in _LINEAR
-
-
-def _exponents(node: Operation, weights: Mapping[str, int]) -> list[int]:
-    """Return by which powers of the scale the arguments of an operation are divided."""
-    known = {name: {weight} for name, weight in weights.items()}
-    degrees = [min(_degrees(argument, known), default=0) for argument in node.arguments]
-    if node.kind == "divide":
-        return degrees
-    if node.kind == "sqrt" and degrees[0] % 2 == 0:
-        return degrees
-    return [0] * len(degrees)
-
-
-def _weight_of(node: Operation, exponents: list[int]) -> int:
-    """Return the weight of an operation whose arguments are divided by such powers."""
-    if node.kind == "divide":
-        return exponents[0] - exponents[1]
-    return exponents[0] // 2 if node.kind == "sqrt" else 0
 
 
 def _cost(node: Node) -> int:
@@ -249,7 +238,7 @@ def _weights(program: Program, counted: Mapping[str, int]) -> dict[str, int]:
 
 
 def _demands(
-    node: Node, weight: int, weights: Mapping[str, int], pending: Collection[str]
+    node: Node, weight: int, weights: Mapping[str, int], pending: set[str]
 ) -> Iterator[tuple[str, int]]:
     """Yield the values among some with the weights for which a node of a weight needs no coefficients."""
     if isinstance(node, Reference) and node.name in pending:
@@ -271,11 +260,8 @@ def _degrees(node: Node, known: Mapping[str, set[int]]) -> set[int]:
     """Return the degrees of the terms of a sum of products."""
     if isinstance(node, Reference):
         return known.get(node.name, {0})
-    if isinstance(node, Constant):
+    if not isinstance(node, Operation):
         return {0}
-    if not _is_linear(node):
-        least = {name: min(several, default=0) for name, several in known.items()}
-        return {_weight_of(node, _exponents(node, least))}
     parts = [_degrees(argument, known) for argument in node.arguments]
     if node.kind == "multiply":
         return {a + b for a in parts[0] for b in parts[1]}

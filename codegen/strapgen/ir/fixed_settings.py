@@ -121,7 +121,8 @@ class Settings:
         bits = self.input_bits
         if bits is not None and not SHORTEST_WORD <= bits <= self.word:
             raise InputError(
-                f"input bits is {bits}; a whole number from {SHORTEST_WORD} to {self.word}, the bits of a word, is needed"
+                f"input bits is {bits}; a whole number from {SHORTEST_WORD} to {self.word}, the bits of a word, is "
+                "needed"
             )
 
     def _check_state(self) -> None:
@@ -187,8 +188,14 @@ class Settings:
         if max_rate_deg_s is None and step is not None and lsb is None:
             raise InputError("max_rate_deg_s and step go together; max_rate_deg_s is missing")
         sensor = None if lsb is None else Sensor.of(lsb, interval, heard)
-        if sample_hz is not None and max_rate_deg_s is None and (sensor is None or heard not in sensor.stated):
-            raise InputError("sample_hz makes angles of rates; max_rate_deg_s or an lsb that is a rate is missing")
+        if (
+            sample_hz is not None
+            and max_rate_deg_s is None
+            and (sensor is None or heard not in sensor.stated)
+        ):
+            raise InputError(
+                "sample_hz makes angles of rates; max_rate_deg_s or an lsb that is a rate is missing"
+            )
         angle, options = None, []
         if largest_angle is not None:
             angle = checks.number("largest angle", largest_angle, positive=True)

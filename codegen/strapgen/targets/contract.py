@@ -85,13 +85,14 @@ def _number(value: Fraction) -> str:
     return f"{float(value):.6g}"
 
 
-def accumulation_text(accumulation: RoundingAccumulation, program: Program) -> str:
-    """Return the bound of a run of N steps in words."""
+def accumulation_text(accumulation: RoundingAccumulation, program: Program, state: str = "") -> str:
+    """Return the bound of a run of N steps in words; `state` names a state that saturates."""
     what = "in the length of a row" if len(program.inputs[0].shape) == 2 else "in the length of the state"
     growth = accumulation.growth - 1
     stretched = f", times exp({_number(growth)} N)" if growth else ""
     once = f"{_number(accumulation.once)} + " if accumulation.once else ""
-    return f"({once}{_number(accumulation.per_step)} N){stretched}, {what}"
+    only = ", as long as exact arithmetic keeps every element of the state from -1 to 1" if state else ""
+    return f"({once}{_number(accumulation.per_step)} N){stretched}, {what}{only}"
 
 
 def residuals_text(residuals: tuple[ErrorFeedback, ...]) -> str:
