@@ -27,8 +27,8 @@ def argument_text(argument: Argument) -> str:
     places = f"{_number(worst)}, {float(worst / unit):.4f} of the last place"
     if worst and argument.saturates:
         parts.append(
-            f"saturates at both ends; error at most {places} where the exact value is at most 1 in magnitude, and at "
-            "most the larger of this and what it exceeds 1 by elsewhere"
+            f"saturates at both ends; error at most {places}, where the exact value is from -1 to 1; beyond, at "
+            "most the larger of this and its distance from the range"
         )
     elif worst:
         parts.append(f"error at most {places}")
