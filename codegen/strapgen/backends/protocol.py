@@ -56,11 +56,17 @@ class Backend(ABC):
         Unit in the last place of a state's element near 1.
     increment_unit : float or None
         Unit in the last place of an increment in rad, in fixed point; None in floating point.
+    count : float or None
+        Angle of a count in rad for a step that takes a gyro's counts; None for any other.
+    saturates : bool
+        Whether an element of a state that would exceed 1 is stored as the largest number.
     sources : Sources
         Sources of the step.
     """
 
     increment_unit: float | None = None
+    count: float | None = None
+    saturates: bool = False
 
     def __init__(self, parts: StepSources, step: Evaluator) -> None:
         sources, kernels = parts.step, parts.step_kernels

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from strapgen.backends import BACKENDS, DEFAULT_BACKENDS, Backend, chosen_step
 from strapgen.backends import backend as attitude_backend
+from strapgen.backends.increments import pulses
 from strapgen.catalogue import Choice
 from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.ir.fixed_settings import Settings
@@ -115,7 +116,8 @@ def compare(
         Keys of `BACKENDS`, by default all but the slow ones; or back ends of the same step, as
         `verification.file_backend` makes one of a file.
     increments : array_like, (N, K, 3)
-        Angle increments of N steps in rad; every back end rounds the same ones to its own format.
+        Angle increments of N steps in rad; every back end rounds the same ones to its own format. Where settings state
+        a gyro that counts, all back ends take its counts, and the rest of each goes into the next.
     reference : str, optional
         A key of `BACKENDS`; "exact" shows all rounding.
     truth : array, (1 + N, 3, 3), optional
@@ -158,6 +160,8 @@ def compare(
     def load(name: str) -> Backend:
         return attitude_backend(choice, backend=name, settings=fixed if BACKENDS[name].fixed else None)
 
+    if fixed.sensor is not None:
+        d = pulses(d, fixed.sensor.count, choice.previous)
     standard = load(reference)
     states: Array = standard.propagate(d).astype(np.float64)
     require_finite(standard, states, np.arange(len(states), dtype=np.float64))
@@ -237,11 +241,14 @@ def _angle_bound(candidate: Backend, increments: Array, reference: Array) -> Cal
     size = float(norms.max())
     # The computed state is as long as the exact one up to a factor exp(a/2).
     shortest = float(norms.min()) * math.exp(-_SMALL_ANGLE / 2)
+    # What saturates loses a unit of an element of 1 in a step, and of a larger one what it exceeds 1 by.
+    excess = max(0.0, float(np.abs(reference).max()) - 1) if candidate.saturates else 0.0
 
     def bound(steps: int) -> float | None:
         known = []
         length = candidate.rounding_bound(steps, rounded)
         if length is not None and math.isfinite(length):
+            length *= 1 + excess / candidate.unit
             known.append(
                 math.sqrt(1.5) * size * length if matrix else 2 * size * length * (size**2 + size * length)
             )

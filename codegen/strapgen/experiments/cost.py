@@ -184,10 +184,11 @@ def _call(sources: Sources) -> tuple[str, str]:
         values = _values(signal)
         if fixed:
             argument = fixed[signal.name]
-            scaled = [round(value * 2.0**argument.format.fraction) for value in values]
+            scaled = [round(value / argument.unit) for value in values]
             values = [max(argument.low, min(argument.high, integer)) for integer in scaled]
         text = ", ".join(map(str, values))
-        lines.append(f"{kind} argument_{number}[{signal.size}] = {{{text}}};")
+        memory = f"int{fixed[signal.name].format.word}_t" if fixed else kind
+        lines.append(f"{memory} argument_{number}[{signal.size}] = {{{text}}};")
         names.append(f"argument_{number}" + ("" if signal.shape or fixed else "[0]"))
     if sources.fixed is not None and sources.fixed.residuals:
         fresh = ", ".join(f"{feedback.fresh}u" for feedback in sources.fixed.residuals)

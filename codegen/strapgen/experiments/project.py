@@ -107,7 +107,7 @@ def coning_run(sources: Sources, conversion: str) -> MotionRun:
     largest, step = LARGEST, _STEP
     if sources.fixed is not None:
         argument = sources.fixed.inputs[-1]
-        largest = argument.high * argument.format.unit / PART
+        largest = argument.high * argument.unit / PART
         step = stated_step(sources.fixed.settings)
     return MotionRun(decimal(largest * samples / step), decimal(step, 15), STEPS, conversion)
 

@@ -157,9 +157,9 @@ def _fixed_rows(
     assert sources.fixed is not None
     boxes = []
     for argument in sources.fixed.inputs:
-        scaled = [round(value / float(argument.format.unit)) for value in _rest(sources, argument.signal)]
+        scaled = [round(value / float(argument.unit)) for value in _rest(sources, argument.signal)]
         rest = tuple(min(max(value, argument.low), argument.high) for value in scaled)
-        unit = float(argument.format.unit)
+        unit = float(argument.unit)
         box = _Box(argument.signal, argument.low, argument.high, unit, rest, argument.format.word)
         boxes.append(box)
     words = [feedback.fresh for feedback in sources.fixed.residuals]

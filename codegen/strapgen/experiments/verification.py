@@ -21,7 +21,7 @@ from strapgen.backends.protocol import Backend
 from strapgen.backends.registry import backend_class
 from strapgen.backends.step_sources import StepSources
 from strapgen.experiments.vectors import MODEL, vectors_of_choice
-from strapgen.ir.fixed_interface import Interface
+from strapgen.ir.fixed_interface import Argument, Interface
 from strapgen.ir.sources import Sources
 from strapgen.library import generated_sources
 from strapgen.library.generated_files import command_of, text_of
@@ -260,15 +260,20 @@ class _Exact:
         """Return the largest error of the elements of all outputs."""
         with mpmath.workdps(DIGITS):
             numbers = [
-                [word * number(argument.format.unit) for word in words]
+                [word * number(argument.unit) for word in words]
                 for words, argument in zip(inputs, self.interface.inputs, strict=True)
             ]
             results = self.interpreter.outputs(*numbers)
             return max(
-                float(abs(word - value / number(argument.format.unit)))
+                float(abs(word - _stored(value, argument) / number(argument.format.unit)))
                 for argument, words in zip(self.interface.outputs, outputs, strict=True)
                 for word, value in zip(words, results[argument.signal.name], strict=True)
             )
+
+
+def _stored(value: Any, argument: Argument) -> Any:
+    """Return the exact value of an output, at the end of the range of one that saturates."""
+    return min(max(value, mpmath.mpf(-1)), mpmath.mpf(1)) if argument.saturates else value
 
 
 def _floating(
@@ -340,10 +345,10 @@ def _cone(interface: Interface) -> Array | None:
 def _words(interface: Interface, increments: Array) -> Array:
     """Return increments as the integers of the second input."""
     argument = interface.inputs[1]
-    scaled = np.rint(increments.reshape(len(increments), -1) / float(argument.format.unit))
+    scaled = np.rint(increments.reshape(len(increments), -1) / float(argument.unit))
     if np.abs(scaled).max() > argument.high:
         raise InputError(
             f"the run has increments of {float(np.abs(increments).max()):.6g} rad; the file takes at most "
-            f"{float(Fraction(argument.high) * argument.format.unit):.6g} rad"
+            f"{float(Fraction(argument.high) * argument.unit):.6g} rad"
         )
     return scaled.astype(np.int64)

@@ -157,8 +157,20 @@ def _fixed_program(context: Quantization) -> FixedProgram:
     """Return what has been lowered as a program."""
     outputs = tuple(_output(context, result.signal) for result in context.program.outputs)
     interface = Interface(context.settings, context.plan.inputs, outputs, _feedbacks(context), None)
+    _require_last(context)
     counts = operation_counts(context.body, context.settings.rounding)
     return FixedProgram(context.program, interface, tuple(context.body), counts)
+
+
+def _require_last(context: Quantization) -> None:
+    """Refuse a program that goes on with a value that saturates: it may be far from the exact one."""
+    saturated = {value.name for value in context.body if value.saturated}
+    for value in context.body:
+        if saturated.intersection(used_by(value)):
+            raise InputError(
+                f"{context.program.kernel} computes {value.name} from its output; state "
+                f"{context.settings.state} does not go with it"
+            )
 
 
 def _feedbacks(context: Quantization) -> tuple[ErrorFeedback, ...]:
@@ -190,6 +202,9 @@ def _errors(context: Quantization, signal: Signal, values: Sequence[Value]) -> t
             uncertain.add(value.name)
     bound = signal.bound or Fraction(0)
     return tuple(
-        bound + value.magnitude / Fraction(2) ** value.fraction if value.name in uncertain else value.error
+        bound + value.magnitude / Fraction(2) ** value.fraction
+        if value.name in uncertain
+        # What exceeds the largest number of a format by no more than a unit is stored as that number.
+        else max(value.error, value.saturated * Fraction(2) ** -value.fraction)
         for value in values
     )

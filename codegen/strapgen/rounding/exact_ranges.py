@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from strapgen.fixedpoint.derivation_context import samples
 from strapgen.fixedpoint.intervals import Interval, maximum
-from strapgen.fixedpoint.probes import samples
 from strapgen.fixedpoint.quantities import Definition, InputElement, Maximum, Quantity, Sum, Terms, combined
 from strapgen.fixedpoint.ranges import Ranges
 from strapgen.ir.float_interface import Condition

@@ -106,12 +106,13 @@ def of_fixed(fixed: FixedProgram, function: str, command: str, memory: Mapping[s
         requires.append(
             ("otherwise", "the call returns 2 and writes nothing where a value leaves its limits")
         )
-    lets = _loads((a.signal, name(a), _unit(a.format.fraction)) for a in interface.inputs)
+    lets = _loads((a.signal, name(a), _unit(a)) for a in interface.inputs)
     lets += _body(fixed.program)
     ensures = [
         (
-            f"|{name(argument)}[{k}]{_unit(argument.format.fraction)} - {text}|",
-            f" <= {decimal_above(argument.errors[k])}",
+            f"|{name(argument)}[{k}]{_unit(argument)} - {text}|",
+            f" <= {decimal_above(argument.errors[k])}"
+            + (f" where -1 <= {text} <= 1" if argument.saturates else ""),
         )
         for argument, texts in zip(interface.outputs, _results(fixed.program), strict=True)
         for k, text in enumerate(texts)
@@ -203,8 +204,11 @@ def _results(program: Program) -> list[list[str]]:
     return [[printer.text(node) for node in result.nodes] for result in program.outputs]
 
 
-def _unit(fraction: int) -> str:
+def _unit(argument: Argument) -> str:
     """Return what turns an integer into the number that it stands for."""
+    fraction = argument.format.fraction
+    if argument.sensor is not None:
+        return f" * {_LinePrinter().constant(argument.sensor.count)}"
     if not fraction:
         return ""
     return f" / 2^{fraction}" if fraction > 0 else f" * 2^{-fraction}"

@@ -34,7 +34,7 @@ def run_paragraphs(interface: Interface, program: Program) -> list[str]:
     if interface.accumulation is not None:
         return [
             "Over a run of N steps without orthonormalization the distance from exact arithmetic on the same "
-            f"increments is at most {accumulation_text(interface.accumulation, program)}."
+            f"increments is at most {accumulation_text(interface.accumulation, program, interface.settings.state)}."
         ]
     return []
 

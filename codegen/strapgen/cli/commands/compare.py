@@ -83,6 +83,7 @@ def compare(
     most = limit("--fail-above", fail_above)
     source.check()
     _check_fixed(fixed, {*names, reference})
+    fixed.check_pulse(source.pulse_arcsec)
 
     import numpy as np
 

@@ -51,6 +51,8 @@ class StepErrors:
         Bounds of the distance of the transition from the identity.
     moves : tuple of Fraction
         How far the elements of the transition move when increments are rounded to their format.
+    saturation : Fraction
+        What a state that saturates loses of an element of 1.
     """
 
     local: tuple[Fraction, ...]
@@ -59,6 +61,7 @@ class StepErrors:
     state_feedback: Fraction
     away: tuple[Fraction, ...]
     moves: tuple[Fraction, ...]
+    saturation: Fraction = Fraction(0)
 
 
 def step_errors(context: Quantization, transition: Result, result: Argument) -> StepErrors | None:
@@ -75,16 +78,19 @@ def step_errors(context: Quantization, transition: Result, result: Argument) -> 
     quantities = context.quantities
     elements = [name for name in quantities.results[transition.signal.name] if isinstance(name, str)]
     rounded = [context.values[name] for name in elements if name in context.values]
-    feedbacks = tuple(_feedback_rounding(context, value) for value in rounded)
+    # Where a state saturates, errors do not add up to what is fed back: it counts as any other.
+    saturates = any(context.values[name].saturated for name in result.values)
+    feedbacks = tuple(Fraction(0) if saturates else _feedback_rounding(context, value) for value in rounded)
     errors = (value.error - 2 * fed_back for value, fed_back in zip(rounded, feedbacks, strict=True))
-    local, fed_back = _local_errors(context, elements, result)
+    local, fed_back = _local_errors(context, elements, result, saturates)
     half_units = {argument.signal.name: argument.format.unit / 2 for argument in context.plan.inputs[1:]}
     moves = _moves(quantities, half_units)
     if moves is None:
         return None
     moved = tuple(moves[name] for name in elements)
     away = _away(context, transition)
-    return StepErrors(tuple(local), tuple(errors), feedbacks, fed_back, away, moved)
+    saturation = result.format.unit if saturates else Fraction(0)
+    return StepErrors(tuple(local), tuple(errors), feedbacks, fed_back, away, moved, saturation)
 
 
 def accumulation(context: Quantization, transition: Result, errors: StepErrors) -> RoundingAccumulation:
@@ -108,7 +114,10 @@ def accumulation(context: Quantization, transition: Result, errors: StepErrors) 
     per_step = max(norm(errors.local[k : k + width]) for k in range(0, len(errors.local), width))
     per_step += length * norm(errors.transition)
     once = Fraction(0)
-    if context.settings.carry != "none":
+    if errors.saturation:
+        # One element of a length of 1 or less can exceed the largest number, by a unit; so can the first state.
+        once, per_step = errors.saturation, per_step + errors.saturation
+    elif context.settings.carry != "none":
         per_step += state_feedback * away
         once += 2 * state_feedback
     if transition_feedback:
@@ -163,7 +172,7 @@ def _feedback_rounding(context: Quantization, value: Value) -> Fraction:
 
 
 def _local_errors(
-    context: Quantization, transition: Sequence[str], result: Argument
+    context: Quantization, transition: Sequence[str], result: Argument, saturates: bool
 ) -> tuple[list[Fraction], Fraction]:
     """Return what the elements of the state lose beside the errors of the transition, and what is fed back of it."""
     items, values = context.quantities.items, context.values
@@ -177,7 +186,7 @@ def _local_errors(
             for factor, other in (monomial, monomial[::-1])
             if other in transition and factor not in transition
         )
-        rounding = _feedback_rounding(context, value)
+        rounding = Fraction(0) if saturates else _feedback_rounding(context, value)
         fed_back = max(fed_back, rounding)
         local.append(value.error - through - 2 * rounding)
     return local, fed_back

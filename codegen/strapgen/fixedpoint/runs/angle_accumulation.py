@@ -80,7 +80,9 @@ class _Sizes:
 def angle_accumulation(
     context: Quantization, transition: Result, errors: StepErrors
 ) -> AngleAccumulation | None:
-    """Return how the errors of a step add up as an angle; None where a step is no product of attitudes, or too coarse.
+    """Return how the errors of a step add up as an angle.
+
+    None stands for a step that is no product of attitudes, saturates, or is too coarse.
 
     Parameters
     ----------
@@ -90,7 +92,7 @@ def angle_accumulation(
     errors : StepErrors
     """
     terms = _products(context.program, transition)
-    if terms is None:
+    if terms is None or errors.saturation:  # what saturates shortens one element alone
         return None
     is_matrix = len(context.program.inputs[0].shape) == 2
     if not (_multiplies_matrices(context.program, terms) if is_matrix else _multiplies_lengths(terms)):
