@@ -30,12 +30,14 @@ def corners_and_random(evaluator: FixedEvaluator, count: int, rng: np.random.Gen
             part = count // 2
             vectors = rng.normal(size=(count - part, argument.signal.size))
             vectors /= np.linalg.norm(vectors, axis=1, keepdims=True)
-            made[part:] = np.rint(vectors / float(argument.format.unit)).astype(np.int64)
+            words = np.rint(vectors / float(argument.format.unit))
+            made[part:] = np.minimum(words, argument.high)  # 1 itself, where a state ends below it
         elif argument.signal.constraint == "rotation":
             part = count // 2
             matrices = np.linalg.qr(rng.normal(size=(count - part, 3, 3)))[0]
             matrices *= np.sign(np.linalg.det(matrices))[:, None, None]
-            made[part:] = np.rint(matrices.reshape(-1, 9) / float(argument.format.unit)).astype(np.int64)
+            words = np.rint(matrices.reshape(-1, 9) / float(argument.format.unit))
+            made[part:] = np.minimum(words, argument.high)
         inputs.append(made.astype(evaluator.integer_type))
     return inputs
 

@@ -22,6 +22,7 @@ ORDER = (
     "ir",
     "symbolic",
     "fixedpoint",
+    "rounding",
     "catalogue",
     "lowering",
     "targets",
@@ -38,7 +39,7 @@ ORDER = (
 )
 #: Folders that import without SymPy: what is in the cache runs without computer algebra.
 WITHOUT_SYMPY = (
-    *("support", "ir", "fixedpoint", "targets", "library", "toolchain", "backends", "simulation"),
+    *("support", "ir", "fixedpoint", "rounding", "targets", "library", "toolchain", "backends", "simulation"),
     *("cli", "catalogue/__init__.py", "catalogue/names.py", "catalogue/choice.py", "catalogue/choosing.py"),
 )
 #: The functions that do the work of a stage, and the folder to which each belongs.

@@ -269,7 +269,8 @@ def page_commands() -> Iterator[str]:
 @pytest.fixture
 def workplace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Return an empty folder to work in, with the examples and a folder for pictures."""
-    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    for name in ("examples", "generated"):
+        (tmp_path / name).symlink_to(ROOT / name)
     (tmp_path / "docs").mkdir()
     monkeypatch.chdir(tmp_path)
     return tmp_path

@@ -30,7 +30,9 @@ TRIP = {
     "strapgen.cli.options",
     "strapgen.catalogue.choosing",
     "strapgen.catalogue.choice",
+    "strapgen.cli.fixed_options",
     "strapgen.library.generated_sources",
+    "strapgen.library.generation",
     "strapgen.pipeline",
 }
 

@@ -44,6 +44,7 @@ if _typing.TYPE_CHECKING:
     from strapgen.ir.attitude_step import Companions as Companions
     from strapgen.ir.attitude_step import Order as Order
     from strapgen.ir.fixed_settings import Settings as Settings
+    from strapgen.ir.float_interface import RoundingBounds as RoundingBounds
     from strapgen.ir.formats import Format as Format
     from strapgen.ir.integer_program import FixedProgram as FixedProgram
     from strapgen.ir.program import Program as Program
@@ -55,6 +56,7 @@ if _typing.TYPE_CHECKING:
     from strapgen.pipeline import lower as lower
     from strapgen.pipeline import quantize as quantize
     from strapgen.reports import formulas as formulas
+    from strapgen.rounding.bounds import rounding_bounds as rounding_bounds
     from strapgen.simulation.courses import Course as Course
     from strapgen.simulation.courses import course as course
     from strapgen.simulation.motions import Motion as Motion
@@ -130,6 +132,7 @@ _NAMES = {
         "Order",
     ),
     "ir.fixed_settings": ("Settings",),
+    "ir.float_interface": ("RoundingBounds",),
     "ir.formats": ("Format",),
     "ir.integer_program": ("FixedProgram",),
     "ir.program": ("Program",),
@@ -142,6 +145,7 @@ _NAMES = {
         "lower",
         "quantize",
     ),
+    "rounding.bounds": ("rounding_bounds",),
     "simulation.courses": (
         "Course",
         "course",

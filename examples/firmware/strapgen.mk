@@ -13,9 +13,8 @@ ATTITUDE_OPTIONS ?= --target c-fixed --word 32 --max-rate-deg-s 400 --step 0.01
 # The folder that holds the generated files and nothing else of yours.
 ATTITUDE_FOLDER ?= firmware
 ATTITUDE_SOURCES = $(filter-out %/main.c $(ATTITUDE_FOLDER)/test_%,$(wildcard $(ATTITUDE_FOLDER)/*.c))
-# The largest error on coning that the firmware may have, in rad, and the back end with its arithmetic.
+# The largest error on coning that the firmware may have, in rad.
 ATTITUDE_FAIL_ABOVE ?= 1e-7
-ATTITUDE_BACKEND ?= c-fixed32
 
 .PHONY: attitude-generate attitude-check attitude-verify attitude-compare attitude-vectors attitude-vectors-m3
 
@@ -35,9 +34,9 @@ attitude-verify:
 
 # Fails if the arithmetic of the firmware leaves that of 40 digits by more than you allow.
 attitude-compare:
-	$(STRAPGEN) compare $(ATTITUDE) --backend $(ATTITUDE_BACKEND) --reference exact \
+	$(STRAPGEN) compare $(ATTITUDE) $(addprefix --source ,$(ATTITUDE_SOURCES)) --reference exact \
 	  --fail-above $(ATTITUDE_FAIL_ABOVE) \
-	  --motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 --step 0.125 --duration 20
+	  --motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 --step 0.01 --duration 20
 
 # Fails if a call on this machine does not return the very integers of the vectors.
 attitude-vectors:

@@ -8,6 +8,7 @@
  * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
  *     4 B and appendix A.
  * Operations of one call: 13 add, 23 multiply, 1 sqrt, 2 negate, 2 function; 19 temporaries.
+ * Rounding: no bound is known, because the range of time is not known.
  *
  * No heap, no global state, reentrant. In one call every input is read before any output is
  * written: an output may be the same memory as an input. Matrices are stored by rows.

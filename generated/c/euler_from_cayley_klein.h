@@ -8,6 +8,7 @@
  * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
  *     2: a1 = e4, a2 = e1, a3 = e2, a4 = e3.
  * Operations of one call: none; 0 temporaries.
+ * Rounding: none, every output is exact.
  *
  * No heap, no global state, reentrant. In one call every input is read before any output is
  * written: an output may be the same memory as an input. Matrices are stored by rows.
@@ -41,10 +42,10 @@ void euler_from_cayley_klein(const double state[4], double converted[4]);
  * digest: ec8b6ada30f78817
  * function: euler_from_cayley_klein
  * let: a_s, a_x, a_y, a_z = state[0..3]
- * ensures: converted[0] = a_x, rounded
- * ensures: converted[1] = a_y, rounded
- * ensures: converted[2] = a_z, rounded
- * ensures: converted[3] = a_s, rounded
+ * ensures: converted[0] = a_x
+ * ensures: converted[1] = a_y
+ * ensures: converted[2] = a_z
+ * ensures: converted[3] = a_s
  */
 
 #endif

@@ -10,6 +10,7 @@
  *     (1978) 223-224.
  * The scalar part of the result is not negative.
  * Operations of one call: 13 add, 8 multiply, 1 divide, 1 sqrt, 16 select; 18 temporaries.
+ * Rounding: no bound is known, because rounding may turn a comparison in column_s.
  *
  * No heap, no global state, reentrant. In one call every input is read before any output is
  * written: an output may be the same memory as an input. Matrices are stored by rows.

@@ -9,6 +9,7 @@
  *     equation (18).
  * The sign is continuous for turns of less than 60 degrees from call to call.
  * Operations of one call: 13 add, 8 multiply, 1 divide, 1 sqrt, 19 select; 19 temporaries.
+ * Rounding: no bound is known, because rounding may turn a comparison in column_s.
  *
  * No heap, no global state, reentrant. In one call every input is read before any output is
  * written: an output may be the same memory as an input. Matrices are stored by rows.

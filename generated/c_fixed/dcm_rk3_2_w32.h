@@ -19,8 +19,15 @@
  * any output is written: an output may be the same memory as an input. Matrices are stored by
  * rows.
  *
- * Over a run of N steps without orthonormalization the distance from exact arithmetic on the same
- * increments is at most (2.00642e-09 N), times exp(0.199827 N), in the length of a row.
+ * Over a run of N steps rounding turns the nearest rotation to the matrix C by at most 1.578e-09
+ * N rad from that of exact arithmetic on the same increments, for N up to 0 from a C whose C'C
+ * has eigenvalues from 0.9845 to 1.015; over more steps by 1.412 times as much, while they
+ * stay between 0.879 and 1.121.
+ * M orthonormalizations on the way, at most as many steps apart, which multiply C by a symmetric
+ * expansion of the inverse root of C'C, make 1.047 times as much of it and add at most (2.373
+ * h) M rad, with h the error of an element that their header states, up to 0.0002441.
+ * - N = 10000: 2.227e-05 rad
+ * - N = 1000000: 0.002227 rad
  *
  * A proper state is orthogonal with rows of length 1; the range of the output is wider than that
  * of the input because it holds for every input in its range. Normalize it before, with the

@@ -19,8 +19,13 @@
  * any output is written: an output may be the same memory as an input. Matrices are stored by
  * rows.
  *
- * Over a run of N steps without orthonormalization the distance from exact arithmetic on the same
- * increments is at most (1.24879e-09 N), times exp(0.0317111 N), in the length of the state.
+ * Over a run of N steps rounding turns the attitude by at most 2.296e-09 N rad from that of exact
+ * arithmetic on the same increments, while the length of the state is at least 0.9375. From a
+ * length of at least 0.9922 that is proved for 1 steps. M normalizations on the way, which
+ * multiply the words of the state by one factor and round each of them once, add at most
+ * 1.987e-09 M rad.
+ * - N = 10000: 2.296e-05 rad; normalized every 1 steps: 4.283e-05 rad
+ * - N = 1000000: 0.002296 rad; normalized every 1 steps: 0.004283 rad
  *
  * A proper state is of length 1; the range of the output is wider than that of the input because
  * it holds for every input in its range. From a proper state it takes at least 1 calls until

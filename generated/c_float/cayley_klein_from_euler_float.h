@@ -8,6 +8,7 @@
  * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
  *     2: a1 = e4, a2 = e1, a3 = e2, a4 = e3.
  * Operations of one call: none; 0 temporaries.
+ * Rounding: none, every output is exact.
  *
  * No heap, no global state, reentrant. In one call every input is read before any output is
  * written: an output may be the same memory as an input. Matrices are stored by rows.
@@ -41,10 +42,10 @@ void cayley_klein_from_euler_float(const float state[4], float converted[4]);
  * digest: 8bbd2f9546482ebf
  * function: cayley_klein_from_euler_float
  * let: e_x, e_y, e_z, e_s = state[0..3]
- * ensures: converted[0] = e_s, rounded
- * ensures: converted[1] = e_x, rounded
- * ensures: converted[2] = e_y, rounded
- * ensures: converted[3] = e_z, rounded
+ * ensures: converted[0] = e_s
+ * ensures: converted[1] = e_x
+ * ensures: converted[2] = e_y
+ * ensures: converted[3] = e_z
  */
 
 #endif

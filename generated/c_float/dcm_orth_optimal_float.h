@@ -12,6 +12,7 @@
  * Irrational constants are rounded to 80 digits, and once more to the format of the target.
  * Operations of one call: 85 add, 128 multiply, 1 divide, 5 sqrt, 1 negate, 1 select, 3 function;
  *     54 temporaries.
+ * Rounding: no bound is known, because atan2 jumps by a turn.
  *
  * No heap, no global state, reentrant. In one call every input is read before any output is
  * written: an output may be the same memory as an input. Matrices are stored by rows.

@@ -9,6 +9,11 @@
  *     3 C, subroutine ORTHO.
  * Made for a matrix near a rotation: all products of its transpose and itself near the identity.
  * Operations of one call: 24 add, 36 multiply, 3 divide, 3 sqrt; 12 temporaries.
+ * Rounding: against exact arithmetic on the same inputs, orthonormalized is off by at most
+ *     1.85625e-06, 15.5714 units in the last place of 1. This holds for computed up to 1.0625;
+ *     the radicand in inverse_length_1, the radicand in inverse_length_2, the radicand in
+ *     inverse_length_3 from 3 to 5.375; IEEE 754, each operation rounded to the nearest;
+ *     -ffp-contract=off.
  *
  * No heap, no global state, reentrant. In one call every input is read before any output is
  * written: an output may be the same memory as an input. Matrices are stored by rows.

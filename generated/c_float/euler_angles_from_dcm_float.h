@@ -12,6 +12,7 @@
  * Errors of angles are told without whole turns.
  * Operations of one call: 6 add, 4 multiply, 1 sqrt, 3 negate, 5 select, 5 function; 4
  *     temporaries.
+ * Rounding: no bound is known, because atan2 jumps by a turn.
  *
  * No heap, no global state, reentrant. In one call every input is read before any output is
  * written: an output may be the same memory as an input. Matrices are stored by rows.

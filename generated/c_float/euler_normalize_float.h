@@ -9,6 +9,10 @@
  *     3 C: x / sqrt(x . x).
  * The state must not be zero.
  * Operations of one call: 3 add, 8 multiply, 1 divide, 1 sqrt; 1 temporaries.
+ * Rounding: against exact arithmetic on the same inputs, next is off by at most 6.46138e-07,
+ *     5.4202 units in the last place of 1. This holds for state up to 1.0625; the radicand in
+ *     inverse_norm from 0.75 to 1.34375; IEEE 754, each operation rounded to the nearest;
+ *     -ffp-contract=off.
  *
  * No heap, no global state, reentrant. In one call every input is read before any output is
  * written: an output may be the same memory as an input. Matrices are stored by rows.

@@ -8,6 +8,7 @@
  * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
  *     4 B.
  * Operations of one call: 8 add, 16 multiply; 4 temporaries.
+ * Rounding: no bound is known, because the range of middle is not known.
  *
  * No heap, no global state, reentrant. In one call every input is read before any output is
  * written: an output may be the same memory as an input. Matrices are stored by rows.

@@ -480,7 +480,10 @@ def test_generate_json(target, strapgen_says, tmp_path):
     counted = pipeline.quantize(program) if TARGETS[target].fixed else program
     assert data["operations"].items() <= counted.operations.items()
     assert data["temporaries"] == counted.temporaries
-    assert set(data) >= {"formats", "ranges", "error_bound"} if TARGETS[target].fixed else len(data) == 5
+    if TARGETS[target].fixed:
+        assert set(data) >= {"formats", "ranges", "error_bound"}
+    else:
+        assert list(data)[5:] == ["error_bounds"] * TARGETS[target].compiled
     sources = pipeline.generate(program, target)
     files = sources.files if with_runs else sources.step_files
     assert len(files) == (4 if with_runs else 2 if target == "c-float" else 1)
@@ -586,7 +589,8 @@ def test_methods_without_tableau_on_the_command_line(method, strapgen_says):
 def test_generate_text(strapgen_says):
     said = strapgen_says("generate euler --target c --out out").splitlines()
     assert re.fullmatch(r"euler-rk4-2 for c: \d+ add, \d+ multiply.*, \d+ temporaries", said[0])
-    assert said[1:] == ["  out/euler_rk4_2.h", "  out/euler_rk4_2.c"]
+    assert said[1:3] == ["  out/euler_rk4_2.h", "  out/euler_rk4_2.c"]
+    assert said[3:] == ["  next: error at most 6.888e-16, 3.1020 of the last place of 1"]
 
 
 def test_generate_writes_numpy_here_by_default(strapgen_says, tmp_path):
@@ -1185,3 +1189,17 @@ def test_strapdown_is_the_course_of_python(strapgen_says, tmp_path):
         .startswith("time_s,e_x,e_y,e_z,e_s,roll_deg,pitch_deg,heading_deg,dvx_m_s")
     )
     assert "roll, deg" in strapgen_says(command)
+
+
+def test_generate_prints_the_error_bounds_of_floating_point(strapgen_says):
+    data = json.loads(strapgen_says("generate euler --target c-float --format json"))["error_bounds"]
+    assert data["inputs"] == {"state": 1.0625, "increments": 0.125}
+    assert len(data["errors"]["next"]) == 4 and 3e-7 < max(data["errors"]["next"]) < 4e-7
+    assert 0 < data["run"]["per_step"] < 1e-6
+    assert data["reason"] is None
+    data = json.loads(strapgen_says("generate euler-from-dcm --target c --format json"))["error_bounds"]
+    assert data["errors"] is None and "comparison" in data["reason"]
+    assert "exact" in strapgen_says("generate euler-from-cayley-klein --target c")
+    assert "no error bound is known: atan2 jumps" in strapgen_says(
+        "generate euler-angles-from-dcm --target c"
+    )

@@ -38,6 +38,10 @@ LOOSE = "--rounding truncation --drift-allowance 1/100 --range angle_sum=0.25 --
         f"two-speed euler --target c-fixed --carry state {LOOSE}",
         "two-speed dcm --sculling 1 --target c-fixed --word 16 --carry full --drift-allowance 0.05",
         "generate euler --target c-fixed --carry full --max-rate-deg-s 400 --step 0.01",
+        "generate euler --target c-fixed --max-rate-deg-s 400 --sample-hz 100 --lsb 0.0175dps --state q31",
+        "generate dcm --method rk1 --target fixed-model --sample-hz 100 --lsb 17.5mdps --max-angle-rad 1/20",
+        "generate euler --method rk2 --target c-fixed --lsb-rad 1/100000000 --input-bits 24 --carry full",
+        "generate euler --method rk2 --target c-fixed --max-rate-deg-s 400 --step 0.01 --input-bits 16",
         "generate dcm-two-speed-slow-2 --target fixed-model --word 24 --carry state --drift-allowance 0.1",
     ],
 )

@@ -153,3 +153,13 @@ def test_a_back_end_is_shown_under_the_name_that_was_asked_for(increments):
 def test_slow_back_ends_are_compared_where_they_are_named():
     rows = comparison.compare("euler", "rk1", 1, increments=np.full((2, 1, 3), 0.01))
     assert [row.backend for row in rows] == [name for name, entry in BACKENDS.items() if not entry.slow]
+
+
+def test_all_back_ends_take_the_counts_of_a_gyro(increments):
+    settings = Settings.of(lsb="3e-6rad", state="q31")
+    rows = comparison.compare(
+        "euler", "rk4", 2, ["c", "c-fixed32"], increments, reference="exact", settings=settings
+    )
+    double, fixed = rows
+    assert double.max_abs_rad < 1e-13, "the reference has the same counts"
+    assert 1e-10 < fixed.max_abs_rad <= fixed.bound_rad

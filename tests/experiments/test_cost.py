@@ -44,6 +44,18 @@ def test_a_call_executes_few_instructions(kernel, cpu):
     assert measured.stack_bytes > 0
 
 
+@pytest.mark.parametrize(("kernel", "more"), [("euler", 1.1), ("dcm", 1.15)])
+def test_counts_of_a_gyro_cost_little_more_than_angles(kernel, more):
+    needed("cortex-m3")
+    stated = {"max_rate_deg_s": 400, "sample_hz": 100, "increments": 2}
+    program = pipeline.lower(pipeline.derive(kernel))
+    angles, counts = (
+        cost.cost(pipeline.generate(program, "c-fixed", Settings.of(**stated, **lsb)), "cortex-m3").executed
+        for lsb in ({}, {"lsb": "0.0175dps"})
+    )
+    assert counts <= more * angles
+
+
 def test_the_command_prints_what_was_agreed(capsys):
     needed("cortex-m3")
     command = "cost euler-normalize euler-product --cross arm-none-eabi-gcc --cpu cortex-m3 --format json"

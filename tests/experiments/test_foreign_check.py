@@ -16,7 +16,7 @@ from strapgen.experiments.foreign_check import check_foreign
 from strapgen.experiments.foreign_cone import closed_form_deg_h
 from strapgen.experiments.foreign_runs import Convention, ForeignStep
 from strapgen.library import generated_sources
-from strapgen.reports.foreign_check import outcome_report
+from strapgen.reports.conformance import outcome_report
 from strapgen.support.exceptions import InputError
 from strapgen.toolchain.foreign_arguments import read_arguments
 from strapgen.toolchain.foreign_bridge import ForeignSource

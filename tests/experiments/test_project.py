@@ -106,7 +106,10 @@ def test_strict_compilers_are_silent(compiler, tmp_path):
     files = files_of(*PROJECTS[0][:3]) | loop_files(*LOOPS[0][:3])
     if compiler != "avr-gcc":  # its double has the bits of a float
         files |= files_of(*PROJECTS[1][:3])
-    sources = [name for name in files if name.endswith(".c")]
+    # A double of 53 bits, which those functions ask for, is not there on AVR.
+    sources = [
+        n for n in files if n.endswith(".c") and not (compiler == "avr-gcc" and n.startswith("motion/"))
+    ]
     assert complaints(compiler, written(tmp_path, files), sources) == ""
 
 
@@ -209,5 +212,5 @@ def test_the_header_of_a_test_names_its_command():
     head = " ".join(files_of(*PROJECTS[0][:3])[test].split("*/")[0].replace("*", "").split())
     assert (
         "strapgen vectors euler --method rk4 --increments 2 --target c-fixed --word 32 --max-rate-deg-s 400 "
-        "--step 0.01 --carry full --count 200 --seed 1"
+        "--step 0.01 --rounding nearest --carry full --drift-allowance 1/16 --count 200 --seed 1"
     ) in head

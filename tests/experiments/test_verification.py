@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -68,6 +70,59 @@ def test_a_change_is_found_with_its_line(ending, old, new, reason, computes, fol
     assert status == 1 and not data["holds"] and not data["in_step"]
     assert data["differences"][0].startswith(f"{path}:{line}: {reason}: ")
     assert bool(data["wrong_calls"]) is not computes
+
+
+@pytest.mark.parametrize("target", ["c", "c-float"])
+def test_floating_point_is_held_to_its_bound(target, tmp_path, capsys):
+    assert says(f"generate dcm --method rk2 --target {target} --out {tmp_path}".split(), capsys)[0] == 0
+    (path,) = tmp_path.glob("*.c")
+    status, data = verified(path, capsys)
+    assert status == 0 and 0.5 < data["max_ulp"] < data["bound_ulp"]
+    changed(path, r"A_12 \* C_11", "A_21 * C_11")
+    status, data = verified(path, capsys)
+    assert status == 1 and data["wrong_calls"] and data["max_ulp"] > data["bound_ulp"]
+
+
+def test_a_run_of_the_user_s_goes_through_the_file(folder, capsys):
+    coning = "--motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 --duration 1"
+    line = f"verify {folder / NAME}.c {coning} --format json --step"
+    status, out, _ = says([*line.split(), "0.01"], capsys)
+    assert status == 0 and json.loads(out)["calls"] == 400
+    status, _, error = says([*line.split(), "0.5"], capsys)
+    assert status == 2 and "the file takes at most 0.0349066 rad" in error
+
+
+def test_a_file_is_compared_as_a_back_end_in_its_own_formats(folder, capsys):
+    coning = "--motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 --step 0.01 --duration 1"
+    line = f"compare euler --source {folder / NAME}.c --reference exact {coning} --format json"
+    status, out, _ = says([*line.split(), "--fail-above", "1e-7"], capsys)
+    (row,) = json.loads(out)
+    assert status == 0 and row["backend"] == f"{folder / NAME}.c"
+    assert 0 < row["max_abs_rad"] < row["bound_rad"] < 1e-6
+    changed(folder / f"{NAME}.c", r"sigma_x = d1_x \+ d2_x", "sigma_x = d1_x + d2_y")
+    assert says([*line.split(), "--fail-above", "1e-7"], capsys)[0] == 1
+    status, _, error = says(line.replace("euler", "dcm", 1).split(), capsys)
+    assert status == 2 and "is euler-rk4-2, and dcm-rk4-2 is compared" in error
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not on this machine")
+def test_two_variants_with_names_of_their_own_link_together(tmp_path, capsys):
+    for prefix, rate in (("slow_", 40), ("fast_", 400)):
+        line = f"generate euler --target c-fixed --prefix {prefix} --max-rate-deg-s {rate} --step 0.01"
+        assert says([*line.split(), "--out", str(tmp_path)], capsys)[0] == 0
+    line = f"generate euler --target c-fixed --name attitude_step --out {tmp_path}"
+    assert says(line.split(), capsys)[0] == 0
+    names = [f"slow_{NAME}", f"fast_{NAME}", "attitude_step"]
+    main_text = "".join(f'#include "{name}.h"\n' for name in names) + "int main(void)\n{\n"
+    for name in names:
+        main_text += f"    int32_t {name}_state[4] = {name.upper()}_IDENTITY, {name}_d[6] = {{0}};\n"
+        main_text += f"    if ({name}({name}_state, {name}_d, {name}_state)) return 1;\n"
+    (tmp_path / "main.c").write_text(main_text + "    return 0;\n}\n")
+    sources = [f"{name}.c" for name in (*names, "main")]
+    command = ["gcc", "-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", *sources, "-o", "linked"]
+    subprocess.run(command, cwd=tmp_path, check=True)
+    assert subprocess.run([tmp_path / "linked"], check=False).returncode == 0
+    assert verified(tmp_path / "attitude_step.c", capsys)[0] == 0
 
 
 def test_what_is_no_generated_file_is_one_line(tmp_path, capsys):

@@ -280,8 +280,7 @@ def test_the_header_states_format_unit_range_and_error():
         assert f"format {argument.format}, unit {unit}; range {argument.low} to {argument.high} (" in text
     worst = float(fixed.error_bounds["next"])
     assert f"error at most {worst:.6g}, {worst * 2**30:.4f} of the last place" in text
-    accumulation = fixed.interface.accumulation
-    assert f"({float(accumulation.once):.6g} + {float(accumulation.per_step):.6g} N)" in text
+    assert "Over a run of N steps rounding turns the attitude by at most" in text
     assert "--max-rate-deg-s 400 --step 0.01 --rounding nearest --carry full --drift-allowance 1/16" in text
 
 

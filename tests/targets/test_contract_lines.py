@@ -8,7 +8,8 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from derived import quantized
+from derived import programs, quantized
+from small_programs import TYPES, computed
 
 import strapgen
 from strapgen import generate
@@ -102,6 +103,39 @@ def test_a_program_can_check_the_integers_of_a_call_by_the_header_alone(choice, 
             assert 0 < abs(distance) <= Fraction(stated[3])
             bounds += 1
     assert bounds == fixed.interface.outputs[0].signal.size
+
+
+@pytest.mark.parametrize(("target", "number"), [("c", "double"), ("c-float", "float")])
+@pytest.mark.parametrize("name", ["euler-rk4-2", "dcm-product", "coning-fast"])
+def test_a_program_can_check_the_numbers_of_a_call_by_the_header_alone(name, target, number):
+    code = programs()[name]
+    sources = generate(code, target)
+    header = next(text for file, text in sources.step_files.items() if file.endswith(".h"))
+    contract, draw = contract_of(header), np.random.default_rng(1969)
+    memory: dict[str, list[Fraction]] = {}
+    for text in contract.of_kind("requires"):
+        low, argument, last, high = re.fullmatch(r"(\S+) <= (\w+)\[0\.\.(\d+)\] <= (\S+)", text).groups()
+        floats = draw.uniform(float(Fraction(low)), float(Fraction(high)), int(last) + 1)
+        memory[argument] = [Fraction(float(x)) for x in floats.astype(TYPES[number])]
+    names: dict[str, Fraction] = {}
+    for text in contract.of_kind("let"):
+        left, _, expression = text.partition(" = ")
+        if several := re.fullmatch(r"(\w+)\[0\.\.\d+\]", expression):
+            names |= zip(left.split(", "), memory[several[1]], strict=True)
+        else:
+            names[left] = value(expression, names)
+    elements = {e: np.array([float(names[e])]) for signal in code.inputs for e in signal.elements}
+    outputs = computed(code, elements, number)
+    bounds = 0
+    for text in contract.of_kind("ensures"):
+        if stated := re.fullmatch(r"\|(\w+)\[(\d+)\] - (.*)\| <= (\S+)", text):
+            got = Fraction(float(outputs[stated[1]][int(stated[2])][0]))
+            assert abs(got - value(stated[3], names)) <= Fraction(stated[4])
+            bounds += 1
+        else:
+            output, place, exact = re.fullmatch(r"(\w+)\[(\d+)\] = (\w+)", text).groups()
+            assert Fraction(float(outputs[output][int(place)][0])) == value(exact, names)
+    assert bounds == sum(error > 0 for errors in sources.rounding.errors.values() for error in errors) > 0
 
 
 def test_the_digest_changes_with_the_algorithm_and_its_options_alone():

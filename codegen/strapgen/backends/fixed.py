@@ -5,13 +5,16 @@ Both convert every input to integers and refuse a number outside the range that 
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
 from strapgen.backends.evaluators import Array, Evaluator
+from strapgen.backends.fixed_numbers import integers, numbers
 from strapgen.backends.protocol import Backend
 from strapgen.backends.step_sources import StepSources
 from strapgen.ir.fixed_interface import Argument, Interface
@@ -19,31 +22,18 @@ from strapgen.ir.sources import Sources
 from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.toolchain import compiler
 
+#: Orthonormalizations that leave the attitude where it is, but for rounding: one factor for all parameters, and for
+#: matrices a symmetric expansion of the inverse root of C'C.
+KEEP_THE_ATTITUDE = frozenset(
+    (
+        *("euler-normalize", "euler-normalize-first-order"),
+        *("cayley-klein-normalize", "cayley-klein-normalize-first-order"),
+        *("dcm-orthonormalize-first-order", "dcm-orthonormalize-second-order"),
+    )
+)
 
-def integers(argument: Argument, values: Any, kernel: str) -> Array:
-    """Return numbers as the integers of an input, rounded to the nearest.
-
-    Raises
-    ------
-    InputError
-        If one lies outside the input's range.
-    """
-    scaled = np.rint(np.ldexp(np.asarray(values, np.float64), argument.format.fraction))
-    outside = (scaled < argument.low) | (scaled > argument.high)
-    if outside.any():
-        worst = float(np.asarray(values)[outside].flat[0])
-        limit = float(argument.high * argument.format.unit)
-        raise InputError(
-            f"{argument.signal.name} holds {worst:.9g}; the formats of {kernel} were chosen for at most "
-            f"{limit:.9g} in magnitude"
-        )
-    whole = scaled.astype(np.int64)
-    return whole.astype(object) if argument.format.word > 32 else whole
-
-
-def numbers(argument: Argument, integers: Any) -> Array:
-    """Return integers of an input or output as numbers."""
-    return np.ldexp(np.asarray(integers).astype(np.float64), -argument.format.fraction)
+#: The orthonormalization that turns the attitude by a little: the scheme of dual rows.
+DUAL_ROWS = "dcm-orthonormalize"
 
 
 class FixedEvaluator(Evaluator):
@@ -106,7 +96,7 @@ class FixedEvaluator(Evaluator):
         """Return the error of a user's input that a status of the generated code stands for."""
         if status == 1:
             limits = ", ".join(
-                f"{a.signal.name} up to {float(a.high * a.format.unit):.6g}" for a in self.interface.inputs
+                f"{a.signal.name} up to {float(a.high * a.unit):.6g}" for a in self.interface.inputs
             )
             return InputError(
                 f"{self.kernel} refuses its input{where}: its formats were chosen for {limits}; orthonormalize more "
@@ -122,13 +112,16 @@ class CFixedEvaluator(FixedEvaluator):
         super().__init__(sources)
         word = self.interface.settings.word
         self.word_type, self.feedback_type = np.dtype(f"int{word}"), np.dtype(f"uint{word}")
+        self.input_types = [np.dtype(f"int{argument.format.word}") for argument in self.interface.inputs]
         self.module = compiler.load(sources)
         self._array = getattr(self.module.lib, f"{sources.function.name}_array")
 
     def run(self, inputs: Sequence[Array], feedback: Array) -> tuple[tuple[Array, ...], Array]:
         """Call the function on integers, see `Evaluator.run`."""
         count = len(feedback)
-        words = [np.ascontiguousarray(array, self.word_type) for array in inputs]
+        words = [
+            np.ascontiguousarray(array, kind) for array, kind in zip(inputs, self.input_types, strict=True)
+        ]
         feedback = np.array(feedback, self.feedback_type)
         outputs = tuple(np.empty((count, a.signal.size), self.word_type) for a in self.interface.outputs)
         status = self.module.ffi.new("int *")
@@ -160,7 +153,7 @@ class ModelEvaluator(FixedEvaluator):
     def run(self, inputs: Sequence[Array], feedback: Array) -> tuple[tuple[Array, ...], Array]:
         """Call the function on integers, see `Evaluator.run`."""
         count = len(feedback)
-        arguments = [list(np.moveaxis(array, -1, 0)) for array in inputs]
+        arguments = [list(np.moveaxis(array.astype(self.integer_type), -1, 0)) for array in inputs]
         if self.interface.residuals:
             arguments.append(list(np.moveaxis(feedback, -1, 0)))
         results = list(self.step(*arguments))
@@ -191,12 +184,46 @@ class FixedBackend(Backend):
         self.evaluator = step
         self.interface = step.interface
         self.unit = float(self.interface.outputs[0].format.unit)
-        self.increment_unit = float(self.interface.inputs[1].format.unit)
+        self.increment_unit = float(self.interface.inputs[1].unit)
+        self.saturates = self.interface.outputs[0].saturates
+        self.count = None if self.interface.inputs[1].sensor is None else self.increment_unit
 
     def rounding_bound(self, steps: int, rounded_inputs: bool = False) -> float | None:
-        """Return the certified bound of a run's rounding, see `Backend.rounding_bound`; None without a transition."""
+        """Return the certified bound of a run's rounding, see `Backend.rounding_bound`; None without a transition.
+
+        Where a state saturates, it holds as long as no element of the exact state exceeds 1 in magnitude.
+        """
         accumulation = self.interface.accumulation
         return None if accumulation is None else accumulation.bound(steps, rounded_inputs)
+
+    def angle_bound(
+        self,
+        steps: int,
+        rounded_inputs: bool = False,
+        orthonormalize_every: int = 0,
+        shortest: float = 0.0,
+    ) -> float | None:
+        """Return the certified bound of the angle by which rounding turns the attitude, see `Backend.angle_bound`."""
+        angles, count, error, dual_rows = self.interface.angle_accumulation, 0, Fraction(0), False
+        if angles is None:
+            return None
+        if (orthonormalize_every or steps) > angles.proved_steps and shortest < angles.shortest:
+            return None
+        if orthonormalize_every:
+            kernel = self._need_orthonormalization()
+            dual_rows = kernel == DUAL_ROWS
+            if not (
+                kernel in KEEP_THE_ATTITUDE or (dual_rows and orthonormalize_every <= angles.dual_rows_apart)
+            ):
+                return None
+            count = steps // orthonormalize_every
+            error = max(self.beside(kernel).interface.outputs[0].errors)
+        bound = angles.bound(steps, count, error, rounded_inputs, dual_rows)
+        return bound if math.isfinite(bound) else None
+
+    @abstractmethod
+    def beside(self, kernel: str) -> FixedEvaluator:
+        """Return another kernel in fixed point, see `Backend.beside`."""
 
     def representable(self, increments: Any) -> Array:
         """Return increments rounded to the input's format."""
@@ -264,7 +291,10 @@ class CFixedBackend(FixedBackend):
         """Propagate integers in C."""
         runs, steps = increments.shape[:2]
         ffi, kind = self._c.module.ffi, self._c.word_type
-        words = [np.ascontiguousarray(array, kind) for array in (initial, increments)]
+        words = [
+            np.ascontiguousarray(array, memory)
+            for array, memory in zip((initial, increments), self._c.input_types, strict=True)
+        ]
         feedback = self.evaluator.fresh(runs).astype(self._c.feedback_type)
         history = np.empty((runs, 1 + steps // record_every, initial.shape[-1]), kind)
         orthonormalizer = ffi.NULL
@@ -312,7 +342,7 @@ class ModelBackend(FixedBackend):
             state, samples, feedback = initial[0].tolist(), increments[0].tolist(), fresh[0].tolist()
         else:
             state = list(np.moveaxis(initial, -1, 0))
-            samples = np.moveaxis(increments, 0, -1)
+            samples = np.moveaxis(increments.astype(self._model.integer_type), 0, -1)
             feedback = list(np.moveaxis(fresh, -1, 0))
         records = [state]
         for number in range(steps):

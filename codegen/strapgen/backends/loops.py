@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from strapgen.backends.evaluators import Array, Evaluator
-from strapgen.backends.fixed import integers, numbers
+from strapgen.backends.fixed_numbers import integers, numbers
 from strapgen.backends.increments import pulses
 from strapgen.backends.kernel_sources import sources_of_choice
 from strapgen.catalogue import Choice

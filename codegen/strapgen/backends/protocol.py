@@ -56,11 +56,17 @@ class Backend(ABC):
         Unit in the last place of a state's element near 1.
     increment_unit : float or None
         Unit in the last place of an increment in rad, in fixed point; None in floating point.
+    count : float or None
+        Angle of a count in rad for a step that takes a gyro's counts; None for any other.
+    saturates : bool
+        Whether an element of a state that would exceed 1 is stored as the largest number.
     sources : Sources
         Sources of the step.
     """
 
     increment_unit: float | None = None
+    count: float | None = None
+    saturates: bool = False
 
     def __init__(self, parts: StepSources, step: Evaluator) -> None:
         sources, kernels = parts.step, parts.step_kernels
@@ -136,6 +142,36 @@ class Backend(ABC):
         float or None
             Bound of the distance from the same algorithm in exact arithmetic, as the length of the difference of two
             states, or of two rows of matrices; None where nothing is certified, as in floating point.
+        """
+        return None
+
+    def angle_bound(
+        self,
+        steps: int,
+        rounded_inputs: bool = False,
+        orthonormalize_every: int = 0,
+        shortest: float = 0.0,
+    ) -> float | None:
+        """Return a certified bound of the angle by which rounding turns the attitude over a run.
+
+        A run begins at a proper attitude. The bound holds while the state stays near one: `AngleAccumulation` says how
+        near, and for how many steps that is proved.
+
+        Parameters
+        ----------
+        steps : int
+        rounded_inputs : bool, optional
+            Whether the bound covers increments that must be rounded to the input's format first.
+        orthonormalize_every : int, optional
+            Steps from one orthonormalization to the next; 0 for none.
+        shortest : float, optional
+            Length that no state of the run falls short of, or singular value of a matrix, where more is known of it
+            than is proved of every run.
+
+        Returns
+        -------
+        float or None
+            Angle in rad from the same algorithm in exact arithmetic; None where nothing is certified.
         """
         return None
 

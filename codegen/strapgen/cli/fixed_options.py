@@ -19,7 +19,10 @@ if TYPE_CHECKING:
 _Text = str | None
 
 #: The options of a run: its formats are chosen for its own increments, or for a largest rate that is stated.
-RUN_OPTIONS = ("word", "max_rate_deg_s", "rounding", "carry", "drift_allowance")
+RUN_OPTIONS = (
+    *("word", "max_rate_deg_s", "lsb", "lsb_rad", "input_bits"),
+    *("state", "rounding", "carry", "drift_allowance"),
+)
 
 
 @dataclass(frozen=True)
@@ -47,6 +50,35 @@ class FixedOptions:
     step: Annotated[
         _Text, option("--step", metavar="S", help="Step length in s; it goes with --max-rate-deg-s.")
     ] = None
+    sample_hz: Annotated[
+        _Text,
+        option(
+            "--sample-hz",
+            metavar="HZ",
+            help="Samples of the gyro in a second, in place of --step: a step takes as many as it has increments.",
+        ),
+    ] = None
+    lsb: Annotated[
+        _Text,
+        option(
+            "--lsb",
+            metavar="RATE",
+            help="Rate that a count of the gyro stands for, as 0.0175dps, 17.5mdps or 3e-4rad/s; the increments are "
+            "then counts.",
+        ),
+    ] = None
+    lsb_rad: Annotated[
+        _Text,
+        option("--lsb-rad", metavar="RAD", help="Angle that a count stands for in rad, in place of a rate."),
+    ] = None
+    input_bits: Annotated[
+        _Text,
+        option(
+            "--input-bits",
+            metavar="BITS",
+            help="Bits of an increment; up to 16 they are int16_t.  [default: those of a word; 16 with --lsb]",
+        ),
+    ] = None
     max_angle_rad: Annotated[
         _Text,
         option(
@@ -70,6 +102,15 @@ class FixedOptions:
             metavar="NAME",
             help="Error feedback, which adds the rounding errors of a step to the next one: none; state for those of "
             "the state; full for those of the transition too.  [default: none]",
+        ),
+    ] = None
+    state: Annotated[
+        _Text,
+        option(
+            "--state",
+            metavar="NAME",
+            help="State in the format of CMSIS: q31 for words of 32 bits, q15 for 16, q63 for 64. It saturates at "
+            "-1 and below 1.",
         ),
     ] = None
     drift_allowance: Annotated[
@@ -104,6 +145,11 @@ class FixedOptions:
             "--word": self.word,
             "--max-rate-deg-s": self.max_rate_deg_s,
             "--step": self.step,
+            "--sample-hz": self.sample_hz,
+            "--lsb": self.lsb,
+            "--lsb-rad": self.lsb_rad,
+            "--input-bits": self.input_bits,
+            "--state": self.state,
             "--max-angle-rad": self.max_angle_rad,
             "--rounding": self.rounding,
             "--carry": self.carry,
@@ -120,9 +166,7 @@ class FixedOptions:
         from strapgen.ir.fixed_settings import Settings
         from strapgen.support import checks
 
-        if (self.max_rate_deg_s is None) != (self.step is None):
-            missing = "--step" if self.step is None else "--max-rate-deg-s"
-            raise InputError(f"--max-rate-deg-s and --step go together; {missing} is missing")
+        self._check_pairs()
         bits = whole("word", self.word)
         allowance = {}
         if self.drift_allowance is not None:
@@ -133,6 +177,10 @@ class FixedOptions:
             step=self.step,
             increments=increments,
             largest_angle=self.max_angle_rad,
+            sample_hz=self.sample_hz,
+            lsb=self.lsb if self.lsb_rad is None else f"{self.lsb_rad}rad",
+            input_bits=whole("input bits", self.input_bits),
+            state=self.state or "",
             rounding="nearest" if self.rounding is None else self.rounding,
             carry="none" if self.carry is None else self.carry,
             **allowance,
@@ -140,17 +188,41 @@ class FixedOptions:
             formats=dict(_pair("--fix", text) for text in self.formats or ()),
         )
 
+    def _check_pairs(self) -> None:
+        """Refuse options that do not go together, or that another one is missing for."""
+        for one_option, other in (("--step", "--sample-hz"), ("--lsb", "--lsb-rad")):
+            if {one_option, other} <= {*self.stated}:
+                raise InputError(f"{one_option} and {other} are both given; one is needed")
+        timed = self.step is not None or self.sample_hz is not None
+        if self.max_rate_deg_s is not None and not timed:
+            raise InputError("--max-rate-deg-s and --step go together; --step is missing, or --sample-hz")
+        if self.lsb is not None and not timed:
+            raise InputError("--lsb is a rate a count; --sample-hz is missing, which makes it an angle")
+        if timed and self.max_rate_deg_s is None and self.lsb is None:
+            stated = "--step" if self.sample_hz is None else "--sample-hz"
+            raise InputError(
+                f"--max-rate-deg-s and {stated} go together; --max-rate-deg-s is missing, or --lsb"
+            )
+        if self.lsb is not None and self.lsb.strip().endswith("rad"):
+            raise InputError(f"--lsb is {self.lsb}, an angle a count; --lsb-rad takes it, without its unit")
+
     def at_step(self, seconds: float) -> FixedOptions:
         """Return the options with the step of a run, by which a largest rate becomes a largest increment."""
-        return replace(self, step=None if self.max_rate_deg_s is None else repr(seconds))
+        is_needed = self.max_rate_deg_s is not None or self.lsb is not None
+        return replace(self, step=repr(seconds) if is_needed else None)
 
     def check_increments(self, choice: Choice) -> None:
         """Refuse a largest rate or angle for a kernel that takes neither."""
         from strapgen.library import generated_sources
 
-        if not {*self.stated} & {"--max-rate-deg-s", "--step", "--max-angle-rad"}:
+        counted = {*self.stated} & {"--sample-hz", "--lsb", "--lsb-rad", "--input-bits"}
+        if not counted and not {*self.stated} & {"--max-rate-deg-s", "--step", "--max-angle-rad"}:
             return
         names = {signal.name for signal in generated_sources.program(choice).inputs}
+        if counted and "increments" not in names:
+            raise InputError(
+                f"kernel {choice.kernel} takes no increments; {min(counted)} does not go with it"
+            )
         if not names & {"increments", "turns"}:
             raise InputError(
                 f"kernel {choice.kernel} takes no increments; a largest rate or angle does not go with it"
@@ -172,6 +244,12 @@ class FixedOptions:
         checks.choice("backend", backend, BACKENDS)
         if self.stated and not BACKENDS[backend].fixed:
             raise InputError(f"{next(iter(self.stated))} is for fixed-point back ends, not for {backend}")
+
+    def check_pulse(self, pulse: str | None) -> None:
+        """Refuse a gyro pulse beside the scale of a gyro that counts, which is one."""
+        scale = next((name for name in ("--lsb", "--lsb-rad") if name in self.stated), None)
+        if pulse is not None and scale is not None:
+            raise InputError(f"--pulse-arcsec and {scale} both state the angle of a count; one is needed")
 
     def settings_for_run(
         self, backend: str, increments: int | None, step: float, largest: Callable[[], float]

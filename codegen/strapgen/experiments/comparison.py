@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from strapgen.backends import BACKENDS, DEFAULT_BACKENDS, Backend, chosen_step
 from strapgen.backends import backend as attitude_backend
+from strapgen.backends.increments import pulses
 from strapgen.catalogue import Choice
 from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.ir.fixed_settings import Settings
@@ -28,6 +29,8 @@ Array = NDArray[np.float64]
 _TIMED = 3
 #: Number of steps, about, at which a history has the certified bound.
 _BOUNDS = 65
+#: Angle up to which a bound of an angle is taken, in rad: lengths then differ by less than a sixty-fourth.
+_SMALL_ANGLE = 1 / 32
 
 
 @dataclass(frozen=True)
@@ -94,7 +97,7 @@ def compare(
     algorithm: str | Choice,
     method: str | Tableau | None = None,
     samples: int | None = None,
-    backends: Sequence[str] = DEFAULT_BACKENDS,
+    backends: Sequence[str | Backend] = DEFAULT_BACKENDS,
     increments: Any = None,
     *,
     reference: str = "numpy",
@@ -109,10 +112,12 @@ def compare(
         As for `strapgen.backend`. A choice also says how many increments from before a step it takes.
     samples : int, optional
         Number of increments per step.
-    backends : sequence of str, optional
-        Keys of `BACKENDS`; by default all but the slow ones.
+    backends : sequence of str or Backend, optional
+        Keys of `BACKENDS`, by default all but the slow ones; or back ends of the same step, as
+        `verification.file_backend` makes one of a file.
     increments : array_like, (N, K, 3)
-        Angle increments of N steps in rad; every back end rounds the same ones to its own format.
+        Angle increments of N steps in rad; every back end rounds the same ones to its own format. Where settings state
+        a gyro that counts, all back ends take its counts, and the rest of each goes into the next.
     reference : str, optional
         A key of `BACKENDS`; "exact" shows all rounding.
     truth : array, (1 + N, 3, 3), optional
@@ -140,7 +145,8 @@ def compare(
     stages.require("compare", algorithm, str, os.PathLike, Choice)
     choice = chosen_step(algorithm, method, samples)
     for name in backends:
-        checks.choice("backend", name, BACKENDS)
+        if not isinstance(name, Backend):
+            checks.choice("backend", name, BACKENDS)
     checks.choice("reference", reference, BACKENDS)
     if not backends:
         raise InputError("no back end is named; at least one is needed")
@@ -154,11 +160,18 @@ def compare(
     def load(name: str) -> Backend:
         return attitude_backend(choice, backend=name, settings=fixed if BACKENDS[name].fixed else None)
 
+    if fixed.sensor is not None:
+        d = pulses(d, fixed.sensor.count, choice.previous)
     standard = load(reference)
     states: Array = standard.propagate(d).astype(np.float64)
     require_finite(standard, states, np.arange(len(states), dtype=np.float64))
     matrices = attitude(standard, states)
-    return [_compared(name, load(name), d, states, matrices, truth) for name in backends]
+    return [
+        _compared(name, load(name), d, states, matrices, truth)
+        if isinstance(name, str)
+        else _compared(name.name, name, d, states, matrices, truth)
+        for name in backends
+    ]
 
 
 def _compared(
@@ -173,7 +186,7 @@ def _compared(
     steps = len(increments)
     states = candidate.propagate(increments)
     run, seconds = candidate.prepared(increments), math.inf
-    for _ in range(1 if BACKENDS[name].slow else _TIMED):
+    for _ in range(1 if name in BACKENDS and BACKENDS[name].slow else _TIMED):
         start = time.perf_counter()
         run()
         seconds = min(seconds, time.perf_counter() - start)
@@ -201,7 +214,9 @@ def certified_angle(candidate: Backend, increments: Array, reference: Array) -> 
 
     The angle is the length of the drift vector, the skew-symmetric part of the product of one matrix and the transpose
     of the other. Where states differ by at most b in length, and reference states have at most length s, it is at most
-    sqrt(3/2) s b for rows of matrices, and 2 s b (s^2 + s b) for Euler parameters.
+    sqrt(3/2) s b for rows of matrices, and 2 s b (s^2 + s b) for Euler parameters. Where rounding turns these by an
+    angle of at most a, it changes their length by no more than a factor exp(a/2), and the drift vector is at most
+    a s^4 exp(a).
 
     Parameters
     ----------
@@ -224,12 +239,23 @@ def _angle_bound(candidate: Backend, increments: Array, reference: Array) -> Cal
     matrix = candidate.attitude is None
     norms = np.linalg.norm(reference, ord=2, axis=(-2, -1)) if matrix else np.linalg.norm(reference, axis=-1)
     size = float(norms.max())
+    # The computed state is as long as the exact one up to a factor exp(a/2).
+    shortest = float(norms.min()) * math.exp(-_SMALL_ANGLE / 2)
+    # What saturates loses a unit of an element of 1 in a step, and of a larger one what it exceeds 1 by.
+    excess = max(0.0, float(np.abs(reference).max()) - 1) if candidate.saturates else 0.0
 
     def bound(steps: int) -> float | None:
+        known = []
         length = candidate.rounding_bound(steps, rounded)
-        if length is None or not math.isfinite(length):
-            return None
-        return math.sqrt(1.5) * size * length if matrix else 2 * size * length * (size**2 + size * length)
+        if length is not None and math.isfinite(length):
+            length *= 1 + excess / candidate.unit
+            known.append(
+                math.sqrt(1.5) * size * length if matrix else 2 * size * length * (size**2 + size * length)
+            )
+        angle = None if matrix else candidate.angle_bound(steps, rounded, shortest=shortest)
+        if angle is not None and angle < _SMALL_ANGLE:
+            known.append(angle * size**4 * math.exp(angle))
+        return min(known, default=None)
 
     return bound
 

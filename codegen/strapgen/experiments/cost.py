@@ -209,12 +209,14 @@ def _call(sources: Sources) -> tuple[str, str]:
     for number, signal in enumerate(sources.function.inputs):
         if fixed:
             argument = fixed[signal.name]
-            unit = float(argument.format.unit)
-            values: Sequence[float] = [round(value / unit) for value in _values(signal, argument.high * unit)]
+            unit = float(argument.unit)
+            scaled = [round(value / unit) for value in _values(signal, argument.high * unit)]
+            values: Sequence[float] = [min(argument.high, integer) for integer in scaled]
         else:
             values = _values(signal, 0.01 * _PART if signal.bound is None else float(signal.bound))
         text = ", ".join(map(str, values))
-        lines.append(f"{kind} argument_{number}[{signal.size}] = {{{text}}};")
+        memory = f"int{fixed[signal.name].format.word}_t" if fixed else kind
+        lines.append(f"{memory} argument_{number}[{signal.size}] = {{{text}}};")
         names.append(f"argument_{number}" + ("" if signal.shape or fixed else "[0]"))
     if sources.fixed is not None and sources.fixed.residuals:
         fresh = ", ".join(f"{feedback.fresh}u" for feedback in sources.fixed.residuals)

@@ -55,7 +55,7 @@ def project_files(
     sources = table.sources
     command = f"strapgen generate {naming.of(generated_sources.program(choice)).arguments} --target {target}"
     if sources.fixed is not None:
-        command += f" {options(sources.fixed.settings)}"
+        command += f" {options(sources.fixed.settings, sources.function.inputs)}"
     command += " --project"
     tests = table_files(table)
     motion: dict[str, str] = {}
@@ -107,7 +107,7 @@ def coning_run(sources: Sources, conversion: str) -> MotionRun:
     largest, step = LARGEST, _STEP
     if sources.fixed is not None:
         argument = sources.fixed.inputs[-1]
-        largest = argument.high * argument.format.unit / PART
+        largest = argument.high * argument.unit / PART
         step = stated_step(sources.fixed.settings)
     return MotionRun(decimal(largest * samples / step), decimal(step, 15), STEPS, conversion)
 

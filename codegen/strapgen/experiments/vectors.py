@@ -104,7 +104,7 @@ def vectors_of_choice(
     program = generated_sources.program(choice)
     command = f"strapgen vectors {naming.of(program).arguments} --target {target}"
     if sources.fixed is not None:
-        command += f" {options(sources.fixed.settings)}"
+        command += f" {options(sources.fixed.settings, program.inputs)}"
         reference = generated_sources.sources(choice, MODEL, settings)
     else:
         reference = sources_of_program(program, "exact")
@@ -157,9 +157,9 @@ def _fixed_rows(
     assert sources.fixed is not None
     boxes = []
     for argument in sources.fixed.inputs:
-        scaled = [round(value / float(argument.format.unit)) for value in _rest(sources, argument.signal)]
+        scaled = [round(value / float(argument.unit)) for value in _rest(sources, argument.signal)]
         rest = tuple(min(max(value, argument.low), argument.high) for value in scaled)
-        unit = float(argument.format.unit)
+        unit = float(argument.unit)
         box = _Box(argument.signal, argument.low, argument.high, unit, rest, argument.format.word)
         boxes.append(box)
     words = [feedback.fresh for feedback in sources.fixed.residuals]
@@ -201,9 +201,12 @@ def _floating_rows(
 ) -> tuple[tuple[CallVector, ...], tuple[float, ...]]:
     """Return vectors of a function on floating-point numbers; those without a finite result are left out."""
     evaluator, exact = ProgramEvaluator(reference, sources.target), ExactEvaluator(reference)
+    # The ranges for which the header bounds the rounding, where it does.
+    bounded = sources.rounding.inputs if sources.rounding is not None else ()
+    stated = {condition.value: float(condition.high) for condition in bounded}
     boxes = []
     for signal in sources.function.inputs:
-        limit = _UNBOUNDED if signal.bound is None else float(signal.bound)
+        limit = stated.get(signal.name, _UNBOUNDED if signal.bound is None else float(signal.bound))
         boxes.append(_Box(signal, -limit, limit, 1.0, tuple(_rest(sources, signal))))
     candidates = itertools.chain(_corners(boxes), _random(boxes, stream))
     rows: list[CallVector] = []

@@ -17,8 +17,11 @@ from numpy.typing import NDArray
 from strapgen.backends.c import CEvaluator
 from strapgen.backends.exact import DIGITS, Interpreter, number
 from strapgen.backends.fixed import CFixedEvaluator, ModelEvaluator
+from strapgen.backends.protocol import Backend
+from strapgen.backends.registry import backend_class
+from strapgen.backends.step_sources import StepSources
 from strapgen.experiments.vectors import MODEL, vectors_of_choice
-from strapgen.ir.fixed_interface import Interface
+from strapgen.ir.fixed_interface import Argument, Interface
 from strapgen.ir.sources import Sources
 from strapgen.library import generated_sources
 from strapgen.library.generated_files import command_of, text_of
@@ -120,13 +123,8 @@ def verify(file: Path, request: Request, increments: Array | None = None) -> Ver
     InputError
         If the file is not the one that its command generates, or the run leaves its range.
     """
-    header, source = paths_of(file)
-    sources = request.sources()
-    here = {path.name: text_of(path) for path in (header, source)}
-    if not {*here} <= {*sources.step_files}:
-        names = " and ".join(sources.step_files)
-        raise InputError(f"the command in {file} generates {names}; another name goes with --name")
-    differences = tuple(_differences(header.parent, here, sources))
+    sources, here = _read(file, request)
+    differences = tuple(_differences(file.parent, here, sources))
     compiled = replace(sources, files={**sources.files, **here})
     table = vectors_of_choice(request.choice, request.target, request.settings, CALLS, naming=request.naming)
     try:
@@ -138,7 +136,43 @@ def verify(file: Path, request: Request, increments: Array | None = None) -> Ver
     except CompilerError as error:
         if not differences:
             raise
-        return Verification(file, (*differences, f"{source}: does not compile: {error}"), 0, 0, None, None)
+        return Verification(file, (*differences, f"{file}: does not compile: {error}"), 0, 0, None, None)
+
+
+def file_backend(file: Path, request: Request) -> Backend:
+    """Return a file as a back end: it is compiled as it stands.
+
+    Parameters
+    ----------
+    file : Path
+        The source or the header of a generated attitude step.
+    request : Request
+        What the command in its header asks for.
+
+    Raises
+    ------
+    CompilerError
+        If the file does not compile.
+    InputError
+        If the file is no attitude step, or not the one that its command generates.
+    """
+    sources, here = _read(file, request)
+    if sources.companions is None:
+        raise InputError(f"{file} is the kernel {sources.kernel}, which is no attitude step")
+    step = StepSources(replace(sources, files={**sources.files, **here}), request.choice)
+    backend = backend_class(sources.target)(step)
+    backend.name = str(file)
+    return backend
+
+
+def _read(file: Path, request: Request) -> tuple[Sources, dict[str, str]]:
+    """Return what the command of a file generates, and the text of the file and of its header."""
+    sources = request.sources()
+    here = {path.name: text_of(path) for path in paths_of(file)}
+    if not {*here} <= {*sources.step_files}:
+        names = " and ".join(sources.step_files)
+        raise InputError(f"the command in {file} generates {names}; another name goes with --name")
+    return sources, here
 
 
 def _differences(folder: Path, here: dict[str, str], sources: Sources) -> Iterator[str]:
@@ -226,24 +260,30 @@ class _Exact:
         """Return the largest error of the elements of all outputs."""
         with mpmath.workdps(DIGITS):
             numbers = [
-                [word * number(argument.format.unit) for word in words]
+                [word * number(argument.unit) for word in words]
                 for words, argument in zip(inputs, self.interface.inputs, strict=True)
             ]
             results = self.interpreter.outputs(*numbers)
             return max(
-                float(abs(word - value / number(argument.format.unit)))
+                float(abs(word - _stored(value, argument) / number(argument.format.unit)))
                 for argument, words in zip(self.interface.outputs, outputs, strict=True)
                 for word, value in zip(words, results[argument.signal.name], strict=True)
             )
 
 
+def _stored(value: Any, argument: Argument) -> Any:
+    """Return the exact value of an output, at the end of the range of one that saturates."""
+    return min(max(value, mpmath.mpf(-1)), mpmath.mpf(1)) if argument.saturates else value
+
+
 def _floating(
     sources: Sources, rows: Sequence[CallVector], tolerances: Sequence[float], request: Request
-) -> tuple[int, int, float, None]:
+) -> tuple[int, int, float, float | None]:
     """Run a function on floating-point numbers; return wrong calls, calls and the largest error in last places of 1."""
     of = CEvaluator(sources)
     exact = Interpreter(generated_sources.program(request.choice))
-    wrong, worst, unit = 0, 0.0, float(np.finfo(of.dtype).eps) / 2
+    wrong, worst, unit = 0, 0.0, float(np.finfo(of.dtype).eps)
+    bound = _bound(sources)
     for row in rows:
         arrays = [
             np.array(values, of.dtype).reshape(signal.shape)
@@ -254,12 +294,33 @@ def _floating(
             not np.all(np.abs(output - np.array(expected, of.dtype)) <= tolerance)
             for output, expected, tolerance in zip(outputs, row.outputs, tolerances, strict=True)
         )
+        if bound is not None and not _inside(row, sources):
+            continue  # the bound says nothing there
         with mpmath.workdps(DIGITS):
             results = exact.outputs(*([mpmath.mpf(float(x)) for x in array.ravel()] for array in arrays))
             for output, values in zip(outputs, results.values(), strict=True):
                 distances = [abs(float(x) - value) for x, value in zip(output, values, strict=True)]
                 worst = max(worst, *(float(distance) / unit for distance in distances))
-    return wrong, len(rows), worst, None
+    return wrong, len(rows), worst, None if bound is None else bound / unit
+
+
+def _bound(sources: Sources) -> float | None:
+    """Return the certified bound of a call in floating point; None where there is none without conditions."""
+    known = sources.rounding
+    if known is None or not known.errors or known.conditions:
+        return None
+    return float(max(known.worst.values()))
+
+
+def _inside(row: CallVector, sources: Sources) -> bool:
+    """Tell whether the inputs of a call lie in the ranges for which the bound holds."""
+    assert sources.rounding is not None
+    ranges = {condition.value: condition for condition in sources.rounding.inputs}
+    return all(
+        ranges[signal.name].low <= value <= ranges[signal.name].high
+        for signal, values in zip(sources.function.inputs, row.inputs, strict=True)
+        for value in values
+    )
 
 
 def _identity(sources: Sources) -> list[int]:
@@ -284,10 +345,10 @@ def _cone(interface: Interface) -> Array | None:
 def _words(interface: Interface, increments: Array) -> Array:
     """Return increments as the integers of the second input."""
     argument = interface.inputs[1]
-    scaled = np.rint(increments.reshape(len(increments), -1) / float(argument.format.unit))
+    scaled = np.rint(increments.reshape(len(increments), -1) / float(argument.unit))
     if np.abs(scaled).max() > argument.high:
         raise InputError(
             f"the run has increments of {float(np.abs(increments).max()):.6g} rad; the file takes at most "
-            f"{float(Fraction(argument.high) * argument.format.unit):.6g} rad"
+            f"{float(Fraction(argument.high) * argument.unit):.6g} rad"
         )
     return scaled.astype(np.int64)

@@ -1,5 +1,7 @@
 """`quantize` turns a program into integer code with proved ranges and certified error bounds."""
 
+from dataclasses import replace
+
 from strapgen.ir.fixed_interface import Interface
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.formats import Format
@@ -30,9 +32,14 @@ def quantize(program: Program, settings: Settings) -> FixedProgram:
     from strapgen.fixedpoint.quantization import (
         lowered,  # numpy and the proofs are loaded when they are needed
     )
+    from strapgen.fixedpoint.sensor_scale import COUNTED, in_counts
 
+    if settings.input_bits is not None and not any(signal.name in COUNTED for signal in program.inputs):
+        what = "an lsb" if settings.sensor is not None else "a number of input bits"
+        raise InputError(f"{program.kernel} takes no increments; {what} does not go with it")
+    counts = program if settings.sensor is None else in_counts(program, settings.sensor)
     try:
-        return lowered(program, settings)
+        return replace(lowered(counts, settings), program=program)
     except InputError:
         raise
     except (ValueError, ArithmeticError) as error:  # a proof fails, as where a divisor may be zero

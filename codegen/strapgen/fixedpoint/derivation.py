@@ -11,10 +11,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from strapgen.fixedpoint.derivation_context import DerivationContext, free_name
+from strapgen.fixedpoint.derivation_context import DerivationContext, free_name, samples
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.fixedpoint.operations import derive_operation
-from strapgen.fixedpoint.probes import samples
 from strapgen.fixedpoint.products import SUM_OPERATIONS, store, terms_of
 from strapgen.fixedpoint.quantities import (
     InputElement,

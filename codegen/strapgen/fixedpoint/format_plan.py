@@ -81,8 +81,7 @@ def format_plan(
         exact = Fraction(0)
         for name in signal.elements:
             values[name] = Value(name, IntegerInput(), fraction, False, -top, top, exact, exact, top)
-        format_ = Format(settings.word, fraction)
-        inputs.append(Argument(signal, format_, signal.elements, -top, top, (exact,) * signal.size))
+        inputs.append(limit.argument(guard_bits))
     forced = _stated_formats(program, settings, quantities)
     for result in program.results:
         names = [name for name in quantities.results[result.signal.name] if isinstance(name, str)]
@@ -166,8 +165,13 @@ def _result_fraction(
     if is_output and (signal.constraint or program.companions is not None):
         return _attitude_fraction(settings, inputs, signal)
     names = [name for name in quantities.results[signal.name] if isinstance(name, str)]
-    largest = max((quantities.items[name].range.magnitude for name in names), default=Fraction(1))
-    return finest(largest * (Fraction(1) + Fraction(1, 1 << (word - 4))), word)
+    sizes = sorted(quantities.items[name].range.magnitude for name in names) or [Fraction(1)]
+    fraction = finest(sizes[-1] * (Fraction(1) + Fraction(1, 1 << (word - 4))), word)
+    if settings.state and result is program.transition:
+        # A state that fills its word leaves no room in sums of products: this has to.
+        width = (program.inputs[0].shape or (1,))[-1]
+        return fraction - (sum(sizes[-width:]) * Fraction(2) ** fraction >= 1 << word)
+    return fraction
 
 
 def _attitude_fraction(settings: Settings, inputs: Sequence[Argument], signal: Signal) -> int:

@@ -7,9 +7,12 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from strapgen.fixedpoint.intervals import Interval
+from strapgen.fixedpoint.sensor_scale import COUNTED
+from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.formats import Format, finest
 from strapgen.ir.program import Program
+from strapgen.ir.sensor import Sensor
 from strapgen.ir.signals import Signal
 from strapgen.support.exceptions import InputError
 
@@ -27,12 +30,18 @@ class Limit:
         Fraction bits of the finest format, or of the one that the user states.
     fixed : bool
         Whether the user states it.
+    bits : int
+        Bits of an element in memory: 8, 16, 32 or 64 of them hold it, or a word.
+    sensor : Sensor or None
+        The scale of the gyro whose counts these are.
     """
 
     signal: Signal
     largest: Fraction
     fraction: int
     fixed: bool
+    bits: int
+    sensor: Sensor | None = None
 
     def places(self, guard_bits: int) -> int:
         """Return the fraction bits of the input when so many bits are left for sums of inputs."""
@@ -42,6 +51,13 @@ class Limit:
         """Return the largest integer that is accepted: the limit of an attitude is rounded down, any other limit up."""
         scaled = self.largest * Fraction(2) ** self.places(guard_bits)
         return math.floor(scaled) if self.signal.constraint else math.ceil(scaled)
+
+    def argument(self, guard_bits: int) -> Argument:
+        """Return the input; what its type in memory cannot hold beyond the range needs no check."""
+        top, exact = self.largest_integer(guard_bits), (Fraction(0),) * self.signal.size
+        format_ = Format(self.bits, self.places(guard_bits))
+        high = min(top, format_.largest)
+        return Argument(self.signal, format_, self.signal.elements, -top, high, exact, self.sensor)
 
     def range(self, guard_bits: int) -> Interval:
         """Return the range of the accepted values."""
@@ -72,7 +88,13 @@ def limits(program: Program, settings: Settings) -> list[Limit]:
     word = settings.word
     stated: list[Limit] = []
     for signal in program.inputs:
-        largest = _largest(program, signal, settings)
+        if signal.constraint and settings.state:
+            stated.append(Limit(signal, Fraction(1), word - 1, True, word))
+            continue
+        largest = largest_magnitude(program, signal, settings)
+        if signal.name in COUNTED and settings.input_bits is not None:
+            stated.append(_counted(signal, largest, settings, settings.input_bits))
+            continue
         text = stated_format(settings, signal)
         if text is not None:
             fraction = Format.parse(text, word).fraction
@@ -88,12 +110,27 @@ def limits(program: Program, settings: Settings) -> list[Limit]:
             fraction = state_fraction(word, largest)
         else:
             fraction = finest(largest, word)
-        stated.append(Limit(signal, largest, fraction, text is not None))
+        stated.append(Limit(signal, largest, fraction, text is not None, word))
     return stated
+
+
+def _counted(signal: Signal, largest: Fraction, settings: Settings, bits: int) -> Limit:
+    """Return the range of increments of so many bits: counts of a gyro, or numbers in the format that fits best."""
+    if signal.name in settings.formats:
+        raise InputError(f"the format of {signal.name} follows from their bits; it takes no other")
+    memory = min(settings.word, next(size for size in (8, 16, 32, 64) if bits <= size))
+    sensor = settings.sensor
+    if sensor is None:
+        return Limit(signal, largest, finest(largest, bits), True, memory)
+    # A limit of the gyro is that of its bits; one in rad is rounded up to a count.
+    counts = min(math.ceil(largest / sensor.count), 1 << (bits - 1))
+    return Limit(signal, counts / Fraction(2) ** sensor.fraction, sensor.fraction, True, memory, sensor)
 
 
 def stated_format(settings: Settings, signal: Signal) -> str | None:
     """Return the format that the user states for an argument, if any; "state" stands for every attitude."""
+    if settings.state and signal.constraint:
+        return str(Format(settings.word, settings.word - 1))
     return settings.formats.get(signal.name, settings.formats.get("state") if signal.constraint else None)
 
 
@@ -102,8 +139,14 @@ def state_fraction(word: int, largest: Fraction) -> int:
     return min(word - 2, finest(largest, word))
 
 
-def _largest(program: Program, signal: Signal, settings: Settings) -> Fraction:
-    """Return the largest magnitude of the elements of an input."""
+def largest_magnitude(program: Program, signal: Signal, settings: Settings) -> Fraction:
+    """Return the largest magnitude of the elements of an input.
+
+    Raises
+    ------
+    InputError
+        If it is not known.
+    """
     if signal.name in settings.ranges:
         if signal.constraint or signal.name in ("increments", "turns"):
             raise InputError(

@@ -8,7 +8,6 @@ from fractions import Fraction
 from typing import Any
 
 from strapgen.fixedpoint import derivation
-from strapgen.fixedpoint.accumulation import accumulation
 from strapgen.fixedpoint.alignment import aligning
 from strapgen.fixedpoint.comparisons import (
     lower_computed,
@@ -31,6 +30,8 @@ from strapgen.fixedpoint.quantities import (
 )
 from strapgen.fixedpoint.quantization_context import Quantization
 from strapgen.fixedpoint.quotients_and_roots import lower_quotient, lower_root
+from strapgen.fixedpoint.runs.accumulation import accumulation, step_errors
+from strapgen.fixedpoint.runs.angle_accumulation import angle_accumulation
 from strapgen.fixedpoint.sums import lower_sum
 from strapgen.ir.fixed_interface import Argument, ErrorFeedback, Interface
 from strapgen.ir.fixed_settings import Settings
@@ -69,8 +70,15 @@ def lowered(program: Program, settings: Settings) -> FixedProgram:
     if program.companions is None or program.transition is None:
         return fixed
     (result,) = fixed.interface.outputs
-    adds_up = accumulation(context, program.transition, result)
-    return replace(fixed, interface=replace(fixed.interface, accumulation=adds_up))
+    errors = step_errors(context, program.transition, result)
+    if errors is None:
+        return fixed
+    interface = replace(
+        fixed.interface,
+        accumulation=accumulation(context, program.transition, errors),
+        angle_accumulation=angle_accumulation(context, program.transition, errors),
+    )
+    return replace(fixed, interface=interface)
 
 
 def _planned(program: Program, settings: Settings) -> tuple[Quantities, FormatPlan]:
@@ -149,8 +157,20 @@ def _fixed_program(context: Quantization) -> FixedProgram:
     """Return what has been lowered as a program."""
     outputs = tuple(_output(context, result.signal) for result in context.program.outputs)
     interface = Interface(context.settings, context.plan.inputs, outputs, _feedbacks(context), None)
+    _require_last(context)
     counts = operation_counts(context.body, context.settings.rounding)
     return FixedProgram(context.program, interface, tuple(context.body), counts)
+
+
+def _require_last(context: Quantization) -> None:
+    """Refuse a program that goes on with a value that saturates: it may be far from the exact one."""
+    saturated = {value.name for value in context.body if value.saturated}
+    for value in context.body:
+        if saturated.intersection(used_by(value)):
+            raise InputError(
+                f"{context.program.kernel} computes {value.name} from its output; state "
+                f"{context.settings.state} does not go with it"
+            )
 
 
 def _feedbacks(context: Quantization) -> tuple[ErrorFeedback, ...]:
@@ -182,6 +202,9 @@ def _errors(context: Quantization, signal: Signal, values: Sequence[Value]) -> t
             uncertain.add(value.name)
     bound = signal.bound or Fraction(0)
     return tuple(
-        bound + value.magnitude / Fraction(2) ** value.fraction if value.name in uncertain else value.error
+        bound + value.magnitude / Fraction(2) ** value.fraction
+        if value.name in uncertain
+        # What exceeds the largest number of a format by no more than a unit is stored as that number.
+        else max(value.error, value.saturated * Fraction(2) ** -value.fraction)
         for value in values
     )

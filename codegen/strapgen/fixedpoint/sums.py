@@ -46,7 +46,8 @@ def lower_sum(context: Quantization, quantity: Quantity, definition: Sum) -> Non
         return
     natural = finest(quantity.range.magnitude, context.word)
     places = [item.place for item in terms]
-    fraction = min(natural, max(places, default=natural), context.most.get(quantity.name, natural))
+    useful = natural if _counts_alone(context, terms) else max(places, default=natural)
+    fraction = min(natural, useful, context.most.get(quantity.name, natural))
     fraction = context.plan.forced.get(quantity.name, fraction)
     value = _rounded(context, quantity, terms, fraction, followed)
     while value.magnitude > context.largest(value.fraction):
@@ -76,6 +77,14 @@ def word_of(context: Quantization, name: str) -> str:
 
 
 # Terms
+
+
+def _counts_alone(context: Quantization, terms: Sequence[Placed]) -> bool:
+    """Tell whether a sum is one of a gyro's counts; it fills its word, so that its products need fewer shifts."""
+    counts = {n for a in context.plan.inputs if a.sensor is not None for n in a.signal.elements}
+    return all(len(item.term.names) == 1 and counts.issuperset(item.term.names) for item in terms) and bool(
+        counts
+    )
 
 
 def _integer_terms(context: Quantization, definition: Sum) -> list[Placed]:
@@ -254,10 +263,13 @@ def _fine(context: Quantization, name: str, terms: Sequence[Placed], fraction: i
 
 def _limited(context: Quantization, quantity: Quantity, value: Value) -> Value:
     """Return a value in a fixed format that does not hold its range: it is checked if its range is otherwise known."""
+    largest = context.largest(value.fraction)
+    if context.settings.state and _is_attitude(context, quantity.name):
+        return replace(value, low=max(value.low, -largest - 1), high=min(value.high, largest), saturated=True)
     known = _known_limit(context, quantity.name)
     inside = quantity.range + Interval.of(quantity.offset) if known is None else Interval.symmetric(known)
     limit = None if known is None else math.floor(known * Fraction(2) ** value.fraction)
-    if limit is None or limit > context.largest(value.fraction):
+    if limit is None or limit > largest:
         if not _is_stated(context, quantity.name):  # chosen from the range, and errors go beyond it
             raise context.too_short(quantity.name)
         raise InputError(
@@ -265,6 +277,12 @@ def _limited(context: Quantization, quantity: Quantity, value: Value) -> Value:
             f"{inside.text()}{', less ' + str(quantity.offset) if quantity.offset else ''}"
         )
     return replace(value, low=max(value.low, -limit), high=min(value.high, limit), guarded=True)
+
+
+def _is_attitude(context: Quantization, name: str) -> bool:
+    """Tell whether a quantity is an element of an output that is an attitude."""
+    results = context.quantities.results
+    return any(r.signal.constraint and name in results[r.signal.name] for r in context.program.outputs)
 
 
 def _is_stated(context: Quantization, name: str) -> bool:

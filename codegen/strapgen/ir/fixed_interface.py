@@ -8,8 +8,10 @@ from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from typing import Any
 
-from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.angle_accumulation import AngleAccumulation
+from strapgen.ir.fixed_settings import DEFAULT_ANGLE, Settings
 from strapgen.ir.formats import Format
+from strapgen.ir.sensor import Sensor
 from strapgen.ir.signals import Signal
 
 
@@ -52,6 +54,8 @@ class Argument:
         Range of the integers: an input outside is refused, an output is proved to lie inside.
     errors : tuple of Fraction
         Error bound of each element of an output after one call; of an input, zeros.
+    sensor : Sensor or None
+        The scale of the gyro whose counts these are.
     """
 
     signal: Signal
@@ -60,6 +64,17 @@ class Argument:
     low: int
     high: int
     errors: tuple[Fraction, ...]
+    sensor: Sensor | None = None
+
+    @property
+    def unit(self) -> Fraction:
+        """What the integer 1 stands for, in the unit of the signal."""
+        return self.format.unit if self.sensor is None else self.sensor.count
+
+    @property
+    def saturates(self) -> bool:
+        """Whether it is an attitude in -1 to 1 less a unit: what lies beyond is stored as the nearer end."""
+        return bool(self.signal.constraint) and self.format.fraction == self.format.word - 1
 
     def as_dict(self) -> dict[str, Any]:
         """Return the argument as plain JSON data."""
@@ -71,6 +86,7 @@ class Argument:
             "low": self.low,
             "high": self.high,
             "errors": [str(error) for error in self.errors],
+            "sensor": self.sensor and self.sensor.as_dict(),
         }
 
     @classmethod
@@ -83,6 +99,7 @@ class Argument:
             data["low"],
             data["high"],
             tuple(map(Fraction, data["errors"])),
+            data["sensor"] and Sensor.from_dict(data["sensor"]),
         )
 
 
@@ -166,6 +183,8 @@ class Interface:
         Error feedback, from call to call.
     accumulation : RoundingAccumulation or None
         How the rounding of a step adds up; None for other kernels.
+    angle_accumulation : AngleAccumulation or None
+        How it adds up as an angle; None where that is not proved.
     """
 
     settings: Settings
@@ -173,11 +192,16 @@ class Interface:
     outputs: tuple[Argument, ...]
     residuals: tuple[ErrorFeedback, ...]
     accumulation: RoundingAccumulation | None
+    angle_accumulation: AngleAccumulation | None = None
 
     @property
     def companion_settings(self) -> Settings:
         """The settings of a kernel that works on the same state beside a step: an orthonormalization."""
-        return replace(self.settings, ranges={}, formats={"state": str(self.inputs[0].format)})
+        formats = {} if self.settings.state else {"state": str(self.inputs[0].format)}
+        settings = replace(self.settings, ranges={}, formats=formats)
+        if settings.input_bits is None:
+            return settings
+        return replace(settings, sensor=None, input_bits=None, largest_angle=DEFAULT_ANGLE, stated="")
 
     def as_dict(self) -> dict[str, Any]:
         """Return the interface as plain JSON data."""
@@ -188,16 +212,18 @@ class Interface:
             "outputs": [argument.as_dict() for argument in self.outputs],
             "residuals": [asdict(feedback) for feedback in self.residuals],
             "accumulation": adds_up and {name: str(value) for name, value in asdict(adds_up).items()},
+            "angle_accumulation": self.angle_accumulation and self.angle_accumulation.as_dict(),
         }
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Interface:
         """Rebuild an interface from `as_dict`."""
-        adds_up = data["accumulation"]
+        adds_up, as_angle = data["accumulation"], data["angle_accumulation"]
         return cls(
             Settings.from_dict(data["settings"]),
             tuple(map(Argument.from_dict, data["inputs"])),
             tuple(map(Argument.from_dict, data["outputs"])),
             tuple(ErrorFeedback(**feedback) for feedback in data["residuals"]),
             adds_up and RoundingAccumulation(**{name: Fraction(value) for name, value in adds_up.items()}),
+            as_angle and AngleAccumulation.from_dict(as_angle),
         )

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any
 
-from strapgen.ir.formats import Format, check_rounding, check_word
+from strapgen.ir.formats import SHORTEST_WORD, Format, check_rounding, check_word
+from strapgen.ir.sensor import DEFAULT_BITS, Sensor
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 
@@ -18,6 +19,9 @@ CARRIES = {
     "state": "the rounding of the state",
     "full": "the rounding of the state and of the transition",
 }
+
+#: Formats of the state that hold no magnitude of 1, as CMSIS has them, with the word that each goes with.
+STATES = {"q15": 16, "q31": 32, "q63": 64}
 
 #: Largest angle increment for which formats are chosen when none is stated, in rad.
 DEFAULT_ANGLE = Fraction(1, 8)
@@ -53,6 +57,12 @@ class Settings:
         Formats that the user fixes, as Qm.n, by the name of a value or of an input or output.
     stated : str
         The options of the command line that the largest angle follows from; "" where it is stated itself.
+    sensor : Sensor or None
+        The scale of the gyro if increments are its counts; None if they have a format in rad.
+    input_bits : int or None
+        Bits of an increment in memory; None for those of a word, or of a usual gyro where `sensor` is stated.
+    state : str
+        "q31", "q15" or "q63" for a state whose elements lie in -1 to 1 less a unit and saturate; "" for room above 1.
 
     Raises
     ------
@@ -73,14 +83,20 @@ class Settings:
     ranges: Mapping[str, Fraction] = field(default_factory=dict, hash=False)
     formats: Mapping[str, str] = field(default_factory=dict, hash=False)
     stated: str = field(default="", compare=False)
+    sensor: Sensor | None = None
+    input_bits: int | None = None
+    state: str = ""
 
     def __post_init__(self) -> None:
         check_word(self.word)
+        self._check_inputs()
+        self._check_state()
         check_rounding(self.rounding)
         checks.choice("carry", self.carry, CARRIES)
         if not SMALLEST_ANGLE <= self.largest_angle <= LARGEST_ANGLE:
             # In the names of Python; the command line turns them into options again.
             stated = self.stated.removeprefix("--").replace("max-rate-deg-s", "max_rate_deg_s")
+            stated = stated.replace("sample-hz", "sample_hz")
             how = f" ({stated.replace(' --', ', ')})" if stated else ""
             raise InputError(
                 f"largest angle increment is {float(self.largest_angle):g} rad{how}; "
@@ -98,6 +114,38 @@ class Settings:
         for text in self.formats.values():
             Format.parse(text, self.word)
 
+    def _check_inputs(self) -> None:
+        """Check the bits of an increment, and fill in those of a usual gyro."""
+        if self.input_bits is None:
+            object.__setattr__(self, "input_bits", self.default_input_bits)
+        bits = self.input_bits
+        if bits is not None and not SHORTEST_WORD <= bits <= self.word:
+            raise InputError(
+                f"input bits is {bits}; a whole number from {SHORTEST_WORD} to {self.word}, the bits of a word, is "
+                "needed"
+            )
+
+    def _check_state(self) -> None:
+        """Check that a saturating state goes with the word, and that no other option sets its range."""
+        if not self.state:
+            return
+        checks.choice("state", self.state, STATES)
+        if STATES[self.state] != self.word:
+            fitting = [name for name, bits in STATES.items() if bits == self.word]
+            raise InputError(
+                f"state {self.state} has {STATES[self.state]} bits and the word {self.word}; "
+                f"{fitting[0] if fitting else 'a word of 16, 32 or 64 bits'} is needed"
+            )
+        if self.allowance != DEFAULT_ALLOWANCE:
+            raise InputError(f"a drift allowance does not go with state {self.state}, which ends at 1")
+        if "state" in self.formats:
+            raise InputError(f"a format of the state does not go with state {self.state}, which is one")
+
+    @property
+    def default_input_bits(self) -> int | None:
+        """Bits of an increment where none are stated: those of a usual gyro, or None without one."""
+        return None if self.sensor is None else min(DEFAULT_BITS, self.word)
+
     @classmethod
     def of(
         cls,
@@ -107,6 +155,8 @@ class Settings:
         step: Any = None,
         increments: int = 1,
         largest_angle: Any = None,
+        sample_hz: Any = None,
+        lsb: Any = None,
         **rest: Any,
     ) -> Settings:
         """Return settings from what a user states: rates and times as numbers or decimals.
@@ -118,20 +168,51 @@ class Settings:
             `increments` a step, bounds an angle increment.
         largest_angle : number, optional
             That bound itself, in rad.
+        sample_hz : number, optional
+            Samples of the gyro in a second, in place of the step.
+        lsb : str, optional
+            Scale of a gyro that counts: rate a count, as "0.0175dps", or angle a count, as "3e-6rad". Increments are
+            then its counts, and the largest of them is bounded by its bits too.
+
+        Examples
+        --------
+        >>> settings = Settings.of(sample_hz=100, lsb="0.0175dps")
+        >>> settings.input_bits, round(float(settings.largest_angle), 4)
+        (16, 0.1001)
         """
-        if (max_rate_deg_s is None) != (step is None):
-            missing = "step" if step is None else "max_rate_deg_s"
-            raise InputError(f"max_rate_deg_s and step go together; {missing} is missing")
         if max_rate_deg_s is not None and largest_angle is not None:
             raise InputError("the largest angle and the largest rate are both given; one is needed")
-        angle = DEFAULT_ANGLE
+        interval, heard = _interval(step, sample_hz, increments)
+        if max_rate_deg_s is not None and interval is None:
+            raise InputError("max_rate_deg_s and step go together; step is missing")
+        if max_rate_deg_s is None and step is not None and lsb is None:
+            raise InputError("max_rate_deg_s and step go together; max_rate_deg_s is missing")
+        sensor = None if lsb is None else Sensor.of(lsb, interval, heard)
+        if (
+            sample_hz is not None
+            and max_rate_deg_s is None
+            and (sensor is None or heard not in sensor.stated)
+        ):
+            raise InputError(
+                "sample_hz makes angles of rates; max_rate_deg_s or an lsb that is a rate is missing"
+            )
+        angle, options = None, []
         if largest_angle is not None:
             angle = checks.number("largest angle", largest_angle, positive=True)
-        elif max_rate_deg_s is not None:
-            rate = checks.number("max_rate_deg_s", max_rate_deg_s, positive=True)
-            angle = rate * checks.number("step", step, positive=True) * _DEGREE / increments
-        stated = "" if max_rate_deg_s is None else f"--max-rate-deg-s {max_rate_deg_s} --step {step}"
-        return cls(word, Fraction(math.ceil(angle * _LIMIT_UNIT), _LIMIT_UNIT), **rest, stated=stated)
+            options = [f"--max-angle-rad {largest_angle}"] * (sensor is not None)
+        elif max_rate_deg_s is not None and interval is not None:
+            angle = checks.number("max_rate_deg_s", max_rate_deg_s, positive=True) * interval * _DEGREE
+            options = [f"--max-rate-deg-s {max_rate_deg_s}"]
+            options += [heard] * (sensor is None or heard not in sensor.stated)
+        if sensor is not None:
+            options.append(sensor.stated)
+            bits = rest.get("input_bits") or min(DEFAULT_BITS, word)
+            whole = sensor.count * (1 << (bits - 1))
+            angle = whole if angle is None else min(angle, whole)
+        if angle is None:
+            angle = DEFAULT_ANGLE
+        largest = Fraction(math.ceil(angle * _LIMIT_UNIT), _LIMIT_UNIT)
+        return cls(word, largest, **rest, stated=" ".join(options), sensor=sensor)
 
     def fitted(self, largest: float) -> Settings:
         """Return the settings with a largest angle of this magnitude, and up to an eighth more.
@@ -144,6 +225,8 @@ class Settings:
         if not SMALLEST_ANGLE * 2 < largest <= LARGEST_ANGLE:
             # Nothing turns, or no format holds the increments: those are refused where they are read.
             return self
+        if self.sensor is not None:
+            return self  # its counts are what they are
         exponent = math.frexp(largest)[1] - 4
         angle = Fraction(2) ** exponent * math.ceil(math.ldexp(largest, -exponent))
         return replace(self, largest_angle=angle, stated="")
@@ -163,6 +246,9 @@ class Settings:
             "ranges": {name: str(value) for name, value in self.ranges.items()},
             "formats": dict(self.formats),
             "stated": self.stated,
+            "sensor": self.sensor and self.sensor.as_dict(),
+            "input_bits": self.input_bits,
+            "state": self.state,
         }
 
     @classmethod
@@ -174,5 +260,17 @@ class Settings:
                 "largest_angle": Fraction(data["largest_angle"]),
                 "allowance": Fraction(data["allowance"]),
                 "ranges": {name: Fraction(value) for name, value in data["ranges"].items()},
+                "sensor": data["sensor"] and Sensor.from_dict(data["sensor"]),
             }
         )
+
+
+def _interval(step: Any, sample_hz: Any, increments: int) -> tuple[Fraction | None, str]:
+    """Return the time of an increment in s if it is stated, and the option that states it."""
+    if step is not None and sample_hz is not None:
+        raise InputError("the step and the sample rate are both given; one is needed")
+    if step is not None:
+        return checks.number("step", step, positive=True) / increments, f"--step {step}"
+    if sample_hz is not None:
+        return 1 / checks.number("sample_hz", sample_hz, positive=True), f"--sample-hz {sample_hz}"
+    return None, ""

@@ -148,6 +148,8 @@ class Value:
         Whether the range is checked when the code runs: the call returns an error for integers outside.
     meaning : str
         The comment where a named stage of the algorithm begins; "" elsewhere.
+    saturated : bool
+        Whether integers outside the range are replaced by its nearer end; the error is that before.
     """
 
     name: str
@@ -161,6 +163,7 @@ class Value:
     peak: int
     guarded: bool = False
     meaning: str = ""
+    saturated: bool = False
 
     @property
     def magnitude(self) -> int:
@@ -279,7 +282,7 @@ class FixedProgram:
     def ranges(self) -> dict[str, tuple[Fraction, Fraction]]:
         """Proved range of every argument and value, by name; it includes the offset of the value."""
         known = {
-            a.signal.name: (a.low * a.format.unit, a.high * a.format.unit)
+            a.signal.name: (a.low * a.unit, a.high * a.unit)
             for a in (*self.interface.inputs, *self.interface.outputs)
         }
         for value in self.body:
@@ -294,7 +297,7 @@ class FixedProgram:
 
     def as_data(self) -> dict[str, Any]:
         """Return formats, ranges and error bounds as plain JSON data."""
-        adds_up = self.interface.accumulation
+        adds_up, as_angle = self.interface.accumulation, self.interface.angle_accumulation
         elements = (
             zip(argument.signal.elements, argument.errors, strict=True) for argument in self.interface.outputs
         )
@@ -306,4 +309,9 @@ class FixedProgram:
             "error_bound_by_element": {name: float(error) for pairs in elements for name, error in pairs},
             "integer_operations": self.operations,
             "accumulation": adds_up and {name: float(value) for name, value in asdict(adds_up).items()},
+            "angle_accumulation": as_angle
+            and {
+                name: float(value) if isinstance(value, Fraction) else value
+                for name, value in asdict(as_angle).items()
+            },
         }

@@ -7,6 +7,7 @@ from typing import Any
 
 from strapgen.ir.attitude_step import Companions
 from strapgen.ir.fixed_interface import Interface
+from strapgen.ir.float_interface import RoundingBounds
 from strapgen.ir.program import Program
 from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import Signal
@@ -48,6 +49,8 @@ class Sources:
         has the kernels.
     runs : tuple of str
         Names of the files that hold loops over samples and runs, which a host calls and firmware does not need.
+    rounding : RoundingBounds or None
+        Error bounds of C in floating point; None for every other target.
     """
 
     kernel: str
@@ -61,6 +64,7 @@ class Sources:
     recursion: Recursion | None = None
     own: tuple[Program, ...] = ()
     runs: tuple[str, ...] = ()
+    rounding: RoundingBounds | None = None
 
     @property
     def step_files(self) -> dict[str, str]:
@@ -84,6 +88,7 @@ class Sources:
             "companions": self.companions and self.companions.as_dict(),
             "fixed": self.fixed and self.fixed.as_dict(),
             "recursion": self.recursion and self.recursion.as_dict(),
+            "rounding": self.rounding and self.rounding.as_dict(),
         }
 
     @classmethod
@@ -105,4 +110,5 @@ class Sources:
             interface["fixed"] and Interface.from_dict(interface["fixed"]),
             interface["recursion"] and Recursion.from_dict(interface["recursion"]),
             runs=tuple(interface["runs"]),
+            rounding=interface["rounding"] and RoundingBounds.from_dict(interface["rounding"]),
         )

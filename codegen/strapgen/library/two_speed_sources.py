@@ -225,5 +225,15 @@ def sources(
 
 
 def _without_largest_angle(settings: Settings) -> Settings:
-    """Return settings without the largest angle of a step's increments, which no loop has."""
+    """Return settings without the largest angle of a step's increments, which no loop has.
+
+    Raises
+    ------
+    InputError
+        If they state counts of a gyro or a saturating state: the loops share increments of one format.
+    """
+    if settings.input_bits is not None or settings.state:
+        raise InputError(
+            "an algorithm in two speeds takes neither counts of a gyro nor a state that saturates"
+        )
     return replace(settings, largest_angle=DEFAULT_ANGLE, stated="")

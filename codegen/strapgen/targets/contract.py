@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from fractions import Fraction
 
 from strapgen.ir.fixed_interface import Argument, ErrorFeedback, Interface, RoundingAccumulation
@@ -10,36 +11,59 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.formats import Format
 from strapgen.ir.integer_program import FixedProgram, Value
 from strapgen.ir.program import Program
+from strapgen.ir.sensor import Sensor
 from strapgen.ir.signals import Signal
 
 
 def argument_text(argument: Argument) -> str:
     """Return format, unit, range and error bound of an argument in words."""
-    unit = argument.format.unit
-    parts = [
-        f"format {argument.format}, unit {_power(argument.format.fraction, argument.signal.unit)}",
-        f"range {argument.low} to {argument.high} ({_number(argument.low * unit)} to {_number(argument.high * unit)})",
-    ]
+    unit, signal = argument.unit, argument.signal
+    if argument.sensor is None:
+        parts = [f"format {argument.format}, unit {_power(argument.format.fraction, signal.unit)}"]
+    else:
+        parts = [_counts_text(argument, argument.sensor)]
+    limits = f"{_number(argument.low * unit)} to {_number(argument.high * unit)}"
+    parts.append(f"range {argument.low} to {argument.high} ({limits})")
     worst = max(argument.errors)
-    if worst:
-        parts.append(f"error at most {_number(worst)}, {float(worst / unit):.4f} of the last place")
-    elif any(name not in argument.signal.elements for name in argument.values):
+    places = f"{_number(worst)}, {float(worst / unit):.4f} of the last place"
+    if worst and argument.saturates:
+        parts.append(
+            f"saturates at both ends; error at most {places}, where the exact value is from -1 to 1; beyond, at "
+            "most the larger of this and its distance from the range"
+        )
+    elif worst:
+        parts.append(f"error at most {places}")
+    elif any(name not in signal.elements for name in argument.values):
         parts.append("exact")
     return "; ".join(parts)
 
 
+def _counts_text(argument: Argument, sensor: Sensor) -> str:
+    """Return in words what a count of a gyro is."""
+    exact = Fraction(f"{float(sensor.count):.17g}") == sensor.count
+    return (
+        f"counts of the gyro in {argument.format.word} bits; 1 count = {float(sensor.count):.{7 if exact else 17}g} "
+        f"{argument.signal.unit} = {sensor.unit}"
+    )
+
+
 def command(fixed: FixedProgram, target: str) -> str:
     """Return the command that generates a fixed-point program, with all options."""
-    turned = any(signal.name in ("increments", "turns") for signal in fixed.program.inputs)
-    stated = options(fixed.interface.settings, angle=turned)
+    stated = options(fixed.interface.settings, fixed.program.inputs)
     return f"strapgen generate {fixed.program.arguments} --target {target} {stated}"
 
 
-def options(settings: Settings, angle: bool = False) -> str:
-    """Return settings as options of the command line, with the largest angle where a function has one."""
+def options(settings: Settings, inputs: Iterable[Signal] = ()) -> str:
+    """Return settings as options of the command line, with the largest angle if one of the inputs has it."""
     words = [f"--word {settings.word}"]
-    if angle:
+    if any(signal.name in ("increments", "turns") for signal in inputs):
         words.append(settings.stated or f"--max-angle-rad {settings.largest_angle}")
+    if settings.sensor is not None and settings.sensor.stated not in settings.stated:
+        words.append(settings.sensor.stated)
+    if settings.input_bits != settings.default_input_bits:
+        words.append(f"--input-bits {settings.input_bits}")
+    if settings.state:
+        words.append(f"--state {settings.state}")
     words += [
         f"--rounding {settings.rounding}",
         f"--carry {settings.carry}",
@@ -58,13 +82,14 @@ def _number(value: Fraction) -> str:
     return f"{float(value):.6g}"
 
 
-def accumulation_text(accumulation: RoundingAccumulation, program: Program) -> str:
-    """Return the bound of a run of N steps in words."""
+def accumulation_text(accumulation: RoundingAccumulation, program: Program, state: str = "") -> str:
+    """Return the bound of a run of N steps in words; `state` names a state that saturates."""
     what = "in the length of a row" if len(program.inputs[0].shape) == 2 else "in the length of the state"
     growth = accumulation.growth - 1
     stretched = f", times exp({_number(growth)} N)" if growth else ""
     once = f"{_number(accumulation.once)} + " if accumulation.once else ""
-    return f"({once}{_number(accumulation.per_step)} N){stretched}, {what}"
+    only = ", as long as exact arithmetic keeps every element of the state from -1 to 1" if state else ""
+    return f"({once}{_number(accumulation.per_step)} N){stretched}, {what}{only}"
 
 
 def upkeep_text(program: Program, interface: Interface | None = None, target: str = "c") -> str:
@@ -93,12 +118,11 @@ def upkeep_text(program: Program, interface: Interface | None = None, target: st
             f"A proper state is {proper}. A step keeps it so but for rounding and the error of its method: now and "
             f"then the function of `{command}` takes these out."
         )
-    sentences = [
-        f"A proper state is {proper}; the range of the output is wider than that of the input because it holds for "
-        "every input in its range."
-    ]
+    saturates = any(argument.saturates for argument in interface.inputs)
+    wider = "; the range of the output is wider than that of the input because it holds for every input in its range"
+    sentences = [f"A proper state is {proper}{'' if saturates else wider}."]
     calls = interface.accumulation and interface.accumulation.calls_within(interface.settings.allowance)
-    if calls:
+    if calls and not saturates:
         sentences.append(
             f"From a proper state it takes at least {calls:,} calls until one is refused for the size of the state."
         )

@@ -10,9 +10,11 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import zip_longest
 from typing import ClassVar
 
 from strapgen.ir.fixed_interface import Argument
+from strapgen.ir.float_interface import RoundingBounds
 from strapgen.ir.integer_program import FixedProgram
 from strapgen.ir.program import Program
 from strapgen.ir.signals import Signal
@@ -104,12 +106,13 @@ def of_fixed(fixed: FixedProgram, function: str, command: str, memory: Mapping[s
         requires.append(
             ("otherwise", "the call returns 2 and writes nothing where a value leaves its limits")
         )
-    lets = _loads((a.signal, name(a), _unit(a.format.fraction)) for a in interface.inputs)
+    lets = _loads((a.signal, name(a), _unit(a)) for a in interface.inputs)
     lets += _body(fixed.program)
     ensures = [
         (
-            f"|{name(argument)}[{k}]{_unit(argument.format.fraction)} - {text}|",
-            f" <= {decimal_above(argument.errors[k])}",
+            f"|{name(argument)}[{k}]{_unit(argument)} - {text}|",
+            f" <= {decimal_above(argument.errors[k])}"
+            + (f" where -1 <= {text} <= 1" if argument.saturates else ""),
         )
         for argument, texts in zip(interface.outputs, _results(fixed.program), strict=True)
         for k, text in enumerate(texts)
@@ -118,8 +121,10 @@ def of_fixed(fixed: FixedProgram, function: str, command: str, memory: Mapping[s
     return _contract(function, command, [*requires, *lets], ensures, ranges)
 
 
-def of_program(program: Program, function: str, command: str) -> Contract:
-    """Return the contract of floating-point code: the exact values of its outputs, which it rounds.
+def of_program(program: Program, function: str, command: str, rounding: RoundingBounds) -> Contract:
+    """Return the contract of floating-point code: the exact values of its outputs, and how far it is from them.
+
+    Where no bound is known, or it depends on values on the way, an output is the exact value, rounded.
 
     Parameters
     ----------
@@ -127,15 +132,34 @@ def of_program(program: Program, function: str, command: str) -> Contract:
         With the names that are printed.
     function, command
         As for `of_fixed`.
+    rounding : RoundingBounds
+        Its error bounds.
     """
+    proved = rounding.errors and not rounding.conditions
+    limits = {condition.value: condition.high for condition in rounding.inputs}
+    requires = []
+    if proved and any(rounding.worst.values()):
+        for signal in program.inputs:
+            largest, place = limits[signal.name], f"[0..{signal.size - 1}]" if signal.shape else ""
+            requires.append(("requires", f"-{largest} <= {signal.name}{place} <= {largest}"))
+        requires.append(("otherwise", "the outputs have no bound"))
     lets = _loads((signal, signal.name, "") for signal in program.inputs if signal.shape)
     lets += _body(program)
-    ensures = [
-        (f"{result.signal.name}[{k}] = {text}", ", rounded")
-        for result, texts in zip(program.outputs, _results(program), strict=True)
-        for k, text in enumerate(texts)
-    ]
-    return _contract(function, command, lets, ensures, [])
+    ensures = []
+    errors = rounding.errors.values() if proved else [()] * len(program.outputs)
+    for result, texts, bounds in zip(program.outputs, _results(program), errors, strict=True):
+        for element, text, error in zip_longest(range(len(texts)), texts, bounds):
+            name = f"{result.signal.name}[{element}]"
+            if error:
+                ensures.append((f"|{name} - {_summand(text)}|", f" <= {decimal_above(error)}"))
+            else:
+                ensures.append((f"{name} = {text}", ", rounded" if error is None else ""))
+    return _contract(function, command, [*requires, *lets], ensures, [])
+
+
+def _summand(text: str) -> str:
+    """Return an expression as it stands behind a minus sign."""
+    return text if re.fullmatch(r"\w+", text) else f"({text})"
 
 
 def _contract(
@@ -180,8 +204,11 @@ def _results(program: Program) -> list[list[str]]:
     return [[printer.text(node) for node in result.nodes] for result in program.outputs]
 
 
-def _unit(fraction: int) -> str:
+def _unit(argument: Argument) -> str:
     """Return what turns an integer into the number that it stands for."""
+    fraction = argument.format.fraction
+    if argument.sensor is not None:
+        return f" * {_LinePrinter().constant(argument.sensor.count)}"
     if not fraction:
         return ""
     return f" / 2^{fraction}" if fraction > 0 else f" * 2^{-fraction}"

@@ -31,10 +31,11 @@ def of_fixed(fixed: FixedProgram, function: str) -> list[Macro]:
     names = _upper(argument.signal for argument in arguments)
     result = []
     for argument in arguments:
-        name, unit = f"{head}_{names[argument.signal.name]}", argument.format.unit
-        result.append(Macro(f"{name}_FRACTION_BITS", str(argument.format.fraction), f"{argument.format}"))
-        result.append(Macro(f"{name}_UNIT", _double(unit), _unit(argument)))
-        result += _limits(name, argument, bits)
+        name = f"{head}_{names[argument.signal.name]}"
+        if argument.sensor is None:
+            result.append(Macro(f"{name}_FRACTION_BITS", str(argument.format.fraction), f"{argument.format}"))
+        result.append(Macro(f"{name}_UNIT", _double(argument.unit), _unit(argument)))
+        result += _limits(name, argument, argument.format.word)
     step = fixed.program.companions
     if step is not None:
         state = interface.inputs[0].format
@@ -88,12 +89,14 @@ def _upper(signals: Iterable[Signal]) -> dict[str, str]:
 
 
 def _unit(argument: Argument) -> str:
+    if argument.sensor is not None:
+        return f"rad: a count of the gyro, {argument.sensor.unit}"
     unit = "" if argument.signal.unit == "1" else f" {argument.signal.unit}"
     return f"2^{-argument.format.fraction}{unit}"
 
 
 def _double(value: Fraction) -> str:
-    """Return the shortest literal that reads as a number that is a power of two."""
+    """Return the shortest literal that reads as the double nearest to a number."""
     text = repr(float(value))
     return text if "." in text or "e" in text else f"{text}.0"
 

@@ -11,6 +11,7 @@ from strapgen.support import resources
 from strapgen.targets import contract
 from strapgen.targets.contract import elements_text, operations_text, range_text
 from strapgen.targets.lines import fill, fill_arguments, fill_definition
+from strapgen.targets.run_text import run_paragraphs
 
 if TYPE_CHECKING:
     import jinja2
@@ -51,7 +52,7 @@ def environment(folder: Path | None = None) -> jinja2.Environment:
         argument_text=contract.argument_text,
         fixed_command=contract.command,
         defined=lambda definition: fill_definition(definition.name, definition.value, definition.meaning),
-        accumulation_text=contract.accumulation_text,
+        run_paragraphs=run_paragraphs,
         residuals_text=contract.residuals_text,
         guards_text=contract.guards_text,
     )

@@ -134,7 +134,7 @@ def oscillation(amplitude, phase, cycles):
 
 def run(loop, samples, kept, slow_cycles):
     """Run a fast loop from numpy's increments, and return its states at the end of every slow cycle."""
-    recursion = derive(loop.function.name.split("_q")[0].removesuffix("_float").replace("_", "-")).recursion
+    recursion = derive(loop.sources.kernel).recursion
     names = [signal.name for signal in loop.function.inputs]
     outputs = [signal.name for signal in loop.function.outputs]
     state = {name: np.zeros(3) for name, _ in recursion.states} | kept

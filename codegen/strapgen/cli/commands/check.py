@@ -81,7 +81,7 @@ def _check_foreign(file: str, foreign: ForeignOptions, output: Output) -> None:
     """Check a function of a file in C or C++."""
     step = foreign.step(file)
     from strapgen.experiments.foreign_check import check_foreign
-    from strapgen.reports.foreign_check import outcome_report
+    from strapgen.reports.conformance import outcome_report
 
     outcome = check_foreign(step)
     output.report(outcome_report(outcome, step.source.function))

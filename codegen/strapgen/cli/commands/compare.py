@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from strapgen.cli.commands.verify import request_of
 from strapgen.cli.fixed_options import RUN_OPTIONS, FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import (
@@ -23,6 +25,8 @@ from strapgen.cli.sample_source import SampleSource
 from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
+    from strapgen.backends import Backend
+    from strapgen.catalogue import Choice
     from strapgen.reports.comparison import ComparedKernel
 
 
@@ -41,6 +45,15 @@ def compare(
             panel="Algorithm",
         ),
     ] = "numpy",
+    files: Annotated[
+        list[Path] | None,
+        option(
+            "--source",
+            metavar="FILE",
+            help="C file that strapgen generated, as one more back end, in its own formats.",
+            panel="Algorithm",
+        ),
+    ] = None,
     source: SampleSource,
     fixed: Annotated[FixedOptions, Shown(only=RUN_OPTIONS)],
     fail_above: Annotated[
@@ -66,10 +79,11 @@ def compare(
     """
     output.check(algorithm, methods.tableau, source.increments_csv, source.rates_csv)
     choices = methods.choices(algorithm)
-    names = _backends(backend, reference)
+    names = _backends(backend, reference, files)
     most = limit("--fail-above", fail_above)
     source.check()
     _check_fixed(fixed, {*names, reference})
+    fixed.check_pulse(source.pulse_arcsec)
 
     import numpy as np
 
@@ -83,7 +97,7 @@ def compare(
             inputs = source.read(choice.increments_per_step, choice.previous)
             rows = comparison.compare(
                 choice,
-                backends=names,
+                backends=[*names, *_of_files(files, choice)],
                 increments=inputs.increments,
                 reference=reference,
                 truth=inputs.truth,
@@ -101,6 +115,19 @@ def compare(
         _fail_above(kernels, most, f"further from {reference} than {fail_above} rad")
 
 
+def _of_files(files: list[Path] | None, choice: Choice) -> list[Backend]:
+    """Return files as back ends of a step that is compared."""
+    from strapgen.experiments.verification import file_backend
+
+    result = []
+    for path in files or ():
+        request = request_of(path)
+        if request.choice.kernel != choice.kernel:
+            raise InputError(f"{path} is {request.choice.kernel}, and {choice.kernel} is compared")
+        result.append(file_backend(path, request))
+    return result
+
+
 def _fail_above(kernels: list[ComparedKernel], most: float, said: str) -> None:
     """Exit with 1 if a back end is further from the reference than allowed."""
     beyond = [(each.kernel, row) for each in kernels for row in each.rows if not row.max_abs_rad <= most]
@@ -114,12 +141,13 @@ def _fail_above(kernels: list[ComparedKernel], most: float, said: str) -> None:
         raise typer.Exit(1)
 
 
-def _backends(text: str | None, reference: str) -> list[str]:
+def _backends(text: str | None, reference: str, files: list[Path] | None) -> list[str]:
     from strapgen.backends import BACKENDS, DEFAULT_BACKENDS
     from strapgen.support import checks
 
     one("--reference", reference)
-    names = backends("--backend", text, DEFAULT_BACKENDS)
+    # A file alone is compared with the reference.
+    names = [] if files and text is None else backends("--backend", text, DEFAULT_BACKENDS)
     checks.choice("reference", reference, BACKENDS)
     return names
 

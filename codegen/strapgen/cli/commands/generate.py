@@ -18,6 +18,7 @@ from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
     from strapgen.catalogue import Choice
+    from strapgen.ir.float_interface import RoundingBounds
     from strapgen.ir.sources import Sources
     from strapgen.library.generation import Request
 
@@ -51,6 +52,9 @@ def generate(
     Example: strapgen generate euler --method rk4 --increments 2 --target c --out firmware
 
     Example: strapgen generate euler --target c-fixed --word 32 --max-rate-deg-s 400 --step 0.01 --out firmware
+
+    Example: strapgen generate euler --target c-fixed --max-rate-deg-s 400 --sample-hz 100 --lsb 0.0175dps
+    --out firmware
     """
     check_format(format)
     if all_:
@@ -162,6 +166,8 @@ def _data(choice: Choice, sources: Sources, target: str, written: list[Path]) ->
         "operations": {kind: operations[kind] for kind in ("add", "multiply", "divide", "sqrt")},
         "temporaries": sources.temporaries,
     }
+    if sources.rounding is not None:
+        data["error_bounds"] = sources.rounding.as_data()
     if sources.fixed is None:
         return data
     program = generated_sources.program(choice)
@@ -181,7 +187,21 @@ def _text(sources: Sources, target: str, written: list[Path]) -> str:
             f"{float(bound / unit):.4f} of the last place"
             + (": of the size of the value, which certifies nothing" if useless else "")
         )
+    if sources.rounding is not None:
+        lines += _rounding_lines(sources.rounding)
     return "\n".join(lines)
+
+
+def _rounding_lines(rounding: RoundingBounds) -> list[str]:
+    """Return the error bound of every output in floating point."""
+    if rounding.reason:
+        return [f"  no error bound is known: {rounding.reason}"]
+    return [
+        f"  {name}: error at most {float(bound):.4g}, {float(bound / rounding.unit):.4f} of the last place of 1"
+        if bound
+        else f"  {name}: exact"
+        for name, bound in rounding.worst.items()
+    ]
 
 
 def _generate_all(output: SourceOptions, format: str) -> None:

@@ -110,6 +110,7 @@ def simulate(
     if matrices and output.format != "json":
         raise InputError("--matrices goes with --format json; --format csv has the matrices")
     fixed.check_backend(backend)
+    fixed.check_pulse(source.pulse_arcsec)
 
     import numpy as np
 
@@ -159,6 +160,7 @@ def _on_motion(
         float(checks.number("step", step, positive=True)),
         lambda: runs.largest_increment(profile, step, duration, samples, pulse, previous),
     )
+    pulse = pulse or backend.count
     run = runs.simulate(backend, profile, step, duration, intervals.orthonormalize, intervals.record, pulse)
     facts = _facts(backend, choice) | {
         "motion": profile.name,
@@ -183,6 +185,7 @@ def _on_recording(
     pulse = source.pulse
     data = source.recording()
     backend = build(data.interval * choice.increments_per_step, lambda: data.largest + (pulse or 0.0))
+    pulse = pulse or backend.count
     history = recording.propagate(backend, data, intervals.orthonormalize, intervals.record, pulse)
     title = f"{backend.kernel}, {backend.name}: attitude along {source.file.name}"
     facts = _facts(backend, choice) | {"source": str(source.file)}

@@ -37,11 +37,9 @@ def verify(
     """
     output.check(file, source.increments_csv, source.rates_csv)
     from strapgen.experiments import verification
-    from strapgen.library.generated_files import command_of, text_of
     from strapgen.reports.verification import verification_report
 
-    header, _ = verification.paths_of(file)
-    request = read_command(command_of(text_of(header)) or "")
+    request = request_of(file)
     increments = None
     if source.stated:
         source.check()
@@ -50,6 +48,15 @@ def verify(
     output.report(verification_report(result))
     if not result.holds:
         raise typer.Exit(1)
+
+
+def request_of(file: Path) -> Request:
+    """Return what the command in the header of a generated file asks for."""
+    from strapgen.experiments import verification
+    from strapgen.library.generated_files import command_of, text_of
+
+    header, _ = verification.paths_of(file)
+    return read_command(command_of(text_of(header)) or "")
 
 
 def read_command(command: str) -> Request:

@@ -7,10 +7,13 @@ from fractions import Fraction
 
 import numpy as np
 
+from strapgen.ir.float_interface import RoundingBounds
 from strapgen.ir.program import Operation, Program, walk
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Function, Sources
+from strapgen.rounding import rounding_bounds
 from strapgen.targets import contract, contract_lines, definitions
+from strapgen.targets.c.rounding_text import rounding_text, with_names
 from strapgen.targets.lines import fill_expression
 from strapgen.targets.names import C, function_name, printed
 from strapgen.targets.printer import Printer
@@ -112,7 +115,13 @@ def emit(program: Program, target: str) -> Sources:
     name = function_name(program, real.infix)
     # A scalar input has one name, which is that of its argument and of its element.
     scalars = [signal.name for signal in program.inputs if not signal.shape]
-    _, files = printed(program, lambda named, _: _files(named, name, target), C, scalars)
+    rounding = rounding_bounds(program, real.name)
+    _, files = printed(
+        program,
+        lambda named, _: _files(named, name, target, with_names(rounding, program, named)),
+        C,
+        scalars,
+    )
     function = Function(name, program.inputs, tuple(result.signal for result in program.outputs))
     return Sources(
         program.kernel,
@@ -124,10 +133,11 @@ def emit(program: Program, target: str) -> Sources:
         program.companions,
         recursion=program.recursion,
         runs=runs_of(name),
+        rounding=rounding,
     )
 
 
-def _files(program: Program, name: str, target: str) -> dict[str, str]:
+def _files(program: Program, name: str, target: str, rounding: RoundingBounds) -> dict[str, str]:
     """Return the header and the source of a program with its printed names."""
     real = real_of(target)
     printer = CPrinter(real, name)
@@ -137,10 +147,11 @@ def _files(program: Program, name: str, target: str) -> dict[str, str]:
         "program": program,
         "guard": f"{name}_h".upper(),
         "command": command,
-        "contract": contract_lines.of_program(program, name, command),
+        "contract": contract_lines.of_program(program, name, command, rounding),
         "definitions": definitions.of_program(program, name, printer),
         "normalizing": contract.upkeep_text(program, target=target),
         "real": real,
+        "rounding": rounding_text(rounding, program),
         "state": program.inputs[0],
         "samples": program.inputs[-1],
         "result": program.outputs[0].signal,

@@ -9,7 +9,7 @@ from strapgen.ir.integer_program import FixedProgram
 from strapgen.ir.sources import Function, Sources
 from strapgen.targets import contract, contract_lines, definitions
 from strapgen.targets.c_fixed.statements import StatementPrinter
-from strapgen.targets.c_fixed.words import WORDS
+from strapgen.targets.c_fixed.words import WORDS, memory_type
 from strapgen.targets.names import C, function_name, printed
 from strapgen.targets.rendering import PROPAGATE, own_call, render_c, runs_of
 
@@ -56,10 +56,11 @@ def _files(fixed: FixedProgram, name: str, target: str) -> dict[str, str]:
     """Return the header and the source of a program with its printed names."""
     interface, word = fixed.interface, WORDS[fixed.word].within(name)
     printer = StatementPrinter(fixed, word, name)
-    signals = [(a.signal, "const ") for a in interface.inputs] + [(a.signal, "") for a in interface.outputs]
+    signals = [(a.signal, f"const {memory_type(a)}") for a in interface.inputs]
+    signals += [(a.signal, memory_type(a)) for a in interface.outputs]
     feedback_words = len(interface.residuals)
-    pieces = [f"{constant}{word.type} {printer.memory(s.name)}[{s.size}]" for s, constant in signals]
-    arrays = [f"{constant}{word.type} *{s.name}" for s, constant in signals]
+    pieces = [f"{kind} {printer.memory(s.name)}[{s.size}]" for s, kind in signals]
+    arrays = [f"{kind} *{s.name}" for s, kind in signals]
     calls = [f"{s.name} + {s.size} * k" for s, _ in signals]
     if feedback_words:
         place = len(interface.inputs)
@@ -85,7 +86,7 @@ def _files(fixed: FixedProgram, name: str, target: str) -> dict[str, str]:
                 *PROPAGATE,
                 f"{name}_orthonormalizer orthonormalize",
                 f"const {word.type} *initial",
-                f"const {word.type} *{interface.inputs[-1].signal.name}",
+                f"const {memory_type(interface.inputs[-1])} *{interface.inputs[-1].signal.name}",
                 *([f"{word.residual} *residuals"] if feedback_words else []),
                 f"{word.type} *history",
                 "size_t *stopped",

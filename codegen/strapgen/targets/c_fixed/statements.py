@@ -44,14 +44,17 @@ class StatementPrinter:
         used = {name for value in self.fixed.body for name in used_by(value)}
         loads, checks = [], []
         for argument in interface.inputs:
-            assert argument.low == -argument.high, "inputs have symmetric ranges"
+            largest = argument.format.largest
+            whole = (argument.low, argument.high) == (-largest - 1, largest)  # whatever the memory holds
+            assert whole or argument.low == -argument.high, "inputs have symmetric ranges"
             limit = self.constant(argument.high)
             for number, element in enumerate(argument.signal.elements):
                 source = f"{self.memory(argument.signal.name)}[{number}]"
                 if element in used:
                     loads.append(f"const {kind} {element} = {source};")
                     source = element
-                checks.append(self._call("out", source, limit))
+                if not whole:
+                    checks.append(self._call("out", source, limit))
         body = [line for value in self.fixed.body for line in self.statements(value)]
         stores = [
             f"{self.memory(argument.signal.name)}[{number}] = {self._stored(name)};"
@@ -172,7 +175,7 @@ class StatementPrinter:
             text = self._joined([*words[:1], rounded, *words[1:]])
             return [*lines, _declared(kind, name, text, note)]
         coarse = [self.term(term) for term in definition.coarse]
-        if not coarse and not value.guarded:
+        if not coarse and not value.guarded and not value.saturated:
             return [*lines, _declared(kind, name, self.narrow(total, value, shift), note)]
         rounded = f"+{self._shifted(total, shift)}"
         return lines + self._result(value, kind, self._joined([*coarse[:1], rounded, *coarse[1:]]), note)
@@ -186,6 +189,8 @@ class StatementPrinter:
                 *self._guard(name, value),
                 _declared(kind, value.name, self.narrow(name, value), note),
             ]
+        if value.saturated:
+            return [_declared(kind, value.name, self._call("sat", text), note)]
         return [_declared(kind, value.name, self.narrow(text, value), note)]
 
     def _is_word(self, term: Term) -> bool:

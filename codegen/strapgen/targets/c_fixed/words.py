@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from strapgen.ir.fixed_interface import Argument
+
 
 @dataclass(frozen=True)
 class Word:
@@ -41,3 +43,8 @@ WORDS = {
     32: Word(32, "int32_t", "uint32_t", "int32_t", "int64_t", "uint64_t", "uint32_t"),
     64: Word(64, "int64_t", "uint64_t", "int64_t", "{}_wide_", "{}_magnitude_", "uint64_t"),
 }
+
+
+def memory_type(argument: Argument) -> str:
+    """Return the type of an argument's elements in memory: that of a word, or a shorter one of a gyro's counts."""
+    return f"int{argument.format.word}_t"

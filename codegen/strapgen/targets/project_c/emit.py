@@ -92,9 +92,13 @@ def step_main(sources: Sources, command: str, run: MotionRun) -> str:
 def _formats(sources: Sources) -> dict[str, Any]:
     """Return the fraction bits of the state and the format of the increments; nothing in floating point."""
     if sources.fixed is None:
-        return {"state_fraction": 0, "increments": None}
+        return {"state_fraction": 0, "increments": None, "increments_unit": ""}
     state, increments = sources.fixed.inputs
-    return {"state_fraction": state.format.fraction, "increments": increments}
+    return {
+        "state_fraction": state.format.fraction,
+        "increments": increments,
+        "increments_unit": repr(float(increments.unit)),
+    }
 
 
 def _values(sources: Sources, command: str, run: MotionRun, identity: Sequence[Fraction]) -> dict[str, Any]:

@@ -9,6 +9,7 @@ parts, only its product with T - 1 is left.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
 
@@ -32,10 +33,39 @@ from strapgen.ir.program import Constant, Node, Program, Reference, Result
 _MOST_TERMS = 1000
 
 
-def accumulation(context: Quantization, transition: Result, result: Argument) -> RoundingAccumulation | None:
-    """Return how the errors of a step add up; None where it calls more than sums, roots, sines and cosines.
+@dataclass(frozen=True)
+class StepErrors:
+    """What one call adds to the error of a run, element by element.
 
-    Lengths are those of a state, or of a row of a matrix: the norm in which a transition stretches least.
+    Parameters
+    ----------
+    local : tuple of Fraction
+        Error bounds of the elements of the state, less those of the transition and less what is fed back.
+    transition : tuple of Fraction
+        Error bounds of the elements of the transition, less what is fed back.
+    transition_feedback : tuple of Fraction
+        Bounds of what is fed back of the elements of the transition.
+    state_feedback : Fraction
+        Bound of what is fed back of an element of the state.
+    away : tuple of Fraction
+        Bounds of the distance of the transition from the identity.
+    moves : tuple of Fraction
+        How far the elements of the transition move when increments are rounded to their format.
+    saturation : Fraction
+        What a state that saturates loses of an element of 1.
+    """
+
+    local: tuple[Fraction, ...]
+    transition: tuple[Fraction, ...]
+    transition_feedback: tuple[Fraction, ...]
+    state_feedback: Fraction
+    away: tuple[Fraction, ...]
+    moves: tuple[Fraction, ...]
+    saturation: Fraction = Fraction(0)
+
+
+def step_errors(context: Quantization, transition: Result, result: Argument) -> StepErrors | None:
+    """Return what one call adds to the error of a run; None where it calls more than sums, roots, sines and cosines.
 
     Parameters
     ----------
@@ -45,34 +75,92 @@ def accumulation(context: Quantization, transition: Result, result: Argument) ->
     result : Argument
         The state after the step.
     """
-    quantities, state = context.quantities, context.program.inputs[0]
-    width = state.size // (state.shape[0] if len(state.shape) == 2 else 1)
-    length = quantities.items[state.elements[0]].range.magnitude * _root(Fraction(width))
+    quantities = context.quantities
     elements = [name for name in quantities.results[transition.signal.name] if isinstance(name, str)]
     rounded = [context.values[name] for name in elements if name in context.values]
-    feedbacks = [_feedback_rounding(context, value) for value in rounded]
-    errors = [value.error - 2 * fed_back for value, fed_back in zip(rounded, feedbacks, strict=True)]
-    transition_feedback = _norm(feedbacks)
-    away = _norm([quantities.distance(value.name) for value in rounded])
-    local, fed_back = _local_errors(context, elements, result)
-    state_feedback = fed_back * _root(Fraction(width))
-
-    per_step = max(_norm(local[k : k + width]) for k in range(0, len(local), width))
-    per_step += length * _norm(errors)
-    once = Fraction(0)
-    if context.settings.carry != "none":
-        per_step += state_feedback * away
-        once += 2 * state_feedback
-    if any(feedbacks):
-        per_step += 2 * transition_feedback * (length * away + state_feedback)
-        once += 2 * length * transition_feedback
+    # Where a state saturates, errors do not add up to what is fed back: it counts as any other.
+    saturates = any(context.values[name].saturated for name in result.values)
+    feedbacks = tuple(Fraction(0) if saturates else _feedback_rounding(context, value) for value in rounded)
+    errors = (value.error - 2 * fed_back for value, fed_back in zip(rounded, feedbacks, strict=True))
+    local, fed_back = _local_errors(context, elements, result, saturates)
     half_units = {argument.signal.name: argument.format.unit / 2 for argument in context.plan.inputs[1:]}
     moves = _moves(quantities, half_units)
     if moves is None:
         return None
-    input_rounding = length * _norm([moves[name] for name in elements])
-    growth = _growth(context.program, transition, quantities, width)
-    return RoundingAccumulation(once, per_step, input_rounding, growth)
+    moved = tuple(moves[name] for name in elements)
+    away = _away(context, transition)
+    saturation = result.format.unit if saturates else Fraction(0)
+    return StepErrors(tuple(local), tuple(errors), feedbacks, fed_back, away, moved, saturation)
+
+
+def accumulation(context: Quantization, transition: Result, errors: StepErrors) -> RoundingAccumulation:
+    """Return how the errors of a step add up.
+
+    Lengths are those of a state, or of a row of a matrix: the norm in which a transition stretches least.
+
+    Parameters
+    ----------
+    context : Quantization
+        The step, with all its values.
+    transition : Result
+    errors : StepErrors
+    """
+    quantities, state = context.quantities, context.program.inputs[0]
+    width = state.size // (state.shape[0] if len(state.shape) == 2 else 1)
+    length = quantities.items[state.elements[0]].range.magnitude * root(Fraction(width))
+    transition_feedback, away = norm(errors.transition_feedback), norm(errors.away)
+    state_feedback = errors.state_feedback * root(Fraction(width))
+
+    per_step = max(norm(errors.local[k : k + width]) for k in range(0, len(errors.local), width))
+    per_step += length * norm(errors.transition)
+    once = Fraction(0)
+    if errors.saturation:
+        # One element of a length of 1 or less can exceed the largest number, by a unit; so can the first state.
+        once, per_step = errors.saturation, per_step + errors.saturation
+    elif context.settings.carry != "none":
+        per_step += state_feedback * away
+        once += 2 * state_feedback
+    if transition_feedback:
+        per_step += 2 * transition_feedback * (length * away + state_feedback)
+        once += 2 * length * transition_feedback
+    return RoundingAccumulation(
+        once, per_step, length * norm(errors.moves), _growth(context, transition, width)
+    )
+
+
+def stretch(context: Quantization, transition: Result, width: int) -> Fraction | None:
+    """Return a bound of how far the squared singular values of any transition are from 1; None where none is known.
+
+    Parameters
+    ----------
+    context : Quantization
+    transition : Result
+    width : int
+        Number of elements of a row; of a vector, all.
+    """
+    program, quantities = context.program, context.quantities
+    if program.companions is not None and program.companions.isometry:
+        return Fraction(0)
+    inputs = [name for signal in program.inputs[1:] for name in signal.elements]
+    sizes = tuple(quantities.items[name].range.magnitude for name in inputs)
+    try:
+        return _expanded_stretch(program, transition, sizes, width)
+    except NotImplementedError:  # it calls functions
+        return None
+
+
+def _away(context: Quantization, transition: Result) -> tuple[Fraction, ...]:
+    """Return how far every element of the transition can be from that of the identity."""
+    quantities, kernels = context.quantities, context.program.companions
+    identity = kernels.identity if kernels is not None else ()
+    distances = []
+    for place, element in enumerate(quantities.results[transition.signal.name]):
+        one = identity[place] if place < len(identity) else Fraction(0)
+        if isinstance(element, str):
+            distances.append(quantities.distance(element) + abs(quantities.items[element].offset - one))
+        else:
+            distances.append(abs(element - one))
+    return tuple(distances)
 
 
 def _feedback_rounding(context: Quantization, value: Value) -> Fraction:
@@ -84,7 +172,7 @@ def _feedback_rounding(context: Quantization, value: Value) -> Fraction:
 
 
 def _local_errors(
-    context: Quantization, transition: Sequence[str], result: Argument
+    context: Quantization, transition: Sequence[str], result: Argument, saturates: bool
 ) -> tuple[list[Fraction], Fraction]:
     """Return what the elements of the state lose beside the errors of the transition, and what is fed back of it."""
     items, values = context.quantities.items, context.values
@@ -98,7 +186,7 @@ def _local_errors(
             for factor, other in (monomial, monomial[::-1])
             if other in transition and factor not in transition
         )
-        rounding = _feedback_rounding(context, value)
+        rounding = Fraction(0) if saturates else _feedback_rounding(context, value)
         fed_back = max(fed_back, rounding)
         local.append(value.error - through - 2 * rounding)
     return local, fed_back
@@ -117,7 +205,7 @@ def _moves(quantities: Quantities, by: Mapping[str, Fraction]) -> dict[str, Frac
             case Computed() | NearestInteger():
                 moves[name] = Fraction(0)  # within a function, whose slope tells what becomes of it
             case SquareRoot(argument):
-                moves[name] = _root(moves[argument])
+                moves[name] = root(moves[argument])
             case _:
                 return None
         if quantity.follows is not None:
@@ -147,38 +235,58 @@ def _function_move(follows: ErrorPropagation, moves: Mapping[str, Fraction]) -> 
     return min(total, follows.most)
 
 
-def _norm(values: Sequence[Fraction]) -> Fraction:
+def norm(values: Sequence[Fraction]) -> Fraction:
     """Return a length that is not below that of a vector."""
-    return _root(sum((value * value for value in values), Fraction(0)))
+    return root(sum((value * value for value in values), Fraction(0)))
 
 
-def _root(value: Fraction) -> Fraction:
+def root(value: Fraction) -> Fraction:
     """Return a number that is not below a square root."""
     return Interval.of(value).sqrt().highest
 
 
-def _growth(program: Program, transition: Result, quantities: Quantities, width: int) -> Fraction:
+def _growth(context: Quantization, transition: Result, width: int) -> Fraction:
     """Return a number that is not below the norm of any transition.
 
     The transition is expanded in its inputs to a degree at which it stays short, the rest bounded; in T T' - 1 the
     terms then cancel that a rotation does not have.
     """
+    stretched = stretch(context, transition, width)
+    if stretched is not None:
+        return root(1 + stretched)
+    # The identity, and the length of what is added to it.
+    return 1 + norm(_away(context, transition))
+
+
+def transition_growth(
+    program: Program, transition: Result, sizes: tuple[Fraction, ...], width: int, coarse: Fraction
+) -> Fraction:
+    """Return a number that is not below the norm of any transition.
+
+    Parameters
+    ----------
+    program : Program
+    transition : Result
+    sizes : tuple of Fraction
+        Largest magnitude of every element of the inputs behind the state.
+    width : int
+        Elements of a row of the state.
+    coarse : Fraction
+        Such a number for a transition that calls functions.
+    """
     if program.companions is not None and program.companions.isometry:
         return Fraction(1)
-    inputs = [name for signal in program.inputs[1:] for name in signal.elements]
-    sizes = tuple(quantities.items[name].range.magnitude for name in inputs)
     try:
-        return _expanded_growth(program, transition, sizes, width)
-    except NotImplementedError:  # it calls functions: the identity, and the length of what is added to it
-        elements = quantities.results[transition.signal.name]
-        return 1 + _norm([quantities.distance(name) for name in elements if isinstance(name, str)])
+        return root(1 + _expanded_stretch(program, transition, sizes, width))
+    except NotImplementedError:
+        return coarse
 
 
 @lru_cache(maxsize=64)
-def _expanded_growth(
+def _expanded_stretch(
     program: Program, transition: Result, sizes: tuple[Fraction, ...], width: int
 ) -> Fraction:
-    """Return what `_growth` does, which no word and no rounding changes.
+    """Return what `stretch` does, which no word and no rounding changes.
 
     Raises
     ------
@@ -196,7 +304,7 @@ def _expanded_growth(
             product = series.dot(row, other)
             total += series.size(series.less(product, one) if other is row else product)
         largest = max(largest, total)
-    return _root(1 + largest)
+    return largest
 
 
 def _expanded(program: Program, transition: Result, series: Truncated) -> list[Series]:

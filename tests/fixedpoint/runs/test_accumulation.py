@@ -12,9 +12,9 @@ from derived import program, quantized
 from strapgen import generate
 from strapgen.backends.fixed import ModelEvaluator
 from strapgen.catalogue import Choice
-from strapgen.fixedpoint.accumulation import _moves
 from strapgen.fixedpoint.derivation import quantities
 from strapgen.fixedpoint.intervals import Interval
+from strapgen.fixedpoint.runs.accumulation import _moves
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.program import Assignment, Constant, Operation, Program, Reference, Result
 from strapgen.ir.signals import Signal

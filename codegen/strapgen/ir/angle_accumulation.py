@@ -1,0 +1,140 @@
+"""How rounding turns the attitude over the steps of a run: a bound that is linear in their number."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from fractions import Fraction
+from typing import Any
+
+#: Largest error of an element of an orthonormalization's result for which anything is proved.
+LARGEST_ERROR = Fraction(1, 1 << 12)
+
+
+@dataclass(frozen=True)
+class AngleAccumulation:
+    """The angle between the computed attitude and that of exact arithmetic on the same increments.
+
+    It is at most ``once + per_step N + per_normalization M`` after N steps and M normalizations, while the state stays
+    proper. A vector of parameters is proper while its length is at least `shortest`; a matrix while its singular values
+    lie between `shortest` and the root of 2 - `shortest`**2. The attitude of a matrix is the nearest rotation.
+
+    Parameters
+    ----------
+    once : Fraction
+        The part that does not depend on the number of steps, in rad.
+    per_step : Fraction
+        What every step adds, in rad.
+    input_rounding : Fraction
+        What every step adds if increments are rounded to their format first, in rad.
+    per_normalization : Fraction
+        What a normalization adds that multiplies the words of the state by one factor and rounds each of them once; an
+        orthonormalization of a matrix adds it too, in rad.
+    per_element : Fraction or None
+        What an orthonormalization adds beside, times the error of an element of its result; None where nothing is
+        proved. It multiplies the matrix C by a symmetric expansion of the inverse root of C'C.
+    shortest : Fraction
+        Length, or singular value, from which the bound holds.
+    start : Fraction
+        Least length of the state from which `proved_steps` counts; of a matrix, least singular value, the largest being
+        at most the root of 2 - `start`**2.
+    proved_steps : int
+        Number of steps in which the state is proved to stay proper.
+    beyond : Fraction
+        Factor of the bound of a run of more steps in which the state stays proper all the same.
+    orthonormalized : Fraction
+        Factor of what the steps add to a run with orthonormalizations.
+    dual_rows_apart : int
+        Most steps from one orthonormalization by dual rows to the next; 0 where nothing is proved of that scheme.
+    dual_rows_growth : Fraction
+        With that scheme, every orthonormalization stretches the error before it by 1 and this much at most.
+    """
+
+    once: Fraction
+    per_step: Fraction
+    input_rounding: Fraction
+    per_normalization: Fraction
+    per_element: Fraction | None
+    shortest: Fraction
+    start: Fraction
+    proved_steps: int
+    beyond: Fraction
+    orthonormalized: Fraction
+    dual_rows_apart: int
+    dual_rows_growth: Fraction
+
+    @property
+    def dual_rows_error(self) -> Fraction:
+        """Largest error of an element of an orthonormalization by dual rows for which anything is proved."""
+        return (1 - self.shortest) / 1024
+
+    @property
+    def dual_rows_start(self) -> Fraction:
+        """How far from 1 the squared singular values of a matrix may be where a run with dual rows begins."""
+        return (1 - self.shortest) / 65
+
+    def bound(
+        self,
+        steps: int,
+        normalizations: int = 0,
+        error: Fraction | float = 0,
+        rounded_inputs: bool = False,
+        dual_rows: bool = False,
+    ) -> float:
+        """Return a bound of the angle after a number of steps, in rad; inf where nothing is proved.
+
+        Parameters
+        ----------
+        steps : int
+        normalizations : int, optional
+            Number of normalizations, or of orthonormalizations, among them; at most `proved_steps` apart, and those by
+            dual rows `dual_rows_apart`.
+        error : number, optional
+            Error bound of an element of an orthonormalization's result, up to `LARGEST_ERROR`; of no effect on a vector
+            of parameters.
+        rounded_inputs : bool, optional
+            Whether increments are rounded to their format first.
+        dual_rows : bool, optional
+            Whether the scheme of dual rows orthonormalizes.
+
+        Examples
+        --------
+        >>> one, unit = Fraction(1), Fraction(1, 1000)
+        >>> run = AngleAccumulation(4 * unit, unit, unit, 2 * unit, 0 * one, one / 2, one, 100, one, one, 0, 0 * one)
+        >>> round(run.bound(10, normalizations=1), 6)
+        0.016
+        """
+        total = self.once + steps * (self.per_step + (self.input_rounding if rounded_inputs else 0))
+        if normalizations:
+            limit = self.dual_rows_error if dual_rows else LARGEST_ERROR
+            if self.per_element is None or (self.per_element and error > limit):
+                return math.inf
+            added = self.per_normalization + self.per_element * Fraction(error)
+            total = total * self.orthonormalized + normalizations * added
+            if dual_rows:
+                return self._stretched(total, normalizations)
+        elif steps > self.proved_steps:
+            total *= self.beyond
+        return math.nextafter(float(total), math.inf)
+
+    def _stretched(self, total: Fraction, normalizations: int) -> float:
+        """Return a bound after so many orthonormalizations by dual rows."""
+        exponent = normalizations * float(self.dual_rows_growth)
+        if not self.dual_rows_apart or exponent > 100:
+            return math.inf
+        return float(total) * math.exp(exponent) * (1 + 1e-12)  # which covers the rounding of this line
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the record as plain JSON data; fractions are text."""
+        return {
+            name: str(value) if isinstance(value, Fraction) else value for name, value in asdict(self).items()
+        }
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> AngleAccumulation:
+        """Rebuild the record from `as_dict`."""
+        fractions: dict[str, Any] = {
+            name: Fraction(value) if isinstance(value, str) else value for name, value in data.items()
+        }
+        return cls(**fractions)

@@ -1,0 +1,120 @@
+"""`Sensor` is the scale of a gyro that counts: the angle of one count, which need not be a power of two."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from strapgen.support import checks
+from strapgen.support.exceptions import InputError
+
+#: pi to 50 decimals: what it leaves out of a scale is below 1e-50 of it.
+_PI = Fraction(314159265358979323846264338327950288419716939937510, 10**50)
+#: Units of a rate a count, each with the rate in rad/s and the name that people read.
+_RATES = {
+    "mdps": (_PI / 180000, "mdeg/s"),
+    "dps": (_PI / 180, "deg/s"),
+    "rad/s": (Fraction(1), "rad/s"),
+}
+#: The unit of an angle a count.
+_ANGLE = "rad"
+#: Bits of a count where none are stated: those of nearly all gyros.
+DEFAULT_BITS = 16
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """The scale of a gyro that counts.
+
+    A count c stands for the angle ``c * count``. Code computes with ``u = c * 2**-fraction``, so that
+    ``c * count = scale * u``; the scale is above 1/2 and at most 1.
+
+    Parameters
+    ----------
+    count : Fraction
+        Angle of one count in rad.
+    unit : str
+        That angle in the user's words.
+    stated : str
+        The options of the command line that it follows from.
+
+    Examples
+    --------
+    >>> Sensor.of("0.0175dps", Fraction(1, 100)).fraction
+    18
+    >>> Sensor.of("1/1000rad").scale
+    Fraction(64, 125)
+    """
+
+    count: Fraction
+    unit: str
+    stated: str
+
+    @classmethod
+    def of(cls, lsb: Any, interval: Fraction | None = None, heard: str = "") -> Sensor:
+        """Return the scale that a user states.
+
+        Parameters
+        ----------
+        lsb : str
+            Rate a count with its unit, "0.0175dps", "17.5mdps" or "3e-4rad/s"; or angle a count, "3e-6rad".
+        interval : Fraction, optional
+            Time of a count in s; a rate needs it.
+        heard : str, optional
+            The options of the command line that the interval follows from.
+
+        Raises
+        ------
+        InputError
+            If it is no number with one of these units, or a rate comes without an interval.
+        """
+        text = str(lsb).strip()
+        unit = next((unit for unit in (*_RATES, _ANGLE) if text.endswith(unit)), None)
+        if unit is None:
+            raise InputError(
+                f"lsb is {text!r}; a number with its unit is needed: {', '.join(_RATES)} for a rate a count, "
+                "as 0.0175dps, or rad for an angle"
+            )
+        value = checks.number("lsb", text.removesuffix(unit), positive=True)
+        digits = text.removesuffix(unit).strip()
+        if unit == _ANGLE:
+            return cls(value, f"{digits} rad", f"--lsb-rad {digits}")
+        if interval is None:
+            raise InputError(f"lsb {text} is a rate; --sample-hz is missing, which makes it an angle")
+        rate, name = _RATES[unit]
+        angle = value * rate * interval
+        stated = f"{heard} --lsb {digits}{unit}".strip()
+        return cls(angle, f"{digits} {name} * {_decimal(interval)} s", stated)
+
+    @property
+    def fraction(self) -> int:
+        """Fraction bits of the number that a count is in the code."""
+        bits = self.count.denominator.bit_length() - self.count.numerator.bit_length()
+        return bits - 1 if self.count * Fraction(2) ** bits > 1 else bits
+
+    @property
+    def scale(self) -> Fraction:
+        """What that number is multiplied with in exact arithmetic, above 1/2 and at most 1."""
+        return self.count * Fraction(2) ** self.fraction
+
+    @property
+    def is_rounded(self) -> bool:
+        """Whether pi is in the scale, which is then off by less than 1e-50 of itself."""
+        return "deg" in self.unit
+
+    def as_dict(self) -> dict[str, str]:
+        """Return the scale as plain JSON data."""
+        return {"count": str(self.count), "unit": self.unit, "stated": self.stated}
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, str]) -> Sensor:
+        """Rebuild a scale from `as_dict`."""
+        return cls(Fraction(data["count"]), data["unit"], data["stated"])
+
+
+def _decimal(value: Fraction) -> str:
+    """Return a time as a decimal if it has one of few digits, else as a fraction."""
+    text = f"{float(value):.12g}"
+    return text if Fraction(text) == value else str(value)

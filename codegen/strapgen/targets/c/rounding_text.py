@@ -1,0 +1,96 @@
+"""Writes in words what is proved of the rounding of a function in floating point, for the head of its file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from fractions import Fraction
+
+from strapgen.ir.float_interface import Condition, RoundingBounds
+from strapgen.ir.program import Program
+from strapgen.targets.contract import decimal_above
+
+
+def with_names(bounds: RoundingBounds, program: Program, named: Program) -> RoundingBounds:
+    """Return the bounds of a program with the names that are printed.
+
+    Parameters
+    ----------
+    bounds : RoundingBounds
+    program, named : Program
+        The program that they are of, and the same with the printed names.
+    """
+    names = dict(zip(_names(program), _names(named), strict=True))
+
+    def renamed(condition: Condition) -> Condition:
+        words, space, name = condition.value.rpartition(" ")
+        return replace(condition, value=words + space + names[name])
+
+    return replace(
+        bounds,
+        inputs=tuple(map(renamed, bounds.inputs)),
+        conditions=tuple(map(renamed, bounds.conditions)),
+        errors={names[name]: errors for name, errors in bounds.errors.items()},
+    )
+
+
+def _names(program: Program) -> Iterator[str]:
+    yield from (signal.name for signal in program.inputs)
+    yield from (assignment.name for assignment in program.body)
+    yield from (result.signal.name for result in program.outputs)
+
+
+def rounding_text(bounds: RoundingBounds, program: Program) -> str:
+    """Return the error bounds of a call and of a run, with their conditions.
+
+    Parameters
+    ----------
+    bounds : RoundingBounds
+    program : Program
+
+    Returns
+    -------
+    str
+        Sentences without the last full stop.
+    """
+    if bounds.reason:
+        return f"no bound is known, because {bounds.reason}"
+    if not any(bounds.worst.values()):
+        return "none, every output is exact"
+    text = f"against exact arithmetic on the same inputs, {_errors(bounds)}"
+    if bounds.accumulation is not None:
+        row = "row of the error" if len(program.inputs[0].shape) == 2 else "error"
+        growth = bounds.accumulation.growth - 1
+        stretched = f" exp({decimal_above(growth)} N)" if growth else ""
+        text += f"; the {row} after N steps is at most {decimal_above(bounds.accumulation.per_step)} N{stretched} long"
+    return f"{text}. This holds for {_conditions(bounds)}"
+
+
+def _errors(bounds: RoundingBounds) -> str:
+    """Return the largest error of every output."""
+    parts = [
+        f"{name} is off by at most {decimal_above(worst)}" if worst else f"{name} is exact"
+        for name, worst in bounds.worst.items()
+    ]
+    if len(parts) == 1:
+        parts[0] += f", {decimal_above(bounds.worst.popitem()[1] / bounds.unit)} units in the last place of 1"
+    return ", ".join(parts)
+
+
+def _conditions(bounds: RoundingBounds) -> str:
+    """Return what the bounds hold for."""
+    sizes: dict[str, list[str]] = {}
+    for condition in bounds.inputs:
+        sizes.setdefault(f"up to {_plain(condition.high)}", []).append(condition.value)
+    for condition in bounds.conditions:
+        limits = f"from {_plain(condition.low)} to {_plain(condition.high)}"
+        sizes.setdefault(limits, []).append(condition.value)
+    parts = [f"{', '.join(names)} {size}" for size, names in sizes.items()]
+    if bounds.functions:
+        names = " and ".join(bounds.functions)
+        parts.append(f"{names} of the C library within a unit in the last place")
+    return "; ".join([*parts, "IEEE 754, each operation rounded to the nearest; -ffp-contract=off"])
+
+
+def _plain(value: Fraction) -> str:
+    return f"{float(value):.6g}"
