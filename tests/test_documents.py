@@ -366,6 +366,49 @@ def test_the_commands_on_own_algorithms(shown_files, capsys):
         run(command, capsys)
 
 
+# The page for reviewers
+
+
+def plain(text: str) -> str:
+    """Return a text with its comments' stars and line ends as single spaces."""
+    return re.sub(r"\s+(?:\* )?\s*", " ", text)
+
+
+#: What the page names beside the words of two files: kernels with other codes or limits, other settings, commands.
+ELSEWHERE = {
+    *("EULER_RK4_2_W32_TOO_FAR", "EULER_RK4_2_W32_FIRST_RESIDUALS", "LOW", "HIGH", "_div", "_rt", "_sat"),
+    *("saturates", "in, out residuals", "N passed, N failed", "generate", "verify", "cost"),
+}
+
+
+def test_the_page_for_reviewers_shows_what_generated_files_hold():
+    page, folder = DOCS["generated-code"], ROOT / "generated"
+    names = ["c_fixed/euler_rk4_2_w32.h", "c_fixed/euler_rk4_2_w32.c", "c_float/euler_rk4_2_float.h"]
+    texts = [(folder / name).read_text() for name in [*names, "c_float/euler_rk4_2_float.c"]]
+    (code,) = blocks(page, "c")
+    assert missing(code, texts[1]) == []
+    held = plain("".join([*names, *texts]))
+    prose = re.sub(r"^```.*?^```", "", page, flags=re.MULTILINE | re.DOTALL)
+    spans = {span.replace("<NAME>", "EULER_RK4_2_W32") for span in re.findall(r"`([^`]+)`", prose)}
+    parts = {
+        part.strip()
+        for span in spans
+        if not re.match(r"-|strapgen [a-z]", span)
+        for part in span.split("...")
+    }
+    assert len(parts) >= 40
+    assert {part for part in parts if part not in held} <= ELSEWHERE
+    assert set(re.findall(r"`(_\w+)`", prose)) - {"__FRAMAC__", "__FAST_MATH__"} == helpers() | {"_sat"}
+
+
+def helpers() -> set[str]:
+    """Return how the names of the helpers of the catalogue's fixed-point sources end."""
+    ends = set()
+    for path in (ROOT / "generated" / "c_fixed").glob("*.c"):
+        ends |= set(re.findall(rf"^static .*?\b{path.stem}(_\w+)\(", path.read_text(), flags=re.MULTILINE))
+    return ends
+
+
 # How to add something
 
 

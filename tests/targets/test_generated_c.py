@@ -7,12 +7,14 @@ import re
 import shutil
 import subprocess
 import sys
+from fractions import Fraction
 from pathlib import Path
 
 import pytest
 
 from strapgen.catalogue import standard
 from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.sensor import Sensor
 from strapgen.library import generated_sources
 from strapgen.support import resources
 
@@ -39,6 +41,8 @@ CROSS = {
     "riscv64-unknown-elf-gcc": ["-march=rv32imc", "-mabi=ilp32"],
     "avr-gcc": ["-mmcu=atmega2560", "-Wno-double-promotion"],
 }
+#: Increments in counts of a gyro, in 16 bits, and a state that saturates.
+SENSOR = Settings(32, Fraction(1, 32), sensor=Sensor.of("0.0175dps", Fraction(1, 200)), state="q31")
 #: Kernels whose error feedback is printed in all ways that there are, and words of other lengths.
 WITH_FEEDBACK = [
     *(
@@ -48,6 +52,7 @@ WITH_FEEDBACK = [
     *((name, Settings(32, carry="full")) for name in ("euler-normalize", "dcm-orthonormalize", "dcm-update")),
     ("dcm-rk4-2", Settings(16, carry="state", rounding="truncation")),
     ("euler-normalize", Settings(16)),
+    ("euler-rk2-2", SENSOR),
 ]
 
 
@@ -169,7 +174,7 @@ def helpers(name: str, text: str) -> set[str]:
     """Return what stands before the function of a source, in parts, without the name of the function."""
     stem = name.removesuffix(".c")
     head = text[text.index("#include") : re.search(rf"\n\w+ {stem}\(", text).start()]
-    return {part.replace(stem, "function") for part in re.split(r"\n\n(?=/\*)", head)}
+    return {part.strip().replace(stem, "function") for part in re.split(r"\n\n(?=/\*)", head)}
 
 
 def broken_rules(folder: Path, files: dict[str, str]) -> set[str]:
@@ -199,6 +204,19 @@ def explained(*where: str) -> set[str]:
     rows = re.findall(r"^\| (\d+\.\d+) \| \w+ \| ([\w ]+) \|", (ROOT / "docs" / "misra.md").read_text(), re.M)
     assert 0 < len(rows) <= 8 and {kind for _, kind in rows} <= {"all", "fixed point"}
     return {rule for rule, kind in rows if kind in where}
+
+
+def test_helpers_have_one_text_and_are_called():
+    """A reviewer reads each of them once."""
+    helper_texts: dict[str, set[str]] = {}
+    for path in (resources.folder("generated") / "c_fixed").glob("*.c"):
+        text = path.read_text()
+        for part in helpers(path.name, text):
+            for ending in set(re.findall(r"^static .*?\bfunction(_\w+)\(", part, flags=re.MULTILINE)):
+                helper_texts.setdefault(ending, set()).add(part)
+                assert f"{path.stem}{ending}(" in text[re.search(rf"\nint {path.stem}\(", text).start() :]
+    assert {ending: len(texts) for ending, texts in helper_texts.items()} == dict.fromkeys(helper_texts, 1)
+    assert {"_out", "_mul", "_fit", "_shr", "_div", "_rt"} <= helper_texts.keys()
 
 
 @pytest.mark.long
