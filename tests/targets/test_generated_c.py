@@ -11,7 +11,7 @@ import pytest
 
 from strapgen.catalogue import standard
 from strapgen.ir.fixed_settings import Settings
-from strapgen.library import generated_sources
+from strapgen.library import generated_sources, two_speed_sources
 from strapgen.support import resources
 
 ROOT = Path(__file__).parents[2]
@@ -44,6 +44,9 @@ def texts() -> dict[str, str]:
     folder = resources.folder("generated")
     found = {path.name: path.read_text() for name in FOLDERS for path in (folder / name).glob("*.[ch]")}
     assert len(found) > 200
+    for target in ("c", "c-fixed"):
+        loops = Settings(carry="full") if target == "c-fixed" else None
+        found |= two_speed_sources.sources("dcm", 2, target, loops).step_files
     settings = Settings(32, carry="full")
     for choice in standard():
         if choice.kernel in ("euler-rk4-2", "dcm-rk1-2"):
