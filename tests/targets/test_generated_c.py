@@ -85,7 +85,7 @@ FORMAT = r"Q-?\d+\.-?\d+, \S+ \.\. \S+, (exact|error \S+)(; stands for [^*]+)?"
 def test_every_fixed_point_value_has_its_format_range_and_error():
     values = 0
     for name, text in texts().items():
-        if not name.endswith("_w32.c"):
+        if not name.endswith("_w32.c") or "memset" in text:  # what calls loops computes nothing itself
             continue
         body = text[text.index(f"\nint {name[:-2]}(") :]
         for declaration in re.findall(
