@@ -322,6 +322,7 @@ KNOWN = [
     *(
         "hypot",
         "write",
+        "step",
         "main",
         "read",
         "index",

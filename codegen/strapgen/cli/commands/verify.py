@@ -77,7 +77,8 @@ def read_command(command: str) -> Request:
     words = shlex.split(command)
     if words[:2] != ["strapgen", "generate"]:
         raise InputError(
-            f"'{command}' does not generate one function; verify takes the files of strapgen generate"
+            f"'{command}' does not generate one function; verify takes the files of strapgen generate, and so "
+            "each loop of an algorithm in two speeds"
         )
     alone = typer.Typer()
     alone.command(cls=PlainCommand)(generate.generate)
