@@ -33,10 +33,8 @@
 #define CAYLEY_KLEIN_FROM_EULER_W32_CONVERTED_LIMIT INT32_C(1140850688) /* largest magnitude */
 
 /* What a call returns. */
-enum {
-    CAYLEY_KLEIN_FROM_EULER_W32_OK = 0,
-    CAYLEY_KLEIN_FROM_EULER_W32_OUT_OF_RANGE = 1 /* an input lies outside its range */
-};
+#define CAYLEY_KLEIN_FROM_EULER_W32_OK 0
+#define CAYLEY_KLEIN_FROM_EULER_W32_OUT_OF_RANGE 1 /* an input lies outside its range */
 
 #ifdef __cplusplus
 extern "C" {

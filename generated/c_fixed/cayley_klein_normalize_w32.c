@@ -26,11 +26,13 @@ static __attribute__((noinline)) int64_t cayley_klein_normalize_w32_mul(int32_t 
     const int32_t b_high = (b < 0) ? ~(~b >> 16) : (b >> 16);
     const uint32_t low = a_low * b_low;
     const int32_t middle = (a_high * (int32_t)b_low) + (int32_t)(low >> 16);
-    const int32_t other = (b_high * (int32_t)a_low) + (int32_t)((uint32_t)middle & 0xFFFFu);
+    const uint32_t middle_low = (uint32_t)middle & 0xFFFFu;
+    const int32_t other = (b_high * (int32_t)a_low) + (int32_t)middle_low;
     const int32_t high = (a_high * b_high) + ((middle < 0) ? ~(~middle >> 16) : (middle >> 16))
         + ((other < 0) ? ~(~other >> 16) : (other >> 16));
     const uint64_t bits = ((uint64_t)(uint32_t)high << 32) | ((uint32_t)a * (uint32_t)b);
-    return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
+    const uint64_t complement = UINT64_MAX - bits;
+    return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)complement);
 }
 #else
 static inline int64_t cayley_klein_normalize_w32_mul(int32_t a, int32_t b)
@@ -49,8 +51,9 @@ static inline int32_t cayley_klein_normalize_w32_fit(int64_t x, int n)
 #ifdef __FRAMAC__
     return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
 #else
-    const int beyond = (n > 32) ? (n - 32) : 0;
-    const uint32_t bits = (uint32_t)((uint64_t)x >> (n - beyond));
+    const int first = (n > 32) ? 32 : n;
+    const int beyond = n - first;
+    const uint32_t bits = (uint32_t)((uint64_t)x >> first);
     const int32_t high = (bits <= (UINT32_MAX >> 1)) ? (int32_t)bits
                                                  : (-1 - (int32_t)(UINT32_MAX - bits));
     return (high < 0) ? ~(~high >> beyond) : (high >> beyond);
@@ -73,9 +76,9 @@ static int64_t cayley_klein_normalize_w32_div(int64_t numerator, int64_t denomin
 }
 
 /* Square root bit by bit, to the nearest. */
-static int32_t cayley_klein_normalize_w32_rt(uint64_t square)
+static int32_t cayley_klein_normalize_w32_rt(int64_t square)
 {
-    uint64_t rest = square;
+    uint64_t rest = (uint64_t)square;
     uint64_t root = 0;
     uint64_t bit = (uint64_t)1 << 62;
     while (bit != 0u) {
@@ -87,7 +90,10 @@ static int32_t cayley_klein_normalize_w32_rt(uint64_t square)
         }
         bit >>= 2;
     }
-    return (int32_t)((rest > root) ? (root + 1u) : root);
+    if (rest > root) {
+        root += 1u;
+    }
+    return (int32_t)root;
 }
 
 int cayley_klein_normalize_w32(const int32_t state[4], int32_t next[4])
@@ -110,8 +116,8 @@ int cayley_klein_normalize_w32(const int32_t state[4], int32_t next[4])
         || (inverse_norm_radicand > (INT64_C(1) << 61))) {
         return 2;
     }
-    const int32_t inverse_norm_root = cayley_klein_normalize_w32_rt((uint64_t)(
-        cayley_klein_normalize_w32_shr(inverse_norm_radicand, 2)));
+    const int32_t inverse_norm_root = cayley_klein_normalize_w32_rt(
+        cayley_klein_normalize_w32_shr(inverse_norm_radicand, 2));
         /* Q2.29, 0.707 .. 1.42, error 9.4e-10 */
     /* 1/|state| */
     const int32_t inverse_norm = cayley_klein_normalize_w32_fit(cayley_klein_normalize_w32_div(

@@ -36,11 +36,9 @@
 #define CAYLEY_KLEIN_PRODUCT_W32_NEXT_LIMIT INT32_C(1140850688) /* largest magnitude */
 
 /* What a call returns. */
-enum {
-    CAYLEY_KLEIN_PRODUCT_W32_OK = 0,
-    CAYLEY_KLEIN_PRODUCT_W32_OUT_OF_RANGE = 1, /* an input lies outside its range */
-    CAYLEY_KLEIN_PRODUCT_W32_TOO_FAR = 2 /* a value on the way leaves its limits */
-};
+#define CAYLEY_KLEIN_PRODUCT_W32_OK 0
+#define CAYLEY_KLEIN_PRODUCT_W32_OUT_OF_RANGE 1 /* an input lies outside its range */
+#define CAYLEY_KLEIN_PRODUCT_W32_TOO_FAR 2 /* a value on the way leaves its limits */
 
 #ifdef __cplusplus
 extern "C" {

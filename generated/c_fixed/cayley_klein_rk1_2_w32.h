@@ -50,10 +50,8 @@
     {INT32_C(1073741824), 0, 0, 0}
 
 /* What a call returns. */
-enum {
-    CAYLEY_KLEIN_RK1_2_W32_OK = 0,
-    CAYLEY_KLEIN_RK1_2_W32_OUT_OF_RANGE = 1 /* an input lies outside its range */
-};
+#define CAYLEY_KLEIN_RK1_2_W32_OK 0
+#define CAYLEY_KLEIN_RK1_2_W32_OUT_OF_RANGE 1 /* an input lies outside its range */
 
 #ifdef __cplusplus
 extern "C" {

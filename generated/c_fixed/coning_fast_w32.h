@@ -48,11 +48,9 @@
 #define CONING_FAST_W32_NEXT_PREVIOUS_INCREMENT_LIMIT INT32_C(1073741824) /* largest magnitude */
 
 /* What a call returns. */
-enum {
-    CONING_FAST_W32_OK = 0,
-    CONING_FAST_W32_OUT_OF_RANGE = 1, /* an input lies outside its range */
-    CONING_FAST_W32_TOO_FAR = 2 /* a value on the way leaves its limits */
-};
+#define CONING_FAST_W32_OK 0
+#define CONING_FAST_W32_OUT_OF_RANGE 1 /* an input lies outside its range */
+#define CONING_FAST_W32_TOO_FAR 2 /* a value on the way leaves its limits */
 
 #ifdef __cplusplus
 extern "C" {

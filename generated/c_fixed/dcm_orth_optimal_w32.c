@@ -27,11 +27,13 @@ static __attribute__((noinline)) int64_t dcm_orth_optimal_w32_mul(int32_t a, int
     const int32_t b_high = (b < 0) ? ~(~b >> 16) : (b >> 16);
     const uint32_t low = a_low * b_low;
     const int32_t middle = (a_high * (int32_t)b_low) + (int32_t)(low >> 16);
-    const int32_t other = (b_high * (int32_t)a_low) + (int32_t)((uint32_t)middle & 0xFFFFu);
+    const uint32_t middle_low = (uint32_t)middle & 0xFFFFu;
+    const int32_t other = (b_high * (int32_t)a_low) + (int32_t)middle_low;
     const int32_t high = (a_high * b_high) + ((middle < 0) ? ~(~middle >> 16) : (middle >> 16))
         + ((other < 0) ? ~(~other >> 16) : (other >> 16));
     const uint64_t bits = ((uint64_t)(uint32_t)high << 32) | ((uint32_t)a * (uint32_t)b);
-    return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
+    const uint64_t complement = UINT64_MAX - bits;
+    return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)complement);
 }
 #else
 static inline int64_t dcm_orth_optimal_w32_mul(int32_t a, int32_t b)
@@ -50,8 +52,9 @@ static inline int32_t dcm_orth_optimal_w32_fit(int64_t x, int n)
 #ifdef __FRAMAC__
     return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
 #else
-    const int beyond = (n > 32) ? (n - 32) : 0;
-    const uint32_t bits = (uint32_t)((uint64_t)x >> (n - beyond));
+    const int first = (n > 32) ? 32 : n;
+    const int beyond = n - first;
+    const uint32_t bits = (uint32_t)((uint64_t)x >> first);
     const int32_t high = (bits <= (UINT32_MAX >> 1)) ? (int32_t)bits
                                                  : (-1 - (int32_t)(UINT32_MAX - bits));
     return (high < 0) ? ~(~high >> beyond) : (high >> beyond);
@@ -74,9 +77,9 @@ static int64_t dcm_orth_optimal_w32_div(int64_t numerator, int64_t denominator)
 }
 
 /* Square root bit by bit, to the nearest. */
-static int32_t dcm_orth_optimal_w32_rt(uint64_t square)
+static int32_t dcm_orth_optimal_w32_rt(int64_t square)
 {
-    uint64_t rest = square;
+    uint64_t rest = (uint64_t)square;
     uint64_t root = 0;
     uint64_t bit = (uint64_t)1 << 62;
     while (bit != 0u) {
@@ -88,7 +91,10 @@ static int32_t dcm_orth_optimal_w32_rt(uint64_t square)
         }
         bit >>= 2;
     }
-    return (int32_t)((rest > root) ? (root + 1u) : root);
+    if (rest > root) {
+        root += 1u;
+    }
+    return (int32_t)root;
 }
 
 int dcm_orth_optimal_w32(const int32_t computed[9], int32_t orthonormalized[9])
@@ -199,9 +205,8 @@ int dcm_orth_optimal_w32(const int32_t computed[9], int32_t orthonormalized[9])
     if (angle_angle_arg_rad_max_arg > angle_angle_arg_rad_largest) {
         angle_angle_arg_rad_largest = angle_angle_arg_rad_max_arg;
     }
-    const int32_t angle_angle_argument_root = dcm_orth_optimal_w32_rt((uint64_t)(
-        dcm_orth_optimal_w32_shr(angle_angle_arg_rad_largest, 1)));
-        /* Q7.24, 0 .. 52.5, error 0.0072 */
+    const int32_t angle_angle_argument_root = dcm_orth_optimal_w32_rt(dcm_orth_optimal_w32_shr(
+        angle_angle_arg_rad_largest, 1)); /* Q7.24, 0 .. 52.5, error 0.0072 */
     int32_t angle_angle_taken; /* Q7.24, 0 .. 52.5, exact */
     if ((int64_t)angle_angle_argument_root >= INT32_C(880607856)) {
         angle_angle_taken = dcm_orth_optimal_w32_fit(INT32_C(880607856), 0);
@@ -236,7 +241,7 @@ int dcm_orth_optimal_w32(const int32_t computed[9], int32_t orthonormalized[9])
     if (1 > angle_angle_larger) {
         angle_angle_larger = 1;
     }
-    const int64_t angle_angle_beyond = (int64_t)angle_angle_smaller * (1 << 5)
+    const int64_t angle_angle_beyond = (int64_t)angle_angle_smaller * (INT16_C(1) << 5)
         - angle_angle_larger * 8 + angle_angle_larger; /* Q34.29, -41.8 .. 57.8, exact */
     const int64_t angle_angle_below = (int64_t)angle_angle_smaller * 2 - angle_angle_larger;
         /* Q38.25, -83.5 .. 0, exact */
@@ -318,8 +323,8 @@ int dcm_orth_optimal_w32(const int32_t computed[9], int32_t orthonormalized[9])
     const int32_t angle = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(angle_angle,
         INT32_C(1431655765) /* 1/3 in Q32 */) + (INT64_C(1) << 31), 32);
         /* Q2.29, -1.05 .. 2.1, error 1.1 */
-    const int32_t radius = dcm_orth_optimal_w32_rt((uint64_t)((int64_t)spread
-        * (INT32_C(1) << 29))); /* Q3.28, 0 .. 3.75, error 0.00017 */
+    const int32_t radius = dcm_orth_optimal_w32_rt((int64_t)spread * (INT32_C(1) << 29));
+        /* Q3.28, 0 .. 3.75, error 0.00017 */
     int32_t along_cosine_taken; /* Q2.29, 0 .. 1.05, exact */
     if ((int64_t)angle >= INT32_C(562209904)) {
         along_cosine_taken = dcm_orth_optimal_w32_fit(INT32_C(562209904), 0);
@@ -395,8 +400,8 @@ int dcm_orth_optimal_w32(const int32_t computed[9], int32_t orthonormalized[9])
         return 2;
     }
     /* singular value 1 of C */
-    const int32_t stretch_1 = dcm_orth_optimal_w32_rt((uint64_t)(dcm_orth_optimal_w32_shr(
-        stretch_1_radicand, 1))); /* Q2.29, 0.707 .. 1.42, error 9.4e-10 */
+    const int32_t stretch_1 = dcm_orth_optimal_w32_rt(dcm_orth_optimal_w32_shr(
+        stretch_1_radicand, 1)); /* Q2.29, 0.707 .. 1.42, error 9.4e-10 */
     const int64_t shared_10 = along * 2 + dcm_orth_optimal_w32_shr(-mean, 2);
         /* Q4.59, -5.44 .. 5.8, error 2.1 */
     const int64_t stretch_2_radicand = across + dcm_orth_optimal_w32_shr(-shared_10, 1);
@@ -406,7 +411,7 @@ int dcm_orth_optimal_w32(const int32_t computed[9], int32_t orthonormalized[9])
         return 2;
     }
     /* singular value 2 of C */
-    const int32_t stretch_2 = dcm_orth_optimal_w32_rt((uint64_t)(stretch_2_radicand));
+    const int32_t stretch_2 = dcm_orth_optimal_w32_rt(stretch_2_radicand);
         /* Q2.29, 0.707 .. 1.42, error 9.4e-10 */
     const int64_t stretch_3_radicand = -across + dcm_orth_optimal_w32_shr(-shared_10, 1);
         /* Q5.58, 0.5 .. 2, exact */
@@ -415,7 +420,7 @@ int dcm_orth_optimal_w32(const int32_t computed[9], int32_t orthonormalized[9])
         return 2;
     }
     /* singular value 3 of C */
-    const int32_t stretch_3 = dcm_orth_optimal_w32_rt((uint64_t)(stretch_3_radicand));
+    const int32_t stretch_3 = dcm_orth_optimal_w32_rt(stretch_3_radicand);
         /* Q2.29, 0.707 .. 1.42, error 9.4e-10 */
     const int32_t shared_1 = stretch_1 + stretch_2; /* Q2.29, 1.41 .. 2.83, error 1.9e-09 */
     /* invariants of (C' C)^(1/2) */

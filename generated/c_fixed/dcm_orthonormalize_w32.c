@@ -26,11 +26,13 @@ static __attribute__((noinline)) int64_t dcm_orthonormalize_w32_mul(int32_t a, i
     const int32_t b_high = (b < 0) ? ~(~b >> 16) : (b >> 16);
     const uint32_t low = a_low * b_low;
     const int32_t middle = (a_high * (int32_t)b_low) + (int32_t)(low >> 16);
-    const int32_t other = (b_high * (int32_t)a_low) + (int32_t)((uint32_t)middle & 0xFFFFu);
+    const uint32_t middle_low = (uint32_t)middle & 0xFFFFu;
+    const int32_t other = (b_high * (int32_t)a_low) + (int32_t)middle_low;
     const int32_t high = (a_high * b_high) + ((middle < 0) ? ~(~middle >> 16) : (middle >> 16))
         + ((other < 0) ? ~(~other >> 16) : (other >> 16));
     const uint64_t bits = ((uint64_t)(uint32_t)high << 32) | ((uint32_t)a * (uint32_t)b);
-    return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
+    const uint64_t complement = UINT64_MAX - bits;
+    return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)complement);
 }
 #else
 static inline int64_t dcm_orthonormalize_w32_mul(int32_t a, int32_t b)
@@ -49,8 +51,9 @@ static inline int32_t dcm_orthonormalize_w32_fit(int64_t x, int n)
 #ifdef __FRAMAC__
     return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
 #else
-    const int beyond = (n > 32) ? (n - 32) : 0;
-    const uint32_t bits = (uint32_t)((uint64_t)x >> (n - beyond));
+    const int first = (n > 32) ? 32 : n;
+    const int beyond = n - first;
+    const uint32_t bits = (uint32_t)((uint64_t)x >> first);
     const int32_t high = (bits <= (UINT32_MAX >> 1)) ? (int32_t)bits
                                                  : (-1 - (int32_t)(UINT32_MAX - bits));
     return (high < 0) ? ~(~high >> beyond) : (high >> beyond);
@@ -73,9 +76,9 @@ static int64_t dcm_orthonormalize_w32_div(int64_t numerator, int64_t denominator
 }
 
 /* Square root bit by bit, to the nearest. */
-static int32_t dcm_orthonormalize_w32_rt(uint64_t square)
+static int32_t dcm_orthonormalize_w32_rt(int64_t square)
 {
-    uint64_t rest = square;
+    uint64_t rest = (uint64_t)square;
     uint64_t root = 0;
     uint64_t bit = (uint64_t)1 << 62;
     while (bit != 0u) {
@@ -87,7 +90,10 @@ static int32_t dcm_orthonormalize_w32_rt(uint64_t square)
         }
         bit >>= 2;
     }
-    return (int32_t)((rest > root) ? (root + 1u) : root);
+    if (rest > root) {
+        root += 1u;
+    }
+    return (int32_t)root;
 }
 
 int dcm_orthonormalize_w32(const int32_t computed[9], int32_t orthonormalized[9])
@@ -131,8 +137,8 @@ int dcm_orthonormalize_w32(const int32_t computed[9], int32_t orthonormalized[9]
         || (inverse_length_1_radicand > INT64_C(1152921501932978172))) {
         return 2;
     }
-    const int32_t inverse_length_1_root = dcm_orthonormalize_w32_rt((uint64_t)(
-        inverse_length_1_radicand * 2)); /* Q2.29, 1.41 .. 2.83, error 7.5e-09 */
+    const int32_t inverse_length_1_root = dcm_orthonormalize_w32_rt(inverse_length_1_radicand
+        * 2); /* Q2.29, 1.41 .. 2.83, error 7.5e-09 */
     /* 1/|row 1| */
     const int32_t inverse_length_1 = dcm_orthonormalize_w32_fit(dcm_orthonormalize_w32_div(
         (INT64_C(1) << 60), inverse_length_1_root), 0);
@@ -156,8 +162,8 @@ int dcm_orthonormalize_w32(const int32_t computed[9], int32_t orthonormalized[9]
         || (inverse_length_2_radicand > INT64_C(1152921501932978172))) {
         return 2;
     }
-    const int32_t inverse_length_2_root = dcm_orthonormalize_w32_rt((uint64_t)(
-        inverse_length_2_radicand * 2)); /* Q2.29, 1.41 .. 2.83, error 7.5e-09 */
+    const int32_t inverse_length_2_root = dcm_orthonormalize_w32_rt(inverse_length_2_radicand
+        * 2); /* Q2.29, 1.41 .. 2.83, error 7.5e-09 */
     /* 1/|row 2| */
     const int32_t inverse_length_2 = dcm_orthonormalize_w32_fit(dcm_orthonormalize_w32_div(
         (INT64_C(1) << 60), inverse_length_2_root), 0);
@@ -181,8 +187,8 @@ int dcm_orthonormalize_w32(const int32_t computed[9], int32_t orthonormalized[9]
         || (inverse_length_3_radicand > INT64_C(1152921501932978172))) {
         return 2;
     }
-    const int32_t inverse_length_3_root = dcm_orthonormalize_w32_rt((uint64_t)(
-        inverse_length_3_radicand * 2)); /* Q2.29, 1.41 .. 2.83, error 7.5e-09 */
+    const int32_t inverse_length_3_root = dcm_orthonormalize_w32_rt(inverse_length_3_radicand
+        * 2); /* Q2.29, 1.41 .. 2.83, error 7.5e-09 */
     /* 1/|row 3| */
     const int32_t inverse_length_3 = dcm_orthonormalize_w32_fit(dcm_orthonormalize_w32_div(
         (INT64_C(1) << 60), inverse_length_3_root), 0);

@@ -58,11 +58,9 @@
     {INT32_C(1073741824), 0, 0, 0, INT32_C(1073741824), 0, 0, 0, INT32_C(1073741824)}
 
 /* What a call returns. */
-enum {
-    DCM_RK3_2_W32_OK = 0,
-    DCM_RK3_2_W32_OUT_OF_RANGE = 1, /* an input lies outside its range */
-    DCM_RK3_2_W32_TOO_FAR = 2 /* a value on the way leaves its limits */
-};
+#define DCM_RK3_2_W32_OK 0
+#define DCM_RK3_2_W32_OUT_OF_RANGE 1 /* an input lies outside its range */
+#define DCM_RK3_2_W32_TOO_FAR 2 /* a value on the way leaves its limits */
 
 #ifdef __cplusplus
 extern "C" {

@@ -61,10 +61,8 @@
     {INT32_C(1073741824), 0, 0, 0, INT32_C(1073741824), 0, 0, 0, INT32_C(1073741824)}
 
 /* What a call returns. */
-enum {
-    DCM_RK4_2_W32_OK = 0,
-    DCM_RK4_2_W32_OUT_OF_RANGE = 1 /* an input lies outside its range */
-};
+#define DCM_RK4_2_W32_OK 0
+#define DCM_RK4_2_W32_OUT_OF_RANGE 1 /* an input lies outside its range */
 
 #ifdef __cplusplus
 extern "C" {

@@ -36,11 +36,9 @@
 #define DCM_UPDATE_W32_NEXT_LIMIT INT32_C(1140850688) /* largest magnitude */
 
 /* What a call returns. */
-enum {
-    DCM_UPDATE_W32_OK = 0,
-    DCM_UPDATE_W32_OUT_OF_RANGE = 1, /* an input lies outside its range */
-    DCM_UPDATE_W32_TOO_FAR = 2 /* a value on the way leaves its limits */
-};
+#define DCM_UPDATE_W32_OK 0
+#define DCM_UPDATE_W32_OUT_OF_RANGE 1 /* an input lies outside its range */
+#define DCM_UPDATE_W32_TOO_FAR 2 /* a value on the way leaves its limits */
 
 #ifdef __cplusplus
 extern "C" {

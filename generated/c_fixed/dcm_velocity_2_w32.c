@@ -26,11 +26,13 @@ static __attribute__((noinline)) int64_t dcm_velocity_2_w32_mul(int32_t a, int32
     const int32_t b_high = (b < 0) ? ~(~b >> 16) : (b >> 16);
     const uint32_t low = a_low * b_low;
     const int32_t middle = (a_high * (int32_t)b_low) + (int32_t)(low >> 16);
-    const int32_t other = (b_high * (int32_t)a_low) + (int32_t)((uint32_t)middle & 0xFFFFu);
+    const uint32_t middle_low = (uint32_t)middle & 0xFFFFu;
+    const int32_t other = (b_high * (int32_t)a_low) + (int32_t)middle_low;
     const int32_t high = (a_high * b_high) + ((middle < 0) ? ~(~middle >> 16) : (middle >> 16))
         + ((other < 0) ? ~(~other >> 16) : (other >> 16));
     const uint64_t bits = ((uint64_t)(uint32_t)high << 32) | ((uint32_t)a * (uint32_t)b);
-    return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
+    const uint64_t complement = UINT64_MAX - bits;
+    return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)complement);
 }
 #else
 static inline int64_t dcm_velocity_2_w32_mul(int32_t a, int32_t b)
@@ -49,8 +51,9 @@ static inline int32_t dcm_velocity_2_w32_fit(int64_t x, int n)
 #ifdef __FRAMAC__
     return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
 #else
-    const int beyond = (n > 32) ? (n - 32) : 0;
-    const uint32_t bits = (uint32_t)((uint64_t)x >> (n - beyond));
+    const int first = (n > 32) ? 32 : n;
+    const int beyond = n - first;
+    const uint32_t bits = (uint32_t)((uint64_t)x >> first);
     const int32_t high = (bits <= (UINT32_MAX >> 1)) ? (int32_t)bits
                                                  : (-1 - (int32_t)(UINT32_MAX - bits));
     return (high < 0) ? ~(~high >> beyond) : (high >> beyond);

@@ -42,10 +42,8 @@
 #define DCM_VELOCITY_2_W32_TRANSFORMED_LIMIT INT32_C(2139095042) /* largest magnitude */
 
 /* What a call returns. */
-enum {
-    DCM_VELOCITY_2_W32_OK = 0,
-    DCM_VELOCITY_2_W32_OUT_OF_RANGE = 1 /* an input lies outside its range */
-};
+#define DCM_VELOCITY_2_W32_OK 0
+#define DCM_VELOCITY_2_W32_OUT_OF_RANGE 1 /* an input lies outside its range */
 
 #ifdef __cplusplus
 extern "C" {

@@ -48,10 +48,8 @@
 #define ERROR_MATRIX_W32_DRIFT_LIMIT INT32_C(1818230785) /* largest magnitude */
 
 /* What a call returns. */
-enum {
-    ERROR_MATRIX_W32_OK = 0,
-    ERROR_MATRIX_W32_OUT_OF_RANGE = 1 /* an input lies outside its range */
-};
+#define ERROR_MATRIX_W32_OK 0
+#define ERROR_MATRIX_W32_OUT_OF_RANGE 1 /* an input lies outside its range */
 
 #ifdef __cplusplus
 extern "C" {

@@ -26,11 +26,13 @@ static __attribute__((noinline)) int64_t euler_angles_from_dcm_w32_mul(int32_t a
     const int32_t b_high = (b < 0) ? ~(~b >> 16) : (b >> 16);
     const uint32_t low = a_low * b_low;
     const int32_t middle = (a_high * (int32_t)b_low) + (int32_t)(low >> 16);
-    const int32_t other = (b_high * (int32_t)a_low) + (int32_t)((uint32_t)middle & 0xFFFFu);
+    const uint32_t middle_low = (uint32_t)middle & 0xFFFFu;
+    const int32_t other = (b_high * (int32_t)a_low) + (int32_t)middle_low;
     const int32_t high = (a_high * b_high) + ((middle < 0) ? ~(~middle >> 16) : (middle >> 16))
         + ((other < 0) ? ~(~other >> 16) : (other >> 16));
     const uint64_t bits = ((uint64_t)(uint32_t)high << 32) | ((uint32_t)a * (uint32_t)b);
-    return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)(UINT64_MAX - bits));
+    const uint64_t complement = UINT64_MAX - bits;
+    return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)complement);
 }
 #else
 static inline int64_t euler_angles_from_dcm_w32_mul(int32_t a, int32_t b)
@@ -49,8 +51,9 @@ static inline int32_t euler_angles_from_dcm_w32_fit(int64_t x, int n)
 #ifdef __FRAMAC__
     return (int32_t)((x < 0) ? ~(~x >> n) : (x >> n));
 #else
-    const int beyond = (n > 32) ? (n - 32) : 0;
-    const uint32_t bits = (uint32_t)((uint64_t)x >> (n - beyond));
+    const int first = (n > 32) ? 32 : n;
+    const int beyond = n - first;
+    const uint32_t bits = (uint32_t)((uint64_t)x >> first);
     const int32_t high = (bits <= (UINT32_MAX >> 1)) ? (int32_t)bits
                                                  : (-1 - (int32_t)(UINT32_MAX - bits));
     return (high < 0) ? ~(~high >> beyond) : (high >> beyond);
@@ -73,9 +76,9 @@ static int64_t euler_angles_from_dcm_w32_div(int64_t numerator, int64_t denomina
 }
 
 /* Square root bit by bit, to the nearest. */
-static int32_t euler_angles_from_dcm_w32_rt(uint64_t square)
+static int32_t euler_angles_from_dcm_w32_rt(int64_t square)
 {
-    uint64_t rest = square;
+    uint64_t rest = (uint64_t)square;
     uint64_t root = 0;
     uint64_t bit = (uint64_t)1 << 62;
     while (bit != 0u) {
@@ -87,7 +90,10 @@ static int32_t euler_angles_from_dcm_w32_rt(uint64_t square)
         }
         bit >>= 2;
     }
-    return (int32_t)((rest > root) ? (root + 1u) : root);
+    if (rest > root) {
+        root += 1u;
+    }
+    return (int32_t)root;
 }
 
 int euler_angles_from_dcm_w32(const int32_t state[9], const int32_t previous[3], int32_t next[3])
@@ -120,8 +126,8 @@ int euler_angles_from_dcm_w32(const int32_t state[9], const int32_t previous[3],
     const int64_t cosine_squared = euler_angles_from_dcm_w32_mul(C_11, C_11)
         + euler_angles_from_dcm_w32_mul(C_21, C_21); /* Q3.60, 0 .. 2.26, exact */
     const int32_t next_pitch_argument = -C_31; /* Q1.30, -1.07 .. 1.07, exact */
-    const int32_t next_pitch_argument_root = euler_angles_from_dcm_w32_rt((uint64_t)(
-        euler_angles_from_dcm_w32_shr(cosine_squared, 2)));
+    const int32_t next_pitch_argument_root = euler_angles_from_dcm_w32_rt(
+        euler_angles_from_dcm_w32_shr(cosine_squared, 2));
         /* Q2.29, 0 .. 1.51, error 2.8e-09 */
     const int64_t next_pitch_distance = euler_angles_from_dcm_w32_mul(next_pitch_argument,
         next_pitch_argument) + cosine_squared; /* Q3.60, 0.5 .. 2, exact */
@@ -157,7 +163,7 @@ int euler_angles_from_dcm_w32(const int32_t state[9], const int32_t previous[3],
     if (1 > next_pitch_larger) {
         next_pitch_larger = euler_angles_from_dcm_w32_fit(1, 0);
     }
-    const int64_t next_pitch_beyond = (int64_t)next_pitch_smaller * (1 << 4)
+    const int64_t next_pitch_beyond = (int64_t)next_pitch_smaller * (INT16_C(1) << 4)
         - (int64_t)next_pitch_larger * 8 + (int64_t)next_pitch_larger;
         /* Q29.34, -0.752 .. 1.16, exact */
     const int64_t next_pitch_below = (int64_t)next_pitch_smaller - (int64_t)next_pitch_larger;
@@ -266,9 +272,9 @@ int euler_angles_from_dcm_w32(const int32_t state[9], const int32_t previous[3],
     if (1 > next_roll_case_angle_larger) {
         next_roll_case_angle_larger = euler_angles_from_dcm_w32_fit(1, 0);
     }
-    const int64_t next_roll_case_angle_beyond = (int64_t)next_roll_case_angle_smaller * (1 << 4)
-        - (int64_t)next_roll_case_angle_larger * 8 + (int64_t)next_roll_case_angle_larger;
-        /* Q29.34, -0.532 .. 1.13, exact */
+    const int64_t next_roll_case_angle_beyond = (int64_t)next_roll_case_angle_smaller
+        * (INT16_C(1) << 4) - (int64_t)next_roll_case_angle_larger * 8
+        + (int64_t)next_roll_case_angle_larger; /* Q29.34, -0.532 .. 1.13, exact */
     const int64_t next_roll_case_angle_below = (int64_t)next_roll_case_angle_smaller
         - (int64_t)next_roll_case_angle_larger; /* Q33.30, -1.07 .. 0, exact */
     const int64_t next_roll_case_angle_both = (int64_t)next_roll_case_angle_smaller
@@ -443,8 +449,8 @@ int euler_angles_from_dcm_w32(const int32_t state[9], const int32_t previous[3],
     if (1 > apart_larger) {
         apart_larger = euler_angles_from_dcm_w32_fit(1, 0);
     }
-    const int64_t apart_beyond = (int64_t)apart_smaller * (1 << 4) - (int64_t)apart_larger * 8
-        + (int64_t)apart_larger; /* Q30.33, -1.07 .. 2.26, exact */
+    const int64_t apart_beyond = (int64_t)apart_smaller * (INT16_C(1) << 4)
+        - (int64_t)apart_larger * 8 + (int64_t)apart_larger; /* Q30.33, -1.07 .. 2.26, exact */
     const int64_t apart_below = (int64_t)apart_smaller - (int64_t)apart_larger;
         /* Q34.29, -2.13 .. 0, exact */
     const int64_t apart_both = (int64_t)apart_smaller + (int64_t)apart_larger;
@@ -552,9 +558,9 @@ int euler_angles_from_dcm_w32(const int32_t state[9], const int32_t previous[3],
     if (1 > next_hdg_case_angle_larger) {
         next_hdg_case_angle_larger = euler_angles_from_dcm_w32_fit(1, 0);
     }
-    const int64_t next_hdg_case_angle_beyond = (int64_t)next_hdg_case_angle_smaller * (1 << 4)
-        - (int64_t)next_hdg_case_angle_larger * 8 + (int64_t)next_hdg_case_angle_larger;
-        /* Q29.34, -0.532 .. 1.13, exact */
+    const int64_t next_hdg_case_angle_beyond = (int64_t)next_hdg_case_angle_smaller
+        * (INT16_C(1) << 4) - (int64_t)next_hdg_case_angle_larger * 8
+        + (int64_t)next_hdg_case_angle_larger; /* Q29.34, -0.532 .. 1.13, exact */
     const int64_t next_hdg_case_angle_below = (int64_t)next_hdg_case_angle_smaller
         - (int64_t)next_hdg_case_angle_larger; /* Q33.30, -1.07 .. 0, exact */
     const int64_t next_hdg_case_angle_both = (int64_t)next_hdg_case_angle_smaller

@@ -34,11 +34,9 @@
 #define EULER_NORMALIZE_W32_NEXT_LIMIT INT32_C(1613406519) /* largest magnitude */
 
 /* What a call returns. */
-enum {
-    EULER_NORMALIZE_W32_OK = 0,
-    EULER_NORMALIZE_W32_OUT_OF_RANGE = 1, /* an input lies outside its range */
-    EULER_NORMALIZE_W32_TOO_FAR = 2 /* a value on the way leaves its limits */
-};
+#define EULER_NORMALIZE_W32_OK 0
+#define EULER_NORMALIZE_W32_OUT_OF_RANGE 1 /* an input lies outside its range */
+#define EULER_NORMALIZE_W32_TOO_FAR 2 /* a value on the way leaves its limits */
 
 #ifdef __cplusplus
 extern "C" {

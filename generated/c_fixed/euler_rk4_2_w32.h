@@ -55,10 +55,8 @@
 #define EULER_RK4_2_W32_IDENTITY {0, 0, 0, INT32_C(1073741824)} /* the state of zero rotation */
 
 /* What a call returns. */
-enum {
-    EULER_RK4_2_W32_OK = 0,
-    EULER_RK4_2_W32_OUT_OF_RANGE = 1 /* an input lies outside its range */
-};
+#define EULER_RK4_2_W32_OK 0
+#define EULER_RK4_2_W32_OUT_OF_RANGE 1 /* an input lies outside its range */
 
 #ifdef __cplusplus
 extern "C" {

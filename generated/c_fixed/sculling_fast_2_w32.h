@@ -51,10 +51,8 @@
 #define SCULLING_FAST_2_W32_NEXT_SCULLING_LIMIT INT32_C(1610612737) /* largest magnitude */
 
 /* What a call returns. */
-enum {
-    SCULLING_FAST_2_W32_OK = 0,
-    SCULLING_FAST_2_W32_OUT_OF_RANGE = 1 /* an input lies outside its range */
-};
+#define SCULLING_FAST_2_W32_OK 0
+#define SCULLING_FAST_2_W32_OUT_OF_RANGE 1 /* an input lies outside its range */
 
 #ifdef __cplusplus
 extern "C" {
