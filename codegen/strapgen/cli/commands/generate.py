@@ -53,7 +53,7 @@ def generate(
 
     Example: strapgen generate euler --target c-fixed --word 32 --max-rate-deg-s 400 --step 0.01 --out firmware
 
-    Example: strapgen generate euler --target c-fixed --sample-hz 100 --lsb 0.0175dps --out firmware
+    Example: strapgen generate euler --target c-fixed --sample-hz 100 --lsb 0.0175dps --out firmware/gyro
     """
     check_format(format)
     if all_:
