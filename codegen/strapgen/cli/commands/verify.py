@@ -21,7 +21,9 @@ if TYPE_CHECKING:
 
 @grouped
 def verify(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="C source or header that strapgen generated.")],
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="Source or header in C that strapgen generated.")
+    ],
     *,
     source: SampleSource,
     output: Annotated[Output, Shown(only=TEXT_OUTPUT)],
