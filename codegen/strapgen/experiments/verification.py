@@ -22,6 +22,7 @@ from strapgen.backends.registry import backend_class
 from strapgen.backends.step_sources import StepSources
 from strapgen.experiments.vectors import MODEL, vectors_of_choice
 from strapgen.ir.fixed_interface import Argument, Interface
+from strapgen.ir.fixed_settings import TURNING
 from strapgen.ir.sources import Sources
 from strapgen.library import generated_sources
 from strapgen.library.generated_files import command_of, text_of
@@ -333,7 +334,7 @@ def _identity(sources: Sources) -> list[int]:
 
 def _cone(interface: Interface) -> Array | None:
     """Return the increments of a cone whose angles are near the largest ones; None for what is no step."""
-    if len(interface.inputs) != 2 or interface.inputs[1].signal.name not in ("increments", "turns"):
+    if len(interface.inputs) != 2 or interface.inputs[1].signal.name not in TURNING:
         return None
     argument = interface.inputs[1]
     angles = np.arange(STEPS * argument.signal.size // 3) * (math.pi / 37)

@@ -9,7 +9,7 @@ from fractions import Fraction
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.fixedpoint.sensor_scale import COUNTED
 from strapgen.ir.fixed_interface import Argument
-from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.fixed_settings import TURNING, Settings
 from strapgen.ir.formats import Format, finest
 from strapgen.ir.program import Program
 from strapgen.ir.sensor import Sensor
@@ -148,12 +148,12 @@ def largest_magnitude(program: Program, signal: Signal, settings: Settings) -> F
         If it is not known.
     """
     if signal.name in settings.ranges:
-        if signal.constraint or signal.name in ("increments", "turns"):
+        if signal.constraint or signal.name in TURNING:
             raise InputError(
                 f"the range of {signal.name} follows from the drift allowance and the largest angle; it takes no other"
             )
         return settings.ranges[signal.name]
-    if signal.name in ("increments", "turns"):
+    if signal.name in TURNING:
         return settings.largest_angle
     if signal.constraint:
         return (signal.bound or Fraction(1)) + settings.allowance

@@ -28,6 +28,8 @@ DEFAULT_ANGLE = Fraction(1, 8)
 #: Increments that formats are chosen for, in rad: from the earth's rate in a microsecond to over half a turn.
 SMALLEST_ANGLE, LARGEST_ANGLE = Fraction(1, 10**11), 4
 DEFAULT_ALLOWANCE = Fraction(1, 16)
+#: Names of the inputs that the largest angle bounds.
+TURNING = ("increments", "turns")
 
 #: A rational above pi/180, by less than 1e-18.
 _DEGREE = Fraction(math.ceil(Fraction(3141592653589793239, 180) * 10**3), 10**21)

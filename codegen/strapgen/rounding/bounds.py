@@ -15,7 +15,7 @@ from strapgen.fixedpoint.limits import largest_magnitude
 from strapgen.fixedpoint.runs.accumulation import transition_growth
 from strapgen.fixedpoint.terms import up
 from strapgen.ir.fixed_interface import RoundingAccumulation
-from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.fixed_settings import TURNING, Settings
 from strapgen.ir.float_interface import Condition, RoundingBounds, StepRounding
 from strapgen.ir.program import Operation, Program, Result, walk
 from strapgen.rounding.errors import ComputedNumbers
@@ -105,7 +105,7 @@ def rounding_bounds(
     for name in settings.ranges:
         checks.choice(f"input of {program.kernel}", name, names)
     format_ = NUMBERS[number]
-    known = {*settings.ranges, "increments", "turns"}
+    known = {*settings.ranges, *TURNING}
     for signal in program.inputs:
         if signal.bound is None and not signal.constraint and signal.name not in known:
             reason = f"the range of {signal.name} is not known"

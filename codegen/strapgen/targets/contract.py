@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from fractions import Fraction
 
 from strapgen.ir.fixed_interface import Argument, ErrorFeedback, Interface, RoundingAccumulation
-from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.fixed_settings import TURNING, Settings
 from strapgen.ir.formats import Format
 from strapgen.ir.integer_program import FixedProgram, Value
 from strapgen.ir.program import Program
@@ -56,7 +56,7 @@ def command(fixed: FixedProgram, target: str) -> str:
 def options(settings: Settings, inputs: Iterable[Signal] = ()) -> str:
     """Return settings as options of the command line, with the largest angle if one of the inputs has it."""
     words = [f"--word {settings.word}"]
-    if any(signal.name in ("increments", "turns") for signal in inputs):
+    if any(signal.name in TURNING for signal in inputs):
         words.append(settings.stated or f"--max-angle-rad {settings.largest_angle}")
     if settings.sensor is not None and settings.sensor.stated not in settings.stated:
         words.append(settings.sensor.stated)
