@@ -34,6 +34,7 @@ ORDER = (
     "analysis",
     "vibration",
     "experiments",
+    "evidence",
     "reports",
     "cli",
 )

@@ -8,7 +8,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from derived import FIXED_POINT, program, quantized
-from evidence import corners_and_random, exactly, in_double
+from fixed_inputs import corners_and_random, exactly, in_double
 from scipy.spatial.transform import Rotation
 
 import strapgen

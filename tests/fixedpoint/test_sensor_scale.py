@@ -7,7 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from derived import program, quantized
-from evidence import corners_and_random
+from fixed_inputs import corners_and_random
 from gathering import each
 
 import strapgen

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from derived import FIXED_POINT, quantized
-from evidence import corners_and_random
+from fixed_inputs import corners_and_random
 from gathering import each
 
 from strapgen import build, generate

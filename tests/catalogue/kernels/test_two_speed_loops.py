@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from evidence import corners_and_random
+from fixed_inputs import corners_and_random
 
 import strapgen
 import strapgen.support.exceptions
