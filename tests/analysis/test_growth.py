@@ -15,7 +15,7 @@ from strapgen.analysis.growth import contraction, growth, stability
 from strapgen.analysis.motion_rates import TIME, model, parameters
 from strapgen.backends import backend
 from strapgen.catalogue import ALGORITHMS, choose, choose_step
-from strapgen.reports.growth import stability_text
+from strapgen.reports.error_analysis.growth import stability_text
 from strapgen.simulation.motions import motion
 from strapgen.support.exceptions import InputError
 

@@ -11,7 +11,7 @@ from strapgen.analysis.error_analysis import analyse
 from strapgen.analysis.notation import LATEX, covariant_text
 from strapgen.analysis.series import MOTIONS, STEP, series
 from strapgen.catalogue import ALGORITHMS, METHODS, choose, choose_step, derive, enough, nodes
-from strapgen.reports.series import series_latex, series_text
+from strapgen.reports.error_analysis.series import series_latex, series_text
 from strapgen.support.exceptions import InputError
 
 W = sp.symbols("w_x w_y w_z")

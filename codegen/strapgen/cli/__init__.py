@@ -17,6 +17,7 @@ from strapgen.cli.commands import (
     converge,
     cost,
     derive,
+    evidence,
     generate,
     listing,
     rate_table,
@@ -48,6 +49,7 @@ COMMANDS: dict[str, dict[str, Any]] = {
         "two-speed": two_speed.two_speed,
         "vectors": vectors.vectors,
         "verify": verify.verify,
+        "evidence": evidence.evidence,
     },
     "Run": {"simulate": simulate.simulate, "strapdown": strapdown.strapdown, "compare": compare.compare},
     "Analyse": {

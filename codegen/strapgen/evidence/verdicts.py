@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -20,7 +20,7 @@ class Verdict:
     kernel : str
         Name of the kernel with its word, as the files have it: "euler_rk4_2_w32".
     claim : str
-        The promise in one line: "no overflow, outputs in their ranges (x86_64)".
+        The promise and the case, as "no overflow: x86_64" or "same bits: cortex-m0".
     tool, version : str
         As "Frama-C Eva", "26.0".
     result : {"proved", "agrees", "fails", "not installed"}
@@ -80,3 +80,14 @@ class Tool:
     def installed(self) -> bool:
         """Return whether all its programs are there."""
         return all(shutil.which(command) for command in self.commands)
+
+
+def failures(verdicts: Iterable[Verdict]) -> list[Verdict]:
+    """Return the verdicts that fail where no other tool proves the same claim of the same kernel."""
+    verdicts = [*verdicts]
+    proved = {(verdict.kernel, verdict.claim) for verdict in verdicts if verdict.result == "proved"}
+    return [
+        verdict
+        for verdict in verdicts
+        if verdict.result == "fails" and (verdict.kernel, verdict.claim) not in proved
+    ]

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from strapgen.analysis.ratios import Claim
 from strapgen.experiments.predicted_tables import PredictedEntry
 from strapgen.experiments.thesis_tables import TABLES
-from strapgen.reports.ratios import claims_text
+from strapgen.reports.error_analysis.ratios import claims_text
 from strapgen.reports.report import Report, flat_table
 from strapgen.reports.table import Column, TextTable
 

@@ -189,13 +189,13 @@ def series(
     most = 2 if count is None else count
     if versus.versus is not None:
         from strapgen.analysis import ratios
-        from strapgen.reports.ratios import ratio_report
+        from strapgen.reports.error_analysis.ratios import ratio_report
 
         second = versus.choose(versus.versus, methods)
         output.report(ratio_report(ratios.versus(choices[0], second, motion, most)))
         return
     from strapgen.analysis.error_analysis import analyse
-    from strapgen.reports.series import series_report
+    from strapgen.reports.error_analysis.series import series_report
 
     image = None if output.plot is None else plot.draw(choices[0], motion, count, output.plot)
     output.report(series_report([analyse(choice, motion, most) for choice in choices]), image)

@@ -61,7 +61,7 @@ def stability(
     choices = methods.choices(algorithm)
     from strapgen.analysis import growth
     from strapgen.reports import plots
-    from strapgen.reports.growth import stability_report
+    from strapgen.reports.error_analysis.growth import stability_report
 
     steps = [growth.stability(choice) for choice in choices]
     title = "constant rate: growth of the state in a step, and where it contracts"

@@ -1,0 +1,1 @@
+"""Lays out the error analysis: series of truncation errors, ratios of errors, growth."""
