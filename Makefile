@@ -8,7 +8,7 @@ TOOLS := .venv/.ready-to-test
 BENCH := .venv-bench/.ready
 
 .PHONY: help demo test test-long test-modules mutants check bench generate clean \
-  check-generated check-style check-layout check-types firmware-tools cost
+  check-generated check-style check-layout check-types firmware-tools cost evidence-tools
 
 help:
 	@echo "make demo      set up, then a short tour: formulas, their C, a table on every back end"
@@ -21,6 +21,7 @@ help:
 	@echo "make generate  rebuild generated/"
 	@echo "make cost      measure generated/COST.md anew, with the tools of make firmware-tools"
 	@echo "make firmware-tools  on Debian: cross compilers, QEMU and CMake, for strapgen cost and tests"
+	@echo "make evidence-tools  on Debian: the tools above, Frama-C, Gappa, Coq, fuzzers and more processors, for make evidence"
 	@echo "make clean     remove .venv and what tools left behind"
 
 $(READY): pyproject.toml
@@ -57,9 +58,16 @@ demo: $(READY)
 FIRMWARE := gcc-arm-none-eabi picolibc-arm-none-eabi qemu-system-arm gcc-riscv64-unknown-elf \
   picolibc-riscv64-unknown-elf qemu-system-misc gcc-avr avr-libc clang cppcheck cmake
 
+EXAMINERS := frama-c-base gappa clang-tidy simavr valgrind qemu-user gcc-powerpc-linux-gnu \
+  libc6-dev-powerpc-cross gcc-i686-linux-gnu libc6-dev-i386-cross afl++ libclang-rt-14-dev coq libcoq-flocq libcoq-gappa
+
 firmware-tools:
 	apt-get update -qq
 	apt-get install -y -qq --no-install-recommends $(FIRMWARE)
+
+evidence-tools: firmware-tools $(READY)
+	apt-get install -y -qq --no-install-recommends $(EXAMINERS)
+	$(BIN)/python -m pip install --disable-pip-version-check -e '.[evidence]'
 
 test: $(TOOLS)
 	$(BIN)/python -m pytest -n auto --dist worksteal -m "not long"
