@@ -17,6 +17,7 @@ from strapgen.support import checks
 #: its files and returns a list of verdicts.
 CHECKS: dict[str, tuple[str, str]] = {
     "eva": ("strapgen.evidence.overflow.eva", "prove"),
+    "z3": ("strapgen.evidence.overflow.solver", "prove"),
 }
 
 

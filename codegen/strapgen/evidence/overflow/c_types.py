@@ -25,13 +25,22 @@ class IntegerType:
 
 @dataclass(frozen=True)
 class Model:
-    """What a processor's C leaves to it: the bits of int and long."""
+    """What a processor's C leaves to it.
+
+    Parameters
+    ----------
+    int_bits, long_bits : int
+        The bits of int and long.
+    frama_c : str
+        What Frama-C calls the model.
+    """
 
     int_bits: int
     long_bits: int
+    frama_c: str
 
     @property
-    def int(self) -> IntegerType:
+    def plain(self) -> IntegerType:
         """The type int."""
         return IntegerType(self.int_bits)
 
@@ -42,7 +51,9 @@ class Model:
         """
         word = names[-1]
         if word.endswith("_t"):
-            return IntegerType(int(word.removeprefix("u").removeprefix("int").removesuffix("_t")), word[0] != "u")
+            return IntegerType(
+                int(word.removeprefix("u").removeprefix("int").removesuffix("_t")), word[0] != "u"
+            )
         if word.endswith(("_wide_", "_magnitude_")):
             return IntegerType(128, word.endswith("_wide_"))
         bits = {0: self.int_bits, 1: self.long_bits, 2: 64}[names.count("long")]
@@ -63,7 +74,7 @@ class Model:
 
     def promoted(self, kind: IntegerType) -> IntegerType:
         """Return the type as which an operand is computed with."""
-        return self.int if kind.low >= self.int.low and kind.high <= self.int.high else kind
+        return self.plain if kind.low >= self.plain.low and kind.high <= self.plain.high else kind
 
     def common(self, left: IntegerType, right: IntegerType) -> IntegerType:
         """Return the type of a sum, product or comparison."""
@@ -75,5 +86,5 @@ class Model:
         return unsigned if unsigned.bits >= signed.bits else signed
 
 
-#: The models by what a claim calls them; that of Frama-C has the same name.
-MODELS = {"64-bit processor": Model(32, 64), "16-bit int": Model(16, 32)}
+#: The models by what a claim calls them.
+MODELS = {"64-bit processor": Model(32, 64, "gcc_x86_64"), "16-bit int": Model(16, 32, "gcc_x86_16")}

@@ -8,14 +8,12 @@ import subprocess
 from functools import partial
 from pathlib import Path
 
+from strapgen.evidence.overflow.c_types import MODELS
 from strapgen.evidence.subjects import Subject
 from strapgen.evidence.verdicts import Result, Tool, Verdict, verdict
 from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.sources import Sources
 from strapgen.targets.c_fixed.words import memory_type
-
-#: The machine models of Frama-C, by what a claim calls them.
-MODELS = {"64-bit processor": "gcc_x86_64", "16-bit int": "gcc_x86_16"}
 
 _OPTIONS = (
     "-eva",
@@ -29,7 +27,9 @@ _SECONDS = 300
 
 
 def _version() -> str:
-    return subprocess.run(["frama-c", "-version"], capture_output=True, text=True, check=True).stdout.split()[0]
+    return subprocess.run(["frama-c", "-version"], capture_output=True, text=True, check=True).stdout.split()[
+        0
+    ]
 
 
 TOOL = Tool("Frama-C Eva", ("frama-c",), "frama-c-base", _version)
@@ -61,12 +61,8 @@ def prove(subject: Subject, folder: Path) -> list[Verdict]:
 def write(sources: Sources, folder: Path) -> None:
     """Write the C of a kernel and the harness that calls it into a folder."""
     folder.mkdir(parents=True, exist_ok=True)
-    for name, text in (*sources.step_files.items(), *_harness_file(sources)):
+    for name, text in {**sources.step_files, f"{sources.function.name}_eva.c": harness(sources)}.items():
         (folder / name).write_text(text)
-
-
-def _harness_file(sources: Sources) -> list[tuple[str, str]]:
-    return [(f"{sources.function.name}_eva.c", harness(sources))]
 
 
 def harness(sources: Sources) -> str:
@@ -86,10 +82,10 @@ def harness(sources: Sources) -> str:
             state[k] = any_int32_t;
         }
         if (euler_normalize_w32(state, next) == 0) {
-            //@ assert -1624595392 <= next[0] <= 1624595392;
-            //@ assert -1624595392 <= next[1] <= 1624595392;
-            //@ assert -1624595392 <= next[2] <= 1624595392;
-            //@ assert -1624595392 <= next[3] <= 1624595392;
+            //@ assert -1613406519 <= next[0] <= 1613406519;
+            //@ assert -1613406519 <= next[1] <= 1613406519;
+            //@ assert -1613406519 <= next[2] <= 1613406519;
+            //@ assert -1613406519 <= next[3] <= 1613406519;
         }
         return 0;
     }
@@ -100,7 +96,10 @@ def harness(sources: Sources) -> str:
     inputs = [(a.signal.name, a.signal.size, memory_type(a)) for a in interface.inputs]
     outputs = [(a.signal.name, a.signal.size, memory_type(a)) for a in interface.outputs]
     feedback = len(interface.residuals)
-    arguments = [*inputs, *([("residuals", feedback, f"uint{interface.settings.word}_t")] if feedback else [])]
+    arguments = [
+        *inputs,
+        *([("residuals", feedback, f"uint{interface.settings.word}_t")] if feedback else []),
+    ]
     lines = [f"{kind} {argument}[{size}];" for argument, size, kind in (*arguments, *outputs)]
     lines.append("int k;")
     for argument, size, kind in arguments:
@@ -113,7 +112,9 @@ def harness(sources: Sources) -> str:
     return "\n".join(
         [
             f"/* Any words go in; what comes out lies in the ranges that {name}.h states.",
-            f" * frama-c {' '.join(_OPTIONS)} -machdep gcc_x86_64 {name}_eva.c",
+            f" * frama-c {' '.join(_OPTIONS[:3])} {' '.join(_OPTIONS[3:5])}",
+            f" *     {_OPTIONS[5]} -eva-split-return-function={name}:0,{name}_out:0",
+            f" *     -machdep gcc_x86_64 {name}_eva.c",
             " */",
             f'#include "{name}.c"',
             "",
@@ -146,12 +147,17 @@ def judge(name: str, folder: Path, model: str) -> tuple[Result, str]:
     if not valid + unknown + invalid:
         return "fails", "Eva finds no way to the end of the function"
     if int(alarms[1]) or unknown or invalid:
-        return "fails", f"{alarms[1]} alarms and {unknown + invalid} ranges of outputs that intervals leave open"
+        return (
+            "fails",
+            f"{alarms[1]} alarms and {unknown + invalid} ranges of outputs that intervals leave open",
+        )
     return "proved", ""
 
 
 def _run(name: str, folder: Path, model: str) -> str:
-    command = ["frama-c", *_OPTIONS, f"-eva-split-return-function={name}:0,{name}_out:0", "-machdep", MODELS[model], f"{name}_eva.c"]
+    machine = MODELS[model].frama_c
+    split = f"-eva-split-return-function={name}:0,{name}_out:0"
+    command = ["frama-c", *_OPTIONS, split, "-machdep", machine, f"{name}_eva.c"]
     environment = os.environ | {"PWD": str(folder.absolute())}
     try:
         done = subprocess.run(
@@ -160,8 +166,7 @@ def _run(name: str, folder: Path, model: str) -> str:
     except subprocess.TimeoutExpired:
         return f"stopped after {_SECONDS} s"
     log = done.stdout + done.stderr
-    case = MODELS[model]
-    (folder / f"{name}_eva_{case}.log").write_text(log)
+    (folder / f"{name}_eva_{machine}.log").write_text(log)
     return log
 
 

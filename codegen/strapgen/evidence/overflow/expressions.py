@@ -12,7 +12,7 @@ import z3
 from pycparser import c_ast
 
 from strapgen.evidence.overflow.c_types import IntegerType, Model
-from strapgen.evidence.overflow.numbers import Fact, Number, Prover, Variable
+from strapgen.evidence.overflow.unknowns import Fact, Number, Prover, Variable
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Obligation:
     text: str
 
 
-class Expressions:
+class ExpressionFormulas:
     """Evaluates the expressions of one function.
 
     Parameters
@@ -80,7 +80,9 @@ class Expressions:
             case c_ast.UnaryOp(op="~"):
                 number = self._promoted(self.value(node.expr, known))
                 assert number.kind.signed
-                return self._fitted(number.kind, ~number.high, ~number.low, -number.real - 1, number.variables)
+                return self._fitted(
+                    number.kind, ~number.high, ~number.low, -number.real - 1, number.variables
+                )
             case c_ast.BinaryOp():
                 left, right = self.value(node.left, known), self.value(node.right, known)
                 return self._binary(node.op, left, right)
@@ -103,7 +105,9 @@ class Expressions:
                 return self._fitted(kind, number.low, number.high, number.real, number.variables)
         return Number.of(self.variable(kind.low, kind.high, "low_bits"), kind)
 
-    def _fitted(self, kind: IntegerType, low: int, high: int, real: Any, variables: frozenset[Variable]) -> Number:
+    def _fitted(
+        self, kind: IntegerType, low: int, high: int, real: Any, variables: frozenset[Variable]
+    ) -> Number:
         """Return a result, which a type with a sign must hold; one without keeps the low bits."""
         if kind.low <= low and high <= kind.high:
             return Number(kind, low, high, real, variables)
@@ -180,7 +184,9 @@ class Expressions:
         low, high = math.isqrt(max(square.low, 0)), math.isqrt(max(square.high, 0)) + nearest
         result = self.variable(low, high, "root")
         real = result.real
-        bounds = (real * real - real, real * real + real) if nearest else (real * real, real * real + 2 * real)
+        bounds = (
+            (real * real - real, real * real + real) if nearest else (real * real, real * real + 2 * real)
+        )
         result.facts.append(
             Fact(z3.And(bounds[0] <= square.real, square.real <= bounds[1]), square.variables | {result})
         )

@@ -8,11 +8,11 @@ from typing import Any
 from pycparser import c_ast
 
 from strapgen.evidence.overflow.c_types import IntegerType, Model
-from strapgen.evidence.overflow.expressions import Expressions, Obligation
-from strapgen.evidence.overflow.numbers import Fact, Number, Prover, Variable
+from strapgen.evidence.overflow.expressions import ExpressionFormulas, Obligation
+from strapgen.evidence.overflow.unknowns import Fact, Number, Prover, Variable
 
 
-class Kernel:
+class KernelStatements:
     """The C function of a kernel, statement by statement.
 
     Parameters
@@ -25,6 +25,8 @@ class Kernel:
         Ranges that the generator states, by value and by element of an output. They are proved, or not used.
     nearest : bool
         Whether roots are rounded to the nearest.
+    effort : int
+        See `Prover`.
 
     Attributes
     ----------
@@ -39,12 +41,13 @@ class Kernel:
         model: Model,
         ranges: Mapping[str, tuple[int, int]],
         nearest: bool,
+        effort: int,
     ) -> None:
         self._functions, self._name, self._model, self._ranges = functions, name, model, ranges
         self._nearest = nearest
-        self._prover = Prover()
+        self._prover = Prover(effort)
         self._open: list[Obligation] = []
-        self._expressions = Expressions(model, self._prover, self._call, self._open)
+        self._expressions = ExpressionFormulas(model, self._prover, self._call, self._open)
         self.places: set[int] = set()
 
     def obligations(self) -> list[Obligation]:

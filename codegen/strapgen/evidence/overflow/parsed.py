@@ -22,7 +22,12 @@ _STDINT = "\n".join(
     ]
 )
 # Types of 128 bits are a compiler's own; `c_types` knows them by the names that a file gives to them.
-_EXTENSIONS = ("-D__SIZEOF_INT128__=16", "-D__extension__=", "-D__int128=long long int", "-D__attribute__(x)=")
+_EXTENSIONS = (
+    "-D__SIZEOF_INT128__=16",
+    "-D__extension__=",
+    "-D__int128=long long int",
+    "-D__attribute__(x)=",
+)
 
 
 class ParsedSource:

@@ -1,4 +1,4 @@
-"""What is known of an integer that a C program computes: its type, an interval, and an exact formula in real numbers."""
+"""What is known of an integer that a C program computes: its type, an interval, and a formula in real numbers."""
 
 from __future__ import annotations
 
@@ -121,11 +121,11 @@ class Prover:
 
     Parameters
     ----------
-    effort : int, optional
+    effort : int
         What one attempt may take, in z3's own count, so that the outcome does not depend on the machine.
     """
 
-    def __init__(self, effort: int = 2_000_000) -> None:
+    def __init__(self, effort: int) -> None:
         self._effort = effort
         self.path: list[Fact] = []
 
