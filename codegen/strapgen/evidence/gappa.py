@@ -5,15 +5,19 @@ from __future__ import annotations
 import re
 import resource
 import subprocess
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 
 from strapgen.evidence.gappa_fixed import fixed_script
+from strapgen.evidence.gappa_floating import DEGREES, floating_script
 from strapgen.evidence.gappa_scripts import CannotFollowError, Script
 from strapgen.evidence.subjects import Subject
 from strapgen.evidence.verdicts import Result, Tool, Verdict, verdict
+from strapgen.rounding.bounds import rounding_bounds
+from strapgen.rounding.number_formats import NUMBERS
 
 #: Processor time after which a proof is given up, and bits of the ends of intervals.
 SECONDS, PRECISION = 60, 256
@@ -29,31 +33,48 @@ TOOL = Tool("Gappa", ("gappa",), "gappa", _version)
 
 
 def check(subject: Subject, folder: Path) -> list[Verdict]:
-    """Have Gappa prove the error bound of a call.
+    """Have Gappa prove the error bounds of a call in fixed point, in double and in float.
 
     Parameters
     ----------
     subject : Subject
     folder : Path
-        For the script, ``one_step.g``.
+        For the scripts, ``one_step.g`` and one for each type.
 
     Returns
     -------
     list of Verdict
     """
-    return [_verdict(subject.name, "one step", folder / "one_step.g", lambda: fixed_script(subject.fixed))]
+    verdicts = [
+        _verdict(subject.name, "one step", folder / "one_step.g", lambda: [fixed_script(subject.fixed)])
+    ]
+    for number in NUMBERS:
+        write = partial(_floating, subject, number)
+        file = folder / f"one_step_{number}.g"
+        verdicts.append(_verdict(subject.name, f"one step in {number}", file, write))
+    return verdicts
 
 
-def _verdict(kernel: str, case: str, file: Path, write: Callable[[], Script]) -> Verdict:
-    """Return what Gappa says of a script."""
+def _floating(subject: Subject, number: str) -> Iterator[Script]:
+    """Yield scripts of a call in floating point, the quicker ones first."""
+    rounding = rounding_bounds(subject.program, number)
+    return (floating_script(subject.program, rounding, degree) for degree in DEGREES)
+
+
+def _verdict(kernel: str, case: str, file: Path, write: Callable[[], Iterable[Script]]) -> Verdict:
+    """Return what Gappa says of the first script with which it proves the bounds, or of the last."""
 
     def judge() -> tuple[Result, str]:
+        outcome: tuple[Result, str] = "fails", "no script"
         try:
-            script = write()
+            for script in write():
+                file.write_text(f"# Run: gappa -Eprecision={PRECISION} {file.name}\n{script.question()}")
+                outcome = judged(script, answered(file))
+                if outcome[0] == "proved":
+                    break
         except CannotFollowError as reason:
             return "not examined", str(reason)
-        file.write_text(f"# Run: gappa -Eprecision={PRECISION} {file.name}\n{script.question()}")
-        return judged(script, answered(file))
+        return outcome
 
     return verdict(kernel, f"error bound: {case}", TOOL, judge)
 
