@@ -18,6 +18,7 @@ from strapgen.support import checks
 CHECKS: dict[str, tuple[str, str]] = {
     "eva": ("strapgen.evidence.overflow.eva", "prove"),
     "z3": ("strapgen.evidence.overflow.solver", "prove"),
+    "gappa": ("strapgen.evidence.gappa", "check"),
 }
 
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-Result = Literal["proved", "agrees", "fails", "not installed"]
+Result = Literal["proved", "agrees", "fails", "not examined", "not installed"]
 
 
 @dataclass(frozen=True)
@@ -24,8 +24,9 @@ class Verdict:
         The promise and the case, as "no overflow: x86_64" or "same bits: cortex-m0".
     tool, version : str
         As "Frama-C Eva", "26.0".
-    result : {"proved", "agrees", "fails", "not installed"}
-        "proved" is of all inputs in the ranges; "agrees" is of those that were run.
+    result : {"proved", "agrees", "fails", "not examined", "not installed"}
+        "proved" is of all inputs in the ranges; "agrees" is of those that were run; "not examined" is where the tool
+        has no theorem for the code, and the detail tells for what.
     seconds : float
     detail : str
         What a reader needs beside it: the figures that were compared, the first alarm, the reason.

@@ -59,7 +59,7 @@ def summary(verdicts: Sequence[Verdict]) -> TextTable:
     )
 
 
-_RESULTS = ("proved", "agrees", "fails", "not installed")
+_RESULTS = ("proved", "agrees", "fails", "not examined", "not installed")
 
 
 def _promise(verdict: Verdict) -> tuple[str, str]:
