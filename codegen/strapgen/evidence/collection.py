@@ -15,7 +15,9 @@ from strapgen.support import checks
 
 #: The checks by the names that ``--tool`` takes: the module and its function, which takes a subject and the folder for
 #: its files and returns a list of verdicts.
-CHECKS: dict[str, tuple[str, str]] = {}
+CHECKS: dict[str, tuple[str, str]] = {
+    "processors": ("strapgen.evidence.same_bits", "same_bits"),
+}
 
 
 def collect(subjects: Sequence[Subject], folder: Path, tools: Sequence[str] = ()) -> Iterator[list[Verdict]]:
