@@ -17,6 +17,7 @@ from strapgen.support import checks
 #: its files and returns a list of verdicts.
 CHECKS: dict[str, tuple[str, str]] = {
     "processors": ("strapgen.evidence.same_bits", "same_bits"),
+    "million-steps": ("strapgen.evidence.long_run", "million_steps"),
 }
 
 

@@ -13,11 +13,11 @@ from strapgen.simulation.motions import GENERAL, Motion, motion
 
 #: Time between two rows in s.
 _STEP = Fraction(1, 8)
-#: Part of its range that an input without the constraint of an attitude fills.
+#: Part of its range that an input fills which has not the constraint of an attitude.
 _PART = 0.9
 
 
-def motion_rows(interface: Interface, count: int) -> tuple[tuple[int, ...], ...]:
+def motion_rows(interface: Interface, count: int, part: float = _PART) -> tuple[tuple[int, ...], ...]:
     """Return the elements of all inputs along a motion whose axis and angle change.
 
     Parameters
@@ -26,21 +26,23 @@ def motion_rows(interface: Interface, count: int) -> tuple[tuple[int, ...], ...]
         Of the kernel.
     count : int
         Number of rows.
+    part : float, optional
+        Part of its range that an input without the constraint of an attitude fills.
 
     Returns
     -------
     tuple of tuple of int
         Attitudes are those of the motion, rounded to their formats; every other input is an integral of its rate, or
-        two of them or more, scaled to fill nine tenths of the range.
+        two of them or more, scaled to fill a part of the range.
     """
     coning = motion("coning", **GENERAL)
-    columns = [_column(argument, coning, count) for argument in interface.inputs]
+    columns = [_column(argument, coning, count, part) for argument in interface.inputs]
     return tuple(
         tuple(int(value) for column in columns for value in column[number]) for number in range(count)
     )
 
 
-def _column(argument: Argument, coning: Motion, count: int) -> Any:
+def _column(argument: Argument, coning: Motion, count: int, part: float) -> Any:
     """Return the integers of an input, (count, elements)."""
     signal = argument.signal
     if signal.constraint:
@@ -51,5 +53,5 @@ def _column(argument: Argument, coning: Motion, count: int) -> Any:
     else:
         samples = -(-signal.size // 3)
         values = coning.increments(_STEP, count, samples).reshape(count, 3 * samples)[:, : signal.size]
-        scaled = values * (_PART * argument.high / float(np.abs(values).max()))
+        scaled = values * (part * argument.high / float(np.abs(values).max()))
     return np.clip(np.rint(scaled), float(argument.low), float(argument.high)).astype(object)

@@ -109,3 +109,70 @@ def run_files(run: CallRun) -> dict[str, str]:
         f"run_{name}.c": render("runner_c/run.c.j2", **values),
         "runner.h": render("runner_c/runner.h.j2"),
     }
+
+
+@dataclass(frozen=True)
+class LongRun:
+    """Many steps of an attitude on a processor.
+
+    Parameters
+    ----------
+    sources : Sources
+        A step from increments, in words of at most 32 bits.
+    rows : tuple of tuple of int
+        A motion: the increments of every step of a pass, in units of the last place.
+    passes : int
+        How many times the motion is taken, one pass after the other.
+    noise : int
+        Largest change of an increment, drawn anew in every step.
+    """
+
+    sources: Sources
+    rows: tuple[tuple[int, ...], ...]
+    passes: int
+    noise: int
+
+    @property
+    def identity(self) -> list[int]:
+        """Zero rotation as the integers of the state."""
+        assert self.sources.fixed is not None
+        assert self.sources.companions is not None
+        state = self.sources.fixed.inputs[0]
+        return [min(round(element / state.unit), state.high) for element in self.sources.companions.identity]
+
+
+def long_run_files(run: LongRun) -> dict[str, str]:
+    """Print a program that takes many steps of an attitude and reports the state again and again.
+
+    Parameters
+    ----------
+    run : LongRun
+
+    Returns
+    -------
+    dict of str to str
+        Text by file name: ``long_run_<name>.c`` and ``runner.h``.
+    """
+    sources = run.sources
+    assert sources.fixed is not None
+    numbers, name = numbers_of(sources), sources.function.name
+    state, samples = sources.fixed.inputs
+    values = {
+        "name": name,
+        "types": types_of(sources),
+        "numbers": numbers,
+        "state": state.signal,
+        "samples": samples.signal,
+        "feedback": sources.fixed.residuals,
+        "fresh": [f"{word.fresh}u" for word in sources.fixed.residuals],
+        "identity": [numbers.literal(word) for word in run.identity],
+        "rows": [
+            fill_arguments(f"{{{', '.join(map(numbers.literal, row))}}},", "     ", 95) for row in run.rows
+        ],
+        "run": run,
+        "seed": SEED,
+    }
+    return {
+        f"long_run_{name}.c": render("runner_c/long_run.c.j2", **values),
+        "runner.h": render("runner_c/runner.h.j2"),
+    }
