@@ -18,6 +18,7 @@ from strapgen.support import checks
 CHECKS: dict[str, tuple[str, str]] = {
     "processors": ("strapgen.evidence.same_bits", "same_bits"),
     "million-steps": ("strapgen.evidence.long_run", "million_steps"),
+    "style": ("strapgen.evidence.style", "style"),
 }
 
 

@@ -24,7 +24,7 @@ from strapgen.toolchain.runners import RUNNERS, Runner
 #: Rows of the motion, which a run goes through again and again.
 ROWS = 250
 #: Longest word that all processors have products of.
-_LONGEST = 32
+LONGEST_WORD = 32
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def same_bits(subject: Subject, folder: Path) -> list[Verdict]:
     list of Verdict
         Claims "same bits: cortex-m0" and so on. None for words of 64 bits: no processor here has their products.
     """
-    if subject.settings is not None and subject.settings.word > _LONGEST:
+    if subject.settings is not None and subject.settings.word > LONGEST_WORD:
         return []
     assert subject.sources.fixed is not None
     place = folder / "processors"

@@ -137,8 +137,8 @@ class LongRun:
         """Zero rotation as the integers of the state."""
         assert self.sources.fixed is not None
         assert self.sources.companions is not None
-        state = self.sources.fixed.inputs[0]
-        return [min(round(element / state.unit), state.high) for element in self.sources.companions.identity]
+        state = self.sources.fixed.inputs[0].format
+        return [state.nearest(element) for element in self.sources.companions.identity]
 
 
 def long_run_files(run: LongRun) -> dict[str, str]:
