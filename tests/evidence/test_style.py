@@ -10,7 +10,7 @@ from fractions import Fraction
 import pytest
 
 from strapgen import fixedpoint
-from strapgen.catalogue import choose, standard
+from strapgen.catalogue import Choice, choose, standard
 from strapgen.evidence import style
 from strapgen.evidence.subjects import Subject
 from strapgen.experiments import project, two_speed_project
@@ -58,8 +58,7 @@ def two_speed(algorithm: str, target: str, settings: Settings | None = None) -> 
     return {**whole.files, **two_speed_project.project_files(algorithm, 2, target, settings)}
 
 
-def with_vectors(kernel: str, target: str, settings: Settings | None = None) -> dict[str, str]:
-    choice = choose(kernel)
+def with_vectors(choice: Choice, target: str, settings: Settings | None = None) -> dict[str, str]:
     table = vectors_of_choice(choice, target, settings, 20)
     return {**generated_sources.sources(choice, target, settings).files, **table_files(table)}
 
@@ -69,8 +68,8 @@ KINDS = {
     "project": lambda: project_of("euler", "c-fixed", SETTINGS["counts"]),
     "project of a call": lambda: project_of("euler-normalize", "c-float"),
     "two speeds": lambda: two_speed("euler", "c-fixed", Settings(carry="full")),
-    "vectors in double": lambda: with_vectors("euler-angles-from-dcm", "c"),
-    "words of 16 bits": lambda: with_vectors("euler", "c-fixed", Settings(16)),
+    "vectors in double": lambda: with_vectors(choose("euler-angles-from-dcm"), "c"),
+    "words of 16 bits": lambda: with_vectors(choose("euler"), "c-fixed", Settings(16)),
 }
 
 
@@ -84,16 +83,12 @@ def every_file() -> Iterator[tuple[str, dict[str, str]]]:
         fixed = fixedpoint.can_lower(generated_sources.program(choice))
         for target in ("c", "c-float", *(["c-fixed"] if fixed else [])):
             truth = choice.kernel.endswith("-truth")  # its vectors would need a range
-            text = (
-                generated_sources.sources(choice, target).files
-                if truth
-                else with_vectors(choice.kernel, target)
-            )
+            text = generated_sources.sources(choice, target).files if truth else with_vectors(choice, target)
             yield f"{choice.kernel}/{target}", text
     for kernel in KERNELS:
         for name, settings in SETTINGS.items():
             if settings.sensor is None or kernel in ("euler", "dcm"):
-                yield f"{kernel}/{name}", with_vectors(kernel, "c-fixed", settings)
+                yield f"{kernel}/{name}", with_vectors(choose(kernel), "c-fixed", settings)
     for target, settings in (
         ("c", None),
         ("c-float", None),

@@ -19,6 +19,7 @@ CHECKS: dict[str, tuple[str, str]] = {
     "processors": ("strapgen.evidence.same_bits", "same_bits"),
     "million-steps": ("strapgen.evidence.long_run", "million_steps"),
     "style": ("strapgen.evidence.style", "style"),
+    "fuzzing": ("strapgen.evidence.fuzzing", "fuzzing"),
 }
 
 

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from functools import cache, partial
 from pathlib import Path
 
+from strapgen.evidence.fuzzing import fuzz_files
 from strapgen.evidence.motion_rows import motion_rows
 from strapgen.evidence.same_bits import LONGEST_WORD, ROWS
 from strapgen.evidence.subjects import Subject
@@ -77,7 +78,7 @@ def _cases(subject: Subject) -> dict[str, _Files]:
 
     def tests() -> dict[str, str]:
         table = vectors_of_choice(subject.choice, "c-fixed", subject.settings, _VECTORS)
-        files = {**subject.sources.step_files, **table_files(table)}
+        files = {**fuzz_files(subject), **table_files(table)}
         assert subject.sources.fixed is not None
         if subject.sources.fixed.settings.word <= LONGEST_WORD:
             files |= run_files(CallRun(subject.sources, motion_rows(subject.sources.fixed, ROWS)))
