@@ -19,6 +19,10 @@ CHECKS: dict[str, tuple[str, str]] = {
     "eva": ("strapgen.evidence.overflow.eva", "prove"),
     "z3": ("strapgen.evidence.overflow.solver", "prove"),
     "gappa": ("strapgen.evidence.gappa", "check"),
+    "processors": ("strapgen.evidence.same_bits", "same_bits"),
+    "million-steps": ("strapgen.evidence.long_run", "million_steps"),
+    "style": ("strapgen.evidence.style", "style"),
+    "fuzzing": ("strapgen.evidence.fuzzing", "fuzzing"),
 }
 
 
