@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import json
 import random
 import tomllib
 from dataclasses import replace
@@ -239,7 +240,7 @@ def test_a_fault_meets_first_what_noticed_it_before_in_whatever_line_it_stands(t
     assert first.tests[0].name == "tests/c/test_h.py::test_elsewhere"
     assert len(first.tests) == len(set(first.tests)) > 1
     state = tmp_path / "state"
-    (tmp_path / "noticed.jsonl").write_text(
+    (tmp_path / "noticed.jsonl").write_text(json.dumps({"fault": fault.lasting_key, "test": "t::last"}) + "\n")
         '{"fault": "codegen/strapgen/b/f.py x + (y -> x - (y", "test": "t::last"}\n'
     )
     moved = replace(fault, line=60)
