@@ -240,8 +240,8 @@ def test_a_fault_meets_first_what_noticed_it_before_in_whatever_line_it_stands(t
     assert first.tests[0].name == "tests/c/test_h.py::test_elsewhere"
     assert len(first.tests) == len(set(first.tests)) > 1
     state = tmp_path / "state"
-    (tmp_path / "noticed.jsonl").write_text(json.dumps({"fault": fault.lasting_key, "test": "t::last"}) + "\n")
-        '{"fault": "codegen/strapgen/b/f.py x + (y -> x - (y", "test": "t::last"}\n'
+    (tmp_path / "noticed.jsonl").write_text(
+        json.dumps({"fault": fault.lasting_key, "test": "t::last"}) + "\n"
     )
     moved = replace(fault, line=60)
     assert mutants.noticed_before(state)[moved.lasting_key] == "t::last"
