@@ -147,11 +147,11 @@ AWAY = 2 * math.sin(ANGLE / 2)
 
 
 def reached(sign, local=0.0, transition=0.0, state_feedback=0.0, transition_feedback=0.0) -> float:
-    """Return the largest error after a run x' = x (T + d) + r from which T is left out.
+    """Return the largest error after a run x' = x (T + d) + r from which d and r are left out.
 
-    The transition turns by an angle in one direction, or to and fro for a sign of -1. Errors d and r are free up to their
-    size, beside the differences of what was fed back before and what is fed back now, which are free too. The error is
-    linear in each of them, but for the product of both feedbacks, for which the state is fed back to and fro.
+    The transition turns by an angle in one direction, or to and fro for a sign of -1. Errors d and r are free up to
+    their size, beside the differences of what was fed back before and what is fed back now, which are free too. The
+    error is linear in each of them, but for the product of both feedbacks, for which the state is fed back to and fro.
     """
     turns = [cmath.exp(1j * ANGLE * sign**k) for k in range(STEPS)]
     after = [1 + 0j] * (STEPS + 1)  # the product of all transitions behind a step
@@ -280,9 +280,9 @@ def test_what_a_step_loses_beside_its_feedback_is_told(algorithm, rounding, rng)
     context = _walked(code, settings, exact, plan, {})
     result = quantized(Choice(algorithm, "rk2", 2), settings).interface.outputs[0]
     errors = step_errors(context, code.transition, result)
-    transition, after = code.transition.signal.name, exact.results[code.outputs[0].signal.name]
+    after = exact.results[code.outputs[0].signal.name]
     names = [node.name for node in code.transition.nodes]
-    worst = {"transition": [Fraction(0)] * len(names), "local": [Fraction(0)] * len(after)}
+    worst = {key: [Fraction(0)] * len(after) for key in ("transition", "local")}
     for _ in range(60):
         integers, numbers, fed = {}, {}, {}
         for argument in context.plan.inputs:
@@ -307,12 +307,53 @@ def test_what_a_step_loses_beside_its_feedback_is_told(algorithm, rounding, rng)
             worst[key] = [max(abs(a), b) for a, b in zip(row, worst[key], strict=True)]
     for key, bounds in (("transition", errors.transition), ("local", errors.local)):
         for measured, bound in zip(worst[key], bounds, strict=True):
-            assert measured <= bound <= 64 * measured, (key, transition)
+            assert measured <= bound <= 64 * measured, key
     rounded = context.rounding_error
     assert errors.state_feedback == rounded * result.format.unit
     assert errors.transition_feedback == tuple(
         rounded / 2 ** context.values[name].fraction if name in fed else 0 for name in names
     )
+
+
+@pytest.mark.parametrize("algorithm", ["euler", "dcm"])
+def test_increments_rounded_to_their_format_move_the_transition_by_what_is_told(algorithm):
+    code, settings = program(Choice(algorithm, "rk2", 2)), Settings(12)
+    exact, plan = _planned(code, settings)
+    context = _walked(code, settings, exact, plan, {})
+    result = quantized(Choice(algorithm, "rk2", 2), settings).interface.outputs[0]
+    errors = step_errors(context, code.transition, result)
+    part, argument = code.transition_program(), plan.inputs[1]
+    names, farthest = argument.signal.elements, [Fraction(0)] * len(errors.moves)
+    for signs in product((-1, 1), repeat=len(names)):
+        corner = dict(zip(names, signs, strict=True))
+        ends = [
+            part.run(
+                {name: sign * (argument.high * argument.format.unit - less) for name, sign in corner.items()}
+            )
+            for less in (0, argument.format.unit / 2)
+        ]
+        (one,), (other,) = (row.values() for row in ends)
+        farthest = [max(known, abs(a - b)) for known, a, b in zip(farthest, one, other, strict=True)]
+    for measured, bound in zip(farthest, errors.moves, strict=True):
+        assert measured <= bound <= 2 * measured
+    # What is linear in the increments cannot cancel.
+    assert min(bound / measured for measured, bound in zip(farthest, errors.moves, strict=True)) < Fraction(
+        11, 10
+    )
+
+
+def test_a_state_that_saturates_loses_a_unit_of_its_last_place():
+    fixed = quantized(Choice("euler", "rk2", 2), Settings(16, state="q15"))
+    told, unit = fixed.interface.accumulation, Fraction(1, 1 << 15)
+    assert told.once == unit
+    assert told.per_step > unit
+
+
+def test_a_transition_of_which_no_stretch_is_known_stretches_by_its_distance_from_the_identity(monkeypatch):
+    monkeypatch.setattr("strapgen.fixedpoint.runs.accumulation.stretch", lambda *_: None)
+    far = (Fraction(3, 8), Fraction(1, 2))
+    monkeypatch.setattr("strapgen.fixedpoint.runs.accumulation._away", lambda *_: far)
+    assert float(accumulation(planar(), None, sized()).growth) == pytest.approx(1 + 5 / 8, rel=1e-12)
 
 
 def test_growth_is_the_largest_singular_value_of_a_transition():

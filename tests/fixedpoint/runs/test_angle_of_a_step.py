@@ -1,6 +1,6 @@
 """The bound of the angle of a run from the errors of a step: each error alone, and each product of two, by hand.
 
-All is told of states of a plane, as of any: r turns x + r by the sine |r|/|x + r| at most, and an attitude by twice that.
+All is told of states of a plane, as of any: r turns x + r by the sine |r|/|x + r| at most, an attitude by twice that.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ NOTHING = StepErrors((), (), (), Fraction(0), (), ())
 
 
 def sizes(**more) -> _Sizes:
-    """Return the sizes of a step that rounds nothing and stretches nothing, but for these; the state is half as long."""
+    """Return the sizes of a step that rounds nothing and stretches nothing, but for these; the state has length 1/2."""
     zeros = {field.name: Fraction(0) for field in fields(_Sizes)}
     ones = {"longest": Fraction(1), "contraction": Fraction(1), "expansion": Fraction(1), "shortest": HALF}
     return _Sizes(**(zeros | ones | {name: Fraction(size) for name, size in more.items()}))
@@ -221,6 +221,8 @@ START = 1 - Fraction(1, 128)
         ({"local": percent(Fraction(1, 10)), "state_feedback": percent(Fraction(1, 2))}, 0.001, 0.001),
         ({"local": percent(Fraction(1, 10)), "expansion": percent(101)}, 0.001, LONGEST / 100 + 0.001),
         ({"local": percent(Fraction(1, 10)), "contraction": percent(99)}, 0.011, 0.001),
+        ({"local": 1e-4, "expansion": 1.001}, 1e-4, LONGEST / 1000 + 1e-4),
+        ({"local": 1e-4, "contraction": 0.999, "state_feedback": 0.005}, 0.0011, 1e-4),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, dict) else "",
 )
@@ -236,7 +238,7 @@ def test_matrices_stay_proper_at_both_ends(errors, shorter, longer):
 
 
 def test_an_orthonormalization_leaves_a_part_of_what_is_symmetric():
-    """f(s) = s (3 - s^2)/2 has the slope 3/2 (1 - s^2), the same size at both ends; it acts over the restored values."""
+    """f(s) = s (3 - s^2)/2 has the slope 3/2 (1 - s^2), the same size at both ends, over what is restored."""
     shortest = float(SHORTEST)
     restored = min(s * (3 - s * s) / 2 for s in (shortest, LONGEST))
     unsteady = 1.5 * (1 - shortest**2) * LONGEST / restored
