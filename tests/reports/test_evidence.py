@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 from strapgen.evidence.verdicts import Verdict, failures
 from strapgen.reports.evidence import evidence_page, evidence_report, summary
@@ -31,7 +32,7 @@ def test_json_has_the_keys_that_programs_read():
 def test_the_text_says_claim_tool_result_time_and_why():
     text = evidence_report([_ALARM, _PROOF, _BEYOND]).written("text")
     assert "euler_w32, error bound: one step, Gappa 1.4: a quotient" in text
-    assert "no overflow: x86_64  Frama-C Eva  fails" in text
+    assert re.search("no overflow: x86_64 +Frama-C Eva +fails", text)
     assert "2 alarms" in text
 
 
