@@ -6,12 +6,11 @@ import re
 import shlex
 import shutil
 import subprocess
-import tempfile
 from functools import partial
 from pathlib import Path
 
 from strapgen.ir.sources import Sources
-from strapgen.support import cache
+from strapgen.support import cache, drafts
 from strapgen.toolchain.compiler import C_FLAGS, build_key, chosen_compiler, compiler
 
 #: Kind of cache entry that holds the size of object code, and its file.
@@ -58,9 +57,9 @@ def _note_size(size: int, draft: Path) -> None:
 
 def _measured_size(sources: Sources, path: str, counter: str) -> int | None:
     """Return the size of compiled sources, measured by a program."""
-    with tempfile.TemporaryDirectory() as folder:
+    with drafts.temporary_folder() as folder:
         for name, text in sources.files.items():
-            (Path(folder) / name).write_text(text)
+            (folder / name).write_text(text)
         code = next(name for name in sources.files if name.endswith(".c"))
         command = [*shlex.split(chosen_compiler() or path), *C_FLAGS, "-c", code, "-o", "code.o"]
         if subprocess.run(command, cwd=folder, capture_output=True, check=False).returncode:
