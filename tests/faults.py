@@ -35,6 +35,8 @@ ROOT = Path(__file__).resolve().parents[1]
 KILLS, OTHERS = 100, 15
 #: A run that takes longer hangs, and so does a process that outlives its parent longer, in s.
 HANGS_S, ORPHANS_S = 120, 10
+#: Part of the trials whose cache holds what is derived.
+WARM = 0.75
 #: Sizes of a disk in kB that is full sooner or later, and of one that is not.
 SMALL_KB, LARGE_KB = (16, 3000), 64_000
 
@@ -47,7 +49,11 @@ tree = Path(sys.argv[1])
 files = {path.relative_to(tree).as_posix(): path.read_text() for path in sorted(tree.rglob("*")) if path.is_file()}
 files = {name: text for name, text in files.items() if name.rpartition("/")[0] or name == "README.md"}
 files["README.md"] = files.pop("README.md")
-print(len(standard_tree.write(Path("out"), files)))
+try:
+    print(len(standard_tree.write(Path("out"), files)))
+except ValueError as error:
+    print(f"strapgen: {error}", file=sys.stderr)
+    sys.exit(2)
 """
 
 
@@ -128,7 +134,7 @@ class Place:
         cache = self.root / "cache"
         names = [path for path in cache.rglob("*") if path.name.startswith(".")]
         names += [path for path in (self.root / "out").rglob("*") if path.name.startswith(".")]
-        names += [path for path in (self.root / "tmp").iterdir() if not path.name.startswith("pymp-")]
+        names += (self.root / "tmp").iterdir()
         for entry in cache.glob("*/*"):
             try:
                 listed = json.loads((entry / "manifest.json").read_text())
@@ -174,11 +180,12 @@ def members(session: int) -> list[int]:
 
 @dataclass
 class Reference:
-    """A run without faults: its result, its files, and how long it takes in s."""
+    """A run without faults: its result, its files, how long it takes in s, and the programs of its cache."""
 
     result: Result
     files: dict[str, str]
     seconds: float
+    programs: Path
 
 
 class Trials:
@@ -215,8 +222,17 @@ class Trials:
             seconds = time.monotonic() - begin
             if result.status or result.err.count("\n") > 1 or place.left():
                 raise SystemExit(f"{name} without a fault: {result}, it leaves {place.left()}")
-            self.references[name] = Reference(result, place.files(), seconds)
+            programs = self.folder / f"programs of {name}"
+            if (place.root / "cache" / "programs").is_dir():
+                shutil.copytree(place.root / "cache" / "programs", programs)
+            self.references[name] = Reference(result, place.files(), seconds, programs)
             print(f"{name}: {seconds:.1f} s without a fault", flush=True)
+
+    def warm(self, name: str, place: Place, draw: random.Random) -> None:
+        """Let most trials begin with what is derived, so that more of them fit into the time."""
+        programs = self.references[name].programs
+        if draw.random() < WARM and programs.is_dir():
+            shutil.copytree(programs, place.root / "cache" / "programs", dirs_exist_ok=True)
 
     def note(self, what: str, seed: str, complaints: list[str]) -> None:
         """Count a trial, and print what is wrong."""
@@ -270,6 +286,7 @@ def killed(trials: Trials, name: str, draw: random.Random) -> list[str]:
     with trials.place() as place:
         if before:
             finish(place.start(before))
+        trials.warm(name, place, draw)
         files = place.files()
         complaints, other = [], None
         process = place.start(command)
@@ -281,7 +298,7 @@ def killed(trials: Trials, name: str, draw: random.Random) -> list[str]:
             shutil.rmtree(beside.root / "cache")
             (beside.root / "cache").symlink_to(place.root / "cache")
             other = beside.start(command)
-        time.sleep(draw.uniform(0.05, 1.0) * expected.seconds)
+        time.sleep(draw.uniform(0.1, 1.0) ** 2 * expected.seconds)  # most begin with what is derived
         process.kill()
         process.wait()
         for stream in (process.stdout, process.stderr):  # others may hold the other ends
@@ -347,6 +364,7 @@ def full(trials: Trials, name: str, draw: random.Random) -> list[str]:
             finish(place.start(before))
             shutil.rmtree(root / "cache")
             (root / "cache").mkdir(mode=0o700)
+        trials.warm(name, place, draw)
         files = place.files()
         if os.geteuid() == 0:
             room = sum(path.stat().st_blocks // 2 for path in root.rglob("*"))
@@ -373,6 +391,7 @@ def read_only(trials: Trials, name: str, draw: random.Random) -> list[str]:
         for words in (before, command if draw.random() < 0.5 else []):
             if words:
                 finish(place.start(words))
+        trials.warm(name, place, draw)
         if name != "verify":
             for path in (root / "out").iterdir():
                 shutil.rmtree(path) if path.is_dir() else path.unlink()
@@ -401,6 +420,7 @@ def jumped(trials: Trials, name: str, draw: random.Random) -> list[str]:
         for words in (before, command if draw.random() < 0.5 else []):
             if words:
                 finish(place.start(words))
+        trials.warm(name, place, draw)
         processes = [place.start(command)]
         (place.root / "other").mkdir()
         beside = Place(place.root / "other")
@@ -411,9 +431,10 @@ def jumped(trials: Trials, name: str, draw: random.Random) -> list[str]:
         processes.append(beside.start(command))
         while any(process.poll() is None for process in processes):
             then = draw.choice([0, 1, time.time() - 10 * 365 * 86400, time.time() + 10 * 365 * 86400])
-            for path in (place.root / "cache").rglob("*"):
-                with contextlib.suppress(OSError):
-                    os.utime(path, (then, then))
+            for folder, folders, files in os.walk(place.root / "cache"):
+                for path in (*folders, *files):
+                    with contextlib.suppress(OSError):
+                        os.utime(Path(folder) / path, (then, then))
             time.sleep(0.02)
         complaints = []
         for process in processes:

@@ -246,8 +246,11 @@ def run_case(case: Case) -> Outcome:
         )
 
     key = cache.digest([cache.generator_digest(), json.dumps(asdict(case), sort_keys=True)])
-    folder = cache.entry("studies", key, fill)
-    return Outcome(case, **json.loads(cache.read(folder, "outcome.json")))
+
+    def read() -> bytes:
+        return cache.read(cache.entry("studies", key, fill), "outcome.json")
+
+    return Outcome(case, **json.loads(cache.persistently(read)))
 
 
 def _run(case: Case) -> Outcome:

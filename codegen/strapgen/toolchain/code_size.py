@@ -6,6 +6,7 @@ import re
 import shlex
 import shutil
 import subprocess
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
@@ -44,7 +45,8 @@ def code_size(sources: Sources) -> int | None:
     key = build_key([sources], C_FLAGS)
     place = cache.lookup(_SIZES, key)
     if place is not None:
-        return int(cache.read(place, _SIZE))
+        with suppress(FileNotFoundError):  # another process has removed it meanwhile
+            return int(cache.read(place, _SIZE))
     size = _measured_size(sources, path, counter)
     if size is not None:
         cache.entry(_SIZES, key, partial(_note_size, size))
