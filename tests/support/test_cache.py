@@ -345,6 +345,24 @@ def test_work_whose_entry_another_process_removes_begins_again(root, times):
             cache.persistently(work)
 
 
+@pytest.mark.parametrize("times", [1, 4, 5])
+def test_an_entry_that_another_process_removes_at_once_is_made_again(root, times, monkeypatch):
+    left, is_whole = [times], cache._is_whole
+
+    def look(place: Path) -> bool:
+        if left[0] and place.is_dir():
+            left[0] -= 1
+            shutil.rmtree(place)
+        return is_whole(place)
+
+    monkeypatch.setattr(cache, "_is_whole", look)
+    if times < 5:
+        assert (cache.entry("kind", "key", write("file")) / "file").is_file()
+    else:
+        with pytest.raises(InputError, match=r"^cache entry .* cannot be made; remove it$"):
+            cache.entry("kind", "key", write("file"))
+
+
 @pytest.mark.parametrize("kind", ["programs", "sources", "builds"])
 def test_what_others_remove_while_it_is_read_is_made_again(kind, root, monkeypatch):
     for name in ("_loaded", "_modules"):

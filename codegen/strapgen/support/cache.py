@@ -137,6 +137,16 @@ def entry(kind: str, key: str, fill: Callable[[Path], None], what: str = "") -> 
         if what:
             from_cache(what)
         return there
+    for _ in range(_TRIALS):  # another process, whose clock may be wrong, can remove it again
+        place = _filled(kind, key, fill)
+        if _is_whole(place):
+            _prune(place.parent)
+            return place
+    raise InputError(f"cache entry {place} cannot be made; remove it")
+
+
+def _filled(kind: str, key: str, fill: Callable[[Path], None]) -> Path:
+    """Fill an entry beside its place, and rename it there."""
     with ExitStack() as stack:
         try:
             place = _folder(create=True) / kind / key
@@ -154,9 +164,6 @@ def entry(kind: str, key: str, fill: Callable[[Path], None], what: str = "") -> 
                 draft.rename(place)
         except OSError as error:
             raise InputError(f"cache folder {root()} cannot be written ({error.strerror})") from error
-    if not _is_whole(place):
-        raise InputError(f"cache entry {place} cannot be made; remove it")
-    _prune(place.parent)
     return place
 
 
