@@ -28,6 +28,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
+from typing import TypeVar
 
 from strapgen.support import drafts, ownership, resources
 from strapgen.support.exceptions import InputError
@@ -40,8 +41,12 @@ _MANIFEST = "manifest.json"
 _DRAFT, _REMOVED = ".filling-", ".removed-"
 #: Beginning of the name of a folder that stands for a cache folder which others can write.
 _TEMPORARY = "strapgen-cache-"
+#: How often work is begun again whose entries others remove.
+_TRIALS = 5
 #: The number of folders that are the user's alone: the cache folder, that of a kind, that of an entry.
 _PRIVATE = 3
+
+Result = TypeVar("Result")
 
 
 def root() -> Path:
@@ -132,6 +137,16 @@ def entry(kind: str, key: str, fill: Callable[[Path], None], what: str = "") -> 
         if what:
             from_cache(what)
         return there
+    for _ in range(_TRIALS):  # another process, whose clock may be wrong, can remove it again
+        place = _filled(kind, key, fill)
+        if _is_whole(place):
+            _prune(place.parent)
+            return place
+    raise InputError(f"cache entry {place} cannot be made; remove it")
+
+
+def _filled(kind: str, key: str, fill: Callable[[Path], None]) -> Path:
+    """Fill an entry beside its place, and rename it there."""
     with ExitStack() as stack:
         try:
             place = _folder(create=True) / kind / key
@@ -149,10 +164,23 @@ def entry(kind: str, key: str, fill: Callable[[Path], None], what: str = "") -> 
                 draft.rename(place)
         except OSError as error:
             raise InputError(f"cache folder {root()} cannot be written ({error.strerror})") from error
-    if not _is_whole(place):
-        raise InputError(f"cache entry {place} cannot be made; remove it")
-    _prune(place.parent)
     return place
+
+
+def persistently(work: Callable[[], Result]) -> Result:
+    """Return what some work with entries returns; begin it again if another process removes one meanwhile.
+
+    A clock that was set wrong makes entries look as if nobody had used them for long.
+
+    Parameters
+    ----------
+    work : callable
+        It gets its entries by `entry` or `lookup`.
+    """
+    for _ in range(_TRIALS - 1):
+        with suppress(FileNotFoundError):
+            return work()
+    return work()
 
 
 def read(place: Path, name: str) -> bytes:
