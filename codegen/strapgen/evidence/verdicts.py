@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import shutil
 import time
 from collections.abc import Callable, Iterable
@@ -71,16 +72,19 @@ class Tool:
         Debian's packages or PyPI's that bring it.
     version : callable
         ``version()`` returns the version of the installed program.
+    modules : tuple of str, optional
+        The modules of Python that it needs.
     """
 
     name: str
     commands: tuple[str, ...]
     package: str
     version: Callable[[], str]
+    modules: tuple[str, ...] = ()
 
     def installed(self) -> bool:
-        """Return whether all its programs are there."""
-        return all(shutil.which(command) for command in self.commands)
+        """Return whether all its programs and modules are there."""
+        return all(map(shutil.which, self.commands)) and all(map(importlib.util.find_spec, self.modules))
 
 
 def failures(verdicts: Iterable[Verdict]) -> list[Verdict]:
