@@ -25,7 +25,7 @@ from types import FrameType
 from typing import Any
 
 CORPUS = Path(__file__).resolve().parent / "data" / "corpus"
-#: Most inputs that --keep leaves of a target, the shortest, and the longest of them in bytes.
+#: Most inputs that --keep leaves of a target, and the longest of them in bytes.
 MOST, LONGEST = 12, 400
 #: Parts of the time for the C, for the readers, and for the command line.
 PARTS = {"c": 0.5, "readers": 0.25, "command-line": 0.25}
@@ -47,12 +47,12 @@ def corpus(name: str) -> list[bytes]:
 
 
 def keep(name: str, inputs: Iterable[bytes]) -> None:
-    """Keep inputs of a target: the shortest."""
-    shortest = sorted({data for data in inputs if len(data) <= LONGEST}, key=lambda data: (len(data), data))
+    """Keep inputs of a target: some of each length."""
+    ordered = sorted({data for data in inputs if len(data) <= LONGEST}, key=lambda data: (len(data), data))
+    if len(ordered) > MOST:
+        ordered = [ordered[k * (len(ordered) - 1) // (MOST - 1)] for k in range(MOST)]
     CORPUS.mkdir(parents=True, exist_ok=True)
-    (CORPUS / f"{name}.txt").write_text(
-        "".join(f"{base64.b64encode(data).decode()}\n" for data in shortest[:MOST])
-    )
+    (CORPUS / f"{name}.txt").write_text("".join(f"{base64.b64encode(data).decode()}\n" for data in ordered))
 
 
 # Python
@@ -178,12 +178,13 @@ def fuzz_with_atheris(name: str, seconds: float, seed: int, keeps: bool) -> int:
 # C
 
 
-def fuzz_c(number: int, seconds: float, seed: int, keeps: bool) -> int:
+def fuzz_c(kernel: str, seconds: float, seed: int, keeps: bool) -> int:
     """Fuzz the C of a kernel of the standard catalogue with libFuzzer."""
+    from strapgen import catalogue
     from strapgen.evidence import fuzzing
-    from strapgen.evidence.subjects import standard
+    from strapgen.evidence.subjects import Subject
 
-    subject = [*standard()][number]
+    subject = next(Subject(choice) for choice in catalogue.standard() if choice.kernel == kernel)
     with tempfile.TemporaryDirectory() as name:
         folder, inputs = Path(name), Path(name) / "inputs"
         inputs.mkdir()
@@ -215,7 +216,7 @@ def jobs(seconds: float, only: Sequence[str], cores: int) -> list[tuple[str, flo
     from strapgen.evidence.subjects import standard
 
     kinds = {
-        "c": [f"c:{k}" for k, _ in enumerate(standard())] if fuzzing.FUZZER.installed() else [],
+        "c": [f"c:{subject.choice.kernel}" for subject in standard()] if fuzzing.FUZZER.installed() else [],
         "readers": [name for name in TARGETS if name != "command-line"],
         "command-line": ["command-line"] * cores,
     }
@@ -233,7 +234,7 @@ def jobs(seconds: float, only: Sequence[str], cores: int) -> list[tuple[str, flo
 def run(job: str, seconds: float, seed: int, keeps: bool) -> int:
     """Fuzz one target in this process."""
     if job.startswith("c:"):
-        return fuzz_c(int(job[2:]), seconds, seed, keeps)
+        return fuzz_c(job[2:], seconds, seed, keeps)
     if importlib.util.find_spec("atheris") and not keeps:
         return fuzz_with_atheris(job, seconds, seed, keeps)
     return fuzz_python(job, seconds, seed, keeps)

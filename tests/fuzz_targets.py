@@ -8,6 +8,7 @@ import signal
 import tempfile
 import warnings
 from collections.abc import Callable, Iterator, Sequence
+from fractions import Fraction
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -256,7 +257,7 @@ TARGETS: dict[str, Callable[[bytes], None]] = {
     "tableau": _of_file(tableaux.read, ".toml"),
     "arguments": _of_text(read_arguments),
     "format": _of_text(lambda text: Format.parse(text, 32)),
-    "sensor": _of_text(lambda text: Sensor.of(text)),
+    "sensor": _of_text(lambda text: Sensor.of(text, Fraction(1, 100))),
     "contract": _of_text(Contract.read),
     "header": generated_header,
     "command-line": command_line,
