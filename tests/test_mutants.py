@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import ast
+import json
 import random
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import execution_map
@@ -195,10 +197,11 @@ def test_the_requirement_is_all_written_and_most_drawn_faults():
     def fault(part: str, number: int) -> mutants.Fault:
         return mutants.Fault(part, Site("f.py", number, number, "", "sign"), number, f"a{number}", "b")
 
-    listed = [fault("seeded", k) for k in range(2)] + [fault("random", k) for k in range(mutants.DRAWN)]
+    draw = mutants.DRAWS["random"]
+    listed = [fault("seeded", k) for k in range(2)] + [fault("random", k) for k in range(draw.count)]
     outcomes = {f.key: mutants.Outcome(f.key, "caught", "a test", 1.0) for f in listed}
     assert mutants.summary(listed, outcomes)[1]
-    spared = random.Random(0).sample(listed[2:], mutants.DRAWN - mutants.LEAST_CAUGHT)
+    spared = random.Random(0).sample(listed[2:], draw.count - draw.least)
     few = outcomes | {f.key: mutants.Outcome(f.key, "survived", "", 9.0) for f in spared}
     lines, met = mutants.summary(listed, few)
     assert met
@@ -224,3 +227,29 @@ def test_a_fault_is_put_into_a_copy_and_taken_out_again(tmp_path, monkeypatch):
     mutants.take_out(tmp_path / "copy", fault, 2)
     assert copy.read_text() == SOURCE == (tmp_path / "root" / "f.py").read_text()
     assert copy.stat().st_mtime_ns // 10**9 != first // 10**9
+
+
+def test_a_fault_meets_first_what_noticed_it_before_in_whatever_line_it_stands(tests, tmp_path, monkeypatch):
+    monkeypatch.setattr(mutants, "ROOT", tmp_path)
+    file = "codegen/strapgen/b/f.py"
+    (tmp_path / file).parent.mkdir(parents=True)
+    (tmp_path / file).write_text(SOURCE)
+    place = SOURCE.index("x + (y")
+    fault = mutants.Fault("seeded", Site(file, place, place + 5, "x - (", "sign"), 6, "x + (y", "x - (y")
+    first, *_ = mutants.sessions_of(fault, tests, {file: 1}, "tests/c/test_h.py::test_elsewhere")
+    assert first.tests[0].name == "tests/c/test_h.py::test_elsewhere"
+    assert len(first.tests) == len(set(first.tests)) > 1
+    state = tmp_path / "state"
+    (tmp_path / "noticed.jsonl").write_text(
+        json.dumps({"fault": fault.lasting_key, "test": "t::last"}) + "\n"
+    )
+    moved = replace(fault, line=60)
+    assert mutants.noticed_before(state)[moved.lasting_key] == "t::last"
+    assert mutants.noticed_before(tmp_path / "other" / "state") == {}
+
+
+def test_the_longer_draw_takes_its_faults_from_the_way_to_integers_and_text():
+    drawn = mutants.faults("lowering", mutants.SEED)
+    assert len({fault.key for fault in drawn}) == mutants.DRAWS["lowering"].count == 200
+    folders = {Path(fault.site.file).parts[2] for fault in drawn}
+    assert folders == {"fixedpoint", "lowering", "targets"}

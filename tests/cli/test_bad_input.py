@@ -582,6 +582,29 @@ def test_cache_folder_that_cannot_be_written(place, folder, capsys, monkeypatch)
     assert said.err.startswith("strapgen: cache folder ") and said.err.count("\n") == 1
 
 
+@pytest.mark.parametrize(
+    "source", ["--motion constant --set x_deg_s=1 --step 1e-3 --duration 3e3", "--increments-csv log.csv"]
+)
+def test_more_records_than_can_be_written(source, folder, capsys, monkeypatch):
+    from strapgen.backends import Backend
+    from strapgen.cli.commands import simulate
+
+    Path("log.csv").write_text("".join(f"{k},0,0,0\n" for k in range(102)))
+    monkeypatch.setattr(simulate, "_MOST_RECORDS", 2_000_000 if "motion" in source else 50)
+    with monkeypatch.context() as patch:
+        patch.setattr(Backend, "propagate", None)  # the run does not begin
+        with pytest.raises(SystemExit) as stop:
+            main(shlex.split(f"simulate euler {source}"))
+    said = capsys.readouterr()
+    records, most = ("3000000", "2000000") if "motion" in source else ("51", "50")
+    told = f"strapgen: {records} records are too many, up to {most} are written; --record S thins them\n"
+    assert (stop.value.code, said.out, said.err) == (2, "", told)
+    if "motion" not in source:
+        with pytest.raises(SystemExit) as stop:
+            main(shlex.split(f"simulate euler {source} --record 4"))
+        assert stop.value.code == 0 and capsys.readouterr().out.count("\n") == 1 + 26
+
+
 def test_run_that_the_memory_does_not_hold(folder, capsys, monkeypatch):
     from strapgen.simulation import runs
 

@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 from tolerances import certified
 
 import strapgen
+from strapgen.backends.increments import pulses
 from strapgen.simulation import recording
 from strapgen.simulation.recording import Recording, propagate, read_increments, read_rates
 from strapgen.support.exceptions import InputError
@@ -265,7 +266,12 @@ def test_times_rounded_to_microseconds_are_even(write, read):
         (b"\xff\xfe0\x00,\x001\x00", "is no text file of comma-separated values"),
         (b"\x89PNG\r\n\x1a\n\x00\x00", "is no text file of comma-separated values"),
         ("0;0;0;0\n0.1;0;0;0\n", ""),
-        ("t,dx,dy,dz\n" + "x" * 200_000 + ",0,0,0\n", "is no text file of comma-separated values"),
+        (
+            "t,dx,dy,dz\n" + "x" * 200_000 + ",0,0,0\n",
+            "line 2: over 20000 characters, which no line may have",
+        ),
+        ("t,dx,dy,dz\n" + "0," * 1500 + "0\n", "line 2: 1501 cells; at most 1000 are allowed"),
+        ('t,dx,dy,dz\n"' + "x\n" * 100_000, "is no text file of comma-separated values (field larger than"),
     ],
 )
 def test_files_that_are_no_recordings(text, said, write, read):
@@ -473,6 +479,6 @@ def test_pulses_of_a_recording_are_counted_once(even):
     backend = strapgen.backend("euler", "rk4", 1, "numpy", previous=2)
     size = 2.0**-10
     history = propagate(backend, even, pulse=size)
-    counted = Recording(even.start, even.interval, recording.pulses(even.increments[:, None], size)[:, 0])
+    counted = Recording(even.start, even.interval, pulses(even.increments[:, None], size)[:, 0])
     np.testing.assert_array_equal(history.states, propagate(backend, counted).states)
     assert not np.array_equal(history.states, propagate(backend, even).states)

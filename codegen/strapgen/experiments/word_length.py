@@ -247,7 +247,7 @@ def run_case(case: Case) -> Outcome:
 
     key = cache.digest([cache.generator_digest(), json.dumps(asdict(case), sort_keys=True)])
     folder = cache.entry("studies", key, fill)
-    return Outcome(case, **json.loads((folder / "outcome.json").read_text()))
+    return Outcome(case, **json.loads(cache.read(folder, "outcome.json")))
 
 
 def _run(case: Case) -> Outcome:

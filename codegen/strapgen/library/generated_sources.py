@@ -48,7 +48,7 @@ def program(choice: Choice) -> Program:
     key = cache.digest([cache.generator_digest(), choice.identity])
     if key not in _programs:
         folder = cache.entry("programs", key, fill, f"program of {choice.kernel}")
-        _programs[key] = pickle.loads((folder / "program.pickle").read_bytes())
+        _programs[key] = pickle.loads(cache.read(folder, "program.pickle"))
     return _programs[key]
 
 
@@ -101,5 +101,7 @@ def sources(
         ]
     )
     folder = cache.entry("sources", key, fill, f"sources of {choice.kernel} for {target}")
-    interface = json.loads((folder / "interface.json").read_text())
-    return Sources.restore(interface, {name: (folder / name).read_text() for name in interface["files"]})
+    interface = json.loads(cache.read(folder, "interface.json"))
+    return Sources.restore(
+        interface, {name: cache.read(folder, name).decode() for name in interface["files"]}
+    )

@@ -45,7 +45,7 @@ def code_size(sources: Sources) -> int | None:
     key = build_key([sources], C_FLAGS)
     place = cache.lookup(_SIZES, key)
     if place is not None:
-        return int((place / _SIZE).read_text())
+        return int(cache.read(place, _SIZE))
     size = _measured_size(sources, path, counter)
     if size is not None:
         cache.entry(_SIZES, key, partial(_note_size, size))

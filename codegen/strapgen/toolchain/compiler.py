@@ -129,7 +129,7 @@ def _shared(key: str) -> Path | None:
     place = cache.lookup(_SHARED, key)
     if place is None:
         return None
-    module = json.loads((place / "module.json").read_text())
+    module = json.loads(cache.read(place, "module.json"))
     folder = cache.lookup("builds", module["build"])
     return folder and folder / _library(module["name"])
 
@@ -211,11 +211,16 @@ def _alone(sources: Sources, key: str) -> Path:
 
 
 def _import_file(file: Path) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(file.name.partition(".")[0], file)
-    if spec is None or spec.loader is None:
-        raise CompilerError(f"{file} cannot be loaded")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    """Import a compiled module of the cache: the very file of which it was checked that it is the user's alone."""
+    name = file.name.partition(".")[0]
+    with cache.loadable(file) as (path, _):
+        loader = importlib.machinery.ExtensionFileLoader(name, path)
+        spec = importlib.util.spec_from_file_location(name, path, loader=loader)
+        if spec is None:
+            raise CompilerError(f"{file} cannot be loaded")
+        module = importlib.util.module_from_spec(spec)
+        loader.exec_module(module)
+    module.__file__ = str(file)  # where a reader finds it
     return module
 
 

@@ -121,20 +121,22 @@ def run_foreign(module: Path, identity: Any, rows: Any) -> ForeignRun:
         (folder / "identity").write_bytes(start.tobytes())
         command = [sys.executable, "-P", str(Path(__file__).with_name("foreign_runner.py"))]
         try:
-            done = subprocess.run(
-                [*command, str(module), name, str(len(values))],
-                cwd=name,
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL,
-                timeout=PATIENCE,
-                check=False,
-            )
+            with cache.loadable(module) as (path, descriptor):
+                done = subprocess.run(
+                    [*command, path, name, str(len(values))],
+                    cwd=name,
+                    pass_fds=[] if path == str(module) else [descriptor],
+                    stdin=subprocess.DEVNULL,
+                    stdout=subprocess.DEVNULL,
+                    stderr=subprocess.DEVNULL,
+                    timeout=PATIENCE,
+                    check=False,
+                )
         except subprocess.TimeoutExpired:
             return ForeignRun(nothing, f"{len(values)} calls have not come to an end in {PATIENCE} s")
         unloaded = folder / "unloaded"
         if unloaded.is_file():
-            reason = unloaded.read_text().rpartition(str(module))[2].strip(": ")
+            reason = unloaded.read_text().rpartition(path)[2].strip(": ")
             raise CompilerError(
                 f"the function cannot be linked: {reason}; include the file that defines it in the one to check"
             )
