@@ -54,7 +54,7 @@ def fuzz_files(subject: Subject) -> dict[str, str]:
     """Return a kernel's C with its driver, text by file name."""
     sources = subject.sources
     guarded = any(value.guarded for value in subject.fixed.body)
-    commands = (" ".join(_build(sources)), f"{_PROGRAM} -max_len={LONGEST} -max_total_time=60")
+    commands = (" ".join(_build(sources)), f"{_PROGRAM} -max_len={LONGEST} -len_control=0 -max_total_time=60")
     return {**sources.files, **driver_files(sources, guarded, commands)}
 
 
@@ -82,7 +82,7 @@ def run_fuzzer(folder: Path, options: Sequence[str]) -> str:
     options : sequence of str
         Options of libFuzzer, and folders of inputs.
     """
-    command = [_PROGRAM, f"-max_len={LONGEST}", "-timeout=10", "-print_final_stats=0", *options]
+    command = [_PROGRAM, f"-max_len={LONGEST}", "-len_control=0", "-timeout=10", *options]
     done = subprocess.run(command, cwd=folder, capture_output=True, check=False)
     return reported(done.stderr.decode(errors="replace")) if done.returncode else ""
 
