@@ -14,6 +14,7 @@ from strapgen.fixedpoint.limits import largest_magnitude, limits
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.formats import Format
 from strapgen.ir.signals import Signal
+from strapgen.support.exceptions import InputError
 
 CODE = program({"y": node("add", "a", "b")}, {"a": Fraction(1, 60), "b": 3})
 STATE = Signal("state", (4,), ("s_x", "s_y", "s_z", "s_s"), constraint="unit")
@@ -39,6 +40,13 @@ def test_what_a_type_cannot_hold_needs_no_check():
     narrow = replace(limit, largest=Fraction(128), fraction=0, bits=8)
     argument = narrow.argument(0)
     assert (argument.low, argument.high) == (-128, 127)
+
+
+@pytest.mark.parametrize("name", ["state", "increments"])
+def test_the_range_of_an_attitude_and_of_increments_is_stated_otherwise(name):
+    code = replace(CODE, inputs=(STATE, replace(CODE.inputs[0], name="increments"), CODE.inputs[1]))
+    with pytest.raises(InputError, match=f"the range of {name} follows from the drift allowance"):
+        limits(code, Settings(16, ranges={name: Fraction(1, 4)}))
 
 
 def test_an_attitude_may_exceed_its_bound_by_the_allowance():
