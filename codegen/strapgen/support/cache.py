@@ -232,11 +232,13 @@ def _folder(create: bool) -> Path:
     place = nominal.resolve()
     if place in _replaced and _replaced[place].is_dir():
         return _replaced[place]
+    if not create and place in _private:  # every entry is checked from the root of the file system down
+        return place
     try:
         if create:
             _make_private(place)
         with ownership.private_folder(place):
-            pass
+            _private.add(place)
     except ForeignFileError as error:
         _replaced[place] = _temporary(nominal, error.reason)
         return _replaced[place]
@@ -248,6 +250,8 @@ def _folder(create: bool) -> Path:
 
 #: Temporary folders by the cache folders that they stand for; a process that is forked uses them too.
 _replaced: dict[Path, Path] = {}
+#: Cache folders that were the user's alone when they were looked at first.
+_private: set[Path] = set()
 
 
 def _temporary(nominal: Path, reason: str) -> Path:
