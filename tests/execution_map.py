@@ -33,7 +33,8 @@ _real_lru_cache = functools.lru_cache
 
 _blocks: set[int] = set()  # what has been executed since the test began
 _seen: dict[int, frozenset[int]] = {}  # sets of blocks that are in it, by identity
-builtins.__dict__[_PROBE] = _blocks.add
+# Pytest imports this file once more when it looks for doctests: the probes stay with the plugin.
+builtins.__dict__.setdefault(_PROBE, _blocks.add)
 
 
 def files(root: Path = ROOT) -> list[str]:

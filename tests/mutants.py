@@ -1,10 +1,13 @@
 """Shows that the tests protect the code: puts faults into copies of the checkout, one at a time, and runs the tests.
 
-Two lists of 40 faults: the first is written down in tests/data/mutants.toml, and the tests have to notice all of it;
-the second is drawn at random, and they have to notice 36. Every run begins with the tests that execute the changed
-line and ends at the first that fails; only a fault that these let pass meets all other tests. Outcomes are kept in
-`.mutants/`, under a hash of the sources and tests, so that a run that was stopped goes on where it was. Exit status 1
-says that too many faults passed, or that the time did not do.
+Three lists of faults. The first is written down in tests/data/mutants.toml, and the tests have to notice all of it.
+The others are drawn at random: 40 from everything that computes, of which they have to notice 36, and 200 from the way
+from programs to text and to fixed point, of which they have to notice 180. Every run begins with the tests that execute
+the changed line and ends at the first that fails; only faults that these let pass meet all other tests, when all faults
+have had their turn. Outcomes are kept in `.mutants/`, under a hash of the sources and tests, so that a run that was
+stopped goes on where it was; a test that noticed a fault before is its first one in every later state of the sources.
+Drawn faults that no test can notice, or none does, stand with a reason in tests/data/unnoticed.toml. Exit status 1 says
+that too many faults passed, or that the time did not do.
 """
 
 from __future__ import annotations
@@ -34,8 +37,8 @@ from mutation_operators import Site
 
 ROOT = Path(__file__).resolve().parents[1]
 SEEDED = Path(__file__).parent / "data" / "mutants.toml"
-#: The draw, how many are drawn, and how many of them the tests have to notice.
-SEED, DRAWN, LEAST_CAUGHT = 1969, 40, 36
+#: The seed of the draws.
+SEED = 1969
 #: A session that takes longer hangs, in s; one of all tests may take as many times what they take without a fault more.
 HANGS_S, TIMES_LONGER = 240, 5
 #: The first session of a fault: most tests, most files that are collected, and most seconds without the fault.
@@ -65,6 +68,11 @@ class Fault:
         """The fault as a text."""
         return f"{self.part} {self.site.file}:{self.line} {self.before} -> {self.after}"
 
+    @property
+    def lasting_key(self) -> str:
+        """The fault as a text that no change elsewhere in the file alters."""
+        return f"{self.site.file} {self.before} -> {self.after}"
+
 
 @dataclass(frozen=True)
 class Outcome:
@@ -77,6 +85,22 @@ class Outcome:
 
 
 # The faults
+
+
+@dataclass(frozen=True)
+class Draw:
+    """The folders that faults are drawn from, how many are drawn, and how many of them the tests have to notice."""
+
+    folders: tuple[str, ...]
+    count: int
+    least: int
+
+
+DRAWS = {
+    "random": Draw((*mutation_operators.FOLDERS, "templates"), 40, 36),
+    "lowering": Draw(("fixedpoint", "lowering", "targets"), 200, 180),
+}
+PARTS = ("seeded", *DRAWS)
 
 
 def seeded() -> list[tuple[Site, str]]:
@@ -93,11 +117,14 @@ def seeded() -> list[tuple[Site, str]]:
 
 
 def faults(part: str, seed: int) -> list[Fault]:
-    """Return the faults of a list, "seeded" or "random"."""
+    """Return the faults of a list, one of PARTS."""
     if part == "seeded":
         sites = [site for site, _ in seeded()]
     else:
-        sites = mutation_operators.drawn(mutation_operators.sites(ROOT), ROOT, DRAWN, seed)
+        draw = DRAWS[part]
+        by_folder = mutation_operators.sites(ROOT, texts=part == "lowering")
+        by_folder = {folder: by_folder[folder] for folder in draw.folders}
+        sites = mutation_operators.drawn(by_folder, ROOT, draw.count, seed)
     listed = []
     for site in sites:
         source = (ROOT / site.file).read_text()
@@ -369,26 +396,38 @@ def verdict(status: int | None, failed: str, running: str) -> str | None:
     return failed or "the import of tests/conftest.py"
 
 
-def run_fault(
-    runner: Runner,
-    place: Path,
-    fault: Fault,
-    tests: list[MappedTest],
-    numbers: dict[str, int],
-    first_only: bool,
-) -> tuple[str, str]:
-    """Return the outcome of a fault that a copy has, and by what it was noticed."""
+@dataclass(frozen=True)
+class Session:
+    """Tests of one process, whether all others follow, and the seconds after which it hangs."""
+
+    tests: list[MappedTest]
+    others: bool
+    limit: float
+
+
+def sessions_of(fault: Fault, tests: list[MappedTest], numbers: dict[str, int], before: str) -> list[Session]:
+    """Return the sessions that a fault meets, of which the first begins with what noticed it before, if anything."""
     source = (ROOT / fault.site.file).read_text()
     executing = executing_tests(fault.site.file, fault.line, source, tests, numbers)
-    first = first_of(executing)
+    killer = [test for test in tests if test.name == before]
+    first = list(dict.fromkeys([*killer, *first_of(executing)]))
     names = {test.name for test in first}
     second = second_of([test for test in executing if test.name not in names])
     suite = sum(test.seconds for test in tests)
-    sessions: list[tuple[list[MappedTest], bool, float]] = [(first, False, HANGS_S)]
-    if not first_only:
-        sessions += [(second, False, HANGS_S + 60), ([], True, HANGS_S + TIMES_LONGER * suite)]
-    done: list[str] = []
-    for session, others, limit in sessions:
+    return [
+        Session(first, False, HANGS_S),
+        Session(second, False, HANGS_S + 60),
+        Session([], True, HANGS_S + TIMES_LONGER * suite),
+    ]
+
+
+def run_fault(
+    runner: Runner, place: Path, sessions: Sequence[Session], first_only: bool, done: Iterable[str] = ()
+) -> tuple[str, str]:
+    """Return the outcome of a fault that a copy has, and by what it was noticed, without the tests that are done."""
+    done = list(done)
+    for item in sessions[:1] if first_only else sessions:
+        session, others, limit = item.tests, item.others, item.limit
         if not session and not others:
             continue
         order = place.with_suffix(".json")
@@ -412,15 +451,22 @@ def run_fault(
     return ("open", f"{len(done)} tests passed") if first_only else ("survived", "")
 
 
-def run_all(
+def run_all(runner: Runner, listed: Sequence[Fault], tests: list[MappedTest], workers: int) -> None:
+    """Give every fault that is not known its first session, and then those that it let pass all others."""
+    for first_only in (True, False):
+        known = outcomes(runner.state)
+        states = {f.key: known[f.key].outcome if f.key in known else "" for f in listed}
+        pending = [f for f in listed if states[f.key] == ("" if first_only else "open")]
+        run_pass(runner, pending, tests, workers, first_only)
+
+
+def run_pass(
     runner: Runner, listed: Sequence[Fault], tests: list[MappedTest], workers: int, first_only: bool
 ) -> None:
-    """Run the faults that have no outcome yet, as long as there is time, and write each outcome down at once."""
+    """Run faults, as long as there is time, and write each outcome down at once."""
     numbers = {file: number for number, file in enumerate(execution_map.files(ROOT))}
-    file = runner.state / "outcomes.jsonl"
-    known = outcomes(runner.state)
-    pending = [f for f in listed if f.key not in known or (known[f.key].outcome == "open" and not first_only)]
-    pending.reverse()
+    earlier = noticed_before(runner.state)
+    pending = list(reversed(listed))
     lock = threading.Lock()
     count = len(pending)
 
@@ -433,14 +479,22 @@ def run_all(
                     return
                 fault = pending.pop()
             begin = time.monotonic()
+            sessions = sessions_of(fault, tests, numbers, earlier.get(fault.lasting_key, ""))
             put(place, fault, number := number + 1)
-            outcome, by = run_fault(runner, place, fault, tests, numbers, first_only)
+            if first_only:
+                outcome, by = run_fault(runner, place, sessions, True)
+            else:
+                done = [test.name for test in sessions[0].tests]
+                outcome, by = run_fault(runner, place, sessions[1:], False, done)
             take_out(place, fault, number := number + 1)
             if runner.stopped.is_set():
                 return
             result = Outcome(fault.key, outcome, by, round(time.monotonic() - begin, 1))
-            with lock, file.open("a") as stream:
+            with lock, (runner.state / "outcomes.jsonl").open("a") as stream:
                 stream.write(json.dumps(asdict(result)) + "\n")
+                if outcome == "caught" and "::" in by and not by.startswith(("time", "signal", "import")):
+                    with (runner.state.parent / "noticed.jsonl").open("a") as notes:
+                        notes.write(json.dumps({"fault": fault.lasting_key, "test": by}) + "\n")
                 print(
                     f"{count - len(pending)}/{count} {outcome} {result.seconds} s {fault.key} {by}",
                     flush=True,
@@ -467,6 +521,13 @@ def outcomes(state: Path) -> dict[str, Outcome]:
     return {line["key"]: Outcome(**line) for line in lines}
 
 
+def noticed_before(state: Path) -> dict[str, str]:
+    """Return the test that noticed a fault last, by the fault, in whatever state of the sources."""
+    file = state.parent / "noticed.jsonl"
+    lines = map(json.loads, file.read_text().splitlines()) if file.exists() else ()
+    return {line["fault"]: line["test"] for line in lines}
+
+
 def table(listed: Sequence[Fault], known: dict[str, Outcome]) -> str:
     """Return the faults with their outcomes, for a reader."""
     rows = []
@@ -483,13 +544,13 @@ def table(listed: Sequence[Fault], known: dict[str, Outcome]) -> str:
 def summary(listed: Sequence[Fault], known: dict[str, Outcome]) -> tuple[list[str], bool]:
     """Return a line for each list, the faults that passed, and whether the requirement is met."""
     lines, met = [], True
-    for part, least in (("seeded", None), ("random", LEAST_CAUGHT)):
+    for part in PARTS:
         group = [fault for fault in listed if fault.part == part]
         if not group:
             continue
         states = [known[f.key].outcome if f.key in known else "open" for f in group]
         caught = states.count("caught")
-        needed = len(group) if least is None else least
+        needed = DRAWS[part].least if part in DRAWS else len(group)
         met &= caught >= needed
         lines.append(f"{part}: {caught} of {len(group)} caught, {needed} needed; {states.count('open')} open")
         lines += [
@@ -503,11 +564,10 @@ def summary(listed: Sequence[Fault], known: dict[str, Outcome]) -> tuple[list[st
 def main() -> int:
     """Run the faults and print what became of them."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--part", choices=("seeded", "random"), action="append", help="one list only")
-    parser.add_argument("--seed", type=int, default=SEED, help=f"of the random list; {SEED} by default")
+    parser.add_argument("--part", choices=PARTS, action="append", help="one list only")
+    parser.add_argument("--seed", type=int, default=SEED, help=f"of the random lists; {SEED} by default")
     parser.add_argument("--only", default="", help="faults alone whose text contains this")
     parser.add_argument("--tests", nargs="*", default=[], help="these tests alone; all by default")
-    parser.add_argument("--first-only", action="store_true", help="only the first tests of every fault")
     parser.add_argument("--minutes", type=float, default=30.0, help="stop after so long; a later run goes on")
     parser.add_argument("--workers", type=int, default=2, help="how many run at once")
     parser.add_argument("--restart", action="store_true", help="forget the outcomes of earlier runs")
@@ -516,7 +576,7 @@ def main() -> int:
     begin = time.monotonic()
     listed = [
         fault
-        for part in options.part or ("seeded", "random")
+        for part in options.part or PARTS
         for fault in faults(part, options.seed)
         if options.only in fault.key
     ]
@@ -536,7 +596,7 @@ def main() -> int:
     runner = Runner(state, options.tests, begin + 60 * options.minutes)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     try:
-        run_all(runner, listed, map_of_tests(runner, options.workers), options.workers, options.first_only)
+        run_all(runner, listed, map_of_tests(runner, options.workers), options.workers)
     finally:
         runner.stop()
     known = outcomes(state)

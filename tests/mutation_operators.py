@@ -286,13 +286,13 @@ def of_template(file: str, source: str) -> list[Site]:
     return sites
 
 
-def sites(root: Path) -> dict[str, list[Site]]:
-    """Return all faults by folder: those of the package, and "templates"."""
+def sites(root: Path, texts: bool = False) -> dict[str, list[Site]]:
+    """Return all faults by folder: those of the package, and "templates"; of modules that compute nothing if told."""
     package = root / "codegen" / "strapgen"
     by_folder: dict[str, list[Site]] = {}
     for folder in FOLDERS:
         for path in sorted((package / folder).rglob("*.py")):
-            if not path.relative_to(package).as_posix().startswith(WITHOUT_NUMBERS):
+            if texts or not path.relative_to(package).as_posix().startswith(WITHOUT_NUMBERS):
                 file = path.relative_to(root).as_posix()
                 by_folder.setdefault(folder, []).extend(of_python(file, path.read_text()))
     for path in sorted((root / "templates").rglob("*.c.j2")) + sorted((root / "templates").rglob("*.py.j2")):

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import ast
+import json
 import random
 import tomllib
+from dataclasses import replace
+from functools import cache
+from itertools import accumulate
 from pathlib import Path
 
 import execution_map
@@ -32,6 +36,13 @@ def changes(sites: list[Site], source: str) -> set[str]:
     return {site.applied(source).splitlines()[site.line(source) - 1].strip() for site in sites}
 
 
+@cache
+def statements(source: str) -> list[tuple[int, int]]:
+    """Return the span of every statement of a module."""
+    starts = [0, *accumulate(map(len, source.splitlines(keepends=True)))]
+    return [(starts[node.lineno - 1], starts[node.end_lineno or 0]) for node in ast.parse(source).body]
+
+
 def test_every_written_fault_applies_once_and_leaves_a_file_that_can_be_read():
     written = mutants.seeded()
     assert len({site for site, _ in written}) == len(written) >= 40
@@ -41,7 +52,9 @@ def test_every_written_fault_applies_once_and_leaves_a_file_that_can_be_read():
         assert breaks
         assert changed != source
         if site.file.endswith(".py"):
-            assert ast.dump(ast.parse(changed)) != ast.dump(ast.parse(source)), site
+            start, end = next(span for span in statements(source) if span[0] <= site.start < span[1])
+            before, after = source[start:end], changed[start : end + len(changed) - len(source)]
+            assert ast.dump(ast.parse(after)) != ast.dump(ast.parse(before)), site
         elif site.file.endswith(".toml"):
             assert tomllib.loads(changed) != tomllib.loads(source), site
 
@@ -195,10 +208,11 @@ def test_the_requirement_is_all_written_and_most_drawn_faults():
     def fault(part: str, number: int) -> mutants.Fault:
         return mutants.Fault(part, Site("f.py", number, number, "", "sign"), number, f"a{number}", "b")
 
-    listed = [fault("seeded", k) for k in range(2)] + [fault("random", k) for k in range(mutants.DRAWN)]
+    draw = mutants.DRAWS["random"]
+    listed = [fault("seeded", k) for k in range(2)] + [fault("random", k) for k in range(draw.count)]
     outcomes = {f.key: mutants.Outcome(f.key, "caught", "a test", 1.0) for f in listed}
     assert mutants.summary(listed, outcomes)[1]
-    spared = random.Random(0).sample(listed[2:], mutants.DRAWN - mutants.LEAST_CAUGHT)
+    spared = random.Random(0).sample(listed[2:], draw.count - draw.least)
     few = outcomes | {f.key: mutants.Outcome(f.key, "survived", "", 9.0) for f in spared}
     lines, met = mutants.summary(listed, few)
     assert met
@@ -224,3 +238,29 @@ def test_a_fault_is_put_into_a_copy_and_taken_out_again(tmp_path, monkeypatch):
     mutants.take_out(tmp_path / "copy", fault, 2)
     assert copy.read_text() == SOURCE == (tmp_path / "root" / "f.py").read_text()
     assert copy.stat().st_mtime_ns // 10**9 != first // 10**9
+
+
+def test_a_fault_meets_first_what_noticed_it_before_in_whatever_line_it_stands(tests, tmp_path, monkeypatch):
+    monkeypatch.setattr(mutants, "ROOT", tmp_path)
+    file = "codegen/strapgen/b/f.py"
+    (tmp_path / file).parent.mkdir(parents=True)
+    (tmp_path / file).write_text(SOURCE)
+    place = SOURCE.index("x + (y")
+    fault = mutants.Fault("seeded", Site(file, place, place + 5, "x - (", "sign"), 6, "x + (y", "x - (y")
+    first, *_ = mutants.sessions_of(fault, tests, {file: 1}, "tests/c/test_h.py::test_elsewhere")
+    assert first.tests[0].name == "tests/c/test_h.py::test_elsewhere"
+    assert len(first.tests) == len(set(first.tests)) > 1
+    state = tmp_path / "state"
+    (tmp_path / "noticed.jsonl").write_text(
+        json.dumps({"fault": fault.lasting_key, "test": "t::last"}) + "\n"
+    )
+    moved = replace(fault, line=60)
+    assert mutants.noticed_before(state)[moved.lasting_key] == "t::last"
+    assert mutants.noticed_before(tmp_path / "other" / "state") == {}
+
+
+def test_the_longer_draw_takes_its_faults_from_the_way_to_integers_and_text():
+    drawn = mutants.faults("lowering", mutants.SEED)
+    assert len({fault.key for fault in drawn}) == mutants.DRAWS["lowering"].count == 200
+    folders = {Path(fault.site.file).parts[2] for fault in drawn}
+    assert folders == {"fixedpoint", "lowering", "targets"}

@@ -16,7 +16,16 @@ from strapgen.support.processes import end_with_parent
 
 #: The checks by the names that ``--tool`` takes: the module and its function, which takes a subject and the folder for
 #: its files and returns a list of verdicts.
-CHECKS: dict[str, tuple[str, str]] = {}
+CHECKS: dict[str, tuple[str, str]] = {
+    "eva": ("strapgen.evidence.overflow.eva", "prove"),
+    "z3": ("strapgen.evidence.overflow.solver", "prove"),
+    "gappa": ("strapgen.evidence.gappa", "check"),
+    "balls": ("strapgen.evidence.actual_errors", "check"),
+    "processors": ("strapgen.evidence.same_bits", "same_bits"),
+    "million-steps": ("strapgen.evidence.long_run", "million_steps"),
+    "style": ("strapgen.evidence.style", "style"),
+    "fuzzing": ("strapgen.evidence.fuzzing", "fuzzing"),
+}
 
 
 def collect(subjects: Sequence[Subject], folder: Path, tools: Sequence[str] = ()) -> Iterator[list[Verdict]]:

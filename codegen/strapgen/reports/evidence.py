@@ -59,7 +59,7 @@ def summary(verdicts: Sequence[Verdict]) -> TextTable:
     )
 
 
-_RESULTS = ("proved", "agrees", "fails", "not installed")
+_RESULTS = ("proved", "agrees", "fails", "not examined", "not installed")
 
 
 def _promise(verdict: Verdict) -> tuple[str, str]:
@@ -110,6 +110,7 @@ def _reasons(verdicts: Sequence[Verdict]) -> list[str]:
 
 
 def _data(verdicts: Sequence[Verdict]) -> list[dict[str, Any]]:
+    """Return what tools say of the claims that they can examine; the text and the page name the others too."""
     return [
         {
             "kernel": verdict.kernel,
@@ -121,6 +122,7 @@ def _data(verdicts: Sequence[Verdict]) -> list[dict[str, Any]]:
             "detail": verdict.detail,
         }
         for verdict in verdicts
+        if verdict.result != "not examined"
     ]
 
 

@@ -2,21 +2,43 @@
 
 from __future__ import annotations
 
+import cmath
+import math
+from dataclasses import replace
 from fractions import Fraction
 from itertools import product
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from derived import program, quantized
+from small_integers import computed, with_feedback
 
 from strapgen import generate
 from strapgen.backends.fixed import ModelEvaluator
 from strapgen.catalogue import Choice
 from strapgen.fixedpoint.derivation import quantities
 from strapgen.fixedpoint.intervals import Interval
-from strapgen.fixedpoint.runs.accumulation import _moves
+from strapgen.fixedpoint.quantities import (
+    ErrorPropagation,
+    InputElement,
+    Quantities,
+    Quantity,
+    SquareRoot,
+    Sum,
+)
+from strapgen.fixedpoint.quantization import _planned, _walked
+from strapgen.fixedpoint.runs.accumulation import (
+    StepErrors,
+    _away,
+    _moves,
+    accumulation,
+    step_errors,
+    transition_growth,
+)
 from strapgen.ir.fixed_settings import Settings
-from strapgen.ir.program import Assignment, Constant, Operation, Program, Reference, Result
+from strapgen.ir.integer_program import IntegerSum
+from strapgen.ir.program import OPERATIONS, Assignment, Constant, Operation, Program, Reference, Result
 from strapgen.ir.signals import Signal
 
 
@@ -76,3 +98,277 @@ def test_a_call_is_inside_its_bound_whatever_the_call_before_left(rounding):
         worst = max(worst, *errors)
     # Half a unit or a whole one is left before, and as much after: without the first the bound would not hold.
     assert worst > Fraction(3, 4) * interface.outputs[0].format.unit
+
+
+# How far a value moves, by other ways than products
+
+
+def quantity(name, definition, low=-1, high=1, **more) -> Quantity:
+    return Quantity(name, definition, Fraction(0), Interval.of(low, high), **more)
+
+
+def test_roots_functions_and_what_stands_beside_move_too():
+    one = Fraction(1)
+    slopes = ErrorPropagation((("a", Fraction(3)), ("b", None)), Fraction(5))
+    items = {
+        "a": quantity("a", InputElement("x")),
+        "b": quantity("b", InputElement("z")),
+        "double": quantity("double", Sum(((("a",), 2 * one),)), beside=((("a",), -one / 2),)),
+        # The root moves most from zero: to the root of what its argument moves by.
+        "root": quantity("root", SquareRoot("a"), 0),
+        "function": quantity("function", Sum(()), follows=slopes),
+        "steep": quantity("steep", Sum(()), follows=replace(slopes, most=one / 8)),
+    }
+    moves = _moves(Quantities(items), {"x": one / 16})
+    expected = {"a": 1 / 16, "b": 0, "double": 5 / 32, "root": 1 / 4, "function": 3 / 16, "steep": 1 / 8}
+    assert {name: float(move) for name, move in moves.items()} == pytest.approx(expected, rel=1e-12)
+    # A jump moves by all there is as soon as its argument moves at all.
+    assert _moves(Quantities(items), {"z": one / 999})["function"] == 5
+
+
+def test_a_transition_is_as_far_from_the_identity_as_its_offset_and_what_is_stored():
+    items = {
+        "t_x": quantity("t_x", Sum(()), Fraction(-1, 8), Fraction(1, 4)),
+        "t_s": replace(quantity("t_s", Sum(()), Fraction(-1, 16), 0), offset=Fraction(3, 4)),
+    }
+    context = SimpleNamespace(
+        quantities=Quantities(items, {"transition": ("t_x", "t_s", Fraction(1, 3))}),
+        program=SimpleNamespace(companions=SimpleNamespace(identity=(Fraction(0), Fraction(1), Fraction(0)))),
+    )
+    result = SimpleNamespace(signal=SimpleNamespace(name="transition"))
+    assert _away(context, result) == (Fraction(1, 4), Fraction(5, 16), Fraction(1, 3))
+
+
+# A run in the plane, whose transitions turn: the worst that errors of stated sizes can do, from the recurrence alone
+
+
+ANGLE, STEPS, LENGTH = 0.05, 400, 1.25
+AWAY = 2 * math.sin(ANGLE / 2)
+
+
+def reached(sign, local=0.0, transition=0.0, state_feedback=0.0, transition_feedback=0.0) -> float:
+    """Return the largest error after a run x' = x (T + d) + r from which d and r are left out.
+
+    The transition turns by an angle in one direction, or to and fro for a sign of -1. Errors d and r are free up to
+    their size, beside the differences of what was fed back before and what is fed back now, which are free too. The
+    error is linear in each of them, but for the product of both feedbacks, for which the state is fed back to and fro.
+    """
+    turns = [cmath.exp(1j * ANGLE * sign**k) for k in range(STEPS)]
+    after = [1 + 0j] * (STEPS + 1)  # the product of all transitions behind a step
+    for k in reversed(range(STEPS)):
+        after[k] = after[k + 1] * turns[k]
+    fed = [state_feedback * (-1) ** k for k in range(STEPS + 1)] if sign < 0 else [0.0] * (STEPS + 1)
+    states = [LENGTH + 0j]
+    for k, turn in enumerate(turns):
+        states.append(states[-1] * turn + fed[k] - fed[k + 1])
+    total = sum(local + abs(states[k]) * transition for k in range(STEPS))
+    # The coefficient of what is fed back from step k - 1 to step k, of the state and of the transition.
+    of_state = [after[1]] + [after[k + 1] - after[k] for k in range(1, STEPS)] + [after[STEPS]]
+    products = [after[k + 1] * states[k] for k in range(STEPS)]
+    of_transition = [products[0]] + [products[k] - products[k - 1] for k in range(1, STEPS)] + [products[-1]]
+    total += state_feedback * sum(map(abs, of_state))
+    return total + transition_feedback * sum(map(abs, of_transition))
+
+
+def planar(carry: str = "full"):
+    """Return a walk of a step in the plane that turns."""
+    state = Signal("state", (2,), ("s_1", "s_2"), bound=1)
+    one = Interval.symmetric(Fraction(LENGTH) / Fraction(math.sqrt(2)))
+    items = {name: Quantity(name, InputElement("state"), Fraction(0), one) for name in state.elements}
+    program = SimpleNamespace(inputs=(state,), companions=SimpleNamespace(isometry=True))
+    settings = SimpleNamespace(carry=carry)
+    return SimpleNamespace(quantities=Quantities(items), program=program, settings=settings)
+
+
+def sized(
+    local=0, transition=0, state_feedback=0, transition_feedback=0, away=0, moves=0, saturation=0
+) -> StepErrors:
+    """Return errors of these lengths; what is fed back of the state has its size in each of two elements."""
+    part = Fraction(state_feedback) / Fraction(math.sqrt(2))
+    lengths = (local, transition, transition_feedback, away, moves)
+    first, second, third, fourth, fifth = ((Fraction(x) * 3 / 5, Fraction(x) * 4 / 5) for x in lengths)
+    return StepErrors(first, second, third, part, fourth, fifth, Fraction(saturation))
+
+
+@pytest.mark.parametrize("sign", [1, -1], ids=["one way", "to and fro"])
+@pytest.mark.parametrize(
+    "sizes",
+    [
+        {"local": 1e-6},
+        {"transition": 1e-6},
+        {"state_feedback": 1e-6},
+        {"transition_feedback": 1e-6},
+        {"local": 1e-6, "transition": 3e-6, "state_feedback": 2e-6, "transition_feedback": 1e-7},
+    ],
+    ids=lambda sizes: " ".join(sizes),
+)
+def test_the_bound_of_a_run_is_what_an_adversary_reaches(sizes, sign):
+    told = accumulation(planar(), None, sized(**sizes, away=AWAY))
+    bound = float(told.once + STEPS * told.per_step)
+    worst = reached(sign, **sizes)
+    assert told.growth == 1
+    assert worst <= bound * (1 + 1e-5)  # the state is longer by what is added to it
+    # Feedback of the transition is worst where it turns to and fro, and half as bad where it turns one way.
+    if "transition_feedback" not in sizes or sign < 0:
+        assert bound <= worst * (1.02 if len(sizes) == 1 else 1.2)
+
+
+def test_what_is_fed_back_of_the_state_moves_what_is_fed_back_of_the_transition(monkeypatch):
+    monkeypatch.setitem(globals(), "ANGLE", 0.0)  # then nothing else does, behind the first and the last step
+    sizes = {"state_feedback": 0.01, "transition_feedback": 0.02}
+    told = accumulation(planar(), None, sized(**sizes))
+    worst = reached(-1, **sizes)
+    assert worst == pytest.approx(float(told.once + (STEPS - 1) * told.per_step), rel=2e-3)
+    assert float(told.per_step) == pytest.approx(2 * 0.01 * 0.02)
+
+
+def test_the_first_state_and_every_step_may_saturate_and_rounded_increments_move_a_state_of_full_length():
+    told = accumulation(planar(), None, sized(saturation=Fraction(1, 64), local=Fraction(1, 32)))
+    assert float(told.once) == 1 / 64
+    assert float(told.per_step) == pytest.approx(1 / 64 + 1 / 32)
+    moved = accumulation(planar(), None, sized(moves=Fraction(1, 32)))
+    assert float(moved.input_rounding) == pytest.approx(LENGTH / 32)
+    assert moved.per_step == 0
+    # Without error feedback nothing is fed back.
+    assert accumulation(planar("none"), None, sized(state_feedback=1, away=1)).once == 0
+
+
+def test_of_a_matrix_the_longest_row_counts():
+    names = tuple(f"s_{k}" for k in range(9))
+    state = Signal("state", (3, 3), names, bound=1)
+    items = {
+        name: Quantity(name, InputElement("state"), Fraction(0), Interval.symmetric(1)) for name in names
+    }
+    context = planar()
+    context.quantities, context.program.inputs = Quantities(items), (state,)
+    rows = tuple(map(Fraction, (1, 0, 0, 0, 3, 4, 0, 1, 0)))
+    zeros, zero = (Fraction(0),) * 9, Fraction(0)
+    told = accumulation(context, None, StepErrors(rows, zeros, zeros, zero, zeros, zeros))
+    assert float(told.per_step) == 5
+    # A row of three elements of 1 meets the whole error of the transition.
+    told = accumulation(context, None, StepErrors(zeros, rows, zeros, zero, zeros, zeros))
+    assert float(told.per_step) == pytest.approx(math.sqrt(3 * 27))
+
+
+# What one call adds, from the code that it runs
+
+
+def behind_transition(code: Program, values: dict[str, Fraction]) -> list[Fraction]:
+    """Return the outputs of a step on numbers, among which are those of the transition."""
+    known = dict(values)
+
+    def value(node):
+        if isinstance(node, Constant):
+            return node.value
+        return (
+            known[node.name]
+            if isinstance(node, Reference)
+            else OPERATIONS[node.kind](*map(value, node.arguments))
+        )
+
+    for assignment in code.body:
+        known.setdefault(assignment.name, value(assignment.value))
+    return [value(node) for node in code.outputs[0].nodes]
+
+
+@pytest.mark.parametrize("rounding", ["nearest", "truncation"])
+@pytest.mark.parametrize("algorithm", ["euler", "dcm"])
+def test_what_a_step_loses_beside_its_feedback_is_told(algorithm, rounding, rng):
+    """The transition, and the state of the computed transition, less what is fed back of them, are off by so little."""
+    code, settings = program(Choice(algorithm, "rk2", 2)), Settings(12, rounding=rounding, carry="full")
+    exact, plan = _planned(code, settings)
+    context = _walked(code, settings, exact, plan, {})
+    result = quantized(Choice(algorithm, "rk2", 2), settings).interface.outputs[0]
+    errors = step_errors(context, code.transition, result)
+    after = exact.results[code.outputs[0].signal.name]
+    names = [node.name for node in code.transition.nodes]
+    worst = {key: [Fraction(0)] * len(after) for key in ("transition", "local")}
+    for _ in range(60):
+        integers, numbers, fed = {}, {}, {}
+        for argument in context.plan.inputs:
+            for name in argument.signal.elements:
+                integers[name] = int(rng.integers(argument.low, argument.high + 1))
+                numbers[name] = integers[name] * argument.format.unit
+        integers |= {name: int(rng.integers(0, 1 << 12)) for name in context.feedback_names.values()}
+        for value in context.body:
+            definition = value.definition
+            if isinstance(definition, IntegerSum) and (left := definition.residual) is not None:
+                rest = (with_feedback(definition, integers) << -left.shift) & 4095
+                fed[value.name] = (integers[left.name] - rest) * Fraction(2) ** -left.fraction
+            integers[value.name], _ = computed(definition, integers, rounding == "nearest")
+        stored = {n: integers[n] * Fraction(2) ** -v.fraction + v.offset for n, v in context.values.items()}
+        (wanted,) = code.transition_program().run(numbers).values()
+        now = behind_transition(code, numbers | {name: stored[name] for name in names})
+        lacks = {
+            "transition": [stored[n] - w - fed.get(n, 0) for n, w in zip(names, wanted, strict=True)],
+            "local": [stored[n] - w - fed.get(n, 0) for n, w in zip(after, now, strict=True)],
+        }
+        for key, row in lacks.items():
+            worst[key] = [max(abs(a), b) for a, b in zip(row, worst[key], strict=True)]
+    for key, bounds in (("transition", errors.transition), ("local", errors.local)):
+        for measured, bound in zip(worst[key], bounds, strict=True):
+            assert measured <= bound <= 64 * measured, key
+    rounded = context.rounding_error
+    assert errors.state_feedback == rounded * result.format.unit
+    assert errors.transition_feedback == tuple(
+        rounded / 2 ** context.values[name].fraction if name in fed else 0 for name in names
+    )
+
+
+@pytest.mark.parametrize("algorithm", ["euler", "dcm"])
+def test_increments_rounded_to_their_format_move_the_transition_by_what_is_told(algorithm):
+    code, settings = program(Choice(algorithm, "rk2", 2)), Settings(12)
+    exact, plan = _planned(code, settings)
+    context = _walked(code, settings, exact, plan, {})
+    result = quantized(Choice(algorithm, "rk2", 2), settings).interface.outputs[0]
+    errors = step_errors(context, code.transition, result)
+    part, argument = code.transition_program(), plan.inputs[1]
+    names, farthest = argument.signal.elements, [Fraction(0)] * len(errors.moves)
+    for signs in product((-1, 1), repeat=len(names)):
+        corner = dict(zip(names, signs, strict=True))
+        ends = [
+            part.run(
+                {name: sign * (argument.high * argument.format.unit - less) for name, sign in corner.items()}
+            )
+            for less in (0, argument.format.unit / 2)
+        ]
+        (one,), (other,) = (row.values() for row in ends)
+        farthest = [max(known, abs(a - b)) for known, a, b in zip(farthest, one, other, strict=True)]
+    for measured, bound in zip(farthest, errors.moves, strict=True):
+        assert measured <= bound <= Fraction(9, 4) * measured
+    # Terms of higher order cancel in part; what is linear in the increments does not.
+    least = min(bound / measured for measured, bound in zip(farthest, errors.moves, strict=True))
+    assert least < Fraction(3, 2)
+
+
+def test_a_state_that_saturates_loses_a_unit_of_its_last_place():
+    fixed = quantized(Choice("euler", "rk2", 2), Settings(16, state="q15"))
+    told, unit = fixed.interface.accumulation, Fraction(1, 1 << 15)
+    assert told.once == unit
+    assert told.per_step > unit
+
+
+def test_a_transition_of_which_no_stretch_is_known_stretches_by_its_distance_from_the_identity(monkeypatch):
+    monkeypatch.setattr("strapgen.fixedpoint.runs.accumulation.stretch", lambda *_: None)
+    far = (Fraction(3, 8), Fraction(1, 2))
+    monkeypatch.setattr("strapgen.fixedpoint.runs.accumulation._away", lambda *_: far)
+    assert float(accumulation(planar(), None, sized()).growth) == pytest.approx(1 + 5 / 8, rel=1e-12)
+
+
+def test_growth_is_the_largest_singular_value_of_a_transition():
+    """Of [[1, x], [x, 1]] it is 1 + x, of [[1, x], [-x, 1]] the root of 1 + x^2."""
+    x = Signal("increments", (1,), ("x",), bound=Fraction(1, 8))
+    one, up, down = Constant(Fraction(1)), Reference("x"), Operation("negate", (Reference("x"),))
+    s = Signal("state", (2,), ("s_1", "s_2"), bound=1)
+    for second, expected in ((up, 9 / 8), (down, math.sqrt(65 / 64))):
+        body = (
+            Assignment("a", Operation("add", (up, Constant(Fraction(0))))),
+            Assignment("b", Operation("add", (second, Constant(Fraction(0))))),
+        )
+        nodes = (one, Reference("a"), Reference("b"), one)
+        transition = Result(Signal("transition", (2, 2), ("t1", "t2", "t3", "t4")), nodes)
+        step = Program("made", "made", "", "", "", (), (s, x), body, (), transition)
+        growth = transition_growth(step, transition, (Fraction(1, 8),), 2, Fraction(7))
+        assert float(growth) == pytest.approx(expected, rel=1e-12)
+    calls = replace(step, body=(*body[:1], Assignment("b", Operation("sqrt", (Reference("x"),)))))
+    assert transition_growth(calls, transition, (Fraction(1, 8),), 2, Fraction(7)) == 7

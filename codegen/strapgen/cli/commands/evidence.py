@@ -73,7 +73,7 @@ def evidence(
     processors and a driver for a fuzzer. The tools that are installed say whether any sum can overflow, whether the
     error bounds hold, and whether other processors return the same bits. The exit status is 1 if a claim fails.
 
-    Example: strapgen evidence euler --method rk4 --out evidence
+    Example: strapgen evidence euler --method rk4 --out out/evidence
     """
     from strapgen.evidence import collection
     from strapgen.reports.evidence import evidence_page, evidence_report

@@ -1,0 +1,341 @@
+"""The bound of the angle of a run from the errors of a step: each error alone, and each product of two, by hand.
+
+All is told of states of a plane, as of any: r turns x + r by the sine |r|/|x + r| at most, an attitude by twice that.
+"""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from fractions import Fraction
+from types import SimpleNamespace
+
+import pytest
+
+from strapgen.fixedpoint.runs.accumulation import StepErrors
+from strapgen.fixedpoint.runs.angle_accumulation import (
+    _dual_rows,
+    _matrix_angles,
+    _operation,
+    _parameter_angles,
+    _Sizes,
+    _sizes,
+    _steps,
+    _turning,
+    _unsteadiness,
+)
+from strapgen.ir.angle_accumulation import LARGEST_ERROR
+from strapgen.ir.signals import Signal
+
+HALF = Fraction(1, 2)
+NOTHING = StepErrors((), (), (), Fraction(0), (), ())
+
+
+def sizes(**more) -> _Sizes:
+    """Return the sizes of a step that rounds nothing and stretches nothing, but for these; the state has length 1/2."""
+    zeros = {field.name: Fraction(0) for field in fields(_Sizes)}
+    ones = {"longest": Fraction(1), "contraction": Fraction(1), "expansion": Fraction(1), "shortest": HALF}
+    return _Sizes(**(zeros | ones | {name: Fraction(size) for name, size in more.items()}))
+
+
+def tangent(sine: Fraction | float) -> float:
+    """Return the tangent of the angle of a sine, which is not below the angle."""
+    return float(sine) / (1 - float(sine) ** 2) ** 0.5
+
+
+def percent(count: int | Fraction) -> Fraction:
+    return Fraction(count, 100)
+
+
+@pytest.mark.parametrize(
+    ("errors", "sine"),
+    [
+        # An error of 1/100 of a state of 1/2.
+        ({"local": percent(1)}, percent(2)),
+        # The state before, with an error of 1/100 of it, is up to 100/99 as long as the one after; shorter transitions
+        # make it longer still.
+        ({"transition": percent(1)}, Fraction(1, 99)),
+        ({"transition": percent(1), "contraction": percent(90)}, Fraction(1, 89)),
+        # An error of 1/100 took up to 2/100 of the length.
+        ({"transition": percent(1), "local": percent(1)}, percent(2) + Fraction(102, 99) / 100),
+        # What is fed back, turned less itself: 1/100 times 1/5, of a state of 1/2 less what is fed back.
+        ({"state_feedback": percent(1), "away": percent(20)}, Fraction(2, 1000) / (HALF - percent(1))),
+        # Errors of the transition turn what is fed back of the state no further, but the state before was longer by two
+        # roundings, of 2/100 each.
+        (
+            {"state_feedback": percent(1), "transition": percent(1)},
+            Fraction(104, 99) / 100 / (1 - percent(2)),
+        ),
+        # Feedback g of the transition acts on the state now, where it was told of the one before. They differ by
+        # transitions 1/5 from the identity each, and by the feedback itself, there and back. All is told in the length
+        # after two steps, each of which shortens by up to 2 g; so is what has been fed back by now.
+        (
+            {"transition_feedback": percent(1), "away": percent(20)},
+            percent(1) * Fraction(100, 98) ** 2 * percent(42) / (1 - Fraction(1, 98)),
+        ),
+        (
+            {"transition_feedback": percent(1)},
+            percent(1) * Fraction(100, 98) ** 2 * percent(2) / (1 - Fraction(1, 98)),
+        ),
+        # The state differs by its rounding too: an error of 1/100 of 1/2, or feedback there and back.
+        (
+            {"transition_feedback": percent(1), "local": percent(1)},
+            (percent(2) + percent(1) * (Fraction(102, 98) ** 2 * percent(2) + percent(2)))
+            / (1 - Fraction(102, 98) / 100),
+        ),
+        (
+            {"transition_feedback": percent(1), "state_feedback": percent(1)},
+            percent(1)
+            * (Fraction(104, 98) ** 2 * percent(2) + percent(4))
+            / (1 - percent(2) - Fraction(104, 98) / 100),
+        ),
+        # And by the error of the transition before, which shortens as much.
+        (
+            {"transition_feedback": percent(1), "transition": percent(1)},
+            (Fraction(100, 97) / 100 + percent(1) * Fraction(100, 97) ** 2 * percent(3))
+            / (1 - Fraction(1, 97)),
+        ),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, dict) else "",
+)
+def test_the_angle_that_a_step_of_parameters_adds(errors, sine):
+    angles = _parameter_angles(sizes(**errors), NOTHING, Fraction(0))
+    assert float(angles.per_step) == pytest.approx(2 * tangent(sine), rel=1e-12)
+
+
+def test_the_ends_of_a_run_of_parameters():
+    """What is fed back turns the first state and the last one, of attitudes twice as far: 1/100 of 1/2, and of g."""
+    angles = _parameter_angles(sizes(state_feedback=percent(1)), NOTHING, Fraction(0))
+    assert float(angles.once) == pytest.approx(4 * tangent(percent(2)), rel=1e-12)
+    fed = Fraction(100, 98) / 100  # of the state before, which may have been longer
+    angles = _parameter_angles(sizes(transition_feedback=percent(1)), NOTHING, Fraction(0))
+    assert float(angles.once) == pytest.approx(4 * tangent(fed), rel=1e-12)
+
+
+def test_a_normalization_of_parameters_rounds_four_words_of_the_shortest_state():
+    """Each by 1/1000: 2/1000 of 1/2; with feedback three times, and what is fed back before and after is forgotten."""
+    rounding = Fraction(1, 1000)
+    angles = _parameter_angles(sizes(), NOTHING, rounding)
+    assert float(angles.per_normalization) == pytest.approx(2 * tangent(Fraction(4, 1000)), rel=1e-12)
+    for fed_back in ({"state_feedback": percent(1)}, {"transition_feedback": percent(Fraction(98, 50))}):
+        angles = _parameter_angles(sizes(**fed_back), NOTHING, rounding)
+        end = float(angles.once) / 4
+        expected = 2 * (tangent(Fraction(12, 1000)) + 2 * end)
+        assert float(angles.per_normalization) == pytest.approx(expected, rel=1e-12)
+
+
+def test_rounded_increments_are_an_error_of_the_transition():
+    errors = replace(NOTHING, moves=(percent(3), percent(4)))
+    angles = _parameter_angles(sizes(transition=percent(1)), errors, Fraction(0))
+    more = _parameter_angles(sizes(transition=percent(6)), NOTHING, Fraction(0))
+    assert angles.per_step + angles.input_rounding == pytest.approx(more.per_step, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("errors", "room", "lost"),
+    [
+        # Seven eighths of the way from 1 to 1/2 are 7/16.
+        ({"local": percent(1)}, Fraction(7, 16), percent(1)),
+        ({"contraction": percent(98)}, Fraction(7, 16), percent(2)),
+        ({"transition": percent(1)}, Fraction(7, 16), Fraction(100, 99) ** 2 * percent(1)),
+        ({"state_feedback": percent(1), "local": percent(2)}, Fraction(7, 16) - percent(2), percent(2)),
+        (
+            {"transition_feedback": percent(1), "local": percent(2), "longest": 3},
+            Fraction(7, 16) - percent(6),
+            percent(2) + percent(1) * (3 * percent(2) + percent(2)),
+        ),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, dict) else "",
+)
+def test_steps_are_proved_as_long_as_there_is_room_for_what_each_takes(errors, room, lost):
+    angles = _parameter_angles(sizes(**errors), NOTHING, Fraction(0))
+    assert angles.start == Fraction(15, 16)
+    assert angles.proved_steps == int(room / lost)
+    assert _steps(Fraction(-1), lost) == 0 == _steps(room, Fraction(0))
+
+
+def test_a_step_that_may_turn_by_more_than_a_twelfth_of_a_turn_has_no_bound():
+    """The sine of 1/2 is the largest for which a bound is worth anything."""
+    assert _parameter_angles(sizes(local=percent(25)), NOTHING, Fraction(0)).per_step > 0
+    with pytest.raises(ValueError):
+        _parameter_angles(sizes(local=percent(26)), NOTHING, Fraction(0))
+    with pytest.raises(ValueError):  # nor has one of which nothing may be left
+        _parameter_angles(sizes(transition=percent(99)), NOTHING, Fraction(0))
+
+
+def test_polynomials_add_subtract_and_negate():
+    one, other = {("s0",): Fraction(2)}, {("s0",): Fraction(2), ("t1",): Fraction(3)}
+    assert _operation("negate", [other]) == {("s0",): -2, ("t1",): -3}
+    assert _operation("add", [one, other]) == {("s0",): 4, ("t1",): 3}
+    assert _operation("subtract", [one, other]) == {("t1",): -3}
+    assert _operation("multiply", [one, other]) == {("s0", "s0"): 4, ("s0", "t1"): 6}
+    with pytest.raises(NotImplementedError):
+        _operation("sqrt", [one])
+
+
+# Matrices
+
+
+@pytest.mark.parametrize(
+    ("errors", "added", "fed_back"),
+    [
+        ({"local": percent(1)}, percent(1), 0),
+        ({"transition": percent(1), "longest": 2}, percent(2), 0),
+        ({"state_feedback": percent(1), "away": percent(20)}, Fraction(2, 1000), percent(1)),
+        # As for parameters; lengths are those of the longest matrix, here 2.
+        (
+            {"transition_feedback": percent(1), "longest": 2, "away": percent(20)},
+            percent(1) * 2 * percent(42),
+            percent(2),
+        ),
+        (
+            {"transition_feedback": percent(1), "longest": 2, "transition": percent(1)},
+            percent(2) + percent(1) * 2 * percent(3),
+            percent(2),
+        ),
+        (
+            {"transition_feedback": percent(1), "local": percent(3)},
+            percent(3) + percent(1) * (percent(2) + percent(3)),
+            percent(1),
+        ),
+        (
+            {"transition_feedback": percent(1), "state_feedback": percent(3)},
+            percent(1) * (percent(2) + percent(6)),
+            percent(4),
+        ),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, dict) else "",
+)
+def test_the_angle_that_a_step_of_matrices_adds(errors, added, fed_back):
+    """What a step adds to M is over the smallest singular value: of the state with its feedback, less what is added.
+
+    Singular values from 1/2 to the longest turn an uneven change of M by more than its skew half.
+    """
+    step = sizes(**errors)
+    assert step.added == added
+    assert step.fed_back == fed_back
+    angles = _matrix_angles(step, NOTHING)
+    uneven = (float(step.longest) - 1 / 2) / (float(step.longest) + 1 / 2)
+    proper = ((1 + uneven**2) / 2) ** 0.5
+    assert float(angles.per_step) == pytest.approx(
+        proper * float(added / (HALF - fed_back - added)), rel=1e-12
+    )
+    # The first state and the last one, told from states without what is fed back.
+    assert float(angles.once) == pytest.approx(
+        2 * proper * float(fed_back / (HALF - 2 * fed_back)), rel=1e-12
+    )
+    assert float(_turning(Fraction(uneven))) == pytest.approx(proper)
+    assert float(angles.beyond) == pytest.approx(1 / proper)
+
+
+SHORTEST = Fraction(15, 16)
+LONGEST = float(2 - SHORTEST**2) ** 0.5
+START = 1 - Fraction(1, 128)
+
+
+@pytest.mark.parametrize(
+    ("errors", "shorter", "longer"),
+    [
+        ({"local": percent(Fraction(1, 10))}, 0.001, 0.001),
+        ({"contraction": percent(99)}, 0.01, 0),
+        ({"expansion": percent(101)}, 0, LONGEST / 100),
+        ({"local": percent(Fraction(1, 10)), "state_feedback": percent(Fraction(1, 2))}, 0.001, 0.001),
+        ({"local": percent(Fraction(1, 10)), "expansion": percent(101)}, 0.001, LONGEST / 100 + 0.001),
+        ({"local": percent(Fraction(1, 10)), "contraction": percent(99)}, 0.011, 0.001),
+        ({"local": 1e-4, "expansion": 1.001}, 1e-4, LONGEST / 1000 + 1e-4),
+        ({"local": 1e-4, "contraction": 0.999, "state_feedback": 0.005}, 0.0011, 1e-4),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, dict) else "",
+)
+def test_matrices_stay_proper_at_both_ends(errors, shorter, longer):
+    step = sizes(**errors, shortest=SHORTEST, longest=Fraction(LONGEST))
+    angles = _matrix_angles(step, NOTHING)
+    fed_back = 2 * float(step.fed_back)
+    rooms = (float(START - SHORTEST) - fed_back, LONGEST - float(2 - START**2) ** 0.5 - fed_back)
+    steps = [int(room / lost) for room, lost in zip(rooms, (shorter, longer), strict=True) if lost]
+    # Where nothing is lost at one end no step is proved; the code always loses something.
+    assert angles.proved_steps == (min(steps) if shorter and longer else 0)
+    assert angles.start == START
+
+
+def test_an_orthonormalization_leaves_a_part_of_what_is_symmetric():
+    """f(s) = s (3 - s^2)/2 has the slope 3/2 (1 - s^2), the same size at both ends, over what is restored."""
+    shortest = float(SHORTEST)
+    restored = min(s * (3 - s * s) / 2 for s in (shortest, LONGEST))
+    unsteady = 1.5 * (1 - shortest**2) * LONGEST / restored
+    assert float(_unsteadiness(SHORTEST, START)) == pytest.approx(unsteady, rel=1e-12)
+    angles = _matrix_angles(sizes(shortest=SHORTEST, longest=Fraction(LONGEST), local=percent(1)), NOTHING)
+    uneven = (LONGEST - shortest) / (LONGEST + shortest)
+    factor = ((1 + ((uneven + unsteady) / (1 - unsteady)) ** 2) / 2) ** 0.5
+    proper = ((1 + uneven**2) / 2) ** 0.5
+    assert float(angles.orthonormalized) == pytest.approx(factor / proper, rel=1e-9)
+    # Three elements of a row, over the smallest singular value: the length of a matrix of nine elements is three.
+    assert float(angles.per_element) == pytest.approx(3 * factor / shortest, rel=1e-9)
+    fed_back = sizes(shortest=SHORTEST, longest=Fraction(LONGEST), state_feedback=percent(1))
+    angles = _matrix_angles(fed_back, NOTHING)
+    assert float(angles.per_normalization) == pytest.approx(float(angles.once) * factor / proper, rel=1e-9)
+    # Restored singular values less the error of a matrix must be those of a start.
+    highest = Fraction(restored) - 3 * LARGEST_ERROR
+    assert _unsteadiness(SHORTEST, highest - Fraction(1, 10**12)) is not None
+    assert _unsteadiness(SHORTEST, highest + Fraction(1, 10**12)) is None
+
+
+def test_dual_rows_have_room_for_what_steps_take_between_them():
+    """An eighth of e is left of it; seven eighths are for the stretch, the rounding and what is fed back."""
+    e = 1 / 256
+    for errors, lost, fed_back in (
+        ({"local": 1e-6}, 1e-6, 0),
+        ({"contraction": 1 - 1e-5, "local": 1e-6}, 1.1e-5, 0),
+        ({"expansion": 1 + 1e-5, "local": 1e-6}, 1e-5 * (1 + e) + 1e-6, 0),
+        ({"state_feedback": 1e-4, "local": 1e-6}, 1e-6, 1e-4),
+    ):
+        step = sizes(**errors, shortest=SHORTEST, longest=Fraction(LONGEST))
+        apart, growth = _dual_rows(step, Fraction(1, 4))
+        assert apart == pytest.approx((7 / 8 * e - 2 * fed_back) / lost, abs=1)
+    square = 9 / 8 * e**2
+    turned, rest = e / (1 - e), 13 / 5 * e
+    weight = (1.01 * turned + 1.1 * rest) / (1 - 1.5 * square * turned - 1.1 * rest)
+    assert float(growth) == pytest.approx(square**2 + weight * 1.5 * square, rel=1e-9)
+    assert _dual_rows(step, Fraction(weight) - Fraction(1, 10**6))[0] == 0
+    assert _dual_rows(step, None) == (0, 0)
+
+
+# The sizes themselves
+
+
+@pytest.mark.parametrize("rounding", [HALF, Fraction(1)])
+def test_sizes_are_lengths_of_all_elements_and_feedback_is_told_from_its_middle(rounding):
+    state = Signal("state", (2, 2), tuple("abcd"), bound=1)
+    companions = SimpleNamespace(isometry=True)
+    context = SimpleNamespace(
+        program=SimpleNamespace(inputs=(state,), companions=companions),
+        settings=SimpleNamespace(allowance=Fraction(1, 16), carry="full"),
+        quantities=None,
+        rounding_error=rounding,
+    )
+    four = (Fraction(3), Fraction(0), Fraction(0), Fraction(4))
+    errors = StepErrors(four, four, four, Fraction(7), four, four)
+    told = _sizes(context, None, errors, True)
+    assert (told.local, told.transition, told.away) == (5, 5, 5)
+    middle = HALF / rounding
+    assert (told.state_feedback, told.transition_feedback) == (middle * 14, middle * 5)
+    assert (told.shortest, told.contraction, told.expansion) == (SHORTEST, 1, 1)
+    assert float(told.longest) == pytest.approx(LONGEST)
+    context.settings.carry = "none"
+    assert _sizes(context, None, errors, True).state_feedback == 0
+
+
+@pytest.mark.parametrize(
+    ("stretched", "contraction", "expansion"), [(None, 0.75, 1.25), (Fraction(7, 16), 0.75, 23**0.5 / 4)]
+)
+def test_a_transition_stretches_by_what_is_known_of_it(stretched, contraction, expansion, monkeypatch):
+    monkeypatch.setattr("strapgen.fixedpoint.runs.angle_accumulation.stretch", lambda *_: stretched)
+    state = Signal("state", (4,), tuple("abcd"), bound=1)
+    context = SimpleNamespace(
+        program=SimpleNamespace(inputs=(state,)),
+        settings=SimpleNamespace(allowance=Fraction(1, 16), carry="none"),
+        rounding_error=HALF,
+    )
+    errors = replace(NOTHING, away=(Fraction(1, 4),))
+    told = _sizes(context, None, errors, False)
+    assert float(told.contraction) == pytest.approx(contraction, rel=1e-12)
+    assert float(told.expansion) == pytest.approx(expansion, rel=1e-12)

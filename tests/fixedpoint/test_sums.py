@@ -1,0 +1,215 @@
+"""Error bounds of sums: each term is attained by integers of a few bits, so that none may be left out or halved."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+
+import pytest
+from small_integers import GRID, Known, at_corners, computed, context, quantity, with_feedback, worst
+
+from strapgen.fixedpoint.quantities import ErrorPropagation, Sum
+from strapgen.fixedpoint.sums import lower_sum, word_of
+
+EXACT = Known(4, -7, 7)
+OFF = Known(4, -9, 9, Fraction(1, 40))
+LESS = Known(3, -5, 5, Fraction(1, 30))
+AB = ("a", "b")
+
+
+def terms(*pairs: tuple[tuple[str, ...], object]) -> Sum:
+    return Sum(tuple((names, Fraction(coefficient)) for names, coefficient in pairs))
+
+
+@dataclass(frozen=True)
+class Case:
+    """A sum of known quantities, its value, and by how much less than the bound the worst input is off."""
+
+    known: dict[str, Known]
+    definition: Sum
+    exact: Callable[..., Fraction]
+    slack: Fraction = Fraction(0)
+    word: bool = False
+    settings: dict = field(default_factory=dict)
+    forced: dict = field(default_factory=dict)
+    wider: int = 0
+
+
+#: What is only added at full precision is not rounded: the errors of its terms are all there is.
+CASES = {
+    "a product of two inexact factors": Case({"a": OFF, "b": LESS}, terms((AB, 1)), lambda a, b: a * b),
+    "four times an inexact value": Case({"a": OFF}, terms((("a",), 4)), lambda a: 4 * a),
+    "an eighth of a product": Case(
+        {"a": OFF, "b": LESS}, terms((AB, Fraction(-1, 8))), lambda a, b: -a * b / 8
+    ),
+    # The factor is 77/128, more than 3/5: its error acts on the computed value, whose end is the farthest.
+    "three fifths of an inexact value": Case(
+        {"a": OFF}, terms((("a",), Fraction(3, 5))), lambda a: a * Fraction(3, 5)
+    ),
+    "a third, which has no finite expansion": Case(
+        {"a": EXACT}, terms((("a",), 1), ((), Fraction(1, 3))), lambda a: a + Fraction(1, 3)
+    ),
+    # Half a unit of the last place, and none of the two values is inexact.
+    "one rounding to the nearest": Case(
+        {"a": EXACT, "b": EXACT}, terms((AB, 1)), lambda a, b: a * b, word=True, forced={"y": 5}
+    ),
+    # All but the last bit of a unit is cut off.
+    "one truncation": Case(
+        {"a": EXACT, "b": EXACT},
+        terms((AB, 1)),
+        lambda a, b: a * b,
+        Fraction(1, 1 << 8),
+        True,
+        {"rounding": "truncation"},
+        {"y": 5},
+        wider=1,  # nothing is cut off upwards
+    ),
+    # What is finer than the last place is rounded, and what is not is added to it, each with its error.
+    "fine and coarse terms": Case(
+        {"a": OFF, "c": LESS},
+        terms((("a",), Fraction(1, 16)), (("c",), 1)),
+        lambda a, c: a / 16 + c,
+        word=True,
+        forced={"y": 5},
+    ),
+    # The wide number has no room for the last places of the small term: they are cut off, up to a unit of its last.
+    "a term shifted down": Case(
+        {"a": Known(18, -33, 33), "b": Known(4, -7, 7)},
+        terms((("a",), 1), (("b",), 1)),
+        lambda a, b: a + b,
+        Fraction(1, 1 << 18),
+        wider=1,
+    ),
+    # A seventh is rounded down to the places of the finest term, and down again to those that there is room for.
+    "a constant shifted down": Case(
+        {"a": Known(13, -33, 33), "b": Known(0, -24, 24)},
+        terms((("a",), 1), (("b",), 1), ((), Fraction(1, 7))),
+        lambda a, b: a + b + Fraction(1, 7),
+        Fraction(1, 1 << 13),
+        wider=2,
+    ),
+    # The rounded part is -2 at most, one more than the eighth of its integer: that is the largest partial sum.
+    "a truncation beside a large term": Case(
+        {"a": Known(2, -3, 3), "b": Known(2, -3, 3), "c": Known(1, -60, 60)},
+        terms((AB, 1), (("c",), 1)),
+        lambda a, b, c: a * b + c,
+        Fraction(1, 1 << 4),
+        True,
+        {"rounding": "truncation"},
+        {"y": 1},
+        wider=1,
+    ),
+}
+
+
+@pytest.mark.parametrize("case", CASES.values(), ids=CASES)
+def test_the_bound_of_a_sum_is_attained(case):
+    item = quantity("y", case.definition, *at_corners(case.known, case.exact))
+    walk = context(case.known, item, words=["y"] if case.word else [], forced=case.forced, **case.settings)
+    lower_sum(walk, item, case.definition)
+    value, measured = walk.values["y"], worst(walk, "y", case.known, case.exact)
+    assert measured.error + case.slack <= value.error <= measured.error + case.slack + GRID
+    # Ends are exact but for an integer, and so are partial sums but for what shifts may add.
+    assert value.low <= measured.low <= value.low + 1 + case.wider
+    assert value.high - 1 - case.wider <= measured.high <= value.high
+    assert measured.peak <= value.peak <= measured.peak + 2
+
+
+def lowered(known: dict[str, Known], item, **options):
+    """Return the value of a sum, and the walk that has it."""
+    walk = context(known, item, **options)
+    lower_sum(walk, item, item.definition)
+    return walk.values[item.name], walk
+
+
+@pytest.mark.parametrize("rounding", ["nearest", "truncation"])
+@pytest.mark.parametrize(("places", "fraction"), [(8, 5), (15, 2), (12, 4)])
+def test_what_error_feedback_loses_is_attained(places, fraction, rounding):
+    """Of an exact product, the word and what it feeds back lack no more than the error less two roundings of a unit.
+
+    Feedback of 8 bits begins 8 places below the word: a finer sum is cut off there, a coarser one cuts off feedback.
+    """
+    known = {"a": Known(places - 1, -7, 7), "b": Known(1, -7, 7)}
+    item = quantity("y", terms((AB, 1)), *at_corners(known, lambda a, b: a * b))
+    value, walk = lowered(
+        known,
+        item,
+        forced={"y": fraction},
+        feedback={"y": "left"},
+        carry="state",
+        rounding=rounding,
+    )
+    definition, unit = value.definition, Fraction(1, 1 << (fraction + 8))
+    lost, errors, sizes = [], [], []
+    for a in range(-7, 8):
+        for b in range(-7, 8):
+            for left in (0, 1, 127, 128, 255):
+                inside = with_feedback(definition, {"a": a, "b": b, "left": left})
+                after = (inside << -definition.residual.shift) & 255
+                integer = inside >> definition.shift
+                exact = Fraction(a * b, 1 << places)
+                word = integer * Fraction(2) ** -value.fraction
+                errors.append(abs(word - exact))
+                lost.append(abs(word + after * unit - exact - left * unit))
+                again, partial = computed(definition, {"a": a, "b": b, "left": left}, rounding == "nearest")
+                assert value.low <= integer == again <= value.high
+                sizes += partial
+    assert max(sizes) <= value.peak
+    if not definition.drop:  # else the sum is larger before places are dropped
+        assert value.peak <= max(sizes) + 2 ** max(0, definition.shift - 8)
+    two = 2 * walk.rounding_error / (1 << fraction)
+    finest = Fraction(1, 1 << min(places, fraction + 8))
+    assert max(lost) <= value.error - two == finest
+    # All of a unit but the last bit of the coarser of both, unless neither is cut off.
+    if places != fraction + 8:
+        assert max(lost) >= finest - Fraction(1, 1 << max(places, fraction + 8))
+    assert max(errors) <= value.error
+    if rounding == "nearest":  # then two roundings are a unit of the last place
+        assert max(errors) >= two - 2 * finest
+
+
+#: A value that is only added up, one that is rounded, and a word that is not.
+FORMS = {"wide": {}, "rounded": {"forced": {"y": 2}}, "word": {"forced": {"y": 4}}}
+
+
+@pytest.mark.parametrize("form", FORMS.values(), ids=FORMS)
+def test_what_functions_add_is_the_slope_times_the_error_or_all_there_is(form):
+    known = {"a": OFF, "b": LESS, "c": EXACT}
+    plain = quantity("y", terms((("a",), 1)), -2, 2)
+    base = lowered(known, plain, **form)[0]
+
+    def added(slopes, most) -> Fraction:
+        value = lowered(known, replace(plain, follows=ErrorPropagation(slopes, most)), **form)[0]
+        assert (value.low, value.high) == (
+            base.low,
+            base.high,
+        )  # an exact value lies in its range wherever it is
+        return value.error - base.error
+
+    most = Fraction(4)
+    steep, jump = (("a", Fraction(3)), ("b", Fraction(1, 2))), (("a", Fraction(1)), ("c", None))
+    assert 0 <= added(steep, most) - 3 * OFF.error - LESS.error / 2 < GRID
+    assert 0 <= added(steep, Fraction(1, 100)) - Fraction(1, 100) < GRID
+    assert 0 <= added(jump, most) - OFF.error < GRID  # nothing is wrong with the value at which it jumps
+    assert added((("b", None),), most) == most
+
+
+def test_what_a_series_leaves_out_is_added_to_the_error_and_to_the_range():
+    left_out = Fraction(1, 9)
+    item = quantity("y", terms((("a",), 1)), -2, 2)
+    base, more = (lowered({"a": OFF}, replace(item, inexact=by))[0] for by in (Fraction(0), left_out))
+    assert left_out <= more.error - base.error < left_out + GRID
+    assert (more.low, more.high) == (base.low - 2, base.high + 2)  # a ninth is nearly two sixteenths
+
+
+def test_a_wide_value_is_rounded_to_a_word_with_the_error_that_it_has():
+    wide = {"a": Known(12, 900, 1100, Fraction(1, 900), wide=True)}
+    walk = context(wide)
+    rounded = walk.values[word_of(walk, "a")]
+    measured = worst(walk, rounded.name, wide, lambda a: a)
+    # Half a unit less half of the last place of the wide number, which rounds to the nearest exactly.
+    assert measured.error <= rounded.error <= measured.error + GRID
+    assert rounded.magnitude <= 127
+    assert word_of(walk, "a") == rounded.name
+    assert word_of(walk, rounded.name) == rounded.name
