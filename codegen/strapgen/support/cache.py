@@ -102,6 +102,11 @@ def lookup(kind: str, key: str) -> Path | None:
         As for `entry`.
     """
     place = _folder(create=False) / kind / key
+    if (
+        place.parent not in _tidied
+    ):  # once, since another process may have made the entry that a killed one began
+        _tidied.add(place.parent)
+        _tidy(place.parent)
     return place if _is_whole(place) else None
 
 
@@ -252,6 +257,8 @@ def _folder(create: bool) -> Path:
 _replaced: dict[Path, Path] = {}
 #: Cache folders that were the user's alone when they were looked at first.
 _private: set[Path] = set()
+#: Folders of a kind in which this process has looked for what others have left.
+_tidied: set[Path] = set()
 
 
 def _temporary(nominal: Path, reason: str) -> Path:
@@ -350,8 +357,7 @@ def _warn(reason: str) -> None:
 
 def _prune(folder: Path) -> None:
     """Remove entries that have not been used for long, and what processes that are gone have left."""
-    for gone in drafts.forgotten(folder, _DRAFT):
-        shutil.rmtree(gone, ignore_errors=True)
+    _tidy(folder)
     oldest = time.time() - _UNUSED_DAYS * 86400
     for path in folder.iterdir():
         with suppress(OSError):
@@ -359,3 +365,9 @@ def _prune(folder: Path) -> None:
                 not path.name.startswith(_DRAFT) and path.stat().st_mtime < oldest
             ):
                 shutil.rmtree(path, ignore_errors=True)
+
+
+def _tidy(folder: Path) -> None:
+    """Remove the drafts of processes that are gone."""
+    for gone in drafts.forgotten(folder, _DRAFT):
+        shutil.rmtree(gone, ignore_errors=True)
