@@ -37,6 +37,8 @@ from mutation_operators import Site
 
 ROOT = Path(__file__).resolve().parents[1]
 SEEDED = Path(__file__).parent / "data" / "mutants.toml"
+#: Drawn faults that no test notices, each with the reason.
+UNNOTICED = Path(__file__).parent / "data" / "unnoticed.toml"
 #: The seed of the draws.
 SEED = 1969
 #: A session that takes longer hangs, in s; one of all tests may take as many times what they take without a fault more.
@@ -114,6 +116,14 @@ def seeded() -> list[tuple[Site, str]]:
         site = Site(entry["file"], start, start + len(entry["text"]), entry["instead"], entry["kind"])
         faults.append((site, entry["breaks"]))
     return faults
+
+
+def reasons() -> dict[str, str]:
+    """Return why no test notices a fault, by the fault as it is in `Fault.lasting_key`."""
+    return {
+        f"{entry['file']} {entry['before']} -> {entry['after']}": entry["reason"]
+        for entry in tomllib.loads(UNNOTICED.read_text())["fault"]
+    }
 
 
 def faults(part: str, seed: int) -> list[Fault]:
@@ -543,7 +553,7 @@ def table(listed: Sequence[Fault], known: dict[str, Outcome]) -> str:
 
 def summary(listed: Sequence[Fault], known: dict[str, Outcome]) -> tuple[list[str], bool]:
     """Return a line for each list, the faults that passed, and whether the requirement is met."""
-    lines, met = [], True
+    lines, met, known_reasons = [], True, reasons()
     for part in PARTS:
         group = [fault for fault in listed if fault.part == part]
         if not group:
@@ -555,6 +565,7 @@ def summary(listed: Sequence[Fault], known: dict[str, Outcome]) -> tuple[list[st
         lines.append(f"{part}: {caught} of {len(group)} caught, {needed} needed; {states.count('open')} open")
         lines += [
             f"  {state}: {f.site.file}:{f.line}\n    - {f.before}\n    + {f.after}"
+            + (f"\n    {known_reasons[f.lasting_key]}" if f.lasting_key in known_reasons else "")
             for f, state in zip(group, states, strict=True)
             if state != "caught"
         ]
