@@ -9,10 +9,10 @@
 #error "integers of 32 and 64 bits are needed"
 #endif
 
-/* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
+/* Whether a number is larger in magnitude than a limit. */
 static inline int dcm_from_cayley_klein_w32_out(int32_t x, int32_t limit)
 {
-    return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
+    return (x < -limit) || (x > limit);
 }
 
 /* The exact product of two words. */
@@ -40,6 +40,12 @@ static inline int64_t dcm_from_cayley_klein_w32_mul(int32_t a, int32_t b)
     return (int64_t)a * (int64_t)b;
 }
 #endif
+
+/* The exact square of a word. */
+static inline int64_t dcm_from_cayley_klein_w32_sqr(int32_t a)
+{
+    return (int64_t)a * (int64_t)a;
+}
 
 /* x / 2^n, rounded down, where the proof of the ranges shows that it fits into a word: then the
  * 32 bits of x from bit n on, read as a number with a sign, are that quotient. For n above 32 the
@@ -78,10 +84,10 @@ int dcm_from_cayley_klein_w32(const int32_t state[4], int32_t attitude[9])
         || dcm_from_cayley_klein_w32_out(a_z, INT32_C(1140850688))) {
         return 1;
     }
-    const int64_t shared_1 = dcm_from_cayley_klein_w32_mul(a_x, a_x); /* Q3.60, 0 .. 1.13, exact */
-    const int64_t shared_2 = dcm_from_cayley_klein_w32_mul(a_y, a_y); /* Q3.60, 0 .. 1.13, exact */
-    const int64_t shared_4 = dcm_from_cayley_klein_w32_mul(a_s, a_s); /* Q3.60, 0 .. 1.13, exact */
-    const int64_t shared_5 = dcm_from_cayley_klein_w32_mul(a_z, a_z); /* Q3.60, 0 .. 1.13, exact */
+    const int64_t shared_1 = dcm_from_cayley_klein_w32_sqr(a_x); /* Q3.60, 0 .. 1.13, exact */
+    const int64_t shared_2 = dcm_from_cayley_klein_w32_sqr(a_y); /* Q3.60, 0 .. 1.13, exact */
+    const int64_t shared_4 = dcm_from_cayley_klein_w32_sqr(a_s); /* Q3.60, 0 .. 1.13, exact */
+    const int64_t shared_5 = dcm_from_cayley_klein_w32_sqr(a_z); /* Q3.60, 0 .. 1.13, exact */
     const int64_t shared_6 = shared_4 - shared_5; /* Q3.60, -1.13 .. 1.13, exact */
     const int64_t shared_13 = shared_1 - shared_2; /* Q3.60, -1.13 .. 1.13, exact */
     /* direction cosine matrix, body to reference */

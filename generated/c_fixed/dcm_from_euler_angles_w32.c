@@ -9,10 +9,10 @@
 #error "integers of 32 and 64 bits are needed"
 #endif
 
-/* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
+/* Whether a number is larger in magnitude than a limit. */
 static inline int dcm_from_euler_angles_w32_out(int32_t x, int32_t limit)
 {
-    return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
+    return (x < -limit) || (x > limit);
 }
 
 /* The exact product of two words. */
@@ -40,6 +40,12 @@ static inline int64_t dcm_from_euler_angles_w32_mul(int32_t a, int32_t b)
     return (int64_t)a * (int64_t)b;
 }
 #endif
+
+/* The exact square of a word. */
+static inline int64_t dcm_from_euler_angles_w32_sqr(int32_t a)
+{
+    return (int64_t)a * (int64_t)a;
+}
 
 /* x / 2^n, rounded down, where the proof of the ranges shows that it fits into a word: then the
  * 32 bits of x from bit n on, read as a number with a sign, are that quotient. For n above 32 the
@@ -89,8 +95,8 @@ int dcm_from_euler_angles_w32(const int32_t angles[3], int32_t attitude[9])
     const int64_t cos_heading_quarter_turns = (int64_t)cos_heading_quarters
         - (int64_t)cos_heading_turns * 4; /* Q63.0, -2 .. 1, exact */
     const int32_t cos_heading_square = dcm_from_euler_angles_w32_fit(
-        dcm_from_euler_angles_w32_mul(cos_heading_rest, cos_heading_rest)
-        + (INT32_C(1) << 30), 31); /* Q0.31, -9.32e-10 .. 0.617, error 6e-10 */
+        dcm_from_euler_angles_w32_sqr(cos_heading_rest) + (INT32_C(1) << 30), 31);
+        /* Q0.31, -9.32e-10 .. 0.617, error 6e-10 */
     const int32_t cos_heading_series = dcm_from_euler_angles_w32_fit(
         dcm_from_euler_angles_w32_shr(-dcm_from_euler_angles_w32_mul(cos_heading_square,
         INT32_C(56412333) /* 1/39916800 in Q51 */), 1)
@@ -174,8 +180,8 @@ int dcm_from_euler_angles_w32(const int32_t angles[3], int32_t attitude[9])
     const int64_t cos_pitch_quarter_turns = (int64_t)cos_pitch_quarters
         - (int64_t)cos_pitch_turns * 4; /* Q63.0, -2 .. 1, exact */
     const int32_t cos_pitch_square = dcm_from_euler_angles_w32_fit(
-        dcm_from_euler_angles_w32_mul(cos_pitch_rest, cos_pitch_rest)
-        + (INT32_C(1) << 30), 31); /* Q0.31, -9.32e-10 .. 0.617, error 6e-10 */
+        dcm_from_euler_angles_w32_sqr(cos_pitch_rest) + (INT32_C(1) << 30), 31);
+        /* Q0.31, -9.32e-10 .. 0.617, error 6e-10 */
     const int32_t cos_pitch_series = dcm_from_euler_angles_w32_fit(
         dcm_from_euler_angles_w32_shr(-dcm_from_euler_angles_w32_mul(cos_pitch_square,
         INT32_C(56412333) /* 1/39916800 in Q51 */), 1)
@@ -257,9 +263,8 @@ int dcm_from_euler_angles_w32(const int32_t angles[3], int32_t attitude[9])
         + 2, 2); /* Q31.0, 0 .. 1, exact */
     const int64_t cos_roll_quarter_turns = (int64_t)cos_roll_quarters
         - (int64_t)cos_roll_turns * 4; /* Q63.0, -2 .. 1, exact */
-    const int32_t cos_roll_square = dcm_from_euler_angles_w32_fit(dcm_from_euler_angles_w32_mul(
-        cos_roll_rest, cos_roll_rest) + (INT32_C(1) << 30), 31);
-        /* Q0.31, -9.32e-10 .. 0.617, error 6e-10 */
+    const int32_t cos_roll_square = dcm_from_euler_angles_w32_fit(dcm_from_euler_angles_w32_sqr(
+        cos_roll_rest) + (INT32_C(1) << 30), 31); /* Q0.31, -9.32e-10 .. 0.617, error 6e-10 */
     const int32_t cos_roll_series = dcm_from_euler_angles_w32_fit(dcm_from_euler_angles_w32_shr(
         -dcm_from_euler_angles_w32_mul(cos_roll_square,
         INT32_C(56412333) /* 1/39916800 in Q51 */), 1)

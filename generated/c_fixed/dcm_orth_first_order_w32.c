@@ -9,10 +9,10 @@
 #error "integers of 32 and 64 bits are needed"
 #endif
 
-/* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
+/* Whether a number is larger in magnitude than a limit. */
 static inline int dcm_orth_first_order_w32_out(int32_t x, int32_t limit)
 {
-    return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
+    return (x < -limit) || (x > limit);
 }
 
 /* The exact product of two words. */
@@ -40,6 +40,12 @@ static inline int64_t dcm_orth_first_order_w32_mul(int32_t a, int32_t b)
     return (int64_t)a * (int64_t)b;
 }
 #endif
+
+/* The exact square of a word. */
+static inline int64_t dcm_orth_first_order_w32_sqr(int32_t a)
+{
+    return (int64_t)a * (int64_t)a;
+}
 
 /* x / 2^n, rounded down, where the proof of the ranges shows that it fits into a word: then the
  * 32 bits of x from bit n on, read as a number with a sign, are that quotient. For n above 32 the
@@ -89,27 +95,24 @@ int dcm_orth_first_order_w32(const int32_t computed[9], int32_t orthonormalized[
         return 1;
     }
     /* C' C - I */
-    const int64_t excess_11 = dcm_orth_first_order_w32_mul(C_11, C_11)
-        + dcm_orth_first_order_w32_mul(C_21, C_21)
-        + dcm_orth_first_order_w32_mul(C_31, C_31) - (INT64_C(1) << 60);
-        /* Q3.60, -1 .. 2.39, exact */
+    const int64_t excess_11 = dcm_orth_first_order_w32_sqr(C_11)
+        + dcm_orth_first_order_w32_sqr(C_21) + dcm_orth_first_order_w32_sqr(C_31)
+        - (INT64_C(1) << 60); /* Q3.60, -1 .. 2.39, exact */
     const int64_t excess_12 = dcm_orth_first_order_w32_mul(C_11, C_12)
         + dcm_orth_first_order_w32_mul(C_21, C_22)
         + dcm_orth_first_order_w32_mul(C_31, C_32); /* Q3.60, -3.39 .. 3.39, exact */
     const int64_t excess_13 = dcm_orth_first_order_w32_mul(C_11, C_13)
         + dcm_orth_first_order_w32_mul(C_21, C_23)
         + dcm_orth_first_order_w32_mul(C_31, C_33); /* Q3.60, -3.39 .. 3.39, exact */
-    const int64_t excess_22 = dcm_orth_first_order_w32_mul(C_12, C_12)
-        + dcm_orth_first_order_w32_mul(C_22, C_22)
-        + dcm_orth_first_order_w32_mul(C_32, C_32) - (INT64_C(1) << 60);
-        /* Q3.60, -1 .. 2.39, exact */
+    const int64_t excess_22 = dcm_orth_first_order_w32_sqr(C_12)
+        + dcm_orth_first_order_w32_sqr(C_22) + dcm_orth_first_order_w32_sqr(C_32)
+        - (INT64_C(1) << 60); /* Q3.60, -1 .. 2.39, exact */
     const int64_t excess_23 = dcm_orth_first_order_w32_mul(C_12, C_13)
         + dcm_orth_first_order_w32_mul(C_22, C_23)
         + dcm_orth_first_order_w32_mul(C_32, C_33); /* Q3.60, -3.39 .. 3.39, exact */
-    const int64_t excess_33 = dcm_orth_first_order_w32_mul(C_13, C_13)
-        + dcm_orth_first_order_w32_mul(C_23, C_23)
-        + dcm_orth_first_order_w32_mul(C_33, C_33) - (INT64_C(1) << 60);
-        /* Q3.60, -1 .. 2.39, exact */
+    const int64_t excess_33 = dcm_orth_first_order_w32_sqr(C_13)
+        + dcm_orth_first_order_w32_sqr(C_23) + dcm_orth_first_order_w32_sqr(C_33)
+        - (INT64_C(1) << 60); /* Q3.60, -1 .. 2.39, exact */
     /* inverse root of C' C to first order */
     const int32_t root_11 = dcm_orth_first_order_w32_fit((INT32_C(1) << 30)
         + dcm_orth_first_order_w32_shr(-excess_11 + (INT32_C(1) << 30), 31), 0);

@@ -10,10 +10,10 @@
 #error "integers of 32 and 64 bits are needed"
 #endif
 
-/* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
+/* Whether a number is larger in magnitude than a limit. */
 static inline int dcm_orth_optimal_w32_out(int32_t x, int32_t limit)
 {
-    return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
+    return (x < -limit) || (x > limit);
 }
 
 /* The exact product of two words. */
@@ -41,6 +41,12 @@ static inline int64_t dcm_orth_optimal_w32_mul(int32_t a, int32_t b)
     return (int64_t)a * (int64_t)b;
 }
 #endif
+
+/* The exact square of a word. */
+static inline int64_t dcm_orth_optimal_w32_sqr(int32_t a)
+{
+    return (int64_t)a * (int64_t)a;
+}
 
 /* x / 2^n, rounded down, where the proof of the ranges shows that it fits into a word: then the
  * 32 bits of x from bit n on, read as a number with a sign, are that quotient. For n above 32 the
@@ -120,8 +126,8 @@ int dcm_orth_optimal_w32(const int32_t computed[9], int32_t orthonormalized[9])
         return 1;
     }
     /* C' C */
-    const int32_t gram_11 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(C_11, C_11)
-        + dcm_orth_optimal_w32_mul(C_21, C_21) + dcm_orth_optimal_w32_mul(C_31, C_31)
+    const int32_t gram_11 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_sqr(C_11)
+        + dcm_orth_optimal_w32_sqr(C_21) + dcm_orth_optimal_w32_sqr(C_31)
         + (INT32_C(1) << 30), 31); /* Q2.29, -1.87e-09 .. 3.39, error 9.4e-10 */
     const int32_t gram_12 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(C_11, C_12)
         + dcm_orth_optimal_w32_mul(C_21, C_22) + dcm_orth_optimal_w32_mul(C_31, C_32)
@@ -129,14 +135,14 @@ int dcm_orth_optimal_w32(const int32_t computed[9], int32_t orthonormalized[9])
     const int32_t gram_13 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(C_11, C_13)
         + dcm_orth_optimal_w32_mul(C_21, C_23) + dcm_orth_optimal_w32_mul(C_31, C_33)
         + (INT32_C(1) << 30), 31); /* Q2.29, -3.39 .. 3.39, error 9.4e-10 */
-    const int32_t gram_22 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(C_12, C_12)
-        + dcm_orth_optimal_w32_mul(C_22, C_22) + dcm_orth_optimal_w32_mul(C_32, C_32)
+    const int32_t gram_22 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_sqr(C_12)
+        + dcm_orth_optimal_w32_sqr(C_22) + dcm_orth_optimal_w32_sqr(C_32)
         + (INT32_C(1) << 30), 31); /* Q2.29, -1.87e-09 .. 3.39, error 9.4e-10 */
     const int32_t gram_23 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(C_12, C_13)
         + dcm_orth_optimal_w32_mul(C_22, C_23) + dcm_orth_optimal_w32_mul(C_32, C_33)
         + (INT32_C(1) << 30), 31); /* Q2.29, -3.39 .. 3.39, error 9.4e-10 */
-    const int32_t gram_33 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(C_13, C_13)
-        + dcm_orth_optimal_w32_mul(C_23, C_23) + dcm_orth_optimal_w32_mul(C_33, C_33)
+    const int32_t gram_33 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_sqr(C_13)
+        + dcm_orth_optimal_w32_sqr(C_23) + dcm_orth_optimal_w32_sqr(C_33)
         + (INT32_C(1) << 30), 31); /* Q2.29, -1.87e-09 .. 3.39, error 9.4e-10 */
     /* mean of the eigenvalues of C' C */
     const int64_t mean = dcm_orth_optimal_w32_mul(gram_11, INT32_C(1431655765) /* 1/3 in Q32 */)
@@ -153,21 +159,18 @@ int dcm_orth_optimal_w32(const int32_t computed[9], int32_t orthonormalized[9])
     const int32_t deviator_33 = dcm_orth_optimal_w32_fit((int64_t)gram_33
         + dcm_orth_optimal_w32_shr(-mean + (INT64_C(1) << 31), 32), 0);
         /* Q2.29, -2.26 .. 2.26, error 3.6e-09 */
-    const int32_t shared_2 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(gram_23, gram_23)
+    const int32_t shared_2 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_sqr(gram_23)
         + (INT32_C(1) << 30), 31); /* Q4.27, -1.5e-08 .. 11.5, error 1.1e-08 */
-    const int32_t spread_product = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(
-        deviator_11, deviator_11) + (INT32_C(1) << 29), 30);
-        /* Q3.28, -1.87e-08 .. 5.1, error 1.9e-08 */
-    const int32_t spread_product_2 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(
-        deviator_22, deviator_22) + (INT32_C(1) << 29), 30);
-        /* Q3.28, -1.87e-08 .. 5.1, error 1.9e-08 */
-    const int32_t spread_product_3 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(
-        deviator_33, deviator_33) + (INT32_C(1) << 29), 30);
-        /* Q3.28, -1.87e-08 .. 5.1, error 1.9e-08 */
-    const int32_t spread_product_4 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(gram_12,
-        gram_12) + (INT32_C(1) << 30), 31); /* Q4.27, -1.5e-08 .. 11.5, error 1.1e-08 */
-    const int32_t spread_product_5 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(gram_13,
-        gram_13) + (INT32_C(1) << 30), 31); /* Q4.27, -1.5e-08 .. 11.5, error 1.1e-08 */
+    const int32_t spread_product = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_sqr(
+        deviator_11) + (INT32_C(1) << 29), 30); /* Q3.28, -1.87e-08 .. 5.1, error 1.9e-08 */
+    const int32_t spread_product_2 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_sqr(
+        deviator_22) + (INT32_C(1) << 29), 30); /* Q3.28, -1.87e-08 .. 5.1, error 1.9e-08 */
+    const int32_t spread_product_3 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_sqr(
+        deviator_33) + (INT32_C(1) << 29), 30); /* Q3.28, -1.87e-08 .. 5.1, error 1.9e-08 */
+    const int32_t spread_product_4 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_sqr(gram_12)
+        + (INT32_C(1) << 30), 31); /* Q4.27, -1.5e-08 .. 11.5, error 1.1e-08 */
+    const int32_t spread_product_5 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_sqr(gram_13)
+        + (INT32_C(1) << 30), 31); /* Q4.27, -1.5e-08 .. 11.5, error 1.1e-08 */
     /* mean square spread of the eigenvalues, halved */
     const int32_t spread = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(shared_2,
         INT32_C(1431655765) /* 1/3 in Q32 */)
@@ -195,11 +198,11 @@ int dcm_orth_optimal_w32(const int32_t computed[9], int32_t orthonormalized[9])
         + dcm_orth_optimal_w32_mul(gram_13, half_determinant_factor_3)
         + (INT64_C(1) << 31), 32); /* Q7.24, -83.5 .. 83.5, error 2.2e-07 */
     const int32_t angle_angle_arg_rad_max_arg_fac = dcm_orth_optimal_w32_fit(
-        dcm_orth_optimal_w32_mul(spread, spread) + (INT32_C(1) << 30), 31);
+        dcm_orth_optimal_w32_sqr(spread) + (INT32_C(1) << 30), 31);
         /* Q8.23, -8.35e-07 .. 197, error 7.9e-07 */
     const int64_t angle_angle_arg_rad_max_arg = dcm_orth_optimal_w32_shr(
         dcm_orth_optimal_w32_mul(angle_angle_arg_rad_max_arg_fac, spread), 1)
-        - dcm_orth_optimal_w32_mul(half_determinant, half_determinant) * 2;
+        - dcm_orth_optimal_w32_sqr(half_determinant) * 2;
         /* Q14.49, -6.97e+03 .. 2.76e+03, error 5.2e-05 */
     int64_t angle_angle_arg_rad_largest = 0; /* Q14.49, -5.13e-05 .. 2.76e+03, error 5.2e-05 */
     if (angle_angle_arg_rad_max_arg > angle_angle_arg_rad_largest) {
@@ -262,8 +265,8 @@ int dcm_orth_optimal_w32(const int32_t computed[9], int32_t orthonormalized[9])
     const int32_t angle_angle_tangent = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_div(
         (int64_t)angle_angle_numerator * (INT64_C(1) << 32), angle_angle_denominator), 0);
         /* Q-1.32, -0.392 .. 0.438, error 1.2e-10 */
-    const int32_t angle_angle_square = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(
-        angle_angle_tangent, angle_angle_tangent) + (INT32_C(1) << 30), 31);
+    const int32_t angle_angle_square = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_sqr(
+        angle_angle_tangent) + (INT32_C(1) << 30), 31);
         /* Q-2.33, -2.33e-10 .. 0.192, error 1.7e-10 */
     const int32_t angle_angle_series = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_shr(
         dcm_orth_optimal_w32_mul(angle_angle_square,
@@ -333,8 +336,8 @@ int dcm_orth_optimal_w32(const int32_t computed[9], int32_t orthonormalized[9])
     } else {
         along_cosine_taken = angle;
     }
-    const int32_t along_cosine_square = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(
-        along_cosine_taken, along_cosine_taken) + (INT32_C(1) << 27), 28);
+    const int32_t along_cosine_square = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_sqr(
+        along_cosine_taken) + (INT32_C(1) << 27), 28);
         /* Q1.30, -9.32e-10 .. 1.1, error 4.7e-10 */
     const int32_t along_cosine_series = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(
         along_cosine_square, INT32_C(18804111) /* 1/479001600 in Q53 */)
@@ -450,8 +453,7 @@ int dcm_orth_optimal_w32(const int32_t computed[9], int32_t orthonormalized[9])
         /* Q5.26, 0.353 .. 17.2, error 3.5e-08 */
     /* adjugate of the denominator */
     const int32_t adjugate_11 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(
-        denominator_22, denominator_33) * 4
-        - dcm_orth_optimal_w32_mul(denominator_23, denominator_23)
+        denominator_22, denominator_33) * 4 - dcm_orth_optimal_w32_sqr(denominator_23)
         + (INT64_C(1) << 31), 32); /* Q9.22, -207 .. 296, error 2e-06 */
     const int32_t adjugate_12 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(
         denominator_13, denominator_23)
@@ -462,16 +464,14 @@ int dcm_orth_optimal_w32(const int32_t computed[9], int32_t orthonormalized[9])
         - dcm_orth_optimal_w32_mul(denominator_13, denominator_22) * 2
         + (INT64_C(1) << 31), 32); /* Q9.22, -454 .. 454, error 1.7e-06 */
     const int32_t adjugate_22 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(
-        denominator_11, denominator_33) * 4
-        - dcm_orth_optimal_w32_mul(denominator_13, denominator_13)
+        denominator_11, denominator_33) * 4 - dcm_orth_optimal_w32_sqr(denominator_13)
         + (INT64_C(1) << 31), 32); /* Q9.22, -207 .. 296, error 2e-06 */
     const int32_t adjugate_23 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(
         denominator_12, denominator_13)
         - dcm_orth_optimal_w32_mul(denominator_11, denominator_23) * 2
         + (INT64_C(1) << 31), 32); /* Q9.22, -454 .. 454, error 1.7e-06 */
     const int32_t adjugate_33 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(
-        denominator_11, denominator_22) * 4
-        - dcm_orth_optimal_w32_mul(denominator_12, denominator_12)
+        denominator_11, denominator_22) * 4 - dcm_orth_optimal_w32_sqr(denominator_12)
         + (INT64_C(1) << 31), 32); /* Q9.22, -207 .. 296, error 2e-06 */
     const int64_t inverse_determinant_den_raw = dcm_orth_optimal_w32_shr(
         dcm_orth_optimal_w32_mul(adjugate_11, denominator_11)

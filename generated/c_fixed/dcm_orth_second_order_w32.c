@@ -9,10 +9,10 @@
 #error "integers of 32 and 64 bits are needed"
 #endif
 
-/* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
+/* Whether a number is larger in magnitude than a limit. */
 static inline int dcm_orth_second_order_w32_out(int32_t x, int32_t limit)
 {
-    return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
+    return (x < -limit) || (x > limit);
 }
 
 /* The exact product of two words. */
@@ -40,6 +40,12 @@ static inline int64_t dcm_orth_second_order_w32_mul(int32_t a, int32_t b)
     return (int64_t)a * (int64_t)b;
 }
 #endif
+
+/* The exact square of a word. */
+static inline int64_t dcm_orth_second_order_w32_sqr(int32_t a)
+{
+    return (int64_t)a * (int64_t)a;
+}
 
 /* x / 2^n, rounded down, where the proof of the ranges shows that it fits into a word: then the
  * 32 bits of x from bit n on, read as a number with a sign, are that quotient. For n above 32 the
@@ -90,10 +96,9 @@ int dcm_orth_second_order_w32(const int32_t computed[9], int32_t orthonormalized
     }
     /* C' C - I */
     const int32_t excess_11 = dcm_orth_second_order_w32_fit(-(INT32_C(1) << 29)
-        + dcm_orth_second_order_w32_shr(dcm_orth_second_order_w32_mul(C_11, C_11)
-        + dcm_orth_second_order_w32_mul(C_21, C_21)
-        + dcm_orth_second_order_w32_mul(C_31, C_31) + (INT32_C(1) << 30), 31), 0);
-        /* Q2.29, -1.01 .. 2.39, error 9.4e-10 */
+        + dcm_orth_second_order_w32_shr(dcm_orth_second_order_w32_sqr(C_11)
+        + dcm_orth_second_order_w32_sqr(C_21) + dcm_orth_second_order_w32_sqr(C_31)
+        + (INT32_C(1) << 30), 31), 0); /* Q2.29, -1.01 .. 2.39, error 9.4e-10 */
     const int32_t excess_12 = dcm_orth_second_order_w32_fit(dcm_orth_second_order_w32_mul(C_11,
         C_12) + dcm_orth_second_order_w32_mul(C_21, C_22)
         + dcm_orth_second_order_w32_mul(C_31, C_32) + (INT32_C(1) << 30), 31);
@@ -103,26 +108,24 @@ int dcm_orth_second_order_w32(const int32_t computed[9], int32_t orthonormalized
         + dcm_orth_second_order_w32_mul(C_31, C_33) + (INT32_C(1) << 30), 31);
         /* Q2.29, -3.39 .. 3.39, error 9.4e-10 */
     const int32_t excess_22 = dcm_orth_second_order_w32_fit(-(INT32_C(1) << 29)
-        + dcm_orth_second_order_w32_shr(dcm_orth_second_order_w32_mul(C_12, C_12)
-        + dcm_orth_second_order_w32_mul(C_22, C_22)
-        + dcm_orth_second_order_w32_mul(C_32, C_32) + (INT32_C(1) << 30), 31), 0);
-        /* Q2.29, -1.01 .. 2.39, error 9.4e-10 */
+        + dcm_orth_second_order_w32_shr(dcm_orth_second_order_w32_sqr(C_12)
+        + dcm_orth_second_order_w32_sqr(C_22) + dcm_orth_second_order_w32_sqr(C_32)
+        + (INT32_C(1) << 30), 31), 0); /* Q2.29, -1.01 .. 2.39, error 9.4e-10 */
     const int32_t excess_23 = dcm_orth_second_order_w32_fit(dcm_orth_second_order_w32_mul(C_12,
         C_13) + dcm_orth_second_order_w32_mul(C_22, C_23)
         + dcm_orth_second_order_w32_mul(C_32, C_33) + (INT32_C(1) << 30), 31);
         /* Q2.29, -3.39 .. 3.39, error 9.4e-10 */
     const int32_t excess_33 = dcm_orth_second_order_w32_fit(-(INT32_C(1) << 29)
-        + dcm_orth_second_order_w32_shr(dcm_orth_second_order_w32_mul(C_13, C_13)
-        + dcm_orth_second_order_w32_mul(C_23, C_23)
-        + dcm_orth_second_order_w32_mul(C_33, C_33) + (INT32_C(1) << 30), 31), 0);
-        /* Q2.29, -1.01 .. 2.39, error 9.4e-10 */
-    const int64_t shared_1 = dcm_orth_second_order_w32_mul(excess_12, excess_12);
+        + dcm_orth_second_order_w32_shr(dcm_orth_second_order_w32_sqr(C_13)
+        + dcm_orth_second_order_w32_sqr(C_23) + dcm_orth_second_order_w32_sqr(C_33)
+        + (INT32_C(1) << 30), 31), 0); /* Q2.29, -1.01 .. 2.39, error 9.4e-10 */
+    const int64_t shared_1 = dcm_orth_second_order_w32_sqr(excess_12);
         /* Q5.58, -6.31e-09 .. 11.5, error 6.4e-09 */
-    const int64_t shared_2 = dcm_orth_second_order_w32_mul(excess_13, excess_13);
+    const int64_t shared_2 = dcm_orth_second_order_w32_sqr(excess_13);
         /* Q5.58, -6.31e-09 .. 11.5, error 6.4e-09 */
     /* (C' C - I)^2 */
     const int32_t excess_squared_11 = dcm_orth_second_order_w32_fit(
-        dcm_orth_second_order_w32_mul(excess_11, excess_11) + shared_1 + shared_2
+        dcm_orth_second_order_w32_sqr(excess_11) + shared_1 + shared_2
         + (INT64_C(1) << 31), 32); /* Q5.26, -2.99e-08 .. 28.7, error 2.5e-08 */
     const int32_t excess_squared_12_factor = dcm_orth_second_order_w32_fit((int64_t)excess_11
         + (int64_t)excess_22 + 1, 1); /* Q3.28, -2.01 .. 4.78, error 3.8e-09 */
@@ -136,10 +139,10 @@ int dcm_orth_second_order_w32(const int32_t computed[9], int32_t orthonormalized
         dcm_orth_second_order_w32_mul(excess_13, excess_squared_13_factor) * 2
         + dcm_orth_second_order_w32_mul(excess_12, excess_23) + (INT64_C(1) << 31), 32);
         /* Q5.26, -27.7 .. 27.7, error 3.1e-08 */
-    const int64_t shared_3 = dcm_orth_second_order_w32_mul(excess_23, excess_23);
+    const int64_t shared_3 = dcm_orth_second_order_w32_sqr(excess_23);
         /* Q5.58, -6.31e-09 .. 11.5, error 6.4e-09 */
     const int32_t excess_squared_22 = dcm_orth_second_order_w32_fit(
-        dcm_orth_second_order_w32_mul(excess_22, excess_22) + shared_1 + shared_3
+        dcm_orth_second_order_w32_sqr(excess_22) + shared_1 + shared_3
         + (INT64_C(1) << 31), 32); /* Q5.26, -2.99e-08 .. 28.7, error 2.5e-08 */
     const int32_t excess_squared_23_factor = dcm_orth_second_order_w32_fit((int64_t)excess_22
         + (int64_t)excess_33 + 1, 1); /* Q3.28, -2.01 .. 4.78, error 3.8e-09 */
@@ -148,7 +151,7 @@ int dcm_orth_second_order_w32(const int32_t computed[9], int32_t orthonormalized
         + dcm_orth_second_order_w32_mul(excess_12, excess_13) + (INT64_C(1) << 31), 32);
         /* Q5.26, -27.7 .. 27.7, error 3.1e-08 */
     const int32_t excess_squared_33 = dcm_orth_second_order_w32_fit(
-        dcm_orth_second_order_w32_mul(excess_33, excess_33) + shared_2 + shared_3
+        dcm_orth_second_order_w32_sqr(excess_33) + shared_2 + shared_3
         + (INT64_C(1) << 31), 32); /* Q5.26, -2.99e-08 .. 28.7, error 2.5e-08 */
     /* inverse root of C' C to second order */
     const int32_t root_11 = (INT32_C(1) << 27)

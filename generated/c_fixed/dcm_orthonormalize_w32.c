@@ -9,10 +9,10 @@
 #error "integers of 32 and 64 bits are needed"
 #endif
 
-/* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
+/* Whether a number is larger in magnitude than a limit. */
 static inline int dcm_orthonormalize_w32_out(int32_t x, int32_t limit)
 {
-    return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
+    return (x < -limit) || (x > limit);
 }
 
 /* The exact product of two words. */
@@ -40,6 +40,12 @@ static inline int64_t dcm_orthonormalize_w32_mul(int32_t a, int32_t b)
     return (int64_t)a * (int64_t)b;
 }
 #endif
+
+/* The exact square of a word. */
+static inline int64_t dcm_orthonormalize_w32_sqr(int32_t a)
+{
+    return (int64_t)a * (int64_t)a;
+}
 
 /* x / 2^n, rounded down, where the proof of the ranges shows that it fits into a word: then the
  * 32 bits of x from bit n on, read as a number with a sign, are that quotient. For n above 32 the
@@ -129,9 +135,9 @@ int dcm_orthonormalize_w32(const int32_t computed[9], int32_t orthonormalized[9]
         + dcm_orthonormalize_w32_mul(C_21, C_32) - dcm_orthonormalize_w32_mul(C_22, C_31)
         + (INT32_C(1) << 30), 31); /* Q2.29, -3.33 .. 3.33, error 9.4e-10 */
     const int64_t inverse_length_1_radicand = dcm_orthonormalize_w32_shr(
-        dcm_orthonormalize_w32_mul(row_1_x, row_1_x), 1)
-        + dcm_orthonormalize_w32_shr(dcm_orthonormalize_w32_mul(row_1_y, row_1_y), 1)
-        + dcm_orthonormalize_w32_shr(dcm_orthonormalize_w32_mul(row_1_z, row_1_z), 1);
+        dcm_orthonormalize_w32_sqr(row_1_x), 1)
+        + dcm_orthonormalize_w32_shr(dcm_orthonormalize_w32_sqr(row_1_y), 1)
+        + dcm_orthonormalize_w32_shr(dcm_orthonormalize_w32_sqr(row_1_z), 1);
         /* Q6.57, 2 .. 8, error 1.9e-08 */
     if ((inverse_length_1_radicand < INT64_C(288230378825580548))
         || (inverse_length_1_radicand > INT64_C(1152921501932978172))) {
@@ -154,9 +160,9 @@ int dcm_orthonormalize_w32(const int32_t computed[9], int32_t orthonormalized[9]
         - dcm_orthonormalize_w32_mul(C_11, C_32) + dcm_orthonormalize_w32_mul(C_12, C_31)
         + (INT32_C(1) << 30), 31); /* Q2.29, -3.33 .. 3.33, error 9.4e-10 */
     const int64_t inverse_length_2_radicand = dcm_orthonormalize_w32_shr(
-        dcm_orthonormalize_w32_mul(row_2_x, row_2_x), 1)
-        + dcm_orthonormalize_w32_shr(dcm_orthonormalize_w32_mul(row_2_y, row_2_y), 1)
-        + dcm_orthonormalize_w32_shr(dcm_orthonormalize_w32_mul(row_2_z, row_2_z), 1);
+        dcm_orthonormalize_w32_sqr(row_2_x), 1)
+        + dcm_orthonormalize_w32_shr(dcm_orthonormalize_w32_sqr(row_2_y), 1)
+        + dcm_orthonormalize_w32_shr(dcm_orthonormalize_w32_sqr(row_2_z), 1);
         /* Q6.57, 2 .. 8, error 1.9e-08 */
     if ((inverse_length_2_radicand < INT64_C(288230378825580548))
         || (inverse_length_2_radicand > INT64_C(1152921501932978172))) {
@@ -179,9 +185,9 @@ int dcm_orthonormalize_w32(const int32_t computed[9], int32_t orthonormalized[9]
         + dcm_orthonormalize_w32_mul(C_11, C_22) - dcm_orthonormalize_w32_mul(C_12, C_21)
         + (INT32_C(1) << 30), 31); /* Q2.29, -3.33 .. 3.33, error 9.4e-10 */
     const int64_t inverse_length_3_radicand = dcm_orthonormalize_w32_shr(
-        dcm_orthonormalize_w32_mul(row_3_x, row_3_x), 1)
-        + dcm_orthonormalize_w32_shr(dcm_orthonormalize_w32_mul(row_3_y, row_3_y), 1)
-        + dcm_orthonormalize_w32_shr(dcm_orthonormalize_w32_mul(row_3_z, row_3_z), 1);
+        dcm_orthonormalize_w32_sqr(row_3_x), 1)
+        + dcm_orthonormalize_w32_shr(dcm_orthonormalize_w32_sqr(row_3_y), 1)
+        + dcm_orthonormalize_w32_shr(dcm_orthonormalize_w32_sqr(row_3_z), 1);
         /* Q6.57, 2 .. 8, error 1.9e-08 */
     if ((inverse_length_3_radicand < INT64_C(288230378825580548))
         || (inverse_length_3_radicand > INT64_C(1152921501932978172))) {

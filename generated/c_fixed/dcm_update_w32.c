@@ -9,10 +9,10 @@
 #error "integers of 32 and 64 bits are needed"
 #endif
 
-/* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
+/* Whether a number is larger in magnitude than a limit. */
 static inline int dcm_update_w32_out(int32_t x, int32_t limit)
 {
-    return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
+    return (x < -limit) || (x > limit);
 }
 
 /* The exact product of two words. */
@@ -40,6 +40,12 @@ static inline int64_t dcm_update_w32_mul(int32_t a, int32_t b)
     return (int64_t)a * (int64_t)b;
 }
 #endif
+
+/* The exact square of a word. */
+static inline int64_t dcm_update_w32_sqr(int32_t a)
+{
+    return (int64_t)a * (int64_t)a;
+}
 
 /* x / 2^n, rounded down, where the proof of the ranges shows that it fits into a word: then the
  * 32 bits of x from bit n on, read as a number with a sign, are that quotient. For n above 32 the
@@ -94,11 +100,11 @@ int dcm_update_w32(const int32_t state[9], const int32_t rotation_vector[3], int
         || dcm_update_w32_out(phi_z, (INT32_C(1) << 30))) {
         return 1;
     }
-    const int32_t shared_1 = dcm_update_w32_fit(dcm_update_w32_mul(phi_x, phi_x)
+    const int32_t shared_1 = dcm_update_w32_fit(dcm_update_w32_sqr(phi_x)
         + (INT32_C(1) << 29), 30); /* Q1.30, -9.32e-10 .. 1.01, error 4.7e-10 */
-    const int32_t shared_2 = dcm_update_w32_fit(dcm_update_w32_mul(phi_y, phi_y)
+    const int32_t shared_2 = dcm_update_w32_fit(dcm_update_w32_sqr(phi_y)
         + (INT32_C(1) << 29), 30); /* Q1.30, -9.32e-10 .. 1.01, error 4.7e-10 */
-    const int32_t shared_3 = dcm_update_w32_fit(dcm_update_w32_mul(phi_z, phi_z)
+    const int32_t shared_3 = dcm_update_w32_fit(dcm_update_w32_sqr(phi_z)
         + (INT32_C(1) << 29), 30); /* Q1.30, -9.32e-10 .. 1.01, error 4.7e-10 */
     /* square of the angle */
     const int32_t angle_squared = dcm_update_w32_fit((int64_t)shared_1 + (int64_t)shared_2
@@ -133,7 +139,7 @@ int dcm_update_w32(const int32_t state[9], const int32_t rotation_vector[3], int
         INT32_C(1431655765) /* 1/6 in Q33 */) * 2
         + dcm_update_w32_mul(factor_1_taken, factor_1_bend) + (INT64_C(1) << 34), 35);
         /* Q1.30, 0.874 .. 1.01, error 6.5e-10 */
-    const int32_t shared_18 = dcm_update_w32_fit(dcm_update_w32_mul(factor_1, factor_1)
+    const int32_t shared_18 = dcm_update_w32_fit(dcm_update_w32_sqr(factor_1)
         + (INT32_C(1) << 29), 30); /* Q0.31, 0.382 .. 0.501, error 8.8e-10 */
     const int64_t shared_7 = dcm_update_w32_mul(shared_18, shared_2);
         /* Q2.61, -1.11e-09 .. 0.501, error 1.2e-09 */

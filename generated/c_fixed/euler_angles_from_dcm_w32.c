@@ -9,10 +9,10 @@
 #error "integers of 32 and 64 bits are needed"
 #endif
 
-/* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
+/* Whether a number is larger in magnitude than a limit. */
 static inline int euler_angles_from_dcm_w32_out(int32_t x, int32_t limit)
 {
-    return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
+    return (x < -limit) || (x > limit);
 }
 
 /* The exact product of two words. */
@@ -40,6 +40,12 @@ static inline int64_t euler_angles_from_dcm_w32_mul(int32_t a, int32_t b)
     return (int64_t)a * (int64_t)b;
 }
 #endif
+
+/* The exact square of a word. */
+static inline int64_t euler_angles_from_dcm_w32_sqr(int32_t a)
+{
+    return (int64_t)a * (int64_t)a;
+}
 
 /* x / 2^n, rounded down, where the proof of the ranges shows that it fits into a word: then the
  * 32 bits of x from bit n on, read as a number with a sign, are that quotient. For n above 32 the
@@ -123,14 +129,14 @@ int euler_angles_from_dcm_w32(const int32_t state[9], const int32_t previous[3],
         return 1;
     }
     /* square of the cosine of pitch */
-    const int64_t cosine_squared = euler_angles_from_dcm_w32_mul(C_11, C_11)
-        + euler_angles_from_dcm_w32_mul(C_21, C_21); /* Q3.60, 0 .. 2.26, exact */
+    const int64_t cosine_squared = euler_angles_from_dcm_w32_sqr(C_11)
+        + euler_angles_from_dcm_w32_sqr(C_21); /* Q3.60, 0 .. 2.26, exact */
     const int32_t next_pitch_argument = -C_31; /* Q1.30, -1.07 .. 1.07, exact */
     const int32_t next_pitch_argument_root = euler_angles_from_dcm_w32_rt(
         euler_angles_from_dcm_w32_shr(cosine_squared, 2));
         /* Q2.29, 0 .. 1.51, error 2.8e-09 */
-    const int64_t next_pitch_distance = euler_angles_from_dcm_w32_mul(next_pitch_argument,
-        next_pitch_argument) + cosine_squared; /* Q3.60, 0.5 .. 2, exact */
+    const int64_t next_pitch_distance = euler_angles_from_dcm_w32_sqr(next_pitch_argument)
+        + cosine_squared; /* Q3.60, 0.5 .. 2, exact */
     if ((next_pitch_distance < (INT64_C(1) << 59))
         || (next_pitch_distance > (INT64_C(1) << 61))) {
         return 2;
@@ -187,8 +193,8 @@ int euler_angles_from_dcm_w32(const int32_t state[9], const int32_t previous[3],
         * (INT64_C(1) << 32), next_pitch_denominator), 0);
         /* Q-1.32, -0.392 .. 0.438, error 1.2e-10 */
     const int32_t next_pitch_square = euler_angles_from_dcm_w32_fit(
-        euler_angles_from_dcm_w32_mul(next_pitch_tangent, next_pitch_tangent)
-        + (INT32_C(1) << 30), 31); /* Q-2.33, -2.33e-10 .. 0.192, error 1.7e-10 */
+        euler_angles_from_dcm_w32_sqr(next_pitch_tangent) + (INT32_C(1) << 30), 31);
+        /* Q-2.33, -2.33e-10 .. 0.192, error 1.7e-10 */
     const int32_t next_pitch_series = euler_angles_from_dcm_w32_fit(
         euler_angles_from_dcm_w32_shr(euler_angles_from_dcm_w32_mul(next_pitch_square,
         INT32_C(735255871) /* 0.042797524437051732 in Q34 */), 1)
@@ -296,9 +302,8 @@ int euler_angles_from_dcm_w32(const int32_t state[9], const int32_t previous[3],
         * (INT64_C(1) << 32), next_roll_case_angle_den), 0);
         /* Q-1.32, -0.392 .. 0.438, error 1.2e-10 */
     const int32_t next_roll_case_angle_square = euler_angles_from_dcm_w32_fit(
-        euler_angles_from_dcm_w32_mul(next_roll_case_angle_tangent,
-        next_roll_case_angle_tangent) + (INT32_C(1) << 30), 31);
-        /* Q-2.33, -2.33e-10 .. 0.192, error 1.7e-10 */
+        euler_angles_from_dcm_w32_sqr(next_roll_case_angle_tangent)
+        + (INT32_C(1) << 30), 31); /* Q-2.33, -2.33e-10 .. 0.192, error 1.7e-10 */
     const int32_t next_roll_case_angle_series = euler_angles_from_dcm_w32_fit(
         euler_angles_from_dcm_w32_shr(euler_angles_from_dcm_w32_mul(
         next_roll_case_angle_square, INT32_C(735255871) /* 0.042797524437051732 in Q34 */),
@@ -402,10 +407,8 @@ int euler_angles_from_dcm_w32(const int32_t state[9], const int32_t previous[3],
         /* Q2.29, -2.13 .. 2.13, error 9.4e-10 */
     const int32_t steep_cosine_word = euler_angles_from_dcm_w32_fit(steep_cosine + 1, 1);
         /* Q2.29, -2.13 .. 2.13, error 9.4e-10 */
-    const int64_t apart_distance = euler_angles_from_dcm_w32_mul(steep_sine_word,
-        steep_sine_word)
-        + euler_angles_from_dcm_w32_mul(steep_cosine_word, steep_cosine_word);
-        /* Q5.58, 0.5 .. 8, error 8e-09 */
+    const int64_t apart_distance = euler_angles_from_dcm_w32_sqr(steep_sine_word)
+        + euler_angles_from_dcm_w32_sqr(steep_cosine_word); /* Q5.58, 0.5 .. 8, error 8e-09 */
     if ((apart_distance < INT64_C(144115190357557249))
         || (apart_distance > INT64_C(2305843006931992575))) {
         return 2;
@@ -470,8 +473,8 @@ int euler_angles_from_dcm_w32(const int32_t state[9], const int32_t previous[3],
     const int32_t apart_tangent = euler_angles_from_dcm_w32_fit(euler_angles_from_dcm_w32_div(
         (int64_t)apart_numerator * (INT64_C(1) << 32), apart_denominator), 0);
         /* Q-1.32, -0.392 .. 0.438, error 1.2e-10 */
-    const int32_t apart_square = euler_angles_from_dcm_w32_fit(euler_angles_from_dcm_w32_mul(
-        apart_tangent, apart_tangent) + (INT32_C(1) << 30), 31);
+    const int32_t apart_square = euler_angles_from_dcm_w32_fit(euler_angles_from_dcm_w32_sqr(
+        apart_tangent) + (INT32_C(1) << 30), 31);
         /* Q-2.33, -2.33e-10 .. 0.192, error 1.7e-10 */
     const int32_t apart_series = euler_angles_from_dcm_w32_fit(euler_angles_from_dcm_w32_shr(
         euler_angles_from_dcm_w32_mul(apart_square,
@@ -582,9 +585,8 @@ int euler_angles_from_dcm_w32(const int32_t state[9], const int32_t previous[3],
         * (INT64_C(1) << 32), next_heading_case_angle_den), 0);
         /* Q-1.32, -0.392 .. 0.438, error 1.2e-10 */
     const int32_t next_hdg_case_angle_square = euler_angles_from_dcm_w32_fit(
-        euler_angles_from_dcm_w32_mul(next_hdg_case_angle_tangent,
-        next_hdg_case_angle_tangent) + (INT32_C(1) << 30), 31);
-        /* Q-2.33, -2.33e-10 .. 0.192, error 1.7e-10 */
+        euler_angles_from_dcm_w32_sqr(next_hdg_case_angle_tangent)
+        + (INT32_C(1) << 30), 31); /* Q-2.33, -2.33e-10 .. 0.192, error 1.7e-10 */
     const int32_t next_heading_case_angle_ser = euler_angles_from_dcm_w32_fit(
         euler_angles_from_dcm_w32_shr(euler_angles_from_dcm_w32_mul(
         next_hdg_case_angle_square, INT32_C(735255871) /* 0.042797524437051732 in Q34 */),

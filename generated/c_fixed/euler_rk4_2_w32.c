@@ -10,10 +10,10 @@
 #error "integers of 32 and 64 bits are needed"
 #endif
 
-/* Whether a number is larger in magnitude than a limit: one comparison, without a sign. */
+/* Whether a number is larger in magnitude than a limit. */
 static inline int euler_rk4_2_w32_out(int32_t x, int32_t limit)
 {
-    return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit);
+    return (x < -limit) || (x > limit);
 }
 
 /* The exact product of two words. */
@@ -41,6 +41,12 @@ static inline int64_t euler_rk4_2_w32_mul(int32_t a, int32_t b)
     return (int64_t)a * (int64_t)b;
 }
 #endif
+
+/* The exact square of a word. */
+static inline int64_t euler_rk4_2_w32_sqr(int32_t a)
+{
+    return (int64_t)a * (int64_t)a;
+}
 
 /* x / 2^n, rounded down, where the proof of the ranges shows that it fits into a word: then the
  * 32 bits of x from bit n on, read as a number with a sign, are that quotient. For n above 32 the
@@ -104,8 +110,8 @@ int euler_rk4_2_w32(const int32_t state[4], const int32_t increments[6], int32_t
     const int32_t sigma_cross_d1_z = euler_rk4_2_w32_fit(euler_rk4_2_w32_mul(d1_y, sigma_x)
         - euler_rk4_2_w32_mul(d1_x, sigma_y) + (INT32_C(1) << 28), 29);
         /* Q-4.35, -0.0313 .. 0.0313, error 1.5e-11 */
-    const int32_t sigma_dot_sigma = euler_rk4_2_w32_fit(euler_rk4_2_w32_mul(sigma_x, sigma_x)
-        + euler_rk4_2_w32_mul(sigma_y, sigma_y) + euler_rk4_2_w32_mul(sigma_z, sigma_z)
+    const int32_t sigma_dot_sigma = euler_rk4_2_w32_fit(euler_rk4_2_w32_sqr(sigma_x)
+        + euler_rk4_2_w32_sqr(sigma_y) + euler_rk4_2_w32_sqr(sigma_z)
         + (INT32_C(1) << 30), 31); /* Q-2.33, -1.17e-10 .. 0.188, error 5.9e-11 */
     /* weight of sigma in p */
     const int32_t p_sigma = euler_rk4_2_w32_fit(-euler_rk4_2_w32_mul(sigma_dot_sigma,

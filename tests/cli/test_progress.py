@@ -68,3 +68,26 @@ def test_a_file_that_takes_its_time_shows_that_it_is_derived(tmp_path, impatient
     with pytest.raises(ValueError, match=r"returned int; a Kernel is needed"):
         MethodOptions().choose(str(path))
     assert re.search(r"deriving \S*slow\.py \d s", stream.getvalue())
+
+
+def test_reading_and_running_a_recording_are_shown(impatient, monkeypatch, tmp_path, capsys):
+    from strapgen.cli import main
+    from strapgen.simulation import recording
+
+    (tmp_path / "log.csv").write_text("".join(f"{k},0,0,0\n" for k in range(5)))
+    stream = Terminal()
+
+    def slowly(function, text):
+        def wait(*arguments):
+            wait_for(stream, text)
+            return function(*arguments)
+
+        return wait
+
+    monkeypatch.setattr(sys, "stderr", stream)
+    for name, text in (("read_increments", "reading log.csv"), ("propagate", "running euler-rk4-2")):
+        monkeypatch.setattr(recording, name, slowly(getattr(recording, name), text))
+    with pytest.raises(SystemExit) as stop:
+        main(["simulate", "euler", "--increments-csv", str(tmp_path / "log.csv")])
+    assert stop.value.code == 0
+    assert stream.getvalue().endswith("\r\x1b[2K")

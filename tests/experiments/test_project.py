@@ -24,6 +24,7 @@ PROJECTS = [
     ("euler", "c-fixed", SETTINGS, 1e-6),
     ("dcm", "c-float", None, 1e-4),
     ("euler", "c", None, 1e-8),
+    ("dcm", "c-fixed", Settings(state="q31"), 1e-4),
     ("euler-normalize", "c-fixed", Settings(16), None),
     ("euler-angles-from-dcm", "c", None, None),
 ]

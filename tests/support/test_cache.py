@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -13,8 +15,9 @@ import pytest
 
 from strapgen.catalogue import choose
 from strapgen.library import generated_sources
-from strapgen.support import cache
+from strapgen.support import cache, drafts, ownership
 from strapgen.support.exceptions import CompilerError, InputError
+from strapgen.toolchain import compiler
 
 
 @pytest.fixture(autouse=True)
@@ -98,16 +101,15 @@ def test_first_of_two_wins(root):
 
 
 def test_draft_of_a_killed_process_is_never_read(root):
-    killed = root / "kind" / ".draft-killed"
-    killed.mkdir(parents=True)
-    write("file", "half")(killed)
-    place = cache.entry("kind", "key", write("file", "whole"))
-    assert (place / "file").read_text() == "whole"
-    assert killed.is_dir(), "it may belong to a process at work"
-    yesterday = time.time() - 86400
-    os.utime(killed, (yesterday, yesterday))
-    cache.entry("kind", "other", write("file"))
-    assert names(root / "kind") == ["key", "other"]
+    (root / "kind").mkdir(parents=True)
+    killed = root / "kind" / ".filling-01234567"
+    with drafts.draft_folder(root / "kind", ".filling-") as at_work:
+        killed.mkdir()
+        write("file", "half")(killed)
+        place = cache.entry("kind", "key", write("file", "whole"))
+        assert (place / "file").read_text() == "whole"
+        assert at_work.is_dir()
+    assert names(root / "kind") == ["key"]
 
 
 def test_entries_of_long_ago_are_removed(root):
@@ -322,3 +324,266 @@ def test_the_home_folder_may_be_written_as_a_tilde(monkeypatch, tmp_path):
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.setenv("STRAPGEN_CACHE_DIR", "~/kept")
     assert cache.root() == tmp_path / "kept"
+
+
+@pytest.mark.parametrize("times", [1, 4, 5])
+def test_work_whose_entry_another_process_removes_begins_again(root, times):
+    """The clock of the other one may be wrong, so that every entry is of long ago."""
+    left = [times]
+
+    def work() -> bytes:
+        place = cache.entry("kind", "key", write("file", "content"))
+        if left[0]:
+            left[0] -= 1
+            shutil.rmtree(place)
+        return cache.read(place, "file")
+
+    if times < 5:
+        assert cache.persistently(work) == b"content"
+    else:
+        with pytest.raises(FileNotFoundError):
+            cache.persistently(work)
+
+
+@pytest.mark.parametrize("times", [1, 4, 5])
+def test_an_entry_that_another_process_removes_at_once_is_made_again(root, times, monkeypatch):
+    left, is_whole = [times], cache._is_whole
+
+    def look(place: Path) -> bool:
+        if left[0] and place.is_dir():
+            left[0] -= 1
+            shutil.rmtree(place)
+        return is_whole(place)
+
+    monkeypatch.setattr(cache, "_is_whole", look)
+    if times < 5:
+        assert (cache.entry("kind", "key", write("file")) / "file").is_file()
+    else:
+        with pytest.raises(InputError, match=r"^cache entry .* cannot be made; remove it$"):
+            cache.entry("kind", "key", write("file"))
+
+
+@pytest.mark.parametrize("kind", ["programs", "sources", "builds"])
+def test_what_others_remove_while_it_is_read_is_made_again(kind, root, monkeypatch):
+    for name in ("_loaded", "_modules"):
+        monkeypatch.setattr(compiler, name, {})
+    monkeypatch.setattr(generated_sources, "_programs", {})
+    looked_up, removed = cache.lookup, []
+
+    def lookup(of_kind: str, key: str) -> Path | None:
+        place = looked_up(of_kind, key)
+        if place is not None and of_kind == kind and not removed:
+            shutil.rmtree(place)
+            removed.append(place)
+        return place
+
+    compiler.load(generated_sources.sources(choose("euler-product"), "c"))
+    monkeypatch.setattr(generated_sources, "_programs", {})
+    for name in ("_loaded", "_modules"):
+        monkeypatch.setattr(compiler, name, {})
+    monkeypatch.setattr(cache, "lookup", lookup)
+    generated_sources.program(choose("euler-product"))
+    assert compiler.load(generated_sources.sources(choose("euler-product"), "c")).lib.euler_product
+    assert len(removed) == 1
+
+
+# Who may write there
+
+
+@pytest.fixture
+def warnings(caplog, monkeypatch) -> pytest.LogCaptureFixture:
+    """The warnings of a process that has given none yet."""
+    cache._warn.cache_clear()
+    monkeypatch.setattr(cache, "_replaced", {})
+    caplog.set_level("WARNING", "strapgen")
+    return caplog
+
+
+def to_stranger(*paths: Path) -> None:
+    """Give files to another user, or at least let others write them."""
+    for path in paths:
+        if os.geteuid() == 0:
+            os.chown(path, 65534, -1)
+        else:
+            path.chmod(path.stat().st_mode | 0o022)
+
+
+def planted(place: Path, files: dict[str, str]) -> list[Path]:
+    """Write an entry that is whole by all that its manifest says, as anybody can; return its files."""
+    place.mkdir(parents=True)
+    for name, text in files.items():
+        (place / name).write_text(text)
+    (place / "manifest.json").write_text(json.dumps(cache._hashes(place)))
+    return list(place.iterdir())
+
+
+WRONG = {
+    "file": lambda place: (place / "file",),
+    "manifest": lambda place: (place / "manifest.json",),
+    "entry": lambda place: (place,),
+    "kind": lambda place: (place.parent,),
+    "all of it": lambda place: (*place.iterdir(), place, place.parent),
+}
+
+
+@pytest.mark.parametrize("which", WRONG.values(), ids=WRONG)
+def test_an_entry_that_others_could_have_changed_is_made_again(root, which, warnings):
+    root.mkdir()
+    place = root / "kind" / "key"
+    planted(place, {"file": "theirs"})
+    to_stranger(*which(place))
+    assert cache.lookup("kind", "key") is None
+    assert cache.entry("kind", "key", write("file", "ours")) == place
+    assert cache.read(place, "file") == b"ours"
+    assert names(root / "kind") == ["key"]
+    assert len(warnings.messages) == 1 and "it is not used, and made again" in warnings.messages[0]
+    cache.entry("kind", "key", never)
+
+
+@pytest.mark.parametrize("above", [False, True])
+def test_a_cache_folder_that_others_write_is_not_used(root, above, warnings):
+    place = root / "kind" / "key"
+    planted(place, {"file": "theirs"})
+    changed = root.parent if above else root
+    changed.chmod(0o777)
+    assert cache.lookup("kind", "key") is None
+    entry = cache.entry("kind", "key", write("file", "ours"))
+    assert not entry.is_relative_to(root)
+    assert cache.read(entry, "file") == b"ours"
+    assert cache.entry("kind", "key", never) == entry
+    assert entry.parents[1].stat().st_mode & 0o777 == 0o700
+    assert warnings.messages == [
+        f"strapgen: cache folder {root} is not used, since {changed} can be written by other users; "
+        "what is generated lasts until the program ends"
+    ]
+
+
+def test_neither_folder_of_the_user_is_refused_in_one_line(root, tmp_path, monkeypatch, warnings):
+    root.mkdir()
+    (tmp_path / "tmp").mkdir()
+    for folder in (root, tmp_path / "tmp"):
+        folder.chmod(0o777)
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "tmp"))
+    with pytest.raises(
+        InputError, match=r"^cache folder .* is not used, since .*; nor is a temporary one \(.*\)$"
+    ):
+        cache.entry("kind", "key", never)
+    assert names(tmp_path / "tmp") == []
+
+
+AT_EXIT = """
+import os, sys
+from strapgen.support import cache
+place = cache.entry("kind", "key", lambda draft: (draft / "file").write_text("x"))
+if os.fork() == 0:
+    raise SystemExit(0 if cache.entry("kind", "key", None) == place else 1)
+assert os.wait()[1] == 0
+assert (place / "file").exists(), "another process still uses it"
+print(place, flush=True)
+if sys.argv[1] == "killed":
+    os.kill(os.getpid(), 9)
+"""
+
+
+def test_a_temporary_folder_is_gone_when_the_program_ends_or_the_next_one_runs(root, tmp_path, monkeypatch):
+    root.mkdir()
+    root.chmod(0o777)
+    (tmp_path / "tmp").mkdir()
+    monkeypatch.setenv("TMPDIR", str(tmp_path / "tmp"))
+
+    def run(how: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [sys.executable, "-c", AT_EXIT, how], capture_output=True, text=True, check=False
+        )
+
+    killed = run("killed")
+    assert Path(killed.stdout.strip()).is_dir()
+    ended = run("ended")
+    assert ended.returncode == 0 and ended.stderr.count("\n") == 1, ended.stderr
+    assert names(tmp_path / "tmp") == []
+
+
+@pytest.mark.parametrize("umask", [0o000, 0o002, 0o077])
+def test_what_is_made_is_the_user_s_alone_whatever_the_umask(root, umask, monkeypatch, warnings):
+    monkeypatch.setenv("STRAPGEN_CACHE_DIR", str(root / "deep" / "er"))
+    before = os.umask(umask)
+    try:
+        place = cache.entry("kind", "key", write("file"))
+    finally:
+        os.umask(before)
+    made = [place, *place.parents[:4], *place.iterdir()]
+    assert root in made
+    assert not any(path.stat().st_mode & 0o022 for path in made)
+    assert cache.lookup("kind", "key") == place and not warnings.messages
+
+
+def test_planted_python_does_not_run(root, tmp_path, warnings):
+    """Generated text is executed as it is: a manifest that is right proves nothing."""
+    sources = generated_sources.sources(choose("euler-product"), "numpy")
+    (entry,) = (root / "sources").iterdir()
+    (name,) = sources.files
+    marker = tmp_path / "ran"
+    (entry / name).write_text(f"open({str(marker)!r}, 'w')\n{sources.files[name]}")
+    (entry / "manifest.json").write_text(json.dumps(cache._hashes(entry)))
+    to_stranger(*entry.iterdir(), entry)
+    again = generated_sources.sources(choose("euler-product"), "numpy")
+    compiler._import_text(again)
+    assert not marker.exists() and again == sources
+    assert len(warnings.messages) == 1
+
+
+PLANTED = (
+    '#include <stdio.h>\n__attribute__((constructor)) static void ran(void) {{ fclose(fopen("{}", "w")); }}\n'
+)
+
+
+@pytest.mark.parametrize("when", ["before", "after the check"])
+def test_a_planted_library_is_not_loaded(root, tmp_path, when, monkeypatch, warnings):
+    sources = generated_sources.sources(choose("euler-product"), "c")
+    monkeypatch.setattr(compiler, "_loaded", {})
+    monkeypatch.setattr(compiler, "_modules", {})
+    compiler.load(sources)
+    (entry,) = (root / "builds").iterdir()
+    library = next(path for path in entry.iterdir() if path.name != "manifest.json")
+    marker = tmp_path / "ran"
+    (tmp_path / "planted.c").write_text(PLANTED.format(marker))
+    planted_library = tmp_path / "planted.so"
+    command = [compiler.compiler(), "-shared", "-fPIC", "-o", planted_library, tmp_path / "planted.c"]
+    subprocess.run(command, check=True)
+    assert not marker.exists()
+
+    def plant() -> None:
+        library.unlink()
+        library.write_bytes(planted_library.read_bytes())
+        (entry / "manifest.json").write_text(json.dumps(cache._hashes(entry)))
+
+    if when == "before":
+        plant()
+        to_stranger(*entry.iterdir(), entry)
+    else:
+        path_of = ownership.path_of
+
+        def late(descriptor: int, place: Path) -> str:
+            if "/builds/" in str(place):
+                plant()
+            return path_of(descriptor, place)
+
+        monkeypatch.setattr(ownership, "path_of", late)
+    monkeypatch.setattr(compiler, "_loaded", {})
+    monkeypatch.setattr(compiler, "_modules", {})
+    module = compiler.load(sources)
+    assert not marker.exists()
+    assert module.lib.euler_product
+    assert len(warnings.messages) == (when == "before")
+
+
+def test_a_planted_library_would_have_run(tmp_path):
+    """The library of the test above does what that test looks for."""
+    marker = tmp_path / "ran"
+    (tmp_path / "planted.c").write_text(PLANTED.format(marker))
+    command = [compiler.compiler(), "-shared", "-fPIC", "-o", tmp_path / "planted.so", tmp_path / "planted.c"]
+    subprocess.run(command, check=True)
+    subprocess.run(
+        [sys.executable, "-c", f"import ctypes; ctypes.CDLL({str(tmp_path / 'planted.so')!r})"], check=True
+    )
+    assert marker.exists()

@@ -5,12 +5,13 @@ from __future__ import annotations
 import errno
 import os
 import stat
+import tempfile
 from pathlib import Path
 
 import pytest
 
 from strapgen.support.exceptions import InputError
-from strapgen.support.files import write_file, write_files
+from strapgen.support.files import is_staged, write_file, write_files
 
 FILES = {"a.txt": "alpha\n", "deep/er/b.txt": "beta\n", "c.bin": b"\x00\xff"}
 
@@ -191,3 +192,100 @@ def test_pipe_is_not_replaced_by_a_file(tmp_path):
     with pytest.raises(InputError, match=r"pipe is no ordinary file"):
         write_file(tmp_path / "pipe", "x")
     assert stat.S_ISFIFO((tmp_path / "pipe").stat().st_mode)
+
+
+def test_files_appear_in_order_the_last_one_last(tmp_path, monkeypatch):
+    renamed = []
+    rename = Path.replace
+
+    def replace(self: Path, target: Path) -> None:
+        assert all(draft.read_bytes() for draft in self.parent.iterdir()), (
+            "all are whole before the first one moves"
+        )
+        renamed.append(target.name)
+        rename(self, target)
+
+    monkeypatch.setattr(Path, "replace", replace)
+    write_files(tmp_path, {"z": "1", "deep/er/a": "2", "b": "3"})
+    assert renamed == ["z", "a", "b"]
+
+
+def test_all_files_are_drafted_in_one_folder(tmp_path, monkeypatch):
+    folders = set()
+    fdopen = os.fdopen
+
+    def opened(handle: int, mode: str):
+        folders.update(path for path in tmp_path.rglob("*") if is_staged(path) and path.is_dir())
+        return fdopen(handle, mode)
+
+    monkeypatch.setattr(os, "fdopen", opened)
+    write_files(tmp_path, FILES)
+    assert [folder.parent for folder in folders] == [tmp_path]
+    assert tree(tmp_path).keys() == FILES.keys()
+
+
+def test_a_failure_leaves_no_folder_that_was_not_there(tmp_path, monkeypatch):
+    (tmp_path / "deep").mkdir()
+    monkeypatch.setattr(os, "fdopen", FullDisk(2))
+    with pytest.raises(InputError):
+        write_files(tmp_path, FILES)
+    assert [path.name for path in tmp_path.rglob("*")] == ["deep"]
+
+
+def forgotten(folder: Path, *names: str) -> Path:
+    place = folder / ".strapgen-draft-01234567"
+    place.mkdir(parents=True)
+    for name in names:
+        (place / name).write_text("half")
+    return place
+
+
+@pytest.mark.parametrize("where", [".", "deep/er"])
+def test_what_a_killed_process_left_is_removed(tmp_path, where):
+    place = forgotten(tmp_path / where, "0", "1", "17")
+    write_files(tmp_path, FILES)
+    assert not place.exists()
+    assert tree(tmp_path).keys() == FILES.keys()
+
+
+@pytest.mark.parametrize("name", ["notes.txt", "0.c", ".0", "-1"])
+def test_a_hidden_folder_with_anything_else_is_not_touched(tmp_path, name):
+    place = forgotten(tmp_path, "0", name)
+    write_files(tmp_path, FILES)
+    assert tree(place).keys() == {"0", name}
+
+
+def test_hidden_files_of_the_user_are_not_touched(tmp_path):
+    names = (
+        ".a.txt-01234567",
+        ".strapgen",
+        ".strapgen-draft-x/0",
+        ".strapgen-draft-0123456/0",
+        "deep/er/.b.txt",
+    )
+    for name in names:
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("mine")
+    (tmp_path / ".strapgen-draft-89abcdef").write_text("a file of that name")
+    write_files(tmp_path, FILES)
+    assert tree(tmp_path).keys() == {*FILES, *names, ".strapgen-draft-89abcdef"}
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root writes where nobody may")
+def test_a_folder_that_cannot_be_written_is_no_hindrance_for_one_below(tmp_path):
+    (tmp_path / "deep" / "er").mkdir(parents=True)
+    tmp_path.chmod(0o555)
+    write_files(tmp_path, {"deep/er/b.txt": "beta\n"})
+    tmp_path.chmod(0o755)
+    assert tree(tmp_path) == {"deep/er/b.txt": b"beta\n"}
+
+
+def test_a_link_to_another_file_system_is_written_through(tmp_path):
+    other = Path("/dev/shm")
+    if not os.access(other, os.W_OK) or other.stat().st_dev == tmp_path.stat().st_dev:
+        pytest.skip("there is no other file system to write to")
+    with tempfile.TemporaryDirectory(dir=other) as name:
+        (tmp_path / "link").symlink_to(Path(name) / "target")
+        write_files(tmp_path, {"link": "new", "beside": "new"})
+        assert tree(Path(name)) == {"target": b"new"}
+    assert (tmp_path / "beside").read_text() == "new"

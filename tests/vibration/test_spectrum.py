@@ -423,3 +423,14 @@ def test_a_density_that_rises_steeply(tmp_path):
     f = np.array([10.0, 200**0.5, 20.0])
     assert found.density(f) == pytest.approx([1e-300, 1, 1e300], rel=1e-10)
     assert random_rates(vibration.of(choose("euler")), found, "0.02").rates == (0, 0, 0)  # in phase
+
+
+@pytest.mark.parametrize("most", [2, 3])
+def test_a_file_of_more_rows_than_a_spectrum_has_is_refused(most, tmp_path, monkeypatch):
+    monkeypatch.setattr("strapgen.vibration.spectrum._MOST_ROWS", most)
+    path = written(tmp_path, "frequency_hz,density,angle_x_rad\n5,1,1\n20,1,1\n")
+    if most == 3:
+        assert read_spectrum(path).edges == (5, 20)
+    else:
+        with pytest.raises(InputError, match=r"has over 2 rows; that is too many for a spectrum$"):
+            read_spectrum(path)

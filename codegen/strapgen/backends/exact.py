@@ -272,5 +272,22 @@ class ExactBackend(Backend):
                             records[count // record_every] = rounded(state)
         return history.reshape(*history.shape[:2], *self.state_shape)
 
+    def _continue(
+        self, increments: Array, orthonormalize_every: int, memory: Any, first: int
+    ) -> tuple[Array, Any]:
+        states = np.full((len(increments), self.identity.size), np.nan)
+        if memory == []:  # a division by zero: from there on, states are not numbers
+            return states.reshape(-1, *self.state_shape), memory
+        with mpmath.workdps(DIGITS):
+            rows = in_digits(increments.reshape(-1, 3 * self.samples))
+            try:
+                for count, state in enumerate(self.states_in_digits(rows, memory, orthonormalize_every)):
+                    memory = state
+                    if count:
+                        states[count - 1] = rounded(state)
+            except ZeroDivisionError:
+                memory = []
+        return states.reshape(-1, *self.state_shape), memory
+
     def _kernels(self) -> list[tuple[str | None, str]]:
         return [*super()._kernels(), (self.attitude, self.sources.target)]

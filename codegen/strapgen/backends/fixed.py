@@ -8,13 +8,14 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
 from strapgen.backends.evaluators import Array, Evaluator
-from strapgen.backends.fixed_numbers import integers, numbers
+from strapgen.backends.fixed_numbers import Memory, integers, numbers
 from strapgen.backends.protocol import Backend
 from strapgen.backends.step_sources import StepSources
 from strapgen.ir.fixed_interface import Argument, Interface
@@ -236,7 +237,11 @@ class FixedBackend(Backend):
         rows = np.asarray(increments).reshape(1, -1, samples.signal.size)
         words = self.evaluator.integers(samples, rows)
         start = self.evaluator.integers(state, self.identity.reshape(1, -1))
-        return lambda: self.propagate_integers(words, 1, 0, start)
+        return lambda: self.propagate_integers(words, 1, 0, self._begun(start))
+
+    def _begun(self, states: Array) -> Memory:
+        """Return what runs begin with, from integers (runs, elements)."""
+        return Memory(states, self.evaluator.fresh(len(states)))
 
     def _propagate(
         self, increments: Array, record_every: int, orthonormalize_every: int, initial: Array
@@ -247,13 +252,25 @@ class FixedBackend(Backend):
             self.evaluator.integers(samples, increments.reshape(runs, steps, samples.signal.size)),
             record_every,
             orthonormalize_every,
-            self.evaluator.integers(state, initial.reshape(runs, state.signal.size)),
+            self._begun(self.evaluator.integers(state, initial.reshape(runs, state.signal.size))),
         )
         return self.evaluator.numbers(state, history).reshape(*history.shape[:2], *self.state_shape)
 
+    def _continue(
+        self, increments: Array, orthonormalize_every: int, memory: Any, first: int
+    ) -> tuple[Array, Any]:
+        state, samples = self.interface.inputs
+        rows = increments.reshape(1, -1, samples.signal.size)
+        memory = memory or self._begun(self.evaluator.integers(state, self.identity.reshape(1, -1)))
+        memory = replace(memory, first=first)
+        words = self.evaluator.integers(samples, rows)
+        history = self.propagate_integers(words, 1, orthonormalize_every, memory)
+        states = self.evaluator.numbers(state, history[0, 1:]).reshape(-1, *self.state_shape)
+        return states, replace(memory, state=history[:, -1])
+
     @abstractmethod
     def propagate_integers(
-        self, increments: Array, record_every: int, orthonormalize_every: int, initial: Array
+        self, increments: Array, record_every: int, orthonormalize_every: int, memory: Memory
     ) -> Array:
         """Propagate integers.
 
@@ -262,7 +279,8 @@ class FixedBackend(Backend):
         increments : array, (runs, N, elements of the increments)
         record_every, orthonormalize_every : int
             As for `propagate`; 0 for never.
-        initial : array, (runs, elements of the state)
+        memory : Memory
+            What the steps before have handed on; its error feedback becomes that after these steps.
 
         Returns
         -------
@@ -286,17 +304,17 @@ class CFixedBackend(FixedBackend):
         return CFixedEvaluator(self._sources(kernel))
 
     def propagate_integers(
-        self, increments: Array, record_every: int, orthonormalize_every: int, initial: Array
+        self, increments: Array, record_every: int, orthonormalize_every: int, memory: Memory
     ) -> Array:
         """Propagate integers in C."""
         runs, steps = increments.shape[:2]
         ffi, kind = self._c.module.ffi, self._c.word_type
         words = [
             np.ascontiguousarray(array, memory)
-            for array, memory in zip((initial, increments), self._c.input_types, strict=True)
+            for array, memory in zip((memory.state, increments), self._c.input_types, strict=True)
         ]
-        feedback = self.evaluator.fresh(runs).astype(self._c.feedback_type)
-        history = np.empty((runs, 1 + steps // record_every, initial.shape[-1]), kind)
+        feedback = memory.feedback.astype(self._c.feedback_type)
+        history = np.empty((runs, 1 + steps // record_every, memory.state.shape[-1]), kind)
         orthonormalizer = ffi.NULL
         if orthonormalize_every:
             address = self.beside(self._need_orthonormalization()).address()
@@ -313,8 +331,11 @@ class CFixedBackend(FixedBackend):
             stopped,
         )
         if status:
-            where = f" in step {stopped[1] + 1}" + (f" of run {stopped[0] + 1}" if runs > 1 else "")
+            where = f" in step {memory.first + stopped[1] + 1}" + (
+                f" of run {stopped[0] + 1}" if runs > 1 else ""
+            )
             raise self.evaluator.refused(status, where)
+        memory.feedback[...] = feedback.astype(memory.feedback.dtype)
         return history
 
 
@@ -330,23 +351,23 @@ class ModelBackend(FixedBackend):
         return ModelEvaluator(self._sources(kernel))
 
     def propagate_integers(
-        self, increments: Array, record_every: int, orthonormalize_every: int, initial: Array
+        self, increments: Array, record_every: int, orthonormalize_every: int, memory: Memory
     ) -> Array:
         """Propagate integers in Python, see `FixedBackend.propagate_integers`."""
         normalize = self.beside(self._need_orthonormalization()) if orthonormalize_every else None
         runs, steps = increments.shape[:2]
         single = runs == 1
-        fresh = self._model.fresh(runs)
         feedback: list[Any]
         if single:
-            state, samples, feedback = initial[0].tolist(), increments[0].tolist(), fresh[0].tolist()
+            state, feedback = memory.state[0].tolist(), memory.feedback[0].tolist()
+            samples = increments[0].tolist()
         else:
-            state = list(np.moveaxis(initial, -1, 0))
+            state = list(np.moveaxis(memory.state, -1, 0))
             samples = np.moveaxis(increments.astype(self._model.integer_type), 0, -1)
-            feedback = list(np.moveaxis(fresh, -1, 0))
+            feedback = list(np.moveaxis(memory.feedback, -1, 0))
         records = [state]
         for number in range(steps):
-            where = f" in step {number + 1}"
+            where = f" in step {memory.first + number + 1}"
             state, feedback = _stepped(self._model, [state, list(samples[number])], feedback, where)
             if normalize is not None and (number + 1) % orthonormalize_every == 0:
                 # The first words of the step's feedback are those of its state.
@@ -355,6 +376,7 @@ class ModelBackend(FixedBackend):
                 feedback = [*first, *feedback[count:]]
             if (number + 1) % record_every == 0:
                 records.append(state)
+        memory.feedback[...] = np.stack(np.broadcast_arrays(*feedback), axis=-1) if feedback else 0
         if single:
             return np.array(records, self._model.integer_type)[None]
         return np.stack([np.stack(np.broadcast_arrays(*record), axis=-1) for record in records], axis=1)

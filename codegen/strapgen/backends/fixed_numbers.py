@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from strapgen.ir.fixed_settings import DEFAULT_ALLOWANCE
 from strapgen.support.exceptions import InputError
 
 
+@np.errstate(all="ignore")  # numbers that overflow are refused, in one line
 def integers(argument: Argument, values: Any, kernel: str) -> Array:
     """Return numbers as the integers of an input, rounded to the nearest.
 
@@ -49,3 +51,12 @@ def in_units(argument: Argument, values: Array) -> Array:
     if argument.sensor is not None:
         return np.asarray(values / float(argument.unit))
     return np.asarray(np.ldexp(values, argument.format.fraction))
+
+
+@dataclass(frozen=True)
+class Memory:
+    """What steps hand on: states, (runs, elements), error feedback, (runs, number of words), and their number."""
+
+    state: Array
+    feedback: Array
+    first: int = 0

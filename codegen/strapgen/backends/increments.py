@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from fractions import Fraction
 from typing import Any
 
@@ -13,6 +14,8 @@ from strapgen.support.exceptions import InputError
 
 #: Most pulses that can be counted, since a double represents every whole number up to here.
 _MOST_PULSES = 2**53
+#: Most steps of a run that are propagated together where their increments come part by part.
+PART = 1 << 18
 
 
 def windows(increments: Any, count: int, previous: int = 0) -> NDArray[np.float64]:
@@ -58,6 +61,7 @@ def windows(increments: Any, count: int, previous: int = 0) -> NDArray[np.float6
     return np.ascontiguousarray(np.moveaxis(overlapping, -1, 1))
 
 
+@np.errstate(all="ignore")  # angles that overflow are refused, in one line
 def pulses(increments: Any, size: float | str | Fraction, previous: int = 0) -> NDArray[np.float64]:
     """Return increments as a gyro that counts pulses measures them.
 
@@ -102,3 +106,78 @@ def pulses(increments: Any, size: float | str | Fraction, previous: int = 0) -> 
         raise InputError(f"pulse is {pulse:g} rad; the run would take more pulses than can be counted")
     counts = np.diff(np.rint(angle), axis=-2, prepend=0.0)
     return (counts * pulse).reshape(d.shape)
+
+
+class StepWindows:
+    """Cuts a row of increments into those of each step, part by part from the first one on.
+
+    Its parts have the bits of what `windows` and `pulses` return for the whole row.
+
+    Parameters
+    ----------
+    read : callable
+        ``read(first, stop)`` returns increments of the row, (stop - first, 3), in rad.
+    count, previous : int
+        As for `windows`.
+    pulse : number, optional
+        As for `pulses`; by default increments are not quantized.
+    """
+
+    def __init__(
+        self,
+        read: Callable[[int, int], Any],
+        count: int,
+        previous: int = 0,
+        pulse: float | str | Fraction | None = None,
+    ) -> None:
+        self._read, self._count, self._previous = read, count, previous
+        self._pulse = None if pulse is None else float(checks.number("pulse", pulse, positive=True))
+        self._angle = self._pulses = np.zeros((1, 3))
+        self._tail = np.empty((0, 3))
+
+    def __call__(self, first: int, steps: int) -> NDArray[np.float64]:
+        """Return the increments of the steps after those of the call before, (steps, previous + count, 3)."""
+        begin = first * self._count + len(self._tail)
+        row = np.asarray(self._read(begin, (first + steps) * self._count + self._previous))
+        row = np.concatenate([self._tail, row if self._pulse is None else self._quantized(row, self._pulse)])
+        self._tail = row[len(row) - self._previous :].copy()
+        return windows(row, self._count, self._previous)
+
+    @np.errstate(all="ignore")  # angles that overflow are refused, in one line
+    def _quantized(self, row: NDArray[np.float64], pulse: float) -> NDArray[np.float64]:
+        angles = np.cumsum(np.concatenate([self._angle, row]), axis=0)
+        self._angle = angles[-1:]
+        counts = np.rint(angles[1:] / pulse)
+        if not np.abs(counts).max(initial=0.0) < _MOST_PULSES:
+            raise InputError(f"pulse is {pulse:g} rad; the run would take more pulses than can be counted")
+        before, self._pulses = self._pulses, counts[-1:]
+        result: NDArray[np.float64] = np.diff(counts, axis=0, prepend=before) * pulse
+        return result
+
+
+def run_parts(steps: int, segment: int) -> Iterator[tuple[int, int, int]]:
+    """Cut the steps of a run into parts that are propagated one after the other.
+
+    Parameters
+    ----------
+    steps : int
+    segment : int
+        Steps from orthonormalization to orthonormalization; 0 for never.
+
+    Yields
+    ------
+    first, count : int
+        First step and number of steps. A part holds whole segments, or a piece of one that is longer than `PART`.
+    segment : int
+        Steps from orthonormalization to orthonormalization inside the part; 0 for never.
+    """
+    first = 0
+    while first < steps:
+        if segment and segment <= PART:
+            count, every = min(PART // segment * segment, steps - first), segment
+        else:
+            until_end = segment - first % segment if segment else steps
+            count = min(PART, until_end, steps - first)
+            every = count if count == until_end and segment else 0
+        yield first, count, every
+        first += count

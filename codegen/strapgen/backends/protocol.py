@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from strapgen.backends.evaluators import Array, Evaluator
+from strapgen.backends.increments import PART, run_parts
 from strapgen.backends.numpy_evaluator import NumpyEvaluator
 from strapgen.backends.step_sources import StepSources
 from strapgen.ir.sources import Sources
@@ -312,6 +313,66 @@ class Backend(ABC):
             np.ascontiguousarray(start).reshape(runs, *self.state_shape),
         )
         return history.reshape(*batch, 1 + steps // record_every, *self.state_shape)
+
+    def propagate_parts(
+        self,
+        part: Callable[[int, int], Any],
+        steps: int,
+        record_every: int = 1,
+        orthonormalize_every: int | None = None,
+    ) -> Array:
+        """Run the algorithm from zero rotation over increments that come part by part.
+
+        The result has the bits of `propagate`, whose arrays hold the whole run.
+
+        Parameters
+        ----------
+        part : callable
+            ``part(first, count)`` returns the increments of some steps, (count, samples, 3), one part after the other.
+        steps : int
+            Number of steps of the run.
+        record_every, orthonormalize_every : int, optional
+            As for `propagate`.
+
+        Returns
+        -------
+        array, (1 + steps // record_every, state shape)
+
+        Raises
+        ------
+        InputError, InputTypeError
+            As `propagate` does.
+        """
+        if steps <= PART:
+            return self.propagate(part(0, steps), record_every, orthonormalize_every)
+        checks.count("record_every", record_every, largest=checks.MOST)
+        if orthonormalize_every is not None:
+            checks.count("orthonormalize_every", orthonormalize_every, largest=checks.MOST)
+            self._need_orthonormalization()
+        history = np.empty((1 + steps // record_every, *self.state_shape), self.dtype)
+        history[0] = self.identity
+        memory: Any = None
+        for first, count, restore_every in run_parts(steps, orthonormalize_every or 0):
+            increments = checks.real_array("increments", part(first, count), (self.samples, 3), self.dtype)
+            states, memory = self._continue(increments, restore_every, memory, first)
+            ahead = -first % record_every or record_every
+            recorded = states[ahead - 1 :: record_every]
+            place = (first + ahead) // record_every
+            history[place : place + len(recorded)] = recorded
+        return history
+
+    def _continue(
+        self, increments: Array, orthonormalize_every: int, memory: Any, first: int
+    ) -> tuple[Array, Any]:
+        """Return the states after each of some steps, (N, state shape), and the memory for the steps after them.
+
+        The memory of the first steps is None; the number of the first step serves messages.
+        """
+        initial = self.identity if memory is None else memory
+        states = self._propagate(
+            increments[None], 1, orthonormalize_every, np.ascontiguousarray(initial)[None]
+        )
+        return states[0, 1:], states[0, -1]
 
     @abstractmethod
     def _propagate(

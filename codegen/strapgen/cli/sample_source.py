@@ -161,11 +161,13 @@ class SampleSource:
 
     def recording(self) -> Recording:
         """Read the recorded data."""
+        from strapgen.cli.progress import waiting
         from strapgen.simulation import recording
 
-        if self.increments_csv is not None:
-            return recording.read_increments(self.increments_csv)
-        return recording.read_rates(self.rates_csv or "", self.rate_unit or "", self.resample_hz)
+        with waiting(f"reading {self.file.name}"):
+            if self.increments_csv is not None:
+                return recording.read_increments(self.increments_csv)
+            return recording.read_rates(self.rates_csv or "", self.rate_unit or "", self.resample_hz)
 
     def read(self, samples: int, previous: int = 0) -> Inputs:
         """Return the increments that the options describe.

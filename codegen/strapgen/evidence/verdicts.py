@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import importlib.util
 import shutil
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-Result = Literal["proved", "agrees", "fails", "not installed"]
+Result = Literal["proved", "agrees", "fails", "not examined", "not installed"]
 
 
 @dataclass(frozen=True)
@@ -23,8 +24,9 @@ class Verdict:
         The promise and the case, as "no overflow: x86_64" or "same bits: cortex-m0".
     tool, version : str
         As "Frama-C Eva", "26.0".
-    result : {"proved", "agrees", "fails", "not installed"}
-        "proved" is of all inputs in the ranges; "agrees" is of those that were run.
+    result : {"proved", "agrees", "fails", "not examined", "not installed"}
+        "proved" is of all inputs in the ranges; "agrees" is of those that were run; "not examined" is where the tool
+        has no theorem for the code, and the detail tells for what.
     seconds : float
     detail : str
         What a reader needs beside it: the figures that were compared, the first alarm, the reason.
@@ -70,16 +72,19 @@ class Tool:
         Debian's packages or PyPI's that bring it.
     version : callable
         ``version()`` returns the version of the installed program.
+    modules : tuple of str, optional
+        The modules of Python that it needs.
     """
 
     name: str
     commands: tuple[str, ...]
     package: str
     version: Callable[[], str]
+    modules: tuple[str, ...] = ()
 
     def installed(self) -> bool:
-        """Return whether all its programs are there."""
-        return all(shutil.which(command) for command in self.commands)
+        """Return whether all its programs and modules are there."""
+        return all(map(shutil.which, self.commands)) and all(map(importlib.util.find_spec, self.modules))
 
 
 def failures(verdicts: Iterable[Verdict]) -> list[Verdict]:

@@ -171,16 +171,29 @@ def _fixed_rows(
     )
     inputs = itertools.chain(_corners(boxes), _outside(boxes), _random(boxes, stream))
     rows = [
-        _called(model, row, feedback)
+        model_call(model, row, feedback)
         for row, feedback in itertools.islice(zip(inputs, before, strict=False), count)
     ]
     return tuple(rows), tuple(0.0 for _ in sources.fixed.outputs)
 
 
-def _called(
+def model_call(
     model: ModelEvaluator, inputs: tuple[tuple[int, ...], ...], feedback: tuple[int, ...]
 ) -> CallVector:
-    """Return a call of the integer model as a vector; a refused call leaves outputs and error feedback alone."""
+    """Return a call of the integer model as a vector; a refused call leaves outputs and error feedback alone.
+
+    Parameters
+    ----------
+    model : ModelEvaluator
+    inputs : tuple of tuple of int
+        The elements of every input.
+    feedback : tuple of int
+        Words of error feedback before the call.
+
+    Returns
+    -------
+    CallVector
+    """
     arguments = [*map(list, inputs), *([list(feedback)] if feedback else [])]
     try:
         results = [tuple(map(int, result)) for result in model.generated(*arguments)]

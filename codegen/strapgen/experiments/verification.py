@@ -327,9 +327,7 @@ def _inside(row: CallVector, sources: Sources) -> bool:
 def _identity(sources: Sources) -> list[int]:
     """Return the integers of the state of zero rotation."""
     assert sources.fixed is not None and sources.companions is not None
-    format_ = sources.fixed.inputs[0].format
-    top = (1 << (format_.word - 1)) - 1
-    return [min(round(x / format_.unit), top) for x in sources.companions.identity]
+    return [sources.fixed.inputs[0].format.nearest(x) for x in sources.companions.identity]
 
 
 def _cone(interface: Interface) -> Array | None:

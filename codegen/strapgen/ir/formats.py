@@ -65,6 +65,16 @@ class Format:
         """The largest integer that a word holds."""
         return (1 << (self.word - 1)) - 1
 
+    def nearest(self, value: Fraction) -> int:
+        """Return the integer of a number; the largest there is where the number lies just beyond.
+
+        Examples
+        --------
+        >>> Format(16, 14).nearest(Fraction(1)), Format(16, 15).nearest(Fraction(1))
+        (16384, 32767)
+        """
+        return min(round(value / self.unit), self.largest)
+
     def __str__(self) -> str:
         return f"Q{self.word - 1 - self.fraction}.{self.fraction}"
 

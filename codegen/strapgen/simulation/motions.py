@@ -88,10 +88,28 @@ class Motion:
         array, (steps, previous + samples, 3)
             Integrals of the body rate in rad, body axes.
         """
-        width = step / samples
-        middles = (2 * np.arange(-previous, steps * samples) + 1) * float(width / 2)
-        values: Array = evaluator(f"{self.name}-increments")(middles, float(width), *self.parameters.values())
-        return windows(values, samples, previous)
+        return windows(self.samples(step / samples, -previous, steps * samples), samples, previous)
+
+    def samples(self, interval: Fraction, first: int, stop: int) -> Array:
+        """Return exact angle increments of some sampling intervals.
+
+        Parameters
+        ----------
+        interval : Fraction
+            Sampling interval in s.
+        first, stop : int
+            Numbers of the first interval and of the one after the last; number 0 begins at t = 0.
+
+        Returns
+        -------
+        array, (stop - first, 3)
+            Integrals of the body rate in rad, body axes.
+        """
+        middles = (2 * np.arange(first, stop) + 1) * float(interval / 2)
+        values: Array = evaluator(f"{self.name}-increments")(
+            middles, float(interval), *self.parameters.values()
+        )
+        return values
 
     def attitude(self, time: Any) -> Array:
         """Return the true attitude.

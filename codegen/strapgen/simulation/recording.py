@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,11 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapgen.backends import Backend
-from strapgen.backends.increments import pulses, windows
+from strapgen.backends.increments import StepWindows
+from strapgen.simulation.recorded_columns import (
+    PART,
+    Columns,
+    SampleIntervals,
+    largest_magnitude,
+    parts,
+    release,
+)
+from strapgen.simulation.recorded_rows import LineNumbers, RecordedRows, read_rows
 from strapgen.simulation.runs import require_finite
 from strapgen.support import checks, stages
 from strapgen.support.exceptions import InputError, InputTypeError
-from strapgen.support.suggestions import counted
 
 Array = NDArray[np.float64]
 
@@ -26,8 +32,6 @@ RATE_UNITS = {"rad/s": 1.0, "deg/s": math.radians(1)}
 
 _INCREMENT_COLUMNS = ("t", "dx", "dy", "dz")
 _INERTIAL_COLUMNS = (*_INCREMENT_COLUMNS, "dvx", "dvy", "dvz")
-#: Number of columns of recorded rates, found by position: the time and three rates.
-_RATE_COLUMNS = 4
 #: Largest relative departure of an interval from the median in an even recording.
 _EVEN = 1e-3
 #: From this multiple of the median on, an interval is a gap in which the motion is not known.
@@ -55,7 +59,7 @@ class Recording:
     @property
     def largest(self) -> float:
         """Largest magnitude of an element of the increments, in rad."""
-        return float(np.abs(self.increments).max())
+        return largest_magnitude(self.increments)
 
 
 @dataclass(frozen=True)
@@ -93,91 +97,36 @@ class History:
     unused: int
 
 
-def _rows(path: Path, names: tuple[str, ...] | None) -> tuple[Array, list[int]]:
-    """Read columns of numbers, found by name if there is a header, and the line number of each row."""
-    values: list[list[float]] = []
-    lines: list[int] = []
-    places = list(range(_RATE_COLUMNS if names is None else len(names)))
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            for count, (line, row) in enumerate(_numbered(csv.reader(file))):
-                if count == 0 and not any(map(_resembles_number, row)):
-                    header = [cell.strip().lower() for cell in row]
-                    if names is not None:
-                        places = [_place(path, line, header, name, names) for name in names]
-                    continue
-                values.append([_number(path, line, row, place) for place in places])
-                lines.append(line)
-    except OSError as error:
-        raise InputError(f"{path} cannot be read ({error.strerror})") from None
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"{path} is no text file of comma-separated values ({error})") from None
-    if len(values) < 2:
-        raise InputError(f"{path} holds {counted(len(values), 'row')} of numbers; at least 2 are needed")
-    return np.array(values), lines
-
-
-def _numbered(reader: Any) -> Iterator[tuple[int, list[str]]]:
-    for row in reader:
-        # A blank line is skipped, but a row of empty cells lacks its data and is refused later.
-        if len(row) > 1 or any(cell.strip() for cell in row):
-            yield reader.line_num, row
-
-
-def _resembles_number(cell: str) -> bool:
-    """Return whether a cell is data: 1_0 is refused as a number, not skipped as a header."""
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return True
-
-
-def _place(path: Path, line: int, header: list[str], name: str, names: tuple[str, ...]) -> int:
-    if name not in header:
-        raise InputError(
-            f"{path}, line {line}: no column {name!r}; the columns {', '.join(names)} are needed"
-        )
-    return header.index(name)
-
-
-def _number(path: Path, line: int, row: list[str], place: int) -> float:
-    if place >= len(row):
-        raise InputError(f"{path}, line {line}: {len(row)} columns; column {place + 1} is needed")
-    number = checks.double(row[place])
-    if not math.isfinite(number):
-        cell = row[place].strip()
-        raise InputError(f"{path}, line {line}: column {place + 1} is {cell!r}; a finite number is needed")
-    return number
-
-
-def _intervals(path: Path, time: Array, lines: list[int]) -> tuple[Array, float]:
+def _checked_intervals(path: Path, rows: RecordedRows) -> tuple[SampleIntervals, float]:
     """Return the intervals and their median in s; refuse times that do not rise, and gaps."""
+    time, lines = rows.time, rows.lines
     if not math.isfinite(float(time[-1]) - float(time[0])):
         raise InputError(f"{path}: times from {time[0]:g} s to {time[-1]:g} s are too far apart")
-    intervals = np.diff(time)
-    worst = int(intervals.argmin())
-    if intervals[worst] <= 0:
+    intervals = SampleIntervals(time)
+    shortest, worst = intervals.shortest
+    if shortest <= 0:
         raise InputError(
             f"{path}, line {lines[worst + 1]}: "
             f"time {float(time[worst + 1])!r} s does not come after {float(time[worst])!r} s"
         )
-    median = float(np.median(intervals))
-    widest = int(intervals.argmax())
-    if intervals[widest] > _GAP * median:
+    median = intervals.median()
+    longest, widest = intervals.longest
+    if longest > _GAP * median:
         raise InputError(
-            f"{path}, line {lines[widest + 1]}: a gap of {intervals[widest]:.6g} s; "
+            f"{path}, line {lines[widest + 1]}: a gap of {longest:.6g} s; "
             f"the median interval is {median:.6g} s, and up to {_GAP} times that is allowed"
         )
     return intervals, median
 
 
-def _require_even(path: Path, intervals: Array, median: float, lines: list[int], remedy: str) -> None:
-    departures = np.abs(intervals - median)
-    worst = int(departures.argmax())
-    if departures[worst] > _EVEN * median:
+def _require_even(
+    path: Path, intervals: SampleIntervals, median: float, lines: LineNumbers, remedy: str
+) -> None:
+    departure, worst = intervals.farthest(median)
+    interval = intervals.at(worst)
+    if departure > _EVEN * median:
         raise InputError(
-            f"{path}, line {lines[worst + 1]}: sample times are not even: the interval of {intervals[worst]:.6g} s "
+            f"{path}, line {lines[worst + 1]}: sample times are not even: the interval of {interval:.6g} s "
             f"before it is the worst, the median is {median:.6g} s; {remedy}"
         )
 
@@ -247,13 +196,14 @@ def read_inertial(path: str | Path) -> InertialRecording:
 
 def _even_increments(path: Path, names: tuple[str, ...]) -> tuple[float, float, Array]:
     """Return the time at which the first increment begins, the interval, and the increments."""
-    values, lines = _rows(path, names)
-    intervals, median = _intervals(path, values[:, 0], lines)
-    _require_even(path, intervals, median, lines, "increments are needed at even times")
-    interval = float((values[-1, 0] - values[0, 0]) / len(intervals))
-    return float(values[0, 0]) - interval, interval, np.ascontiguousarray(values[:, 1:])
+    rows = read_rows(path, names)
+    intervals, median = _checked_intervals(path, rows)
+    _require_even(path, intervals, median, rows.lines, "increments are needed at even times")
+    interval = float((rows.time[-1] - rows.time[0]) / intervals.count)
+    return float(rows.time[0]) - interval, interval, rows.values
 
 
+@np.errstate(all="ignore")  # numbers that overflow are refused, in one line
 def read_rates(path: str | Path, unit: str, resample_hz: float | str | None = None) -> Recording:
     r"""Read a file of body rates and integrate them, with linear interpolation between samples.
 
@@ -289,15 +239,25 @@ def read_rates(path: str | Path, unit: str, resample_hz: float | str | None = No
     """
     path = checks.path("path", path)
     factor = RATE_UNITS[checks.choice("rate unit", unit, RATE_UNITS)]
-    values, lines = _rows(path, None)
-    time, rates = values[:, 0], values[:, 1:] * factor
-    intervals, median = _intervals(path, time, lines)
-    pieces = (rates[1:] + rates[:-1]) / 2 * intervals[:, None]
+    rows = read_rows(path, None)
+    time, lines = rows.time, rows.lines
+    intervals, median = _checked_intervals(path, rows)
     if resample_hz is None:
         _require_even(path, intervals, median, lines, "resample_hz integrates them over an even grid")
-        return Recording(float(time[0]), float((time[-1] - time[0]) / len(intervals)), pieces)
-    interval = 1 / float(checks.number("resample_hz", resample_hz, positive=True))
-    ratio = float((time[-1] - time[0]) / interval * (1 + 1e-12))
+        interval = float((time[-1] - time[0]) / intervals.count)
+        increments = _integrals(rows, factor)
+    else:
+        interval = 1 / float(checks.number("resample_hz", resample_hz, positive=True))
+        increments = _resampled(rows, factor, interval, _points(path, time, resample_hz, interval))
+    recording = Recording(float(time[0]), interval, increments)
+    if not math.isfinite(recording.largest):
+        raise InputError(f"{path}: the integral of a rate is beyond the range of double")
+    return recording
+
+
+def _points(path: Path, time: Array, resample_hz: float | str, interval: float) -> int:
+    """Return the number of intervals of an even grid over a recording."""
+    ratio = (float(time[-1]) - float(time[0])) / interval * (1 + 1e-12)
     if ratio > checks.MOST:
         raise InputError(f"resample_hz {resample_hz}: {path} would make over {checks.MOST:.0e} increments")
     count = math.floor(ratio)
@@ -305,15 +265,46 @@ def read_rates(path: str | Path, unit: str, resample_hz: float | str | None = No
         raise InputError(
             f"resample_hz {resample_hz}: {path} is {time[-1] - time[0]:.6g} s long, less than one interval"
         )
-    grid = np.minimum(time[0] + interval * np.arange(count + 1), time[-1])
-    before = np.minimum(np.searchsorted(time, grid, side="right") - 1, len(intervals) - 1)
-    inside = (grid - time[before])[:, None]
-    slopes = np.diff(rates, axis=0) / intervals[:, None]
-    angles = np.vstack([np.zeros(3), np.cumsum(pieces, axis=0)])[before]
-    angles += inside * (rates[before] + inside / 2 * slopes[before])
-    return Recording(float(time[0]), interval, np.diff(angles, axis=0))
+    return count
 
 
+def _integrals(rows: RecordedRows, factor: float) -> Array:
+    """Return the integrals of rates from each row to the next."""
+    increments = Columns(3)
+    for first, part in parts(rows.values, 1):
+        rates, time = part * factor, np.asarray(rows.time[first : first + len(part)])
+        increments.append((rates[1:] + rates[:-1]) / 2 * np.diff(time)[:, None])
+    release(rows.time)
+    return increments.array()
+
+
+def _resampled(rows: RecordedRows, factor: float, interval: float, count: int) -> Array:
+    """Return the integrals of rates over an even grid of so many intervals."""
+    begin, end, last = float(rows.time[0]), float(rows.time[-1]), len(rows.time) - 1
+    increments, angle, before, done = Columns(3), np.zeros((1, 3)), np.zeros((0, 3)), 0
+    for first, part in parts(rows.values, 1):
+        rates, time = part * factor, np.asarray(rows.time[first : first + len(part)])
+        gaps = np.diff(time)
+        pieces = (rates[1:] + rates[:-1]) / 2 * gaps[:, None]
+        slopes = np.diff(rates, axis=0) / gaps[:, None]
+        angles = np.cumsum(np.vstack([angle, pieces]), axis=0)
+        angle = angles[-1:]
+        while done <= count:
+            grid = np.minimum(begin + interval * np.arange(done, min(done + PART, count + 1)), end)
+            if first + len(gaps) < last:  # the rest lies in the parts to come
+                grid = grid[grid < time[-1]]
+            if not len(grid):
+                break
+            row = np.minimum(np.searchsorted(time, grid, side="right") - 1, len(gaps) - 1)
+            inside = (grid - time[row])[:, None]
+            there = angles[row] + inside * (rates[row] + inside / 2 * slopes[row])
+            increments.append(np.diff(np.vstack([before, there]), axis=0))
+            before, done = there[-1:], done + len(grid)
+    release(rows.time)
+    return increments.array()
+
+
+@np.errstate(all="ignore")  # numbers that overflow are refused, in one line
 def propagate(
     backend: Backend,
     recording: Recording,
@@ -370,11 +361,13 @@ def propagate(
     every = None if orthonormalize is None else _multiple("orthonormalize", orthonormalize, step)
     if record_every > steps:
         raise InputError(f"record {record} s is longer than the recording, {steps * step:.6g} s")
-    used = recording.increments[: backend.previous + steps * backend.increments]
-    samples = windows(used, backend.increments, backend.previous)
-    if pulse is not None:
-        samples = pulses(samples, pulse, backend.previous)
-    states = backend.propagate(samples, record_every, every)
+
+    def read(first: int, stop: int) -> Array:
+        release(recording.increments)  # what was read of a long one before
+        return recording.increments[first:stop]
+
+    parts_of_run = StepWindows(read, backend.increments, backend.previous, pulse)
+    states = backend.propagate_parts(parts_of_run, steps, record_every, every)
     start = recording.start + recording.interval * backend.previous
     time: Array = start + step * record_every * np.arange(len(states), dtype=np.float64)
     require_finite(backend, states, time)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapgen.backends import Backend, evaluator
-from strapgen.backends.increments import pulses
+from strapgen.backends.increments import PART, StepWindows
 from strapgen.simulation.motions import Motion
 from strapgen.support import checks, stages
 from strapgen.support.exceptions import InputError
@@ -117,6 +117,7 @@ def require_finite(backend: Backend, states: Any, time: Array) -> None:
         )
 
 
+@np.errstate(all="ignore")  # numbers that overflow are refused, in one line
 def largest_increment(
     motion: Motion,
     step: float | str | Fraction,
@@ -146,12 +147,23 @@ def largest_increment(
     """
     h = checks.number("step", step, positive=True)
     steps = checks.multiple("duration", checks.number("duration", duration, positive=True), "step", h)
-    increments = motion.increments(h, steps, samples, previous)
-    if pulse is not None:
-        increments = pulses(increments, pulse, previous)
-    return float(np.abs(increments).max())
+    part = _increments(motion, h, samples, previous, pulse)
+    counts = ((first, min(PART, steps - first)) for first in range(0, steps, PART))
+    return max(float(np.abs(part(first, count)).max()) for first, count in counts)
 
 
+def _increments(
+    motion: Motion, step: Fraction, samples: int, previous: int, pulse: float | str | Fraction | None
+) -> StepWindows:
+    """Return the increments of a run, part by part."""
+
+    def read(first: int, stop: int) -> Array:
+        return motion.samples(step / samples, first - previous, stop - previous)
+
+    return StepWindows(read, samples, previous, pulse)
+
+
+@np.errstate(all="ignore")  # numbers that overflow are refused, in one line
 def simulate(
     backend: Backend,
     motion: Motion,
@@ -210,10 +222,8 @@ def simulate(
     if record_every > steps:
         raise InputError(f"record {float(interval):g} s is longer than the duration {float(total):g} s")
     checks.multiple("duration", total, "record interval", interval)
-    increments = motion.increments(h, steps, backend.increments, backend.previous)
-    if pulse is not None:
-        increments = pulses(increments, pulse, backend.previous)
-    states = backend.propagate(increments, record_every, every)
+    increments = _increments(motion, h, backend.increments, backend.previous, pulse)
+    states = backend.propagate_parts(increments, steps, record_every, every)
     time: Array = np.arange(len(states), dtype=np.float64) * float(interval)
     require_finite(backend, states, time)
     true = motion.attitude(time)

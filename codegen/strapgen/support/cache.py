@@ -4,30 +4,49 @@ An entry is filled in a separate folder and then renamed into place. Two process
 at once, and a process that is killed or fails leaves nothing that is ever read. Every entry holds the hashes of its
 files, and a damaged one is created again.
 
+What is in the cache runs. Nothing is taken from it that anybody but the user could have put there: the cache folder and
+all below it must belong to the user and be writable by nobody else, see `ownership`. An entry for which this does not
+hold is created again; where it does not hold for the folder, a temporary one takes its place.
+
 The cache is part of the ground, and not of the library that fills most of it, because the catalogue needs it too: it
 keeps the kernels of users' files here.
 """
 
 from __future__ import annotations
 
-import contextlib
+import atexit
 import hashlib
 import json
 import os
+import secrets
 import shutil
+import stat
 import tempfile
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
+from typing import TypeVar
 
-from strapgen.support import resources
+from strapgen.support import drafts, ownership, resources
 from strapgen.support.exceptions import InputError
-from strapgen.support.timing import from_cache
+from strapgen.support.ownership import ForeignFileError
+from strapgen.support.timing import LOGGER, from_cache
 
 _UNUSED_DAYS = 60
 _MANIFEST = "manifest.json"
+#: Beginning of the name of a folder in which an entry is filled, and of one that is to be removed.
+_DRAFT, _REMOVED = ".filling-", ".removed-"
+#: Beginning of the name of a folder that stands for a cache folder which others can write.
+_TEMPORARY = "strapgen-cache-"
+#: How often work is begun again whose entries others remove.
+_TRIALS = 5
+#: The number of folders that are the user's alone: the cache folder, that of a kind, that of an entry.
+_PRIVATE = 3
+
+Result = TypeVar("Result")
 
 
 def root() -> Path:
@@ -75,24 +94,20 @@ def generator_digest() -> str:
 
 
 def lookup(kind: str, key: str) -> Path | None:
-    """Return the folder of a cache entry; None if there is none, or if it is damaged.
+    """Return the folder of a cache entry; None if there is none, if it is damaged, or if it is not the user's alone.
 
     Parameters
     ----------
     kind, key : str
         As for `entry`.
     """
-    place = root() / kind / key
-    if not _is_whole(place):
-        return None
-    with contextlib.suppress(OSError):
-        os.utime(place)  # in use: not to be pruned
-    return place
+    place = _folder(create=False) / kind / key
+    return place if _is_whole(place) else None
 
 
 def discard(kind: str, key: str) -> None:
     """Remove a cache entry whose content no longer holds."""
-    shutil.rmtree(root() / kind / key, ignore_errors=True)
+    shutil.rmtree(_folder(create=False) / kind / key, ignore_errors=True)
 
 
 def entry(kind: str, key: str, fill: Callable[[Path], None], what: str = "") -> Path:
@@ -122,32 +137,181 @@ def entry(kind: str, key: str, fill: Callable[[Path], None], what: str = "") -> 
         if what:
             from_cache(what)
         return there
-    place = root() / kind / key
+    for _ in range(_TRIALS):  # another process, whose clock may be wrong, can remove it again
+        place = _filled(kind, key, fill)
+        if _is_whole(place):
+            _prune(place.parent)
+            return place
+    raise InputError(f"cache entry {place} cannot be made; remove it")
+
+
+def _filled(kind: str, key: str, fill: Callable[[Path], None]) -> Path:
+    """Fill an entry beside its place, and rename it there."""
+    with ExitStack() as stack:
+        try:
+            place = _folder(create=True) / kind / key
+            _make_way(place)
+            draft = stack.enter_context(drafts.draft_folder(place.parent, _DRAFT))
+        except OSError as error:
+            raise InputError(
+                f"cache folder {root()} cannot be written ({error.strerror}); set STRAPGEN_CACHE_DIR to one that can"
+            ) from None
+        try:
+            fill(draft)
+            (draft / _MANIFEST).write_text(json.dumps(_hashes(draft)))
+            _protect(draft)
+            with suppress(OSError):  # another process was first: its entry is the same
+                draft.rename(place)
+        except OSError as error:
+            raise InputError(f"cache folder {root()} cannot be written ({error.strerror})") from error
+    return place
+
+
+def persistently(work: Callable[[], Result]) -> Result:
+    """Return what some work with entries returns; begin it again if another process removes one meanwhile.
+
+    A clock that was set wrong makes entries look as if nobody had used them for long.
+
+    Parameters
+    ----------
+    work : callable
+        It gets its entries by `entry` or `lookup`.
+    """
+    for _ in range(_TRIALS - 1):
+        with suppress(FileNotFoundError):
+            return work()
+    return work()
+
+
+def read(place: Path, name: str) -> bytes:
+    """Return the content of a file of an entry.
+
+    Parameters
+    ----------
+    place : Path
+        The folder of the entry, from `entry` or `lookup`.
+    name : str
+
+    Raises
+    ------
+    OSError
+        If it cannot be read, or is not the user's alone.
+    """
+    with ownership.private_folder(place, _PRIVATE) as folder:
+        return folder.read(name)
+
+
+@contextmanager
+def loadable(file: Path) -> Iterator[tuple[str, int]]:
+    """Open a file of an entry for what loads it by a path.
+
+    Parameters
+    ----------
+    file : Path
+        Below the folder of the entry.
+
+    Yields
+    ------
+    str
+        A path to the very file that was checked, wherever the system has one.
+    int
+        The descriptor of the file, which the path needs in a process that is started.
+
+    Raises
+    ------
+    OSError
+        If it cannot be read, or is not the user's alone.
+    """
+    with ownership.private_folder(file.parent, _PRIVATE) as folder, folder.opened(file.name) as descriptor:
+        yield ownership.path_of(descriptor, file), descriptor
+
+
+def _folder(create: bool) -> Path:
+    """Return the cache folder without links, or the temporary one in its place."""
+    nominal = root()
+    place = nominal.resolve()
+    if place in _replaced and _replaced[place].is_dir():
+        return _replaced[place]
     try:
-        place.parent.mkdir(parents=True, exist_ok=True)
-        if place.is_dir():
-            if not _is_whole(place):  # looked at again: another process may have been first
-                shutil.rmtree(place, ignore_errors=True)
-        elif place.exists():
-            place.unlink()
-        draft = Path(tempfile.mkdtemp(prefix=".draft-", dir=place.parent))
+        if create:
+            _make_private(place)
+        with ownership.private_folder(place):
+            pass
+    except ForeignFileError as error:
+        _replaced[place] = _temporary(nominal, error.reason)
+        return _replaced[place]
+    except OSError:  # there is none, or it cannot be opened: then neither can its entries
+        if create:
+            raise
+    return place
+
+
+#: Temporary folders by the cache folders that they stand for; a process that is forked uses them too.
+_replaced: dict[Path, Path] = {}
+
+
+def _temporary(nominal: Path, reason: str) -> Path:
+    """Return a folder in place of the cache folder until the process ends, and say so."""
+    parent = Path(tempfile.gettempdir()).resolve()
+    for gone in drafts.forgotten(parent, _TEMPORARY):
+        shutil.rmtree(gone, ignore_errors=True)
+    folder = drafts.draft_folder(parent, _TEMPORARY)
+    try:
+        place = folder.__enter__()
+        with ownership.private_folder(place):
+            pass
     except OSError as error:
         raise InputError(
-            f"cache folder {root()} cannot be written ({error.strerror}); set STRAPGEN_CACHE_DIR to one that can"
+            f"cache folder {nominal} is not used, since {reason}; nor is a temporary one ({error.strerror})"
         ) from None
-    try:
-        fill(draft)
-        (draft / _MANIFEST).write_text(json.dumps(_hashes(draft)))
-        with contextlib.suppress(OSError):  # another process was first: its entry is the same
-            draft.rename(place)
-        if not _is_whole(place):
-            raise InputError(f"cache entry {place} cannot be made; remove it")
-    except OSError as error:
-        raise InputError(f"cache folder {root()} cannot be written ({error.strerror})") from error
-    finally:
-        shutil.rmtree(draft, ignore_errors=True)
-    _prune(place.parent)
+    atexit.register(folder.__exit__, None, None, None)
+    LOGGER.warning(
+        "strapgen: cache folder %s is not used, since %s; what is generated lasts until the program ends",
+        nominal,
+        reason,
+    )
     return place
+
+
+def _make_private(place: Path) -> None:
+    """Make a folder and those above it that are missing, for the user alone."""
+    missing = [folder for folder in (place, *place.parents) if not folder.exists()]
+    for folder in reversed(missing):
+        with suppress(FileExistsError):
+            folder.mkdir(mode=0o700)
+    place.mkdir(exist_ok=True)  # says what is wrong with what stands there
+
+
+def _make_way(place: Path) -> None:
+    """Make the folder of a kind, and remove what stands in the place of an entry and is none."""
+    try:
+        _make_private(place.parent)
+        with ownership.private_folder(place.parent, _PRIVATE - 1):
+            pass
+    except (ForeignFileError, FileExistsError, NotADirectoryError):
+        _remove(place.parent)
+        _make_private(place.parent)
+    if os.path.lexists(place) and not _is_whole(
+        place
+    ):  # looked at again: another process may have been first
+        _remove(place)
+
+
+def _remove(place: Path) -> None:
+    """Remove a folder or a file; what others have in it may stay, under another name."""
+    removed = place.with_name(f"{_REMOVED}{secrets.token_hex(4)}")
+    with suppress(FileNotFoundError):
+        place.rename(removed)
+        if removed.is_dir() and not removed.is_symlink():
+            shutil.rmtree(removed, ignore_errors=True)
+        else:
+            removed.unlink()
+
+
+def _protect(folder: Path) -> None:
+    """Let nobody but the user write the files of an entry, whatever the umask."""
+    for path in folder.iterdir():
+        path.chmod(stat.S_IMODE(path.stat().st_mode) & ~0o022)
 
 
 def _hashes(folder: Path) -> dict[str, str]:
@@ -157,17 +321,37 @@ def _hashes(folder: Path) -> dict[str, str]:
 
 
 def _is_whole(place: Path) -> bool:
+    """Return whether an entry is there, the user's alone and undamaged; one that is others' is told of."""
     try:
-        return bool(json.loads((place / _MANIFEST).read_text()) == _hashes(place))
+        with ownership.private_folder(place, _PRIVATE) as folder:
+            manifest = json.loads(folder.read(_MANIFEST))
+            hashes = {name: digest([folder.read(name)]) for name in folder.names() if name != _MANIFEST}
+            if manifest != hashes:
+                return False
+            with suppress(OSError):
+                folder.touch()  # in use: not to be pruned
+            return True
+    except ForeignFileError as error:
+        _warn(error.reason)
+        return False
     except (OSError, ValueError):
         return False
 
 
+@cache
+def _warn(reason: str) -> None:
+    """Say once that an entry is not used."""
+    LOGGER.warning("strapgen: %s: it is not used, and made again", reason)
+
+
 def _prune(folder: Path) -> None:
-    """Remove entries that have not been used for long, and drafts of processes that were killed."""
+    """Remove entries that have not been used for long, and what processes that are gone have left."""
+    for gone in drafts.forgotten(folder, _DRAFT):
+        shutil.rmtree(gone, ignore_errors=True)
     oldest = time.time() - _UNUSED_DAYS * 86400
     for path in folder.iterdir():
-        with contextlib.suppress(OSError):
-            age_limit = time.time() - 3600 if path.name.startswith(".draft-") else oldest
-            if path.stat().st_mtime < age_limit:
+        with suppress(OSError):
+            if path.name.startswith(_REMOVED) or (
+                not path.name.startswith(_DRAFT) and path.stat().st_mtime < oldest
+            ):
                 shutil.rmtree(path, ignore_errors=True)

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from strapgen.ir.fixed_interface import Argument
-from strapgen.ir.formats import Format
 from strapgen.ir.integer_program import FixedProgram
 from strapgen.ir.program import Program
 from strapgen.ir.signals import Signal
@@ -39,7 +38,7 @@ def of_fixed(fixed: FixedProgram, function: str) -> list[Macro]:
     step = fixed.program.companions
     if step is not None:
         state = interface.inputs[0].format
-        words = ", ".join(word_literal(_nearest(x, state), bits) for x in step.identity)
+        words = ", ".join(word_literal(state.nearest(x), bits) for x in step.identity)
         result.append(Macro(f"{head}_IDENTITY", f"{{{words}}}", "the state of zero rotation"))
     if interface.residuals:
         first = ", ".join(f"UINT{bits}_C({feedback.fresh})" for feedback in interface.residuals)
@@ -99,8 +98,3 @@ def _double(value: Fraction) -> str:
     """Return the shortest literal that reads as the double nearest to a number."""
     text = repr(float(value))
     return text if "." in text or "e" in text else f"{text}.0"
-
-
-def _nearest(value: Fraction, format_: Format) -> int:
-    """Return the integer of a number; the largest there is where the number lies just beyond."""
-    return min(round(value / format_.unit), (1 << (format_.word - 1)) - 1)

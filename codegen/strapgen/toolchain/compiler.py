@@ -42,10 +42,8 @@ _VISIBILITY = "-fvisibility=hidden"
 _flags: tuple[str, ...] = C_FLAGS
 #: Text after the headers. The wrappers of cffi only pass arguments on and are not worth optimizing.
 _UNOPTIMIZED = '#if defined(__GNUC__) && !defined(__clang__)\n#pragma GCC optimize ("O0")\n#endif\n'
-
 #: Kind of cache entry that says in which module of many a source was compiled.
 _SHARED = "shared"
-
 
 _loaded: dict[str, Any] = {}
 _modules: dict[Path, Any] = {}
@@ -129,7 +127,7 @@ def _shared(key: str) -> Path | None:
     place = cache.lookup(_SHARED, key)
     if place is None:
         return None
-    module = json.loads((place / "module.json").read_text())
+    module = json.loads(cache.read(place, "module.json"))
     folder = cache.lookup("builds", module["build"])
     return folder and folder / _library(module["name"])
 
@@ -198,10 +196,12 @@ def chosen_compiler() -> str:
 
 def _compiled(sources: Sources) -> Any:
     key = build_key([sources])
-    file = _shared(key) or _alone(sources, key)
-    if file not in _modules:
-        _modules[file] = _import_file(file)
-    return _modules[file]
+
+    def module() -> Any:
+        file = _shared(key) or _alone(sources, key)
+        return _modules.get(file) or _modules.setdefault(file, _import_file(file))
+
+    return cache.persistently(module)
 
 
 def _alone(sources: Sources, key: str) -> Path:
@@ -211,11 +211,16 @@ def _alone(sources: Sources, key: str) -> Path:
 
 
 def _import_file(file: Path) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(file.name.partition(".")[0], file)
-    if spec is None or spec.loader is None:
-        raise CompilerError(f"{file} cannot be loaded")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    """Import a compiled module of the cache: the very file of which it was checked that it is the user's alone."""
+    name = file.name.partition(".")[0]
+    with cache.loadable(file) as (path, _):
+        loader = importlib.machinery.ExtensionFileLoader(name, path)
+        spec = importlib.util.spec_from_file_location(name, path, loader=loader)
+        if spec is None:
+            raise CompilerError(f"{file} cannot be loaded")
+        module = importlib.util.module_from_spec(spec)
+        loader.exec_module(module)
+    module.__file__ = str(file)  # where a reader finds it
     return module
 
 

@@ -10,59 +10,24 @@ from functools import cache
 from pathlib import Path
 
 from strapgen.support.exceptions import CompilerError
+from strapgen.toolchain import bare_metal
 from strapgen.toolchain.processors import Processor
 
 #: Longest time in s that a call may take in the emulator.
 _PATIENCE = 60
 
-_VECTORS = """
-extern char stack_top[];
-void start(void);
-__attribute__((section(".start"), used)) void *const vectors[2] = {(void *)stack_top, (void *)start};
-"""
-_ENTRY = """
-__asm__(".section .start,\\"ax\\"\\n.globl entry\\nentry: la sp, stack_top\\n call start\\n1: j 1b\\n.text\\n");
-"""
 _MAIN = """
-#include <stddef.h>
-#include <stdint.h>
-{start}
-/* What compilers call even where there is no library. */
-void *memcpy(void *to, const void *from, size_t count)
-{{
-    for (size_t k = 0; k < count; ++k)
-        ((volatile char *)to)[k] = ((const char *)from)[k];
-    return to;
-}}
 {declarations}
-__attribute__((noinline, used)) void stop(void)
-{{
-    *(volatile uint32_t *)(uintptr_t){address}u = {word}u;
-    for (;;) {{
-    }}
-}}
+void refuse(void);
 __attribute__((noinline, used)) void refuse(void)
 {{
     __asm__ volatile("");
 }}
+void start(void);
 __attribute__((noinline, used)) void start(void)
 {{
     {call};
     stop();
-}}
-"""
-_LAYOUT = """
-SECTIONS
-{{
-    . = {code};
-    .start : {{ KEEP(*(.start)) }}
-    .text : {{ *(.text*) *(.rodata*) *(.srodata*) }}
-    .ARM.exidx : {{ *(.ARM*) }}
-    . = {data};
-    .data : {{ *(.data*) *(.sdata*) *(.bss*) *(.sbss*) *(COMMON) }}
-    . = ALIGN(16);
-    . += 0x1800;
-    stack_top = .;
 }}
 """
 
@@ -99,16 +64,9 @@ def executed(
     if not processor.emulator or shutil.which(processor.emulator[0]) is None:
         return None
     folder = binary.parent
-    address, word = processor.stop
-    start = _VECTORS if processor.start == "vectors" else _ENTRY
-    main = _MAIN.format(start=start, declarations=declarations, call=call, address=address, word=word)
-    (folder / "main.c").write_text(main)
-    (folder / "layout.ld").write_text(_LAYOUT.format(code=processor.code, data=processor.data))
-    command = [processor.compiler, *processor.flags, *flags, "-nostartfiles", "-nostdlib", "-T", "layout.ld"]
-    command += ["-Wl,--no-warn-rwx-segments", "main.c", binary.name, "-lgcc", "-o", "program.elf"]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-    if done.returncode:
-        raise CompilerError(f"{processor.compiler} cannot link {binary.name}: {_first_error(done.stderr)}")
+    bare_metal.write_start(processor, folder, _MAIN.format(declarations=declarations, call=call), "main.c")
+    command = [processor.compiler, *processor.flags, *flags, *bare_metal.LINKING]
+    bare_metal.compiled([*command, "main.c", binary.name, "-lgcc", "-o", "program.elf"], folder)
     log = folder / "trace.log"
     one_by_one = ["-singlestep"] if _major_version(processor.emulator[0]) < 8 else ["-one-insn-per-tb"]
     command = [*processor.emulator, "-display", "none", "-serial", "none", "-monitor", "none", "-no-reboot"]
@@ -155,9 +113,3 @@ def _major_version(program: str) -> int:
     said = subprocess.run([program, "--version"], capture_output=True, text=True, check=True).stdout
     match = re.search(r"version (\d+)", said)
     return int(match[1]) if match else 0
-
-
-def _first_error(said: str) -> str:
-    return next(
-        (line for line in said.splitlines() if "error" in line or "undefined" in line), said.strip()[:200]
-    )

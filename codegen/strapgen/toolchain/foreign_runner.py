@@ -7,6 +7,7 @@ cannot be loaded, ``unloaded`` says why.
 
 from __future__ import annotations
 
+import importlib.machinery
 import importlib.util
 import sys
 from pathlib import Path
@@ -14,13 +15,13 @@ from pathlib import Path
 
 def main(module_path: str, folder_name: str, calls: int) -> None:
     """Call the function and write its results."""
-    spec = importlib.util.spec_from_file_location("strapgen_foreign", module_path)
+    loader = importlib.machinery.ExtensionFileLoader("strapgen_foreign", module_path)
+    spec = importlib.util.spec_from_file_location("strapgen_foreign", module_path, loader=loader)
     assert spec is not None
-    assert spec.loader is not None
     folder = Path(folder_name)
     try:
         module = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)
+        loader.exec_module(module)
     except ImportError as error:  # a function that the file calls is defined nowhere
         (folder / "unloaded").write_text(str(error))
         return

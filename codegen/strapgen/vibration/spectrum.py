@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
-from itertools import pairwise
+from itertools import chain, islice, pairwise
 from numbers import Real
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen.support import checks
+from strapgen.support import checks, delimited
 from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.support.suggestions import counted, needed
 from strapgen.vibration.mean_rates import Assessment, Rates
@@ -27,6 +26,9 @@ Array = NDArray[Any]
 
 #: Outputs of the transfer functions, with the unit of each for an input of unit 1.
 TRANSFERS = {"angle_x": "rad", "angle_y": "rad", "acceleration_x": "m_s2", "acceleration_y": "m_s2"}
+
+#: Most rows of a file.
+_MOST_ROWS = 100_000
 
 
 @dataclass(frozen=True)
@@ -310,15 +312,10 @@ def _columns(path: Path) -> dict[str, Array]:
     allowed = ["frequency_hz", "density"]
     for name, unit in TRANSFERS.items():
         allowed += [f"{name}_{unit}", f"{name}_phase_rad"]
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            rows = [
-                (number, row) for number, row in enumerate(csv.reader(file), 1) if any(map(str.strip, row))
-            ]
-    except OSError as error:
-        raise InputError(f"{path} cannot be read ({error.strerror})") from None
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"{path} is no text file of comma-separated values ({error})") from None
+    read = delimited.rows(path, chain.from_iterable(delimited.blocks(path)))
+    rows = [*islice(((line, row) for line, row in read if any(map(str.strip, row))), _MOST_ROWS + 1)]
+    if len(rows) > _MOST_ROWS:
+        raise InputError(f"{path} has over {_MOST_ROWS} rows; that is too many for a spectrum")
     if len(rows) < 3:
         raise InputError(
             f"{path} holds {counted(max(0, len(rows) - 1), 'row')} below its header; at least 2 are needed"

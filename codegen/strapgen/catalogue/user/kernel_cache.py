@@ -70,9 +70,9 @@ def _stored(key: str, folder: Path | None) -> Kernel | None:
     if place is None:
         return None
     try:
-        record = Record(**json.loads((place / _RECORD).read_text()))
+        record = Record(**json.loads(cache.read(place, _RECORD)))
         if record.holds(folder):
-            stored: Kernel = pickle.loads((place / _KERNEL).read_bytes())
+            stored: Kernel = pickle.loads(cache.read(place, _KERNEL))
             return stored
     except Exception:  # of another Python, or removed meanwhile: derived again
         return None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -74,7 +73,7 @@ def evidence(
     processors and a driver for a fuzzer. The tools that are installed say whether any sum can overflow, whether the
     error bounds hold, and whether other processors return the same bits. The exit status is 1 if a claim fails.
 
-    Example: strapgen evidence euler --method rk4 --out evidence
+    Example: strapgen evidence euler --method rk4 --out out/evidence
     """
     from strapgen.evidence import collection
     from strapgen.reports.evidence import evidence_page, evidence_report
@@ -119,8 +118,10 @@ def _subjects(
 @contextlib.contextmanager
 def _folder(out: Path | None) -> Iterator[Path]:
     if out is None:
-        with tempfile.TemporaryDirectory(prefix="strapgen-") as name:
-            yield Path(name)
+        from strapgen.support.drafts import temporary_folder
+
+        with temporary_folder() as folder:
+            yield folder
         return
     yield out
 

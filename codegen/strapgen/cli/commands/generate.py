@@ -226,7 +226,9 @@ def _generate_all(output: SourceOptions, format: str) -> None:
         elif difference:
             typer.echo(difference, nl=False)
         if difference:
-            refuse_out_of_step(out, "strapgen generate --all rebuilds it")
+            left = standard_tree.strangers(out, files)
+            remove = f"; {left[0]} is no part of it, and yours to remove" if left else ""
+            refuse_out_of_step(out, f"strapgen generate --all rebuilds it{remove}")
         if format == "text":
             typer.echo(f"{out}: {len(files)} files, in step")
         return

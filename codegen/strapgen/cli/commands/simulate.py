@@ -129,6 +129,20 @@ def simulate(
             _on_motion(build, choice, source, intervals, output, matrices)
 
 
+#: Most records that are written: the text of one takes some hundred bytes.
+_MOST_RECORDS = 2_000_000
+
+
+def _refuse_many(steps: float, step: float, record: _Text) -> None:
+    """Refuse a run of more records than can be written, before it begins."""
+    interval = 0.0 if record is None else float(checks.number("record", record, positive=True))
+    records = steps / max(1.0, interval / step)
+    if _MOST_RECORDS < records <= checks.MOST:  # more steps than that are refused as such
+        raise InputError(
+            f"{records:.0f} records are too many, up to {_MOST_RECORDS} are written; --record S thins them"
+        )
+
+
 _Build = Callable[[float, Callable[[], float]], "Backend"]
 
 
@@ -148,6 +162,7 @@ def _on_motion(
     matrices: bool,
 ) -> None:
     """Simulate, and deliver the run."""
+    from strapgen.cli.progress import waiting
     from strapgen.reports import plots
     from strapgen.reports.runs import run_report
     from strapgen.simulation import runs
@@ -156,12 +171,17 @@ def _on_motion(
     profile = source.profile()
     step, duration = source.step or "", source.duration or ""
     samples, previous = choice.increments_per_step, choice.previous
+    length = float(checks.number("step", step, positive=True))
+    _refuse_many(float(checks.number("duration", duration, positive=True)) / length, length, intervals.record)
     backend = build(
-        float(checks.number("step", step, positive=True)),
+        length,
         lambda: runs.largest_increment(profile, step, duration, samples, pulse, previous),
     )
     pulse = pulse or backend.count
-    run = runs.simulate(backend, profile, step, duration, intervals.orthonormalize, intervals.record, pulse)
+    with waiting(f"running {backend.kernel}"):
+        run = runs.simulate(
+            backend, profile, step, duration, intervals.orthonormalize, intervals.record, pulse
+        )
     facts = _facts(backend, choice) | {
         "motion": profile.name,
         "step_s": float(checks.number("step", step)),
@@ -178,15 +198,19 @@ def _on_recording(
     build: _Build, choice: Choice, source: SampleSource, intervals: Intervals, output: Output
 ) -> None:
     """Propagate recorded data, and deliver the attitude."""
+    from strapgen.cli.progress import waiting
     from strapgen.reports import plots
     from strapgen.reports.runs import history_report
     from strapgen.simulation import recording
 
     pulse = source.pulse
     data = source.recording()
-    backend = build(data.interval * choice.increments_per_step, lambda: data.largest + (pulse or 0.0))
+    length = data.interval * choice.increments_per_step
+    _refuse_many(len(data.increments) / choice.increments_per_step, length, intervals.record)
+    backend = build(length, lambda: data.largest + (pulse or 0.0))
     pulse = pulse or backend.count
-    history = recording.propagate(backend, data, intervals.orthonormalize, intervals.record, pulse)
+    with waiting(f"running {backend.kernel}"):
+        history = recording.propagate(backend, data, intervals.orthonormalize, intervals.record, pulse)
     title = f"{backend.kernel}, {backend.name}: attitude along {source.file.name}"
     facts = _facts(backend, choice) | {"source": str(source.file)}
     replace(output, format=output.format or "csv").report(

@@ -230,7 +230,8 @@ class StatementPrinter:
         if abs(term.factor) != 1:
             factors.append(self.constant(abs(term.factor)) + _exactly(term))
         if len(factors) == 2:
-            text = self._call("mul", *factors)
+            first, second = factors
+            text = self._call("sqr", first) if first == second else self._call("mul", first, second)
         else:
             (text,) = factors
             text = text if text in self.wide_names else f"({wide}){text}"

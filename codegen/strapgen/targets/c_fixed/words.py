@@ -21,8 +21,6 @@ class Word:
     wide, magnitude : str
         Types of a product, and of the magnitude of a product. C has none for words of 64 bits: a file defines them
         under names of its own.
-    check : str
-        Type in which the ranges of inputs are checked.
     """
 
     bits: int
@@ -31,7 +29,6 @@ class Word:
     fast: str
     wide: str
     magnitude: str
-    check: str
 
     def within(self, name: str) -> Word:
         """Return the types as the file of a function calls them."""
@@ -39,9 +36,9 @@ class Word:
 
 
 WORDS = {
-    16: Word(16, "int16_t", "uint16_t", "int", "int32_t", "uint32_t", "unsigned int"),
-    32: Word(32, "int32_t", "uint32_t", "int32_t", "int64_t", "uint64_t", "uint32_t"),
-    64: Word(64, "int64_t", "uint64_t", "int64_t", "{}_wide_", "{}_magnitude_", "uint64_t"),
+    16: Word(16, "int16_t", "uint16_t", "int", "int32_t", "uint32_t"),
+    32: Word(32, "int32_t", "uint32_t", "int32_t", "int64_t", "uint64_t"),
+    64: Word(64, "int64_t", "uint64_t", "int64_t", "{}_wide_", "{}_magnitude_"),
 }
 
 

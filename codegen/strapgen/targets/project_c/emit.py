@@ -106,7 +106,9 @@ def _values(sources: Sources, command: str, run: MotionRun, identity: Sequence[F
     numbers = numbers_of(sources)
     kernels = ["coning_increments", "coning_truth", *([run.conversion] if run.conversion else [])]
     feedback = () if sources.fixed is None else sources.fixed.residuals
-    unit = 1 if sources.fixed is None else sources.fixed.inputs[0].format.unit
+    start: Sequence[Any] = identity
+    if sources.fixed is not None:
+        start = [sources.fixed.inputs[0].format.nearest(element) for element in identity]
     return {
         "name": sources.function.name,
         "command": command,
@@ -116,7 +118,7 @@ def _values(sources: Sources, command: str, run: MotionRun, identity: Sequence[F
         "steps": run.steps,
         "conversion": run.conversion,
         "state": sources.function.inputs[0],
-        "identity": [numbers.literal(round(x / unit) if numbers.word else x) for x in identity],
+        "identity": [numbers.literal(element) for element in start],
         "type": numbers.type,
         "types": types_of(sources),
         "word": numbers.word,

@@ -1,0 +1,57 @@
+"""The integers that the inputs of a kernel have along a motion that cones."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from strapgen.backends import evaluator
+from strapgen.ir.fixed_interface import Argument, Interface
+from strapgen.simulation.motions import GENERAL, Motion, motion
+
+#: Time between two rows in s.
+_STEP = Fraction(1, 8)
+#: Part of its range that an input fills which has not the constraint of an attitude.
+_PART = 0.9
+
+
+def motion_rows(interface: Interface, count: int, part: float = _PART) -> tuple[tuple[int, ...], ...]:
+    """Return the elements of all inputs along a motion whose axis and angle change.
+
+    Parameters
+    ----------
+    interface : Interface
+        Of the kernel.
+    count : int
+        Number of rows.
+    part : float, optional
+        Part of its range that an input without the constraint of an attitude fills.
+
+    Returns
+    -------
+    tuple of tuple of int
+        Attitudes are those of the motion, rounded to their formats; every other input is an integral of its rate, or
+        two of them or more, scaled to fill a part of the range.
+    """
+    coning = motion("coning", **GENERAL)
+    columns = [_column(argument, coning, count, part) for argument in interface.inputs]
+    return tuple(
+        tuple(int(value) for column in columns for value in column[number]) for number in range(count)
+    )
+
+
+def _column(argument: Argument, coning: Motion, count: int, part: float) -> Any:
+    """Return the integers of an input, (count, elements)."""
+    signal = argument.signal
+    if signal.constraint:
+        values = coning.attitude(np.arange(count) * float(_STEP))
+        if signal.constraint == "unit":
+            (values,) = (np.asarray(evaluator("euler-from-dcm")(values)),)
+        scaled = values.reshape(count, signal.size) / float(argument.unit)
+    else:
+        samples = -(-signal.size // 3)
+        values = coning.increments(_STEP, count, samples).reshape(count, 3 * samples)[:, : signal.size]
+        scaled = values * (part * argument.high / float(np.abs(values).max()))
+    return np.clip(np.rint(scaled), float(argument.low), float(argument.high)).astype(object)

@@ -1,0 +1,256 @@
+"""Expressions of C as intervals and formulas; whatever could go wrong in them becomes an obligation that is proved."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import z3
+from pycparser import c_ast
+
+from strapgen.evidence.overflow.c_types import IntegerType, Model
+from strapgen.evidence.overflow.unknowns import Fact, Number, Prover, Variable
+
+
+@dataclass(frozen=True)
+class Obligation:
+    """What must hold for the C to do what it says, and does not follow.
+
+    Parameters
+    ----------
+    place : str
+        The function, and the value or the statement in it.
+    text : str
+    """
+
+    place: str
+    text: str
+
+
+class ExpressionFormulas:
+    """Evaluates the expressions of one function.
+
+    Parameters
+    ----------
+    model : Model
+    prover : Prover
+    calls : callable
+        ``calls(name, arguments)`` returns the result of a function of the file.
+    obligations : list of Obligation
+        What cannot be proved is added.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        prover: Prover,
+        calls: Callable[[str, list[Number]], Number],
+        obligations: list[Obligation],
+    ) -> None:
+        self.model, self.prover, self._calls, self._obligations = model, prover, calls, obligations
+        self.place = ""
+        self._fresh = 0
+
+    def variable(self, low: int, high: int, name: str = "t") -> Variable:
+        """Return a new unknown."""
+        self._fresh += 1
+        return Variable(f"{name}!{self._fresh}", low, high, tuple(self.prover.path))
+
+    def _note(self, text: str) -> None:
+        self._obligations.append(Obligation(self.place, text))
+
+    def value(self, node: Any, known: Mapping[str, Number]) -> Number:
+        """Return the value of an expression of integers."""
+        match node:
+            case c_ast.Constant():
+                return Number.constant(*self.model.literal(node.value))
+            case c_ast.ID():
+                return known[node.name].narrowed()
+            case c_ast.ArrayRef():
+                return known[f"{node.name.name}[{node.subscript.value}]"].narrowed()
+            case c_ast.Cast():
+                kind = self.model.named(tuple(node.to_type.type.type.names))
+                return self.converted(self.value(node.expr, known), kind)
+            case c_ast.UnaryOp(op="-"):
+                number = self._promoted(self.value(node.expr, known))
+                return self._fitted(number.kind, -number.high, -number.low, -number.real, number.variables)
+            case c_ast.UnaryOp(op="~"):
+                number = self._promoted(self.value(node.expr, known))
+                assert number.kind.signed
+                return self._fitted(
+                    number.kind, ~number.high, ~number.low, -number.real - 1, number.variables
+                )
+            case c_ast.BinaryOp():
+                left, right = self.value(node.left, known), self.value(node.right, known)
+                return self._binary(node.op, left, right)
+            case c_ast.TernaryOp():
+                return self._chosen(node, known)
+            case c_ast.FuncCall():
+                arguments = [self.value(argument, known) for argument in node.args.exprs]
+                return self._calls(node.name.name, arguments)
+        raise NotImplementedError(f"{type(node).__name__} in {self.place}")
+
+    def _promoted(self, number: Number) -> Number:
+        return number.as_type(self.model.promoted(number.kind))
+
+    def converted(self, number: Number, kind: IntegerType) -> Number:
+        """Return a number as another type has it: the same one, which must fit; without a sign, what remains of it."""
+        if kind.signed or number.low >= 0:
+            if kind.low <= number.low and number.high <= kind.high:
+                return number.as_type(kind)
+            if kind.signed:
+                return self._fitted(kind, number.low, number.high, number.real, number.variables)
+        return Number.of(self.variable(kind.low, kind.high, "low_bits"), kind)
+
+    def _fitted(
+        self, kind: IntegerType, low: int, high: int, real: Any, variables: frozenset[Variable]
+    ) -> Number:
+        """Return a result, which a type with a sign must hold; one without keeps the low bits."""
+        if kind.low <= low and high <= kind.high:
+            return Number(kind, low, high, real, variables)
+        if not kind.signed:
+            return Number.of(self.variable(kind.low, kind.high, "low_bits"), kind)
+        number = Number(kind, low, high, real, variables)
+        if not self.prover.within(number, kind.low, kind.high):
+            self._note(f"a result between {low} and {high} must fit into {kind.bits} bits")
+        return Number(kind, max(low, kind.low), min(high, kind.high), real, variables)
+
+    def _binary(self, operator: str, left: Number, right: Number) -> Number:
+        if operator in ("<<", ">>"):
+            return self._shifted(operator, self._promoted(left), right)
+        kind = self.model.common(left.kind, right.kind)
+        left, right = self.converted(left, kind), self.converted(right, kind)
+        variables = left.variables | right.variables
+        if operator == "+":
+            return self._fitted(
+                kind, left.low + right.low, left.high + right.high, left.real + right.real, variables
+            )
+        if operator == "-":
+            return self._fitted(
+                kind, left.low - right.high, left.high - right.low, left.real - right.real, variables
+            )
+        if operator == "*":
+            ends = [a * b for a, b in product((left.low, left.high), (right.low, right.high))]
+            low = 0 if left.real is right.real and min(ends) < 0 else min(ends)
+            return self._fitted(kind, low, max(ends), left.real * right.real, variables)
+        if operator == "/":
+            return self._quotient(kind, left, right)
+        raise NotImplementedError(f"{operator} in {self.place}")
+
+    def _shifted(self, operator: str, left: Number, right: Number) -> Number:
+        assert right.exact and 0 <= right.low < left.kind.bits, "the places of a shift are constant"
+        factor = 1 << right.low
+        self._at_least(left, 0, "what is shifted must not be negative")
+        if operator == "<<":
+            return self._fitted(
+                left.kind, left.low * factor, left.high * factor, left.real * factor, left.variables
+            )
+        return self.floored(left, right.low)
+
+    def _at_least(self, number: Number, least: int, text: str) -> None:
+        if not self.prover.within(number, least, number.high):
+            self._note(text)
+
+    def floored(self, number: Number, places: int) -> Number:
+        """Return a number over a power of two, rounded down."""
+        if not places:
+            return number
+        if number.exact:
+            return Number.constant(number.low >> places, number.kind)
+        unit = 1 << places
+        result = self.variable(number.low >> places, number.high >> places)
+        rest = number.real - unit * result.real
+        result.facts.append(Fact(z3.And(rest >= 0, rest <= unit - 1), number.variables | {result}))
+        return Number.of(result, number.kind)
+
+    def _quotient(self, kind: IntegerType, left: Number, right: Number) -> Number:
+        """Return a quotient of numbers that must not be negative."""
+        self._at_least(left, 0, "what is divided must not be negative")
+        self._at_least(right, 1, "what divides must be positive")
+        low, high = max(left.low, 0) // max(right.high, 1), left.high // max(right.low, 1)
+        result = self.variable(low, high, "quotient")
+        rest = left.real - right.real * result.real
+        result.facts.append(
+            Fact(z3.And(rest >= 0, rest <= right.real - 1), left.variables | right.variables | {result})
+        )
+        return Number.of(result, kind)
+
+    def rooted(self, square: Number, kind: IntegerType, nearest: bool) -> Number:
+        """Return the square root of a number, which must not be negative."""
+        self._at_least(square, 0, "what a root is taken of must not be negative")
+        low, high = math.isqrt(max(square.low, 0)), math.isqrt(max(square.high, 0)) + nearest
+        result = self.variable(low, high, "root")
+        real = result.real
+        bounds = (
+            (real * real - real, real * real + real) if nearest else (real * real, real * real + 2 * real)
+        )
+        result.facts.append(
+            Fact(z3.And(bounds[0] <= square.real, square.real <= bounds[1]), square.variables | {result})
+        )
+        return self.converted(Number.of(result, IntegerType(64)), kind)
+
+    def _chosen(self, node: c_ast.TernaryOp, known: Mapping[str, Number]) -> Number:
+        condition = self.condition(node.cond, known)
+        if isinstance(condition, bool):
+            return self.value(node.iftrue if condition else node.iffalse, known)
+        first = self.under(condition, lambda: self.value(node.iftrue, known))
+        second = self.under(condition.negated(), lambda: self.value(node.iffalse, known))
+        return self.merged(condition, first, second)
+
+    def under(self, condition: Fact, evaluate: Callable[[], Any]) -> Any:
+        """Return what is evaluated on a path on which a condition holds."""
+        self.prover.path.append(condition)
+        try:
+            return evaluate()
+        finally:
+            self.prover.path.pop()
+
+    def merged(self, condition: Fact, first: Number, second: Number) -> Number:
+        """Return the first number where a condition holds, the second elsewhere."""
+        kind = first.kind if first.kind == second.kind else self.model.common(first.kind, second.kind)
+        result = self.variable(min(first.low, second.low), max(first.high, second.high), "chosen")
+        formula = z3.Or(
+            z3.And(condition.formula, result.real == first.real),
+            z3.And(z3.Not(condition.formula), result.real == second.real),
+        )
+        variables = condition.variables | first.variables | second.variables | {result}
+        result.facts.append(Fact(formula, variables))
+        return Number.of(result, kind)
+
+    def condition(self, node: Any, known: Mapping[str, Number]) -> Fact | bool:
+        """Return a condition as a formula, or whether it holds where the intervals say so."""
+        match node:
+            case c_ast.BinaryOp(op="||"):
+                first, second = self.condition(node.left, known), self.condition(node.right, known)
+                if isinstance(first, bool):
+                    return first or second
+                if isinstance(second, bool):
+                    return second or first
+                return Fact(z3.Or(first.formula, second.formula), first.variables | second.variables)
+            case c_ast.BinaryOp(op="!=") if isinstance(node.left, c_ast.BinaryOp):
+                first, second = self.condition(node.left, known), self.condition(node.right, known)
+                if isinstance(first, bool) or isinstance(second, bool):
+                    certain, other = (first, second) if isinstance(first, bool) else (second, first)
+                    if isinstance(other, bool):
+                        return certain != other
+                    return other.negated() if certain else other
+                return Fact(first.formula != second.formula, first.variables | second.variables)
+            case c_ast.BinaryOp():
+                return self._comparison(node.op, self.value(node.left, known), self.value(node.right, known))
+        raise NotImplementedError(f"the condition in {self.place}")
+
+    def _comparison(self, operator: str, left: Number, right: Number) -> Fact | bool:
+        kind = self.model.common(left.kind, right.kind)
+        left, right = self.converted(left, kind), self.converted(right, kind)
+        formulas, certain, impossible = {
+            "<": (left.real < right.real, left.high < right.low, left.low >= right.high),
+            ">": (left.real > right.real, left.low > right.high, left.high <= right.low),
+            ">=": (left.real >= right.real, left.low >= right.high, left.high < right.low),
+            "<=": (left.real <= right.real, left.high <= right.low, left.low > right.high),
+        }[operator]
+        if certain or impossible:
+            return bool(certain)
+        return Fact(formulas, left.variables | right.variables)

@@ -1,0 +1,239 @@
+"""Walks through the C of a kernel and lists what could overflow or leave its range and cannot be proved."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from pycparser import c_ast
+
+from strapgen.evidence.overflow.c_types import IntegerType, Model
+from strapgen.evidence.overflow.expressions import ExpressionFormulas, Obligation
+from strapgen.evidence.overflow.unknowns import Fact, Number, Prover, Variable
+
+
+class KernelStatements:
+    """The C function of a kernel, statement by statement.
+
+    Parameters
+    ----------
+    functions : mapping of str to c_ast.FuncDef
+    name : str
+        Of the function.
+    model : Model
+    ranges : mapping of str to (int, int)
+        Ranges that the generator states, by value and by element of an output. They are proved, or not used.
+    nearest : bool
+        Whether roots are rounded to the nearest.
+    effort : int
+        See `Prover`.
+
+    Attributes
+    ----------
+    places : set of int
+        By how many places ``_fit`` and ``_shr`` shift.
+    """
+
+    def __init__(
+        self,
+        functions: Mapping[str, c_ast.FuncDef],
+        name: str,
+        model: Model,
+        ranges: Mapping[str, tuple[int, int]],
+        nearest: bool,
+        effort: int,
+    ) -> None:
+        self._functions, self._name, self._model, self._ranges = functions, name, model, ranges
+        self._nearest = nearest
+        self._prover = Prover(effort)
+        self._open: list[Obligation] = []
+        self._expressions = ExpressionFormulas(model, self._prover, self._call, self._open)
+        self.places: set[int] = set()
+
+    def obligations(self) -> list[Obligation]:
+        """Return what cannot be proved; nothing if the kernel is safe."""
+        function = self._functions[self._name]
+        known = {}
+        for parameter in function.decl.type.args.params:
+            kind = self._kind(parameter.type.type)
+            for k in range(int(parameter.type.dim.value)):
+                place = f"{parameter.name}[{k}]"
+                known[place] = Number.of(Variable(place, kind.low, kind.high), kind)
+        self._block(function.body.block_items, known)
+        return self._open
+
+    def _kind(self, node: Any) -> IntegerType:
+        return self._model.named(tuple(node.type.names))
+
+    def _block(self, statements: list[Any], known: dict[str, Number]) -> None:
+        """Go through statements; what they declare and assign is put among the known."""
+        for statement in statements:
+            self._expressions.place = f"{self._name}: {_subject(statement)}"
+            match statement:
+                case c_ast.Decl():
+                    if statement.init is not None:
+                        kind = self._kind(statement.type)
+                        number = self._expressions.value(statement.init, known)
+                        self._assign(statement.name, self._expressions.converted(number, kind), known)
+                    else:
+                        known[statement.name] = Number.constant(0, self._kind(statement.type))
+                case c_ast.Assignment(op="="):
+                    self._assigned(statement, known)
+                case c_ast.If():
+                    self._if(statement, known)
+                case c_ast.Return():
+                    return
+                case _:
+                    raise NotImplementedError(f"{type(statement).__name__} in {self._name}")
+
+    def _assigned(self, statement: c_ast.Assignment, known: dict[str, Number]) -> None:
+        target = statement.lvalue
+        name = target.name
+        if isinstance(target, c_ast.ArrayRef):
+            name = f"{target.name.name}[{target.subscript.value}]"
+        number = self._expressions.value(statement.rvalue, known)
+        self._assign(name, self._expressions.converted(number, known[name].kind), known)
+        if isinstance(target, c_ast.ArrayRef) and name in self._ranges:
+            low, high = self._ranges[name]
+            if not (low <= known[name].low and known[name].high <= high):
+                self._open.append(Obligation(f"{self._name}: {name}", f"it must lie in {low} .. {high}"))
+
+    def _assign(self, name: str, number: Number, known: dict[str, Number]) -> None:
+        """Store a value, in the stated range if that is proved."""
+        known[name] = number
+        low, high = self._ranges.get(name, (number.low, number.high))
+        if low <= number.low and number.high <= high:
+            return
+        if not self._prover.within(number, low, high):
+            return
+        low, high = max(low, number.low), min(high, number.high)
+        if self._prover.path:
+            known[name] = Number(number.kind, low, high, number.real, number.variables)
+            return
+        result = self._expressions.variable(low, high, name)
+        result.facts.append(Fact(result.real == number.real, number.variables | {result}))
+        known[name] = Number.of(result, number.kind)
+
+    def _if(self, statement: c_ast.If, known: dict[str, Number]) -> None:
+        if statement.iffalse is None and isinstance(_items(statement.iftrue)[-1], c_ast.Return):
+            self._refused(statement.cond, known)
+            return
+        condition = self._expressions.condition(statement.cond, known)
+        branches = _items(statement.iftrue), _items(statement.iffalse)
+        if isinstance(condition, bool):
+            self._block(branches[0 if condition else 1], known)
+            return
+        after = []
+        for fact, items in zip((condition, condition.negated()), branches, strict=True):
+            learned = self._learned(statement.cond, fact is condition, known)
+            inside = known | learned
+            self._expressions.under(fact, lambda: self._block(items, inside))  # noqa: B023
+            untouched = {name for name, number in learned.items() if inside[name] is number}
+            after.append({name: known[name] if name in untouched else inside[name] for name in known})
+        first, second = after
+        for name in known:
+            if first[name] is not second[name]:
+                merged = self._expressions.merged(condition, first[name], second[name])
+                self._assign(name, merged, known)
+
+    def _learned(self, condition: Any, true: bool, known: Mapping[str, Number]) -> dict[str, Number]:
+        """Return the values in a comparison with the intervals that its outcome leaves to them."""
+        if not isinstance(condition, c_ast.BinaryOp) or condition.op not in (">", ">="):
+            return {}
+        left, right = (self._expressions.value(node, known) for node in (condition.left, condition.right))
+        more = int((condition.op == ">") == true)
+        sides = [(condition.left, left, right), (condition.right, right, left)]
+        (name, larger, least), (other, smaller, most) = sides if true else sides[::-1]
+        learned = {}
+        if (place := _named(name)) is not None:
+            learned[place] = known[place].between(least.low + more, larger.high)
+        if (place := _named(other)) is not None:
+            learned[place] = known[place].between(smaller.low, most.high - more)
+        return learned
+
+    def _refused(self, condition: Any, known: dict[str, Number]) -> None:
+        """Go on where a check has let the values pass."""
+        if isinstance(condition, c_ast.BinaryOp) and condition.op == "||":
+            self._refused(condition.left, known)
+            self._refused(condition.right, known)
+            return
+        if isinstance(condition, c_ast.FuncCall):
+            body = self._functions[condition.name.name]
+            arguments = [self._expressions.value(node, known) for node in condition.args.exprs]
+            inside = self._bound(body, arguments)
+            (statement,) = body.body.block_items
+            self._refused(statement.expr, inside)
+            return
+        fact = self._expressions.condition(condition, known)
+        assert not isinstance(fact, bool) or not fact, "a check that always refuses"
+        if isinstance(fact, bool):
+            return
+        assert not self._prover.path, "a check inside a branch"
+        passes = fact.negated()
+        for variable in fact.variables:
+            variable.facts.append(passes)
+        self._narrow(condition, known)
+
+    def _narrow(self, condition: c_ast.BinaryOp, known: dict[str, Number]) -> None:
+        """Narrow the interval of a value that passes a comparison with a constant."""
+        left = self._expressions.value(condition.left, known)
+        right = self._expressions.value(condition.right, known)
+        assert right.exact and condition.op in "<>", "a check compares with constants"
+        low, high = (right.low, left.high) if condition.op == "<" else (left.low, right.low)
+        low, high = max(low, left.low), min(high, left.high)
+        if len(left.variables) == 1:
+            (variable,) = left.variables
+            if variable.real is left.real:
+                variable.low, variable.high = low, high
+        if isinstance(condition.left, c_ast.ID):
+            known[condition.left.name] = left.between(low, high)
+
+    def _bound(self, function: c_ast.FuncDef, arguments: list[Number]) -> dict[str, Number]:
+        """Return the parameters of a function of the file with their values in a call."""
+        return {
+            parameter.name: self._expressions.converted(argument, self._kind(parameter.type))
+            for parameter, argument in zip(function.decl.type.args.params, arguments, strict=True)
+        }
+
+    def _call(self, name: str, arguments: list[Number]) -> Number:
+        """Return what a function of the file returns: by what is proved of it, or by its own statements."""
+        function = self._functions[name]
+        inside = self._bound(function, arguments)
+        kind = self._kind(function.decl.type.type)
+        part = name.removeprefix(f"{self._name}_")
+        if part in ("fit", "shr"):
+            places = inside["n"].low
+            self.places.add(places)
+            return self._expressions.converted(self._expressions.floored(inside["x"], places), kind)
+        if part == "rt":
+            return self._expressions.rooted(inside["square"], kind, self._nearest)
+        *statements, last = function.body.block_items
+        place = self._expressions.place
+        self._block(statements, inside)
+        self._expressions.place = place
+        return self._expressions.converted(self._expressions.value(last.expr, inside), kind)
+
+
+def _items(node: Any) -> list[Any]:
+    if node is None:
+        return []
+    return node.block_items or [] if isinstance(node, c_ast.Compound) else [node]
+
+
+def _named(node: Any) -> str | None:
+    """Return the name of a value, if an expression is one, whatever type it is converted to."""
+    while isinstance(node, c_ast.Cast):
+        node = node.expr
+    return str(node.name) if isinstance(node, c_ast.ID) else None
+
+
+def _subject(statement: Any) -> str:
+    """Return what a statement is about, for a message."""
+    match statement:
+        case c_ast.Decl():
+            return str(statement.name)
+        case c_ast.Assignment(lvalue=c_ast.ArrayRef() as target):
+            return f"{target.name.name}[{target.subscript.value}]"
+        case c_ast.Assignment():
+            return str(statement.lvalue.name)
+    return type(statement).__name__.lower()

@@ -1,0 +1,231 @@
+"""Runs generated C on processors, and compares every integer that it returns with the model in Python integers."""
+
+from __future__ import annotations
+
+import re
+import zlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+
+from strapgen.backends.fixed import ModelEvaluator
+from strapgen.evidence.motion_rows import motion_rows
+from strapgen.evidence.subjects import Subject
+from strapgen.evidence.verdicts import Result, Tool, Verdict, verdict
+from strapgen.experiments.vectors import MODEL, model_call
+from strapgen.library import generated_sources
+from strapgen.support.exceptions import CompilerError
+from strapgen.support.files import write_files
+from strapgen.targets.runner_c.emit import MOST, NEEDED, NOISE, SEED, UNTOUCHED, CallRun, run_files
+from strapgen.targets.vectors_c.emit import CallVector
+from strapgen.toolchain.runners import RUNNERS, Runner
+
+#: Rows of the motion, which a run goes through again and again.
+ROWS = 250
+#: Longest word that all processors have products of.
+LONGEST_WORD = 32
+
+
+@dataclass(frozen=True)
+class Part:
+    """What a part of a run reports: calls, those accepted, and the checksum of all integers."""
+
+    name: str
+    calls: int
+    accepted: int
+    checksum: int
+
+
+def same_bits(subject: Subject, folder: Path) -> list[Verdict]:
+    """Tell, for each processor, whether a kernel returns the integers of the model.
+
+    Parameters
+    ----------
+    subject : Subject
+    folder : Path
+        Folder of the kernel; the programs go into ``processors/`` in it.
+
+    Returns
+    -------
+    list of Verdict
+        Claims "same bits: cortex-m0" and so on. None for words of 64 bits: no processor here has their products.
+    """
+    if subject.settings is not None and subject.settings.word > LONGEST_WORD:
+        return []
+    assert subject.sources.fixed is not None
+    place = folder / "processors"
+    run = CallRun(subject.sources, motion_rows(subject.sources.fixed, ROWS))
+    write_files(place, {**subject.sources.step_files, **run_files(run)})
+    expected: list[Part] = []
+
+    def judged(runner: Runner) -> tuple[Result, str]:
+        expected.extend(() if expected else of_model(subject, run))
+        return _judged(runner, place, [*_code(subject), f"run_{subject.name}.c"], expected)
+
+    return [
+        verdict(subject.name, f"same bits: {runner.name}", tool_of(runner), partial(judged, runner))
+        for runner in RUNNERS.values()
+    ]
+
+
+def tool_of(runner: Runner) -> Tool:
+    """Return the emulator of a processor as a tool."""
+    return Tool(runner.tool, runner.commands, runner.package, runner.version)
+
+
+def _code(subject: Subject) -> list[str]:
+    return [name for name in subject.sources.step_files if name.endswith(".c")]
+
+
+def _judged(runner: Runner, place: Path, sources: Sequence[str], expected: list[Part]) -> tuple[Result, str]:
+    """Return whether what a processor reports is what the model computes."""
+    folder = place / runner.name
+    folder.mkdir(exist_ok=True)
+    try:
+        said = runner.run(folder, [f"../{source}" for source in sources])
+    except CompilerError as error:
+        return "fails", str(error)
+    reported = parts_of(said)
+    for part in expected:
+        if part.accepted < NEEDED:
+            return "fails", f"{part.name}: {part.accepted} of {part.calls} calls are accepted"
+        if part not in reported:
+            other = [text for text in reported if text.name == part.name]
+            return (
+                "fails",
+                f"{part.name}: {_text(part)} in the model, {_text(other[0]) if other else 'no report'}",
+            )
+    return "agrees", f"{NEEDED} calls of coning and {NEEDED} of random input"
+
+
+def parts_of(said: str) -> list[Part]:
+    """Return the parts of a run that a program reports.
+
+    Examples
+    --------
+    >>> parts_of("coning 000003e9 000003e8 00c0ffee")
+    [Part(name='coning', calls=1001, accepted=1000, checksum=12648430)]
+    """
+    digits = " ".join(["([0-9a-f]{8})"] * 3)
+    rows = re.findall(rf"^(\w+) {digits}\b", said, flags=re.MULTILINE)
+    return [Part(name, *(int(number, 16) for number in numbers)) for name, *numbers in rows]
+
+
+def _text(part: Part) -> str:
+    return f"{part.calls} calls, {part.accepted} accepted, CRC-32 {part.checksum:08x}"
+
+
+@dataclass
+class Draws:
+    """The generator of the program: xorshift of 32 bits."""
+
+    state: int = SEED
+
+    def draw(self) -> int:
+        """Return the next number."""
+        self.state ^= (self.state << 13) & 0xFFFFFFFF
+        self.state ^= self.state >> 17
+        self.state ^= (self.state << 5) & 0xFFFFFFFF
+        return self.state
+
+    def anywhere(self, low: int, high: int) -> int:
+        """Return a number of a range: an end of it in one of four draws."""
+        kind, offset = self.draw() & 7, self.draw() % (high - low + 1)
+        return {0: low, 1: high}.get(kind, low + offset)
+
+    def near(self, center: int, low: int, high: int, largest: int) -> int:
+        """Return a number of a range that lies near another one of it."""
+        change = self.draw() % (largest + 1)
+        return min(center + change, high) if self.draw() & 1 else max(center - change, low)
+
+
+@dataclass
+class _ModelRun:
+    """A part of a run in the model: calls one by one, and all integers that they return."""
+
+    subject: Subject
+    run: CallRun
+    model: ModelEvaluator
+    words: list[int] = field(default_factory=list)
+    calls: int = 0
+    accepted: int = 0
+
+    def call(self, elements: Sequence[int], feedback: tuple[int, ...]) -> CallVector:
+        """Call the model on the elements of all inputs."""
+        rest = iter(elements)
+        inputs = tuple(
+            tuple(next(rest) for _ in range(signal.size)) for signal in self.run.sources.function.inputs
+        )
+        result = model_call(self.model, inputs, feedback)
+        refused = result.status != 0
+        self.words.append(result.status)
+        self.words += [UNTOUCHED if refused else value for output in result.outputs for value in output]
+        self.words += result.next_feedback
+        self.calls += 1
+        self.accepted += not refused
+        return result
+
+    def goes_on(self) -> bool:
+        """Return whether another call follows."""
+        return self.accepted < NEEDED and self.calls < MOST
+
+    def part(self, name: str) -> Part:
+        """Return what the program must report."""
+        octets = b"".join((word & 0xFFFFFFFF).to_bytes(4, "little") for word in self.words)
+        return Part(name, self.calls, self.accepted, zlib.crc32(octets))
+
+
+def of_model(subject: Subject, run: CallRun) -> Iterator[Part]:
+    """Yield what each part of a run must report, from the model in Python integers.
+
+    Parameters
+    ----------
+    subject : Subject
+    run : CallRun
+
+    Yields
+    ------
+    Part
+        "coning", then "random".
+    """
+    model = ModelEvaluator(generated_sources.sources(subject.choice, MODEL, subject.settings))
+    yield _coning(_ModelRun(subject, run, model))
+    yield _random(_ModelRun(subject, run, model))
+
+
+def _coning(part: _ModelRun) -> Part:
+    run = part.run
+    assert run.sources.fixed is not None
+    fresh = tuple(word.fresh for word in run.sources.fixed.residuals)
+    places = run.places
+    outputs = [signal.name for signal in run.sources.function.outputs]
+    last: CallVector | None = None
+    while part.goes_on():
+        elements = list(run.rows[part.calls % len(run.rows)])
+        feedback = fresh
+        if last is not None:
+            feedback = last.next_feedback
+            for before, after in run.pairs:
+                place = places[before.name]
+                elements[place : place + before.size] = last.outputs[outputs.index(after.name)]
+        result = part.call(elements, feedback)
+        last = None if result.status else result
+    return part.part("coning")
+
+
+def _random(part: _ModelRun) -> Part:
+    run, draws = part.run, Draws()
+    assert run.sources.fixed is not None
+    words, mask = len(run.sources.fixed.residuals), (1 << run.sources.fixed.settings.word) - 1
+    while part.goes_on():
+        row = run.rows[draws.draw() % len(run.rows)]
+        shift = 2 + draws.draw() % NOISE
+        elements = [
+            draws.near(center, low, high, (high - low) >> shift)
+            if part.calls % 2
+            else draws.anywhere(low, high)
+            for center, (low, high) in zip(row, run.limits, strict=True)
+        ]
+        part.call(elements, tuple(draws.draw() & mask for _ in range(words)))
+    return part.part("random")

@@ -1,0 +1,1 @@
+"""Prints drivers for fuzzers of generated C functions."""

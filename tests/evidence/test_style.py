@@ -1,0 +1,158 @@
+"""Two tools find nothing in any kind of generated C, and something where there is something."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from dataclasses import replace
+from fractions import Fraction
+
+import pytest
+
+from strapgen.catalogue import Choice, choose
+from strapgen.evidence import style
+from strapgen.evidence.subjects import Subject
+from strapgen.experiments import project, two_speed_project
+from strapgen.experiments.vectors import vectors_of_choice
+from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.sensor import Sensor
+from strapgen.library import generated_sources, two_speed_sources
+from strapgen.support.files import write_files
+from strapgen.support.resources import folder as shipped
+from strapgen.targets.vectors_c.emit import table_files
+
+#: Words, error feedback, counts of a gyro with a state that saturates.
+SETTINGS = {
+    "16 bits": Settings(16),
+    "64 bits": Settings(64),
+    "feedback of state and transition": Settings(carry="full"),
+    "feedback of the state, truncation": Settings(16, carry="state", rounding="truncation"),
+    "feedback in 64 bits": Settings(64, carry="full"),
+    "counts": Settings(32, Fraction(1, 32), sensor=Sensor.of("0.0175dps", Fraction(1, 200)), state="q31"),
+}
+#: Kernels whose code differs from that of all others in what a setting changes.
+KERNELS = ("euler", "dcm", "euler-normalize", "dcm-orthonormalize", "dcm-update", "coning-fast")
+
+
+@pytest.fixture(autouse=True)
+def tools():
+    for command in ("clang", "clang-tidy"):
+        if shutil.which(command) is None:
+            pytest.skip(f"{command} is not on this machine")
+
+
+def findings(files, folder) -> list[str]:
+    write_files(folder, files)
+    return [*style.found_by_clang(folder), *style.found_by_clang_tidy(folder)]
+
+
+def project_of(kernel: str, target: str, settings: Settings | None = None) -> dict[str, str]:
+    choice = choose(kernel)
+    sources = generated_sources.sources(choice, target, settings)
+    return {**sources.step_files, **project.project_files(choice, target, settings)}
+
+
+def two_speed(algorithm: str, target: str, settings: Settings | None = None) -> dict[str, str]:
+    whole = two_speed_sources.sources(algorithm, 2, target, settings)
+    return {**whole.files, **two_speed_project.project_files(algorithm, 2, target, settings)}
+
+
+def with_vectors(choice: Choice, target: str, settings: Settings | None = None) -> dict[str, str]:
+    table = vectors_of_choice(choice, target, settings, 20)
+    return {**generated_sources.sources(choice, target, settings).files, **table_files(table)}
+
+
+#: A file of each kind.
+KINDS = {
+    "project": lambda: project_of("euler", "c-fixed", SETTINGS["counts"]),
+    "project of a call": lambda: project_of("euler-normalize", "c-float"),
+    "two speeds": lambda: two_speed("euler", "c-fixed", Settings(carry="full")),
+    "vectors in double": lambda: with_vectors(choose("euler-angles-from-dcm"), "c"),
+    "words of 16 bits": lambda: with_vectors(choose("euler"), "c-fixed", Settings(16)),
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_nothing_is_in_files_of_any_kind(kind, tmp_path):
+    assert findings(KINDS[kind](), tmp_path) == []
+
+
+def every_setting() -> Iterator[tuple[str, dict[str, str]]]:
+    for kernel in KERNELS:
+        for name, settings in SETTINGS.items():
+            if settings.sensor is None or kernel in ("euler", "dcm"):
+                yield f"{kernel}/{name}", with_vectors(choose(kernel), "c-fixed", settings)
+
+
+def every_project() -> Iterator[tuple[str, dict[str, str]]]:
+    short = Settings(16, carry="full")
+    for target, settings in (("c", None), ("c-float", None), ("c-fixed", None), ("c-fixed", short)):
+        for algorithm in ("dcm", "euler"):
+            place = f"{algorithm}/{target}{settings.word if settings else ''}"
+            yield f"loops/{place}", two_speed(algorithm, target, settings)
+            yield f"projects/{place}", project_of(algorithm, target, settings)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("files", [every_setting, every_project])
+def test_nothing_is_in_any_generated_file(files, tmp_path):
+    """What `strapgen evidence --all` does not examine: other settings, two speeds, projects."""
+    for name, texts in files():
+        assert findings(texts, tmp_path / name.replace(" ", "_")) == [], name
+
+
+def test_nothing_is_in_the_files_that_are_shipped(tmp_path):
+    files = {
+        f"{name}/{path.name}": path.read_text()
+        for name in ("c", "c_float", "c_fixed")
+        for path in (shipped("generated") / name).glob("euler_*.[ch]")
+    }
+    assert len(files) > 30
+    assert findings(files, tmp_path) == []
+
+
+#: Bodies of functions of an int, each with the function that finds its fault.
+FAULTS = {
+    "if (a == 1) {\n        return 2;\n    } else {\n        return 2;\n    }": "found_by_clang_tidy",
+    "return (a > 0) ? rand() : 0;": "found_by_clang_tidy",
+    "unsigned int b = 1u;\n    return b;": "found_by_clang",
+    "return missing;": "found_by_clang",
+}
+
+
+@pytest.mark.parametrize("body", FAULTS)
+def test_a_fault_is_found(body, tmp_path):
+    text = f"#include <stdlib.h>\nint f(int a);\nint f(int a)\n{{\n    {body}\n}}\n"
+    write_files(tmp_path, {"part/fault.c": text})
+    assert [line for line in getattr(style, FAULTS[body])(tmp_path) if line.startswith("fault.c:")]
+
+
+def test_a_finding_fails_the_claim(monkeypatch, tmp_path):
+    subject = Subject(choose("euler-product"))
+    name = "euler_product_w32.c"
+    text = subject.sources.files[name].replace("return 0;", "int nothing = 0;\n    return 0;")
+    vars(subject)["sources"] = replace(subject.sources, files=subject.sources.files | {name: text})
+    results = {(v.claim, v.tool): (v.result, v.detail) for v in style.style(subject, tmp_path)}
+    assert len(results) == 6
+    result, detail = results["style: fixed point", "clang"]
+    assert result == "fails"
+    assert detail.startswith("1 findings, first euler_product_w32.c:")
+    assert results["style: floating point", "clang"] == ("agrees", "")
+    assert results["style: floating point", "clang-tidy"] == ("agrees", "")
+
+
+def test_no_check_is_left_out_without_need(monkeypatch, tmp_path):
+    write_files(tmp_path, {**two_speed("euler", "c-fixed", Settings(16))})
+    monkeypatch.setattr(style, "CHECKS", "-*,bugprone-easily-swappable-parameters")
+    assert style.found_by_clang_tidy(tmp_path)
+    for name in ("declaration-after-statement", "padded"):
+        monkeypatch.setattr(
+            style, "UNWARNED", {key: 0 for key in style.UNWARNED if key != name} | {"unsafe-buffer-usage": 99}
+        )
+        assert style.found_by_clang(tmp_path), name
+
+
+def test_three_warnings_are_left_out():
+    assert len(style.UNWARNED) == 3
+    assert style.CHECKS.startswith("-*,bugprone-*,cert-*,")
+    assert style.CHECKS.count("-bugprone") + style.CHECKS.count("-cert") == 1
