@@ -12,7 +12,11 @@
 /* Whether a number is larger in magnitude than a limit. */
 static inline int euler_from_cayley_klein_w32_out(int32_t x, int32_t limit)
 {
+#if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
+    return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit); /* fewer instructions there */
+#else
     return (x < -limit) || (x > limit);
+#endif
 }
 
 int euler_from_cayley_klein_w32(const int32_t state[4], int32_t converted[4])
