@@ -59,6 +59,16 @@ def test_every_written_fault_applies_once_and_leaves_a_file_that_can_be_read():
             assert tomllib.loads(changed) != tomllib.loads(source), site
 
 
+def test_faults_that_no_test_notices_stand_with_a_reason():
+    told = tomllib.loads(mutants.UNNOTICED.read_text())["fault"]
+    assert len(mutants.reasons()) == len(told)
+    for entry in told:
+        lines = " ".join((mutants.ROOT / entry["file"]).read_text().split())
+        assert entry["before"] in lines, entry
+        assert entry["before"] != entry["after"]
+        assert len(entry["reason"].split()) >= 5
+
+
 def test_written_faults_lie_in_every_folder_that_computes():
     folders = {Path(site.file).parts[2] for site, _ in mutants.seeded() if site.file.startswith("codegen/")}
     assert folders >= set(mutation_operators.FOLDERS) - {"ir"}
