@@ -143,7 +143,7 @@ class Place:
                     names.append(entry)
             except (OSError, ValueError):
                 names.append(entry)
-        return [str(path.relative_to(self.root)) for path in names]
+        return [*dict.fromkeys(str(path.relative_to(self.root)) for path in names)]
 
 
 @dataclass(frozen=True)
