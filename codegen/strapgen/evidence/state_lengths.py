@@ -1,7 +1,7 @@
 """Proves for how many steps parameters stay in their format, from the exact length of a transition.
 
-A step multiplies Euler or Cayley-Klein parameters by p, so that it multiplies their length by |p|. |p|^2 is a polynomial
-of the increments that no rotation changes: two of them may be turned so that the first lies along x and the second in
+A step multiplies Euler or Cayley-Klein parameters by p, and their length by |p|, whose square is a polynomial of the
+increments that no rotation changes: two of them may be turned so that the first lies along x and the second in
 the plane of x and y. What is left are three variables, whose box is cut until the bound is close to values that are
 reached.
 """
