@@ -21,6 +21,7 @@ CHECKS: dict[str, tuple[str, str]] = {
     "z3": ("strapgen.evidence.overflow.solver", "prove"),
     "gappa": ("strapgen.evidence.gappa", "check"),
     "coq": ("strapgen.evidence.coq_proof", "check"),
+    "lengths": ("strapgen.evidence.state_lengths", "check"),
     "balls": ("strapgen.evidence.actual_errors", "check"),
     "processors": ("strapgen.evidence.same_bits", "same_bits"),
     "million-steps": ("strapgen.evidence.long_run", "million_steps"),
