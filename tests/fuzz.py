@@ -51,6 +51,8 @@ def keep(name: str, inputs: Iterable[bytes]) -> None:
     ordered = sorted({data for data in inputs if len(data) <= LONGEST}, key=lambda data: (len(data), data))
     if len(ordered) > MOST:
         ordered = [ordered[k * (len(ordered) - 1) // (MOST - 1)] for k in range(MOST)]
+    if not ordered:
+        return
     CORPUS.mkdir(parents=True, exist_ok=True)
     (CORPUS / f"{name}.txt").write_text("".join(f"{base64.b64encode(data).decode()}\n" for data in ordered))
 

@@ -112,6 +112,15 @@ def test_draft_of_a_killed_process_is_never_read(root):
     assert names(root / "kind") == ["key"]
 
 
+def test_draft_of_a_killed_process_is_removed_though_another_one_made_the_entry(root):
+    place = cache.entry("kind", "key", write("file"))
+    killed = root / "kind" / ".filling-01234567"
+    killed.mkdir()
+    cache._tidied.clear()  # as in a new process
+    assert cache.entry("kind", "key", never) == place
+    assert names(root / "kind") == ["key"]
+
+
 def test_entries_of_long_ago_are_removed(root):
     old = cache.entry("kind", "old", write("file"))
     recent = cache.entry("kind", "recent", write("file"))

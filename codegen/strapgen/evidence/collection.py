@@ -20,6 +20,7 @@ CHECKS: dict[str, tuple[str, str]] = {
     "eva": ("strapgen.evidence.overflow.eva", "prove"),
     "z3": ("strapgen.evidence.overflow.solver", "prove"),
     "gappa": ("strapgen.evidence.gappa", "check"),
+    "coq": ("strapgen.evidence.coq_proof", "check"),
     "balls": ("strapgen.evidence.actual_errors", "check"),
     "processors": ("strapgen.evidence.same_bits", "same_bits"),
     "million-steps": ("strapgen.evidence.long_run", "million_steps"),

@@ -102,6 +102,11 @@ def lookup(kind: str, key: str) -> Path | None:
         As for `entry`.
     """
     place = _folder(create=False) / kind / key
+    if (
+        place.parent not in _tidied
+    ):  # once, since another process may have made the entry that a killed one began
+        _tidied.add(place.parent)
+        _tidy(place.parent)
     return place if _is_whole(place) else None
 
 
@@ -232,11 +237,13 @@ def _folder(create: bool) -> Path:
     place = nominal.resolve()
     if place in _replaced and _replaced[place].is_dir():
         return _replaced[place]
+    if not create and place in _private:  # every entry is checked from the root of the file system down
+        return place
     try:
         if create:
             _make_private(place)
         with ownership.private_folder(place):
-            pass
+            _private.add(place)
     except ForeignFileError as error:
         _replaced[place] = _temporary(nominal, error.reason)
         return _replaced[place]
@@ -248,6 +255,10 @@ def _folder(create: bool) -> Path:
 
 #: Temporary folders by the cache folders that they stand for; a process that is forked uses them too.
 _replaced: dict[Path, Path] = {}
+#: Cache folders that were the user's alone when they were looked at first.
+_private: set[Path] = set()
+#: Folders of a kind in which this process has looked for what others have left.
+_tidied: set[Path] = set()
 
 
 def _temporary(nominal: Path, reason: str) -> Path:
@@ -346,8 +357,7 @@ def _warn(reason: str) -> None:
 
 def _prune(folder: Path) -> None:
     """Remove entries that have not been used for long, and what processes that are gone have left."""
-    for gone in drafts.forgotten(folder, _DRAFT):
-        shutil.rmtree(gone, ignore_errors=True)
+    _tidy(folder)
     oldest = time.time() - _UNUSED_DAYS * 86400
     for path in folder.iterdir():
         with suppress(OSError):
@@ -355,3 +365,9 @@ def _prune(folder: Path) -> None:
                 not path.name.startswith(_DRAFT) and path.stat().st_mtime < oldest
             ):
                 shutil.rmtree(path, ignore_errors=True)
+
+
+def _tidy(folder: Path) -> None:
+    """Remove the drafts of processes that are gone."""
+    for gone in drafts.forgotten(folder, _DRAFT):
+        shutil.rmtree(gone, ignore_errors=True)
