@@ -92,7 +92,7 @@ CASES = {
     ),
     # The rounded part is -2 at most, one more than the eighth of its integer: that is the largest partial sum.
     "a truncation beside a large term": Case(
-        {"a": Known(2, -3, 3), "b": Known(2, -3, 3), "c": Known(1, -60, 60)},
+        {"a": Known(2, -3, 3), "b": Known(2, -3, 3), "c": Known(1, -20, 20)},
         terms((AB, 1), (("c",), 1)),
         lambda a, b, c: a * b + c,
         Fraction(1, 1 << 4),
