@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,8 +15,9 @@ import strapgen
 from strapgen import generate
 from strapgen.backends.fixed import CFixedEvaluator, ModelEvaluator
 from strapgen.catalogue import Choice
-from strapgen.fixedpoint.sensor_scale import in_counts
+from strapgen.fixedpoint.sensor_scale import _note, in_counts
 from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.program import Assignment, Reference
 from strapgen.ir.sensor import Sensor
 from strapgen.library import two_speed_sources
 from strapgen.support.exceptions import InputError
@@ -159,3 +161,14 @@ def test_what_does_not_go_with_counts_is_refused():
         two_speed_sources.sources("dcm", 2, "c-fixed", settings)
     with pytest.raises(InputError, match="the format of increments follows from their bits"):
         quantized(EULER, Settings.of(lsb="3e-6rad", formats={"increments": "Q0.31"}))
+
+
+def test_a_reader_is_told_which_values_are_divided_by_powers_of_the_scale():
+    sensor = SimpleNamespace(scale=Fraction(1, 8), is_rounded=False)
+    body = tuple(Assignment(name, Reference("x")) for name in ("a_x", "a_y", "b", "c"))
+    code = SimpleNamespace(body=body)
+    start = "The increments are counts; with s = 0.125, an angle in rad is s times its number in the code"
+    assert _note(code, {}, sensor) == f"{start}."
+    told = _note(code, {"a_x": 1, "a_y": 1, "c": 2}, sensor)
+    assert told.startswith(f"{start}. Powers of s are in the constants, and values are divided: ")
+    assert told.endswith("c by s^2; a by s.")

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from types import SimpleNamespace
 
 import pytest
 from small_integers import GRID, Known, at_corners, computed, context, quantity, with_feedback, worst
 
 from strapgen.fixedpoint.quantities import ErrorPropagation, Sum
-from strapgen.fixedpoint.sums import lower_sum, word_of
+from strapgen.fixedpoint.sums import _is_attitude, lower_sum, word_of
 
 EXACT = Known(4, -7, 7)
 OFF = Known(4, -9, 9, Fraction(1, 40))
@@ -91,7 +92,7 @@ CASES = {
     ),
     # The rounded part is -2 at most, one more than the eighth of its integer: that is the largest partial sum.
     "a truncation beside a large term": Case(
-        {"a": Known(2, -3, 3), "b": Known(2, -3, 3), "c": Known(1, -60, 60)},
+        {"a": Known(2, -3, 3), "b": Known(2, -3, 3), "c": Known(1, -20, 20)},
         terms((AB, 1), (("c",), 1)),
         lambda a, b, c: a * b + c,
         Fraction(1, 1 << 4),
@@ -213,3 +214,13 @@ def test_a_wide_value_is_rounded_to_a_word_with_the_error_that_it_has():
     assert rounded.magnitude <= 127
     assert word_of(walk, "a") == rounded.name
     assert word_of(walk, rounded.name) == rounded.name
+
+
+@pytest.mark.parametrize(
+    ("constraint", "name", "attitude"), [("unit", "a", True), ("unit", "b", False), ("", "a", False)]
+)
+def test_only_elements_of_an_output_that_is_an_attitude_saturate(constraint, name, attitude):
+    walk = context({"a": EXACT, "b": EXACT})
+    walk.quantities.results["next"] = ("a",)
+    walk.program.outputs = (SimpleNamespace(signal=SimpleNamespace(name="next", constraint=constraint)),)
+    assert _is_attitude(walk, name) is attitude

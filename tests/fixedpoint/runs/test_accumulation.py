@@ -283,7 +283,7 @@ def test_what_a_step_loses_beside_its_feedback_is_told(algorithm, rounding, rng)
     after = exact.results[code.outputs[0].signal.name]
     names = [node.name for node in code.transition.nodes]
     worst = {key: [Fraction(0)] * len(after) for key in ("transition", "local")}
-    for _ in range(60):
+    for _ in range(30):
         integers, numbers, fed = {}, {}, {}
         for argument in context.plan.inputs:
             for name in argument.signal.elements:
