@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 from strapgen.evidence.verdicts import Verdict, failures
 from strapgen.reports.evidence import evidence_page, evidence_report, summary
@@ -10,6 +11,7 @@ from strapgen.reports.evidence import evidence_page, evidence_report, summary
 _ALARM = Verdict("dcm_w32", "no overflow: x86_64", "Frama-C Eva", "25.0", "fails", 1.25, "2 alarms")
 _PROOF = Verdict("dcm_w32", "no overflow: x86_64", "bitwuzla", "0.9", "proved", 3.0)
 _BITS = Verdict("dcm_w32", "same bits: avr", "simavr", "1.6", "agrees", 0.5)
+_BEYOND = Verdict("euler_w32", "error bound: one step", "Gappa", "1.4", "not examined", 0.1, "a quotient")
 _MISSING = Verdict("euler_w32", "same bits: avr", "simavr", "", "not installed", 0.0, "install simavr")
 
 
@@ -19,7 +21,7 @@ def test_a_proof_by_one_tool_makes_up_for_alarms_of_another():
 
 
 def test_json_has_the_keys_that_programs_read():
-    rows = json.loads(evidence_report([_ALARM, _MISSING]).written("json"))
+    rows = json.loads(evidence_report([_ALARM, _BEYOND, _MISSING]).written("json"))
     assert [{*row} for row in rows] == [
         {"kernel", "claim", "tool", "version", "result", "seconds", "detail"}
     ] * 2
@@ -28,8 +30,9 @@ def test_json_has_the_keys_that_programs_read():
 
 
 def test_the_text_says_claim_tool_result_time_and_why():
-    text = evidence_report([_ALARM, _PROOF]).written("text")
-    assert "no overflow: x86_64  Frama-C Eva  fails" in text
+    text = evidence_report([_ALARM, _PROOF, _BEYOND]).written("text")
+    assert "euler_w32, error bound: one step, Gappa 1.4: a quotient" in text
+    assert re.search("no overflow: x86_64 +Frama-C Eva +fails", text)
     assert "2 alarms" in text
 
 

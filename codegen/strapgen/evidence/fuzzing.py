@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import subprocess
-import tempfile
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
@@ -12,6 +11,7 @@ from pathlib import Path
 from strapgen.evidence.subjects import Subject
 from strapgen.evidence.verdicts import Result, Tool, Verdict, verdict
 from strapgen.ir.sources import Sources
+from strapgen.support.drafts import temporary_folder
 from strapgen.support.files import write_files
 from strapgen.targets.fuzz_c.emit import driver_files, driver_name
 
@@ -54,7 +54,7 @@ def fuzz_files(subject: Subject) -> dict[str, str]:
     """Return a kernel's C with its driver, text by file name."""
     sources = subject.sources
     guarded = any(value.guarded for value in subject.fixed.body)
-    commands = (" ".join(_build(sources)), f"{_PROGRAM} -max_len={LONGEST} -max_total_time=60")
+    commands = (" ".join(_build(sources)), f"{_PROGRAM} -max_len={LONGEST} -len_control=0 -max_total_time=60")
     return {**sources.files, **driver_files(sources, guarded, commands)}
 
 
@@ -82,7 +82,7 @@ def run_fuzzer(folder: Path, options: Sequence[str]) -> str:
     options : sequence of str
         Options of libFuzzer, and folders of inputs.
     """
-    command = [_PROGRAM, f"-max_len={LONGEST}", "-timeout=10", "-print_final_stats=0", *options]
+    command = [_PROGRAM, f"-max_len={LONGEST}", "-len_control=0", "-timeout=10", *options]
     done = subprocess.run(command, cwd=folder, capture_output=True, check=False)
     return reported(done.stderr.decode(errors="replace")) if done.returncode else ""
 
@@ -113,12 +113,12 @@ class _LibFuzzer(Tool):
 
 @cache
 def _links() -> bool:
-    with tempfile.TemporaryDirectory() as name:
+    with temporary_folder() as folder:
         text = "int LLVMFuzzerTestOneInput(const unsigned char *data, unsigned long size);\n"
         text += "int LLVMFuzzerTestOneInput(const unsigned char *data, unsigned long size)\n"
-        (Path(name) / "empty.c").write_text(f"{text}{{\n    return (data != 0) && (size > 9u) && 0;\n}}\n")
+        (folder / "empty.c").write_text(f"{text}{{\n    return (data != 0) && (size > 9u) && 0;\n}}\n")
         done = subprocess.run(
-            ["clang", *_FLAGS, "empty.c", "-o", _PROGRAM], cwd=name, capture_output=True, check=False
+            ["clang", *_FLAGS, "empty.c", "-o", _PROGRAM], cwd=folder, capture_output=True, check=False
         )
         return done.returncode == 0
 

@@ -60,7 +60,7 @@ def driver_files(sources: Sources, guarded: bool, commands: Sequence[str] = ()) 
         },
         "feedback": interface.residuals,
         "guarded": guarded,
-        "call": ", ".join(f"all->{name}" for name in order),
+        "arrays": order,
         "array_call": ", ".join(f"{name}[0]" for name in order),
         "alias": _alias(inputs, outputs, order),
         "state": inputs[0].signal if step else None,
