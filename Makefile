@@ -8,7 +8,7 @@ TOOLS := .venv/.ready-to-test
 BENCH := .venv-bench/.ready
 
 .PHONY: help demo test test-long test-modules mutants check bench generate clean \
-  check-generated check-style check-layout check-types firmware-tools cost evidence-tools
+  check-generated check-style check-layout check-types firmware-tools cost evidence evidence-page evidence-tools faults fuzz
 
 help:
 	@echo "make demo      set up, then a short tour: formulas, their C, a table on every back end"
@@ -22,6 +22,10 @@ help:
 	@echo "make cost      measure generated/COST.md anew, with the tools of make firmware-tools"
 	@echo "make firmware-tools  on Debian: cross compilers, QEMU and CMake, for strapgen cost and tests"
 	@echo "make evidence-tools  on Debian: the tools above, Frama-C, Gappa, Coq, fuzzers and more processors, for make evidence"
+	@echo "make evidence  have independent tools examine the standard catalogue; hold generated/EVIDENCE.md to what they say"
+	@echo "make evidence-page  the same, and write generated/EVIDENCE.md anew"
+	@echo "make faults    kill commands, fill disks and move clocks for four minutes; see that nothing wrong is left"
+	@echo "make fuzz      try drawn inputs on the C, the readers and the command line for five minutes"
 	@echo "make clean     remove .venv and what tools left behind"
 
 $(READY): pyproject.toml
@@ -122,6 +126,17 @@ generate: $(READY)
 
 cost: $(READY)
 	$(BIN)/strapgen cost --all --format markdown --out generated/COST.md
+
+# It fails if a tool is missing or the page differs from what the tools say.
+evidence: $(READY)
+	$(BIN)/strapgen evidence --all --complete --page generated/EVIDENCE.md --check
+evidence-page: $(READY)
+	$(BIN)/strapgen evidence --all --complete --page generated/EVIDENCE.md
+
+faults: $(TOOLS)
+	$(BIN)/python tests/faults.py --seconds 240
+fuzz: $(TOOLS)
+	$(BIN)/python tests/fuzz.py --seconds 300
 
 clean:
 	rm -rf .venv .venv-bench .mypy_cache .ruff_cache .pytest_cache .hypothesis .mutants build dist

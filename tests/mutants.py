@@ -37,6 +37,8 @@ from mutation_operators import Site
 
 ROOT = Path(__file__).resolve().parents[1]
 SEEDED = Path(__file__).parent / "data" / "mutants.toml"
+#: Drawn faults that no test notices, each with the reason.
+UNNOTICED = Path(__file__).parent / "data" / "unnoticed.toml"
 #: The seed of the draws.
 SEED = 1969
 #: A session that takes longer hangs, in s; one of all tests may take as many times what they take without a fault more.
@@ -114,6 +116,14 @@ def seeded() -> list[tuple[Site, str]]:
         site = Site(entry["file"], start, start + len(entry["text"]), entry["instead"], entry["kind"])
         faults.append((site, entry["breaks"]))
     return faults
+
+
+def reasons() -> dict[str, str]:
+    """Return why no test notices a fault, by the fault as it is in `Fault.lasting_key`."""
+    return {
+        f"{entry['file']} {entry['before']} -> {entry['after']}": entry["reason"]
+        for entry in tomllib.loads(UNNOTICED.read_text())["fault"]
+    }
 
 
 def faults(part: str, seed: int) -> list[Fault]:
@@ -543,7 +553,7 @@ def table(listed: Sequence[Fault], known: dict[str, Outcome]) -> str:
 
 def summary(listed: Sequence[Fault], known: dict[str, Outcome]) -> tuple[list[str], bool]:
     """Return a line for each list, the faults that passed, and whether the requirement is met."""
-    lines, met = [], True
+    lines, met, known_reasons = [], True, reasons()
     for part in PARTS:
         group = [fault for fault in listed if fault.part == part]
         if not group:
@@ -555,6 +565,7 @@ def summary(listed: Sequence[Fault], known: dict[str, Outcome]) -> tuple[list[st
         lines.append(f"{part}: {caught} of {len(group)} caught, {needed} needed; {states.count('open')} open")
         lines += [
             f"  {state}: {f.site.file}:{f.line}\n    - {f.before}\n    + {f.after}"
+            + (f"\n    {known_reasons[f.lasting_key]}" if f.lasting_key in known_reasons else "")
             for f, state in zip(group, states, strict=True)
             if state != "caught"
         ]
@@ -568,7 +579,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=SEED, help=f"of the random lists; {SEED} by default")
     parser.add_argument("--only", default="", help="faults alone whose text contains this")
     parser.add_argument("--tests", nargs="*", default=[], help="these tests alone; all by default")
-    parser.add_argument("--minutes", type=float, default=30.0, help="stop after so long; a later run goes on")
+    parser.add_argument("--minutes", type=float, default=60.0, help="stop after so long; a later run goes on")
     parser.add_argument("--workers", type=int, default=2, help="how many run at once")
     parser.add_argument("--restart", action="store_true", help="forget the outcomes of earlier runs")
     parser.add_argument("--list", action="store_true", help="print the faults and run nothing")
@@ -593,6 +604,7 @@ def main() -> int:
     if options.restart:
         (state / "outcomes.jsonl").unlink(missing_ok=True)
     state.mkdir(parents=True, exist_ok=True)
+    (state / "draw.json").write_text(json.dumps({"seed": options.seed, "tests": options.tests}))
     runner = Runner(state, options.tests, begin + 60 * options.minutes)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     try:

@@ -7,6 +7,8 @@ import json
 import random
 import tomllib
 from dataclasses import replace
+from functools import cache
+from itertools import accumulate
 from pathlib import Path
 
 import execution_map
@@ -34,6 +36,13 @@ def changes(sites: list[Site], source: str) -> set[str]:
     return {site.applied(source).splitlines()[site.line(source) - 1].strip() for site in sites}
 
 
+@cache
+def statements(source: str) -> list[tuple[int, int]]:
+    """Return the span of every statement of a module."""
+    starts = [0, *accumulate(map(len, source.splitlines(keepends=True)))]
+    return [(starts[node.lineno - 1], starts[node.end_lineno or 0]) for node in ast.parse(source).body]
+
+
 def test_every_written_fault_applies_once_and_leaves_a_file_that_can_be_read():
     written = mutants.seeded()
     assert len({site for site, _ in written}) == len(written) >= 40
@@ -43,9 +52,21 @@ def test_every_written_fault_applies_once_and_leaves_a_file_that_can_be_read():
         assert breaks
         assert changed != source
         if site.file.endswith(".py"):
-            assert ast.dump(ast.parse(changed)) != ast.dump(ast.parse(source)), site
+            start, end = next(span for span in statements(source) if span[0] <= site.start < span[1])
+            before, after = source[start:end], changed[start : end + len(changed) - len(source)]
+            assert ast.dump(ast.parse(after)) != ast.dump(ast.parse(before)), site
         elif site.file.endswith(".toml"):
             assert tomllib.loads(changed) != tomllib.loads(source), site
+
+
+def test_faults_that_no_test_notices_stand_with_a_reason():
+    told = tomllib.loads(mutants.UNNOTICED.read_text())["fault"]
+    assert len(mutants.reasons()) == len(told)
+    for entry in told:
+        lines = " ".join((mutants.ROOT / entry["file"]).read_text().split())
+        assert entry["before"] in lines, entry
+        assert entry["before"] != entry["after"]
+        assert len(entry["reason"].split()) >= 5
 
 
 def test_written_faults_lie_in_every_folder_that_computes():

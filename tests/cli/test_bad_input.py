@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
 import pytest
@@ -580,6 +581,51 @@ def test_cache_folder_that_cannot_be_written(place, folder, capsys, monkeypatch)
     said = capsys.readouterr()
     assert (stop.value.code, said.out) == (2, "")
     assert said.err.startswith("strapgen: cache folder ") and said.err.count("\n") == 1
+
+
+LONG = "x" * 5000
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        f"simulate euler --{LONG}",
+        f"simulate {LONG} {CONSTANT}",
+        LONG,
+        f"simulate euler --motion constant --set {LONG} --step 1 --duration 1",
+        f"derive {LONG}.py",
+        f"generate euler --target c --out {LONG}",
+        f"simulate euler --increments-csv {LONG}",
+        f"generate euler --target c --name {LONG}",
+        f"derive euler --method '{'x ' * 3000}'",
+        f"{CONSTANT} {'x ' * 3000}",
+    ],
+)
+def test_what_is_long_is_not_repeated_in_full(command, folder, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(shlex.split(command))
+    said = capsys.readouterr()
+    assert (stop.value.code, said.out, said.err.count("\n")) == (2, "", 1)
+    assert len(said.err) < 2100 and "x" * 301 not in said.err
+    assert "output cannot be written" not in said.err, "that is said of the terminal"
+
+
+def test_a_path_is_repeated_in_full(folder, capsys):
+    path = "/".join(["folder"] * 30)
+    with pytest.raises(SystemExit):
+        main(["simulate", "euler", "--increments-csv", path])
+    assert path in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("entry", ["1if 2else 3", "1is 1", "0x1for x in y", "1or 2"])
+def test_python_s_warnings_of_a_coefficient_are_not_shown(entry, folder, capsys):
+    text = 'name = "x"\nsource = "y"\norder = 1\nnodes = ["0"]\nmatrix = [[]]\nweights = ["{}"]\n'
+    Path("method.toml").write_text(text.format(entry))
+    with warnings.catch_warnings(record=True) as caught, pytest.raises(SystemExit) as stop:
+        warnings.simplefilter("always")
+        main(["tableau", "method.toml"])
+    assert not caught
+    assert stop.value.code == 2 and f"entry 1 is '{entry}'" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -121,6 +121,13 @@ def test_ranges_are_tighter_than_plain_intervals():
     assert made["square"].range == Interval.of(0, 4)
 
 
+def test_the_largest_of_several_is_at_least_their_mean():
+    # x and 1 - x are both as low as -1 and 0, but the larger one is 1/2 or more.
+    box = {name: Interval.symmetric(1) for name in ("x_1", "x_2", "x_3")}
+    body = {"y": op("maximum", "x_1", op("subtract", number(1), "x_1"))}
+    assert quantities(hand_made(body, "y"), box).items["y"].range == Interval.of(Fraction(1, 2), 2)
+
+
 def test_a_cut_of_the_box_saves_a_bit():
     # x (1 - x) on [0, 1] is at most 1/4; an interval of the product alone gives 1, of the expansion 1.
     box = {name: Interval.of(0, 1) for name in ("x_1", "x_2", "x_3")}

@@ -255,9 +255,24 @@ def test_functions_have_their_ranges(kind, ranges, ends):
     links = chain(kind, *ranges)
     inside = links.links[-1].range
     low, high = inside.lowest, inside.highest
-    slack = Fraction(1, 1000)
+    slack = Fraction(
+        2, 1 << 12
+    )  # two units of the grid on which a turn is taken off, that of words of 12 bits
     assert ends[0] - slack <= low <= ends[0] + Fraction(1, 1 << 100)
     assert ends[1] - Fraction(1, 1 << 100) <= high <= ends[1] + slack
+
+
+def test_the_smaller_and_the_larger_argument_have_their_ranges():
+    links = chain("direction", (Fraction(-1, 3), Fraction(1, 4)), (1, 2), word=16)
+    smaller, larger = (link(links, label) for label in ("smaller", "larger"))
+    assert (smaller.range.lowest, smaller.range.magnitude) == (
+        0,
+        max(smaller.range.lowest, smaller.range.highest),
+    )
+    assert smaller.range.highest - Fraction(1, 3) < Fraction(1, 1 << 100)
+    assert larger.range.highest == 2
+    # The stand-in for the larger one at the origin is the last place of the finer of both: a third has 16 places.
+    assert [one for one in larger.definition.arguments if isinstance(one, Fraction)] == [Fraction(1, 1 << 16)]
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 import runpy
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -482,3 +483,57 @@ def test_pulses_of_a_recording_are_counted_once(even):
     counted = Recording(even.start, even.interval, pulses(even.increments[:, None], size)[:, 0])
     np.testing.assert_array_equal(history.states, propagate(backend, counted).states)
     assert not np.array_equal(history.states, propagate(backend, even).states)
+
+
+# Numbers near the end of their range
+
+EXTREME = {
+    "large": [(0.1, "1e200"), (0.2, "1e200"), (0.3, "-1e200"), (0.4, "1e200")],
+    "largest": [(0.1, "1e308"), (0.2, "1e308"), (0.3, "1e308"), (0.4, "1e308")],
+    "smallest": [(0.1, "5e-324"), (0.2, "5e-324"), (0.3, "1e-310"), (0.4, "1e-320")],
+    "late": [(1e307, "1e300"), (2e307, "1e300"), (3e307, "1e300"), (4e307, "1e300")],
+    "short": [(5e-324, "1"), (1e-323, "1"), (1.5e-323, "1"), (2e-323, "1")],
+    "far": [(-1.7e308, "1"), (0, "1"), (1.7e308, "1")],
+}
+
+
+def outcome(call) -> object:
+    """Return what a call returns, or the one line in which it refuses; nothing may warn."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        try:
+            return call()
+        except InputError as error:
+            assert "\n" not in str(error)
+            return str(error)
+
+
+@pytest.mark.parametrize("name", EXTREME)
+def test_extreme_recordings_are_run_or_refused_and_nothing_warns(name, write):
+    path = write([[repr(time), *[value] * 6] for time, value in EXTREME[name]])
+    outcomes = {}
+    for hz in (None, "7", "1e300", "1e-300"):
+        outcomes[f"rates {hz}"] = outcome(lambda hz=hz: read_rates(path, "rad/s", hz))
+    outcomes["increments"] = data = outcome(lambda: read_increments(path))
+    inertial = outcome(lambda: strapgen.read_inertial(path))
+    for backend in (strapgen.backend("euler", "rk4", 1, name) for name in ("numpy", "c-fixed32")):
+        for pulse in (None, 1e-6, 1e-306):
+            if isinstance(data, Recording):
+                run = outcome(lambda b=backend, p=pulse: propagate(b, data, pulse=p))
+                outcomes[f"{backend.name} {pulse}"] = run
+        if isinstance(inertial, Recording):
+            options = {"fast_cycles": 2, "backend": backend.name}
+            outcomes[f"course {backend.name}"] = outcome(
+                lambda o=options: strapgen.course("dcm", inertial, **o)
+            )
+    for key, result in outcomes.items():
+        if isinstance(result, Recording):
+            assert np.isfinite(result.increments).all(), key
+        elif not isinstance(result, str):
+            assert np.isfinite(result.time).all() and np.isfinite(result.states).all(), key
+
+
+def test_rates_whose_integral_is_beyond_all_numbers_are_refused(write):
+    path = write([[repr(time), value, "0", "0"] for time, value in EXTREME["late"]])
+    with pytest.raises(InputError, match=r"the integral of a rate is beyond the range of double$"):
+        read_rates(path, "rad/s")

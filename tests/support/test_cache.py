@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -108,6 +109,15 @@ def test_draft_of_a_killed_process_is_never_read(root):
         place = cache.entry("kind", "key", write("file", "whole"))
         assert (place / "file").read_text() == "whole"
         assert at_work.is_dir()
+    assert names(root / "kind") == ["key"]
+
+
+def test_draft_of_a_killed_process_is_removed_though_another_one_made_the_entry(root):
+    place = cache.entry("kind", "key", write("file"))
+    killed = root / "kind" / ".filling-01234567"
+    killed.mkdir()
+    cache._tidied.clear()  # as in a new process
+    assert cache.entry("kind", "key", never) == place
     assert names(root / "kind") == ["key"]
 
 
@@ -323,6 +333,67 @@ def test_the_home_folder_may_be_written_as_a_tilde(monkeypatch, tmp_path):
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.setenv("STRAPGEN_CACHE_DIR", "~/kept")
     assert cache.root() == tmp_path / "kept"
+
+
+@pytest.mark.parametrize("times", [1, 4, 5])
+def test_work_whose_entry_another_process_removes_begins_again(root, times):
+    """The clock of the other one may be wrong, so that every entry is of long ago."""
+    left = [times]
+
+    def work() -> bytes:
+        place = cache.entry("kind", "key", write("file", "content"))
+        if left[0]:
+            left[0] -= 1
+            shutil.rmtree(place)
+        return cache.read(place, "file")
+
+    if times < 5:
+        assert cache.persistently(work) == b"content"
+    else:
+        with pytest.raises(FileNotFoundError):
+            cache.persistently(work)
+
+
+@pytest.mark.parametrize("times", [1, 4, 5])
+def test_an_entry_that_another_process_removes_at_once_is_made_again(root, times, monkeypatch):
+    left, is_whole = [times], cache._is_whole
+
+    def look(place: Path) -> bool:
+        if left[0] and place.is_dir():
+            left[0] -= 1
+            shutil.rmtree(place)
+        return is_whole(place)
+
+    monkeypatch.setattr(cache, "_is_whole", look)
+    if times < 5:
+        assert (cache.entry("kind", "key", write("file")) / "file").is_file()
+    else:
+        with pytest.raises(InputError, match=r"^cache entry .* cannot be made; remove it$"):
+            cache.entry("kind", "key", write("file"))
+
+
+@pytest.mark.parametrize("kind", ["programs", "sources", "builds"])
+def test_what_others_remove_while_it_is_read_is_made_again(kind, root, monkeypatch):
+    for name in ("_loaded", "_modules"):
+        monkeypatch.setattr(compiler, name, {})
+    monkeypatch.setattr(generated_sources, "_programs", {})
+    looked_up, removed = cache.lookup, []
+
+    def lookup(of_kind: str, key: str) -> Path | None:
+        place = looked_up(of_kind, key)
+        if place is not None and of_kind == kind and not removed:
+            shutil.rmtree(place)
+            removed.append(place)
+        return place
+
+    compiler.load(generated_sources.sources(choose("euler-product"), "c"))
+    monkeypatch.setattr(generated_sources, "_programs", {})
+    for name in ("_loaded", "_modules"):
+        monkeypatch.setattr(compiler, name, {})
+    monkeypatch.setattr(cache, "lookup", lookup)
+    generated_sources.program(choose("euler-product"))
+    assert compiler.load(generated_sources.sources(choose("euler-product"), "c")).lib.euler_product
+    assert len(removed) == 1
 
 
 # Who may write there

@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -100,6 +101,17 @@ def test_a_draft_that_another_process_takes_at_once_is_made_again(tmp_path, monk
     monkeypatch.setattr(drafts, "_locked", lambda place: answers.pop() if answers else locked(place))
     with drafts.draft_folder(tmp_path, ".draft-") as place:
         assert list(tmp_path.iterdir()) == [place]
+
+
+def test_a_temporary_folder_of_a_killed_process_is_removed_by_the_next_one(tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    (tmp_path / "strapgen-work-01234567" / "deep").mkdir(parents=True)
+    (tmp_path / "strapgen-work-mine").mkdir()
+    with drafts.temporary_folder() as place:
+        assert sorted(tmp_path.iterdir()) == sorted([place, tmp_path / "strapgen-work-mine"])
+        with drafts.temporary_folder() as other:
+            assert place.is_dir() and other != place
+    assert list(tmp_path.iterdir()) == [tmp_path / "strapgen-work-mine"]
 
 
 def test_a_busy_folder_is_an_error_and_no_endless_loop(tmp_path, monkeypatch):

@@ -13,6 +13,7 @@ from strapgen.ir.fixed_settings import DEFAULT_ALLOWANCE
 from strapgen.support.exceptions import InputError
 
 
+@np.errstate(all="ignore")  # numbers that overflow are refused, in one line
 def integers(argument: Argument, values: Any, kernel: str) -> Array:
     """Return numbers as the integers of an input, rounded to the nearest.
 

@@ -61,6 +61,7 @@ def windows(increments: Any, count: int, previous: int = 0) -> NDArray[np.float6
     return np.ascontiguousarray(np.moveaxis(overlapping, -1, 1))
 
 
+@np.errstate(all="ignore")  # angles that overflow are refused, in one line
 def pulses(increments: Any, size: float | str | Fraction, previous: int = 0) -> NDArray[np.float64]:
     """Return increments as a gyro that counts pulses measures them.
 
@@ -142,6 +143,7 @@ class StepWindows:
         self._tail = row[len(row) - self._previous :].copy()
         return windows(row, self._count, self._previous)
 
+    @np.errstate(all="ignore")  # angles that overflow are refused, in one line
     def _quantized(self, row: NDArray[np.float64], pulse: float) -> NDArray[np.float64]:
         angles = np.cumsum(np.concatenate([self._angle, row]), axis=0)
         self._angle = angles[-1:]

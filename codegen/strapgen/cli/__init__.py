@@ -63,6 +63,9 @@ COMMANDS: dict[str, dict[str, Any]] = {
     "Reproduce": {"tables": tables.tables, "rate-table": rate_table.rate_table, "study": study.app},
 }
 
+#: Most characters of a word that a message repeats, what is left of a longer one, and most characters of a message.
+_LONGEST_WORD, _CUT, _LONGEST_LINE = 300, 60, 2000
+
 
 class _Strapgen(PlainGroup):
     """The program itself."""
@@ -103,7 +106,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except BrokenPipeError:  # the reader has gone, as `head` does
         _drop_output()
         sys.exit(1)
-    except OSError as error:  # the files that are asked for have errors of their own
+    except OSError as error:
+        if error.filename is not None:  # a name that no file can have
+            _fail(f"{error.filename} cannot be used ({error.strerror})")
         _drop_output()
         _fail(f"the output cannot be written ({error.strerror or error})")
     except MemoryError:
@@ -125,7 +130,8 @@ def _drop_output() -> None:
 
 
 def _fail(message: str) -> None:
-    sys.stderr.write(f"strapgen: {' '.join(message.split())}\n")
+    line = " ".join(word if len(word) <= _LONGEST_WORD else f"{word[:_CUT]}..." for word in message.split())
+    sys.stderr.write(f"strapgen: {line if len(line) <= _LONGEST_LINE else line[:_LONGEST_LINE] + '...'}\n")
     sys.exit(2)
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from strapgen.evidence.subjects import Subject
 from strapgen.evidence.verdicts import Verdict
 from strapgen.support import checks
+from strapgen.support.processes import end_with_parent
 
 #: The checks by the names that ``--tool`` takes: the module and its function, which takes a subject and the folder for
 #: its files and returns a list of verdicts.
@@ -19,6 +20,8 @@ CHECKS: dict[str, tuple[str, str]] = {
     "eva": ("strapgen.evidence.overflow.eva", "prove"),
     "z3": ("strapgen.evidence.overflow.solver", "prove"),
     "gappa": ("strapgen.evidence.gappa", "check"),
+    "coq": ("strapgen.evidence.coq_proof", "check"),
+    "balls": ("strapgen.evidence.actual_errors", "check"),
     "processors": ("strapgen.evidence.same_bits", "same_bits"),
     "million-steps": ("strapgen.evidence.long_run", "million_steps"),
     "style": ("strapgen.evidence.style", "style"),
@@ -51,7 +54,7 @@ def collect(subjects: Sequence[Subject], folder: Path, tools: Sequence[str] = ()
         checks.choice("tool", tool, CHECKS)
     for subject in subjects:
         subject.sources  # noqa: B018 - one line of refusal before any work, and once for all processes
-    with ProcessPoolExecutor(os.cpu_count(), get_context("spawn")) as pool:
+    with ProcessPoolExecutor(os.cpu_count(), get_context("spawn"), end_with_parent) as pool:
         tasks = [
             pool.submit(_examined, tool, subject, folder / subject.name)
             for tool in tools or CHECKS

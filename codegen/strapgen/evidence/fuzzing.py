@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import subprocess
-import tempfile
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
@@ -12,6 +11,7 @@ from pathlib import Path
 from strapgen.evidence.subjects import Subject
 from strapgen.evidence.verdicts import Result, Tool, Verdict, verdict
 from strapgen.ir.sources import Sources
+from strapgen.support.drafts import temporary_folder
 from strapgen.support.files import write_files
 from strapgen.targets.fuzz_c.emit import driver_files, driver_name
 
@@ -113,12 +113,12 @@ class _LibFuzzer(Tool):
 
 @cache
 def _links() -> bool:
-    with tempfile.TemporaryDirectory() as name:
+    with temporary_folder() as folder:
         text = "int LLVMFuzzerTestOneInput(const unsigned char *data, unsigned long size);\n"
         text += "int LLVMFuzzerTestOneInput(const unsigned char *data, unsigned long size)\n"
-        (Path(name) / "empty.c").write_text(f"{text}{{\n    return (data != 0) && (size > 9u) && 0;\n}}\n")
+        (folder / "empty.c").write_text(f"{text}{{\n    return (data != 0) && (size > 9u) && 0;\n}}\n")
         done = subprocess.run(
-            ["clang", *_FLAGS, "empty.c", "-o", _PROGRAM], cwd=name, capture_output=True, check=False
+            ["clang", *_FLAGS, "empty.c", "-o", _PROGRAM], cwd=folder, capture_output=True, check=False
         )
         return done.returncode == 0
 

@@ -15,15 +15,13 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from strapgen.catalogue import choose
+from strapgen.evidence.balls import ball, column_of, multiplied, outcome
 from strapgen.evidence.motion_rows import motion_rows
 from strapgen.evidence.same_bits import Draws, tool_of
 from strapgen.evidence.subjects import Subject
 from strapgen.evidence.verdicts import Result, Tool, Verdict, verdict
 from strapgen.ir.fixed_settings import Settings
-from strapgen.ir.program import Program
 from strapgen.library import generated_sources
 from strapgen.support.exceptions import CompilerError
 from strapgen.support.files import write_files
@@ -155,17 +153,10 @@ def exact_states(subject: Subject, run: LongRun) -> list[list[Any]]:
         state, states = [ball(word * units[0]) for word in run.identity], []
         for _ in range(run.passes):
             rows = [next(integers) for _ in run.rows]
-            columns = [_column(column) * ball(units[1]) for column in zip(*rows, strict=True)]
-            turns = _outcome(transition, columns)
-            while len(turns[0]) > 1:
-                odd = len(turns[0]) % 2
-                pairs = [[column[k : len(column) - odd : 2] for column in turns] for k in (0, 1)]
-                last = [column[len(column) - odd :] for column in turns]
-                turns = [
-                    np.concatenate(parts)
-                    for parts in zip(_outcome(product, [*pairs[0], *pairs[1]]), last, strict=True)
-                ]
-            state = _outcome(product, [*state, *(column[0] for column in turns)])
+            columns = [column_of(column) * ball(units[1]) for column in zip(*rows, strict=True)]
+            turns = outcome(transition, columns)
+            turns = multiplied(product, turns)
+            state = outcome(product, [*state, *turns])
             states.append(state)
     return states
 
@@ -176,29 +167,6 @@ def noisy_integers(run: LongRun) -> Iterator[list[int]]:
     for _ in range(run.passes):
         for row in run.rows:
             yield [value - run.noise + draws.draw() % width for value in row]
-
-
-def ball(number: Fraction) -> Any:
-    """Return a ball that holds a number."""
-    from flint import arb, fmpq
-
-    return arb(fmpq(number.numerator, number.denominator))
-
-
-def _column(integers: Sequence[int]) -> Any:
-    """Return integers as an array of balls: numpy's loops over objects call their operators."""
-    from flint import arb
-
-    column = np.empty(len(integers), object)
-    column[:] = [arb(value) for value in integers]
-    return column
-
-
-def _outcome(program: Program, values: Sequence[Any]) -> list[Any]:
-    """Return the elements of a program's only output, from those of its inputs in order."""
-    names = [name for signal in program.inputs for name in signal.elements]
-    (elements,) = program.run(dict(zip(names, values, strict=True)), ball).values()
-    return elements
 
 
 def compared(

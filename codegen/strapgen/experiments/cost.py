@@ -6,7 +6,6 @@ import math
 import re
 import shutil
 import subprocess
-import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -16,7 +15,7 @@ from strapgen import catalogue, fixedpoint
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Sources
 from strapgen.library import generated_sources
-from strapgen.support import checks
+from strapgen.support import checks, drafts
 from strapgen.support.exceptions import CompilerError, InputError
 from strapgen.targets import TARGETS
 from strapgen.toolchain import emulation
@@ -116,8 +115,7 @@ def cost(sources: Sources, cpu: str) -> Cost:
     if not TARGETS[sources.target].compiled:
         raise InputError(f"sources for {sources.target} are not in C, which cost measures")
     processor = PROCESSORS[cpu]
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
+    with drafts.temporary_folder() as folder:
         for file, text in sources.step_files.items():
             (folder / file).write_text(text)
         source = folder / next(file for file in sources.step_files if file.endswith(".c"))

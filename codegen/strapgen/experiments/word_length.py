@@ -6,7 +6,6 @@ import json
 import math
 import multiprocessing
 import os
-import signal
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, fields, replace
@@ -25,6 +24,7 @@ from strapgen.simulation.motions import Motion, motion
 from strapgen.simulation.runs import attitude, drift_between
 from strapgen.support import cache, checks
 from strapgen.support.exceptions import InputError
+from strapgen.support.processes import begin_worker
 
 #: Most cases of one study.
 _MOST_CASES = 5000
@@ -246,8 +246,11 @@ def run_case(case: Case) -> Outcome:
         )
 
     key = cache.digest([cache.generator_digest(), json.dumps(asdict(case), sort_keys=True)])
-    folder = cache.entry("studies", key, fill)
-    return Outcome(case, **json.loads(cache.read(folder, "outcome.json")))
+
+    def read() -> bytes:
+        return cache.read(cache.entry("studies", key, fill), "outcome.json")
+
+    return Outcome(case, **json.loads(cache.persistently(read)))
 
 
 def _run(case: Case) -> Outcome:
@@ -305,7 +308,7 @@ def run(planned: Sequence[Case], jobs: int | None = None) -> Iterator[Outcome]:
         return
     others = set(multiprocessing.active_children())
     # An interrupt reaches this process alone, which then stops the others.
-    pool = ProcessPoolExecutor(workers, initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN))
+    pool = ProcessPoolExecutor(workers, initializer=begin_worker)
     pending = [pool.submit(run_case, case) for case in planned]
     try:
         for done in as_completed(pending):

@@ -47,8 +47,12 @@ def program(choice: Choice) -> Program:
 
     key = cache.digest([cache.generator_digest(), choice.identity])
     if key not in _programs:
-        folder = cache.entry("programs", key, fill, f"program of {choice.kernel}")
-        _programs[key] = pickle.loads(cache.read(folder, "program.pickle"))
+
+        def read() -> bytes:
+            place = cache.entry("programs", key, fill, f"program of {choice.kernel}")
+            return cache.read(place, "program.pickle")
+
+        _programs[key] = pickle.loads(cache.persistently(read))
     return _programs[key]
 
 
@@ -100,8 +104,11 @@ def sources(
             naming.prefix or "",
         ]
     )
-    folder = cache.entry("sources", key, fill, f"sources of {choice.kernel} for {target}")
-    interface = json.loads(cache.read(folder, "interface.json"))
-    return Sources.restore(
-        interface, {name: cache.read(folder, name).decode() for name in interface["files"]}
-    )
+
+    def read() -> Sources:
+        folder = cache.entry("sources", key, fill, f"sources of {choice.kernel} for {target}")
+        interface = json.loads(cache.read(folder, "interface.json"))
+        files = {name: cache.read(folder, name).decode() for name in interface["files"]}
+        return Sources.restore(interface, files)
+
+    return cache.persistently(read)

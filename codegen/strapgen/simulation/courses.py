@@ -68,6 +68,7 @@ class NavigationFrame:
 RESTING = NavigationFrame()
 
 
+@np.errstate(all="ignore")  # numbers that overflow are refused, in one line
 def course(
     algorithm: str,
     recording: InertialRecording,

@@ -98,8 +98,8 @@ def parts(array: Array, overlap: int = 0) -> Iterator[tuple[int, Array]]:
 
 
 def largest_magnitude(array: Array) -> float:
-    """Return the largest magnitude of an element; 0 if there is none."""
-    return max(float(np.abs(part).max(initial=0.0)) for _, part in parts(array))
+    """Return the largest magnitude of an element; 0 if there is none, and no number if one is none."""
+    return float(np.max([np.abs(part).max(initial=0.0) for _, part in parts(array)]))
 
 
 class SampleIntervals:

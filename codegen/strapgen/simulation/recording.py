@@ -203,6 +203,7 @@ def _even_increments(path: Path, names: tuple[str, ...]) -> tuple[float, float, 
     return float(rows.time[0]) - interval, interval, rows.values
 
 
+@np.errstate(all="ignore")  # numbers that overflow are refused, in one line
 def read_rates(path: str | Path, unit: str, resample_hz: float | str | None = None) -> Recording:
     r"""Read a file of body rates and integrate them, with linear interpolation between samples.
 
@@ -243,11 +244,20 @@ def read_rates(path: str | Path, unit: str, resample_hz: float | str | None = No
     intervals, median = _checked_intervals(path, rows)
     if resample_hz is None:
         _require_even(path, intervals, median, lines, "resample_hz integrates them over an even grid")
-        return Recording(
-            float(time[0]), float((time[-1] - time[0]) / intervals.count), _integrals(rows, factor)
-        )
-    interval = 1 / float(checks.number("resample_hz", resample_hz, positive=True))
-    ratio = float((time[-1] - time[0]) / interval * (1 + 1e-12))
+        interval = float((time[-1] - time[0]) / intervals.count)
+        increments = _integrals(rows, factor)
+    else:
+        interval = 1 / float(checks.number("resample_hz", resample_hz, positive=True))
+        increments = _resampled(rows, factor, interval, _points(path, time, resample_hz, interval))
+    recording = Recording(float(time[0]), interval, increments)
+    if not math.isfinite(recording.largest):
+        raise InputError(f"{path}: the integral of a rate is beyond the range of double")
+    return recording
+
+
+def _points(path: Path, time: Array, resample_hz: float | str, interval: float) -> int:
+    """Return the number of intervals of an even grid over a recording."""
+    ratio = (float(time[-1]) - float(time[0])) / interval * (1 + 1e-12)
     if ratio > checks.MOST:
         raise InputError(f"resample_hz {resample_hz}: {path} would make over {checks.MOST:.0e} increments")
     count = math.floor(ratio)
@@ -255,7 +265,7 @@ def read_rates(path: str | Path, unit: str, resample_hz: float | str | None = No
         raise InputError(
             f"resample_hz {resample_hz}: {path} is {time[-1] - time[0]:.6g} s long, less than one interval"
         )
-    return Recording(float(time[0]), interval, _resampled(rows, factor, interval, count))
+    return count
 
 
 def _integrals(rows: RecordedRows, factor: float) -> Array:
@@ -294,6 +304,7 @@ def _resampled(rows: RecordedRows, factor: float, interval: float, count: int) -
     return increments.array()
 
 
+@np.errstate(all="ignore")  # numbers that overflow are refused, in one line
 def propagate(
     backend: Backend,
     recording: Recording,

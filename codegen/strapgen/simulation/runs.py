@@ -117,6 +117,7 @@ def require_finite(backend: Backend, states: Any, time: Array) -> None:
         )
 
 
+@np.errstate(all="ignore")  # numbers that overflow are refused, in one line
 def largest_increment(
     motion: Motion,
     step: float | str | Fraction,
@@ -162,6 +163,7 @@ def _increments(
     return StepWindows(read, samples, previous, pulse)
 
 
+@np.errstate(all="ignore")  # numbers that overflow are refused, in one line
 def simulate(
     backend: Backend,
     motion: Motion,

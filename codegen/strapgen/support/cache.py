@@ -28,6 +28,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
+from typing import TypeVar
 
 from strapgen.support import drafts, ownership, resources
 from strapgen.support.exceptions import InputError
@@ -40,8 +41,12 @@ _MANIFEST = "manifest.json"
 _DRAFT, _REMOVED = ".filling-", ".removed-"
 #: Beginning of the name of a folder that stands for a cache folder which others can write.
 _TEMPORARY = "strapgen-cache-"
+#: How often work is begun again whose entries others remove.
+_TRIALS = 5
 #: The number of folders that are the user's alone: the cache folder, that of a kind, that of an entry.
 _PRIVATE = 3
+
+Result = TypeVar("Result")
 
 
 def root() -> Path:
@@ -97,6 +102,11 @@ def lookup(kind: str, key: str) -> Path | None:
         As for `entry`.
     """
     place = _folder(create=False) / kind / key
+    if (
+        place.parent not in _tidied
+    ):  # once, since another process may have made the entry that a killed one began
+        _tidied.add(place.parent)
+        _tidy(place.parent)
     return place if _is_whole(place) else None
 
 
@@ -132,6 +142,16 @@ def entry(kind: str, key: str, fill: Callable[[Path], None], what: str = "") -> 
         if what:
             from_cache(what)
         return there
+    for _ in range(_TRIALS):  # another process, whose clock may be wrong, can remove it again
+        place = _filled(kind, key, fill)
+        if _is_whole(place):
+            _prune(place.parent)
+            return place
+    raise InputError(f"cache entry {place} cannot be made; remove it")
+
+
+def _filled(kind: str, key: str, fill: Callable[[Path], None]) -> Path:
+    """Fill an entry beside its place, and rename it there."""
     with ExitStack() as stack:
         try:
             place = _folder(create=True) / kind / key
@@ -149,10 +169,23 @@ def entry(kind: str, key: str, fill: Callable[[Path], None], what: str = "") -> 
                 draft.rename(place)
         except OSError as error:
             raise InputError(f"cache folder {root()} cannot be written ({error.strerror})") from error
-    if not _is_whole(place):
-        raise InputError(f"cache entry {place} cannot be made; remove it")
-    _prune(place.parent)
     return place
+
+
+def persistently(work: Callable[[], Result]) -> Result:
+    """Return what some work with entries returns; begin it again if another process removes one meanwhile.
+
+    A clock that was set wrong makes entries look as if nobody had used them for long.
+
+    Parameters
+    ----------
+    work : callable
+        It gets its entries by `entry` or `lookup`.
+    """
+    for _ in range(_TRIALS - 1):
+        with suppress(FileNotFoundError):
+            return work()
+    return work()
 
 
 def read(place: Path, name: str) -> bytes:
@@ -204,11 +237,13 @@ def _folder(create: bool) -> Path:
     place = nominal.resolve()
     if place in _replaced and _replaced[place].is_dir():
         return _replaced[place]
+    if not create and place in _private:  # every entry is checked from the root of the file system down
+        return place
     try:
         if create:
             _make_private(place)
         with ownership.private_folder(place):
-            pass
+            _private.add(place)
     except ForeignFileError as error:
         _replaced[place] = _temporary(nominal, error.reason)
         return _replaced[place]
@@ -220,6 +255,10 @@ def _folder(create: bool) -> Path:
 
 #: Temporary folders by the cache folders that they stand for; a process that is forked uses them too.
 _replaced: dict[Path, Path] = {}
+#: Cache folders that were the user's alone when they were looked at first.
+_private: set[Path] = set()
+#: Folders of a kind in which this process has looked for what others have left.
+_tidied: set[Path] = set()
 
 
 def _temporary(nominal: Path, reason: str) -> Path:
@@ -318,8 +357,7 @@ def _warn(reason: str) -> None:
 
 def _prune(folder: Path) -> None:
     """Remove entries that have not been used for long, and what processes that are gone have left."""
-    for gone in drafts.forgotten(folder, _DRAFT):
-        shutil.rmtree(gone, ignore_errors=True)
+    _tidy(folder)
     oldest = time.time() - _UNUSED_DAYS * 86400
     for path in folder.iterdir():
         with suppress(OSError):
@@ -327,3 +365,9 @@ def _prune(folder: Path) -> None:
                 not path.name.startswith(_DRAFT) and path.stat().st_mtime < oldest
             ):
                 shutil.rmtree(path, ignore_errors=True)
+
+
+def _tidy(folder: Path) -> None:
+    """Remove the drafts of processes that are gone."""
+    for gone in drafts.forgotten(folder, _DRAFT):
+        shutil.rmtree(gone, ignore_errors=True)

@@ -12,6 +12,7 @@ import re
 import secrets
 import shutil
 import stat
+import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -26,6 +27,8 @@ except ImportError:  # no POSIX system
 _FORGOTTEN = 3600
 #: Number of folders that are tried before the system counts as busy.
 _TRIALS = 20
+#: Beginning of the name of a temporary folder.
+_TEMPORARY = "strapgen-work-"
 _FOLDER = getattr(os, "O_DIRECTORY", 0) | getattr(os, "O_NOFOLLOW", 0)
 
 
@@ -103,6 +106,16 @@ def forgotten(parent: Path, prefix: str) -> Iterator[Path]:
                 yield place
             finally:
                 os.close(descriptor)
+
+
+@contextmanager
+def temporary_folder() -> Iterator[Path]:
+    """Make a private folder among the temporary ones that is gone after the block; see `draft_folder`."""
+    parent = Path(tempfile.gettempdir())
+    for gone in forgotten(parent, _TEMPORARY):
+        shutil.rmtree(gone, ignore_errors=True)
+    with draft_folder(parent, _TEMPORARY) as place:
+        yield place
 
 
 def _locked(place: Path) -> int | None:

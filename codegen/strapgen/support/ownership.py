@@ -63,17 +63,16 @@ class PrivateFolder:
         OSError
             If it cannot be opened.
         """
-        place = self.place / name
         if IS_CHECKED:
             descriptor = os.open(name, os.O_RDONLY | _READ, dir_fd=self._descriptor)
         else:
-            descriptor = os.open(place, os.O_RDONLY | _READ)
+            descriptor = os.open(self.place / name, os.O_RDONLY | _READ)
         try:
             status = os.fstat(descriptor)
             if not stat.S_ISREG(status.st_mode):
-                raise ForeignFileError(place, "is no ordinary file")
-            if IS_CHECKED:
-                _require_private(place, status)
+                raise ForeignFileError(self.place / name, "is no ordinary file")
+            if IS_CHECKED and (reason := _foreign(status)):
+                raise ForeignFileError(self.place / name, reason)
             yield descriptor
         finally:
             os.close(descriptor)
@@ -112,15 +111,16 @@ def private_folder(place: Path, parts: int = 1) -> Iterator[PrivateFolder]:
         return
     descriptor = os.open(place.anchor, _PASS)
     try:
-        here = Path(place.anchor)
-        _require_safe(here, os.fstat(descriptor))
-        for left, part in zip(range(len(place.parts) - 2, -1, -1), place.parts[1:], strict=True):
-            inner = os.open(part, _LIST if left == 0 else _PASS, dir_fd=descriptor)
+        reason, count = _unsafe(os.fstat(descriptor)), len(place.parts)
+        for number, part in enumerate(place.parts[1:], 2):
+            if reason:
+                raise ForeignFileError(Path(*place.parts[: number - 1]), reason)
+            inner = os.open(part, _LIST if number == count else _PASS, dir_fd=descriptor)
             os.close(descriptor)
             descriptor = inner
-            here /= part
-            status = os.fstat(descriptor)
-            (_require_private if left < parts else _require_safe)(here, status)
+            reason = (_foreign if number > count - parts else _unsafe)(os.fstat(descriptor))
+        if reason:
+            raise ForeignFileError(place, reason)
         yield PrivateFolder(place, descriptor)
     finally:
         os.close(descriptor)
@@ -140,18 +140,19 @@ def path_of(descriptor: int, place: Path) -> str:
     return str(place)
 
 
-def _require_private(place: Path, status: os.stat_result) -> None:
+def _foreign(status: os.stat_result) -> str:
+    """Return why a file or a folder is not the user's alone; "" if it is."""
     if status.st_uid != os.geteuid():
-        raise ForeignFileError(place, "belongs to another user")
-    if _others_write(status):
-        raise ForeignFileError(place, "can be written by other users")
+        return "belongs to another user"
+    return "can be written by other users" if _others_write(status) else ""
 
 
-def _require_safe(place: Path, status: os.stat_result) -> None:
+def _unsafe(status: os.stat_result) -> str:
+    """Return why others could replace what a folder holds; "" if they cannot."""
     if status.st_uid not in (0, os.geteuid()) and not _is_outside(status.st_uid):
-        raise ForeignFileError(place, "belongs to another user")
-    if _others_write(status) and not status.st_mode & stat.S_ISVTX:
-        raise ForeignFileError(place, "can be written by other users")
+        return "belongs to another user"
+    is_sticky = status.st_mode & stat.S_ISVTX
+    return "can be written by other users" if _others_write(status) and not is_sticky else ""
 
 
 def _others_write(status: os.stat_result) -> bool:

@@ -6,12 +6,12 @@ import re
 import shlex
 import shutil
 import subprocess
-import tempfile
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
 from strapgen.ir.sources import Sources
-from strapgen.support import cache
+from strapgen.support import cache, drafts
 from strapgen.toolchain.compiler import C_FLAGS, build_key, chosen_compiler, compiler
 
 #: Kind of cache entry that holds the size of object code, and its file.
@@ -45,7 +45,8 @@ def code_size(sources: Sources) -> int | None:
     key = build_key([sources], C_FLAGS)
     place = cache.lookup(_SIZES, key)
     if place is not None:
-        return int(cache.read(place, _SIZE))
+        with suppress(FileNotFoundError):  # another process has removed it meanwhile
+            return int(cache.read(place, _SIZE))
     size = _measured_size(sources, path, counter)
     if size is not None:
         cache.entry(_SIZES, key, partial(_note_size, size))
@@ -58,9 +59,9 @@ def _note_size(size: int, draft: Path) -> None:
 
 def _measured_size(sources: Sources, path: str, counter: str) -> int | None:
     """Return the size of compiled sources, measured by a program."""
-    with tempfile.TemporaryDirectory() as folder:
+    with drafts.temporary_folder() as folder:
         for name, text in sources.files.items():
-            (Path(folder) / name).write_text(text)
+            (folder / name).write_text(text)
         code = next(name for name in sources.files if name.endswith(".c"))
         command = [*shlex.split(chosen_compiler() or path), *C_FLAGS, "-c", code, "-o", "code.o"]
         if subprocess.run(command, cwd=folder, capture_output=True, check=False).returncode:

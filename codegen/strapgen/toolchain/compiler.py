@@ -42,10 +42,8 @@ _VISIBILITY = "-fvisibility=hidden"
 _flags: tuple[str, ...] = C_FLAGS
 #: Text after the headers. The wrappers of cffi only pass arguments on and are not worth optimizing.
 _UNOPTIMIZED = '#if defined(__GNUC__) && !defined(__clang__)\n#pragma GCC optimize ("O0")\n#endif\n'
-
 #: Kind of cache entry that says in which module of many a source was compiled.
 _SHARED = "shared"
-
 
 _loaded: dict[str, Any] = {}
 _modules: dict[Path, Any] = {}
@@ -198,10 +196,12 @@ def chosen_compiler() -> str:
 
 def _compiled(sources: Sources) -> Any:
     key = build_key([sources])
-    file = _shared(key) or _alone(sources, key)
-    if file not in _modules:
-        _modules[file] = _import_file(file)
-    return _modules[file]
+
+    def module() -> Any:
+        file = _shared(key) or _alone(sources, key)
+        return _modules.get(file) or _modules.setdefault(file, _import_file(file))
+
+    return cache.persistently(module)
 
 
 def _alone(sources: Sources, key: str) -> Path:

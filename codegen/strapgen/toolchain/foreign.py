@@ -10,7 +10,6 @@ import re
 import signal
 import subprocess
 import sys
-import tempfile
 from dataclasses import dataclass
 from itertools import dropwhile
 from pathlib import Path
@@ -19,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen.support import cache
+from strapgen.support import cache, drafts
 from strapgen.support.exceptions import CompilerError
 from strapgen.support.suggestions import suggestions
 from strapgen.support.timing import timed
@@ -76,8 +75,8 @@ def compile_foreign(source: ForeignSource) -> Path:
     """
     bridge = bridge_text(source)
     suffix = ".cpp" if source.is_cpp else ".c"
-    with tempfile.TemporaryDirectory() as folder:
-        text = Path(folder) / f"bridge{suffix}"
+    with drafts.temporary_folder() as folder:
+        text = folder / f"bridge{suffix}"
         text.write_text(bridge)
         preprocessed = _preprocessed(source, text)
     key = cache.digest([preprocessed, bridge, compiler.build_key([], _FLAGS), os.environ.get("CXX", "")])
@@ -115,16 +114,15 @@ def run_foreign(module: Path, identity: Any, rows: Any) -> ForeignRun:
     values = np.ascontiguousarray(rows, np.float64)
     start = np.ascontiguousarray(identity, np.float64)
     nothing = np.empty((0, start.size))
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
+    with drafts.temporary_folder() as folder:
         (folder / "input").write_bytes(values.tobytes())
         (folder / "identity").write_bytes(start.tobytes())
         command = [sys.executable, "-P", str(Path(__file__).with_name("foreign_runner.py"))]
         try:
             with cache.loadable(module) as (path, descriptor):
                 done = subprocess.run(
-                    [*command, path, name, str(len(values))],
-                    cwd=name,
+                    [*command, path, str(folder), str(len(values))],
+                    cwd=folder,
                     pass_fds=[] if path == str(module) else [descriptor],
                     stdin=subprocess.DEVNULL,
                     stdout=subprocess.DEVNULL,

@@ -26,6 +26,12 @@ FAULTS = {
     "weaker check": (f"{NAME}_out(e_s, INT32_C(1140850688))", f"{NAME}_out(e_s, INT32_C(2140850688))"),
 }
 
+#: One fault with the quick tests, all with the long ones.
+QUICK_FAULTS = [
+    pytest.param(fault, id=name, marks=() if name.startswith("removed") else pytest.mark.long)
+    for name, fault in FAULTS.items()
+]
+
 
 def faulty(subject, fault):
     """Return the files of a kernel with a fault in its C."""
@@ -36,7 +42,7 @@ def faulty(subject, fault):
 
 
 @needs_z3
-@pytest.mark.parametrize("fault", FAULTS.values(), ids=FAULTS)
+@pytest.mark.parametrize("fault", QUICK_FAULTS)
 def test_the_solver_notices(fault):
     """With a fault the solver's proof does not go through."""
     subject = Subject(RK1)
@@ -46,7 +52,7 @@ def test_the_solver_notices(fault):
 
 
 @needs_eva
-@pytest.mark.parametrize("fault", FAULTS.values(), ids=FAULTS)
+@pytest.mark.parametrize("fault", QUICK_FAULTS)
 def test_eva_notices(fault, tmp_path):
     """With a fault Eva raises an alarm where it raises none for what is printed."""
     subject = Subject(RK1)
@@ -66,17 +72,20 @@ def test_eva_proves(tmp_path):
 
 
 @needs_z3
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize(
+    "model", [MODEL, *(pytest.param(name, marks=pytest.mark.long) for name in MODELS if name != MODEL)]
+)
 @pytest.mark.parametrize(
     ("choice", "settings"),
     [
-        *((RK1, Settings(carry=carry)) for carry in CARRIES),
-        *((RK1, Settings(word=word)) for word in (16, 64)),
-        (RK1, Settings(rounding="truncation", state="q31")),
-        (Choice("euler-normalize"), None),
-        (Choice("euler-from-dcm"), Settings(rounding="truncation")),
+        *(pytest.param(RK1, Settings(carry=carry), id=f"{carry} carried") for carry in CARRIES),
+        *(pytest.param(RK1, Settings(word=word), id=f"{word} bits") for word in (16, 64)),
+        pytest.param(RK1, Settings(rounding="truncation", state="q31"), id="saturated"),
+        pytest.param(Choice("euler-normalize"), None, marks=pytest.mark.long, id="root to the nearest"),
+        pytest.param(
+            Choice("euler-from-dcm"), Settings(rounding="truncation"), marks=pytest.mark.long, id="quotients"
+        ),
     ],
-    ids=lambda value: str(value),
 )
 def test_the_solver_proves(choice, settings, model):
     """Words, rounding, error feedback, roots and quotients are followed."""

@@ -15,6 +15,7 @@ from strapgen.fixedpoint.runs.accumulation import StepErrors
 from strapgen.fixedpoint.runs.angle_accumulation import (
     _dual_rows,
     _matrix_angles,
+    _operation,
     _parameter_angles,
     _Sizes,
     _sizes,
@@ -150,6 +151,25 @@ def test_steps_are_proved_as_long_as_there_is_room_for_what_each_takes(errors, r
     assert angles.start == Fraction(15, 16)
     assert angles.proved_steps == int(room / lost)
     assert _steps(Fraction(-1), lost) == 0 == _steps(room, Fraction(0))
+
+
+def test_a_step_that_may_turn_by_more_than_a_twelfth_of_a_turn_has_no_bound():
+    """The sine of 1/2 is the largest for which a bound is worth anything."""
+    assert _parameter_angles(sizes(local=percent(25)), NOTHING, Fraction(0)).per_step > 0
+    with pytest.raises(ValueError):
+        _parameter_angles(sizes(local=percent(26)), NOTHING, Fraction(0))
+    with pytest.raises(ValueError):  # nor has one of which nothing may be left
+        _parameter_angles(sizes(transition=percent(99)), NOTHING, Fraction(0))
+
+
+def test_polynomials_add_subtract_and_negate():
+    one, other = {("s0",): Fraction(2)}, {("s0",): Fraction(2), ("t1",): Fraction(3)}
+    assert _operation("negate", [other]) == {("s0",): -2, ("t1",): -3}
+    assert _operation("add", [one, other]) == {("s0",): 4, ("t1",): 3}
+    assert _operation("subtract", [one, other]) == {("t1",): -3}
+    assert _operation("multiply", [one, other]) == {("s0", "s0"): 4, ("s0", "t1"): 6}
+    with pytest.raises(NotImplementedError):
+        _operation("sqrt", [one])
 
 
 # Matrices

@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 import math
 import re
+import warnings
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -106,7 +107,11 @@ def _parsed(source: str) -> ast.expr:
     try:
         if not _CHARACTERS.fullmatch(source):
             raise SyntaxError
-        return ast.parse(source.strip(), mode="eval").body
+        with warnings.catch_warnings():
+            warnings.simplefilter(
+                "ignore", SyntaxWarning
+            )  # what Python warns of is refused below, in one line
+            return ast.parse(source.strip(), mode="eval").body
     # What is nested too deeply is a MemoryError or a RecursionError, depending on the release of Python.
     except (SyntaxError, ValueError, MemoryError, RecursionError):
         raise _NotAllowedError('a number such as "9/44", "-0.5" or "(18-sqrt(21))/180" is needed') from None

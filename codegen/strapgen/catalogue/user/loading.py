@@ -68,9 +68,11 @@ def load(name: str, **options: Any) -> Kernel:
 
 def _of_file(name: str, options: dict[str, Any], texts: list[str]) -> Kernel:
     path = Path(os.path.realpath(name))  # which a circle of links does not stop
-    if not path.is_file():
-        raise InputError(f"algorithm {name} is no file; a Python file with a function {FUNCTION} is needed")
     try:
+        if not path.is_file():
+            raise InputError(
+                f"algorithm {name} is no file; a Python file with a function {FUNCTION} is needed"
+            )
         source = path.read_bytes()
     except OSError as error:
         raise InputError(f"algorithm {name} cannot be read ({error.strerror})") from None

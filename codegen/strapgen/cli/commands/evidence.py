@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -119,8 +118,10 @@ def _subjects(
 @contextlib.contextmanager
 def _folder(out: Path | None) -> Iterator[Path]:
     if out is None:
-        with tempfile.TemporaryDirectory(prefix="strapgen-") as name:
-            yield Path(name)
+        from strapgen.support.drafts import temporary_folder
+
+        with temporary_folder() as folder:
+            yield folder
         return
     yield out
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import subprocess
-import tempfile
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from pathlib import Path
 
 from pycparser import c_ast, c_parser
+
+from strapgen.support.drafts import temporary_folder
 
 _BITS = (8, 16, 32, 64)
 _STDINT = "\n".join(
@@ -53,8 +53,7 @@ class ParsedSource:
         return {node.decl.name: node for node in tree.ext if isinstance(node, c_ast.FuncDef)}
 
     def _preprocessed(self) -> str:
-        with tempfile.TemporaryDirectory(prefix="strapgen-") as name:
-            folder = Path(name)
+        with temporary_folder() as folder:
             for file, text in {**self._files, "stdint.h": _STDINT, "stddef.h": ""}.items():
                 (folder / file).write_text(text)
             macros = [f"-D{macro}=1" for macro in self._defined]

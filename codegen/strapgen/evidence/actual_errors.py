@@ -1,0 +1,299 @@
+"""Certifies in ball arithmetic how far single calls and runs in fixed point are from exact arithmetic.
+
+The integer model computes what the C computes; the exact program is evaluated in balls on the same integers.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import random
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from strapgen.backends.fixed import ModelEvaluator
+from strapgen.catalogue import choose
+from strapgen.evidence.balls import ball, column_of, multiplied, outcome, outcomes
+from strapgen.evidence.subjects import Subject
+from strapgen.evidence.verdicts import Result, Tool, Verdict, verdict
+from strapgen.experiments.vectors import MODEL, vectors_of_choice
+from strapgen.ir.angle_accumulation import AngleAccumulation
+from strapgen.ir.program import Program
+from strapgen.library import generated_sources
+from strapgen.support.exceptions import InputError
+
+#: Calls, and steps of a run; steps from one look at the state to the next.
+COUNT, BETWEEN = 10_000, 100
+#: Bits of balls, and the largest radius in units of the last place.
+PRECISION, LARGEST_RADIUS = 384, Fraction(1, 100)
+#: Bits of the balls of a run with orthonormalizations: there are no products to be grouped, and radii grow.
+_MORE_BITS = 8192
+#: Part of their range that the increments fill where no number of steps is proved to keep the state proper.
+_SMALL = Fraction(1, 128)
+#: Iterations from a matrix to the nearest rotation; each squares the distance.
+_ITERATIONS = 10
+#: The orthonormalization of a run of matrices, which keeps the nearest rotation.
+_OF_MATRICES = "dcm-orthonormalize-first-order"
+
+TOOL = Tool(
+    "FLINT", (), "python-flint from PyPI", lambda: importlib.metadata.version("python-flint"), ("flint",)
+)
+
+
+def check(subject: Subject, folder: Path) -> list[Verdict]:
+    """Compare calls, and a run of a step, with balls.
+
+    Parameters
+    ----------
+    subject : Subject
+    folder : Path
+        Nothing is written there.
+
+    Returns
+    -------
+    list of Verdict
+        The claim "error bound: 10000 calls", and for an attitude step "error bound: 10000 steps".
+    """
+    claims = {"calls": partial(_judged_calls, subject)}
+    if subject.fixed.interface.accumulation is not None:
+        claims["steps"] = partial(_judged_run, subject)
+    return [
+        verdict(subject.name, f"error bound: {COUNT} {what}", TOOL, judge) for what, judge in claims.items()
+    ]
+
+
+# Calls
+
+
+@dataclass(frozen=True)
+class CertifiedCalls:
+    """The largest errors of calls, and the largest radius of a ball, as parts of the bounds and of the last place.
+
+    Parameters
+    ----------
+    count : int
+        Calls that were not refused.
+    share : float
+        The largest error, as a part of its bound.
+    radius : float
+        The largest radius, in units of the last place.
+    """
+
+    count: int
+    share: float
+    radius: float
+
+
+def _judged_calls(subject: Subject) -> tuple[Result, str]:
+    calls = errors_of_calls(subject, COUNT)
+    result: Result = "agrees" if calls.share <= 1 and calls.radius < LARGEST_RADIUS else "fails"
+    if calls.radius >= LARGEST_RADIUS:
+        return result, "balls become too wide"
+    return result, f"{calls.count} of {COUNT} calls accepted, errors up to {calls.share:.3f} of the bound"
+
+
+def errors_of_calls(subject: Subject, count: int) -> CertifiedCalls:
+    """Return the largest errors of calls at corners of the ranges, near them and anywhere.
+
+    Parameters
+    ----------
+    subject : Subject
+    count : int
+        Number of calls; those that are refused do not count.
+    """
+    from flint import ctx
+
+    table = vectors_of_choice(subject.choice, "c-fixed", subject.settings, count)
+    rows = [row for row in table.rows if row.status == 0]
+    interface = subject.fixed.interface
+    share = radius = 0.0
+    with ctx.workprec(PRECISION):
+        values = [
+            column * ball(argument.unit)
+            for place, argument in enumerate(interface.inputs)
+            for column in map(column_of, zip(*(row.inputs[place] for row in rows), strict=True))
+        ]
+        for place, (argument, exact) in enumerate(
+            zip(interface.outputs, outcomes(subject.program, values), strict=True)
+        ):
+            columns = map(column_of, zip(*(row.outputs[place] for row in rows), strict=True))
+            for column, balls, bound in zip(columns, exact, argument.errors, strict=True):
+                apart = np.broadcast_to(column - balls / ball(argument.unit), len(rows))
+                radius = max(radius, *map(_radius, apart))
+                largest = max(abs(distance).upper() for distance in apart)
+                if largest > 0:
+                    share = max(
+                        share,
+                        float((largest * ball(argument.unit) / ball(bound)).upper()) if bound else np.inf,
+                    )
+    return CertifiedCalls(len(rows), share, radius)
+
+
+def _radius(number: Any) -> float:
+    return float(number.rad()) if number.is_finite() else np.inf
+
+
+# Runs
+
+
+@dataclass(frozen=True)
+class CertifiedRun:
+    """The largest angle from the exact attitude in a run, with its bound at the same step.
+
+    Parameters
+    ----------
+    steps, normalizations : int
+    angle, bound : float
+        In rad, where the angle is the largest part of the bound.
+    proper : bool
+        Whether the state stayed proper after every step.
+    """
+
+    steps: int
+    normalizations: int
+    angle: float
+    bound: float
+    proper: bool
+
+
+def _judged_run(subject: Subject) -> tuple[Result, str]:
+    angles = subject.fixed.interface.angle_accumulation
+    if angles is None:
+        return "not examined", "the header's bound of a run grows beyond all numbers"
+    try:
+        run = run_of(subject, angles, COUNT)
+    except InputError as error:
+        return "fails", str(error)
+    detail = f"{run.normalizations} normalizations, {run.angle:.3g} rad, the bound is {run.bound:.3g} rad"
+    if not run.proper:
+        return "fails", f"{detail}, but the state does not stay proper"
+    return "agrees" if run.angle <= run.bound else "fails", detail
+
+
+def run_of(subject: Subject, angles: AngleAccumulation, steps: int, seed: int = 1) -> CertifiedRun:
+    """Return how far a run of random increments turns from the exact one.
+
+    Where the state is proved to stay proper for some steps, the increments fill their range and the state is normalized
+    as often as that; elsewhere they are small.
+
+    Parameters
+    ----------
+    subject : Subject
+        A step.
+    angles : AngleAccumulation
+        Its bound.
+    steps : int
+    seed : int, optional
+
+    Raises
+    ------
+    InputError
+        If a step is refused.
+    """
+    model, beside = _models(subject)
+    state, samples = subject.fixed.interface.inputs
+    stream, every = random.Random(seed), angles.proved_steps
+    between = every if every and len(state.signal.shape) == 2 else BETWEEN
+    limit = samples.high if every else int(samples.high * _SMALL)
+    increments = [[stream.randint(-limit, limit) for _ in range(samples.signal.size)] for _ in range(steps)]
+    identity = subject.program.companions.identity if subject.program.companions else ()
+    words, count, worst, proper = [int(one / state.unit) for one in identity], 0, (0.0, 1.0), True
+    feedback = [entry.fresh for entry in subject.fixed.interface.residuals]
+    exact = _exact_states(subject, increments, between, beside if between == every else None)
+    for step, row in enumerate(increments, 1):
+        results = model(words, row, *([feedback] if feedback else []))
+        words, feedback = [*results[0]], [*results[1]] if feedback else []
+        proper = proper and _is_proper([float(word * state.unit) for word in words], angles)
+        if every and step % every == 0:
+            words, count = [*beside.model(words)[0]], count + 1
+        if step % between == 0:
+            angle = angle_between([ball(word * state.unit) for word in words], next(exact))
+            bound = angles.bound(step, count, beside.error)
+            worst = max(worst, (angle, bound), key=lambda pair: pair[0] / pair[1])
+    return CertifiedRun(steps, count, *worst, proper)
+
+
+@dataclass(frozen=True)
+class _Normalization:
+    """The kernel that normalizes a state: its integer model, its program, and the error of an element."""
+
+    model: Any
+    program: Program
+    error: Fraction
+
+
+def _models(subject: Subject) -> tuple[Any, _Normalization]:
+    """Return the function of a step on integers, and its normalization."""
+    kernels = subject.program.companions
+    assert kernels is not None
+    matrix = len(subject.program.inputs[0].shape) == 2
+    name = _OF_MATRICES if matrix else str(kernels.orthonormalize)
+    beside = Subject(choose(name), subject.fixed.interface.companion_settings)
+    step, normalize = (
+        ModelEvaluator(generated_sources.sources(part.choice, MODEL, part.settings)).step
+        for part in (subject, beside)
+    )
+    return step, _Normalization(normalize, beside.program, max(beside.fixed.interface.outputs[0].errors))
+
+
+def _exact_states(
+    subject: Subject, increments: Sequence[Sequence[int]], between: int, beside: _Normalization | None
+) -> Iterator[list[Any]]:
+    """Yield the exact state after every block of steps; with a normalization, after that."""
+    from flint import ctx
+
+    samples = subject.fixed.interface.inputs[1]
+    kernels, transition = subject.program.companions, subject.program.transition_program()
+    assert kernels is not None
+    product = generated_sources.program(choose(str(kernels.product)))
+    exact = [ball(one) for one in kernels.identity]
+    for begin in range(0, len(increments) - between + 1, between):
+        rows = increments[begin : begin + between]
+        with ctx.workprec(_MORE_BITS if beside else PRECISION):
+            columns = [column_of(column) * ball(samples.unit) for column in zip(*rows, strict=True)]
+            exact = outcome(product, [*exact, *multiplied(product, outcome(transition, columns))])
+            if beside:
+                exact = outcome(beside.program, exact)
+        yield exact
+
+
+def angle_between(state: Sequence[Any], exact: Sequence[Any]) -> float:
+    """Return an upper end of the angle between two attitudes, in rad.
+
+    Parameters
+    ----------
+    state, exact : sequence of arb
+        Four parameters of any length and sign, or the elements of matrices, which stand for the nearest rotations.
+    """
+    from flint import arb, arb_mat, ctx
+
+    with ctx.workprec(PRECISION):
+        if len(state) == 4:
+            dot = sum(x * y for x, y in zip(state, exact, strict=True))
+            lengths = sum(x * x for x in state) * sum(y * y for y in exact)
+            sine = ((lengths - dot * dot) / lengths).nonnegative_part().sqrt()
+            return float((2 * sine.asin()).upper())
+        first, second = (_nearest_rotation(arb_mat(3, 3, [*elements])) for elements in (state, exact))
+        apart = sum((x * x for x in (first - second).entries()), arb(0))
+        return float((2 * (apart / 8).sqrt().asin()).upper())
+
+
+def _nearest_rotation(matrix: Any) -> Any:
+    """Return the rotation nearest to a matrix, by Newton's iteration."""
+    for _ in range(_ITERATIONS):
+        matrix = (matrix + matrix.inv().transpose()) / 2
+    return matrix
+
+
+def _is_proper(values: Sequence[float], angles: AngleAccumulation) -> bool:
+    """Tell whether a state is so near a proper one that the bound holds."""
+    shortest = float(angles.shortest)
+    if len(values) == 4:
+        return float(np.linalg.norm(values)) >= shortest
+    singular = np.linalg.svd(np.reshape(values, (3, 3)), compute_uv=False)
+    return bool(singular[-1] >= shortest and singular[0] <= np.sqrt(2 - shortest**2))

@@ -1,0 +1,65 @@
+"""Coq checks Gappa's proof of an error bound, its identities included."""
+
+from __future__ import annotations
+
+import pytest
+from derived import quantized
+
+from strapgen.catalogue import choose, choose_step
+from strapgen.evidence import coq_proof
+from strapgen.evidence.gappa_fixed import fixed_script
+from strapgen.evidence.gappa_scripts import Script
+from strapgen.evidence.subjects import Subject
+from strapgen.ir.fixed_settings import Settings
+
+pytestmark = pytest.mark.skipif(not coq_proof.TOOL.installed(), reason="coqc or gappa is not installed")
+
+
+def script(name: str = "euler-product") -> Script:
+    return fixed_script(quantized(choose(name), Settings()))
+
+
+def test_a_product_of_quaternions_is_proved_from_the_axioms_of_real_numbers(tmp_path):
+    result, detail = coq_proof.checked(script(), tmp_path / "product.v")
+    assert (result, detail) == (
+        "proved",
+        "Gappa's proof and the 8 identities in it; axioms of the real numbers alone",
+    )
+    text = (tmp_path / "product.v").read_text()
+    assert "Hypothesis" not in text
+    assert text.startswith("(* Run: coqc product.v *)")
+
+
+def test_a_rule_that_is_no_identity_has_no_proof(tmp_path):
+    off = script()
+    off.rules += [f"{goal} -> 0;" for goal in off.goals]
+    result, detail = coq_proof.checked(off, tmp_path / "product.v")
+    assert result == "fails"
+    assert "field" in detail
+
+
+def test_a_smaller_bound_has_no_proof(tmp_path):
+    off = script()
+    off.goals = {goal: bound / 2 for goal, bound in off.goals.items()}
+    assert coq_proof.checked(off, tmp_path / "product.v") == ("fails", "Gappa finds no proof")
+
+
+def test_a_hypothesis_that_is_left_is_told():
+    text, count = coq_proof.without_hypotheses("Hypothesis a1 : r1 = r2.\nVariable x : R.\n")
+    assert (count, "Hypothesis" in text) == (1, False)
+    real = "ClassicalDedekindReals.sig_not_dec : forall P : Prop, {~ ~ P} + {~ P}"
+    assert coq_proof.strange_axioms(f"Axioms:\n{real}\na7 : (r1 = r2)%R\nClassical_Prop.classic\n") == ["a7"]
+    assert coq_proof.strange_axioms(f"Axioms:\n{real}\n") == []
+    assert coq_proof.strange_axioms("")
+
+
+@pytest.mark.parametrize("subject", [Subject(choose("euler-product")), Subject(choose_step("dcm", "rk4", 2))])
+def test_other_kernels_have_no_claim(subject, tmp_path):
+    assert coq_proof.check(subject, tmp_path) == []
+
+
+@pytest.mark.long
+def test_the_step_of_fourth_order_is_proved(tmp_path):
+    (verdict,) = coq_proof.check(Subject(choose_step("euler", "rk4", 2)), tmp_path)
+    assert verdict.result == "proved", verdict.detail
+    assert verdict.claim == "error bound: one step"

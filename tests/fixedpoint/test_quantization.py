@@ -1,0 +1,50 @@
+"""What is told of an output: its error, also where a value was taken as exact or saturates, and its range."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from fractions import Fraction
+from types import SimpleNamespace
+
+import pytest
+
+from strapgen.fixedpoint.quantities import Quantities
+from strapgen.fixedpoint.quantization import _errors, _output
+from strapgen.ir.integer_program import IntegerInput, IntegerSum, Term, Value
+from strapgen.ir.signals import Signal
+from strapgen.support.exceptions import InputError
+
+ZERO = Fraction(0)
+
+
+def value(name, low, high, *uses, error=Fraction(1, 100), **more) -> Value:
+    definition = IntegerSum(tuple(Term((use,), 1) for use in uses)) if uses else IntegerInput()
+    return Value(name, definition, 4, False, low, high, ZERO, error, 99, **more)
+
+
+def test_of_what_depends_on_a_reset_nothing_is_known_but_its_range_and_that_of_the_exact_value():
+    reset, between, after = value("r", -9, 9), value("m", -7, 7, "r"), value("y", -20, 12, "m")
+    other, saturated = value("z", -5, 5), replace(value("s", -5, 5), saturated=True)
+    context = SimpleNamespace(resets={"r"}, body=[reset, between, after, other, saturated])
+    signal = Signal("out", (3,), ("y", "z", "s"), bound=Fraction(3, 2))
+    told = _errors(context, signal, [after, other, saturated])
+    # The exact one is at 3/2 and the computed one at -20/16; what saturates may lack a unit, and more if it is inexact.
+    assert told == (Fraction(3, 2) + Fraction(20, 16), Fraction(1, 100), Fraction(1, 16))
+    assert _errors(context, signal, [replace(saturated, error=Fraction(1, 3))]) == (Fraction(1, 3),)
+
+
+def test_an_output_has_the_range_of_all_of_its_elements_and_one_format():
+    first, second = value("y", -20, 5), value("z", -3, 12)
+    context = SimpleNamespace(
+        resets=set(),
+        body=[first, second],
+        values={"y": first, "z": second},
+        word=8,
+        quantities=Quantities({}, {"out": ("y", Fraction(1), "z")}),
+    )
+    signal = Signal("out", (2,), ("o_1", "o_2"))
+    argument = _output(context, signal)
+    assert (argument.low, argument.high, argument.format.fraction) == (-20, 12, 4)
+    context.values["z"] = replace(second, fraction=5)
+    with pytest.raises(InputError, match="elements of out share one format"):
+        _output(context, signal)
