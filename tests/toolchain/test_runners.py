@@ -42,7 +42,7 @@ def test_a_program_that_does_not_end_is_stopped(monkeypatch, tmp_path):
 
 def test_a_program_that_does_not_compile_is_told_with_its_error(tmp_path):
     (tmp_path / "program.c").write_text("int main(void)\n{\n    return missing;\n}\n")
-    with pytest.raises(CompilerError, match=r"cc failed: .*'missing' undeclared"):
+    with pytest.raises(CompilerError, match=r"cc failed: .*missing.* undeclared"):
         HOST.run(tmp_path, ["program.c"])
 
 

@@ -15,7 +15,7 @@ from strapgen.toolchain import bare_metal
 from strapgen.toolchain.processors import PROCESSORS, Processor
 
 #: Longest time in s of a run.
-_PATIENCE = 120
+_PATIENCE = 300
 #: Flags of the compiler for all.
 _FLAGS = ("-std=c99", "-O2", "-ffp-contract=off")
 #: QEMU answers a program that reports by semihosting, on its standard output.
