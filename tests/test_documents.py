@@ -288,7 +288,7 @@ def test_a_command_of_a_page(command, workplace, capsys):
     if compiler is not None and shutil.which(compiler[1]) is None:
         pytest.skip(f"{compiler[1]} is not on this machine")
     if command.startswith("strapgen evidence"):  # one tool will do: make evidence runs them all
-        command += " --tool eva"
+        command += " --tool z3"
     run(command, capsys)
 
 

@@ -20,10 +20,9 @@ static inline int cayley_klein_rk4_2_w32_out(int32_t x, int32_t limit)
 #endif
 }
 
+/* The exact product of two words. */
 #if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
-/* The exact product of two words. These processors have no instruction for it: the high word takes
- * four products of half words.
- */
+/* These processors have no instruction for it: the high word takes four products of half words. */
 static __attribute__((noinline)) int64_t cayley_klein_rk4_2_w32_mul(int32_t a, int32_t b)
 {
     const uint32_t a_low = (uint32_t)a & 0xFFFFu;
@@ -40,25 +39,22 @@ static __attribute__((noinline)) int64_t cayley_klein_rk4_2_w32_mul(int32_t a, i
     const uint64_t complement = UINT64_MAX - bits;
     return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)complement);
 }
-
-/* The exact square of a word. */
-static inline int64_t cayley_klein_rk4_2_w32_sqr(int32_t a)
-{
-    return cayley_klein_rk4_2_w32_mul(a, a);
-}
 #else
-/* The exact product of two words. */
 static inline int64_t cayley_klein_rk4_2_w32_mul(int32_t a, int32_t b)
 {
     return (int64_t)a * (int64_t)b;
 }
+#endif
 
 /* The exact square of a word. */
 static inline int64_t cayley_klein_rk4_2_w32_sqr(int32_t a)
 {
+#if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
+    return cayley_klein_rk4_2_w32_mul(a, a);
+#else
     return (int64_t)a * (int64_t)a;
-}
 #endif
+}
 
 /* x / 2^n, rounded down, where the proof of the ranges shows that it fits into a word: then the
  * 32 bits of x from bit n on, read as a number with a sign, are that quotient. For n above 32 the

@@ -19,10 +19,9 @@ static inline int sculling_fast_2_w32_out(int32_t x, int32_t limit)
 #endif
 }
 
+/* The exact product of two words. */
 #if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
-/* The exact product of two words. These processors have no instruction for it: the high word takes
- * four products of half words.
- */
+/* These processors have no instruction for it: the high word takes four products of half words. */
 static __attribute__((noinline)) int64_t sculling_fast_2_w32_mul(int32_t a, int32_t b)
 {
     const uint32_t a_low = (uint32_t)a & 0xFFFFu;
@@ -40,7 +39,6 @@ static __attribute__((noinline)) int64_t sculling_fast_2_w32_mul(int32_t a, int3
     return (bits <= (UINT64_MAX >> 1)) ? (int64_t)bits : (-1 - (int64_t)complement);
 }
 #else
-/* The exact product of two words. */
 static inline int64_t sculling_fast_2_w32_mul(int32_t a, int32_t b)
 {
     return (int64_t)a * (int64_t)b;

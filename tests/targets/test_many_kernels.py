@@ -33,11 +33,11 @@ def files(folder: str) -> list[Path]:
 def names_of_the_file(text: str) -> set[str]:
     """Return the names that a C source defines for itself: static functions, constants and types."""
     code = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
+    both = code.count(
+        "__attribute__((noinline))"
+    )  # a product has a form for some processors, and one for all others
     code = code.replace("__attribute__((noinline)) ", "")
     static = list(dict.fromkeys(re.findall(r"^static [^;{=]*?(\w+)\s*\(", code, re.MULTILINE)))
-    both = code.count(
-        "#if defined(__GNUC__)"
-    )  # a product has a form for some processors, and one for all others
     assert len(static) == len(re.findall(r"\bstatic\b", code)) - both
     constants = [
         name for body in re.findall(r"\benum\s*\{(.*?)\}", code) for name in re.findall(r"[A-Za-z_]\w*", body)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -108,7 +108,12 @@ def _reasons(verdicts: Sequence[Verdict]) -> list[str]:
             said.setdefault(f"{_promise(verdict)[1]}, {verdict.tool}: {verdict.detail}", {})[
                 verdict.kernel
             ] = None
-    return ["\n".join(f"- {text} ({', '.join(kernels)})" for text, kernels in said.items())] if said else []
+    every = {verdict.kernel for verdict in verdicts}
+
+    def named(kernels: Collection[str]) -> str:
+        return "all" if every == {*kernels} and len(every) > 1 else ", ".join(kernels)
+
+    return ["\n".join(f"- {text} ({named(kernels)})" for text, kernels in said.items())] if said else []
 
 
 def _data(verdicts: Sequence[Verdict]) -> list[dict[str, Any]]:

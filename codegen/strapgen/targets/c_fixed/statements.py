@@ -31,6 +31,13 @@ class StatementPrinter:
         self.places = {feedback.name: k for k, feedback in enumerate(fixed.interface.residuals)}
         self.checks = any(value.guarded for value in fixed.body)
         self.nearest = fixed.interface.settings.rounding == "nearest"
+        # A file that multiplies nothing else has no function for squares, whose text needs that for products.
+        self.has_products = any(
+            len({*term.names}) == 2 or (term.names and abs(term.factor) != 1)
+            for value in fixed.body
+            if isinstance(value.definition, IntegerSum)
+            for term in (*value.definition.fine, *value.definition.coarse)
+        )
         self.names = {value.name for value in fixed.body}
         self.names |= {name for argument in fixed.interface.inputs for name in argument.signal.elements}
 
@@ -231,7 +238,8 @@ class StatementPrinter:
             factors.append(self.constant(abs(term.factor)) + _exactly(term))
         if len(factors) == 2:
             first, second = factors
-            text = self._call("sqr", first) if first == second else self._call("mul", first, second)
+            square = first == second and self.has_products
+            text = self._call("sqr", first) if square else self._call("mul", first, second)
         else:
             (text,) = factors
             text = text if text in self.wide_names else f"({wide}){text}"
