@@ -116,7 +116,9 @@ def test_whole_catalogue_goes_to_a_folder_of_the_user(installed, tmp_path):
         return {
             path.relative_to(folder).as_posix(): path.read_bytes()
             for path in folder.rglob("*")
-            if path.is_file() and path.name != "COST.md" and "__pycache__" not in path.parts
+            if path.is_file()
+            and path.name not in ("COST.md", "EVIDENCE.md")
+            and "__pycache__" not in path.parts
         }
 
     assert contents(tmp_path / "generated") == contents(resources.folder("generated"))

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 
 from strapgen.evidence.verdicts import Verdict, failures
-from strapgen.reports.evidence import evidence_page, evidence_report, summary
+from strapgen.reports.evidence import evidence_page, evidence_report, summary, without_versions
 
 _ALARM = Verdict("dcm_w32", "no overflow: x86_64", "Frama-C Eva", "25.0", "fails", 1.25, "2 alarms")
 _PROOF = Verdict("dcm_w32", "no overflow: x86_64", "bitwuzla", "0.9", "proved", 3.0)
@@ -43,6 +44,9 @@ def test_the_page_has_a_table_for_each_promise_and_does_not_depend_on_times():
     assert "- x86_64, Frama-C Eva: 2 alarms (dcm_w32)" in page
     assert "- Frama-C Eva 25.0" in page
     assert "1.25" not in page
+    newer = evidence_page([replace(_ALARM, version="26.0"), _PROOF, _BITS, _MISSING], {"dcm_w32": "0123"})
+    assert newer != page
+    assert without_versions(newer) == without_versions(page)
 
 
 def test_the_summary_counts_results_by_claim_and_tool():

@@ -23,6 +23,9 @@ shows.
 """
 
 
+_VERSIONS = "## Versions"
+
+
 def evidence_report(verdicts: Sequence[Verdict]) -> Report:
     """Return verdicts as a report."""
     return Report(lambda: _text(verdicts), lambda: _data(verdicts), lambda: _table(verdicts))
@@ -45,8 +48,13 @@ def evidence_page(verdicts: Sequence[Verdict], digests: Mapping[str, str]) -> st
     files = TextTable([Column("kernel", "<"), Column("digest", "<")], [[*row] for row in digests.items()])
     parts += ["## What was examined", files.as_markdown()]
     versions = dict.fromkeys(f"{verdict.tool} {verdict.version}".strip() for verdict in verdicts)
-    parts += ["## Versions", "\n".join(f"- {version}" for version in sorted(versions))]
+    parts += [_VERSIONS, "\n".join(f"- {version}" for version in sorted(versions))]
     return "\n\n".join(part.strip("\n") for part in parts) + "\n"
+
+
+def without_versions(page: str) -> str:
+    """Return a page without the versions of the tools, which differ from machine to machine where the results do not."""
+    return page.partition(_VERSIONS)[0]
 
 
 def summary(verdicts: Sequence[Verdict]) -> TextTable:

@@ -63,7 +63,9 @@ def evidence(
     ] = None,
     check: Annotated[
         bool,
-        option("--check", help="Compare the page with its file; write nothing.", panel="Output"),
+        option(
+            "--check", help="Compare the page with its file, but for versions; write nothing.", panel="Output"
+        ),
     ] = False,
     format: Annotated[str, format_option(_FORMATS)] = "text",
 ) -> None:
@@ -135,12 +137,15 @@ def _status(verdicts: list[Verdict], complete: bool) -> int:
 
 
 def _page(page: Path, text: str, check: bool) -> int:
-    """Write the page, or return 1 if its file differs from it."""
+    """Write the page, or return 1 if its file differs from it, but for the versions of tools."""
+    from strapgen.reports.evidence import without_versions
     from strapgen.support.files import write_files
 
     if not check:
         write_files(Path(), {str(page): text})
         return 0
-    same = page.is_file() and page.read_text() == text
-    typer.echo(f"{page} is {'in step' if same else 'out of step'} with what the tools say", err=True)
+    written = page.read_text() if page.is_file() else ""
+    same = without_versions(written) == without_versions(text)
+    other = ", of other versions" if same and written != text else ""
+    typer.echo(f"{page} is {'in step' if same else 'out of step'} with what the tools{other} say", err=True)
     return int(not same)
