@@ -53,7 +53,7 @@ def evidence_page(verdicts: Sequence[Verdict], digests: Mapping[str, str]) -> st
 
 
 def without_versions(page: str) -> str:
-    """Return a page without the versions of the tools, which differ from machine to machine where the results do not."""
+    """Return a page without the versions of the tools, which differ between machines where the results do not."""
     return page.partition(_VERSIONS)[0]
 
 

@@ -1,0 +1,63 @@
+"""The command that collects evidence: its list, its page, and its exit status."""
+
+from __future__ import annotations
+
+import json
+import shlex
+
+import pytest
+
+from strapgen.cli import main
+from strapgen.evidence.overflow import eva
+
+needs_eva = pytest.mark.skipif(not eva.TOOL.installed(), reason=f"install {eva.TOOL.package}")
+
+
+def status(command: str) -> int:
+    with pytest.raises(SystemExit) as stop:
+        main(["evidence", *shlex.split(command)])
+    return stop.value.code
+
+
+@needs_eva
+def test_the_list_and_the_page_of_a_kernel(capsys, tmp_path):
+    page, folder = tmp_path / "page.md", tmp_path / "files"
+    command = f"euler-product --tool eva --page {page} --format json"
+    assert status(f"{command} --out {folder}") == 0
+    rows = json.loads(capsys.readouterr().out)
+    assert [row["kernel"] for row in rows] == ["euler_product_w32"] * 2
+    assert {row["claim"] for row in rows} == {"no overflow: 64-bit processor", "no overflow: 16-bit int"}
+    assert {(row["tool"], row["result"]) for row in rows} == {("Frama-C Eva", "proved")}
+    assert all(row["seconds"] > 0 and row["version"] for row in rows)
+    assert (folder / "euler_product_w32" / "euler_product_w32_eva.c").is_file()
+
+    assert status(f"{command} --check") == 0
+    assert "in step" in capsys.readouterr().err
+    text = page.read_text().replace("| proved, Frama-C Eva |", "| - |", 1)
+    page.write_text(text)
+    assert status(f"{command} --check") == 1
+    assert "out of step" in capsys.readouterr().err
+    assert page.read_text() == text
+
+
+def test_a_tool_that_is_missing_is_named_and_fails_where_all_must_be_there(capsys, monkeypatch):
+    monkeypatch.setenv("PATH", "")
+    assert status("euler-product --tool eva") == 0
+    assert "install frama-c-base" in capsys.readouterr().out
+    assert status("euler-product --tool eva --complete") == 1
+
+
+@pytest.mark.parametrize(
+    ("command", "line"),
+    [
+        ("", "a kernel is needed, or --all"),
+        ("euler --all", "--all examines the whole catalogue; euler does not go with it"),
+        ("euler --check", "--page is missing"),
+        ("euler --tool gapa", "did you mean gappa"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_one_line(command, line, capsys):
+    assert status(command) == 2
+    said = capsys.readouterr()
+    assert (said.out, said.err.count("\n")) == ("", 1)
+    assert line in said.err
