@@ -52,7 +52,7 @@ def exact_attitudes(
         caller sets the precision of mpmath to `exact.DIGITS`.
     """
     backend = ExactBackend.of_choice(choice)
-    samples, previous = backend.increments, backend.previous
+    samples, previous, ahead = backend.increments, backend.previous, backend.ahead
     increment, truth = interpreter(f"{motion.name}-increments"), interpreter(f"{motion.name}-truth")
     attitude = backend.attitude_in_digits()
 
@@ -61,10 +61,10 @@ def exact_attitudes(
         width = length / samples
         row = [
             increment([number((2 * k + 1) * width / 2)], [number(width)], *parameters)
-            for k in range(-previous, count * samples)
+            for k in range(-previous, count * samples + ahead)
         ]
         steps = (
-            [x for vector in row[k : k + previous + samples] for x in vector]
+            [x for vector in row[k : k + backend.samples] for x in vector]
             for k in range(0, count * samples, samples)
         )
         for place, state in enumerate(backend.states_in_digits(steps)):
