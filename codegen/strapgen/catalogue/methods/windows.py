@@ -107,6 +107,32 @@ WINDOWS: Mapping[str, Window] = _BUILT_IN
 #: The titles of their families.
 WINDOW_TITLES: Mapping[str, str] = _BUILT_IN.titles
 
+#: Ending of the name of a window whose rotation is exact, and the terms of its power series.
+EXACT, EXACT_TERMS = "-exact", 20
+
+
+def named_window(method: str | Window) -> Window | None:
+    """Return the window that a method is or names; None for the name of any other method.
+
+    Examples
+    --------
+    >>> named_window("window-7-7-exact").rotation, named_window("rk4")
+    ('exact', None)
+    """
+    if isinstance(method, Window):
+        return method
+    name = method.removesuffix(EXACT)
+    if name not in WINDOWS:
+        return None
+    return WINDOWS[name] if name == method else with_exact_rotation(WINDOWS[name])
+
+
+def with_exact_rotation(window: Window) -> Window:
+    """Return a window of the catalogue with the exact rotation of its polynomial."""
+    one_sided = tuple(with_exact_rotation(one) for one in window.one_sided)
+    name, title = f"{window.name}{EXACT}", f"{window.title}; exact rotation"
+    return replace(window, name=name, title=title, rotation="exact", terms=EXACT_TERMS, one_sided=one_sided)
+
 
 def read(path: str | Path) -> Window:
     """Read a family of filters from a file and check that every filter holds its conditions.
