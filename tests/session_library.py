@@ -39,7 +39,8 @@ FEWEST_TESTS = 1000
 _TOGETHER = 48
 
 _STEP = re.compile(
-    f"({'|'.join([*ALGORITHMS, *VECTORS])})-({'|'.join(METHODS)})-([0-9]+|rates)(?:-previous([0-9]))?"
+    f"({'|'.join([*ALGORITHMS, *VECTORS])})-({'|'.join(METHODS)})-([0-9]+|rates)"
+    "(?:-previous([0-9]+))?(?:-ahead([0-9]+))?"
 )
 
 
@@ -50,8 +51,9 @@ def choice_by_name(kernel: str) -> Choice | None:
     step = _STEP.fullmatch(kernel)
     if step is None:
         return None
-    name, method, count, previous = step.groups()
-    return Choice(name, method, None if count == "rates" else int(count), int(previous or 0))
+    name, method, count, previous, ahead = step.groups()
+    increments = None if count == "rates" else int(count)
+    return Choice(name, method, increments, int(previous or 0), int(ahead or 0))
 
 
 def line(sources: Sources) -> str | None:

@@ -53,6 +53,7 @@ def derive(
     *,
     rates: bool = False,
     previous: int = 0,
+    ahead: int = 0,
 ) -> Kernel:
     """Derive an algorithm exactly.
 
@@ -67,8 +68,8 @@ def derive(
         Angle increments a step, 1 to 8 (default 2), of an attitude algorithm.
     rates : bool, optional
         Whether the step takes the body rate at every node of its method, times the step length, in place of increments.
-    previous : int, optional
-        Increments before the step that it takes too, 0 to 3 (default 0): a fit of higher degree for a slow gyro.
+    previous, ahead : int, optional
+        Increments from before the step and from after it that it takes too, together at most 32 (default 0).
 
     Raises
     ------
@@ -84,8 +85,8 @@ def derive(
     """
     if not isinstance(algorithm, Choice):
         stages.require("derive", algorithm, str, os.PathLike, Choice)
-        algorithm = catalogue.choose(algorithm, method, increments, rates, previous)
-    elif (method, increments, rates, previous) != (None, None, False, 0):
+        algorithm = catalogue.choose(algorithm, method, increments, rates, previous, ahead)
+    elif (method, increments, rates, previous, ahead) != (None, None, False, 0, 0):
         raise InputError(f"the choice of {algorithm.kernel} is complete; derive takes it alone")
     with timed("derive", algorithm.kernel):
         return catalogue.derive(algorithm)

@@ -26,8 +26,8 @@ class Choice:
     increments : int, optional
         Increments of a step. A step of the catalogue without increments takes the body rate at every node of its
         method.
-    previous : int, optional
-        Number of increments from before the step that it takes in addition to its own.
+    previous, ahead : int, optional
+        Numbers of increments from before the step and from after it that it takes in addition to its own.
     user_kernel : Kernel, optional
         A user's kernel itself, with the kernels that it brings; None for one of the catalogue.
     """
@@ -36,6 +36,7 @@ class Choice:
     method: str | Tableau | None = None
     increments: int | None = None
     previous: int = 0
+    ahead: int = 0
     # Equality compares the kernels; the hash leaves them out, because most choices differ in name or numbers.
     user_kernel: Kernel | None = field(default=None, hash=False, repr=False)
 
@@ -44,8 +45,9 @@ class Choice:
         """Return the choice of a user's kernel: an attitude step, or a kernel that comes with one."""
         if kernel.companions is None:
             return cls(kernel.name, user_kernel=kernel)
-        previous = kernel.companions.previous
-        return cls(kernel.name, None, kernel.inputs[1].shape[0] - previous, previous, kernel)
+        previous, ahead = kernel.companions.previous, kernel.companions.ahead
+        increments = kernel.inputs[1].shape[0] - previous - ahead
+        return cls(kernel.name, None, increments, previous, ahead, kernel)
 
     @property
     def method_name(self) -> str | None:
@@ -58,7 +60,8 @@ class Choice:
         if self.method is None:
             return self.name
         before = f"-previous{self.previous}" if self.previous else ""
-        return f"{self.name}-{self.method_name}-{self.increments or 'rates'}{before}"
+        after = f"-ahead{self.ahead}" if self.ahead else ""
+        return f"{self.name}-{self.method_name}-{self.increments or 'rates'}{before}{after}"
 
     @cached_property
     def identity(self) -> str:

@@ -13,8 +13,8 @@ from strapgen.catalogue.names import (
     INTEGRATORS,
     KERNELS,
     METHODS,
+    MOST_BESIDE,
     MOST_INCREMENTS,
-    MOST_PREVIOUS,
     RESERVED,
     STANDARD_METHODS,
     VECTORS,
@@ -34,6 +34,7 @@ def choose(
     increments: int | None = None,
     rates: bool = False,
     previous: int = 0,
+    ahead: int = 0,
 ) -> Choice:
     """Check a choice of kernel and fill in the defaults: fourth order, two increments.
 
@@ -42,8 +43,10 @@ def choose(
     name : str
         A name of the catalogue, a user's Python file, or the entry point of one.
     method : str or Tableau, optional
-    increments, previous : int, optional
-        Increments in a step, and increments from before it that it takes in addition.
+    increments : int, optional
+        Increments in a step.
+    previous, ahead : int, optional
+        Increments from before the step and from after it that it takes in addition, together at most 32.
     rates : bool, optional
         Whether the step takes the rate at the nodes of its method in place of increments.
 
@@ -62,7 +65,7 @@ def choose(
     if not isinstance(name, str):
         raise InputTypeError(f"algorithm is {name!r}; a name or the path of a Python file is needed")
     if name.endswith(".py") or (name not in RESERVED and name in loading.installed()):
-        return _choose_users(name, method, increments, rates, previous)
+        return _choose_users(name, method, increments, rates, previous, ahead)
     if name not in RESERVED:
         shown = [kernel for kernel, recipe in KERNELS.items() if recipe.standard]
         names = [*_algorithms(), *VECTORS, *shown, *KERNELS]
@@ -73,6 +76,7 @@ def choose(
             "increments": increments,
             "rates": rates or None,
             "previous": previous or None,
+            "ahead": ahead or None,
         }
         for option, value in options.items():
             if value is not None:
@@ -88,20 +92,34 @@ def choose(
         checks.choice(f"method of {name}", method, VECTORS[name].methods)
     if not isinstance(method, Tableau):
         method = checks.choice("method", "rk4" if method is None else method, METHODS)
-    previous = checks.count("previous", previous, smallest=0, largest=MOST_PREVIOUS)
+    previous, ahead = _beside(previous, ahead)
     if rates:
-        if increments is not None or previous:
-            what = f"{increments} increments" if increments is not None else f"{previous} previous ones"
+        if increments is not None or previous or ahead:
+            beside = f"{previous} previous ones" if previous else f"{ahead} ahead"
+            what = f"{increments} increments" if increments is not None else beside
             raise InputError(f"a step takes increments or rates, not both (got {what} and rates)")
         if method in INTEGRATORS and not INTEGRATORS[method].takes_rates:
             raise InputError(f"method {method} takes increments; rates at nodes do not go with it")
         return Choice(name, method)
     increments = checks.count("increments", 2 if increments is None else increments, largest=MOST_INCREMENTS)
-    return Choice(name, method, increments, previous)
+    if ahead and method in INTEGRATORS and not INTEGRATORS[method].takes_ahead:
+        raise InputError(f"method {method} takes no increments ahead; --previous goes with it")
+    return Choice(name, method, increments, previous, ahead)
+
+
+def _beside(previous: int, ahead: int) -> tuple[int, int]:
+    """Check the numbers of increments from before a step and from after it."""
+    before = checks.count("previous", previous, smallest=0, largest=MOST_BESIDE)
+    after = checks.count("ahead", ahead, smallest=0, largest=MOST_BESIDE)
+    if before + after > MOST_BESIDE:
+        raise InputError(
+            f"previous {before} and ahead {after} are {before + after} together; at most {MOST_BESIDE} are allowed"
+        )
+    return before, after
 
 
 def _choose_users(
-    name: str, method: str | Tableau | None, increments: int | None, rates: bool, previous: int
+    name: str, method: str | Tableau | None, increments: int | None, rates: bool, previous: int, ahead: int
 ) -> Choice:
     """Load a user's algorithm with the options that the user chose."""
     if rates:
@@ -111,8 +129,7 @@ def _choose_users(
         options["method"] = method if isinstance(method, Tableau) else TABLEAUX[_tableau_name(method)]
     if increments is not None:
         options["increments"] = checks.count("increments", increments, largest=MOST_INCREMENTS)
-    if previous:
-        options["previous"] = checks.count("previous", previous, smallest=0, largest=MOST_PREVIOUS)
+    options |= {k: v for k, v in zip(("previous", "ahead"), _beside(previous, ahead), strict=True) if v}
     return Choice.of_user(loading.load(name, **options))
 
 
@@ -133,6 +150,7 @@ def choose_step(
     increments: int | None = None,
     rates: bool = False,
     previous: int = 0,
+    ahead: int = 0,
 ) -> Choice:
     """Check a choice of attitude step; parameters and errors are those of `choose`."""
     if name in KERNELS or name in VECTORS:
@@ -141,7 +159,7 @@ def choose_step(
         )
     if isinstance(name, str) and name not in ALGORITHMS and not name.endswith(".py"):
         checks.choice("algorithm", name, _algorithms(), _FILE)
-    return choose(name, method, increments, rates, previous)
+    return choose(name, method, increments, rates, previous, ahead)
 
 
 def standard() -> list[Choice]:

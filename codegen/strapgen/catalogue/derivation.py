@@ -45,7 +45,7 @@ def enough(method: str | Tableau) -> int:
     """
     loaded = _method(method)
     return next(
-        count for count in range(1, MOST_INCREMENTS + 1) if loaded.limit(count, 0) >= min(loaded.order, 10)
+        count for count in range(1, MOST_INCREMENTS + 1) if loaded.limit(count, 0, 0) >= min(loaded.order, 10)
     )
 
 
@@ -66,14 +66,15 @@ def derive(choice: Choice) -> Kernel:
         return kernel
     if choice.name in VECTORS:
         vector = VECTORS[choice.name]
-        derived: Kernel = getattr(import_module(f"{_PACKAGE}.kernels.{vector.module}"), vector.function)(
-            _method(choice.method), choice.increments, choice.previous
-        )
+        function = getattr(import_module(f"{_PACKAGE}.kernels.{vector.module}"), vector.function)
+        ahead = {"ahead": choice.ahead} if choice.ahead else {}
+        derived: Kernel = function(_method(choice.method), choice.increments, choice.previous, **ahead)
         return derived
     from strapgen.catalogue.kernels.attitude_step import step
     from strapgen.catalogue.kinematics import KINEMATICS
 
-    return step(KINEMATICS[choice.name], _method(choice.method), choice.increments, choice.previous)
+    method = _method(choice.method)
+    return step(KINEMATICS[choice.name], method, choice.increments, choice.previous, choice.ahead)
 
 
 def companion(kernel: Kernel, name: str) -> Kernel:

@@ -22,6 +22,7 @@ class Integrator(NamedTuple):
     order: int
     takes_rates: bool = True
     arguments: tuple[str, ...] = ()
+    takes_ahead: bool = True
 
 
 #: Integration methods that have no tableau.
@@ -38,7 +39,7 @@ INTEGRATORS = {
     },
     "munthe-kaas4": Integrator("Runge-Kutta-Munthe-Kaas method of order 4", "munthe_kaas", 4),
     "coning-compressed": Integrator(
-        "compressed coning coefficients, made for coning", "coning", 4, False, ("compressed",)
+        "compressed coning coefficients, made for coning", "coning", 4, False, ("compressed",), False
     ),
     "coning-uncompressed": Integrator(
         "uncompressed coning coefficients, made for polynomial rates",
@@ -46,6 +47,7 @@ INTEGRATORS = {
         4,
         False,
         ("uncompressed",),
+        False,
     ),
     "coning-combined": Integrator(
         "coning coefficients for both, with the terms of third and fourth order",
@@ -53,6 +55,7 @@ INTEGRATORS = {
         6,
         False,
         ("combined",),
+        False,
     ),
     "coning-polynomial": Integrator(
         "uncompressed coning coefficients, with the terms of third and fourth order",
@@ -60,6 +63,7 @@ INTEGRATORS = {
         6,
         False,
         ("polynomial",),
+        False,
     ),
 }
 
@@ -69,9 +73,9 @@ METHODS = {**TITLES, **{name: integrator.title for name, integrator in INTEGRATO
 #: Methods of the standard catalogue, which are those of the thesis.
 STANDARD_METHODS = ("rk1", "rk2", "rk3", "rk4")
 
-#: Largest number of angle increments in a step, and of increments from before the step that it can use.
+#: Largest number of angle increments in a step, and of increments beside them, from before the step and from after it.
 MOST_INCREMENTS = 8
-MOST_PREVIOUS = 3
+MOST_BESIDE = 32
 
 #: Motions with a closed-form attitude, and the unit of each of their parameters.
 MOTIONS = {

@@ -124,7 +124,15 @@ class MethodOptions:
         option(
             "--previous",
             metavar="N",
-            help="Number of increments from before the step that it uses as well, 0 to 3.  [default: 0]",
+            help="Number of increments from before the step that it uses as well, 0 to 32.  [default: 0]",
+        ),
+    ] = None
+    ahead: Annotated[
+        _Text,
+        option(
+            "--ahead",
+            metavar="N",
+            help="Number of increments from after the step that it uses as well, 0 to 32.  [default: 0]",
         ),
     ] = None
     rates: Annotated[
@@ -152,13 +160,14 @@ class MethodOptions:
         method = self.method if self.tableau is None else tableaux.read(self.tableau)
         choose = catalogue.choose_step if step else catalogue.choose
         one("--method", self.method)
-        count, before = whole("increments", self.increments), whole("previous", self.previous) or 0
+        count = whole("increments", self.increments)
+        before, after = whole("previous", self.previous) or 0, whole("ahead", self.ahead) or 0
         with waiting(f"deriving {algorithm}"):  # a user's code may take its time
-            return choose(algorithm, method, count, self.rates, before)
+            return choose(algorithm, method, count, self.rates, before, after)
 
 
 #: The options of an attitude step, which takes increments.
-STEP_OPTIONS = ("method", "tableau", "increments", "previous")
+STEP_OPTIONS = ("method", "tableau", "increments", "previous", "ahead")
 
 
 @dataclass(frozen=True)

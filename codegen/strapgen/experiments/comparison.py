@@ -161,7 +161,7 @@ def compare(
         return attitude_backend(choice, backend=name, settings=fixed if BACKENDS[name].fixed else None)
 
     if fixed.sensor is not None:
-        d = pulses(d, fixed.sensor.count, choice.previous)
+        d = pulses(d, fixed.sensor.count, choice.previous + choice.ahead)
     standard = load(reference)
     states: Array = standard.propagate(d).astype(np.float64)
     require_finite(standard, states, np.arange(len(states), dtype=np.float64))

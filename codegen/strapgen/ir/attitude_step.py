@@ -27,6 +27,8 @@ class Companions:
         Number of increments from before the step that it takes in addition to its own.
     isometry : bool
         Whether the exact transition is a rotation for any increments.
+    ahead : int
+        Number of increments from after the step that it takes in addition to its own.
     """
 
     product: str | None
@@ -35,6 +37,12 @@ class Companions:
     identity: tuple[Fraction, ...]
     previous: int = 0
     isometry: bool = False
+    ahead: int = 0
+
+    @property
+    def beside(self) -> int:
+        """Number of increments that the step takes in addition to its own."""
+        return self.previous + self.ahead
 
     def as_dict(self) -> dict[str, Any]:
         """Return the record as plain JSON data."""

@@ -57,7 +57,7 @@ def exact_attitudes(
         If the attitude of the motion has no closed form.
     """
     backend = ExactBackend.of_choice(choice)
-    samples, previous = backend.increments, backend.previous
+    samples, previous, ahead = backend.increments, backend.previous, backend.ahead
     if motion.name not in MOTIONS:
         raise InputError(
             f"the attitude of motion {motion.name} has no closed form, which many digits need; these have: "
@@ -71,10 +71,10 @@ def exact_attitudes(
         width = length / samples
         row = [
             increment([number((2 * k + 1) * width / 2)], [number(width)], *parameters)
-            for k in range(-previous, count * samples)
+            for k in range(-previous, count * samples + ahead)
         ]
         steps = (
-            [x for vector in row[k : k + previous + samples] for x in vector]
+            [x for vector in row[k : k + backend.samples] for x in vector]
             for k in range(0, count * samples, samples)
         )
         for place, state in enumerate(backend.states_in_digits(steps)):

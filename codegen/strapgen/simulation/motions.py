@@ -90,7 +90,9 @@ class Motion:
     name: str
     parameters: dict[str, float]
 
-    def increments(self, step: Fraction, steps: int, samples: int, previous: int = 0) -> Array:
+    def increments(
+        self, step: Fraction, steps: int, samples: int, previous: int = 0, ahead: int = 0
+    ) -> Array:
         """Return the exact angle increments.
 
         Parameters
@@ -101,15 +103,17 @@ class Motion:
             Number of steps from t = 0.
         samples : int
             Increments per step.
-        previous : int, optional
-            Increments from before each step that it takes in addition; those of the first step lie before t = 0.
+        previous, ahead : int, optional
+            Increments from before each step and from after it that it takes in addition; those before the first step
+            lie before t = 0.
 
         Returns
         -------
-        array, (steps, previous + samples, 3)
+        array, (steps, previous + samples + ahead, 3)
             Integrals of the body rate in rad, body axes.
         """
-        return windows(self.samples(step / samples, -previous, steps * samples), samples, previous)
+        row = self.samples(step / samples, -previous, steps * samples + ahead)
+        return windows(row, samples, previous + ahead)
 
     def samples(self, interval: Fraction, first: int, stop: int) -> Array:
         """Return exact angle increments of some sampling intervals.

@@ -12,7 +12,9 @@ from strapgen.ir.signals import Signal
 from strapgen.symbolic.kernel import Kernel, KernelBuilder
 
 
-def step(kinematics: Kinematics, method: Method, increments: int | None, previous: int = 0) -> Kernel:
+def step(
+    kinematics: Kinematics, method: Method, increments: int | None, previous: int = 0, ahead: int = 0
+) -> Kernel:
     """Derive one integration step from angle increments, or from rates, to the next state.
 
     The method is applied to the identity, which gives the transition: the step is linear in the state. The
@@ -26,23 +28,23 @@ def step(kinematics: Kinematics, method: Method, increments: int | None, previou
         The integration method.
     increments : int or None
         Angle increments a step, 1 to 8; None for a step that takes the rate at every node.
-    previous : int, optional
-        Increments from before the step, 0 to 3, that the rate extraction uses too.
+    previous, ahead : int, optional
+        Increments from before the step and from after it that the rate extraction uses too.
 
     Returns
     -------
     Kernel
-        Inputs ``state`` and ``increments`` (previous + increments, 3) in rad, or ``turns`` (nodes, 3) in rad: the
-        rates times the step length; output ``next``.
+        Inputs ``state`` and ``increments`` (previous + increments + ahead, 3) in rad, or ``turns`` (nodes, 3) in
+        rad: the rates times the step length; output ``next``.
     """
     build = KernelBuilder()
     state = build.input(kinematics.state)
-    samples = Samples(build, increments, previous, method.nodes)
+    samples = Samples(build, increments, previous, method.nodes, ahead)
     transition = build.stage(kinematics.transition, method.transition(build, kinematics, samples))
     build.output(kinematics.next, kinematics.product(state, transition))
-    suffix, option, source = chosen(method, increments, previous)
+    suffix, option, source = chosen(method, increments, previous, ahead)
     extracted = "" if increments is None else "rate extraction chapter 3 A; "
-    order = method.step_order(increments, previous)
+    order = method.step_order(increments, previous, ahead)
     return build.kernel(
         f"{kinematics.name}-{suffix}",
         f"{kinematics.title}: step by {method.title} from {source}",
@@ -54,7 +56,8 @@ def step(kinematics: Kinematics, method: Method, increments: int | None, previou
             kinematics.attitude,
             tuple(Fraction(int(x)) for x in kinematics.identity),
             previous,
-            method.isometry(None if increments is None else increments + previous),
+            method.isometry(None if increments is None else increments + previous + ahead),
+            ahead,
         ),
         order=order,
         arguments=f"{kinematics.name} {option}",
@@ -62,20 +65,21 @@ def step(kinematics: Kinematics, method: Method, increments: int | None, previou
     )
 
 
-def rotation_vector(method: Method, increments: int | None, previous: int = 0) -> Kernel:
+def rotation_vector(method: Method, increments: int | None, previous: int = 0, ahead: int = 0) -> Kernel:
     """Derive the rotation vector of one step from angle increments, or from rates.
 
     Parameters
     ----------
     method : Method
         A method whose transition is the exponential of a rotation vector.
-    increments, previous : int
+    increments, previous, ahead : int
         As in `step`.
 
     Returns
     -------
     Kernel
-        Input ``increments`` (previous + increments, 3) in rad, or ``turns``; output ``rotation_vector`` (3,) in rad.
+        Input ``increments`` (previous + increments + ahead, 3) in rad, or ``turns``; output ``rotation_vector`` (3,)
+        in rad.
 
     Raises
     ------
@@ -85,7 +89,8 @@ def rotation_vector(method: Method, increments: int | None, previous: int = 0) -
     if method.rotation_vector is None:
         raise ValueError(f"{method.name} has no rotation vector")
     build = KernelBuilder()
-    vector = method.rotation_vector(build, Samples(build, increments, previous, method.nodes))
+    samples = Samples(build, increments, previous, method.nodes, ahead)
+    vector = method.rotation_vector(build, samples)
     build.output(
         Signal.vector(
             "rotation_vector",
@@ -95,8 +100,8 @@ def rotation_vector(method: Method, increments: int | None, previous: int = 0) -
         ),
         vector,
     )
-    suffix, option, source = chosen(method, increments, previous)
-    order = method.step_order(increments, previous)
+    suffix, option, source = chosen(method, increments, previous, ahead)
+    order = method.step_order(increments, previous, ahead)
     return build.kernel(
         f"rotation-vector-{suffix}",
         f"Rotation vector of a step by {method.title} from {source}",
@@ -107,7 +112,7 @@ def rotation_vector(method: Method, increments: int | None, previous: int = 0) -
     )
 
 
-def chosen(method: Method, increments: int | None, previous: int) -> tuple[str, str, str]:
+def chosen(method: Method, increments: int | None, previous: int = 0, ahead: int = 0) -> tuple[str, str, str]:
     """Return the ending of a kernel's name, its options on the command line, and its inputs in words."""
     suffix = f"{method.name}-{increments or 'rates'}"
     option = method.option or f"--method {method.name}"
@@ -119,7 +124,10 @@ def chosen(method: Method, increments: int | None, previous: int) -> tuple[str, 
         option = f"{option} --increments {increments}"
     if previous:
         suffix, option = f"{suffix}-previous{previous}", f"{option} --previous {previous}"
-        source += f" and {previous} before {'it' if increments == 1 else 'them'}"
+        source += f"{',' if ahead else ' and'} {previous} before {'it' if increments == 1 else 'them'}"
+    if ahead:
+        suffix, option = f"{suffix}-ahead{ahead}", f"{option} --ahead {ahead}"
+        source += f" and {ahead} after {'it' if increments == 1 else 'them'}"
     return suffix, option, source
 
 

@@ -10,7 +10,7 @@ from strapgen.catalogue.kernels.attitude_step import chosen
 from strapgen.catalogue.methods import coning_coefficients
 from strapgen.catalogue.methods.coning import _METHODS
 from strapgen.catalogue.methods.method import Method
-from strapgen.catalogue.methods.samples import increments_signal, kept, sample_names
+from strapgen.catalogue.methods.samples import beside, increments_signal, sample_names
 from strapgen.ir.signals import Signal
 from strapgen.symbolic.evaluation import exact
 from strapgen.symbolic.kernel import Kernel, KernelBuilder
@@ -38,14 +38,14 @@ def sculling(method: Method, increments: int, previous: int = 0) -> Kernel:
     form = _METHODS[method.name.removeprefix("coning-")][0]
     build = KernelBuilder()
     angles = increments_signal(increments, previous)
-    names = [sample_names(increments, previous, letter) for letter in "dv"]
+    names = [sample_names(increments, previous, letter=letter) for letter in "dv"]
     velocities = Signal(
         "velocity_increments",
         angles.shape,
         tuple(f"{name}_{axis}" for name in names[1] for axis in "xyz"),
         unit="m/s",
         meaning="velocity increments of the step, body axes, oldest first: exact integrals of the specific force"
-        + kept(previous),
+        + beside(previous),
     )
     d, v = build.input(angles), build.input(velocities)
     rows = [d[k, :].T for k in range(d.rows)], [v[k, :].T for k in range(v.rows)]

@@ -43,7 +43,7 @@ def method(name: str) -> Method:
     form, terms = _METHODS[name]
     order = _FOURTH if terms else _SECOND
 
-    def limit(increments: int, previous: int) -> int:
+    def limit(increments: int, previous: int, ahead: int) -> int:
         # The first product with an error has a total degree one higher; its local order is that degree plus two.
         return min(order, coning_coefficients.design(increments, previous, form).degree + 2)
 

@@ -36,8 +36,10 @@ SOURCES = {
     "combined": "M. Song, W. Wu, X. Pan, J. Guid. Control Dyn. 36 (2013) 1872-1880, for polynomials and coning",
 }
 FORMS = tuple(SOURCES)
-#: Most samples of a slow cycle, and most samples from before it, since a larger design would take long.
-MOST_SAMPLES, MOST_KEPT = 12, 3
+#: Most samples of a slow cycle, and most samples from before it.
+MOST_SAMPLES, MOST_KEPT = 12, 32
+#: Most samples in all of combined coefficients: the time of their design grows with the fourth power of that number.
+MOST_COMBINED = 17
 
 
 @dataclass(frozen=True)
@@ -155,7 +157,8 @@ def design(samples: int, previous: int = 0, form: str = "compressed") -> Design:
     Raises
     ------
     InputError
-        If the form is unknown, or there are more than 12 samples or more than 3 from before the cycle.
+        If the form is unknown, there are more than 12 samples or more than 32 from before the cycle, or the form is
+        "combined" and they are more than 17 together.
 
     Examples
     --------
@@ -166,7 +169,12 @@ def design(samples: int, previous: int = 0, form: str = "compressed") -> Design:
     """
     count = checks.count("samples", samples, largest=MOST_SAMPLES)
     before = checks.count("previous", previous, smallest=0, largest=MOST_KEPT)
-    return _designed(count, before, checks.choice("form", form, FORMS))
+    if checks.choice("form", form, FORMS) == "combined" and count + before > MOST_COMBINED:
+        raise InputError(
+            f"samples {count} and previous {before} are {count + before} together; at most {MOST_COMBINED} are allowed "
+            "for combined coefficients"
+        )
+    return _designed(count, before, form)
 
 
 @cache

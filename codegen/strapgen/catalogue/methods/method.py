@@ -48,8 +48,8 @@ class Method:
         ``rotation_vector(build, samples)`` writes the stages of the rotation vector of the step and returns it, where
         the transition is its exponential.
     limit : callable, optional
-        ``limit(increments, previous)`` returns the highest order that these samples allow; by default that of the
-        polynomial through them.
+        ``limit(increments, previous, ahead)`` returns the highest order that these samples allow; by default that of
+        the polynomial through them.
     """
 
     name: str
@@ -62,16 +62,16 @@ class Method:
     isometry: Callable[[int | None], bool] = lambda count: False
     option: str = ""
     rotation_vector: Callable[[KernelBuilder, Samples], sp.Matrix] | None = None
-    limit: Callable[[int, int], int] = rate_fit.step_order
+    limit: Callable[[int, int, int], int] = rate_fit.step_order
 
-    def step_order(self, increments: int | None, previous: int = 0) -> Order:
+    def step_order(self, increments: int | None, previous: int = 0, ahead: int = 0) -> Order:
         """Return the orders of a step on so many increments; None stands for rates at the nodes."""
         of = self.attitude_order or (lambda degree: self.order)
         attitude = of(None)
         if increments is None:
             return Order(self.order, attitude, None, attitude)
-        count = increments + previous
-        step = min(of(count - 1), self.limit(increments, previous))
+        count = increments + previous + ahead
+        step = min(of(count - 1), self.limit(increments, previous, ahead))
         return Order(self.order, attitude, count, step)
 
 

@@ -94,7 +94,7 @@ def compare(
     kernels = []
     with np.errstate(all="ignore"):  # numbers that overflow are refused, in one line
         for choice in choices:
-            inputs = source.read(choice.increments_per_step, choice.previous)
+            inputs = source.read(choice.increments_per_step, choice.previous, choice.ahead)
             rows = comparison.compare(
                 choice,
                 backends=[*names, *_of_files(files, choice)],

@@ -30,7 +30,7 @@ def coning(
         option(
             "--previous",
             metavar="N",
-            help="Number of samples from before the slow cycle that it uses as well, 0 to 3.",
+            help="Number of samples from before the slow cycle that it uses as well, 0 to 32.",
             panel="Algorithm",
         ),
     ] = "0",
@@ -70,7 +70,7 @@ def coning(
 
     count = checks.count("samples", whole("samples", samples), largest=catalogue.MOST_INCREMENTS)
     before = checks.count(
-        "previous", whole("previous", previous), smallest=0, largest=catalogue.MOST_PREVIOUS
+        "previous", whole("previous", previous), smallest=0, largest=coning_coefficients.MOST_KEPT
     )
     checks.choice("form", form, coning_coefficients.FORMS)
     if terms and count + before > _MOST_SAMPLES:

@@ -143,6 +143,7 @@ def _check_alone(
         ("--tableau", method.tableau),
         ("--increments", method.increments),
         ("--previous", method.previous),
+        ("--ahead", method.ahead),
         ("--rates", method.rates or None),
         ("--target", target),
         ("a fixed-point option", fixed.stated or None),

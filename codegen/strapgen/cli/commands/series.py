@@ -219,6 +219,7 @@ def _overview(algorithm: _Text, method: MethodOptions, versus: Versus, output: O
         "--tableau": method.tableau,
         "--increments": method.increments,
         "--previous": method.previous,
+        "--ahead": method.ahead,
         "--rates": method.rates or None,
     }.items():
         if value is not None:

@@ -150,6 +150,8 @@ def _facts(backend: Backend, choice: Choice) -> dict[str, Any]:
     facts = {"algorithm": choice.name, "method": choice.method_name, "increments": backend.increments}
     if backend.previous:
         facts["previous"] = backend.previous
+    if backend.ahead:
+        facts["ahead"] = backend.ahead
     return facts | {"backend": backend.name}
 
 
@@ -170,12 +172,12 @@ def _on_motion(
     pulse = source.pulse
     profile = source.profile()
     step, duration = source.step or "", source.duration or ""
-    samples, previous = choice.increments_per_step, choice.previous
+    samples, beside = choice.increments_per_step, (choice.previous, choice.ahead)
     length = float(checks.number("step", step, positive=True))
     _refuse_many(float(checks.number("duration", duration, positive=True)) / length, length, intervals.record)
     backend = build(
         length,
-        lambda: runs.largest_increment(profile, step, duration, samples, pulse, previous),
+        lambda: runs.largest_increment(profile, step, duration, samples, pulse, beside),
     )
     pulse = pulse or backend.count
     with waiting(f"running {backend.kernel}"):

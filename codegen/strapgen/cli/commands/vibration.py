@@ -288,6 +288,7 @@ def _check_plain(algorithm: str, method: MethodOptions) -> None:
         ("--method", method.method),
         ("--tableau", method.tableau),
         ("--previous", method.previous),
+        ("--ahead", method.ahead),
         ("--rates", method.rates or None),
     ):
         if value is not None:
