@@ -90,6 +90,15 @@ MOTIONS = {
     "polynomial": {"a0": "rad/s", **{f"a{k}": f"rad/s^{k + 1}" for k in range(1, 5)}},
 }
 
+#: Motions without kernels, which only runs know, and the unit of each of their parameters.
+RUN_MOTIONS = {
+    "cone": {"half_angle": "rad", "frequency": "Hz", "spin": "rad/s"},
+    "random": {"rate": "rad/s"},
+    "slew": {"onset": "s", "rate": "rad/s"},
+    "ramps": {"onset": "s", "rate": "rad/s"},
+    "vibration": {"angle": "rad", "gyro": "Hz"},
+}
+
 
 class Recipe(NamedTuple):
     """A kernel that takes no method: the module, the function and its arguments that derive it."""
