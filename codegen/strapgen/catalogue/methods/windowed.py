@@ -17,7 +17,7 @@ import sympy as sp
 from strapgen.catalogue.kinematics import Kinematics
 from strapgen.catalogue.methods import rate_fit, rotation_series
 from strapgen.catalogue.methods.method import PHI, Method
-from strapgen.catalogue.methods.rotation_series import Scalars
+from strapgen.catalogue.methods.rotation_series import Scalars, Words
 from strapgen.catalogue.methods.samples import Samples
 from strapgen.catalogue.methods.window import Taps, Window
 from strapgen.ir.signals import Signal
@@ -166,14 +166,36 @@ def _rotation_vector(build: KernelBuilder, rate: _Filtered) -> sp.Matrix:
 
 @cache
 def _lean_series(vectors: int) -> tuple[Scalars, dict[int, Scalars], dict[tuple[int, int], Scalars]]:
-    """Return the terms of second, third and fourth order of a rate of two or three vectors, in c_0, c_1 and e_0."""
-    terms = rotation_series.legendre_terms(vectors, 4)
-    # By powers of the step c_m is of order m + 1; what is of higher order than the step is left out.
-    words = [{word: c for word, c in term.items() if sum(word) + len(word) <= _FOURTH + 1} for term in terms]
+    """Return the terms of second, third and fourth order of a rate of two or three vectors, in c_0, c_1 and e_0.
+
+    In powers of the step c_m is of the order m + 1. What is of higher order than the step is left out, but of the
+    products with c_0 x c_1: without the last of them a fast cone of 15 degrees drifts four times as much.
+    """
+    _, second, third, fourth = rotation_series.legendre_terms(vectors, 4)
     # With e_0 = c_2/30 - c_0/6, c_2 = 30 e_0 + 5 c_0.
     table = [{0: Fraction(1)}, {1: Fraction(1)}, {0: Fraction(5), 2: Fraction(30)}]
-    _, second, third, fourth = (rotation_series.substituted(term, table) for term in words)
-    return rotation_series.pairs(second), rotation_series.third(third), rotation_series.fourth(fourth)
+    crossed = rotation_series.pairs(rotation_series.substituted(second, table))
+    scaled: dict[int, Scalars] = {}
+    words: Words = {(k, *key): c for k, row in rotation_series.third(third).items() for key, c in row.items()}
+    for (k, *key), c in rotation_series.substituted(words, table).items():
+        _collect(scaled.setdefault(k, {}), key, c)
+    turned: dict[tuple[int, int], Scalars] = {}
+    words = {
+        (*pair, *key): c
+        for pair, row in rotation_series.fourth(fourth).items()
+        for key, c in row.items()
+        if pair == (0, 1) or sum(pair) + sum(key) + 4 <= _FOURTH + 1
+    }
+    for (k, m, *key), c in rotation_series.substituted(words, table).items():
+        if k != m:
+            _collect(turned.setdefault((min(k, m), max(k, m)), {}), key, c if k < m else -c)
+    return crossed, scaled, turned
+
+
+def _collect(row: Scalars, key: list[int], c: Fraction) -> None:
+    """Add a coefficient of the scalar product of two vectors."""
+    low, high = sorted(key)
+    row[low, high] = row.get((low, high), Fraction(0)) + c
 
 
 class _Scalars:
@@ -186,7 +208,7 @@ class _Scalars:
     def weight(self, name: str, constant: Fraction, row: Scalars) -> sp.Expr:
         """Return a constant plus scalar products, each times its coefficient."""
         total: sp.Expr = exact(constant)
-        for (i, j), c in row.items():
+        for (i, j), c in sorted((key, c) for key, c in row.items() if c):
             if (i, j) not in self._products:
                 self._products[i, j] = self._build.value(
                     f"product_{i}_{j}",
@@ -194,7 +216,7 @@ class _Scalars:
                     f"scalar product of Legendre coefficients {i} and {j}",
                 )
             total += exact(c) * self._products[i, j]
-        return self._build.value(name, total, "weight of a vector") if row else total
+        return self._build.value(name, total, "weight of a vector") if any(row.values()) else total
 
 
 def _crossed(build: KernelBuilder, name: str, left: sp.Matrix, right: sp.Matrix, meaning: str) -> sp.Matrix:
