@@ -38,6 +38,9 @@ INTEGRATORS = {
         f"magnus{order}": Integrator(f"Magnus series of order {order}", "magnus", order)
         for order in (2, 4, 6)
     },
+    "fit-exact": Integrator(
+        "polynomial through the increments, integrated exactly", "fit_exact", 16, takes_rates=False
+    ),
     "munthe-kaas4": Integrator("Runge-Kutta-Munthe-Kaas method of order 4", "munthe_kaas", 4),
     "coning-compressed": Integrator(
         "compressed coning coefficients, made for coning", "coning", 4, False, ("compressed",), False
