@@ -18,9 +18,10 @@ import sympy as sp
 from strapgen.catalogue.kinematics import Kinematics
 from strapgen.catalogue.methods import polynomial_rotation, rate_fit, rotation_series
 from strapgen.catalogue.methods.method import PHI, Method
-from strapgen.catalogue.methods.rotation_series import Scalars, Words
+from strapgen.catalogue.methods.rotation_series import Scalars, Words, fraction
 from strapgen.catalogue.methods.samples import Samples
 from strapgen.catalogue.methods.window import Taps, Window
+from strapgen.ir.attitude_step import Truncation
 from strapgen.ir.signals import Signal
 from strapgen.symbolic.evaluation import exact
 from strapgen.symbolic.kernel import KernelBuilder
@@ -30,6 +31,8 @@ from strapgen.symbolic.rotations import cross, dot
 _DEGREE, _FOURTH = 4, 6
 #: Highest power of the rotation vector in its exponential. At half a radian the powers left out are below 3e-18.
 SERIES = 12
+#: Name of the square of the angle.
+_SQUARE = "angle_square"
 
 
 def method(window: Window) -> Method:
@@ -46,7 +49,7 @@ def method(window: Window) -> Method:
 
     def transition(build: KernelBuilder, kinematics: Kinematics, samples: Samples) -> sp.Matrix:
         phi = rotation_vector(build, samples)
-        square = build.value("angle_square", dot(phi, phi), "square of the angle of the step")
+        square = build.value(_SQUARE, dot(phi, phi), "square of the angle of the step")
         return kinematics.exponential(phi, SERIES, square)
 
     def exact_rotation(build: KernelBuilder, kinematics: Kinematics, samples: Samples) -> sp.Matrix:
@@ -65,6 +68,8 @@ def method(window: Window) -> Method:
         limit=lambda increments, previous, ahead: _order(window),
         fit=lambda increments, previous, ahead: rate_fit.from_legendre(window.filters),
         conditions=window.conditions,
+        isometry=lambda count: True,
+        truncation=lambda kinematics: Truncation(SERIES, fraction(kinematics.scale), _SQUARE),
     )
     if window.rotation == "fourth":
         return fourth
@@ -74,7 +79,7 @@ def method(window: Window) -> Method:
         order=window.terms,
         transition=exact_rotation,
         rotation_vector=None,
-        isometry=lambda count: True,
+        truncation=None,
     )
 
 
