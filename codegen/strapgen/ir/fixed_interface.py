@@ -196,7 +196,7 @@ class Interface:
 
     @property
     def normalized_within(self) -> int:
-        """The number of steps from one normalization to the next in which no call is refused and the state stays proper.
+        """The most steps from a normalization to the next that are proved to be accepted and to keep the state proper.
 
         It is 0 where nothing is proved.
         """
