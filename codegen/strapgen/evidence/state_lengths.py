@@ -46,11 +46,23 @@ def check(subject: Subject, folder: Path) -> list[Verdict]:
         return []
 
     stretch = cache(lambda: stretch_of(program.transition_program(), _limit(subject)))
-    claims = {"stays in its format": in_format, "stays proper": is_proper}
+    claims = {"stays in its format": (_calls, in_format), "stays proper": (_steps, is_proper)}
     return [
-        verdict(subject.name, f"state: {name}", TOOL, partial(_judged, compare, subject, stretch))
-        for name, compare in claims.items()
+        verdict(subject.name, f"state: {name}", TOOL, partial(_judged, number, compare, subject, stretch))
+        for name, (number, compare) in claims.items()
     ]
+
+
+def _calls(subject: Subject) -> int:
+    """Return for how many calls the header says that none is refused, 0 if it does not."""
+    interface = subject.fixed.interface
+    return interface.accumulation.calls_within(interface.settings.allowance) if interface.accumulation else 0
+
+
+def _steps(subject: Subject) -> int:
+    """Return for how many steps the header says that the state stays proper, 0 if it does not."""
+    angles = subject.fixed.interface.angle_accumulation
+    return angles.proved_steps if angles else 0
 
 
 def _limit(subject: Subject) -> Fraction:
@@ -60,10 +72,13 @@ def _limit(subject: Subject) -> Fraction:
 
 
 def _judged(
+    number: Callable[[Subject], int],
     compare: Callable[[Subject, Stretch], tuple[Result, str]],
     subject: Subject,
     stretch: Callable[[], Stretch | None],
 ) -> tuple[Result, str]:
+    if not number(subject):
+        return "not examined", "the header states no number of steps"
     bounds = stretch()
     if bounds is None:
         return "fails", "a transition does not turn with its increments"
@@ -93,9 +108,7 @@ def in_format(subject: Subject, stretch: Stretch) -> tuple[Result, str]:
     """
     interface = subject.fixed.interface
     assert interface.accumulation is not None
-    stated = interface.accumulation.calls_within(interface.settings.allowance)
-    if not stated:
-        return "not examined", "the header states no number of steps"
+    stated = _calls(subject)
     growth = _root_above(1 + max(Fraction(0), stretch.high))
     steps = replace(interface.accumulation, growth=growth).calls_within(interface.settings.allowance)
     return (
@@ -114,8 +127,7 @@ def is_proper(subject: Subject, stretch: Stretch) -> tuple[Result, str]:
     """
     interface = subject.fixed.interface
     angles, adds_up = interface.angle_accumulation, interface.accumulation
-    if angles is None or adds_up is None or not angles.proved_steps:
-        return "not examined", "the header states no number of steps"
+    assert angles is not None and adds_up is not None
     # What a run adds once is twice what may be fed back; of a matrix all rows together count.
     shape = subject.program.inputs[0].shape
     fed_back = float(adds_up.once) * (math.sqrt(shape[0]) if len(shape) == 2 else 1)
@@ -127,7 +139,7 @@ def is_proper(subject: Subject, stretch: Stretch) -> tuple[Result, str]:
         first, longest = (math.sqrt(2 - length**2) for length in (start, shortest))
         growth = float(_root_above(1 + max(Fraction(0), stretch.high)) - 1)
         steps = min(steps, steps_between(first + fed_back, longest, growth, added))
-    stated = angles.proved_steps
+    stated = _steps(subject)
     return "proved" if steps >= stated else "fails", f"{steps:,} steps, the header states {stated:,}"
 
 
