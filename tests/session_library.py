@@ -19,7 +19,8 @@ from typing import Any
 
 import pytest
 
-from strapgen.catalogue import Choice
+from strapgen.catalogue import Choice, choose
+from strapgen.catalogue.methods.windows import named_window
 from strapgen.catalogue.names import ALGORITHMS, KERNELS, METHODS, VECTORS
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
@@ -50,7 +51,9 @@ def choice_by_name(kernel: str) -> Choice | None:
         return Choice(kernel)
     step = _STEP.fullmatch(kernel)
     if step is None:
-        return None
+        algorithm, _, method = kernel.rpartition("-window-")
+        window = f"window-{method}"
+        return choose(algorithm, window) if algorithm in ALGORITHMS and named_window(window) else None
     name, method, count, previous, ahead = step.groups()
     increments = None if count == "rates" else int(count)
     return Choice(name, method, increments, int(previous or 0), int(ahead or 0))

@@ -24,6 +24,7 @@ from strapgen.support.timing import timed
 
 if TYPE_CHECKING:
     from strapgen.catalogue.methods.tableau import Tableau
+    from strapgen.catalogue.methods.window import Window
     from strapgen.symbolic.kernel import Kernel
 
 
@@ -48,12 +49,12 @@ def compile(
 
 def derive(
     algorithm: str | Choice,
-    method: str | Tableau | None = None,
+    method: str | Tableau | Window | None = None,
     increments: int | None = None,
     *,
     rates: bool = False,
-    previous: int = 0,
-    ahead: int = 0,
+    previous: int | None = None,
+    ahead: int | None = None,
 ) -> Kernel:
     """Derive an algorithm exactly.
 
@@ -62,8 +63,8 @@ def derive(
     algorithm : str or Choice
         An attitude algorithm ("dcm", "euler", "cayley-klein") or another kernel that ``strapgen list`` shows; a Python
         file; or what `strapgen.choose` returned, to which the other parameters do not apply.
-    method : str or Tableau, optional
-        Integration method of an attitude algorithm, by name or as a tableau; by default "rk4".
+    method : str, Tableau or Window, optional
+        Integration method of an attitude algorithm, by name, as a tableau or as a window; by default "rk4".
     increments : int, optional
         Angle increments a step, 1 to 8 (default 2), of an attitude algorithm.
     rates : bool, optional
@@ -86,7 +87,7 @@ def derive(
     if not isinstance(algorithm, Choice):
         stages.require("derive", algorithm, str, os.PathLike, Choice)
         algorithm = catalogue.choose(algorithm, method, increments, rates, previous, ahead)
-    elif (method, increments, rates, previous, ahead) != (None, None, False, 0, 0):
+    elif (method, increments, rates, previous, ahead) != (None, None, False, None, None):
         raise InputError(f"the choice of {algorithm.kernel} is complete; derive takes it alone")
     with timed("derive", algorithm.kernel):
         return catalogue.derive(algorithm)

@@ -13,6 +13,7 @@ from strapgen.backends.registry import BACKENDS, DEFAULT_BACKENDS, Entry, backen
 from strapgen.backends.step_sources import StepSources
 from strapgen.catalogue import Choice
 from strapgen.catalogue.methods.tableau import Tableau
+from strapgen.catalogue.methods.window import Window
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
 from strapgen.support import checks, stages
@@ -109,14 +110,14 @@ def evaluator(kernel: str | Choice, backend: str = "numpy", settings: Settings |
 
 def backend(
     algorithm: str | Choice,
-    method: str | Tableau | None = None,
+    method: str | Tableau | Window | None = None,
     increments: int | None = None,
     backend: str = "numpy",
     orthonormalization: str | None = None,
     settings: Settings | None = None,
     *,
-    previous: int = 0,
-    ahead: int = 0,
+    previous: int | None = None,
+    ahead: int | None = None,
 ) -> Backend:
     """Return an attitude algorithm as a back end, generated and compiled if it is not in the cache.
 
@@ -125,7 +126,7 @@ def backend(
     algorithm : str or Choice
         "dcm", "euler" or "cayley-klein"; a Python file, or the entry point of a user's algorithm; or a choice that
         `catalogue.choose` returns, with which the other parameters of a choice do not go.
-    method : str or Tableau, optional
+    method : str, Tableau or Window, optional
         A name that ``strapgen list`` shows, or a tableau; by default "rk4".
     increments : int, optional
         Angle increments per step, 1 to 8; by default 2.
@@ -187,10 +188,10 @@ def sources_to_build(choice: Choice, backend: str, settings: Settings | None = N
 
 def chosen_step(
     algorithm: str | Choice,
-    method: str | Tableau | None,
+    method: str | Tableau | Window | None,
     increments: int | None,
-    previous: int = 0,
-    ahead: int = 0,
+    previous: int | None = None,
+    ahead: int | None = None,
 ) -> Choice:
     """Return the choice of an attitude step from its name and options; a choice is returned as it is.
 
@@ -201,8 +202,7 @@ def chosen_step(
     """
     if not isinstance(algorithm, Choice):
         return catalogue.choose_step(algorithm, method, increments, previous=previous, ahead=ahead)
-    beside = {"previous": previous or None, "ahead": ahead or None}
-    options = {"method": method, "increments": increments, **beside}
+    options = {"method": method, "increments": increments, "previous": previous, "ahead": ahead}
     for option, value in options.items():
         if value is not None:
             raise InputError(f"{option} is {value!r}, but the choice of {algorithm.kernel} has its own")

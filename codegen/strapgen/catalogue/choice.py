@@ -7,6 +7,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from strapgen.catalogue.methods.tableau import Tableau
+from strapgen.catalogue.methods.window import Window
+from strapgen.catalogue.methods.windows import named_window
 from strapgen.catalogue.names import KERNELS
 
 if TYPE_CHECKING:
@@ -21,7 +23,7 @@ class Choice:
     ----------
     name : str
         Name of the algorithm or kernel; of a user's the name of its kernel.
-    method : str or Tableau, optional
+    method : str, Tableau or Window, optional
         Method of an attitude step of the catalogue, or of a vector of one.
     increments : int, optional
         Increments of a step. A step of the catalogue without increments takes the body rate at every node of its
@@ -33,7 +35,7 @@ class Choice:
     """
 
     name: str
-    method: str | Tableau | None = None
+    method: str | Tableau | Window | None = None
     increments: int | None = None
     previous: int = 0
     ahead: int = 0
@@ -52,13 +54,20 @@ class Choice:
     @property
     def method_name(self) -> str | None:
         """Name of the method."""
-        return self.method.name if isinstance(self.method, Tableau) else self.method
+        return self.method.name if isinstance(self.method, (Tableau, Window)) else self.method
+
+    @property
+    def window(self) -> Window | None:
+        """The window, if the method is one."""
+        return named_window(self.method) if isinstance(self.method, (str, Window)) else None
 
     @property
     def kernel(self) -> str:
         """Name of the kernel."""
         if self.method is None:
             return self.name
+        if self.window is not None:  # its name says how many samples it takes
+            return f"{self.name}-{self.method_name}"
         before = f"-previous{self.previous}" if self.previous else ""
         after = f"-ahead{self.ahead}" if self.ahead else ""
         return f"{self.name}-{self.method_name}-{self.increments or 'rates'}{before}{after}"
@@ -71,7 +80,7 @@ class Choice:
         """
         if self.user_kernel is not None:
             return f"{self.kernel} {_text(self.user_kernel)}"
-        if isinstance(self.method, Tableau):
+        if isinstance(self.method, (Tableau, Window)):
             return f"{self.kernel} {self.method!r} {self.method.file}"
         return self.kernel
 

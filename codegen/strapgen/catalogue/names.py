@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from strapgen.catalogue.methods.tableaux import TITLES
+from strapgen.catalogue.methods.windows import WINDOW_TITLES
 
 #: Attitude algorithms, by the state they integrate.
 ALGORITHMS = {
@@ -70,8 +71,12 @@ INTEGRATORS = {
     ),
 }
 
-#: Integration methods.
-METHODS = {**TITLES, **{name: integrator.title for name, integrator in INTEGRATORS.items()}}
+#: Integration methods. Each family of windows has others for the same samples, such as window-8-6 beside window-7-7.
+METHODS = {
+    **TITLES,
+    **{name: integrator.title for name, integrator in INTEGRATORS.items()},
+    **WINDOW_TITLES,
+}
 
 #: Methods of the standard catalogue, which are those of the thesis.
 STANDARD_METHODS = ("rk1", "rk2", "rk3", "rk4")
@@ -270,13 +275,14 @@ KERNELS = {
 
 
 class StepVector(NamedTuple):
-    """A vector of a step: the module and function that derive it, and the modules of the methods that it can use."""
+    """A vector of a step: the module and function that derive it, the methods that it can use, and the default."""
 
     title: str
     module: str
     function: str
     families: tuple[str, ...]
     default: str
+    takes_windows: bool = False
 
     @property
     def methods(self) -> list[str]:
@@ -292,6 +298,7 @@ VECTORS = {
         "rotation_vector",
         ("magnus", "munthe_kaas", "coning"),
         "coning-combined",
+        True,
     ),
     "sculling": StepVector(
         "sculling term of a step, by duality with coning",

@@ -15,6 +15,8 @@ from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
     from strapgen.catalogue import Choice
+    from strapgen.catalogue.methods.tableau import Tableau
+    from strapgen.catalogue.methods.window import Window
 
 _Text = str | None
 
@@ -118,6 +120,14 @@ class MethodOptions:
             help="TOML file with the Butcher tableau of your own method, in place of --method.",
         ),
     ] = None
+    window: Annotated[
+        Path | None,
+        option(
+            "--window",
+            metavar="FILE",
+            help="TOML file with the filters of your own window, in place of --method; window design writes one.",
+        ),
+    ] = None
     increments: Increments = None
     previous: Annotated[
         _Text,
@@ -151,23 +161,27 @@ class MethodOptions:
     def choose(self, algorithm: str, *, step: bool = True) -> Choice:
         """Return the kernel that the options choose of an algorithm; with `step` it must be an attitude step."""
         from strapgen import catalogue
-        from strapgen.catalogue.methods import tableaux
+        from strapgen.catalogue.methods import tableaux, windows
 
-        if self.tableau is not None and self.method is not None:
-            raise InputError(
-                f"--method {self.method} and --tableau {self.tableau} are both given; one is needed"
-            )
-        method = self.method if self.tableau is None else tableaux.read(self.tableau)
+        stated = {"--method": self.method, "--tableau": self.tableau, "--window": self.window}
+        both = [f"{name} {value}" for name, value in stated.items() if value is not None]
+        if len(both) > 1:
+            raise InputError(f"{both[0]} and {both[1]} are both given; one is needed")
+        method: str | Tableau | Window | None = self.method
+        if self.tableau is not None:
+            method = tableaux.read(self.tableau)
+        if self.window is not None:
+            method = windows.read(self.window)
         choose = catalogue.choose_step if step else catalogue.choose
         one("--method", self.method)
         count = whole("increments", self.increments)
-        before, after = whole("previous", self.previous) or 0, whole("ahead", self.ahead) or 0
+        before, after = whole("previous", self.previous), whole("ahead", self.ahead)
         with waiting(f"deriving {algorithm}"):  # a user's code may take its time
             return choose(algorithm, method, count, self.rates, before, after)
 
 
 #: The options of an attitude step, which takes increments.
-STEP_OPTIONS = ("method", "tableau", "increments", "previous", "ahead")
+STEP_OPTIONS = ("method", "tableau", "window", "increments", "previous", "ahead")
 
 
 @dataclass(frozen=True)

@@ -39,11 +39,12 @@ def step(
     """
     build = KernelBuilder()
     state = build.input(kinematics.state)
-    samples = Samples(build, increments, previous, method.nodes, ahead)
+    samples = Samples(build, increments, previous, method.nodes, ahead, method.fit)
     transition = build.stage(kinematics.transition, method.transition(build, kinematics, samples))
     build.output(kinematics.next, kinematics.product(state, transition))
     suffix, option, source = chosen(method, increments, previous, ahead)
-    extracted = "" if increments is None else "rate extraction chapter 3 A; "
+    fitted = increments is not None and method.conditions is None
+    extracted = "rate extraction chapter 3 A; " if fitted else ""
     order = method.step_order(increments, previous, ahead)
     return build.kernel(
         f"{kinematics.name}-{suffix}",
@@ -89,7 +90,7 @@ def rotation_vector(method: Method, increments: int | None, previous: int = 0, a
     if method.rotation_vector is None:
         raise ValueError(f"{method.name} has no rotation vector")
     build = KernelBuilder()
-    samples = Samples(build, increments, previous, method.nodes, ahead)
+    samples = Samples(build, increments, previous, method.nodes, ahead, method.fit)
     vector = method.rotation_vector(build, samples)
     build.output(
         Signal.vector(
@@ -115,7 +116,7 @@ def rotation_vector(method: Method, increments: int | None, previous: int = 0, a
 def chosen(method: Method, increments: int | None, previous: int = 0, ahead: int = 0) -> tuple[str, str, str]:
     """Return the ending of a kernel's name, its options on the command line, and its inputs in words."""
     suffix = f"{method.name}-{increments or 'rates'}"
-    option = method.option or f"--method {method.name}"
+    option = stated = method.option or f"--method {method.name}"
     if increments is None:
         source = f"the rate at {len(method.nodes)} {'node' if len(method.nodes) == 1 else 'nodes'}"
         option = f"{option} --rates"
@@ -128,6 +129,8 @@ def chosen(method: Method, increments: int | None, previous: int = 0, ahead: int
     if ahead:
         suffix, option = f"{suffix}-ahead{ahead}", f"{option} --ahead {ahead}"
         source += f" and {ahead} after {'it' if increments == 1 else 'them'}"
+    if method.conditions is not None:
+        suffix, option = method.name, stated
     return suffix, option, source
 
 

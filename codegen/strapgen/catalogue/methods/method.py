@@ -11,6 +11,7 @@ import sympy as sp
 from strapgen.catalogue.kinematics import Kinematics
 from strapgen.catalogue.methods import rate_fit
 from strapgen.catalogue.methods.coefficients import Number
+from strapgen.catalogue.methods.rate_fit import Fit
 from strapgen.catalogue.methods.samples import Samples
 from strapgen.ir.attitude_step import Order
 from strapgen.ir.signals import Signal
@@ -50,6 +51,12 @@ class Method:
     limit : callable, optional
         ``limit(increments, previous, ahead)`` returns the highest order that these samples allow; by default that of
         the polynomial through them.
+    fit : callable, optional
+        ``fit(increments, previous, ahead)`` returns the rate over the step in terms of these samples; by default the
+        polynomial through them.
+    conditions : int, optional
+        Of a method with filters of its own, which says itself how many samples a step takes: the number of powers of
+        time for which the rate is exact. By default it is the number of the samples.
     """
 
     name: str
@@ -63,6 +70,8 @@ class Method:
     option: str = ""
     rotation_vector: Callable[[KernelBuilder, Samples], sp.Matrix] | None = None
     limit: Callable[[int, int, int], int] = rate_fit.step_order
+    fit: Callable[[int, int, int], Fit] = rate_fit.from_increments
+    conditions: int | None = None
 
     def step_order(self, increments: int | None, previous: int = 0, ahead: int = 0) -> Order:
         """Return the orders of a step on so many increments; None stands for rates at the nodes."""
@@ -70,7 +79,7 @@ class Method:
         attitude = of(None)
         if increments is None:
             return Order(self.order, attitude, None, attitude)
-        count = increments + previous + ahead
+        count = increments + previous + ahead if self.conditions is None else self.conditions
         step = min(of(count - 1), self.limit(increments, previous, ahead))
         return Order(self.order, attitude, count, step)
 

@@ -36,8 +36,8 @@ class Fit:
 
     @property
     def degree(self) -> int:
-        """Degree of the polynomial: one less than the number of samples."""
-        return len(self.basis) - 1
+        """Degree of the polynomial; of one that goes through the samples, one less than their number."""
+        return len(self.basis[0]) - 1
 
     def at(self, node: Fraction | sp.Expr) -> list[sp.Expr]:
         """Return the weights of the samples in the rate at a node."""
@@ -95,6 +95,30 @@ class Fit:
             _reduced(sum((c * x for c, x in zip(row, integrals, strict=True)), sp.Integer(0)))
             for row in self.basis
         ]
+
+
+def from_legendre(filters: Sequence[Sequence[Fraction]]) -> Fit:
+    """Return the rate whose Legendre coefficients are given sums of the samples.
+
+    Parameters
+    ----------
+    filters : sequence of sequence of Fraction
+        For every Legendre polynomial of the step, from degree 0 on, the weights of the samples in its coefficient.
+
+    Examples
+    --------
+    >>> from_legendre([from_increments(2).legendre(m) for m in range(2)]) == from_increments(2)
+    True
+    """
+    polynomials = [legendre(m) for m in range(len(filters))]
+    basis = []
+    for weights in zip(*filters, strict=True):
+        column = [sp.Integer(0)] * len(filters)
+        for weight, polynomial in zip(weights, polynomials, strict=True):
+            for power, c in enumerate(polynomial):
+                column[power] += exact(weight) * c
+        basis.append(tuple(column))
+    return Fit(tuple(basis))
 
 
 def legendre(degree: int, middle: sp.Rational = sp.S.Zero) -> Coefficients:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 
 import sympy as sp
 
 from strapgen.catalogue.methods import rate_fit
 from strapgen.catalogue.methods.coefficients import Number
+from strapgen.catalogue.methods.rate_fit import Fit
 from strapgen.ir.attitude_step import Order
 from strapgen.ir.signals import Signal
 from strapgen.symbolic.kernel import KernelBuilder
@@ -111,6 +112,9 @@ class Samples:
         Nodes at which the method needs the rate; without increments the samples are the rates there.
     ahead : int
         Number of increments from after the step.
+    fit : callable, optional
+        ``fit(increments, previous, ahead)`` returns the rate in terms of the increments; by default the polynomial
+        through them.
     """
 
     def __init__(
@@ -120,6 +124,7 @@ class Samples:
         previous: int = 0,
         nodes: Sequence[Number] = (),
         ahead: int = 0,
+        fit: Callable[[int, int, int], Fit] = rate_fit.from_increments,
     ) -> None:
         self._build = build
         self._labels = labels(nodes)
@@ -127,7 +132,7 @@ class Samples:
             signal, self.fit = turns_signal(nodes), rate_fit.from_rates(nodes)
         else:
             signal = increments_signal(increments, previous, ahead)
-            self.fit = rate_fit.from_increments(increments, previous, ahead)
+            self.fit = fit(increments, previous, ahead)
         self._symbols = build.input(signal)
         self.increments, self.previous, self.ahead = increments, previous, ahead
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import NamedTuple
@@ -66,6 +67,8 @@ class Window:
         fewer samples before the step, from none up to p - 1.
     file : str
         Path of the file; empty for a window of the catalogue.
+    sibling : bool
+        Whether it is one of the one-sided filters of another window.
 
     Examples
     --------
@@ -93,6 +96,14 @@ class Window:
     terms: int = 16
     one_sided: tuple[Window, ...] = ()
     file: str = field(default="", compare=False, repr=False)
+    sibling: bool = False
+
+    @property
+    def option(self) -> str:
+        """The options that choose it on the command line."""
+        if not self.file:
+            return f"--method {self.name}"
+        return f"--window {shlex.quote(self.file)}" + (f" --ahead {self.ahead}" if self.sibling else "")
 
     @property
     def samples(self) -> int:

@@ -172,12 +172,11 @@ def _require_step(kernel: Kernel) -> None:
         return
     if not isinstance(step, Companions):
         _refuse(kernel, f"its companions are {step!r}; strapgen.Companions is needed")
-    if not isinstance(step.isometry, bool) or {type(step.previous), type(step.ahead)} != {int}:
-        _refuse(
-            kernel,
-            f"isometry {step.isometry!r} is no truth value, or previous {step.previous!r} or ahead {step.ahead!r} no "
-            "number",
-        )
+    if not isinstance(step.isometry, bool):
+        _refuse(kernel, f"isometry {step.isometry!r} is no truth value")
+    for name in ("previous", "ahead"):
+        if type(getattr(step, name)) is not int:
+            _refuse(kernel, f"{name} {getattr(step, name)!r} is no number")
     if kernel.order is not None and not isinstance(kernel.order, Order):
         _refuse(kernel, f"its order is {kernel.order!r}; strapgen.Order is needed")
     names = [signal.name for signal in kernel.inputs]

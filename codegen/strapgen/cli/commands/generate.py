@@ -141,6 +141,7 @@ def _check_alone(
         ("an algorithm", algorithm),
         ("--method", method.method),
         ("--tableau", method.tableau),
+        ("--window", method.window),
         ("--increments", method.increments),
         ("--previous", method.previous),
         ("--ahead", method.ahead),
