@@ -14,7 +14,10 @@ from strapgen.analysis.series import series
 from strapgen.catalogue.methods.window import Window
 from strapgen.catalogue.methods.windows import WINDOWS, named_window, read
 from strapgen.ir.attitude_step import Truncation
+from strapgen.ir.fixed_settings import Settings
+from strapgen.rounding.bounds import rounding_bounds
 from strapgen.simulation.drift import drift
+from strapgen.simulation.runs import largest_increment
 from strapgen.support.exceptions import InputError
 
 Vector = list[Fraction]
@@ -127,9 +130,6 @@ def test_the_series_leaves_out_no_more_than_is_stated(algorithm, scale):
 
 
 def test_bounds_have_what_the_series_leaves_out():
-    from strapgen.ir.fixed_settings import Settings
-    from strapgen.rounding.bounds import rounding_bounds
-
     program = lower(derive("euler", "window-3-3"))
     near, far = (
         max(rounding_bounds(program, settings=Settings(largest_angle=Fraction(1, part))).errors["next"])
@@ -245,6 +245,25 @@ def test_drift_of_windows(method, motions):
         run = strapgen.simulate(backend, motions[name], "0.01", 60)
         # Below 1e-8 deg/h rounding counts.
         assert drift(run) == pytest.approx(expected, rel=0.1) or max(drift(run), expected) < 1e-8, name
+
+
+@pytest.mark.long
+def test_drift_of_a_window_in_words_of_32_bits(motions):
+    choice = choose("euler", "window-7-7")
+    for name, expected in zip(MOTIONS, DRIFTS["window-7-7"], strict=True):
+        if expected < 1e-4:
+            continue
+        motion = motions[name]
+        # Formats for the increments of the run, as the command simulate chooses them.
+        largest = largest_increment(motion, "0.01", 60, 1, beside=(7, 7))
+        settings = Settings(carry="full").fitted(largest)
+        backend = strapgen.backend(choice, backend="c-fixed32", settings=settings)
+        # The gyro delivers differences of rounded angles, to the unit of the increments.
+        pulse = Fraction(backend.increment_unit)
+        run = strapgen.simulate(backend, motion, "0.01", 60, pulse=pulse)
+        assert drift(run) < 2 * expected, name
+        if expected > 1e-3:  # below it the rounding of words may also make up for the error of the window
+            assert drift(run) > expected / 2, name
 
 
 @pytest.mark.long
