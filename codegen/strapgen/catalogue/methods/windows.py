@@ -266,7 +266,7 @@ def _all_one_sided(window: Window, tables: list[Any]) -> tuple[Window, ...]:
             size = one.previous, one.ahead
             if size not in sizes or size in stored:
                 twice = "there twice" if size in stored else f"not among those for {window.samples} samples"
-                raise InputError(f"{size[0]} samples before and {size[1]} ahead are {twice}")
+                raise InputError(f"{counted(size[0], 'sample')} before and {size[1]} ahead are {twice}")
         except InputError as error:
             raise InputError(f"{what}: {error}") from None
         stored[size] = one
@@ -275,7 +275,9 @@ def _all_one_sided(window: Window, tables: list[Any]) -> tuple[Window, ...]:
             stored[previous, ahead] = stored[ahead, previous].mirrored()
     for previous, ahead in sizes:
         if (previous, ahead) not in stored:
-            raise InputError(f"one_sided lacks the filters with {previous} samples before and {ahead} ahead")
+            raise InputError(
+                f"one_sided lacks the filters with {counted(previous, 'sample')} before and {ahead} ahead"
+            )
     return tuple(stored[size] for size in sizes)
 
 

@@ -325,7 +325,9 @@ def show(
     if window.endswith(".toml") or any(separator in window for separator in (os.sep, os.altsep) if separator):
         family = windows.read(window)
     else:
-        family = windows.WINDOWS[checks.choice("window", window, windows.WINDOWS)]
+        if window not in windows.WINDOWS:
+            checks.choice("window", window, windows.WINDOW_TITLES, "their one-sided filters, as window-14-0")
+        family = windows.WINDOWS[window]
         windows.verify(family)
     if family.increments != 1:
         raise InputError(
