@@ -42,6 +42,14 @@ INTEGRATORS = {
         "polynomial through the increments, integrated exactly", "fit_exact", 16, takes_rates=False
     ),
     "munthe-kaas4": Integrator("Runge-Kutta-Munthe-Kaas method of order 4", "munthe_kaas", 4),
+    "crouch-grossman3": Integrator("Crouch-Grossman method of order 3", "crouch_grossman", 3),
+    "coning-least-squares": Integrator(
+        "compressed coning coefficients, by least squares over a band",
+        "frequency_shaping",
+        2,
+        takes_rates=False,
+        takes_ahead=False,
+    ),
     "coning-compressed": Integrator(
         "compressed coning coefficients, made for coning", "coning", 4, False, ("compressed",), False
     ),
