@@ -121,6 +121,9 @@ class Recipe(NamedTuple):
     standard: bool = True
 
 
+#: Degrees of the rate for which there are steps from its Legendre coefficients.
+LEGENDRE_DEGREES = range(1, 5)
+
 #: Orders at which the series of an update can be cut off.
 UPDATE_ORDERS = range(1, 21)
 
@@ -242,6 +245,17 @@ KERNELS = {
             f"{title}: state after a transition", "attitude_step", "product", (algorithm,)
         )
         for algorithm, title in ALGORITHMS.items()
+    },
+    **{
+        f"{name}-legendre-{degree}": Recipe(
+            f"{ALGORITHMS[name]}: step from the Legendre coefficients of the rate to degree {degree}",
+            "legendre_step",
+            "step",
+            (name, degree),
+            False,
+        )
+        for name in ("dcm", "euler")
+        for degree in LEGENDRE_DEGREES
     },
     "dcm-orthonormalize": Recipe(
         "orthonormalization by dual rows, the thesis's scheme", "orthonormal", "dcm"
