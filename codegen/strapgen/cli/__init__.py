@@ -32,6 +32,7 @@ from strapgen.cli.commands import (
     vectors,
     verify,
     vibration,
+    window,
 )
 from strapgen.cli.help import PlainCommand, PlainGroup, explanation
 from strapgen.support.exceptions import StrapgenError
@@ -43,6 +44,7 @@ COMMANDS: dict[str, dict[str, Any]] = {
         "derive": derive.derive,
         "tableau": tableau.tableau,
         "coning": coning.coning,
+        "window": window.app,
     },
     "Generate": {
         "generate": generate.generate,

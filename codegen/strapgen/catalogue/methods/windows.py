@@ -42,6 +42,9 @@ MOST_CONDITIONS = 12
 MOST_DEGREE = 8
 MOST_TERMS = 40
 
+#: Most characters of a fraction; those of filters for a gyro are long.
+MOST_CHARACTERS = 4000
+
 #: Most bytes of a file; the longest family takes less.
 MOST_BYTES = 4_000_000
 
@@ -65,7 +68,7 @@ class _BuiltInWindows(Mapping[str, Window]):
         return {
             f"window-{before}-{after}": f"window-{previous}-{ahead}"
             for previous, ahead in sorted(sizes)
-            for before, after in [(previous, ahead), *_one_sided_sizes(previous, ahead)]
+            for before, after in [(previous, ahead), *one_sided_sizes(previous, ahead)]
         }
 
     @cached_property
@@ -92,11 +95,29 @@ class _BuiltInWindows(Mapping[str, Window]):
         return len(self.families)
 
 
-def _one_sided_sizes(previous: int, ahead: int) -> list[tuple[int, int]]:
-    """Return the samples before and ahead of the one-sided filters of a family, in the order of `Window.one_sided`."""
+def one_sided_sizes(previous: int, ahead: int) -> list[tuple[int, int]]:
+    """Return the samples before and ahead of the one-sided filters of a family, in the order of `Window.one_sided`.
+
+    Examples
+    --------
+    >>> one_sided_sizes(2, 2)
+    [(3, 1), (4, 0), (0, 4), (1, 3)]
+    """
     total = previous + ahead
     now = [(total - after, after) for after in range(ahead - 1, -1, -1)]
     return now + [(before, total - before) for before in range(previous)]
+
+
+def stored_sizes(previous: int, ahead: int, ideal: bool) -> list[tuple[int, int]]:
+    """Return those sizes whose filters a file has to hold: with an ideal gyro and p = L the others are mirrored.
+
+    Examples
+    --------
+    >>> stored_sizes(2, 2, True), stored_sizes(2, 1, True)
+    ([(3, 1), (4, 0)], [(3, 0), (0, 3), (1, 2)])
+    """
+    sizes = one_sided_sizes(previous, ahead)
+    return sizes[:ahead] if ideal and previous == ahead else sizes
 
 
 _BUILT_IN = _BuiltInWindows(Path(__file__).resolve().parent / "window_filters")
@@ -233,7 +254,7 @@ def _family(data: Mapping[str, Any], name: str) -> Window:
 
 def _all_one_sided(window: Window, tables: list[Any]) -> tuple[Window, ...]:
     """Return the one-sided filters of a family, those with fewer samples before the step mirrored where it can be."""
-    sizes = _one_sided_sizes(window.previous, window.ahead)
+    sizes = one_sided_sizes(window.previous, window.ahead)
     stored: dict[tuple[int, int], Window] = {}
     for number, table in enumerate(tables, 1):
         what = f"one_sided, table {number}"
@@ -306,7 +327,7 @@ def _gyro(table: Any) -> GyroResponse | None:
 
 def _rational(what: str, value: Any) -> Fraction:
     # The whole of a large family is read: what is plainly a fraction does not take the way of an expression.
-    if isinstance(value, str) and len(value) <= coefficients.MOST_CHARACTERS and _FRACTION.fullmatch(value):
+    if isinstance(value, str) and len(value) <= MOST_CHARACTERS and _FRACTION.fullmatch(value):
         top, _, bottom = value.partition("/")
         return Fraction(int(top), int(bottom or 1))
     number = coefficients.number(what, value)

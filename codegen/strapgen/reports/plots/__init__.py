@@ -14,4 +14,5 @@ from strapgen.reports.plots.stability import stability_image as stability_image
 from strapgen.reports.plots.thesis_tables import predicted_tables_image as predicted_tables_image
 from strapgen.reports.plots.thesis_tables import thesis_tables_image as thesis_tables_image
 from strapgen.reports.plots.vibration import vibration_image as vibration_image
+from strapgen.reports.plots.window import window_image as window_image
 from strapgen.reports.plots.word_length import word_length_image as word_length_image
