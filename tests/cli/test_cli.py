@@ -150,7 +150,10 @@ def test_list(strapgen_says):
     assert list(data["methods"].items()) == list(catalogue.METHODS.items())
     assert data["vectors"].keys() == catalogue.VECTORS.keys()
     assert data["kernels"].keys() == catalogue.KERNELS.keys()
-    assert list(data["motions"]) == ["constant", "sinusoidal", "coning", "polynomial"]
+    assert list(data["motions"]) == [
+        *("constant", "sinusoidal", "coning", "polynomial"),
+        *("cone", "random", "slew", "ramps", "vibration"),
+    ]
     assert list(data["targets"]) == list(TARGETS) == ["numpy", "c", "c-float", "c-fixed", "fixed-model"]
     floating = ["numpy", "c", "c-float"]
     assert (

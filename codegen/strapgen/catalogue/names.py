@@ -38,6 +38,9 @@ INTEGRATORS = {
         f"magnus{order}": Integrator(f"Magnus series of order {order}", "magnus", order)
         for order in (2, 4, 6)
     },
+    "fit-exact": Integrator(
+        "polynomial through the increments, integrated exactly", "fit_exact", 16, takes_rates=False
+    ),
     "munthe-kaas4": Integrator("Runge-Kutta-Munthe-Kaas method of order 4", "munthe_kaas", 4),
     "coning-compressed": Integrator(
         "compressed coning coefficients, made for coning", "coning", 4, False, ("compressed",), False
@@ -88,6 +91,15 @@ MOTIONS = {
     "sinusoidal": dict.fromkeys("ab", "rad/s"),
     "coning": dict.fromkeys("abg", "rad/s"),
     "polynomial": {"a0": "rad/s", **{f"a{k}": f"rad/s^{k + 1}" for k in range(1, 5)}},
+}
+
+#: Motions without kernels, which only runs know, and the unit of each of their parameters.
+RUN_MOTIONS = {
+    "cone": {"half_angle": "rad", "frequency": "Hz", "spin": "rad/s"},
+    "random": {"rate": "rad/s"},
+    "slew": {"onset": "s", "rate": "rad/s"},
+    "ramps": {"onset": "s", "rate": "rad/s"},
+    "vibration": {"angle": "rad", "gyro": "Hz"},
 }
 
 

@@ -19,8 +19,9 @@ if TYPE_CHECKING:
 
 _Text = str | None
 
-#: Names of motions, for the help.
+#: Names of motions with a closed-form attitude, and of all that a run can have, for the help.
 MOTION_NAMES = "constant, sinusoidal, coning or polynomial"
+RUN_MOTION_NAMES = "constant, sinusoidal, coning, polynomial, cone, random, slew, ramps or vibration"
 MotionSettings = Annotated[
     list[str] | None,
     option(
@@ -59,7 +60,7 @@ class SampleSource:
 
     panel: ClassVar[str] = "Input"
 
-    motion: Annotated[_Text, option("--motion", metavar="NAME", help=f"Motion: {MOTION_NAMES}.")] = None
+    motion: Annotated[_Text, option("--motion", metavar="NAME", help=f"Motion: {RUN_MOTION_NAMES}.")] = None
     settings: MotionSettings = None
     step: Annotated[_Text, option("--step", metavar="S", help="Step length in s.")] = None
     duration: Annotated[_Text, option("--duration", metavar="S", help="Duration of each run in s.")] = None

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from strapgen.catalogue import MOTIONS
+from strapgen.catalogue import MOTIONS, RUN_MOTIONS
 from strapgen.cli.fixed_options import RUN_OPTIONS, FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import STEP_OPTIONS, MethodOptions, OneBackend, StepAlgorithm, one, option
@@ -102,7 +102,7 @@ def simulate(
     one("--backend", backend)
     checks.choice("backend", backend, BACKENDS)
     if source.motion is not None:
-        checks.choice("motion", source.motion, MOTIONS)
+        checks.choice("motion", source.motion, {**MOTIONS, **RUN_MOTIONS})
     output.check(algorithm, method.tableau, method.window, source.increments_csv, source.rates_csv)
     source.check()
     if matrices and source.motion is None:
