@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -12,8 +13,10 @@ from small_programs import TYPES, computed, exactly, in_long_double, node, progr
 
 import strapgen
 from strapgen.ir.fixed_settings import Settings
-from strapgen.ir.float_interface import RoundingBounds
+from strapgen.ir.float_interface import RoundingBounds, StepRounding
+from strapgen.ir.program import Program
 from strapgen.rounding import rounding_bounds
+from strapgen.rounding.bounds import _accumulation
 from strapgen.support.exceptions import InputError
 
 #: Kernels without a bound, and why.
@@ -138,6 +141,70 @@ def test_the_bound_of_a_call_is_at_most_four_times_the_worst_of_many(name, numbe
         # The reference has an error of its own, a thousandth of that of a double.
         assert worst <= float(error) * 1.001
         assert float(error) <= 4 * worst
+
+
+def halves(code) -> tuple[Program, Program]:
+    """Return the transition of a step, and its product with a state."""
+    product_names = {node.name for node in code.outputs[0].nodes}
+    product = tuple(a for a in code.body if a.name in product_names)
+    rest = tuple(a for a in code.body if a.name not in product_names)
+    transition = replace(code, body=rest, outputs=(code.transition,), transition=None)
+    inputs = (code.inputs[0], code.transition.signal)
+    return transition, replace(code, body=product, inputs=inputs, transition=None)
+
+
+@pytest.mark.parametrize("name", STEPS)
+@pytest.mark.parametrize("number", TYPES)
+def test_a_step_rounds_its_transition_and_its_product_by_nearly_their_bounds(name, number, rng):
+    code = programs()[name]
+    bounds = rounding_bounds(code, number)
+    transition, product = halves(code)
+    values = inputs(code, bounds, 20_000, rng)
+    (elements,) = computed(transition, values, number).values()
+    (exact,) = in_long_double(transition, values).values()
+    state = {name: values[name] for name in code.inputs[0].elements}
+    values = state | dict(zip(code.transition.signal.elements, elements, strict=True))
+    (near,) = computed(product, values, number).values()
+    (far,) = in_long_double(product, values).values()
+    pairs = [(bounds.step.local, near, far), (bounds.step.transition, elements, exact)]
+    for errors, approximate, reference in pairs:
+        for error, one, other in zip(errors, approximate, reference, strict=True):
+            worst = float(np.abs(one - other).max())
+            # The reference has an error of its own, a thousandth of that of a double.
+            assert worst <= float(error) * 1.001
+            assert float(error) <= 4 * worst
+    # Ranges are those of intervals, in which an increment may differ from itself.
+    for away, one, other in zip(bounds.step.away, exact, code.companions.identity, strict=True):
+        distance = float(np.abs(one - one.dtype.type(other)).max())
+        assert distance <= float(away) <= 2.5 * distance
+
+
+LARGEST = {"state": Fraction(17, 16), "increments": Fraction(1, 8)}
+
+
+@pytest.mark.parametrize(
+    ("name", "local", "transition", "length", "stretched"),
+    [
+        # A product of Euler parameters is as long as both of them: 17/8, and 5.
+        ("euler-rk4-2", (1, 2, 2, 4), (2, 1, 2, 4), 5, 5 * 17 / 8),
+        # A row of equal elements stretches a matrix of equal rows by its length: 17/16 root(3), and root(3) 3.
+        ("dcm-rk4-2", (0, 0, 1, 1, 2, 2, 0, 0, 0), 3 * (1, 2, 2), 3, 17 / 16 * 3 * 3),
+    ],
+)
+def test_the_error_of_a_step_is_that_of_its_product_and_what_its_transition_makes_of_a_state(
+    name, local, transition, length, stretched
+):
+    code, scale = programs()[name], Fraction(1, 10**9)
+    parts = ([scale * part for part in numbers] for numbers in (local, transition))
+    step = StepRounding(*map(tuple, parts), away=(Fraction(0),) * len(local))
+    limits = {s.name: size for s, size in zip(code.inputs, LARGEST.values(), strict=True)}
+    large = [Fraction(1)] * len(local)
+    assert float(_accumulation(code, limits, step, large).per_step / scale) == pytest.approx(
+        length + stretched
+    )
+    # Where the errors of the elements are known to be smaller, those of the largest row count.
+    small = [scale * part / 2 for part in local]
+    assert float(_accumulation(code, limits, step, small).per_step / scale) == pytest.approx(length / 2)
 
 
 def adversarial_run(code, number: str, steps: int, rng: np.random.Generator) -> list[float]:

@@ -14,7 +14,7 @@ from strapgen.catalogue.methods import rate_fit
 from strapgen.catalogue.methods.coefficients import Number
 from strapgen.catalogue.methods.rate_fit import Fit
 from strapgen.catalogue.methods.samples import Samples
-from strapgen.ir.attitude_step import Order
+from strapgen.ir.attitude_step import Order, Truncation
 from strapgen.ir.signals import Signal
 from strapgen.symbolic.evaluation import exact
 from strapgen.symbolic.kernel import KernelBuilder
@@ -61,6 +61,8 @@ class Method:
     coning : callable, optional
         Of a method by coning coefficients: ``coning(increments, previous)`` returns the coefficient of
         each cross product, see `coning_coefficients.Design`.
+    truncation : callable, optional
+        ``truncation(kinematics)`` returns what its series for an exponential leaves out.
     """
 
     name: str
@@ -77,6 +79,7 @@ class Method:
     fit: Callable[[int, int, int], Fit] = rate_fit.from_increments
     conditions: int | None = None
     coning: Callable[[int, int], dict[tuple[int, int], Fraction]] | None = None
+    truncation: Callable[[Kinematics], Truncation] | None = None
 
     def step_order(self, increments: int | None, previous: int = 0, ahead: int = 0) -> Order:
         """Return the orders of a step on so many increments; None stands for rates at the nodes."""

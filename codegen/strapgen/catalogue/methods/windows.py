@@ -126,7 +126,7 @@ WINDOWS: Mapping[str, Window] = _BUILT_IN
 WINDOW_TITLES: Mapping[str, str] = _BUILT_IN.titles
 
 #: Ending of the name of a window whose rotation is exact, and the terms of its power series.
-EXACT, EXACT_TERMS = "-exact", 20
+EXACT, EXACT_TERMS = "-exact", 16
 
 
 def named_window(method: str | Window) -> Window | None:
@@ -282,6 +282,7 @@ def _one_sided(window: Window, table: Mapping[str, Any]) -> Window:
     samples = previous + window.increments + ahead
     return replace(
         window,
+        sibling=True,
         name=sibling_name(window.name, window.previous, window.ahead, previous, ahead),
         title=sibling_title(window.title, previous, ahead),
         previous=previous,
