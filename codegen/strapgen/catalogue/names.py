@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from strapgen.catalogue.methods.shaped_coning import SHAPE_TITLES
 from strapgen.catalogue.methods.tableaux import TITLES
 from strapgen.catalogue.methods.windows import WINDOW_TITLES
 
@@ -83,6 +84,7 @@ INTEGRATORS = {
 METHODS = {
     **TITLES,
     **{name: integrator.title for name, integrator in INTEGRATORS.items()},
+    **SHAPE_TITLES,
     **WINDOW_TITLES,
 }
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
 import sympy as sp
@@ -57,6 +58,9 @@ class Method:
     conditions : int, optional
         Of a method with filters of its own, which says itself how many samples a step takes: the number of powers of
         time for which the rate is exact. By default it is the number of the samples.
+    coning : callable, optional
+        Of a method by coning coefficients: ``coning(increments, previous)`` returns the coefficient of
+        each cross product, see `coning_coefficients.Design`.
     truncation : callable, optional
         ``truncation(kinematics)`` returns what its series for an exponential leaves out.
     """
@@ -74,6 +78,7 @@ class Method:
     limit: Callable[[int, int, int], int] = rate_fit.step_order
     fit: Callable[[int, int, int], Fit] = rate_fit.from_increments
     conditions: int | None = None
+    coning: Callable[[int, int], dict[tuple[int, int], Fraction]] | None = None
     truncation: Callable[[Kinematics], Truncation] | None = None
 
     def step_order(self, increments: int | None, previous: int = 0, ahead: int = 0) -> Order:
