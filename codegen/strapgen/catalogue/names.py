@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from strapgen.catalogue.methods.shaped_coning import SHAPE_TITLES
 from strapgen.catalogue.methods.tableaux import TITLES
 from strapgen.catalogue.methods.windows import WINDOW_TITLES
 
@@ -42,6 +43,14 @@ INTEGRATORS = {
         "polynomial through the increments, integrated exactly", "fit_exact", 16, takes_rates=False
     ),
     "munthe-kaas4": Integrator("Runge-Kutta-Munthe-Kaas method of order 4", "munthe_kaas", 4),
+    "crouch-grossman3": Integrator("Crouch-Grossman method of order 3", "crouch_grossman", 3),
+    "coning-least-squares": Integrator(
+        "compressed coning coefficients, by least squares over a band",
+        "frequency_shaping",
+        2,
+        takes_rates=False,
+        takes_ahead=False,
+    ),
     "coning-compressed": Integrator(
         "compressed coning coefficients, made for coning", "coning", 4, False, ("compressed",), False
     ),
@@ -75,6 +84,7 @@ INTEGRATORS = {
 METHODS = {
     **TITLES,
     **{name: integrator.title for name, integrator in INTEGRATORS.items()},
+    **SHAPE_TITLES,
     **WINDOW_TITLES,
 }
 

@@ -18,6 +18,7 @@ from strapgen.cli.commands import (
     cost,
     derive,
     evidence,
+    frontier,
     generate,
     listing,
     rate_table,
@@ -61,6 +62,7 @@ COMMANDS: dict[str, dict[str, Any]] = {
         "converge": converge.converge,
         "check": check.check,
         "cost": cost.cost,
+        "frontier": frontier.frontier,
     },
     "Reproduce": {"tables": tables.tables, "rate-table": rate_table.rate_table, "study": study.app},
 }
