@@ -18,7 +18,7 @@ _COUNTED = ("multiply", "add")
 
 
 @dataclass(frozen=True)
-class Cost:
+class CallCost:
     """Multiplications and additions.
 
     Parameters
@@ -29,25 +29,25 @@ class Cost:
     multiply: int = 0
     add: int = 0
 
-    def __add__(self, other: Cost) -> Cost:
+    def __add__(self, other: CallCost) -> CallCost:
         """Return the sum of two costs."""
-        return Cost(self.multiply + other.multiply, self.add + other.add)
+        return CallCost(self.multiply + other.multiply, self.add + other.add)
 
-    def __rmul__(self, times: int) -> Cost:
+    def __rmul__(self, times: int) -> CallCost:
         """Return the cost of doing it several times."""
-        return Cost(times * self.multiply, times * self.add)
+        return CallCost(times * self.multiply, times * self.add)
 
     def __str__(self) -> str:
         """Return the cost in words."""
         return f"{self.multiply:,} multiply and {self.add:,} add"
 
     @classmethod
-    def of(cls, sources: Sources) -> Cost:
+    def of(cls, sources: Sources) -> CallCost:
         """Return the cost of a generated function."""
         return cls(*(sources.operations.get(kind, 0) for kind in _COUNTED))
 
     @classmethod
-    def of_sum(cls, taps: int) -> Cost:
+    def of_sum(cls, taps: int) -> CallCost:
         """Return the cost of a sum of vectors, each times its tap."""
         return cls(3 * taps, 3 * (taps - 1))
 
@@ -58,30 +58,30 @@ class LateCosts:
 
     Parameters
     ----------
-    commit : Cost
+    commit : CallCost
         A commit with all samples ahead, which nearly every sample is.
-    start, gap : Cost
+    start, gap : CallCost
         The most in one call of ``_push``, at the start and after a gap, both where a gap ends the start.
-    now, now_gap : Cost
+    now, now_gap : CallCost
         The attitude of now, without a gap and with one.
     """
 
-    commit: Cost
-    start: Cost
-    gap: Cost
-    now: Cost
-    now_gap: Cost
+    commit: CallCost
+    start: CallCost
+    gap: CallCost
+    now: CallCost
+    now_gap: CallCost
 
     @classmethod
     def of(cls, filters: LateFilters, step: Sources, rotation: Sources, normalization: Sources) -> LateCosts:
         """Return the costs with filters and the generated functions."""
         window = filters.window
         rows = len(_sums(filters))
-        single = Cost.of(step)
-        other = rows * Cost.of_sum(filters.samples) + Cost.of(rotation)
-        normal = Cost.of(normalization)
+        single = CallCost.of(step)
+        other = rows * CallCost.of_sum(filters.samples) + CallCost.of(rotation)
+        normal = CallCost.of(normalization)
         commit = single + normal
-        restored = Cost.of_sum(2 * REACH + 1) + Cost(0, 6)
+        restored = CallCost.of_sum(2 * REACH + 1) + CallCost(0, 6)
         before = (
             filters.most_commits - REACH - 1
         )  # at the start, where the gap is the last sample that is waited for
