@@ -130,9 +130,9 @@ def _restored(row: Array, kinds: Array, filters: LateFilters) -> Array:
             f"kinds holds {int(kinds[~np.isin(kinds, list(SampleKind))][0])}; 0, 1 and 2 are allowed"
         )
     result, last = row.copy(), -REACH - 1
-    for number in np.flatnonzero(kinds):
+    for number in map(int, np.flatnonzero(kinds)):
         gap = number - last if number - last <= REACH else 0
-        reason = refusal(int(kinds[number]), int(gap), int(number))
+        reason = refusal(int(kinds[number]), gap, number)
         if reason:
             raise GapError(f"sample {number}: {reason}")
         if kinds[number] == SampleKind.MERGED:
