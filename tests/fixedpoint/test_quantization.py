@@ -7,9 +7,12 @@ from fractions import Fraction
 from types import SimpleNamespace
 
 import pytest
+from small_programs import node, program
 
+from strapgen import quantize
 from strapgen.fixedpoint.quantities import Quantities
-from strapgen.fixedpoint.quantization import _errors, _output
+from strapgen.fixedpoint.quantization import _MOST_GUARD_BITS, _errors, _output
+from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.integer_program import IntegerInput, IntegerSum, Term, Value
 from strapgen.ir.signals import Signal
 from strapgen.support.exceptions import InputError
@@ -48,3 +51,12 @@ def test_an_output_has_the_range_of_all_of_its_elements_and_one_format():
     context.values["z"] = replace(second, fraction=5)
     with pytest.raises(InputError, match="elements of out share one format"):
         _output(context, signal)
+
+
+@pytest.mark.parametrize("bits", [1, _MOST_GUARD_BITS, _MOST_GUARD_BITS + 1])
+def test_inputs_have_up_to_so_many_bits_less_that_their_sum_is_exact(bits):
+    largest = {"a": Fraction(1, 2), "b": Fraction(1, 2) / 2**bits}
+    code = program({"s": node("add", "a", "b"), "y": node("multiply", "s", "s")}, largest)
+    b = quantize(code, Settings(16)).interface.inputs[1]
+    # The sum, of 1/2 to 1, has 15 places; an input of up to 1/2 has as many, and a smaller one more.
+    assert b.format.fraction == (15 if bits <= _MOST_GUARD_BITS else 15 + bits)
