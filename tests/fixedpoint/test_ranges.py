@@ -105,3 +105,12 @@ def test_all_parts_of_a_box_that_is_cut_count(sign):
     known = ranges.of_sum("v", terms, 3.0)
     assert -4 <= known.lowest <= -3
     assert Fraction(1, 5) <= known.highest <= 2
+
+
+def test_the_side_that_is_cut_is_the_one_of_which_most_is_left():
+    box = {"x": Interval.of(-4, 0), "y": Interval.of(0, 1)}
+    parts = _Parts(box, [*quantities([], box).values()], Sum(((("x", "y"), Fraction(1)),)))
+    _, upper = parts.halves(parts.whole(), "y")
+    assert parts.widest(upper, box) == "x"
+    for half in parts.halves(parts.whole(), "x"):
+        assert parts.widest(half, box) == "y"
