@@ -136,7 +136,7 @@ def design(
     The file holds the filters that commit an attitude and one-sided ones, with fewer samples ahead, for the attitude of
     now. Each is exact for polynomial rates, and the best one over the band. A second design gives the same file.
 
-    Example: strapgen window design --previous 7 --ahead 7 --band 1.3 --out window.toml
+    Example: strapgen window design --previous 7 --ahead 7 --band 1.3 --out out/window.toml
     """
     output.check(band.spectrum)
     brief = _brief(size, band, name)
