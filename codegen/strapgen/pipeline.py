@@ -23,8 +23,7 @@ from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.support.timing import timed
 
 if TYPE_CHECKING:
-    from strapgen.catalogue.methods.tableau import Tableau
-    from strapgen.catalogue.methods.window import Window
+    from strapgen.catalogue.choice import AnyMethod
     from strapgen.symbolic.kernel import Kernel
 
 
@@ -49,7 +48,7 @@ def compile(
 
 def derive(
     algorithm: str | Choice,
-    method: str | Tableau | Window | None = None,
+    method: AnyMethod | None = None,
     increments: int | None = None,
     *,
     rates: bool = False,
@@ -63,7 +62,7 @@ def derive(
     algorithm : str or Choice
         An attitude algorithm ("dcm", "euler", "cayley-klein") or another kernel that ``strapgen list`` shows; a Python
         file; or what `strapgen.choose` returned, to which the other parameters do not apply.
-    method : str, Tableau or Window, optional
+    method : str, Tableau, Window or ShapedConing, optional
         Integration method of an attitude algorithm, by name, as a tableau or as a window; by default "rk4".
     increments : int, optional
         Angle increments a step, 1 to 8 (default 2), of an attitude algorithm.

@@ -1,10 +1,13 @@
-"""Ranges on parts of the inputs' box: plain integers give what intervals do, and a half what it gives by itself."""
+"""Ranges of sums of products: they hold all values; on parts of the inputs' box integers give what intervals do."""
 
 from __future__ import annotations
 
+import itertools
+import math
 from fractions import Fraction
 
-from hypothesis import given
+import pytest
+from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from strapgen.fixedpoint.intervals import Interval
@@ -51,3 +54,61 @@ def test_a_part_and_its_halves_have_the_range_that_intervals_give(sums, box, sid
     assert parts.evaluate(whole) == by_intervals(sums, box)
     for part, half in zip(parts.halves(whole, side), box[side].halves(), strict=True):
         assert parts.evaluate(part) == by_intervals(sums, box | {side: half})
+
+
+# A cut takes long: no shorter example is sought.
+@settings(max_examples=20, phases=(Phase.explicit, Phase.generate))
+@given(chains(), st.fixed_dictionaries(dict.fromkeys(INPUTS, intervals)))
+def test_no_value_at_a_corner_or_inside_leaves_its_range(sums, box):
+    items = quantities([], box)
+    ranges = Ranges(items, box)
+    sides = [(box[name].lowest, box[name].highest) for name in INPUTS]
+    inside = [(2 * low + high) / 3 for low, high in sides]
+    points = [dict(zip(INPUTS, point, strict=True)) for point in (inside, *itertools.product(*sides))]
+    for k, definition in enumerate(sums):
+        name = f"v_{k}"
+        for point in points:
+            point[name] = sum((c * math.prod(map(point.get, m)) for m, c in definition.terms), Fraction(0))
+        seen = float(max(abs(point[name]) for point in points)) or 1e-300
+        known = ranges.of_sum(name, dict(definition.terms), seen)
+        items[name] = Quantity(name, definition, Fraction(0), known)
+        assert all(known.lowest <= point[name] <= known.highest for point in points)
+
+
+def of_product(coefficient: Fraction, inexact: Fraction) -> tuple[Fraction, Fraction]:
+    """Return the range of p x, where p is a multiple of x z up to an error."""
+    x, z = Interval.of(-1, 1), Interval.of(Fraction(1, 2), 1)
+    items = quantities([], {"x": x, "z": z})
+    p = Sum(((("x", "z"), coefficient),))
+    known = (x * z).scale(coefficient).widened(inexact)
+    items["p"] = Quantity("p", p, Fraction(0), known, inexact=inexact)
+    result = Ranges(items, {"x": x, "z": z}).enclosure([(("p", "x"), Fraction(1))])
+    return result.lowest, result.highest
+
+
+def test_a_product_with_a_factor_of_its_own_has_the_range_of_a_square():
+    assert of_product(Fraction(-1, 2), Fraction(0)) == (Fraction(-1, 2), 0)
+    assert of_product(Fraction(3, 4), Fraction(0)) == (0, Fraction(3, 4))
+    # At x = 1/4 and z = 1/2 the product is positive if the factor is too large by 1/8.
+    low, high = of_product(Fraction(-1, 2), Fraction(1, 8))
+    assert low == -high == Fraction(-5, 8)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_all_parts_of_a_box_that_is_cut_count(sign):
+    """x (1 - y) - y (1 - x) is x - y on the box from 0 to 1; plain intervals see twice that."""
+    box = dict.fromkeys("xy", Interval.of(0, 1))
+    items = quantities([], box)
+    ranges = Ranges(items, box)
+    ranges.expanded = dict.fromkeys("xy")  # no expansion, so that only a cut helps
+    terms = {
+        ("x",): Fraction(sign),
+        ("y",): Fraction(-sign),
+        ("x", "y"): Fraction(3),
+        ("x", "x"): Fraction(-3),
+    }
+    points = [(Fraction(x, 64), Fraction(y, 64)) for x in range(65) for y in range(65)]
+    values = [sign * (x - y) + 3 * x * (y - x) for x, y in points]
+    known = ranges.of_sum("v", terms, float(max(map(abs, values))))
+    assert known.magnitude <= 4
+    assert known.lowest <= min(values) <= max(values) <= known.highest

@@ -12,8 +12,7 @@ from strapgen.backends.protocol import Backend
 from strapgen.backends.registry import BACKENDS, DEFAULT_BACKENDS, Entry, backend_class, of_sources
 from strapgen.backends.step_sources import StepSources
 from strapgen.catalogue import Choice
-from strapgen.catalogue.methods.tableau import Tableau
-from strapgen.catalogue.methods.window import Window
+from strapgen.catalogue.choice import AnyMethod
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
 from strapgen.support import checks, stages
@@ -110,7 +109,7 @@ def evaluator(kernel: str | Choice, backend: str = "numpy", settings: Settings |
 
 def backend(
     algorithm: str | Choice,
-    method: str | Tableau | Window | None = None,
+    method: AnyMethod | None = None,
     increments: int | None = None,
     backend: str = "numpy",
     orthonormalization: str | None = None,
@@ -126,7 +125,7 @@ def backend(
     algorithm : str or Choice
         "dcm", "euler" or "cayley-klein"; a Python file, or the entry point of a user's algorithm; or a choice that
         `catalogue.choose` returns, with which the other parameters of a choice do not go.
-    method : str, Tableau or Window, optional
+    method : str, Tableau, Window or ShapedConing, optional
         A name that ``strapgen list`` shows, or a tableau; by default "rk4".
     increments : int, optional
         Angle increments per step, 1 to 8; by default 2.
@@ -188,7 +187,7 @@ def sources_to_build(choice: Choice, backend: str, settings: Settings | None = N
 
 def chosen_step(
     algorithm: str | Choice,
-    method: str | Tableau | Window | None,
+    method: AnyMethod | None,
     increments: int | None,
     previous: int | None = None,
     ahead: int | None = None,

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
+from strapgen.catalogue.methods.shaped_coning import ShapedConing, named_shape
 from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.catalogue.methods.window import Window
 from strapgen.catalogue.methods.windows import named_window
@@ -13,6 +14,10 @@ from strapgen.catalogue.names import KERNELS
 
 if TYPE_CHECKING:
     from strapgen.symbolic.kernel import Kernel, Stage
+
+
+#: What chooses a method: its name, or the value that holds its coefficients.
+AnyMethod: TypeAlias = str | Tableau | Window | ShapedConing
 
 
 @dataclass(frozen=True)
@@ -23,7 +28,7 @@ class Choice:
     ----------
     name : str
         Name of the algorithm or kernel; of a user's the name of its kernel.
-    method : str, Tableau or Window, optional
+    method : str, Tableau, Window or ShapedConing, optional
         Method of an attitude step of the catalogue, or of a vector of one.
     increments : int, optional
         Increments of a step. A step of the catalogue without increments takes the body rate at every node of its
@@ -35,7 +40,7 @@ class Choice:
     """
 
     name: str
-    method: str | Tableau | Window | None = None
+    method: AnyMethod | None = None
     increments: int | None = None
     previous: int = 0
     ahead: int = 0
@@ -54,12 +59,17 @@ class Choice:
     @property
     def method_name(self) -> str | None:
         """Name of the method."""
-        return self.method.name if isinstance(self.method, (Tableau, Window)) else self.method
+        return self.method if self.method is None or isinstance(self.method, str) else self.method.name
 
     @property
     def window(self) -> Window | None:
         """The window, if the method is one."""
         return named_window(self.method) if isinstance(self.method, (str, Window)) else None
+
+    @property
+    def shape(self) -> ShapedConing | None:
+        """The coning coefficients for a band or a spectrum, if the method has such."""
+        return named_shape(self.method)
 
     @property
     def kernel(self) -> str:
@@ -80,7 +90,7 @@ class Choice:
         """
         if self.user_kernel is not None:
             return f"{self.kernel} {_text(self.user_kernel)}"
-        if isinstance(self.method, (Tableau, Window)):
+        if self.method is not None and not isinstance(self.method, str):
             return f"{self.kernel} {self.method!r} {self.method.file}"
         return self.kernel
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 from typing import Any
 
-from strapgen.catalogue.choice import Choice
+from strapgen.catalogue.choice import AnyMethod, Choice
+from strapgen.catalogue.methods.shaped_coning import ShapedConing, named_shape
 from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.catalogue.methods.window import Window
@@ -32,7 +33,7 @@ _FILE = "a Python file"
 
 def choose(
     name: str,
-    method: str | Tableau | Window | None = None,
+    method: AnyMethod | None = None,
     increments: int | None = None,
     rates: bool = False,
     previous: int | None = None,
@@ -44,7 +45,7 @@ def choose(
     ----------
     name : str
         A name of the catalogue, a user's Python file, or the entry point of one.
-    method : str, Tableau or Window, optional
+    method : str, Tableau, Window or ShapedConing, optional
     increments : int, optional
         Increments in a step.
     previous, ahead : int, optional
@@ -90,7 +91,10 @@ def choose(
         window = named_window(method)
         if window is not None:
             return _choose_window(name, window, increments, rates, previous, ahead)
-    assert not isinstance(method, Window), "one is taken before"
+    shape = named_shape(method)
+    if shape is not None:
+        return _choose_shape(name, shape, increments, rates, (previous, ahead))
+    assert not isinstance(method, (Window, ShapedConing)), "those are taken before"
     if name in VECTORS:
         if isinstance(method, Tableau):
             raise InputError(
@@ -154,6 +158,24 @@ def _choose_window(
     return Choice(name, method, window.increments, window.previous, window.ahead)
 
 
+def _choose_shape(
+    name: str,
+    shape: ShapedConing,
+    increments: int | None,
+    rates: bool,
+    beside: tuple[int | None, int | None],
+) -> Choice:
+    """Return the choice of coning coefficients for a band or a spectrum, which say what samples a step takes."""
+    if rates:
+        raise InputError(f"{shape.name} takes increments; rates at nodes do not go with it")
+    stated = {"increments": increments, "previous": beside[0], "ahead": beside[1]}
+    for (what, value), needed in zip(stated.items(), (shape.samples, shape.previous, 0), strict=True):
+        if value is not None and checks.count(what, value, smallest=0) != needed:
+            raise InputError(f"{what} is {value}; a step of {shape.name} has {needed}")
+    method = shape if shape.file or named_shape(shape.name) != shape else shape.name
+    return Choice(name, method, shape.samples, shape.previous)
+
+
 def _beside(previous: int | None, ahead: int | None) -> tuple[int, int]:
     """Check the numbers of increments from before a step and from after it."""
     before = checks.count("previous", previous or 0, smallest=0, largest=MOST_BESIDE)
@@ -167,7 +189,7 @@ def _beside(previous: int | None, ahead: int | None) -> tuple[int, int]:
 
 def _choose_users(
     name: str,
-    method: str | Tableau | Window | None,
+    method: AnyMethod | None,
     increments: int | None,
     rates: bool,
     previous: int | None,
@@ -177,8 +199,9 @@ def _choose_users(
     if rates:
         raise InputError(f"{name}: an algorithm of a user takes increments, not rates")
     options: dict[str, Any] = {}
-    if isinstance(method, Window):
-        raise InputError(f"{name}: an algorithm of a user takes a tableau, not the window {method.name}")
+    if isinstance(method, (Window, ShapedConing)):
+        what = "window" if isinstance(method, Window) else "coning coefficients"
+        raise InputError(f"{name}: an algorithm of a user takes a tableau, not the {what} {method.name}")
     if method is not None:
         options["method"] = method if isinstance(method, Tableau) else TABLEAUX[_tableau_name(method)]
     if increments is not None:
@@ -200,7 +223,7 @@ def _tableau_name(method: str) -> str:
 
 def choose_step(
     name: str,
-    method: str | Tableau | Window | None = None,
+    method: AnyMethod | None = None,
     increments: int | None = None,
     rates: bool = False,
     previous: int | None = None,

@@ -6,7 +6,8 @@ from fractions import Fraction
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from strapgen.catalogue.choice import Choice
+from strapgen.catalogue.choice import AnyMethod, Choice
+from strapgen.catalogue.methods.shaped_coning import named_shape
 from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.catalogue.methods.window import Window
@@ -35,7 +36,7 @@ def rounding(choice: Choice) -> Fraction:
     return method.tolerance if isinstance(method, Tableau) else Fraction(0)
 
 
-def enough(method: str | Tableau | Window) -> int:
+def enough(method: AnyMethod) -> int:
     """Return the smallest number of increments with which a step reaches the order of its method.
 
     Examples
@@ -43,7 +44,10 @@ def enough(method: str | Tableau | Window) -> int:
     >>> enough("rk4"), enough("butcher6"), enough("window-7-7")
     (2, 4, 1)
     """
-    window = None if isinstance(method, Tableau) else named_window(method)
+    shape = named_shape(method)
+    if shape is not None:
+        return shape.samples
+    window = named_window(method) if isinstance(method, (str, Window)) else None
     if window is not None:
         return window.increments
     loaded = _method(method)
@@ -93,11 +97,14 @@ def companion(kernel: Kernel, name: str) -> Kernel:
     return next((brought for brought in kernel.own if brought.name == name), None) or derive(Choice(name))
 
 
-def _method(method: str | Tableau | Window) -> Method:
+def _method(method: AnyMethod) -> Method:
     """Load a method by its name, from its tableau or from its window."""
-    from strapgen.catalogue.methods import runge_kutta, windowed
+    from strapgen.catalogue.methods import coning, runge_kutta, windowed
 
-    window = None if isinstance(method, Tableau) else named_window(method)
+    shape = named_shape(method)
+    if shape is not None:
+        return coning.shaped(shape)
+    window = named_window(method) if isinstance(method, (str, Window)) else None
     if window is not None:
         return windowed.method(window)
     if isinstance(method, Tableau):

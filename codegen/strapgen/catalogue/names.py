@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from strapgen.catalogue.methods.shaped_coning import SHAPE_TITLES
 from strapgen.catalogue.methods.tableaux import TITLES
 from strapgen.catalogue.methods.windows import WINDOW_TITLES
 
@@ -83,6 +84,7 @@ INTEGRATORS = {
 METHODS = {
     **TITLES,
     **{name: integrator.title for name, integrator in INTEGRATORS.items()},
+    **SHAPE_TITLES,
     **WINDOW_TITLES,
 }
 
@@ -120,6 +122,9 @@ class Recipe(NamedTuple):
     arguments: tuple[Any, ...] = ()
     standard: bool = True
 
+
+#: Degrees of the rate for which there are steps from its Legendre coefficients.
+LEGENDRE_DEGREES = range(1, 5)
 
 #: Orders at which the series of an update can be cut off.
 UPDATE_ORDERS = range(1, 21)
@@ -242,6 +247,17 @@ KERNELS = {
             f"{title}: state after a transition", "attitude_step", "product", (algorithm,)
         )
         for algorithm, title in ALGORITHMS.items()
+    },
+    **{
+        f"{name}-legendre-{degree}": Recipe(
+            f"{ALGORITHMS[name]}: step from the Legendre coefficients of the rate to degree {degree}",
+            "legendre_step",
+            "step",
+            (name, degree),
+            False,
+        )
+        for name in ("dcm", "euler")
+        for degree in LEGENDRE_DEGREES
     },
     "dcm-orthonormalize": Recipe(
         "orthonormalization by dual rows, the thesis's scheme", "orthonormal", "dcm"

@@ -171,33 +171,6 @@ def _bessel_integer(m: int, x: int) -> int:
     return value
 
 
-def bessel(m: int, b: Any) -> tuple[Any, Any, Any]:
-    """Return j_m(b/2), its derivative in b and its second derivative, for b up to 4.
-
-    Examples
-    --------
-    >>> [round(float(value), 12) for value in bessel(0, REAL.mpf(2))]
-    [0.841470984808, -0.15058433947, -0.059783406732]
-    """
-    x = b / 2
-    value = slope = curvature = REAL.mpf(0)
-    square = x * x
-    for c in reversed(_series(m)):
-        curvature = curvature * square + 2 * slope
-        slope = slope * square + value
-        value = value * square + c
-    # With j = x^m q(x^2): q' and q'' above are derivatives in x^2.
-    power = x**m
-    lower = m * x ** (m - 1) if m else REAL.mpf(0)
-    lowest = m * (m - 1) * x ** (m - 2) if m > 1 else REAL.mpf(0)
-    q1, q2 = 2 * x * slope, 2 * slope + 4 * square * curvature
-    return (
-        power * value,
-        (lower * value + power * q1) / 2,
-        (lowest * value + 2 * lower * q1 + power * q2) / 4,
-    )
-
-
 def magnitude(re: int, im: int) -> int:
     """Return the magnitude of a complex number."""
     return isqrt(re * re + im * im)

@@ -33,9 +33,16 @@ def rounded(unknowns: Unknowns, taps: Sequence[Any], bits: int = TABLE_BITS) -> 
     >>> [str(tap) for tap in rounded(Unknowns(Shape(3, 3, 4), 1), taps, 30)[4:]]
     ['3292544549/8053063680', '-200490913/2013265920', '7214415/536870912']
     """
-    outer = [_nearest(value, bits) for value in unknowns.values(taps)[unknowns.inner :]]
+    outer = [nearest(value, bits) for value in unknowns.values(taps)[unknowns.inner :]]
     return unknowns.taps(unknowns.complete(outer))
 
 
-def _nearest(value: Any, bits: int) -> Fraction:
+def nearest(value: Any, bits: int) -> Fraction:
+    """Return the multiple of 2^-bits nearest to a number.
+
+    Examples
+    --------
+    >>> nearest(REAL.mpf(1) / 3, 4)
+    Fraction(5, 16)
+    """
     return Fraction(int(REAL.nint(REAL.ldexp(value, bits))), 1 << bits)

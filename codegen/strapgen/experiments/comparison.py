@@ -16,8 +16,7 @@ from strapgen.backends import BACKENDS, DEFAULT_BACKENDS, Backend, chosen_step
 from strapgen.backends import backend as attitude_backend
 from strapgen.backends.increments import pulses
 from strapgen.catalogue import Choice
-from strapgen.catalogue.methods.tableau import Tableau
-from strapgen.catalogue.methods.window import Window
+from strapgen.catalogue.choice import AnyMethod
 from strapgen.ir.fixed_settings import Settings
 from strapgen.simulation.runs import attitude, drift_between, require_finite
 from strapgen.support import checks, stages
@@ -96,7 +95,7 @@ class Comparison:
 
 def compare(
     algorithm: str | Choice,
-    method: str | Tableau | Window | None = None,
+    method: AnyMethod | None = None,
     samples: int | None = None,
     backends: Sequence[str | Backend] = DEFAULT_BACKENDS,
     increments: Any = None,

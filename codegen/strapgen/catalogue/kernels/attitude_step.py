@@ -7,7 +7,7 @@ from fractions import Fraction
 from strapgen.catalogue.kinematics import KINEMATICS, Kinematics
 from strapgen.catalogue.methods.method import Method
 from strapgen.catalogue.methods.samples import Samples
-from strapgen.ir.attitude_step import Companions
+from strapgen.ir.attitude_step import Companions, Order, Truncation
 from strapgen.ir.signals import Signal
 from strapgen.symbolic.kernel import Kernel, KernelBuilder
 
@@ -46,6 +46,7 @@ def step(
     fitted = increments is not None and method.conditions is None
     extracted = "rate extraction chapter 3 A; " if fitted else ""
     order = method.step_order(increments, previous, ahead)
+    truncation = None if method.truncation is None else method.truncation(kinematics)
     return build.kernel(
         f"{kinematics.name}-{suffix}",
         f"{kinematics.title}: step by {method.title} from {source}",
@@ -59,11 +60,21 @@ def step(
             previous,
             method.isometry(None if increments is None else increments + previous + ahead),
             ahead,
+            truncation,
         ),
         order=order,
         arguments=f"{kinematics.name} {option}",
-        notes=(str(order).capitalize() + ".",) if order.limited else (),
+        notes=_notes(order, truncation),
     )
+
+
+def _notes(order: Order, truncation: Truncation | None) -> tuple[str, ...]:
+    """Return what the reader of generated code should know of the order and of a series that is cut off."""
+    notes: tuple[str, ...] = (f"{str(order).capitalize()}.",) if order.limited else ()
+    if truncation is not None:
+        text = f"The exponential of the rotation vector is a series to its power {truncation.order}"
+        notes += (f"{text}; error bounds have what it leaves out.",)
+    return notes
 
 
 def rotation_vector(method: Method, increments: int | None, previous: int = 0, ahead: int = 0) -> Kernel:

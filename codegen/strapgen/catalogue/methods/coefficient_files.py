@@ -1,15 +1,22 @@
-"""Reads files of exact coefficients, which are TOML: their bytes, their keys and the name that their title gives."""
+"""Reads files of exact coefficients, which are TOML: bytes, keys, rationals, and the name that a title gives."""
 
 from __future__ import annotations
 
 import re
 import tomllib
 from collections.abc import Collection, Mapping
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+from strapgen.catalogue.methods import coefficients
+from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
+
+_FRACTION = re.compile(r"-?[0-9]+(/[1-9][0-9]*)?")
+#: Most characters of a fraction; those of filters for a gyro are long.
+MOST_CHARACTERS = 4000
 
 
 def content(path: str | Path, what: str, most_bytes: int) -> dict[str, Any]:
@@ -95,3 +102,76 @@ def slug(title: str) -> str:
     if not name[:1].isalpha():
         raise InputError(f"name {title!r} must begin with a letter from a to z, for its name in code")
     return name
+
+
+def rational(what: str, value: Any) -> Fraction:
+    """Return an entry that must be a rational number: a whole number or a text, see `coefficients.number`.
+
+    Raises
+    ------
+    InputError
+        If it is none.
+
+    Examples
+    --------
+    >>> rational("tap", "-7/30")
+    Fraction(-7, 30)
+    """
+    # The whole of a large family is read: what is plainly a fraction does not take the way of an expression.
+    if isinstance(value, str) and len(value) <= MOST_CHARACTERS and _FRACTION.fullmatch(value):
+        top, _, bottom = value.partition("/")
+        return Fraction(int(top), int(bottom or 1))
+    number = coefficients.number(what, value)
+    if not isinstance(number, Fraction):
+        raise InputError(f"{what} is {value!r}; a rational number is needed")
+    return number
+
+
+def not_negative(what: str, value: Any) -> Fraction:
+    """Return an entry that must be a rational number from 0 on.
+
+    Raises
+    ------
+    InputError
+        If it is none.
+    """
+    number = rational(what, value)
+    if number < 0:
+        raise InputError(f"{what} is {value}; a number that is not below 0 is needed")
+    return number
+
+
+def band(value: Any) -> Fraction:
+    """Return an entry that must be the highest angular frequency of a band, in rad a sample.
+
+    Raises
+    ------
+    InputError
+        If it is none, or not below half the sampling rate.
+    """
+    highest = rational("band", value)
+    if not 0 < highest < 3:
+        raise InputError(
+            f"band is {value} rad a sample; a number between 0 and 3 is needed, pi is half the sampling rate"
+        )
+    return highest
+
+
+def gyro(table: Any) -> GyroResponse | None:
+    """Return a table with a gyro of second order; None without a table.
+
+    Raises
+    ------
+    InputError
+        If it is no table, a key is wrong, or a number is not above 0.
+    """
+    if table is None:
+        return None
+    if not isinstance(table, dict):
+        raise InputError(f"gyro is of type {type(table).__name__}; a table is needed")
+    check_keys(table, GyroResponse._fields, ())
+    values = [not_negative(f"gyro {key}", table[key]) for key in GyroResponse._fields]
+    for key, value in zip(GyroResponse._fields, values, strict=True):
+        if not value:
+            raise InputError(f"gyro {key} is 0; a number above 0 is needed")
+    return GyroResponse(*values)

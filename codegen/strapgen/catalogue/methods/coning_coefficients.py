@@ -49,7 +49,7 @@ class Design:
     Parameters
     ----------
     form : str
-        "compressed", "uncompressed" or "combined".
+        "compressed", "uncompressed" or "combined", or "shaped" for coefficients of a file.
     samples, previous : int
         Samples of the slow cycle, and samples from before it.
     pairs : dict
@@ -251,11 +251,27 @@ def _coning(samples: int, previous: int) -> Iterator[tuple[Scalars, Fraction]]:
     total = samples + previous
     for q in range(1, total):
         power = 2 * q + 1
-        row = {}
-        for older, newer in _pairs(total):
-            m = Fraction(newer - older)
-            row[older, newer] = 2 * m**power - (m + 1) ** power - (m - 1) ** power
+        row = {(older, newer): power_of_coning(newer - older, power) for older, newer in _pairs(total)}
         yield row, -(Fraction(samples) ** power) / 2
+
+
+def power_of_coning(distance: int, power: int) -> Fraction:
+    """Return a power of lambda in the cross product of two samples on coning.
+
+    Parameters
+    ----------
+    distance : int
+        m, from the older sample to the newer one.
+    power : int
+        An odd one, 2q + 1.
+
+    Returns
+    -------
+    Fraction
+        The coefficient of the power in 2 sin(m lambda) (1 - cos lambda), by (-1)^q / (2q + 1)!.
+    """
+    m = Fraction(distance)
+    return 2 * m**power - (m + 1) ** power - (m - 1) ** power
 
 
 def _nearest(conditions: list[tuple[list[Fraction], Fraction]], start: list[Fraction]) -> list[Fraction]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
 import sympy as sp
@@ -13,7 +14,7 @@ from strapgen.catalogue.methods import rate_fit
 from strapgen.catalogue.methods.coefficients import Number
 from strapgen.catalogue.methods.rate_fit import Fit
 from strapgen.catalogue.methods.samples import Samples
-from strapgen.ir.attitude_step import Order
+from strapgen.ir.attitude_step import Order, Truncation
 from strapgen.ir.signals import Signal
 from strapgen.symbolic.evaluation import exact
 from strapgen.symbolic.kernel import KernelBuilder
@@ -57,6 +58,11 @@ class Method:
     conditions : int, optional
         Of a method with filters of its own, which says itself how many samples a step takes: the number of powers of
         time for which the rate is exact. By default it is the number of the samples.
+    coning : callable, optional
+        Of a method by coning coefficients: ``coning(increments, previous)`` returns the coefficient of
+        each cross product, see `coning_coefficients.Design`.
+    truncation : callable, optional
+        ``truncation(kinematics)`` returns what its series for an exponential leaves out.
     """
 
     name: str
@@ -72,6 +78,8 @@ class Method:
     limit: Callable[[int, int, int], int] = rate_fit.step_order
     fit: Callable[[int, int, int], Fit] = rate_fit.from_increments
     conditions: int | None = None
+    coning: Callable[[int, int], dict[tuple[int, int], Fraction]] | None = None
+    truncation: Callable[[Kinematics], Truncation] | None = None
 
     def step_order(self, increments: int | None, previous: int = 0, ahead: int = 0) -> Order:
         """Return the orders of a step on so many increments; None stands for rates at the nodes."""

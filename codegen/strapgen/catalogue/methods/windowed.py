@@ -9,17 +9,19 @@ their own: c_k x e_(k-1) with e_(k-1) = c_(k+1) / (2 (2k+1) (2k+3)) - c_(k-1) / 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from fractions import Fraction
 from functools import cache
 
 import sympy as sp
 
 from strapgen.catalogue.kinematics import Kinematics
-from strapgen.catalogue.methods import rate_fit, rotation_series
+from strapgen.catalogue.methods import polynomial_rotation, rate_fit, rotation_series
 from strapgen.catalogue.methods.method import PHI, Method
-from strapgen.catalogue.methods.rotation_series import Scalars, Words
+from strapgen.catalogue.methods.rotation_series import Scalars, Words, fraction
 from strapgen.catalogue.methods.samples import Samples
 from strapgen.catalogue.methods.window import Taps, Window
+from strapgen.ir.attitude_step import Truncation
 from strapgen.ir.signals import Signal
 from strapgen.symbolic.evaluation import exact
 from strapgen.symbolic.kernel import KernelBuilder
@@ -29,6 +31,8 @@ from strapgen.symbolic.rotations import cross, dot
 _DEGREE, _FOURTH = 4, 6
 #: Highest power of the rotation vector in its exponential. At half a radian the powers left out are below 3e-18.
 SERIES = 12
+#: Name of the square of the angle.
+_SQUARE = "angle_square"
 
 
 def method(window: Window) -> Method:
@@ -37,7 +41,7 @@ def method(window: Window) -> Method:
     Parameters
     ----------
     window : Window
-        A window whose rotation is the rotation vector to fourth order.
+        Its key `rotation` says whether the rotation is that of the rotation vector to fourth order, or exact.
     """
 
     def rotation_vector(build: KernelBuilder, samples: Samples) -> sp.Matrix:
@@ -45,33 +49,47 @@ def method(window: Window) -> Method:
 
     def transition(build: KernelBuilder, kinematics: Kinematics, samples: Samples) -> sp.Matrix:
         phi = rotation_vector(build, samples)
-        square = build.value("angle_square", dot(phi, phi), "square of the angle of the step")
+        square = build.value(_SQUARE, dot(phi, phi), "square of the angle of the step")
         return kinematics.exponential(phi, SERIES, square)
 
-    return Method(
+    def exact_rotation(build: KernelBuilder, kinematics: Kinematics, samples: Samples) -> sp.Matrix:
+        rate = _Filtered(build, samples, window)
+        coefficients = [rate.coefficient(m) for m in range(window.degree + 1)]
+        return polynomial_rotation.rotation(build, kinematics, coefficients, window.terms, window.increments)
+
+    fourth = Method(
         window.name,
         window.title,
         f"{window.source}; {rotation_series.SOURCE}",
         _FOURTH,
         transition,
         option=window.option,
-        conditions=window.conditions,
         rotation_vector=rotation_vector,
         limit=lambda increments, previous, ahead: _order(window),
         fit=lambda increments, previous, ahead: rate_fit.from_legendre(window.filters),
+        conditions=window.conditions,
+        isometry=lambda count: True,
+        truncation=lambda kinematics: Truncation(SERIES, fraction(kinematics.scale), _SQUARE),
+    )
+    if window.rotation == "fourth":
+        return fourth
+    return replace(
+        fourth,
+        source=f"{window.source}; {polynomial_rotation.SOURCE}",
+        order=window.terms,
+        transition=exact_rotation,
+        rotation_vector=None,
+        truncation=None,
     )
 
 
 def _order(window: Window) -> int:
-    """Return the order of a step: that of the drift which the first power of time outside the conditions leaves.
+    """Return the order that the filters allow: that of the drift which the first power of time outside them leaves.
 
     With the conditions r the coefficient c_m errs by the power r + 1 of the step, or by the next one where r is of the
     other parity than m and the filters have a parity; the product with c_0, or with c_1, has one power more, or two.
     """
-    conditions = window.conditions
-    if not window.parity:
-        return min(_FOURTH, conditions + 1)
-    return min(_FOURTH, conditions + (1 if conditions % 2 else 2))
+    return window.conditions + (2 if window.parity and window.conditions % 2 == 0 else 1)
 
 
 class _Filtered:

@@ -6,7 +6,6 @@ that commit an attitude, and one-sided filters for the same samples.
 
 from __future__ import annotations
 
-import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -16,8 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from strapgen.catalogue.methods import coefficient_files, coefficients, window_conditions
-from strapgen.catalogue.methods.coefficient_files import entries
-from strapgen.catalogue.methods.window import GyroResponse, Taps, Window, sibling_name, sibling_title
+from strapgen.catalogue.methods.coefficient_files import band, entries, gyro, not_negative, rational
+from strapgen.catalogue.methods.window import Taps, Window, sibling_name, sibling_title
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 from strapgen.support.suggestions import counted
@@ -42,8 +41,6 @@ MOST_CONDITIONS = 12
 MOST_DEGREE = 8
 MOST_TERMS = 40
 
-#: Most characters of a fraction; those of filters for a gyro are long.
-MOST_CHARACTERS = 4000
 
 #: Most bytes of a file; the longest family takes less.
 MOST_BYTES = 4_000_000
@@ -129,7 +126,7 @@ WINDOWS: Mapping[str, Window] = _BUILT_IN
 WINDOW_TITLES: Mapping[str, str] = _BUILT_IN.titles
 
 #: Ending of the name of a window whose rotation is exact, and the terms of its power series.
-EXACT, EXACT_TERMS = "-exact", 20
+EXACT, EXACT_TERMS = "-exact", 16
 
 
 def named_window(method: str | Window) -> Window | None:
@@ -241,11 +238,11 @@ def _family(data: Mapping[str, Any], name: str) -> Window:
         previous,
         ahead,
         _count("conditions", data["conditions"], 1, min(samples, MOST_CONDITIONS)),
-        _band(data["band"]),
+        band(data["band"]),
         checks.choice("objective", data["objective"], OBJECTIVES),
         _filters("filters", filters, len(filters), samples),
-        _gyro(data.get("gyro")),
-        _not_negative("noise", data.get("noise", 0)),
+        gyro(data.get("gyro")),
+        not_negative("noise", data.get("noise", 0)),
         checks.choice("rotation", data.get("rotation", "fourth"), ROTATIONS),
         _count("terms", data.get("terms", 16), 1, MOST_TERMS),
     )
@@ -266,7 +263,7 @@ def _all_one_sided(window: Window, tables: list[Any]) -> tuple[Window, ...]:
             size = one.previous, one.ahead
             if size not in sizes or size in stored:
                 twice = "there twice" if size in stored else f"not among those for {window.samples} samples"
-                raise InputError(f"{size[0]} samples before and {size[1]} ahead are {twice}")
+                raise InputError(f"{counted(size[0], 'sample')} before and {size[1]} ahead are {twice}")
         except InputError as error:
             raise InputError(f"{what}: {error}") from None
         stored[size] = one
@@ -275,7 +272,9 @@ def _all_one_sided(window: Window, tables: list[Any]) -> tuple[Window, ...]:
             stored[previous, ahead] = stored[ahead, previous].mirrored()
     for previous, ahead in sizes:
         if (previous, ahead) not in stored:
-            raise InputError(f"one_sided lacks the filters with {previous} samples before and {ahead} ahead")
+            raise InputError(
+                f"one_sided lacks the filters with {counted(previous, 'sample')} before and {ahead} ahead"
+            )
     return tuple(stored[size] for size in sizes)
 
 
@@ -285,13 +284,14 @@ def _one_sided(window: Window, table: Mapping[str, Any]) -> Window:
     samples = previous + window.increments + ahead
     return replace(
         window,
+        sibling=True,
         name=sibling_name(window.name, window.previous, window.ahead, previous, ahead),
         title=sibling_title(window.title, previous, ahead),
         previous=previous,
         ahead=ahead,
-        band=_band(table["band"]) if "band" in table else window.band,
+        band=band(table["band"]) if "band" in table else window.band,
         objective=checks.choice("objective", table["objective"], OBJECTIVES),
-        noise=_not_negative("noise", table.get("noise", 0)),
+        noise=not_negative("noise", table.get("noise", 0)),
         filters=_filters("filters", entries("filters", table["filters"]), window.degree + 1, samples),
     )
 
@@ -308,51 +308,8 @@ def _filters(what: str, rows: list[Any], count: int, samples: int) -> tuple[Taps
             raise InputError(
                 f"{what} row {number} has {counted(len(taps), 'tap')}; as many as samples are needed: {samples}"
             )
-        result.append(tuple(_rational(f"{what} row {number}, tap {k}", tap) for k, tap in enumerate(taps, 1)))
+        result.append(tuple(rational(f"{what} row {number}, tap {k}", tap) for k, tap in enumerate(taps, 1)))
     return tuple(result)
-
-
-def _gyro(table: Any) -> GyroResponse | None:
-    if table is None:
-        return None
-    if not isinstance(table, dict):
-        raise InputError(f"gyro is of type {type(table).__name__}; a table is needed")
-    coefficient_files.check_keys(table, GyroResponse._fields, ())
-    values = [_not_negative(f"gyro {key}", table[key]) for key in GyroResponse._fields]
-    for key, value in zip(GyroResponse._fields, values, strict=True):
-        if not value:
-            raise InputError(f"gyro {key} is 0; a number above 0 is needed")
-    return GyroResponse(*values)
-
-
-def _rational(what: str, value: Any) -> Fraction:
-    # The whole of a large family is read: what is plainly a fraction does not take the way of an expression.
-    if isinstance(value, str) and len(value) <= MOST_CHARACTERS and _FRACTION.fullmatch(value):
-        top, _, bottom = value.partition("/")
-        return Fraction(int(top), int(bottom or 1))
-    number = coefficients.number(what, value)
-    if not isinstance(number, Fraction):
-        raise InputError(f"{what} is {value!r}; a rational number is needed")
-    return number
-
-
-_FRACTION = re.compile(r"-?[0-9]+(/[1-9][0-9]*)?")
-
-
-def _not_negative(what: str, value: Any) -> Fraction:
-    number = _rational(what, value)
-    if number < 0:
-        raise InputError(f"{what} is {value}; a number that is not below 0 is needed")
-    return number
-
-
-def _band(value: Any) -> Fraction:
-    band = _rational("band", value)
-    if not 0 < band < 3:
-        raise InputError(
-            f"band is {value} rad a sample; a number between 0 and 3 is needed, pi is half the sampling rate"
-        )
-    return band
 
 
 def _count(what: str, value: Any, smallest: int, largest: int) -> int:

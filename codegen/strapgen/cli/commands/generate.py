@@ -142,6 +142,7 @@ def _check_alone(
         ("--method", method.method),
         ("--tableau", method.tableau),
         ("--window", method.window),
+        ("--coning", method.coning),
         ("--increments", method.increments),
         ("--previous", method.previous),
         ("--ahead", method.ahead),

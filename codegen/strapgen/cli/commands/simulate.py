@@ -103,7 +103,7 @@ def simulate(
     checks.choice("backend", backend, BACKENDS)
     if source.motion is not None:
         checks.choice("motion", source.motion, {**MOTIONS, **RUN_MOTIONS})
-    output.check(algorithm, method.tableau, method.window, source.increments_csv, source.rates_csv)
+    output.check(algorithm, *method.files, source.increments_csv, source.rates_csv)
     source.check()
     if matrices and source.motion is None:
         raise InputError("--matrices goes with --motion")

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import os
-import shlex
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import typer
 
+from strapgen.cli.band_options import BandOptions, command_line
 from strapgen.cli.help import PlainCommand, PlainGroup
 from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import option, whole
@@ -20,7 +20,6 @@ from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
-    from strapgen.catalogue.methods.window import GyroResponse
     from strapgen.design.family import FamilyBrief
 
 _Text = str | None
@@ -73,37 +72,9 @@ class WindowSize:
 
 
 @dataclass(frozen=True)
-class Band:
+class Band(BandOptions):
     """Options of the motion and the gyro for which filters are designed."""
 
-    panel: ClassVar[str] = "Band"
-
-    band: Annotated[
-        _Text,
-        option("--band", metavar="RAD", help="Highest angular frequency of the rate in rad a sample."),
-    ] = None
-    band_hz: Annotated[
-        _Text,
-        option(
-            "--band-hz",
-            metavar="HZ",
-            help="Highest frequency of the rate in Hz, in place of --band; it goes with --sample-hz.",
-        ),
-    ] = None
-    sample_hz: Annotated[
-        _Text, option("--sample-hz", metavar="HZ", help="Samples of the gyro in a second.")
-    ] = None
-    gyro_bandwidth_hz: Annotated[
-        _Text,
-        option(
-            "--gyro-bandwidth-hz",
-            metavar="HZ",
-            help="Natural frequency of a gyro of second order, whose response the filters take out.",
-        ),
-    ] = None
-    gyro_damping: Annotated[
-        _Text, option("--gyro-damping", metavar="RATIO", help="Damping of that gyro, as 0.7071.")
-    ] = None
     noise: Annotated[
         str,
         option(
@@ -127,40 +98,6 @@ class Band:
         ),
     ] = None
 
-    def radians(self) -> Fraction:
-        """Return the band in rad a sample."""
-        from strapgen.catalogue.methods.window_conditions import PI
-
-        if self.band is not None and self.band_hz is not None:
-            raise InputError(f"--band {self.band} and --band-hz {self.band_hz} are both given; one is needed")
-        if self.band is not None:
-            band = checks.number("--band", self.band, positive=True)
-        elif self.band_hz is None:
-            raise InputError("a band is needed, as --band in rad a sample, or as --band-hz with --sample-hz")
-        else:
-            turns = checks.number("--band-hz", self.band_hz, positive=True) / self._sampling("--band-hz")
-            band = Fraction(round(2 * PI * turns * 10**6), 10**6)
-        if band >= 3:
-            raise InputError(
-                f"the band is {float(band):g} rad a sample; a number below 3 is needed, pi is half the sampling rate"
-            )
-        return band
-
-    def gyro(self) -> GyroResponse | None:
-        """Return the gyro; None if it is ideal."""
-        from strapgen.catalogue.methods.window import GyroResponse
-
-        if (self.gyro_bandwidth_hz is None) != (self.gyro_damping is None):
-            missing = "--gyro-damping" if self.gyro_damping is None else "--gyro-bandwidth-hz"
-            raise InputError(f"--gyro-bandwidth-hz and --gyro-damping go together; {missing} is missing")
-        if self.gyro_bandwidth_hz is None or self.gyro_damping is None:
-            return None
-        return GyroResponse(
-            checks.number("--gyro-bandwidth-hz", self.gyro_bandwidth_hz, positive=True),
-            checks.number("--gyro-damping", self.gyro_damping, positive=True),
-            self._sampling("--gyro-bandwidth-hz"),
-        )
-
     def densities(self, band: Fraction) -> tuple[int, ...] | None:
         """Return the density of the rate over the band; None if it is flat."""
         if self.spectrum is None:
@@ -168,18 +105,13 @@ class Band:
         from strapgen.design import spectra
         from strapgen.vibration.spectrum import read_spectrum
 
-        return spectra.weights(read_spectrum(self.spectrum), band, self._sampling("--spectrum"))
+        return spectra.weights(read_spectrum(self.spectrum), band, self.sampling("--spectrum"))
 
     def check(self) -> None:
         """Refuse a sampling frequency that nothing needs."""
         needs = (self.band_hz, self.gyro_bandwidth_hz, self.gyro_damping, self.spectrum)
         if self.sample_hz is not None and all(value is None for value in needs):
             raise InputError("--sample-hz goes with --band-hz, --gyro-bandwidth-hz or --spectrum")
-
-    def _sampling(self, option: str) -> Fraction:
-        if self.sample_hz is None:
-            raise InputError(f"{option} needs --sample-hz, the samples of the gyro in a second")
-        return checks.number("--sample-hz", self.sample_hz, positive=True)
 
 
 @app.command("design", cls=PlainCommand)
@@ -288,16 +220,8 @@ def _ratio(what: str, value: str) -> Fraction:
 
 def _command(size: WindowSize, band: Band, name: str | None, out: Path | None) -> str:
     """Return the command that designs the filters, with what differs from its defaults."""
-    words = ["strapgen", "window", "design"]
-    for group in (size, band):
-        for part in fields(group):
-            value = getattr(group, part.name)
-            if value != part.default:
-                text = value.name if isinstance(value, Path) else str(value)
-                words += [f"--{part.name.replace('_', '-')}", text]
-    words += [] if name is None else ["--name", name]
-    words += [] if out is None else ["--out", out.name]
-    return shlex.join(words)
+    out_name = None if out is None else out.name
+    return command_line(("strapgen", "window", "design"), (size, band), name=name, out=out_name)
 
 
 @app.command("show", cls=PlainCommand)
@@ -325,7 +249,9 @@ def show(
     if window.endswith(".toml") or any(separator in window for separator in (os.sep, os.altsep) if separator):
         family = windows.read(window)
     else:
-        family = windows.WINDOWS[checks.choice("window", window, windows.WINDOWS)]
+        if window not in windows.WINDOWS:
+            checks.choice("window", window, windows.WINDOW_TITLES, "their one-sided filters, as window-14-0")
+        family = windows.WINDOWS[window]
         windows.verify(family)
     if family.increments != 1:
         raise InputError(
