@@ -104,6 +104,7 @@ CANDIDATES = tuple(
         "coning-combined": ((2, 1), (3,), (3, 3), (5, 3)),
         "crouch-grossman3": ((2,), (3,)),
         "coning-least-squares": ((4,), (3, 3), (1, 8)),
+        "coning-shaped-8": ((1, 8),),
         "fit-exact": ((1, 1), (2,), (3,), (4,)),
         "window-3-3": ((1, 3, 3),),
         "window-5-5": ((1, 5, 5),),
