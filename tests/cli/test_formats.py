@@ -35,6 +35,7 @@ TABLES = {
     f"vibration euler --method rk1,rk2 {WAVE}": ("kernel", 2),
     "rate-table --algorithm dcm --backend numpy --duration 1": ("motion", 12),
     "study word-length --method rk1 --word 16 --carry none --duration 1": ("algorithm", 1),
+    "frontier --method rk4:2,rk4:4 --duration 1 --jobs 1": ("algorithm", 2),
 }
 
 
