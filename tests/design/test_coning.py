@@ -1,4 +1,4 @@
-"""Coning coefficients for a band or a spectrum: published values, best by other programmes, exact in their conditions."""
+"""Coning coefficients for a band or a spectrum: published values, best by other programmes, exact conditions."""
 
 from __future__ import annotations
 

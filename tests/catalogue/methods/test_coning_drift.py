@@ -1,4 +1,4 @@
-"""The drift on coning with a weighted sum of older samples: against samples themselves, known designs, and its series."""
+"""The drift on coning with a weighted sum of older samples: against samples, known designs, and its series."""
 
 from __future__ import annotations
 
