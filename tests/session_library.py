@@ -19,7 +19,8 @@ from typing import Any
 
 import pytest
 
-from strapgen.catalogue import Choice
+from strapgen.catalogue import Choice, choose
+from strapgen.catalogue.methods.windows import named_window
 from strapgen.catalogue.names import ALGORITHMS, KERNELS, METHODS, VECTORS
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
@@ -39,7 +40,8 @@ FEWEST_TESTS = 1000
 _TOGETHER = 48
 
 _STEP = re.compile(
-    f"({'|'.join([*ALGORITHMS, *VECTORS])})-({'|'.join(METHODS)})-([0-9]+|rates)(?:-previous([0-9]))?"
+    f"({'|'.join([*ALGORITHMS, *VECTORS])})-({'|'.join(METHODS)})-([0-9]+|rates)"
+    "(?:-previous([0-9]+))?(?:-ahead([0-9]+))?"
 )
 
 
@@ -49,9 +51,12 @@ def choice_by_name(kernel: str) -> Choice | None:
         return Choice(kernel)
     step = _STEP.fullmatch(kernel)
     if step is None:
-        return None
-    name, method, count, previous = step.groups()
-    return Choice(name, method, None if count == "rates" else int(count), int(previous or 0))
+        algorithm, _, method = kernel.rpartition("-window-")
+        window = f"window-{method}"
+        return choose(algorithm, window) if algorithm in ALGORITHMS and named_window(window) else None
+    name, method, count, previous, ahead = step.groups()
+    increments = None if count == "rates" else int(count)
+    return Choice(name, method, increments, int(previous or 0), int(ahead or 0))
 
 
 def line(sources: Sources) -> str | None:
@@ -66,16 +71,27 @@ def line(sources: Sources) -> str | None:
         return None
     if again.files != sources.files:
         return None
-    return json.dumps([sources.kernel, sources.target, settings and settings.as_dict()])
+    return json.dumps([sources.kernel, sources.target, settings and _stated(settings)])
 
 
-def _sources(entry: list[Any]) -> Sources | None:
+def _stated(settings: Settings) -> dict[str, Any]:
+    """Return what settings have that default ones do not: a new field of all settings changes no line."""
+    default = Settings().as_dict()
+    return {name: value for name, value in settings.as_dict().items() if value != default[name]}
+
+
+def settings_of(stated: dict[str, Any] | None) -> Settings | None:
+    """Return the settings of a line; None if its target has none."""
+    return None if stated is None else Settings.from_dict(Settings().as_dict() | stated)
+
+
+def sources_of(entry: list[Any]) -> Sources | None:
     """Return the sources of a line; None if the catalogue no longer has them."""
     kernel, target, settings = entry
     choice = choice_by_name(kernel)
     try:
-        return choice and generated_sources.sources(choice, target, settings and Settings.from_dict(settings))
-    except (InputError, TypeError, KeyError):
+        return choice and generated_sources.sources(choice, target, settings_of(settings))
+    except (InputError, TypeError):
         return None
 
 
@@ -122,7 +138,7 @@ def provide(forecast: Path) -> None:
 
     @memoized
     def sources(number: int) -> Sources | None:
-        return _sources(entries[number])
+        return sources_of(entries[number])
 
     kernels: dict[str, list[int]] = {}
     for number, (kernel, *_) in enumerate(entries):
@@ -140,7 +156,8 @@ def provide(forecast: Path) -> None:
     layers: dict[int, list[int]] = {}
     variants: dict[tuple[str, str, int], int] = {}
     for number, (kernel, target, settings) in enumerate(entries):
-        name = (kernel, target, settings["word"] if settings else 0)
+        stated = settings_of(settings)
+        name = (kernel, target, stated.word if stated else 0)
         variants[name] = variants.get(name, -1) + 1
         layers.setdefault(variants[name], []).append(number)
     groups = [

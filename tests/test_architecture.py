@@ -33,6 +33,7 @@ ORDER = (
     "simulation",
     "analysis",
     "vibration",
+    "design",
     "experiments",
     "evidence",
     "reports",

@@ -237,6 +237,7 @@ LONG_COMMANDS = (
     "strapgen compare ",
     "strapgen converge euler --method rk1,rk2,rk4,butcher6",
     "strapgen derive dcm --method butcher6",
+    "strapgen evidence ",
     "strapgen generate dcm ",
     "strapgen generate euler --method rk4 --",
     "strapgen rate-table ",

@@ -269,6 +269,7 @@ def test_a_fault_meets_first_what_noticed_it_before_in_whatever_line_it_stands(t
     assert mutants.noticed_before(tmp_path / "other" / "state") == {}
 
 
+@pytest.mark.long
 def test_the_longer_draw_takes_its_faults_from_the_way_to_integers_and_text():
     drawn = mutants.faults("lowering", mutants.SEED)
     assert len({fault.key for fault in drawn}) == mutants.DRAWS["lowering"].count == 200

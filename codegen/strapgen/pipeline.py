@@ -23,7 +23,7 @@ from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.support.timing import timed
 
 if TYPE_CHECKING:
-    from strapgen.catalogue.methods.tableau import Tableau
+    from strapgen.catalogue.choice import AnyMethod
     from strapgen.symbolic.kernel import Kernel
 
 
@@ -48,11 +48,12 @@ def compile(
 
 def derive(
     algorithm: str | Choice,
-    method: str | Tableau | None = None,
+    method: AnyMethod | None = None,
     increments: int | None = None,
     *,
     rates: bool = False,
-    previous: int = 0,
+    previous: int | None = None,
+    ahead: int | None = None,
 ) -> Kernel:
     """Derive an algorithm exactly.
 
@@ -61,14 +62,14 @@ def derive(
     algorithm : str or Choice
         An attitude algorithm ("dcm", "euler", "cayley-klein") or another kernel that ``strapgen list`` shows; a Python
         file; or what `strapgen.choose` returned, to which the other parameters do not apply.
-    method : str or Tableau, optional
-        Integration method of an attitude algorithm, by name or as a tableau; by default "rk4".
+    method : str, Tableau, Window or ShapedConing, optional
+        Integration method of an attitude algorithm, by name, as a tableau or as a window; by default "rk4".
     increments : int, optional
         Angle increments a step, 1 to 8 (default 2), of an attitude algorithm.
     rates : bool, optional
         Whether the step takes the body rate at every node of its method, times the step length, in place of increments.
-    previous : int, optional
-        Increments before the step that it takes too, 0 to 3 (default 0): a fit of higher degree for a slow gyro.
+    previous, ahead : int, optional
+        Increments from before the step and from after it that it takes too, together at most 32 (default 0).
 
     Raises
     ------
@@ -84,8 +85,8 @@ def derive(
     """
     if not isinstance(algorithm, Choice):
         stages.require("derive", algorithm, str, os.PathLike, Choice)
-        algorithm = catalogue.choose(algorithm, method, increments, rates, previous)
-    elif (method, increments, rates, previous) != (None, None, False, 0):
+        algorithm = catalogue.choose(algorithm, method, increments, rates, previous, ahead)
+    elif (method, increments, rates, previous, ahead) != (None, None, False, None, None):
         raise InputError(f"the choice of {algorithm.kernel} is complete; derive takes it alone")
     with timed("derive", algorithm.kernel):
         return catalogue.derive(algorithm)

@@ -322,18 +322,25 @@ METHODS = ("taylor4", "magnus4", "munthe-kaas4")
 
 
 @pytest.mark.parametrize(
-    ("algorithm", "count", "previous"),
+    ("algorithm", "count", "previous", "ahead"),
     [
-        ("dcm", 1, 2),
-        *(pytest.param(*case, marks=pytest.mark.long) for case in (("euler", 2, 1), ("cayley-klein", 1, 3))),
+        ("dcm", 1, 2, 1),
+        *(
+            pytest.param(*case, marks=pytest.mark.long)
+            for case in (("euler", 2, 1, 0), ("euler", 1, 0, 3), ("cayley-klein", 1, 3, 2))
+        ),
     ],
 )
-def test_a_step_keeps_increments_on_every_back_end(make, algorithm, count, previous, rng):
-    backend = make(algorithm, "rk4", count, previous=previous)
-    assert (backend.increments, backend.previous, backend.samples) == (count, previous, count + previous)
-    row = random_increments(rng, previous + 60 * count)
-    increments = windows(row, count, previous)
-    wanted = strapgen.backend(algorithm, "rk4", count, "numpy", previous=previous).propagate(increments)
+def test_a_step_takes_increments_beside_its_own_on_every_back_end(
+    make, algorithm, count, previous, ahead, rng
+):
+    beside = {"previous": previous, "ahead": ahead}
+    backend = make(algorithm, "rk4", count, **beside)
+    assert (backend.increments, backend.previous, backend.ahead) == (count, previous, ahead)
+    assert backend.samples == count + previous + ahead
+    row = random_increments(rng, previous + 60 * count + ahead)
+    increments = windows(row, count, previous + ahead)
+    wanted = strapgen.backend(algorithm, "rk4", count, "numpy", **beside).propagate(increments)
     history = backend.propagate(increments)
     both = roundoff(backend, 60) + 16 * 60 * 2.0**-53
     assert np.abs(history - wanted).max() <= both
@@ -343,17 +350,17 @@ def test_a_step_keeps_increments_on_every_back_end(make, algorithm, count, previ
         assert np.abs(state - expected).max() <= roundoff(backend, 60)
 
 
-@pytest.mark.parametrize(("count", "previous"), [(1, 1), (2, 2)])
-def test_an_exact_fit_needs_no_more_samples(make, count, previous):
+@pytest.mark.parametrize(("count", "previous", "ahead"), [(1, 1, 0), (1, 0, 1), (2, 2, 1)])
+def test_an_exact_fit_needs_no_more_samples(make, count, previous, ahead):
     # A rate that rises linearly: whatever fits it gives the step of two increments.
-    backend, other = make("euler", "rk4", count, previous=previous), make("euler", "rk4", 2)
+    backend, other = make("euler", "rk4", count, previous=previous, ahead=ahead), make("euler", "rk4", 2)
 
-    def row(samples: int, before: int) -> np.ndarray:
-        times = np.arange(-before, 20 * samples + 1)[:, None] / samples
+    def row(samples: int, before: int, after: int = 0) -> np.ndarray:
+        times = np.arange(-before, 20 * samples + after + 1)[:, None] / samples
         angle = 0.004 * times * [1, -2, 1] + 1e-4 * times**2 * [3, 1, -1]
         return np.diff(angle, axis=0)
 
-    found = backend.propagate(windows(row(count, previous), count, previous))
+    found = backend.propagate(windows(row(count, previous, ahead), count, previous + ahead))
     wanted = other.propagate(windows(row(2, 0), 2))
     assert np.abs(found - wanted).max() <= roundoff(backend, 20) + roundoff(other, 20)
 

@@ -97,10 +97,10 @@ def test_pulses_that_cannot_be_counted_are_refused_in_a_later_part():
         part(5, 50)
 
 
-@pytest.mark.parametrize("previous", [0, 2])
+@pytest.mark.parametrize(("previous", "ahead"), [(0, 0), (2, 1)])
 @pytest.mark.parametrize("pulse", [None, "1e-4"])
-def test_simulations_and_recordings_run_in_parts(previous, pulse, request):
-    backend = strapgen.backend("euler", "rk4", 1, previous=previous)
+def test_simulations_and_recordings_run_in_parts(previous, ahead, pulse, request):
+    backend = strapgen.backend("euler", "rk4", 1, previous=previous, ahead=ahead)
     motion = strapgen.motion("coning", a_deg_s=10, b_deg_s=10, g_deg_s=10)
     data = Recording(0.0, 0.125, motion.increments(runs.Fraction("0.125"), STEPS, 1)[:, 0])
 
@@ -108,7 +108,7 @@ def test_simulations_and_recordings_run_in_parts(previous, pulse, request):
         return (
             runs.simulate(backend, motion, "0.125", 6.25, "0.5", "0.25", pulse).computed,
             propagate(backend, data, 0.5, 0.25, pulse).states,
-            runs.largest_increment(motion, "0.125", 6.25, 1, pulse, previous),
+            runs.largest_increment(motion, "0.125", 6.25, 1, pulse, (previous, ahead)),
         )
 
     whole = results()

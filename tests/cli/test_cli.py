@@ -54,7 +54,8 @@ COMMANDS = (
         "strapdown",
         "vibration",
     ),
-    *("study word-length", "series", "stability", "rate-table"),
+    *("study word-length", "series", "stability", "rate-table", "frontier"),
+    *("window design", "window show"),
 )
 DATA = Path(__file__).resolve().parents[1] / "data"
 CONING = "--motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 --step 0.125 --duration 5"
@@ -107,6 +108,8 @@ COSTLY = (
     "stability",
     "rate-table",
     "generate",
+    "frontier",
+    "window design",
 )
 
 
@@ -150,7 +153,10 @@ def test_list(strapgen_says):
     assert list(data["methods"].items()) == list(catalogue.METHODS.items())
     assert data["vectors"].keys() == catalogue.VECTORS.keys()
     assert data["kernels"].keys() == catalogue.KERNELS.keys()
-    assert list(data["motions"]) == ["constant", "sinusoidal", "coning", "polynomial"]
+    assert list(data["motions"]) == [
+        *("constant", "sinusoidal", "coning", "polynomial"),
+        *("cone", "random", "slew", "ramps", "vibration"),
+    ]
     assert list(data["targets"]) == list(TARGETS) == ["numpy", "c", "c-float", "c-fixed", "fixed-model"]
     floating = ["numpy", "c", "c-float"]
     assert (
@@ -856,6 +862,21 @@ def test_study_word_length(strapgen_says, tmp_path):
     assert (tmp_path / "study.png").read_bytes().startswith(b"\x89PNG")
     assert strapgen_says(f"{command} --format csv").count("\n") == 5
     assert "the method itself drifts by" in strapgen_says(command)
+
+
+def test_frontier(strapgen_says, tmp_path):
+    pytest.importorskip("matplotlib")
+    command = "frontier --method coning-compressed:1+1,rk4:2 --duration 1 --jobs 1 --results results.jsonl"
+    data = json.loads(
+        strapgen_says(f"{command} --format json --plot frontier.png"), parse_constant=pytest.fail
+    )
+    assert [row["algorithm"] for row in data["algorithms"]] == ["coning-compressed:1+1", "rk4:2"]
+    assert (tmp_path / "frontier.png").read_bytes().startswith(b"\x89PNG")
+    content = (tmp_path / "results.jsonl").read_bytes()
+    text = strapgen_says(command)
+    assert "every figure is measured here" in text
+    assert (tmp_path / "results.jsonl").read_bytes() == content  # nothing was run again
+    assert strapgen_says(f"{command} --format csv").count("\n") == 3
 
 
 @pytest.mark.long

@@ -8,9 +8,9 @@ import shlex
 import pytest
 
 from strapgen.cli import main
-from strapgen.evidence.overflow import eva
+from strapgen.evidence import gappa
 
-needs_eva = pytest.mark.skipif(not eva.TOOL.installed(), reason=f"install {eva.TOOL.package}")
+needs_gappa = pytest.mark.skipif(not gappa.TOOL.installed(), reason=f"install {gappa.TOOL.package}")
 
 
 def status(command: str) -> int:
@@ -19,21 +19,22 @@ def status(command: str) -> int:
     return stop.value.code
 
 
-@needs_eva
+@needs_gappa
 def test_the_list_and_the_page_of_a_kernel(capsys, tmp_path):
     page, folder = tmp_path / "page.md", tmp_path / "files"
-    command = f"euler-product --tool eva --page {page} --format json"
+    command = f"euler-product --tool gappa --page {page} --format json"
     assert status(f"{command} --out {folder}") == 0
     rows = json.loads(capsys.readouterr().out)
-    assert [row["kernel"] for row in rows] == ["euler_product_w32"] * 2
-    assert {row["claim"] for row in rows} == {"no overflow: 64-bit processor", "no overflow: 16-bit int"}
-    assert {(row["tool"], row["result"]) for row in rows} == {("Frama-C Eva", "proved")}
+    assert [row["kernel"] for row in rows] == ["euler_product_w32"] * 3
+    claims = {"one step", "one step in double", "one step in float"}
+    assert {row["claim"] for row in rows} == {f"error bound: {claim}" for claim in claims}
+    assert {(row["tool"], row["result"]) for row in rows} == {("Gappa", "proved")}
     assert all(row["seconds"] > 0 and row["version"] for row in rows)
-    assert (folder / "euler_product_w32" / "euler_product_w32_eva.c").is_file()
+    assert (folder / "euler_product_w32" / "one_step.g").is_file()
 
     assert status(f"{command} --check") == 0
     assert "in step" in capsys.readouterr().err
-    text = page.read_text().replace("| proved, Frama-C Eva |", "| - |", 1)
+    text = page.read_text().replace("| proved, Gappa |", "| - |", 1)
     page.write_text(text)
     assert status(f"{command} --check") == 1
     assert "out of step" in capsys.readouterr().err

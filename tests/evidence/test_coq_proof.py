@@ -38,6 +38,7 @@ def test_a_rule_that_is_no_identity_has_no_proof(tmp_path):
     assert "field" in detail
 
 
+@pytest.mark.long
 def test_a_smaller_bound_has_no_proof(tmp_path):
     off = script()
     off.goals = {goal: bound / 2 for goal, bound in off.goals.items()}

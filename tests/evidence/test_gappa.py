@@ -36,7 +36,9 @@ def judged(script: Script, folder) -> tuple[str, str]:
 
 
 @pytest.mark.parametrize(
-    "choice", [EULER, PRODUCT, NORMALIZE, choose("error-matrix")], ids=lambda choice: choice.name
+    "choice",
+    [EULER, PRODUCT, NORMALIZE, pytest.param(choose("error-matrix"), marks=pytest.mark.long)],
+    ids=lambda choice: choice.name,
 )
 def test_the_error_bound_of_the_header_is_proved_and_is_as_small_as_gappas(choice, tmp_path):
     script = fixed_script(fixed(choice))
@@ -99,7 +101,7 @@ def test_gappa_proves_nothing_of_a_program_with_a_fault(choice, fault, tmp_path)
 
 
 def test_a_rounded_coefficient_that_is_off_is_noticed(tmp_path):
-    choice = choose_step("euler", "rk3", 2)
+    choice = choose("coning-fast")
 
     def change(total: IntegerSum) -> IntegerSum | None:
         if total.fine[0].coefficient is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from fractions import Fraction
 
 import numpy as np
@@ -97,6 +98,31 @@ def test_removable_singularities():
     np.testing.assert_allclose(
         cone.attitude(7.0), strapgen.motion("constant", y_deg_s=-5).attitude(7.0), atol=1e-15
     )
+
+
+def test_the_axis_of_a_cone_keeps_its_angle_while_the_body_spins_about_it():
+    cone = strapgen.motion("cone", half_angle_deg=20, frequency_hz=0.5, spin_deg_s=30)
+    attitude = cone.attitude(np.linspace(0, 2, 33))
+    tip = attitude[:, :, 1]
+    centre = tip[:-1].mean(axis=0)
+    np.testing.assert_allclose(tip @ centre / np.linalg.norm(centre), math.cos(math.radians(20)), atol=1e-14)
+    # After a period of 2 s the axis is back, and the body has turned by 60 degrees about it.
+    turned = strapgen.motion("constant", y_deg_s=30).attitude(2.0)
+    np.testing.assert_allclose(attitude[-1], turned, atol=1e-14)
+    np.testing.assert_allclose(cone.rate(0.7)[1], cone.rate(0)[1], rtol=1e-15)
+
+
+def test_a_cone_without_spin_ends_where_it_began():
+    cone = strapgen.motion("cone", half_angle_deg=15, frequency_hz=2)
+    np.testing.assert_allclose(cone.attitude([0.5, 1.0]), [np.eye(3)] * 2, atol=1e-14)
+
+
+def test_many_digits_need_a_closed_form():
+    motion = strapgen.motion("random", rate_deg_s=10)
+    with pytest.raises(
+        InputError, match="the attitude of motion random has no closed form, which many digits need"
+    ):
+        strapgen.converge(strapgen.choose("euler"), motion, ["1/2", "1/4"], 1)
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from strapgen.symbolic.polynomials import (
     ONE,
+    OPERATIONS,
     Polynomial,
     add,
     atom,
@@ -44,6 +45,15 @@ def test_sums(p, q, factor, point):
     assert value(total, point) == value(p, point) + factor * value(q, point)
     assert is_tidy(total)
     assert add(total, q, -factor) == p
+
+
+def test_operations_of_programs_are_those_of_polynomials():
+    one, other = {("a",): Fraction(2)}, {("a",): Fraction(2), ("b",): Fraction(3)}
+    assert OPERATIONS["negate"](other) == {("a",): -2, ("b",): -3}
+    assert OPERATIONS["add"](one, other) == {("a",): 4, ("b",): 3}
+    assert OPERATIONS["subtract"](one, other) == {("b",): -3}
+    assert OPERATIONS["multiply"](one, other) == {("a", "a"): 4, ("a", "b"): 6}
+    assert "sqrt" not in OPERATIONS
 
 
 @SETTINGS

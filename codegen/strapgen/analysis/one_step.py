@@ -229,8 +229,8 @@ def computed_state(attitude_step: Step, ring: Any, rate: Rate, top: int) -> list
         for name, x in zip(state.elements, step_kernels.identity, strict=True)
     }
     if attitude_step.nodes is None:
-        count, previous = samples.shape[0] - step_kernels.previous, step_kernels.previous
-        sampled = increments(ring, rate, count, previous, top)
+        first, count = -step_kernels.previous, samples.shape[0] - step_kernels.beside
+        sampled = increments(ring, rate, count, range(first, count + step_kernels.ahead), top)
     else:
         sampled = turns(ring, rate, attitude_step.nodes, top)
     values |= dict(zip(samples.elements, sampled, strict=True))
@@ -269,8 +269,8 @@ def _evaluated(kernel: Kernel, values: dict[str, Any], ring: Any, top: int) -> l
     return outputs(kernel, values, ring, top)[kernel.outputs[-1].signal.name]
 
 
-def increments(ring: Any, rate: Rate, count: int, previous: int, top: int) -> list[Powers]:
-    """Return the elements of the exact increments of a step in rad, row by row.
+def increments(ring: Any, rate: Rate, count: int, intervals: range, top: int) -> list[Powers]:
+    """Return the elements of exact increments in rad, row by row.
 
     Parameters
     ----------
@@ -278,8 +278,10 @@ def increments(ring: Any, rate: Rate, count: int, previous: int, top: int) -> li
         Ring of the coefficients.
     rate : sequence of sequence of ring element
         The rate in rad/s and its derivatives at the beginning of the step.
-    count, previous : int
-        Increments of the step, and increments from before it.
+    count : int
+        Increments of the step.
+    intervals : range
+        Numbers of the sampling intervals: 0 is the first of the step, -1 the one before it.
     top : int
         The last power of the series.
 
@@ -289,7 +291,7 @@ def increments(ring: Any, rate: Rate, count: int, previous: int, top: int) -> li
         Three elements for each increment, oldest first.
     """
     elements = []
-    for k in range(-previous, count):
+    for k in intervals:
         begin, end = sp.Rational(k, count), sp.Rational(k + 1, count)
         shares = [(end ** (j + 1) - begin ** (j + 1)) / sp.factorial(j + 1) for j in range(len(rate))]
         elements += _moments(ring, rate, shares, top)

@@ -12,7 +12,7 @@ from strapgen.backends.protocol import Backend
 from strapgen.backends.registry import BACKENDS, DEFAULT_BACKENDS, Entry, backend_class, of_sources
 from strapgen.backends.step_sources import StepSources
 from strapgen.catalogue import Choice
-from strapgen.catalogue.methods.tableau import Tableau
+from strapgen.catalogue.choice import AnyMethod
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
 from strapgen.support import checks, stages
@@ -109,13 +109,14 @@ def evaluator(kernel: str | Choice, backend: str = "numpy", settings: Settings |
 
 def backend(
     algorithm: str | Choice,
-    method: str | Tableau | None = None,
+    method: AnyMethod | None = None,
     increments: int | None = None,
     backend: str = "numpy",
     orthonormalization: str | None = None,
     settings: Settings | None = None,
     *,
-    previous: int = 0,
+    previous: int | None = None,
+    ahead: int | None = None,
 ) -> Backend:
     """Return an attitude algorithm as a back end, generated and compiled if it is not in the cache.
 
@@ -123,8 +124,8 @@ def backend(
     ----------
     algorithm : str or Choice
         "dcm", "euler" or "cayley-klein"; a Python file, or the entry point of a user's algorithm; or a choice that
-        `catalogue.choose` returns, with which `method`, `increments` and `previous` do not go.
-    method : str or Tableau, optional
+        `catalogue.choose` returns, with which the other parameters of a choice do not go.
+    method : str, Tableau, Window or ShapedConing, optional
         A name that ``strapgen list`` shows, or a tableau; by default "rk4".
     increments : int, optional
         Angle increments per step, 1 to 8; by default 2.
@@ -135,8 +136,9 @@ def backend(
     settings : Settings, optional
         Settings of fixed point: largest increment, rounding, error feedback, and the word of "fixed-model". By default
         increments are at most 1/8 rad.
-    previous : int, optional
-        Number of increments from before the step that it takes in addition, 0 to 3; by default 0.
+    previous, ahead : int, optional
+        Numbers of increments from before the step and from after it that it takes in addition, together at most 32;
+        by default 0.
 
     Returns
     -------
@@ -158,7 +160,7 @@ def backend(
     """
     stages.require("backend", algorithm, str, os.PathLike, Choice)
     checks.choice("backend", backend, BACKENDS)
-    choice = chosen_step(algorithm, method, increments, previous)
+    choice = chosen_step(algorithm, method, increments, previous, ahead)
     if orthonormalization is not None:
         checks.choice("orthonormalization", orthonormalization, choice.orthonormalizations)
     step = sources_of_choice(choice, BACKENDS[backend].target, fitted(backend, settings))
@@ -184,7 +186,11 @@ def sources_to_build(choice: Choice, backend: str, settings: Settings | None = N
 
 
 def chosen_step(
-    algorithm: str | Choice, method: str | Tableau | None, increments: int | None, previous: int = 0
+    algorithm: str | Choice,
+    method: AnyMethod | None,
+    increments: int | None,
+    previous: int | None = None,
+    ahead: int | None = None,
 ) -> Choice:
     """Return the choice of an attitude step from its name and options; a choice is returned as it is.
 
@@ -194,8 +200,8 @@ def chosen_step(
         If a name or number is not allowed, or options go with a choice, which has its own.
     """
     if not isinstance(algorithm, Choice):
-        return catalogue.choose_step(algorithm, method, increments, previous=previous)
-    options = {"method": method, "increments": increments, "previous": previous or None}
+        return catalogue.choose_step(algorithm, method, increments, previous=previous, ahead=ahead)
+    options = {"method": method, "increments": increments, "previous": previous, "ahead": ahead}
     for option, value in options.items():
         if value is not None:
             raise InputError(f"{option} is {value!r}, but the choice of {algorithm.kernel} has its own")

@@ -18,21 +18,21 @@ _MOST_PULSES = 2**53
 PART = 1 << 18
 
 
-def windows(increments: Any, count: int, previous: int = 0) -> NDArray[np.float64]:
+def windows(increments: Any, count: int, beside: int = 0) -> NDArray[np.float64]:
     """Cut a row of increments into the increments of each step.
 
     Parameters
     ----------
-    increments : array_like, (previous + N count, 3)
+    increments : array_like, (beside + N count, 3)
         Angle increments in rad, body axes.
     count : int
         Increments per step.
-    previous : int, optional
-        Increments from before each step that it takes in addition.
+    beside : int, optional
+        Increments from before each step and from after it that it takes in addition.
 
     Returns
     -------
-    array, (N, previous + count, 3)
+    array, (N, beside + count, 3)
         Angle increments in rad, body axes, oldest first.
 
     Raises
@@ -42,27 +42,27 @@ def windows(increments: Any, count: int, previous: int = 0) -> NDArray[np.float6
 
     Examples
     --------
-    >>> windows(np.arange(15.0).reshape(5, 3), 2, previous=1)[:, :, 0]
+    >>> windows(np.arange(15.0).reshape(5, 3), 2, beside=1)[:, :, 0]
     array([[ 0.,  3.,  6.],
            [ 6.,  9., 12.]])
     """
     row = np.ascontiguousarray(checks.numbers("increments", increments))
     checks.count("count", count)
-    checks.count("previous", previous, smallest=0)
-    if row.ndim != 2 or row.shape[1] != 3 or (len(row) - previous) % count or len(row) < previous:
+    checks.count("beside", beside, smallest=0)
+    if row.ndim != 2 or row.shape[1] != 3 or (len(row) - beside) % count or len(row) < beside:
         raise InputError(
-            f"increments has shape {row.shape}; ({previous} + a multiple of {count}, 3) is needed for whole steps"
+            f"increments has shape {row.shape}; ({beside} + a multiple of {count}, 3) is needed for whole steps"
         )
-    if not previous:
+    if not beside:
         return row.reshape(-1, count, 3)
-    if len(row) < previous + count:
-        return np.empty((0, previous + count, 3))
-    overlapping = np.lib.stride_tricks.sliding_window_view(row, previous + count, axis=0)[::count]
+    if len(row) < beside + count:
+        return np.empty((0, beside + count, 3))
+    overlapping = np.lib.stride_tricks.sliding_window_view(row, beside + count, axis=0)[::count]
     return np.ascontiguousarray(np.moveaxis(overlapping, -1, 1))
 
 
 @np.errstate(all="ignore")  # angles that overflow are refused, in one line
-def pulses(increments: Any, size: float | str | Fraction, previous: int = 0) -> NDArray[np.float64]:
+def pulses(increments: Any, size: float | str | Fraction, beside: int = 0) -> NDArray[np.float64]:
     """Return increments as a gyro that counts pulses measures them.
 
     The angle since the start is rounded to the nearest pulse, and each increment is a difference of rounded angles.
@@ -74,8 +74,8 @@ def pulses(increments: Any, size: float | str | Fraction, previous: int = 0) -> 
         Angle increments of N steps in rad, body axes; leading axes are independent runs.
     size : number
         Angle of a pulse in rad.
-    previous : int, optional
-        Number of the K increments of a step that come from before it, as `windows` repeats them.
+    beside : int, optional
+        Number of the K increments of a step that come from before it or from after it, as `windows` repeats them.
 
     Returns
     -------
@@ -95,11 +95,11 @@ def pulses(increments: Any, size: float | str | Fraction, previous: int = 0) -> 
     """
     pulse = float(checks.number("pulse", size, positive=True))
     d = checks.numbers("increments", increments, (None, None, 3))
-    if previous and d.ndim > 3 and d.size:
-        return np.stack([pulses(run, size, previous) for run in d])
-    if previous and d.size:
-        row = np.concatenate([d[0, :previous], d[:, previous:].reshape(-1, 3)])
-        return windows(pulses(row[:, None], size)[:, 0], d.shape[1] - previous, previous)
+    if beside and d.ndim > 3 and d.size:
+        return np.stack([pulses(run, size, beside) for run in d])
+    if beside and d.size:
+        row = np.concatenate([d[0, :beside], d[:, beside:].reshape(-1, 3)])
+        return windows(pulses(row[:, None], size)[:, 0], d.shape[1] - beside, beside)
     flat = d.reshape(*d.shape[:-3], -1, 3)
     angle = np.cumsum(flat, axis=-2) / pulse
     if not np.abs(angle).max(initial=0.0) < _MOST_PULSES:
@@ -117,7 +117,7 @@ class StepWindows:
     ----------
     read : callable
         ``read(first, stop)`` returns increments of the row, (stop - first, 3), in rad.
-    count, previous : int
+    count, beside : int
         As for `windows`.
     pulse : number, optional
         As for `pulses`; by default increments are not quantized.
@@ -127,21 +127,21 @@ class StepWindows:
         self,
         read: Callable[[int, int], Any],
         count: int,
-        previous: int = 0,
+        beside: int = 0,
         pulse: float | str | Fraction | None = None,
     ) -> None:
-        self._read, self._count, self._previous = read, count, previous
+        self._read, self._count, self._beside = read, count, beside
         self._pulse = None if pulse is None else float(checks.number("pulse", pulse, positive=True))
         self._angle = self._pulses = np.zeros((1, 3))
         self._tail = np.empty((0, 3))
 
     def __call__(self, first: int, steps: int) -> NDArray[np.float64]:
-        """Return the increments of the steps after those of the call before, (steps, previous + count, 3)."""
+        """Return the increments of the steps after those of the call before, (steps, beside + count, 3)."""
         begin = first * self._count + len(self._tail)
-        row = np.asarray(self._read(begin, (first + steps) * self._count + self._previous))
+        row = np.asarray(self._read(begin, (first + steps) * self._count + self._beside))
         row = np.concatenate([self._tail, row if self._pulse is None else self._quantized(row, self._pulse)])
-        self._tail = row[len(row) - self._previous :].copy()
-        return windows(row, self._count, self._previous)
+        self._tail = row[len(row) - self._beside :].copy()
+        return windows(row, self._count, self._beside)
 
     @np.errstate(all="ignore")  # angles that overflow are refused, in one line
     def _quantized(self, row: NDArray[np.float64], pulse: float) -> NDArray[np.float64]:

@@ -41,8 +41,10 @@ class Backend(ABC):
         Type of its states.
     takes : str
         Name of the step's second input: "increments", or "turns" where a step takes rates at nodes times its length.
-    increments, previous : int
-        Number of increments of a step, and of increments from before the step that it takes in addition.
+    increments : int
+        Number of increments of a step.
+    previous, ahead : int
+        Numbers of increments from before the step and from after it that it takes in addition.
     samples : int
         Number of increments that a step takes in all.
     state_shape : tuple of int
@@ -77,8 +79,8 @@ class Backend(ABC):
         self.kernel = sources.kernel
         self.takes = samples.name
         self.samples = samples.shape[0]
-        self.previous = kernels.previous
-        self.increments = self.samples - self.previous
+        self.previous, self.ahead = kernels.previous, kernels.ahead
+        self.increments = self.samples - kernels.beside
         self.state_shape = state.shape
         self.elements = state.elements
         self.attitude = kernels.attitude

@@ -4,13 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
+from strapgen.catalogue.methods.shaped_coning import ShapedConing, named_shape
 from strapgen.catalogue.methods.tableau import Tableau
+from strapgen.catalogue.methods.window import Window
+from strapgen.catalogue.methods.windows import named_window
 from strapgen.catalogue.names import KERNELS
 
 if TYPE_CHECKING:
     from strapgen.symbolic.kernel import Kernel, Stage
+
+
+#: What chooses a method: its name, or the value that holds its coefficients.
+AnyMethod: TypeAlias = str | Tableau | Window | ShapedConing
 
 
 @dataclass(frozen=True)
@@ -21,21 +28,22 @@ class Choice:
     ----------
     name : str
         Name of the algorithm or kernel; of a user's the name of its kernel.
-    method : str or Tableau, optional
+    method : str, Tableau, Window or ShapedConing, optional
         Method of an attitude step of the catalogue, or of a vector of one.
     increments : int, optional
         Increments of a step. A step of the catalogue without increments takes the body rate at every node of its
         method.
-    previous : int, optional
-        Number of increments from before the step that it takes in addition to its own.
+    previous, ahead : int, optional
+        Numbers of increments from before the step and from after it that it takes in addition to its own.
     user_kernel : Kernel, optional
         A user's kernel itself, with the kernels that it brings; None for one of the catalogue.
     """
 
     name: str
-    method: str | Tableau | None = None
+    method: AnyMethod | None = None
     increments: int | None = None
     previous: int = 0
+    ahead: int = 0
     # Equality compares the kernels; the hash leaves them out, because most choices differ in name or numbers.
     user_kernel: Kernel | None = field(default=None, hash=False, repr=False)
 
@@ -44,21 +52,35 @@ class Choice:
         """Return the choice of a user's kernel: an attitude step, or a kernel that comes with one."""
         if kernel.companions is None:
             return cls(kernel.name, user_kernel=kernel)
-        previous = kernel.companions.previous
-        return cls(kernel.name, None, kernel.inputs[1].shape[0] - previous, previous, kernel)
+        previous, ahead = kernel.companions.previous, kernel.companions.ahead
+        increments = kernel.inputs[1].shape[0] - previous - ahead
+        return cls(kernel.name, None, increments, previous, ahead, kernel)
 
     @property
     def method_name(self) -> str | None:
         """Name of the method."""
-        return self.method.name if isinstance(self.method, Tableau) else self.method
+        return self.method if self.method is None or isinstance(self.method, str) else self.method.name
+
+    @property
+    def window(self) -> Window | None:
+        """The window, if the method is one."""
+        return named_window(self.method) if isinstance(self.method, (str, Window)) else None
+
+    @property
+    def shape(self) -> ShapedConing | None:
+        """The coning coefficients for a band or a spectrum, if the method has such."""
+        return named_shape(self.method)
 
     @property
     def kernel(self) -> str:
         """Name of the kernel."""
         if self.method is None:
             return self.name
+        if self.window is not None:  # its name says how many samples it takes
+            return f"{self.name}-{self.method_name}"
         before = f"-previous{self.previous}" if self.previous else ""
-        return f"{self.name}-{self.method_name}-{self.increments or 'rates'}{before}"
+        after = f"-ahead{self.ahead}" if self.ahead else ""
+        return f"{self.name}-{self.method_name}-{self.increments or 'rates'}{before}{after}"
 
     @cached_property
     def identity(self) -> str:
@@ -68,7 +90,7 @@ class Choice:
         """
         if self.user_kernel is not None:
             return f"{self.kernel} {_text(self.user_kernel)}"
-        if isinstance(self.method, Tableau):
+        if self.method is not None and not isinstance(self.method, str):
             return f"{self.kernel} {self.method!r} {self.method.file}"
         return self.kernel
 

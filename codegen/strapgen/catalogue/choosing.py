@@ -5,16 +5,19 @@ from __future__ import annotations
 import os
 from typing import Any
 
-from strapgen.catalogue.choice import Choice
+from strapgen.catalogue.choice import AnyMethod, Choice
+from strapgen.catalogue.methods.shaped_coning import ShapedConing, named_shape
 from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.catalogue.methods.tableaux import TABLEAUX
+from strapgen.catalogue.methods.window import Window
+from strapgen.catalogue.methods.windows import EXACT, named_window
 from strapgen.catalogue.names import (
     ALGORITHMS,
     INTEGRATORS,
     KERNELS,
     METHODS,
+    MOST_BESIDE,
     MOST_INCREMENTS,
-    MOST_PREVIOUS,
     RESERVED,
     STANDARD_METHODS,
     VECTORS,
@@ -30,10 +33,11 @@ _FILE = "a Python file"
 
 def choose(
     name: str,
-    method: str | Tableau | None = None,
+    method: AnyMethod | None = None,
     increments: int | None = None,
     rates: bool = False,
-    previous: int = 0,
+    previous: int | None = None,
+    ahead: int | None = None,
 ) -> Choice:
     """Check a choice of kernel and fill in the defaults: fourth order, two increments.
 
@@ -41,9 +45,12 @@ def choose(
     ----------
     name : str
         A name of the catalogue, a user's Python file, or the entry point of one.
-    method : str or Tableau, optional
-    increments, previous : int, optional
-        Increments in a step, and increments from before it that it takes in addition.
+    method : str, Tableau, Window or ShapedConing, optional
+    increments : int, optional
+        Increments in a step.
+    previous, ahead : int, optional
+        Increments from before the step and from after it that it takes in addition, together at most 32. Of a window
+        they choose the filters with so many of its samples on that side.
     rates : bool, optional
         Whether the step takes the rate at the nodes of its method in place of increments.
 
@@ -62,23 +69,32 @@ def choose(
     if not isinstance(name, str):
         raise InputTypeError(f"algorithm is {name!r}; a name or the path of a Python file is needed")
     if name.endswith(".py") or (name not in RESERVED and name in loading.installed()):
-        return _choose_users(name, method, increments, rates, previous)
+        return _choose_users(name, method, increments, rates, previous, ahead)
     if name not in RESERVED:
         shown = [kernel for kernel, recipe in KERNELS.items() if recipe.standard]
         names = [*_algorithms(), *VECTORS, *shown, *KERNELS]
         checks.choice("algorithm", name, dict.fromkeys(names), _FILE, "kernels")
     if name in KERNELS:
         options = {
-            "method": method.name if isinstance(method, Tableau) else method,
+            "method": method if isinstance(method, str) or method is None else method.name,
             "increments": increments,
             "rates": rates or None,
             "previous": previous or None,
+            "ahead": ahead or None,
         }
         for option, value in options.items():
             if value is not None:
                 takers = ", ".join([*ALGORITHMS, *VECTORS])
                 raise InputError(f"kernel {name} takes no {option} (got {value}); these do: {takers}")
         return Choice(name)
+    if isinstance(method, (str, Window)):
+        window = named_window(method)
+        if window is not None:
+            return _choose_window(name, window, increments, rates, previous, ahead)
+    shape = named_shape(method)
+    if shape is not None:
+        return _choose_shape(name, shape, increments, rates, (previous, ahead))
+    assert not isinstance(method, (Window, ShapedConing)), "those are taken before"
     if name in VECTORS:
         if isinstance(method, Tableau):
             raise InputError(
@@ -88,31 +104,109 @@ def choose(
         checks.choice(f"method of {name}", method, VECTORS[name].methods)
     if not isinstance(method, Tableau):
         method = checks.choice("method", "rk4" if method is None else method, METHODS)
-    previous = checks.count("previous", previous, smallest=0, largest=MOST_PREVIOUS)
+    return _choose_samples(name, method, increments, rates, _beside(previous, ahead))
+
+
+def _choose_samples(
+    name: str, method: str | Tableau, increments: int | None, rates: bool, beside: tuple[int, int]
+) -> Choice:
+    """Return the choice of a method with the samples that the options ask for, if it goes with them."""
+    previous, ahead = beside
     if rates:
-        if increments is not None or previous:
-            what = f"{increments} increments" if increments is not None else f"{previous} previous ones"
+        if increments is not None or previous or ahead:
+            more = f"{previous} previous ones" if previous else f"{ahead} ahead"
+            what = f"{increments} increments" if increments is not None else more
             raise InputError(f"a step takes increments or rates, not both (got {what} and rates)")
-        if method in INTEGRATORS and not INTEGRATORS[method].takes_rates:
+        if method in INTEGRATORS and not INTEGRATORS[str(method)].takes_rates:
             raise InputError(f"method {method} takes increments; rates at nodes do not go with it")
         return Choice(name, method)
     increments = checks.count("increments", 2 if increments is None else increments, largest=MOST_INCREMENTS)
-    return Choice(name, method, increments, previous)
+    if ahead and method in INTEGRATORS and not INTEGRATORS[str(method)].takes_ahead:
+        raise InputError(f"method {method} takes no increments ahead; --previous goes with it")
+    return Choice(name, method, increments, previous, ahead)
+
+
+def _choose_window(
+    name: str, window: Window, increments: int | None, rates: bool, previous: int | None, ahead: int | None
+) -> Choice:
+    """Return the choice of a window, or of the filters of its family with other numbers of samples beside the step."""
+    if name in VECTORS and not VECTORS[name].takes_windows:
+        raise InputError(f"{name} goes with no window; allowed methods: {', '.join(VECTORS[name].methods)}")
+    if name in VECTORS and window.rotation != "fourth":
+        raise InputError(
+            f"{name}: {window.name} computes a rotation, not its vector; {window.name.removesuffix(EXACT)} does"
+        )
+    if rates:
+        raise InputError(f"{window.name} takes increments; rates at nodes do not go with it")
+    if increments is not None and checks.count("increments", increments) != window.increments:
+        raise InputError(f"increments is {increments}; a step of {window.name} has {window.increments}")
+    if ahead is None and previous is not None:
+        ahead = window.previous + window.ahead - checks.count("previous", previous, smallest=0)
+    if ahead is not None:
+        chosen = window.one_sided_with(checks.count("ahead", ahead, smallest=0))
+        if previous not in (None, chosen.previous):
+            raise InputError(
+                f"previous {previous} and ahead {ahead} are no samples of {window.name}, which has "
+                f"{window.previous + window.ahead} beside the step"
+            )
+        window = chosen
+    if f"{name}-{window.name}" in KERNELS:
+        raise InputError(
+            f"a window called {window.name} would make the kernel {name}-{window.name}, which exists"
+        )
+    method = window if window.file or named_window(window.name) != window else window.name
+    return Choice(name, method, window.increments, window.previous, window.ahead)
+
+
+def _choose_shape(
+    name: str,
+    shape: ShapedConing,
+    increments: int | None,
+    rates: bool,
+    beside: tuple[int | None, int | None],
+) -> Choice:
+    """Return the choice of coning coefficients for a band or a spectrum, which say what samples a step takes."""
+    if rates:
+        raise InputError(f"{shape.name} takes increments; rates at nodes do not go with it")
+    stated = {"increments": increments, "previous": beside[0], "ahead": beside[1]}
+    for (what, value), needed in zip(stated.items(), (shape.samples, shape.previous, 0), strict=True):
+        if value is not None and checks.count(what, value, smallest=0) != needed:
+            raise InputError(f"{what} is {value}; a step of {shape.name} has {needed}")
+    method = shape if shape.file or named_shape(shape.name) != shape else shape.name
+    return Choice(name, method, shape.samples, shape.previous)
+
+
+def _beside(previous: int | None, ahead: int | None) -> tuple[int, int]:
+    """Check the numbers of increments from before a step and from after it."""
+    before = checks.count("previous", previous or 0, smallest=0, largest=MOST_BESIDE)
+    after = checks.count("ahead", ahead or 0, smallest=0, largest=MOST_BESIDE)
+    if before + after > MOST_BESIDE:
+        raise InputError(
+            f"previous {before} and ahead {after} are {before + after} together; at most {MOST_BESIDE} are allowed"
+        )
+    return before, after
 
 
 def _choose_users(
-    name: str, method: str | Tableau | None, increments: int | None, rates: bool, previous: int
+    name: str,
+    method: AnyMethod | None,
+    increments: int | None,
+    rates: bool,
+    previous: int | None,
+    ahead: int | None,
 ) -> Choice:
     """Load a user's algorithm with the options that the user chose."""
     if rates:
         raise InputError(f"{name}: an algorithm of a user takes increments, not rates")
     options: dict[str, Any] = {}
+    if isinstance(method, (Window, ShapedConing)):
+        what = "window" if isinstance(method, Window) else "coning coefficients"
+        raise InputError(f"{name}: an algorithm of a user takes a tableau, not the {what} {method.name}")
     if method is not None:
         options["method"] = method if isinstance(method, Tableau) else TABLEAUX[_tableau_name(method)]
     if increments is not None:
         options["increments"] = checks.count("increments", increments, largest=MOST_INCREMENTS)
-    if previous:
-        options["previous"] = checks.count("previous", previous, smallest=0, largest=MOST_PREVIOUS)
+    options |= {k: v for k, v in zip(("previous", "ahead"), _beside(previous, ahead), strict=True) if v}
     return Choice.of_user(loading.load(name, **options))
 
 
@@ -129,10 +223,11 @@ def _tableau_name(method: str) -> str:
 
 def choose_step(
     name: str,
-    method: str | Tableau | None = None,
+    method: AnyMethod | None = None,
     increments: int | None = None,
     rates: bool = False,
-    previous: int = 0,
+    previous: int | None = None,
+    ahead: int | None = None,
 ) -> Choice:
     """Check a choice of attitude step; parameters and errors are those of `choose`."""
     if name in KERNELS or name in VECTORS:
@@ -141,7 +236,7 @@ def choose_step(
         )
     if isinstance(name, str) and name not in ALGORITHMS and not name.endswith(".py"):
         checks.choice("algorithm", name, _algorithms(), _FILE)
-    return choose(name, method, increments, rates, previous)
+    return choose(name, method, increments, rates, previous, ahead)
 
 
 def standard() -> list[Choice]:

@@ -6,9 +6,12 @@ from fractions import Fraction
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from strapgen.catalogue.choice import Choice
+from strapgen.catalogue.choice import AnyMethod, Choice
+from strapgen.catalogue.methods.shaped_coning import named_shape
 from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.catalogue.methods.tableaux import TABLEAUX
+from strapgen.catalogue.methods.window import Window
+from strapgen.catalogue.methods.windows import named_window
 from strapgen.catalogue.names import INTEGRATORS, KERNELS, MOST_INCREMENTS, VECTORS
 
 if TYPE_CHECKING:
@@ -29,23 +32,27 @@ def nodes(choice: Choice) -> tuple[Number, ...]:
 
 def rounding(choice: Choice) -> Fraction:
     """Return the largest rounding error of a method's published coefficients; 0 if they are exact, as most are."""
-    method = choice.method
-    if isinstance(method, str):
-        method = TABLEAUX.get(method)
-    return Fraction(0) if method is None else method.tolerance
+    method = TABLEAUX.get(choice.method) if isinstance(choice.method, str) else choice.method
+    return method.tolerance if isinstance(method, Tableau) else Fraction(0)
 
 
-def enough(method: str | Tableau) -> int:
+def enough(method: AnyMethod) -> int:
     """Return the smallest number of increments with which a step reaches the order of its method.
 
     Examples
     --------
-    >>> enough("rk4"), enough("butcher6")
-    (2, 4)
+    >>> enough("rk4"), enough("butcher6"), enough("window-7-7")
+    (2, 4, 1)
     """
+    shape = named_shape(method)
+    if shape is not None:
+        return shape.samples
+    window = named_window(method) if isinstance(method, (str, Window)) else None
+    if window is not None:
+        return window.increments
     loaded = _method(method)
     return next(
-        count for count in range(1, MOST_INCREMENTS + 1) if loaded.limit(count, 0) >= min(loaded.order, 10)
+        count for count in range(1, MOST_INCREMENTS + 1) if loaded.limit(count, 0, 0) >= min(loaded.order, 10)
     )
 
 
@@ -66,14 +73,15 @@ def derive(choice: Choice) -> Kernel:
         return kernel
     if choice.name in VECTORS:
         vector = VECTORS[choice.name]
-        derived: Kernel = getattr(import_module(f"{_PACKAGE}.kernels.{vector.module}"), vector.function)(
-            _method(choice.method), choice.increments, choice.previous
-        )
+        function = getattr(import_module(f"{_PACKAGE}.kernels.{vector.module}"), vector.function)
+        ahead = {"ahead": choice.ahead} if choice.ahead else {}
+        derived: Kernel = function(_method(choice.method), choice.increments, choice.previous, **ahead)
         return derived
     from strapgen.catalogue.kernels.attitude_step import step
     from strapgen.catalogue.kinematics import KINEMATICS
 
-    return step(KINEMATICS[choice.name], _method(choice.method), choice.increments, choice.previous)
+    method = _method(choice.method)
+    return step(KINEMATICS[choice.name], method, choice.increments, choice.previous, choice.ahead)
 
 
 def companion(kernel: Kernel, name: str) -> Kernel:
@@ -89,15 +97,22 @@ def companion(kernel: Kernel, name: str) -> Kernel:
     return next((brought for brought in kernel.own if brought.name == name), None) or derive(Choice(name))
 
 
-def _method(method: str | Tableau) -> Method:
-    """Load a method by its name or from its tableau."""
-    from strapgen.catalogue.methods import runge_kutta
+def _method(method: AnyMethod) -> Method:
+    """Load a method by its name, from its tableau or from its window."""
+    from strapgen.catalogue.methods import coning, runge_kutta, windowed
 
+    shape = named_shape(method)
+    if shape is not None:
+        return coning.shaped(shape)
+    window = named_window(method) if isinstance(method, (str, Window)) else None
+    if window is not None:
+        return windowed.method(window)
     if isinstance(method, Tableau):
         return runge_kutta.method(method)
-    if method in TABLEAUX:
-        return runge_kutta.method(TABLEAUX[method])
-    family = INTEGRATORS[method]
+    name = str(method)
+    if name in TABLEAUX:
+        return runge_kutta.method(TABLEAUX[name])
+    family = INTEGRATORS[name]
     integrator: Method = import_module(f"{_PACKAGE}.methods.{family.module}").method(
         *(family.arguments or (family.order,))
     )

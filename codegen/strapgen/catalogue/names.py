@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from strapgen.catalogue.methods.shaped_coning import SHAPE_TITLES
 from strapgen.catalogue.methods.tableaux import TITLES
+from strapgen.catalogue.methods.windows import WINDOW_TITLES
 
 #: Attitude algorithms, by the state they integrate.
 ALGORITHMS = {
@@ -22,6 +24,7 @@ class Integrator(NamedTuple):
     order: int
     takes_rates: bool = True
     arguments: tuple[str, ...] = ()
+    takes_ahead: bool = True
 
 
 #: Integration methods that have no tableau.
@@ -36,9 +39,20 @@ INTEGRATORS = {
         f"magnus{order}": Integrator(f"Magnus series of order {order}", "magnus", order)
         for order in (2, 4, 6)
     },
+    "fit-exact": Integrator(
+        "polynomial through the increments, integrated exactly", "fit_exact", 16, takes_rates=False
+    ),
     "munthe-kaas4": Integrator("Runge-Kutta-Munthe-Kaas method of order 4", "munthe_kaas", 4),
+    "crouch-grossman3": Integrator("Crouch-Grossman method of order 3", "crouch_grossman", 3),
+    "coning-least-squares": Integrator(
+        "compressed coning coefficients, by least squares over a band",
+        "frequency_shaping",
+        2,
+        takes_rates=False,
+        takes_ahead=False,
+    ),
     "coning-compressed": Integrator(
-        "compressed coning coefficients, made for coning", "coning", 4, False, ("compressed",)
+        "compressed coning coefficients, made for coning", "coning", 4, False, ("compressed",), False
     ),
     "coning-uncompressed": Integrator(
         "uncompressed coning coefficients, made for polynomial rates",
@@ -46,6 +60,7 @@ INTEGRATORS = {
         4,
         False,
         ("uncompressed",),
+        False,
     ),
     "coning-combined": Integrator(
         "coning coefficients for both, with the terms of third and fourth order",
@@ -53,6 +68,7 @@ INTEGRATORS = {
         6,
         False,
         ("combined",),
+        False,
     ),
     "coning-polynomial": Integrator(
         "uncompressed coning coefficients, with the terms of third and fourth order",
@@ -60,18 +76,24 @@ INTEGRATORS = {
         6,
         False,
         ("polynomial",),
+        False,
     ),
 }
 
-#: Integration methods.
-METHODS = {**TITLES, **{name: integrator.title for name, integrator in INTEGRATORS.items()}}
+#: Integration methods. Each family of windows has others for the same samples, such as window-8-6 beside window-7-7.
+METHODS = {
+    **TITLES,
+    **{name: integrator.title for name, integrator in INTEGRATORS.items()},
+    **SHAPE_TITLES,
+    **WINDOW_TITLES,
+}
 
 #: Methods of the standard catalogue, which are those of the thesis.
 STANDARD_METHODS = ("rk1", "rk2", "rk3", "rk4")
 
-#: Largest number of angle increments in a step, and of increments from before the step that it can use.
+#: Largest number of angle increments in a step, and of increments beside them, from before the step and from after it.
 MOST_INCREMENTS = 8
-MOST_PREVIOUS = 3
+MOST_BESIDE = 32
 
 #: Motions with a closed-form attitude, and the unit of each of their parameters.
 MOTIONS = {
@@ -79,6 +101,15 @@ MOTIONS = {
     "sinusoidal": dict.fromkeys("ab", "rad/s"),
     "coning": dict.fromkeys("abg", "rad/s"),
     "polynomial": {"a0": "rad/s", **{f"a{k}": f"rad/s^{k + 1}" for k in range(1, 5)}},
+}
+
+#: Motions without kernels, which only runs know, and the unit of each of their parameters.
+RUN_MOTIONS = {
+    "cone": {"half_angle": "rad", "frequency": "Hz", "spin": "rad/s"},
+    "random": {"rate": "rad/s"},
+    "slew": {"onset": "s", "rate": "rad/s"},
+    "ramps": {"onset": "s", "rate": "rad/s"},
+    "vibration": {"angle": "rad", "gyro": "Hz"},
 }
 
 
@@ -91,6 +122,9 @@ class Recipe(NamedTuple):
     arguments: tuple[Any, ...] = ()
     standard: bool = True
 
+
+#: Degrees of the rate for which there are steps from its Legendre coefficients.
+LEGENDRE_DEGREES = range(1, 5)
 
 #: Orders at which the series of an update can be cut off.
 UPDATE_ORDERS = range(1, 21)
@@ -214,6 +248,17 @@ KERNELS = {
         )
         for algorithm, title in ALGORITHMS.items()
     },
+    **{
+        f"{name}-legendre-{degree}": Recipe(
+            f"{ALGORITHMS[name]}: step from the Legendre coefficients of the rate to degree {degree}",
+            "legendre_step",
+            "step",
+            (name, degree),
+            False,
+        )
+        for name in ("dcm", "euler")
+        for degree in LEGENDRE_DEGREES
+    },
     "dcm-orthonormalize": Recipe(
         "orthonormalization by dual rows, the thesis's scheme", "orthonormal", "dcm"
     ),
@@ -254,13 +299,14 @@ KERNELS = {
 
 
 class StepVector(NamedTuple):
-    """A vector of a step: the module and function that derive it, and the modules of the methods that it can use."""
+    """A vector of a step: the module and function that derive it, the methods that it can use, and the default."""
 
     title: str
     module: str
     function: str
     families: tuple[str, ...]
     default: str
+    takes_windows: bool = False
 
     @property
     def methods(self) -> list[str]:
@@ -276,6 +322,7 @@ VECTORS = {
         "rotation_vector",
         ("magnus", "munthe_kaas", "coning"),
         "coning-combined",
+        True,
     ),
     "sculling": StepVector(
         "sculling term of a step, by duality with coning",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
@@ -15,6 +15,7 @@ from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
     from strapgen.catalogue import Choice
+    from strapgen.catalogue.choice import AnyMethod
 
 _Text = str | None
 
@@ -118,13 +119,37 @@ class MethodOptions:
             help="TOML file with the Butcher tableau of your own method, in place of --method.",
         ),
     ] = None
+    window: Annotated[
+        Path | None,
+        option(
+            "--window",
+            metavar="FILE",
+            help="TOML file with the filters of your own window, in place of --method; window design writes one.",
+        ),
+    ] = None
+    coning: Annotated[
+        Path | None,
+        option(
+            "--coning",
+            metavar="FILE",
+            help="TOML file with coning coefficients for a band or spectrum, in place of --method; coning writes one.",
+        ),
+    ] = None
     increments: Increments = None
     previous: Annotated[
         _Text,
         option(
             "--previous",
             metavar="N",
-            help="Number of increments from before the step that it uses as well, 0 to 3.  [default: 0]",
+            help="Number of increments from before the step that it uses as well, 0 to 32.  [default: 0]",
+        ),
+    ] = None
+    ahead: Annotated[
+        _Text,
+        option(
+            "--ahead",
+            metavar="N",
+            help="Number of increments from after the step that it uses as well, 0 to 32.  [default: 0]",
         ),
     ] = None
     rates: Annotated[
@@ -136,6 +161,11 @@ class MethodOptions:
     ] = False
 
     @property
+    def files(self) -> tuple[Path | None, ...]:
+        """The files that the options name."""
+        return self.tableau, self.window, self.coning
+
+    @property
     def stated(self) -> list[str]:
         """The options that the command line has."""
         return [f"--{part.name}" for part in fields(self) if getattr(self, part.name) not in (None, False)]
@@ -143,22 +173,31 @@ class MethodOptions:
     def choose(self, algorithm: str, *, step: bool = True) -> Choice:
         """Return the kernel that the options choose of an algorithm; with `step` it must be an attitude step."""
         from strapgen import catalogue
-        from strapgen.catalogue.methods import tableaux
+        from strapgen.catalogue.methods import shaped_coning, tableaux, windows
 
-        if self.tableau is not None and self.method is not None:
-            raise InputError(
-                f"--method {self.method} and --tableau {self.tableau} are both given; one is needed"
-            )
-        method = self.method if self.tableau is None else tableaux.read(self.tableau)
+        readers: dict[str, tuple[Path | None, Callable[[Path], AnyMethod]]] = {
+            "--tableau": (self.tableau, tableaux.read),
+            "--window": (self.window, windows.read),
+            "--coning": (self.coning, shaped_coning.read),
+        }
+        stated = {"--method": self.method, **{name: path for name, (path, _) in readers.items()}}
+        both = [f"{name} {value}" for name, value in stated.items() if value is not None]
+        if len(both) > 1:
+            raise InputError(f"{both[0]} and {both[1]} are both given; one is needed")
+        method: AnyMethod | None = self.method
+        for path, read in readers.values():
+            if path is not None:
+                method = read(path)
         choose = catalogue.choose_step if step else catalogue.choose
         one("--method", self.method)
-        count, before = whole("increments", self.increments), whole("previous", self.previous) or 0
+        count = whole("increments", self.increments)
+        before, after = whole("previous", self.previous), whole("ahead", self.ahead)
         with waiting(f"deriving {algorithm}"):  # a user's code may take its time
-            return choose(algorithm, method, count, self.rates, before)
+            return choose(algorithm, method, count, self.rates, before, after)
 
 
 #: The options of an attitude step, which takes increments.
-STEP_OPTIONS = ("method", "tableau", "increments", "previous")
+STEP_OPTIONS = ("method", "tableau", "window", "coning", "increments", "previous", "ahead")
 
 
 @dataclass(frozen=True)

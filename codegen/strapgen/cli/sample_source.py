@@ -19,8 +19,9 @@ if TYPE_CHECKING:
 
 _Text = str | None
 
-#: Names of motions, for the help.
+#: Names of motions with a closed-form attitude, and of all that a run can have, for the help.
 MOTION_NAMES = "constant, sinusoidal, coning or polynomial"
+RUN_MOTION_NAMES = "constant, sinusoidal, coning, polynomial, cone, random, slew, ramps or vibration"
 MotionSettings = Annotated[
     list[str] | None,
     option(
@@ -59,7 +60,7 @@ class SampleSource:
 
     panel: ClassVar[str] = "Input"
 
-    motion: Annotated[_Text, option("--motion", metavar="NAME", help=f"Motion: {MOTION_NAMES}.")] = None
+    motion: Annotated[_Text, option("--motion", metavar="NAME", help=f"Motion: {RUN_MOTION_NAMES}.")] = None
     settings: MotionSettings = None
     step: Annotated[_Text, option("--step", metavar="S", help="Step length in s.")] = None
     duration: Annotated[_Text, option("--duration", metavar="S", help="Duration of each run in s.")] = None
@@ -169,13 +170,15 @@ class SampleSource:
                 return recording.read_increments(self.increments_csv)
             return recording.read_rates(self.rates_csv or "", self.rate_unit or "", self.resample_hz)
 
-    def read(self, samples: int, previous: int = 0) -> Inputs:
+    def read(self, samples: int, previous: int = 0, ahead: int = 0) -> Inputs:
         """Return the increments that the options describe.
 
         Parameters
         ----------
-        samples, previous : int
-            Increments of a step, and those from before it that it takes as well.
+        samples : int
+            Increments of a step.
+        previous, ahead : int
+            Increments from before the step and from after it that it takes as well.
 
         Returns
         -------
@@ -189,12 +192,12 @@ class SampleSource:
         from strapgen.backends.increments import pulses
 
         pulse = self.pulse
-        read = self._recorded(samples, previous) if self.motion is None else self._computed(samples, previous)
+        read = (self._recorded if self.motion is None else self._computed)(samples, previous, ahead)
         if pulse is None:
             return read
-        return Inputs(pulses(read.increments, pulse, previous), read.truth, read.step, read.title)
+        return Inputs(pulses(read.increments, pulse, previous + ahead), read.truth, read.step, read.title)
 
-    def _computed(self, samples: int, previous: int) -> Inputs:
+    def _computed(self, samples: int, previous: int, ahead: int) -> Inputs:
         import numpy as np
 
         from strapgen.support import checks
@@ -202,22 +205,23 @@ class SampleSource:
         profile = self.profile()
         step, duration = self.times()
         steps = checks.multiple("duration", duration, "step", step)
-        increments, length = profile.increments(step, steps, samples, previous), float(step)
+        increments, length = profile.increments(step, steps, samples, previous, ahead), float(step)
         truth = profile.attitude(np.arange(1 + steps) * length)
         return Inputs(
             increments, truth, length, f"{self.motion} motion ({self.words}), {steps} steps of {self.step} s"
         )
 
-    def _recorded(self, samples: int, previous: int) -> Inputs:
+    def _recorded(self, samples: int, previous: int, ahead: int) -> Inputs:
         from strapgen.backends.increments import windows
 
         data = self.recording()
-        steps = max(0, len(data.increments) - previous) // samples
+        beside = previous + ahead
+        steps = max(0, len(data.increments) - beside) // samples
         if steps < 1:
             raise InputError(
-                f"the recording holds {len(data.increments)} increments; a step needs {samples + previous}"
+                f"the recording holds {len(data.increments)} increments; a step needs {samples + beside}"
             )
-        increments = windows(data.increments[: previous + steps * samples], samples, previous)
+        increments = windows(data.increments[: beside + steps * samples], samples, beside)
         length = data.interval * samples
         return Inputs(increments, None, length, f"{self.file.name}, {steps} steps of {length:.6g} s")
 

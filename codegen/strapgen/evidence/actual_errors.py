@@ -197,7 +197,7 @@ def run_of(subject: Subject, angles: AngleAccumulation, steps: int, seed: int = 
     """
     model, beside = _models(subject)
     state, samples = subject.fixed.interface.inputs
-    stream, every = random.Random(seed), angles.proved_steps
+    stream, every = random.Random(seed), subject.fixed.interface.normalized_within
     between = every if every and len(state.signal.shape) == 2 else BETWEEN
     limit = samples.high if every else int(samples.high * _SMALL)
     increments = [[stream.randint(-limit, limit) for _ in range(samples.signal.size)] for _ in range(steps)]

@@ -1,15 +1,13 @@
-"""Proves for how many steps parameters stay in their format, from the exact length of a transition.
+"""Proves for how many steps a state stays in its format, and proper, from the exact singular values of a transition.
 
-A step multiplies Euler or Cayley-Klein parameters by p, and their length by |p|, whose square is a polynomial of the
-increments that no rotation changes: two of them may be turned so that the first lies along x and the second in
-the plane of x and y. What is left are three variables, whose box is cut until the bound is close to values that are
-reached.
+A step multiplies Euler or Cayley-Klein parameters by p, and their length by |p|; it stretches a matrix by no more than
+the largest singular value of its transition. The squares are eigenvalues of polynomials of the increments that no
+rotation changes: the longer of two increments may lie along x, and the other one in the plane of x and y. What is left
+are three variables.
 """
 
 from __future__ import annotations
 
-import heapq
-import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -19,17 +17,13 @@ from pathlib import Path
 from typing import Any
 
 from strapgen.evidence.actual_errors import TOOL
-from strapgen.evidence.balls import ball
+from strapgen.evidence.eigenvalues import Matrix, exact, largest, turns_alone
 from strapgen.evidence.subjects import Subject
 from strapgen.evidence.verdicts import Result, Verdict, verdict
 from strapgen.ir.program import Program
 
-#: Bits of balls, the share of the bound that may be lost, and boxes after which that share does not matter.
-PRECISION, _CLOSE, _MOST_BOXES = 128, 0.02, 1_500
 #: Dimensions of space.
 _SPACE = 3
-#: A box of the three variables: the ends of every side.
-_Box = tuple[tuple[Fraction, Fraction], ...]
 
 
 def check(subject: Subject, folder: Path) -> list[Verdict]:
@@ -44,19 +38,31 @@ def check(subject: Subject, folder: Path) -> list[Verdict]:
     Returns
     -------
     list of Verdict
-        The claims "state: stays in its format" and "state: stays proper" of steps of parameters from two increments;
-        of any other kernel none.
+        The claims "state: stays in its format" and "state: stays proper" of steps from two increments; of any other
+        kernel none.
     """
     program, interface = subject.program, subject.fixed.interface
-    if interface.accumulation is None or program.inputs[0].size != 4 or program.inputs[1].size != 2 * _SPACE:
+    if interface.accumulation is None or [signal.size for signal in program.inputs[1:]] != [2 * _SPACE]:
         return []
 
     stretch = cache(lambda: stretch_of(program.transition_program(), _limit(subject)))
-    claims = {"stays in its format": in_format, "stays proper": is_proper}
+    claims = {"stays in its format": (_calls, in_format), "stays proper": (_steps, is_proper)}
     return [
-        verdict(subject.name, f"state: {name}", TOOL, partial(_judged, compare, subject, stretch))
-        for name, compare in claims.items()
+        verdict(subject.name, f"state: {name}", TOOL, partial(_judged, number, compare, subject, stretch))
+        for name, (number, compare) in claims.items()
     ]
+
+
+def _calls(subject: Subject) -> int:
+    """Return for how many calls the header says that none is refused, 0 if it does not."""
+    interface = subject.fixed.interface
+    return interface.accumulation.calls_within(interface.settings.allowance) if interface.accumulation else 0
+
+
+def _steps(subject: Subject) -> int:
+    """Return for how many steps the header says that the state stays proper, 0 if it does not."""
+    angles = subject.fixed.interface.angle_accumulation
+    return angles.proved_steps if angles else 0
 
 
 def _limit(subject: Subject) -> Fraction:
@@ -66,19 +72,22 @@ def _limit(subject: Subject) -> Fraction:
 
 
 def _judged(
+    number: Callable[[Subject], int],
     compare: Callable[[Subject, Stretch], tuple[Result, str]],
     subject: Subject,
     stretch: Callable[[], Stretch | None],
 ) -> tuple[Result, str]:
+    if not number(subject):
+        return "not examined", "the header states no number of steps"
     bounds = stretch()
     if bounds is None:
-        return "fails", "the length of a transition changes when the increments turn"
+        return "fails", "a transition does not turn with its increments"
     return compare(subject, bounds)
 
 
 @dataclass(frozen=True)
 class Stretch:
-    """Bounds of |p|^2 - 1.
+    """Bounds of the squared singular values of a transition, less 1.
 
     Parameters
     ----------
@@ -99,9 +108,7 @@ def in_format(subject: Subject, stretch: Stretch) -> tuple[Result, str]:
     """
     interface = subject.fixed.interface
     assert interface.accumulation is not None
-    stated = interface.accumulation.calls_within(interface.settings.allowance)
-    if not stated:
-        return "not examined", "the header states no number of steps"
+    stated = _calls(subject)
     growth = _root_above(1 + max(Fraction(0), stretch.high))
     steps = replace(interface.accumulation, growth=growth).calls_within(interface.settings.allowance)
     return (
@@ -120,25 +127,49 @@ def is_proper(subject: Subject, stretch: Stretch) -> tuple[Result, str]:
     """
     interface = subject.fixed.interface
     angles, adds_up = interface.angle_accumulation, interface.accumulation
-    if angles is None or adds_up is None or not angles.proved_steps:
-        return "not examined", "the header states no number of steps"
-    # A step makes the state x at least |x| |p| - r long, and r is at most r |x| / shortest.
+    assert angles is not None and adds_up is not None
+    # What a run adds once is twice what may be fed back; of a matrix all rows together count.
+    shape = subject.program.inputs[0].shape
+    fed_back = float(adds_up.once) * (math.sqrt(shape[0]) if len(shape) == 2 else 1)
+    shortest, start, added = (float(x) for x in (angles.shortest, angles.start, angles.added))
     # The root of 1 - a is at least 1 - a/2 - a^2/2 for a up to 1.
     lack = max(Fraction(0), -stretch.low)
-    lost = float(lack / 2 + lack**2 / 2 + adds_up.per_step / angles.shortest) * (1 + 1e-9)
-    room = math.log(float((angles.start - adds_up.once) / (angles.shortest + adds_up.once))) * (1 - 1e-9)
-    steps = math.floor(room / -math.log1p(-lost))
-    stated = angles.proved_steps
+    steps = steps_between(start - fed_back, shortest, -float(lack / 2 + lack**2 / 2), -added)
+    if len(shape) == 2:
+        first, longest = (math.sqrt(2 - length**2) for length in (start, shortest))
+        growth = float(_root_above(1 + max(Fraction(0), stretch.high)) - 1)
+        steps = min(steps, steps_between(first + fed_back, longest, growth, added))
+    stated = _steps(subject)
     return "proved" if steps >= stated else "fails", f"{steps:,} steps, the header states {stated:,}"
 
 
+def steps_between(start: float, end: float, growth: float, added: float) -> int:
+    """Return for how many steps x' = (1 + growth) x + added stays between two numbers.
+
+    Parameters
+    ----------
+    start, end : float
+    growth, added : float
+        Of one sign, that of the difference.
+    """
+    if (end - start) * (growth + added) <= 0:
+        return 0
+    if not growth:
+        return math.floor((end - start) / added * (1 - 1e-9))
+    # From the point where a step changes nothing, -added/growth, the distance is multiplied by 1 + growth.
+    stretched = math.log1p((end - start) / (start + added / growth))
+    return math.floor(stretched / math.log1p(growth) * (1 - 1e-9))
+
+
 def stretch_of(transition: Program, limit: Fraction) -> Stretch | None:
-    """Return bounds of |p|^2 - 1 for two increments whose elements are at most a limit; None if rotations change it.
+    """Return bounds of the eigenvalues of T T' - 1 for two increments whose elements are at most a limit.
+
+    None stands for a transition that does not turn with its increments.
 
     Parameters
     ----------
     transition : Program
-        Its output has four elements, and its input two vectors.
+        Its output is a quaternion, whose |p|^2 - 1 is bounded, or a matrix; its input are two vectors.
     limit : Fraction
         In rad.
     """
@@ -149,89 +180,28 @@ def stretch_of(transition: Program, limit: Fraction) -> Stretch | None:
         return None
     plane = fmpq_mpoly_ctx.get(["x", "y", "z"], Ordering.lex)
     x, y, z = plane.gens()
-    zero = plane.constant(0)
-    polynomial = _excess(transition, [x, zero, zero, y, z, zero], plane)
-    terms = [(powers, Fraction(int(c.p), int(c.q))) for powers, c in polynomial.to_dict().items()]
-    radius = _root_above(_SPACE * limit**2)
-    high = largest(terms, radius)
-    low = -largest([(powers, -c) for powers, c in terms], radius)
-    return Stretch(low, high)
+    radius, zero = exact(_root_above(_SPACE * limit**2)), plane.constant(0)
+    longer, shorter = [radius * x, zero, zero], [radius * x * y, radius * x * z, zero]
+    excess = [_excess(transition, increments, plane) for increments in (longer + shorter, shorter + longer)]
+    lack = [[[-element for element in row] for row in matrix] for matrix in excess]
+    return Stretch(-largest(lack), largest(excess))
 
 
-def _excess(transition: Program, increments: Any, context: Any) -> Any:
-    """Return |p|^2 - 1 as a polynomial."""
-    from flint import fmpq
-
+def _excess(transition: Program, increments: Any, context: Any) -> Matrix:
+    """Return T T' - 1 as polynomials; of a quaternion one element."""
     names = [name for signal in transition.inputs for name in signal.elements]
-
-    def constant(value: Fraction) -> Any:
-        return context.constant(fmpq(value.numerator, value.denominator))
-
-    (elements,) = transition.run(dict(zip(names, increments, strict=True)), constant).values()
-    return sum((element * element for element in elements), context.constant(-1))
-
-
-def turns_alone(polynomial: Any) -> bool:
-    """Tell whether no rotation of all vectors together changes a polynomial of their elements."""
-    gens = polynomial.context().gens()
-    for first, second in itertools.combinations(range(_SPACE), 2):
-        change = 0 * gens[0]
-        for vector in range(0, len(gens), _SPACE):
-            a, b = vector + first, vector + second
-            change += gens[a] * polynomial.derivative(b) - gens[b] * polynomial.derivative(a)
-        if change != 0:
-            return False
-    return True
-
-
-def largest(terms: list[tuple[tuple[int, ...], Fraction]], radius: Fraction) -> Fraction:
-    """Return an upper bound of a polynomial for 0 <= x <= r and y^2 + z^2 <= r^2 with z >= 0.
-
-    Parameters
-    ----------
-    terms : list
-        Powers of x, y and z with their coefficients.
-    radius : Fraction
-    """
-    from flint import ctx
-
-    with ctx.workprec(PRECISION):
-        coefficients = [(powers, ball(c)) for powers, c in terms]
-        zero = Fraction(0)
-        start: _Box = ((zero, radius), (-radius, radius), (zero, radius))
-        order = itertools.count()
-        pending = [(-_above(coefficients, start), next(order), start)]
-        reached = 0.0
-        while len(pending) < _MOST_BOXES:
-            bound, _, box = heapq.heappop(pending)
-            centre = tuple(((a + b) / 2,) * 2 for a, b in box)
-            if _least_square(centre) <= radius**2:
-                reached = max(reached, _above(coefficients, centre))
-            if -bound <= reached * (1 + _CLOSE) + 1e-12:
-                heapq.heappush(pending, (bound, next(order), box))
-                break
-            side = max(range(_SPACE), key=lambda k: box[k][1] - box[k][0])
-            low, high = box[side]
-            for half in ((low, (low + high) / 2), ((low + high) / 2, high)):
-                part = (*box[:side], half, *box[side + 1 :])
-                if _least_square(part) <= radius**2:
-                    heapq.heappush(pending, (-_above(coefficients, part), next(order), part))
-        return Fraction(-pending[0][0])
-
-
-def _least_square(box: Any) -> Fraction:
-    """Return the least y^2 + z^2 in a box."""
-    return sum((min(a * a, b * b) if a * b > 0 else Fraction(0) for a, b in box[1:]), Fraction(0))
-
-
-def _above(terms: list[tuple[tuple[int, ...], Any]], box: Any) -> float:
-    """Return a number that is not below a polynomial anywhere in a box."""
-    sides = [ball(a).union(ball(b)) for a, b in box]
-    total = sum(
-        (c * math.prod(side**n for side, n in zip(sides, powers, strict=True) if n) for powers, c in terms),
-        ball(Fraction(0)),
-    )
-    return math.nextafter(float(total.upper()), math.inf)
+    (elements,) = transition.run(
+        dict(zip(names, increments, strict=True)), lambda value: context.constant(exact(value))
+    ).values()
+    width = _SPACE if len(elements) == _SPACE**2 else len(elements)
+    rows = [elements[k : k + width] for k in range(0, len(elements), width)]
+    return [
+        [
+            sum((a * b for a, b in zip(row, other, strict=True)), context.constant(-1 if i == j else 0))
+            for j, other in enumerate(rows)
+        ]
+        for i, row in enumerate(rows)
+    ]
 
 
 def _root_above(value: Fraction) -> Fraction:

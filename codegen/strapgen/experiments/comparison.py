@@ -16,7 +16,7 @@ from strapgen.backends import BACKENDS, DEFAULT_BACKENDS, Backend, chosen_step
 from strapgen.backends import backend as attitude_backend
 from strapgen.backends.increments import pulses
 from strapgen.catalogue import Choice
-from strapgen.catalogue.methods.tableau import Tableau
+from strapgen.catalogue.choice import AnyMethod
 from strapgen.ir.fixed_settings import Settings
 from strapgen.simulation.runs import attitude, drift_between, require_finite
 from strapgen.support import checks, stages
@@ -95,7 +95,7 @@ class Comparison:
 
 def compare(
     algorithm: str | Choice,
-    method: str | Tableau | None = None,
+    method: AnyMethod | None = None,
     samples: int | None = None,
     backends: Sequence[str | Backend] = DEFAULT_BACKENDS,
     increments: Any = None,
@@ -161,7 +161,7 @@ def compare(
         return attitude_backend(choice, backend=name, settings=fixed if BACKENDS[name].fixed else None)
 
     if fixed.sensor is not None:
-        d = pulses(d, fixed.sensor.count, choice.previous)
+        d = pulses(d, fixed.sensor.count, choice.previous + choice.ahead)
     standard = load(reference)
     states: Array = standard.propagate(d).astype(np.float64)
     require_finite(standard, states, np.arange(len(states), dtype=np.float64))

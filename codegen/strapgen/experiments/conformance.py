@@ -148,11 +148,11 @@ def _samples(program: Program) -> int:
 
 
 def _random(program: Program, steps: int, size: float = 0.02) -> NDArray[np.float64]:
-    """Return random increments; a step that takes increments from before it sees those of the step before."""
-    previous = _step_kernels(program).previous
-    count = _samples(program) - previous
-    row = np.random.default_rng(1969).uniform(-size, size, (previous + steps * count, 3))
-    return windows(row, count, previous)
+    """Return random increments; a step that takes increments from beside it sees those of its neighbours."""
+    beside = _step_kernels(program).beside
+    count = _samples(program) - beside
+    row = np.random.default_rng(1969).uniform(-size, size, (beside + steps * count, 3))
+    return windows(row, count, beside)
 
 
 def _exact_finding(name: str, off: Any, holds: str, fails: str) -> Finding:
@@ -190,7 +190,7 @@ def _at_rest(step: _Precise) -> Finding:
 def _direction(step: _Precise) -> Finding:
     """Compare a small rotation with the true one and with its opposite, which tells a wrong sign."""
     samples = _samples(step.program)
-    count = samples - _step_kernels(step.program).previous
+    count = samples - _step_kernels(step.program).beside
     worst, mirrored = 0.0, math.inf
     size = 0.01
     with mpmath.workdps(exact.DIGITS):

@@ -234,12 +234,12 @@ def _on_backend(
     choice: Choice, motion: Motion, total: Fraction, backend: str, settings: Settings | None
 ) -> _Measure:
     """Return the function that measures a step length on a back end."""
-    samples, previous = choice.increments_per_step, choice.previous
+    samples, beside = choice.increments_per_step, (choice.previous, choice.ahead)
 
     def measure(length: Fraction, count: int) -> tuple[float | None, float]:
         chosen = None
         if BACKENDS[backend].fixed:
-            largest = largest_increment(motion, length, total, samples, previous=previous)
+            largest = largest_increment(motion, length, total, samples, beside=beside)
             chosen = (settings or Settings()).fitted(largest)
         stepper = attitude_backend(choice, backend=backend, settings=chosen)
         try:

@@ -103,7 +103,7 @@ def coning_run(sources: Sources, conversion: str) -> MotionRun:
     """Return a run of a step on coning whose increments lie well inside the range of its input."""
     assert sources.companions is not None
     signal = sources.function.inputs[-1]
-    samples = signal.size // 3 - sources.companions.previous
+    samples = signal.size // 3 - sources.companions.beside
     largest, step = LARGEST, _STEP
     if sources.fixed is not None:
         argument = sources.fixed.inputs[-1]

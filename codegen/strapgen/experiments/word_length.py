@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-import multiprocessing
-import os
 from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, fields, replace
 from itertools import product
 from pathlib import Path
@@ -24,7 +21,7 @@ from strapgen.simulation.motions import Motion, motion
 from strapgen.simulation.runs import attitude, drift_between
 from strapgen.support import cache, checks
 from strapgen.support.exceptions import InputError
-from strapgen.support.processes import begin_worker
+from strapgen.support.resumable import side_by_side
 
 #: Most cases of one study.
 _MOST_CASES = 5000
@@ -302,20 +299,5 @@ def run(planned: Sequence[Case], jobs: int | None = None) -> Iterator[Outcome]:
     ------
     Outcome
     """
-    workers = min(len(planned), jobs or os.cpu_count() or 1)
-    if workers == 1:
-        yield from map(run_case, planned)
-        return
-    others = set(multiprocessing.active_children())
-    # An interrupt reaches this process alone, which then stops the others.
-    pool = ProcessPoolExecutor(workers, initializer=begin_worker)
-    pending = [pool.submit(run_case, case) for case in planned]
-    try:
-        for done in as_completed(pending):
-            yield done.result()
-    except BaseException:
-        pool.shutdown(wait=False, cancel_futures=True)
-        for child in set(multiprocessing.active_children()) - others:
-            child.terminate()
-        raise
-    pool.shutdown()
+    for _, outcome in side_by_side(run_case, {str(k): case for k, case in enumerate(planned)}, jobs):
+        yield outcome

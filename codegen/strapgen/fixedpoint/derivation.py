@@ -6,6 +6,7 @@ Ranges are proved on the way; an operation that fixed point does not have is ref
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from fractions import Fraction
 from functools import lru_cache
 
@@ -24,7 +25,9 @@ from strapgen.fixedpoint.quantities import (
     used_by,
 )
 from strapgen.fixedpoint.ranges import Ranges
+from strapgen.fixedpoint.terms import up
 from strapgen.ir.program import Assignment, Constant, Operation, Program, Reference, Result
+from strapgen.support.exceptions import InputError
 
 
 def quantities(
@@ -73,8 +76,25 @@ def _derived(
             for node in program.transition.nodes
             if isinstance(node, Reference | Constant)
         )
+        _add_truncation(context)
     _drop_unused(context.quantities)
     return context.quantities
+
+
+def _add_truncation(context: DerivationContext) -> None:
+    """Note on the transition what its series leaves out."""
+    program = context.program
+    if program.transition is None or program.companions is None or program.companions.truncation is None:
+        return
+    truncation = program.companions.truncation
+    square = context.items[truncation.square]
+    left_out = truncation.bound((square.range + Interval.of(square.offset)).magnitude)
+    if left_out is None:
+        raise InputError(f"{program.kernel}: its series does not converge for increments in that range")
+    for name in context.quantities.results[program.transition.signal.name]:
+        if isinstance(name, str):
+            quantity = context.items[name]
+            context.items[name] = replace(quantity, inexact=quantity.inexact + up(left_out))
 
 
 def _context(program: Program, ranges: Mapping[str, Interval], split: bool, word: int) -> DerivationContext:

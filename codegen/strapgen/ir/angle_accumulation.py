@@ -49,6 +49,8 @@ class AngleAccumulation:
         Most steps from one orthonormalization by dual rows to the next; 0 where nothing is proved of that scheme.
     dual_rows_growth : Fraction
         With that scheme, every orthonormalization stretches the error before it by 1 and this much at most.
+    added : Fraction, optional
+        What rounding adds to a proper state in a step, as the length of all its elements together.
     """
 
     once: Fraction
@@ -63,6 +65,7 @@ class AngleAccumulation:
     orthonormalized: Fraction
     dual_rows_apart: int
     dual_rows_growth: Fraction
+    added: Fraction = Fraction(0)
 
     @property
     def dual_rows_error(self) -> Fraction:

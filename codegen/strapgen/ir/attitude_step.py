@@ -2,10 +2,65 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from fractions import Fraction
 from typing import Any
+
+#: Fraction bits to which the root of a square is rounded up.
+_ROOT_BITS = 64
+
+
+@dataclass(frozen=True)
+class Truncation:
+    """What the transition leaves out of the exponential of its rotation vector, whose series it cuts off.
+
+    Parameters
+    ----------
+    order : int
+        Highest power of the rotation vector that it has.
+    scale : Fraction
+        Length of the generator by that of the rotation vector: 1/2 for parameters of half the angle, 1 for matrices.
+    square : str
+        Name of the value that is the square of the rotation vector's length, in rad^2.
+
+    Examples
+    --------
+    >>> cut = Truncation(12, Fraction(1, 2), "angle_square")
+    >>> float(cut.bound(Fraction(1, 4))) < 3e-18, cut.bound(Fraction(0))
+    (True, Fraction(0, 1))
+    """
+
+    order: int
+    scale: Fraction
+    square: str
+
+    def bound(self, square: Fraction) -> Fraction | None:
+        """Return a bound of what is left out, as the length of a quaternion or the largest singular value of a matrix.
+
+        Parameters
+        ----------
+        square : Fraction
+            Largest square of the rotation vector's length, in rad^2.
+
+        Returns
+        -------
+        Fraction or None
+            None where the angle is so large that the terms do not shrink at once.
+        """
+        # A power of a length that is rounded up: its root is rational again.
+        x = self.scale * Fraction(math.isqrt(math.ceil(square * 4**_ROOT_BITS)) + bool(square), 2**_ROOT_BITS)
+        if x >= self.order + 2:
+            return None
+        # The terms that follow shrink at least as fast as a geometric series.
+        first = x ** (self.order + 1) / math.factorial(self.order + 1)
+        return first / (1 - x / (self.order + 2))
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Truncation:
+        """Rebuild the record from plain JSON data."""
+        return cls(data["order"], Fraction(data["scale"]), data["square"])
 
 
 @dataclass(frozen=True)
@@ -26,7 +81,11 @@ class Companions:
     previous : int
         Number of increments from before the step that it takes in addition to its own.
     isometry : bool
-        Whether the exact transition is a rotation for any increments.
+        Whether the exact transition, with what a series leaves out, is a rotation for any increments.
+    ahead : int
+        Number of increments from after the step that it takes in addition to its own.
+    truncation : Truncation or None
+        What the transition leaves out of a series; None where it is the exponential itself, or a method of its own.
     """
 
     product: str | None
@@ -35,15 +94,28 @@ class Companions:
     identity: tuple[Fraction, ...]
     previous: int = 0
     isometry: bool = False
+    ahead: int = 0
+    truncation: Truncation | None = None
+
+    @property
+    def beside(self) -> int:
+        """Number of increments that the step takes in addition to its own."""
+        return self.previous + self.ahead
 
     def as_dict(self) -> dict[str, Any]:
         """Return the record as plain JSON data."""
-        return asdict(self) | {"identity": [str(element) for element in self.identity]}
+        cut = self.truncation
+        return asdict(self) | {
+            "identity": [str(element) for element in self.identity],
+            "truncation": cut and {**asdict(cut), "scale": str(cut.scale)},
+        }
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Companions:
         """Rebuild the record from `as_dict`."""
-        return cls(**{**data, "identity": tuple(map(Fraction, data["identity"]))})
+        cut = data["truncation"]
+        identity = tuple(map(Fraction, data["identity"]))
+        return cls(**{**data, "identity": identity, "truncation": cut and Truncation.from_dict(cut)})
 
 
 @dataclass(frozen=True)

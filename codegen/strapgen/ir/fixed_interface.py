@@ -195,6 +195,18 @@ class Interface:
     angle_accumulation: AngleAccumulation | None = None
 
     @property
+    def normalized_within(self) -> int:
+        """The most steps from a normalization to the next that are proved to be accepted and to keep the state proper.
+
+        It is 0 where nothing is proved.
+        """
+        if self.accumulation is None or self.angle_accumulation is None:
+            return 0
+        return min(
+            self.angle_accumulation.proved_steps, self.accumulation.calls_within(self.settings.allowance)
+        )
+
+    @property
     def companion_settings(self) -> Settings:
         """The settings of a kernel that works on the same state beside a step: an orthonormalization."""
         formats = {} if self.settings.state else {"state": str(self.inputs[0].format)}

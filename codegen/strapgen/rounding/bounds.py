@@ -120,6 +120,13 @@ def rounding_bounds(
     except NoBoundError as error:
         return RoundingBounds(number, format_.precision, inputs, reason=str(error))
     added = [item.added for item in computed.items]
+    left_out = _left_out(program, analysis)
+    if left_out is None:
+        reason = "the series of its transition does not converge on this range"
+        return RoundingBounds(number, format_.precision, inputs, reason=reason)
+    if left_out and program.transition is not None:
+        for place in analysis.expressions.results[program.transition.signal.name]:
+            added[place] += left_out
     outputs = {result.signal.name: _errors(analysis.moves(result), added) for result in program.outputs}
     step = _step_rounding(program, analysis, added)
     return RoundingBounds(
@@ -132,6 +139,15 @@ def rounding_bounds(
         step,
         None if step is None else _accumulation(program, dict(limits), step, *outputs.values()),
     )
+
+
+def _left_out(program: Program, analysis: _Analysis) -> Fraction | None:
+    """Return a bound of what the transition leaves out of a series; None where it is not known."""
+    if program.companions is None or program.companions.truncation is None:
+        return Fraction(0)
+    truncation = program.companions.truncation
+    left_out = truncation.bound(analysis.ranges[analysis.expressions.names[truncation.square]].magnitude)
+    return None if left_out is None else up(left_out)
 
 
 def _errors(moves: Iterable[Mapping[int, Fraction]], added: Sequence[Fraction]) -> tuple[Fraction, ...]:

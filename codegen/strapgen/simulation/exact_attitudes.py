@@ -10,7 +10,7 @@ import mpmath
 
 from strapgen import pipeline
 from strapgen.backends.exact import ExactBackend, interpreter, number
-from strapgen.catalogue import Choice
+from strapgen.catalogue import MOTIONS, Choice
 from strapgen.simulation.motions import Motion
 from strapgen.support.exceptions import InputError, InputTypeError
 
@@ -50,9 +50,19 @@ def exact_attitudes(
     callable
         ``run(step, count)`` yields the computed and the true matrix, row by row, at time 0 and after every step. The
         caller sets the precision of mpmath to `exact.DIGITS`.
+
+    Raises
+    ------
+    InputError
+        If the attitude of the motion has no closed form.
     """
     backend = ExactBackend.of_choice(choice)
-    samples, previous = backend.increments, backend.previous
+    samples, previous, ahead = backend.increments, backend.previous, backend.ahead
+    if motion.name not in MOTIONS:
+        raise InputError(
+            f"the attitude of motion {motion.name} has no closed form, which many digits need; these have: "
+            f"{', '.join(MOTIONS)}"
+        )
     increment, truth = interpreter(f"{motion.name}-increments"), interpreter(f"{motion.name}-truth")
     attitude = backend.attitude_in_digits()
 
@@ -61,10 +71,10 @@ def exact_attitudes(
         width = length / samples
         row = [
             increment([number((2 * k + 1) * width / 2)], [number(width)], *parameters)
-            for k in range(-previous, count * samples)
+            for k in range(-previous, count * samples + ahead)
         ]
         steps = (
-            [x for vector in row[k : k + previous + samples] for x in vector]
+            [x for vector in row[k : k + backend.samples] for x in vector]
             for k in range(0, count * samples, samples)
         )
         for place, state in enumerate(backend.states_in_digits(steps)):

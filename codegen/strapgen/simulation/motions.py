@@ -1,6 +1,7 @@
 """A `Motion` has exact increments for an algorithm, and the true attitude to compare its result with.
 
-The formulas are kernels of the catalogue; the generated numpy code of the kernels evaluates them.
+The formulas are kernels of the catalogue; the generated numpy code of the kernels evaluates them. An attitude without
+a closed form is integrated, see `reference_attitudes`.
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -16,13 +18,30 @@ from numpy.typing import NDArray
 from strapgen import catalogue
 from strapgen.backends import evaluator
 from strapgen.backends.increments import windows
+from strapgen.simulation.rate_profiles import PROFILES, RateProfile
+from strapgen.simulation.reference_attitudes import ReferenceAttitude
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 
 Array = NDArray[np.float64]
 
-#: Motions whose parameters are zero by default, as long as one of them is set.
-_MAY_BE_LEFT_OUT = ("constant", "polynomial")
+#: Motions that runs can have, and the unit of each of their parameters.
+MOTIONS = {**catalogue.MOTIONS, **catalogue.RUN_MOTIONS}
+#: Parameters that can be left out as long as another one is set, by motion, and their values in SI units.
+_DEFAULTS: dict[str, dict[str, float]] = {
+    **{name: dict.fromkeys(catalogue.MOTIONS[name], 0.0) for name in ("constant", "polynomial")},
+    "cone": {"spin": 0.0},
+    "slew": {"rate": math.radians(300)},
+    "ramps": {"rate": math.radians(300)},
+    "vibration": {"gyro": math.inf},
+}
+#: Endings of the keys of a parameter by its unit, and the factor of each to SI units.
+_ENDINGS = {
+    "rad/s": {"deg_s": math.radians(1), "rad_s": 1.0},
+    "rad": {"deg": math.radians(1), "rad": 1.0},
+    "s": {"s": 1.0},
+    "Hz": {"hz": 1.0},
+}
 
 
 def keys(name: str) -> dict[str, dict[str, float]]:
@@ -47,11 +66,13 @@ def keys(name: str) -> dict[str, dict[str, float]]:
     >>> sorted(keys("sinusoidal")["b"])
     ['b_deg_s', 'b_rad_s']
     """
-    parameters = catalogue.MOTIONS[checks.choice("motion", name, catalogue.MOTIONS)]
-    degree = math.radians(1)
+    parameters = MOTIONS[checks.choice("motion", name, MOTIONS)]
     if name == "polynomial":
-        return {parameter: {parameter: degree} for parameter in parameters}
-    return {p: {f"{p}_deg_s": degree, f"{p}_rad_s": 1.0} for p in parameters}
+        return {parameter: {parameter: math.radians(1)} for parameter in parameters}
+    return {
+        p: {f"{p}_{ending}": factor for ending, factor in _ENDINGS[unit].items()}
+        for p, unit in parameters.items()
+    }
 
 
 @dataclass(frozen=True)
@@ -69,7 +90,9 @@ class Motion:
     name: str
     parameters: dict[str, float]
 
-    def increments(self, step: Fraction, steps: int, samples: int, previous: int = 0) -> Array:
+    def increments(
+        self, step: Fraction, steps: int, samples: int, previous: int = 0, ahead: int = 0
+    ) -> Array:
         """Return the exact angle increments.
 
         Parameters
@@ -80,15 +103,17 @@ class Motion:
             Number of steps from t = 0.
         samples : int
             Increments per step.
-        previous : int, optional
-            Increments from before each step that it takes in addition; those of the first step lie before t = 0.
+        previous, ahead : int, optional
+            Increments from before each step and from after it that it takes in addition; those before the first step
+            lie before t = 0.
 
         Returns
         -------
-        array, (steps, previous + samples, 3)
+        array, (steps, previous + samples + ahead, 3)
             Integrals of the body rate in rad, body axes.
         """
-        return windows(self.samples(step / samples, -previous, steps * samples), samples, previous)
+        row = self.samples(step / samples, -previous, steps * samples + ahead)
+        return windows(row, samples, previous + ahead)
 
     def samples(self, interval: Fraction, first: int, stop: int) -> Array:
         """Return exact angle increments of some sampling intervals.
@@ -154,15 +179,63 @@ class Motion:
         return result
 
 
-def motion(name: str, /, **settings: float | str | Fraction) -> Motion:
-    """Return a motion with a closed-form attitude.
+@dataclass(frozen=True)
+class IntegratedMotion(Motion):
+    """A motion whose increments are exact, and whose attitude is integrated.
 
     Parameters
     ----------
     name : str
-        "constant" (keys x, y, z), "sinusoidal" (a, b) or "coning" (a, b, g), whose keys end with a unit, as in
-        ``a_deg_s`` or ``a_rad_s``; or "polynomial" (a0, ..., a4, in deg/s^(k+1)). For "constant" and
-        "polynomial" missing parameters are zero, but one is needed.
+        A key of `PROFILES`.
+    parameters : dict of str to float
+        Its parameters in SI units.
+    """
+
+    @cached_property
+    def _profile(self) -> RateProfile:
+        return PROFILES[self.name](**self.parameters)
+
+    def samples(self, interval: Fraction, first: int, stop: int) -> Array:
+        """Return exact angle increments of some sampling intervals, see `Motion.samples`."""
+        edges = np.arange(first, stop + 1) * float(interval)
+        increments: Array = np.diff(self._profile.angle(edges), axis=0)
+        return increments
+
+    def attitude(self, time: Any) -> Array:
+        """Return the true attitude, see `Motion.attitude`; no time may be below 0."""
+        return _reference(self.name, tuple(self.parameters.items()))(time)
+
+    def rate(self, time: Any) -> Array:
+        """Return the body rate, see `Motion.rate`."""
+        return self._profile.rate(time)
+
+
+@lru_cache(maxsize=16)
+def _reference(name: str, parameters: tuple[tuple[str, float], ...]) -> ReferenceAttitude:
+    """Return the attitude of a motion, which all runs on it share."""
+    profile = PROFILES[name](**dict(parameters))
+    return ReferenceAttitude(profile.rate, profile.substeps)
+
+
+def _cone(half_angle: float, frequency: float, spin: float) -> Motion:
+    """Return the coning motion whose axis y goes round a cone while the body spins about it."""
+    # Round the cone's axis y turns at b + spin; a and b + g are the components of that rate across y and along it.
+    turning = 2 * math.pi * frequency
+    across, along = turning * math.sin(half_angle), -2 * turning * math.sin(half_angle / 2) ** 2
+    return Motion("coning", {"a": across, "b": turning - spin, "g": along + spin})
+
+
+def motion(name: str, /, **settings: float | str | Fraction) -> Motion:
+    """Return a motion with a known attitude.
+
+    Parameters
+    ----------
+    name : str
+        "constant" (keys x, y, z), "sinusoidal" (a, b), "coning" (a, b, g), "cone" (half_angle, frequency, spin),
+        "random" (rate), "slew" and "ramps" (onset, rate) or "vibration" (angle, gyro), whose keys end with a unit, as
+        in ``a_deg_s`` or ``a_rad_s``; or "polynomial" (a0, ..., a4, in deg/s^(k+1)). A spin and the parameters of
+        "constant" and "polynomial" are zero by default, a rate of slews is 300 deg/s, and a gyro passes on everything;
+        one parameter is needed.
     **settings : number
         The parameters.
 
@@ -191,12 +264,17 @@ def motion(name: str, /, **settings: float | str | Fraction) -> Motion:
         used = [key for key in choices if key in settings]
         if len(used) > 1:
             raise InputError(f"motion {name}: {' and '.join(used)} are both given; one is needed")
-        if not used and name not in _MAY_BE_LEFT_OUT:
+        if not used and parameter not in _DEFAULTS.get(name, {}):
             raise InputError(f"motion {name} lacks {' or '.join(choices)}")
-        parameters[parameter] = 0.0
+        parameters[parameter] = _DEFAULTS.get(name, {}).get(parameter, 0.0)
         for key in used:
             parameters[parameter] = float(checks.number(key, settings[key])) * choices[key]
-    return Motion(name, parameters)
+    if name == "cone":
+        return _cone(**parameters)
+    if name not in PROFILES:
+        return Motion(name, parameters)
+    PROFILES[name](**parameters)  # refuses parameters that it cannot use
+    return IntegratedMotion(name, parameters)
 
 
 #: A motion whose rate changes direction and size, of about 1 rad/s: settings of coning.

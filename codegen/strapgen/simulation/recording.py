@@ -352,7 +352,9 @@ def propagate(
         )
     backend.need_increments()
     step = recording.interval * backend.increments
-    steps, unused = divmod(max(0, len(recording.increments) - backend.previous), backend.increments)
+    steps, unused = divmod(
+        max(0, len(recording.increments) - backend.samples + backend.increments), backend.increments
+    )
     if steps < 1:
         raise InputError(
             f"the recording holds {len(recording.increments)} increments; a step needs {backend.samples}"
@@ -366,7 +368,7 @@ def propagate(
         release(recording.increments)  # what was read of a long one before
         return recording.increments[first:stop]
 
-    parts_of_run = StepWindows(read, backend.increments, backend.previous, pulse)
+    parts_of_run = StepWindows(read, backend.increments, backend.previous + backend.ahead, pulse)
     states = backend.propagate_parts(parts_of_run, steps, record_every, every)
     start = recording.start + recording.interval * backend.previous
     time: Array = start + step * record_every * np.arange(len(states), dtype=np.float64)

@@ -124,7 +124,7 @@ def largest_increment(
     duration: float | str | Fraction,
     samples: int,
     pulse: float | str | Fraction | None = None,
-    previous: int = 0,
+    beside: tuple[int, int] = (0, 0),
 ) -> float:
     """Return the largest magnitude of an element of the angle increments of a simulation, in rad.
 
@@ -133,8 +133,10 @@ def largest_increment(
     motion : Motion
     step, duration, pulse : number
         As for `simulate`.
-    samples, previous : int
-        Increments per step, and increments from before it that it takes in addition.
+    samples : int
+        Increments per step.
+    beside : tuple of int, optional
+        Increments from before a step and from after it that it takes in addition.
 
     Returns
     -------
@@ -147,20 +149,24 @@ def largest_increment(
     """
     h = checks.number("step", step, positive=True)
     steps = checks.multiple("duration", checks.number("duration", duration, positive=True), "step", h)
-    part = _increments(motion, h, samples, previous, pulse)
+    part = _increments(motion, h, samples, beside, pulse)
     counts = ((first, min(PART, steps - first)) for first in range(0, steps, PART))
     return max(float(np.abs(part(first, count)).max()) for first, count in counts)
 
 
 def _increments(
-    motion: Motion, step: Fraction, samples: int, previous: int, pulse: float | str | Fraction | None
+    motion: Motion,
+    step: Fraction,
+    samples: int,
+    beside: tuple[int, int],
+    pulse: float | str | Fraction | None,
 ) -> StepWindows:
     """Return the increments of a run, part by part."""
 
     def read(first: int, stop: int) -> Array:
-        return motion.samples(step / samples, first - previous, stop - previous)
+        return motion.samples(step / samples, first - beside[0], stop - beside[0])
 
-    return StepWindows(read, samples, previous, pulse)
+    return StepWindows(read, samples, sum(beside), pulse)
 
 
 @np.errstate(all="ignore")  # numbers that overflow are refused, in one line
@@ -222,7 +228,7 @@ def simulate(
     if record_every > steps:
         raise InputError(f"record {float(interval):g} s is longer than the duration {float(total):g} s")
     checks.multiple("duration", total, "record interval", interval)
-    increments = _increments(motion, h, backend.increments, backend.previous, pulse)
+    increments = _increments(motion, h, backend.increments, (backend.previous, backend.ahead), pulse)
     states = backend.propagate_parts(increments, steps, record_every, every)
     time: Array = np.arange(len(states), dtype=np.float64) * float(interval)
     require_finite(backend, states, time)

@@ -359,12 +359,13 @@ def _prune(folder: Path) -> None:
     """Remove entries that have not been used for long, and what processes that are gone have left."""
     _tidy(folder)
     oldest = time.time() - _UNUSED_DAYS * 86400
-    for path in folder.iterdir():
-        with suppress(OSError):
-            if path.name.startswith(_REMOVED) or (
-                not path.name.startswith(_DRAFT) and path.stat().st_mtime < oldest
-            ):
-                shutil.rmtree(path, ignore_errors=True)
+    with os.scandir(folder) as places:
+        for place in places:
+            with suppress(OSError):
+                if place.name.startswith(_REMOVED) or (
+                    not place.name.startswith(_DRAFT) and place.stat().st_mtime < oldest
+                ):
+                    shutil.rmtree(place.path, ignore_errors=True)
 
 
 def _tidy(folder: Path) -> None:

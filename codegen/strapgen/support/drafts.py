@@ -86,7 +86,8 @@ def forgotten(parent: Path, prefix: str) -> Iterator[Path]:
     """
     name = re.compile(re.escape(prefix) + "[0-9a-f]{8}")
     try:
-        folders = [place for place in parent.iterdir() if name.fullmatch(place.name)]
+        with os.scandir(parent) as places:
+            folders = [Path(place.path) for place in places if name.fullmatch(place.name)]
     except OSError:
         return
     for place in folders:

@@ -53,6 +53,15 @@ def multiply(p: Polynomial, q: Polynomial) -> Polynomial:
     return total
 
 
+#: The operations of programs that polynomials have, by kind.
+OPERATIONS: dict[str, Callable[..., Polynomial]] = {
+    "add": add,
+    "subtract": lambda p, q: add(p, q, -1),
+    "negate": lambda p: scale(p, -1),
+    "multiply": multiply,
+}
+
+
 def substitute(p: Polynomial, value: Callable[[Any], Polynomial]) -> Polynomial:
     """Return p with every atom replaced by a polynomial."""
     total: Polynomial = {}

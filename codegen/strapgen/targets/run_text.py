@@ -45,7 +45,7 @@ def _parameter_words(angles: AngleAccumulation) -> list[str]:
         "Over a run of N steps rounding turns the attitude by at most "
         f"{_formula(angles)} rad from that of exact arithmetic on the same increments, while the length of the state "
         f"is at least {_above(angles.shortest)}. From a length of at least {_above(angles.start)} that is proved for "
-        f"{angles.proved_steps} steps. M normalizations on the way, which multiply the words of the state by one "
+        f"{angles.proved_steps:,} steps. M normalizations on the way, which multiply the words of the state by one "
         f"factor and round each of them once, add at most {_above(angles.per_normalization)} M rad.",
     ]
 
@@ -56,7 +56,7 @@ def _matrix_words(angles: AngleAccumulation) -> list[str]:
     words = [
         "Over a run of N steps rounding turns the nearest rotation to the matrix C by at most "
         f"{_formula(angles)} rad from that of exact arithmetic on the same increments, for N up to "
-        f"{angles.proved_steps} from a C whose C'C has eigenvalues from {_above(inner)} to {_below(2 - inner)}; over "
+        f"{angles.proved_steps:,} from a C whose C'C has eigenvalues from {_above(inner)} to {_below(2 - inner)}; over "
         f"more steps by {_above(angles.beyond)} times as much, while they stay between {_above(outer)} and "
         f"{_below(2 - outer)}.",
     ]
@@ -84,7 +84,7 @@ def _formula(angles: AngleAccumulation) -> str:
 
 def _table(interface: Interface, angles: AngleAccumulation) -> list[str]:
     """Return the bounds of some runs, a line each."""
-    apart = min(_APART, angles.proved_steps)
+    apart = min(_APART, interface.normalized_within)
     is_restored = angles.per_element is not None and apart > 0
     error = _UNITS * interface.inputs[0].format.unit if angles.per_element else Fraction(0)
     to_first_order = f"orthonormalized to first order (h = {_UNITS} units of the last place)"

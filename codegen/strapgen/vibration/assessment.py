@@ -23,7 +23,9 @@ from strapgen.vibration.response import Form
 from strapgen.vibration.systems import ANGLES, T_M, VELOCITIES, T
 
 
-def drift(kernel: Kernel, *, nodes: Sequence[Fraction | sp.Expr] = (), previous: int = 0) -> Assessment:
+def drift(
+    kernel: Kernel, *, nodes: Sequence[Fraction | sp.Expr] = (), previous: int = 0, ahead: int = 0
+) -> Assessment:
     """Assess the mean drift rate of a kernel about z, in rad/s.
 
     Parameters
@@ -32,8 +34,9 @@ def drift(kernel: Kernel, *, nodes: Sequence[Fraction | sp.Expr] = (), previous:
         An attitude step of the catalogue or of a user, the rotation vector of a step, or a recursion that sums coning.
     nodes : sequence of Fraction or Expr, optional
         Nodes of a step that takes rates, as fractions of the step.
-    previous : int, optional
-        Number of samples from before the step, for the rotation vector of a step; an attitude step has this number.
+    previous, ahead : int, optional
+        Numbers of samples from before the step and from after it, for the rotation vector of a step; an attitude step
+        has these numbers.
 
     Returns
     -------
@@ -50,7 +53,7 @@ def drift(kernel: Kernel, *, nodes: Sequence[Fraction | sp.Expr] = (), previous:
     >>> drift(derive("euler", "rk1", 1)).text("computed")
     '-pi*f*theta_x*theta_y*sin(phi)*(sin(2*pi*T*f)/(2*pi*T*f))'
     """
-    system = systems.of(kernel, "rad", nodes, previous)
+    system = systems.of(kernel, "rad", nodes, previous, ahead)
     if system.unit != "rad":
         raise InputError(f"kernel {kernel.name} computes a velocity; it has a sculling rate, not a drift")
     endless = system.slow_cycle is None
@@ -59,7 +62,9 @@ def drift(kernel: Kernel, *, nodes: Sequence[Fraction | sp.Expr] = (), previous:
     )
 
 
-def sculling(kernel: Kernel, *, nodes: Sequence[Fraction | sp.Expr] = (), previous: int = 0) -> Assessment:
+def sculling(
+    kernel: Kernel, *, nodes: Sequence[Fraction | sp.Expr] = (), previous: int = 0, ahead: int = 0
+) -> Assessment:
     """Assess the mean sculling rate of a kernel about z, in m/s^2.
 
     A kernel without velocity increments is assessed by duality, in which the cross product of two angle increments
@@ -67,7 +72,7 @@ def sculling(kernel: Kernel, *, nodes: Sequence[Fraction | sp.Expr] = (), previo
 
     Parameters
     ----------
-    kernel, nodes, previous
+    kernel, nodes, previous, ahead
         As for `drift`. The kernel may also be the sculling term of a step or a recursion that sums sculling.
 
     Returns
@@ -88,8 +93,8 @@ def sculling(kernel: Kernel, *, nodes: Sequence[Fraction | sp.Expr] = (), previo
     if not _takes_velocities(systems.checked(kernel)):
         if kernel.recursion is not None and kernel.companions is None:
             raise InputError(f"kernel {kernel.name} takes no velocity increments; sculling-fast-1 or -2 does")
-        return _dual(drift(kernel, nodes=nodes, previous=previous))
-    system = systems.of(kernel, "m/s", nodes, previous)
+        return _dual(drift(kernel, nodes=nodes, previous=previous, ahead=ahead))
+    system = systems.of(kernel, "m/s", nodes, previous, ahead)
     computed = response.forms(system)
     if not all(set(pair) & set(ANGLES) and set(pair) & set(VELOCITIES) for pair in computed):
         raise InputError(f"kernel {kernel.name} gives a velocity that is no product of angles and velocities")
@@ -238,7 +243,7 @@ def _of(choice: Choice, quantity: str) -> Assessment:
     if quantity == "sculling" and kernel.companions is not None:
         return _dual(of(choice))
     assess = {"drift": drift, "sculling": sculling}[quantity]
-    return assess(kernel, nodes=catalogue.nodes(choice), previous=choice.previous)
+    return assess(kernel, nodes=catalogue.nodes(choice), previous=choice.previous, ahead=choice.ahead)
 
 
 _of_catalogue = lru_cache(maxsize=64)(_of)

@@ -80,7 +80,11 @@ class System:
 
 
 def of(
-    kernel: Kernel, unit: str = "rad", nodes: Sequence[Fraction | sp.Expr] = (), previous: int = 0
+    kernel: Kernel,
+    unit: str = "rad",
+    nodes: Sequence[Fraction | sp.Expr] = (),
+    previous: int = 0,
+    ahead: int = 0,
 ) -> System:
     """Return the system of a kernel.
 
@@ -93,8 +97,9 @@ def of(
         For a recursion that sums coning and sculling, the one to assess: "rad" or "m/s".
     nodes : sequence of Fraction or Expr, optional
         Nodes of a step that takes rates.
-    previous : int, optional
-        Number of samples from before the step, for the vector of a step; an attitude step has this number.
+    previous, ahead : int, optional
+        Numbers of samples from before the step and from after it, for the vector of a step; an attitude step has these
+        numbers.
 
     Returns
     -------
@@ -117,7 +122,14 @@ def of(
         return _of_step(kernel, sampled, nodes)
     if kernel.recursion is not None:
         return _of_recursion(kernel, sampled, unit)
-    return _of_vector(kernel, sampled, nodes, previous)
+    _check_beside(sampled[0], previous, ahead)
+    return _of_vector(kernel, sampled, nodes, (previous, ahead))
+
+
+def _check_beside(signal: Signal, previous: int, ahead: int) -> None:
+    """Refuse numbers of samples from beside a step that leave none for the step itself."""
+    before = checks.count("previous", previous, smallest=0, largest=signal.size // 3 - 1)
+    checks.count("ahead", ahead, smallest=0, largest=signal.size // 3 - 1 - before)
 
 
 def checked(kernel: Any) -> Kernel:
@@ -143,7 +155,8 @@ def _of_step(kernel: Kernel, sampled: Sequence[Signal], nodes: Sequence[Fraction
         element: expander.variable(element, exact(value))
         for element, value in zip(state.elements, kernel.companions.identity, strict=True)
     }
-    samples, times, cycle = _waves(expander, kernel, sampled, kernel.companions.previous, nodes)
+    beside = kernel.companions.previous, kernel.companions.ahead
+    samples, times, cycle = _waves(expander, kernel, sampled, beside, nodes)
     following = expander(kernel, initial | _variables(expander, samples))[output.name]
     if attitude is None:
         matrix = list(initial.values())
@@ -171,7 +184,7 @@ def _rotation_about_z(expander: Expander, matrix: Sequence[Powers]) -> dict[str,
 
 
 def _of_vector(
-    kernel: Kernel, sampled: Sequence[Signal], nodes: Sequence[Fraction | sp.Expr], previous: int
+    kernel: Kernel, sampled: Sequence[Signal], nodes: Sequence[Fraction | sp.Expr], beside: tuple[int, int]
 ) -> System:
     slow = pipeline.derive(Choice(_SLOW_LOOP))
     assert slow.recursion is not None
@@ -179,9 +192,7 @@ def _of_vector(
     output = kernel.outputs[-1].signal
     if output.shape != (3,) or output.unit not in ("rad", "m/s"):
         raise InputError(f"kernel {kernel.name} gives {output.name}; a vector in rad or m/s can be assessed")
-    most = sampled[0].size // 3
-    count = most - checks.count("previous", previous, smallest=0, largest=most - 1)
-    samples, times, cycle = _waves(expander, kernel, sampled, previous, nodes)
+    samples, times, cycle = _waves(expander, kernel, sampled, beside, nodes)
     variables = _variables(expander, samples)
     vector = expander(kernel, variables)[output.name]
     inputs = {signal.name: signal for signal in slow.inputs}
@@ -198,7 +209,9 @@ def _of_vector(
     if output.unit == "m/s":
         for signal in sampled:
             name = "angle_sum" if signal.unit == "rad" else "velocity_sum"
-            rows = [signal.elements[3 * k : 3 * k + 3] for k in range(previous, previous + count)]
+            rows = [
+                signal.elements[3 * k : 3 * k + 3] for k in range(beside[0], signal.size // 3 - beside[1])
+            ]
             zero = expander.constant(0)
             sums[name] = [
                 sum((variables.get(e, zero) for e in axis), zero) for axis in zip(*rows, strict=True)
@@ -245,7 +258,7 @@ def _of_recursion(kernel: Kernel, sampled: Sequence[Signal], unit: str) -> Syste
         for name, _ in kernel.recursion.states
         for element in inputs[name].elements
     }
-    samples, times, cycle = _waves(expander, kernel, sampled, 0, (), T_L)
+    samples, times, cycle = _waves(expander, kernel, sampled, (0, 0), (), T_L)
     outputs = expander(kernel, initial | _variables(expander, samples))
     following: dict[str, Powers] = {}
     summed = []
@@ -304,14 +317,15 @@ def _waves(
     expander: Expander,
     kernel: Kernel,
     sampled: Sequence[Signal],
-    previous: int,
+    beside: tuple[int, int],
     nodes: Sequence[Fraction | sp.Expr],
     cycle: sp.Symbol = T,
 ) -> tuple[dict[str, dict[str, Wave]], tuple[sp.Expr, ...], Shift]:
     """Return the responses of the samples to the channels, the basic times in s, and the cycle as a shift."""
     if sampled[0].name == "turns":
         return _waves_of_rates(expander, kernel, sampled[0], nodes, cycle)
-    counts = {signal.size // 3 - previous for signal in sampled}
+    previous = beside[0]
+    counts = {signal.size // 3 - sum(beside) for signal in sampled}
     if len(counts) != 1:
         raise InputError(f"kernel {kernel.name} takes different numbers of angle and velocity increments")
     (count,) = counts

@@ -12,7 +12,7 @@ import sympy as sp
 from gathering import each
 
 from strapgen import catalogue, derive
-from strapgen.catalogue import ALGORITHMS, INTEGRATORS, MOST_INCREMENTS, MOST_PREVIOUS
+from strapgen.catalogue import ALGORITHMS, INTEGRATORS, MOST_INCREMENTS
 from strapgen.catalogue.methods.rate_fit import step_order
 from strapgen.catalogue.methods.runge_kutta import method
 from strapgen.catalogue.methods.samples import increments_signal, label, labels, turns_signal
@@ -37,18 +37,23 @@ weights = ["1/4", 0, "3/4"]
 # Samples
 
 
-@pytest.mark.parametrize("previous", range(MOST_PREVIOUS + 1))
-@pytest.mark.parametrize("count", [1, 2, MOST_INCREMENTS])
-def test_increments_before_the_step_come_first_and_the_last_of_them_is_the_latest(count, previous):
-    signal = increments_signal(count, previous)
-    assert signal.shape == (previous + count, 3)
+@pytest.mark.parametrize(("previous", "ahead"), [(0, 0), (1, 0), (0, 1), (3, 2), (2, 30)])
+@pytest.mark.parametrize("count", [1, MOST_INCREMENTS])
+def test_increments_come_in_the_order_of_time_and_those_beside_the_step_count_from_it(count, previous, ahead):
+    signal = increments_signal(count, previous, ahead)
+    assert signal.shape == (previous + count + ahead, 3)
     vectors = [element.removesuffix("_x") for element in signal.elements[::3]]
-    assert vectors == [f"past{k}" for k in range(previous, 0, -1)] + [f"d{k}" for k in range(1, count + 1)]
+    assert vectors == [
+        *(f"past{k}" for k in range(previous, 0, -1)),
+        *(f"d{k}" for k in range(1, count + 1)),
+        *(f"ahead{k}" for k in range(1, ahead + 1)),
+    ]
     assert signal.elements[1::3] == tuple(f"{vector}_y" for vector in vectors)
     assert signal.unit == "rad" and signal.bound == 1
     assert ("before the step" in signal.meaning) == bool(previous)
     if previous:
         assert f"the first {previous} are those before the step" in signal.meaning
+    assert (f"the last {ahead} are those after the step" in signal.meaning) == bool(ahead)
 
 
 @pytest.mark.parametrize(
@@ -140,9 +145,9 @@ def test_orders_of_steps(method, count, previous, expected):
 
 def test_the_order_of_a_step_is_that_of_the_weaker_part():
     for count in range(1, MOST_INCREMENTS + 1):
-        for previous in range(MOST_PREVIOUS + 1):
-            order = method(TABLEAUX["rk3"]).step_order(count, previous)
-            assert order.step == min(3, step_order(count, previous))
+        for previous, ahead in ((0, 0), (0, 1), (1, 0), (1, 1), (3, 0)):
+            order = method(TABLEAUX["rk3"]).step_order(count, previous, ahead)
+            assert order.step == min(3, step_order(count, previous, ahead))
 
 
 def test_a_sixth_order_method_on_three_increments_is_told_to_be_of_fourth():
@@ -213,6 +218,8 @@ def test_titles_count_what_is_given():
     assert given("rk4", 2) == "2 angle increments"
     assert given("rk4", 1, previous=1) == "1 angle increment and 1 before it"
     assert given("rk4", 2, previous=3) == "2 angle increments and 3 before them"
+    assert given("rk4", 1, ahead=1) == "1 angle increment and 1 after it"
+    assert given("rk4", 2, previous=1, ahead=3) == "2 angle increments, 1 before them and 3 after them"
     assert given("rk4", rates=True) == "the rate at 3 nodes"
     assert given("midpoint", rates=True) == "the rate at 2 nodes"
     assert given("rk1", rates=True) == "the rate at 1 node"
@@ -280,8 +287,8 @@ def test_previous_increments_are_of_use_only_where_the_rate_changes(algorithm):
     rate = [[1, -2, 3], [2, 5, -1]]
     ring, h = sp.ring("h", sp.QQ)
 
-    def increments(previous: int) -> list:
-        times = [sp.Rational(k, 2) for k in range(-previous, 3)]
+    def increments(previous: int, ahead: int) -> list:
+        times = [sp.Rational(k, 2) for k in range(-previous, 3 + ahead)]
         return [
             sum(
                 (
@@ -295,8 +302,8 @@ def test_previous_increments_are_of_use_only_where_the_rate_changes(algorithm):
         ]
 
     results = []
-    for previous in range(MOST_PREVIOUS + 1):
-        step = derive(algorithm, "rk4", 2, previous=previous)
+    for previous, ahead in ((0, 0), (1, 0), (0, 1), (2, 2)):
+        step = derive(algorithm, "rk4", 2, previous=previous, ahead=ahead)
         state = [ring(k + 1) for k in range(step.inputs[0].size)]
-        results.append(step.expand(values_of(step, state, increments(previous)))["next"])
+        results.append(step.expand(values_of(step, state, increments(previous, ahead)))["next"])
     assert all(result == results[0] for result in results)

@@ -150,8 +150,8 @@ def test_a_state_stays_proper_for_as_many_steps_as_are_proved(algorithm):
     signs = np.array([[[1, 1, 1], [1, 1, 1]], [[1, -1, 1], [-1, 1, 1]], [[1, 1, 0], [-1, 1, 0]]])
     longest = math.sqrt(2 - angles.shortest**2)
     for row in signs * limit:
-        increments = np.repeat(row[None], angles.proved_steps, axis=0)
-        final = backend.propagate(increments, record_every=angles.proved_steps)[-1]
+        increments = np.repeat(row[None], backend.interface.normalized_within, axis=0)
+        final = backend.propagate(increments, record_every=len(increments))[-1]
         sizes = np.linalg.svd(np.atleast_2d(final), compute_uv=False)
         assert angles.shortest <= sizes.min() <= sizes.max() <= longest
 

@@ -7,12 +7,14 @@ from fractions import Fraction
 from strapgen.catalogue.kinematics import KINEMATICS, Kinematics
 from strapgen.catalogue.methods.method import Method
 from strapgen.catalogue.methods.samples import Samples
-from strapgen.ir.attitude_step import Companions
+from strapgen.ir.attitude_step import Companions, Order, Truncation
 from strapgen.ir.signals import Signal
 from strapgen.symbolic.kernel import Kernel, KernelBuilder
 
 
-def step(kinematics: Kinematics, method: Method, increments: int | None, previous: int = 0) -> Kernel:
+def step(
+    kinematics: Kinematics, method: Method, increments: int | None, previous: int = 0, ahead: int = 0
+) -> Kernel:
     """Derive one integration step from angle increments, or from rates, to the next state.
 
     The method is applied to the identity, which gives the transition: the step is linear in the state. The
@@ -26,23 +28,25 @@ def step(kinematics: Kinematics, method: Method, increments: int | None, previou
         The integration method.
     increments : int or None
         Angle increments a step, 1 to 8; None for a step that takes the rate at every node.
-    previous : int, optional
-        Increments from before the step, 0 to 3, that the rate extraction uses too.
+    previous, ahead : int, optional
+        Increments from before the step and from after it that the rate extraction uses too.
 
     Returns
     -------
     Kernel
-        Inputs ``state`` and ``increments`` (previous + increments, 3) in rad, or ``turns`` (nodes, 3) in rad: the
-        rates times the step length; output ``next``.
+        Inputs ``state`` and ``increments`` (previous + increments + ahead, 3) in rad, or ``turns`` (nodes, 3) in
+        rad: the rates times the step length; output ``next``.
     """
     build = KernelBuilder()
     state = build.input(kinematics.state)
-    samples = Samples(build, increments, previous, method.nodes)
+    samples = Samples(build, increments, previous, method.nodes, ahead, method.fit)
     transition = build.stage(kinematics.transition, method.transition(build, kinematics, samples))
     build.output(kinematics.next, kinematics.product(state, transition))
-    suffix, option, source = chosen(method, increments, previous)
-    extracted = "" if increments is None else "rate extraction chapter 3 A; "
-    order = method.step_order(increments, previous)
+    suffix, option, source = chosen(method, increments, previous, ahead)
+    fitted = increments is not None and method.conditions is None
+    extracted = "rate extraction chapter 3 A; " if fitted else ""
+    order = method.step_order(increments, previous, ahead)
+    truncation = None if method.truncation is None else method.truncation(kinematics)
     return build.kernel(
         f"{kinematics.name}-{suffix}",
         f"{kinematics.title}: step by {method.title} from {source}",
@@ -54,28 +58,40 @@ def step(kinematics: Kinematics, method: Method, increments: int | None, previou
             kinematics.attitude,
             tuple(Fraction(int(x)) for x in kinematics.identity),
             previous,
-            method.isometry(None if increments is None else increments + previous),
+            method.isometry(None if increments is None else increments + previous + ahead),
+            ahead,
+            truncation,
         ),
         order=order,
         arguments=f"{kinematics.name} {option}",
-        notes=(str(order).capitalize() + ".",) if order.limited else (),
+        notes=_notes(order, truncation),
     )
 
 
-def rotation_vector(method: Method, increments: int | None, previous: int = 0) -> Kernel:
+def _notes(order: Order, truncation: Truncation | None) -> tuple[str, ...]:
+    """Return what the reader of generated code should know of the order and of a series that is cut off."""
+    notes: tuple[str, ...] = (f"{str(order).capitalize()}.",) if order.limited else ()
+    if truncation is not None:
+        text = f"The exponential of the rotation vector is a series to its power {truncation.order}"
+        notes += (f"{text}; error bounds have what it leaves out.",)
+    return notes
+
+
+def rotation_vector(method: Method, increments: int | None, previous: int = 0, ahead: int = 0) -> Kernel:
     """Derive the rotation vector of one step from angle increments, or from rates.
 
     Parameters
     ----------
     method : Method
         A method whose transition is the exponential of a rotation vector.
-    increments, previous : int
+    increments, previous, ahead : int
         As in `step`.
 
     Returns
     -------
     Kernel
-        Input ``increments`` (previous + increments, 3) in rad, or ``turns``; output ``rotation_vector`` (3,) in rad.
+        Input ``increments`` (previous + increments + ahead, 3) in rad, or ``turns``; output ``rotation_vector`` (3,)
+        in rad.
 
     Raises
     ------
@@ -85,7 +101,8 @@ def rotation_vector(method: Method, increments: int | None, previous: int = 0) -
     if method.rotation_vector is None:
         raise ValueError(f"{method.name} has no rotation vector")
     build = KernelBuilder()
-    vector = method.rotation_vector(build, Samples(build, increments, previous, method.nodes))
+    samples = Samples(build, increments, previous, method.nodes, ahead, method.fit)
+    vector = method.rotation_vector(build, samples)
     build.output(
         Signal.vector(
             "rotation_vector",
@@ -95,8 +112,8 @@ def rotation_vector(method: Method, increments: int | None, previous: int = 0) -
         ),
         vector,
     )
-    suffix, option, source = chosen(method, increments, previous)
-    order = method.step_order(increments, previous)
+    suffix, option, source = chosen(method, increments, previous, ahead)
+    order = method.step_order(increments, previous, ahead)
     return build.kernel(
         f"rotation-vector-{suffix}",
         f"Rotation vector of a step by {method.title} from {source}",
@@ -107,10 +124,10 @@ def rotation_vector(method: Method, increments: int | None, previous: int = 0) -
     )
 
 
-def chosen(method: Method, increments: int | None, previous: int) -> tuple[str, str, str]:
+def chosen(method: Method, increments: int | None, previous: int = 0, ahead: int = 0) -> tuple[str, str, str]:
     """Return the ending of a kernel's name, its options on the command line, and its inputs in words."""
     suffix = f"{method.name}-{increments or 'rates'}"
-    option = method.option or f"--method {method.name}"
+    option = stated = method.option or f"--method {method.name}"
     if increments is None:
         source = f"the rate at {len(method.nodes)} {'node' if len(method.nodes) == 1 else 'nodes'}"
         option = f"{option} --rates"
@@ -119,7 +136,12 @@ def chosen(method: Method, increments: int | None, previous: int) -> tuple[str, 
         option = f"{option} --increments {increments}"
     if previous:
         suffix, option = f"{suffix}-previous{previous}", f"{option} --previous {previous}"
-        source += f" and {previous} before {'it' if increments == 1 else 'them'}"
+        source += f"{',' if ahead else ' and'} {previous} before {'it' if increments == 1 else 'them'}"
+    if ahead:
+        suffix, option = f"{suffix}-ahead{ahead}", f"{option} --ahead {ahead}"
+        source += f" and {ahead} after {'it' if increments == 1 else 'them'}"
+    if method.conditions is not None:
+        suffix, option = method.name, stated
     return suffix, option, source
 
 

@@ -7,10 +7,8 @@ from fractions import Fraction
 import sympy as sp
 
 from strapgen.catalogue.kernels.attitude_step import chosen
-from strapgen.catalogue.methods import coning_coefficients
-from strapgen.catalogue.methods.coning import _METHODS
 from strapgen.catalogue.methods.method import Method
-from strapgen.catalogue.methods.samples import increments_signal, kept, sample_names
+from strapgen.catalogue.methods.samples import beside, increments_signal, sample_names
 from strapgen.ir.signals import Signal
 from strapgen.symbolic.evaluation import exact
 from strapgen.symbolic.kernel import Kernel, KernelBuilder
@@ -35,21 +33,22 @@ def sculling(method: Method, increments: int, previous: int = 0) -> Kernel:
         Inputs ``increments`` in rad and ``velocity_increments`` in m/s, both (previous + increments, 3); output
         ``sculling`` (3,) in m/s.
     """
-    form = _METHODS[method.name.removeprefix("coning-")][0]
+    if method.coning is None:
+        raise ValueError(f"{method.name} has no coning coefficients")
+    pairs = method.coning(increments, previous)
     build = KernelBuilder()
     angles = increments_signal(increments, previous)
-    names = [sample_names(increments, previous, letter) for letter in "dv"]
+    names = [sample_names(increments, previous, letter=letter) for letter in "dv"]
     velocities = Signal(
         "velocity_increments",
         angles.shape,
         tuple(f"{name}_{axis}" for name in names[1] for axis in "xyz"),
         unit="m/s",
         meaning="velocity increments of the step, body axes, oldest first: exact integrals of the specific force"
-        + kept(previous),
+        + beside(previous),
     )
     d, v = build.input(angles), build.input(velocities)
     rows = [d[k, :].T for k in range(d.rows)], [v[k, :].T for k in range(v.rows)]
-    pairs = coning_coefficients.design(increments, previous, form).pairs
     total = sp.zeros(3, 1)
     for newer in range(1, d.rows):
         for levered, crossed, what in ((0, 1, "angle"), (1, 0, "velocity")):
@@ -75,8 +74,8 @@ def sculling(method: Method, increments: int, previous: int = 0) -> Kernel:
     samples_text = samples_text.replace("angle ", "angle and velocity ")
     return build.kernel(
         f"sculling-{suffix}",
-        f"Sculling term of a step by {form} coning coefficients from {samples_text}",
-        f"{coning_coefficients.SOURCES[form]}; by duality: K. M. Roscoe, J. Guid. Control Dyn. 24 (2001) 201-205",
+        f"Sculling term of a step by {method.title.partition(',')[0]} from {samples_text}",
+        f"{method.source.partition('; ')[0]}; by duality: K. M. Roscoe, J. Guid. Control Dyn. 24 (2001) 201-205",
         arguments=f"sculling {option}",
     )
 

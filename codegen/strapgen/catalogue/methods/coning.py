@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from fractions import Fraction
 
 import sympy as sp
 
 from strapgen.catalogue.methods import coning_coefficients, rate_fit, rotation_series
+from strapgen.catalogue.methods.coning_coefficients import Design
 from strapgen.catalogue.methods.method import PHI, Method, exponential
 from strapgen.catalogue.methods.rotation_series import Scalars, Words, fraction
 from strapgen.catalogue.methods.samples import Samples, sample_names
+from strapgen.catalogue.methods.shaped_coning import ShapedConing
 from strapgen.ir.signals import Signal
 from strapgen.symbolic.evaluation import exact
 from strapgen.symbolic.kernel import KernelBuilder
@@ -43,9 +46,8 @@ def method(name: str) -> Method:
     form, terms = _METHODS[name]
     order = _FOURTH if terms else _SECOND
 
-    def limit(increments: int, previous: int) -> int:
-        # The first product with an error has a total degree one higher; its local order is that degree plus two.
-        return min(order, coning_coefficients.design(increments, previous, form).degree + 2)
+    def coefficients(increments: int, previous: int) -> Design:
+        return coning_coefficients.design(increments, previous, form)
 
     return exponential(
         f"coning-{name}",
@@ -54,16 +56,42 @@ def method(name: str) -> Method:
         if terms
         else coning_coefficients.SOURCES[form],
         order,
-        lambda build, samples: (_with_terms if terms else _of_pairs)(build, samples, form),
-        limit=limit,
+        lambda build, samples: (_with_terms if terms else _of_pairs)(build, samples, coefficients),
+        limit=_limit(order, coefficients),
+        coning=lambda increments, previous: coefficients(increments, previous).pairs,
     )
 
 
-def _of_pairs(build: KernelBuilder, samples: Samples, form: str) -> sp.Matrix:
+def shaped(shape: ShapedConing) -> Method:
+    """Return a step by coning coefficients for a band or a spectrum, with terms up to second order."""
+
+    def coefficients(increments: int, previous: int) -> Design:
+        return Design("shaped", increments, previous, dict(shape.pairs))
+
+    return exponential(
+        shape.name,
+        f"shaped coning coefficients, {shape.title}",
+        shape.source,
+        _SECOND,
+        lambda build, samples: _of_pairs(build, samples, coefficients),
+        option=shape.option,
+        limit=_limit(_SECOND, coefficients),
+        coning=lambda increments, previous: coefficients(increments, previous).pairs,
+    )
+
+
+def _limit(order: int, coefficients: Callable[[int, int], Design]) -> Callable[[int, int, int], int]:
+    """Return the order that samples allow: the first product with an error has a total degree one higher."""
+    return lambda increments, previous, ahead: min(order, coefficients(increments, previous).degree + 2)
+
+
+def _of_pairs(
+    build: KernelBuilder, samples: Samples, coefficients: Callable[[int, int], Design]
+) -> sp.Matrix:
     """Return the rotation vector as the sum of the increments and of weighted cross products of them."""
     increments = samples.increments
     assert increments is not None, "rates are refused before"
-    pairs = coning_coefficients.design(increments, samples.previous, form).pairs
+    pairs = coefficients(increments, samples.previous).pairs
     names = sample_names(increments, samples.previous)
     total = samples.combination("increment_sum", samples.fit.moment(0), "integral of the rate over the step")
     if not any(pairs.values()):
@@ -82,10 +110,12 @@ def _of_pairs(build: KernelBuilder, samples: Samples, form: str) -> sp.Matrix:
     return build.stage(PHI, total + second)
 
 
-def _with_terms(build: KernelBuilder, samples: Samples, form: str) -> sp.Matrix:
+def _with_terms(
+    build: KernelBuilder, samples: Samples, coefficients: Callable[[int, int], Design]
+) -> sp.Matrix:
     """Return the rotation vector in the Legendre coefficients of the rate, where half of the weights vanish."""
     assert samples.increments is not None, "rates are refused before"
-    pairs = coning_coefficients.design(samples.increments, samples.previous, form).pairs
+    pairs = coefficients(samples.increments, samples.previous).pairs
     count = len(samples.fit.basis)
     vectors = [
         samples.combination(

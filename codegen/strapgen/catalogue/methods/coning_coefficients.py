@@ -36,8 +36,10 @@ SOURCES = {
     "combined": "M. Song, W. Wu, X. Pan, J. Guid. Control Dyn. 36 (2013) 1872-1880, for polynomials and coning",
 }
 FORMS = tuple(SOURCES)
-#: Most samples of a slow cycle, and most samples from before it, since a larger design would take long.
-MOST_SAMPLES, MOST_KEPT = 12, 3
+#: Most samples of a slow cycle, and most samples from before it.
+MOST_SAMPLES, MOST_KEPT = 12, 32
+#: Most samples in all of combined coefficients: the time of their design grows with the fourth power of that number.
+MOST_COMBINED = 17
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ class Design:
     Parameters
     ----------
     form : str
-        "compressed", "uncompressed" or "combined".
+        "compressed", "uncompressed" or "combined", or "shaped" for coefficients of a file.
     samples, previous : int
         Samples of the slow cycle, and samples from before it.
     pairs : dict
@@ -155,7 +157,8 @@ def design(samples: int, previous: int = 0, form: str = "compressed") -> Design:
     Raises
     ------
     InputError
-        If the form is unknown, or there are more than 12 samples or more than 3 from before the cycle.
+        If the form is unknown, there are more than 12 samples or more than 32 from before the cycle, or the form is
+        "combined" and they are more than 17 together.
 
     Examples
     --------
@@ -166,7 +169,12 @@ def design(samples: int, previous: int = 0, form: str = "compressed") -> Design:
     """
     count = checks.count("samples", samples, largest=MOST_SAMPLES)
     before = checks.count("previous", previous, smallest=0, largest=MOST_KEPT)
-    return _designed(count, before, checks.choice("form", form, FORMS))
+    if checks.choice("form", form, FORMS) == "combined" and count + before > MOST_COMBINED:
+        raise InputError(
+            f"samples {count} and previous {before} are {count + before} together; at most {MOST_COMBINED} are allowed "
+            "for combined coefficients"
+        )
+    return _designed(count, before, form)
 
 
 @cache
@@ -243,11 +251,27 @@ def _coning(samples: int, previous: int) -> Iterator[tuple[Scalars, Fraction]]:
     total = samples + previous
     for q in range(1, total):
         power = 2 * q + 1
-        row = {}
-        for older, newer in _pairs(total):
-            m = Fraction(newer - older)
-            row[older, newer] = 2 * m**power - (m + 1) ** power - (m - 1) ** power
+        row = {(older, newer): power_of_coning(newer - older, power) for older, newer in _pairs(total)}
         yield row, -(Fraction(samples) ** power) / 2
+
+
+def power_of_coning(distance: int, power: int) -> Fraction:
+    """Return a power of lambda in the cross product of two samples on coning.
+
+    Parameters
+    ----------
+    distance : int
+        m, from the older sample to the newer one.
+    power : int
+        An odd one, 2q + 1.
+
+    Returns
+    -------
+    Fraction
+        The coefficient of the power in 2 sin(m lambda) (1 - cos lambda), by (-1)^q / (2q + 1)!.
+    """
+    m = Fraction(distance)
+    return 2 * m**power - (m + 1) ** power - (m - 1) ** power
 
 
 def _nearest(conditions: list[tuple[list[Fraction], Fraction]], start: list[Fraction]) -> list[Fraction]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
 import sympy as sp
@@ -11,8 +12,9 @@ import sympy as sp
 from strapgen.catalogue.kinematics import Kinematics
 from strapgen.catalogue.methods import rate_fit
 from strapgen.catalogue.methods.coefficients import Number
+from strapgen.catalogue.methods.rate_fit import Fit
 from strapgen.catalogue.methods.samples import Samples
-from strapgen.ir.attitude_step import Order
+from strapgen.ir.attitude_step import Order, Truncation
 from strapgen.ir.signals import Signal
 from strapgen.symbolic.evaluation import exact
 from strapgen.symbolic.kernel import KernelBuilder
@@ -48,8 +50,19 @@ class Method:
         ``rotation_vector(build, samples)`` writes the stages of the rotation vector of the step and returns it, where
         the transition is its exponential.
     limit : callable, optional
-        ``limit(increments, previous)`` returns the highest order that these samples allow; by default that of the
+        ``limit(increments, previous, ahead)`` returns the highest order that these samples allow; by default that of
+        the polynomial through them.
+    fit : callable, optional
+        ``fit(increments, previous, ahead)`` returns the rate over the step in terms of these samples; by default the
         polynomial through them.
+    conditions : int, optional
+        Of a method with filters of its own, which says itself how many samples a step takes: the number of powers of
+        time for which the rate is exact. By default it is the number of the samples.
+    coning : callable, optional
+        Of a method by coning coefficients: ``coning(increments, previous)`` returns the coefficient of
+        each cross product, see `coning_coefficients.Design`.
+    truncation : callable, optional
+        ``truncation(kinematics)`` returns what its series for an exponential leaves out.
     """
 
     name: str
@@ -62,16 +75,20 @@ class Method:
     isometry: Callable[[int | None], bool] = lambda count: False
     option: str = ""
     rotation_vector: Callable[[KernelBuilder, Samples], sp.Matrix] | None = None
-    limit: Callable[[int, int], int] = rate_fit.step_order
+    limit: Callable[[int, int, int], int] = rate_fit.step_order
+    fit: Callable[[int, int, int], Fit] = rate_fit.from_increments
+    conditions: int | None = None
+    coning: Callable[[int, int], dict[tuple[int, int], Fraction]] | None = None
+    truncation: Callable[[Kinematics], Truncation] | None = None
 
-    def step_order(self, increments: int | None, previous: int = 0) -> Order:
+    def step_order(self, increments: int | None, previous: int = 0, ahead: int = 0) -> Order:
         """Return the orders of a step on so many increments; None stands for rates at the nodes."""
         of = self.attitude_order or (lambda degree: self.order)
         attitude = of(None)
         if increments is None:
             return Order(self.order, attitude, None, attitude)
-        count = increments + previous
-        step = min(of(count - 1), self.limit(increments, previous))
+        count = increments + previous + ahead if self.conditions is None else self.conditions
+        step = min(of(count - 1), self.limit(increments, previous, ahead))
         return Order(self.order, attitude, count, step)
 
 

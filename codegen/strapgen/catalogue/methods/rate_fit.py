@@ -36,8 +36,8 @@ class Fit:
 
     @property
     def degree(self) -> int:
-        """Degree of the polynomial: one less than the number of samples."""
-        return len(self.basis) - 1
+        """Degree of the polynomial; of one that goes through the samples, one less than their number."""
+        return len(self.basis[0]) - 1
 
     def at(self, node: Fraction | sp.Expr) -> list[sp.Expr]:
         """Return the weights of the samples in the rate at a node."""
@@ -97,6 +97,30 @@ class Fit:
         ]
 
 
+def from_legendre(filters: Sequence[Sequence[Fraction]]) -> Fit:
+    """Return the rate whose Legendre coefficients are given sums of the samples.
+
+    Parameters
+    ----------
+    filters : sequence of sequence of Fraction
+        For every Legendre polynomial of the step, from degree 0 on, the weights of the samples in its coefficient.
+
+    Examples
+    --------
+    >>> from_legendre([from_increments(2).legendre(m) for m in range(2)]) == from_increments(2)
+    True
+    """
+    polynomials = [legendre(m) for m in range(len(filters))]
+    basis = []
+    for weights in zip(*filters, strict=True):
+        column = [sp.Integer(0)] * len(filters)
+        for weight, polynomial in zip(weights, polynomials, strict=True):
+            for power, c in enumerate(polynomial):
+                column[power] += exact(weight) * c
+        basis.append(tuple(column))
+    return Fit(tuple(basis))
+
+
 def legendre(degree: int, middle: sp.Rational = sp.S.Zero) -> Coefficients:
     """Return the coefficients of a Legendre polynomial of the step in powers of time, from the constant term on.
 
@@ -119,7 +143,7 @@ def legendre(degree: int, middle: sp.Rational = sp.S.Zero) -> Coefficients:
 
 
 @lru_cache(maxsize=64)
-def from_increments(increments: int, previous: int = 0) -> Fit:
+def from_increments(increments: int, previous: int = 0, ahead: int = 0) -> Fit:
     """Fit angle increments: the polynomial through the samples of the integrated rate, differentiated.
 
     Thesis, chapter 3 A, has it for two increments.
@@ -128,10 +152,10 @@ def from_increments(increments: int, previous: int = 0) -> Fit:
     ----------
     increments : int
         Number of equally spaced increments in the step.
-    previous : int, optional
-        Number of increments from before the step that the fit includes.
+    previous, ahead : int, optional
+        Numbers of increments from before and from after the step that the fit includes.
     """
-    times = [sp.Rational(k, increments) for k in range(-previous, increments + 1)]
+    times = [sp.Rational(k, increments) for k in range(-previous, increments + ahead + 1)]
     cardinal = _lagrange(times)
     basis = []
     for first in range(1, len(times)):  # an increment raises the integral at every later sample
@@ -150,33 +174,33 @@ def from_rates(nodes: Sequence[Fraction | sp.Expr]) -> Fit:
     return Fit(tuple(_lagrange([exact(node) for node in nodes])))
 
 
-def step_order(increments: int, previous: int = 0) -> int:
+def step_order(increments: int, previous: int = 0, ahead: int = 0) -> int:
     """Return the highest order of a step whose only samples are increments.
 
-    The fit of n = increments + previous increments errs by h^n e(t), where the integral of e over the step is zero:
-    what is left is the commutator of e and the rate, whose first term is the integral of the sample polynomial
+    The fit of n = increments + previous + ahead increments errs by h^n e(t), where the integral of e over the step is
+    zero: what is left is the commutator of e and the rate, whose first term is the integral of the sample polynomial
     prod (t - t_k), t_k the times of the samples, over the step. That integral is zero for an even number of
-    increments without previous ones, as in Simpson's rule.
+    increments with as many before the step as after it, as in Simpson's rule.
 
     Parameters
     ----------
     increments : int
-    previous : int, optional
+    previous, ahead : int, optional
 
     Examples
     --------
     >>> [step_order(count) for count in range(1, 9)]
     [2, 4, 4, 6, 6, 8, 8, 10]
-    >>> step_order(1, previous=2)
-    4
+    >>> step_order(1, previous=2), step_order(2, previous=1, ahead=1)
+    (4, 6)
     """
     integral = [Fraction(1)]
-    for k in range(-previous, increments + 1):
+    for k in range(-previous, increments + ahead + 1):
         time = Fraction(k, increments)
         shifted = [Fraction(0), *integral]
         integral = [a - time * b for a, b in zip(shifted, [*integral, Fraction(0)], strict=True)]
     total = sum((c / (k + 1) for k, c in enumerate(integral)), Fraction(0))
-    return increments + previous + (1 if total else 2)
+    return increments + previous + ahead + (1 if total else 2)
 
 
 def _lagrange(nodes: list[sp.Expr]) -> list[Coefficients]:

@@ -2,61 +2,67 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 
 import sympy as sp
 
 from strapgen.catalogue.methods import rate_fit
 from strapgen.catalogue.methods.coefficients import Number
+from strapgen.catalogue.methods.rate_fit import Fit
 from strapgen.ir.attitude_step import Order
 from strapgen.ir.signals import Signal
 from strapgen.symbolic.kernel import KernelBuilder
 
 
-def sample_names(count: int, previous: int = 0, letter: str = "d") -> list[str]:
+def sample_names(count: int, previous: int = 0, ahead: int = 0, letter: str = "d") -> list[str]:
     """Return the names of the samples that a step takes, oldest first.
 
     Parameters
     ----------
-    count, previous : int
-        Samples of the step, and samples from before it.
+    count, previous, ahead : int
+        Samples of the step, samples from before it and samples from after it.
     letter : str, optional
         Beginning of the names of the step's samples.
 
     Examples
     --------
-    >>> sample_names(2, previous=1)
-    ['past1', 'd1', 'd2']
+    >>> sample_names(2, previous=1, ahead=1)
+    ['past1', 'd1', 'd2', 'ahead1']
     """
-    past = "past" if letter == "d" else f"past_{letter}"
-    return [f"{past}{k}" for k in range(previous, 0, -1)] + [f"{letter}{k}" for k in range(1, count + 1)]
+    past, after = ("past", "ahead") if letter == "d" else (f"past_{letter}", f"ahead_{letter}")
+    return [
+        *(f"{past}{k}" for k in range(previous, 0, -1)),
+        *(f"{letter}{k}" for k in range(1, count + 1)),
+        *(f"{after}{k}" for k in range(1, ahead + 1)),
+    ]
 
 
-def increments_signal(count: int, previous: int = 0) -> Signal:
+def increments_signal(count: int, previous: int = 0, ahead: int = 0) -> Signal:
     """Return the signal of the angle increments that a step takes, oldest first.
 
     Parameters
     ----------
     count : int
         Increments of the step.
-    previous : int, optional
-        Increments from before the step.
+    previous, ahead : int, optional
+        Increments from before the step, and increments from after it.
     """
     return Signal(
         "increments",
-        (previous + count, 3),
-        tuple(f"{name}_{axis}" for name in sample_names(count, previous) for axis in "xyz"),
+        (previous + count + ahead, 3),
+        tuple(f"{name}_{axis}" for name in sample_names(count, previous, ahead) for axis in "xyz"),
         unit="rad",
         meaning="angle increments of the step, body axes, oldest first: exact integrals of the body rate"
-        + kept(previous),
+        + beside(previous, ahead),
         bound=Fraction(1),
     )
 
 
-def kept(previous: int) -> str:
-    """Return the part of a signal's meaning that tells of samples from before the step."""
-    return f"; the first {previous} are those before the step" if previous else ""
+def beside(previous: int, ahead: int = 0) -> str:
+    """Return the part of a signal's meaning that tells of samples from before the step and from after it."""
+    before = f"; the first {previous} are those before the step" if previous else ""
+    return before + (f"; the last {ahead} are those after the step" if ahead else "")
 
 
 def turns_signal(nodes: Sequence[Number]) -> Signal:
@@ -104,6 +110,11 @@ class Samples:
         Number of increments from before the step.
     nodes : sequence of Fraction or Expr
         Nodes at which the method needs the rate; without increments the samples are the rates there.
+    ahead : int
+        Number of increments from after the step.
+    fit : callable, optional
+        ``fit(increments, previous, ahead)`` returns the rate in terms of the increments; by default the polynomial
+        through them.
     """
 
     def __init__(
@@ -112,23 +123,25 @@ class Samples:
         increments: int | None,
         previous: int = 0,
         nodes: Sequence[Number] = (),
+        ahead: int = 0,
+        fit: Callable[[int, int, int], Fit] = rate_fit.from_increments,
     ) -> None:
         self._build = build
         self._labels = labels(nodes)
         if increments is None:
             signal, self.fit = turns_signal(nodes), rate_fit.from_rates(nodes)
         else:
-            signal = increments_signal(increments, previous)
-            self.fit = rate_fit.from_increments(increments, previous)
+            signal = increments_signal(increments, previous, ahead)
+            self.fit = fit(increments, previous, ahead)
         self._symbols = build.input(signal)
-        self.increments, self.previous = increments, previous
+        self.increments, self.previous, self.ahead = increments, previous, ahead
 
     def order(self, method: int) -> Order:
         """Return the order of a step by a method of this order on any kinematics."""
         if self.increments is None:
             return Order(method, method, None, method)
-        limit = rate_fit.step_order(self.increments, self.previous)
-        return Order(method, method, self.increments + self.previous, min(method, limit))
+        limit = rate_fit.step_order(self.increments, self.previous, self.ahead)
+        return Order(method, method, self.fit.degree + 1, min(method, limit))
 
     def turn(self, node: Number, scale: sp.Expr = sp.S.One) -> sp.Matrix:
         """Add a stage for the rate times the step at a node, times `scale`, 1 or 1/2, and return its symbols."""

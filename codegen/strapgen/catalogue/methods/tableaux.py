@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -14,7 +13,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from strapgen.catalogue.methods import coefficients, order_conditions
+from strapgen.catalogue.methods import coefficient_files, coefficients, order_conditions
+from strapgen.catalogue.methods.coefficient_files import entries
 from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
@@ -100,26 +100,10 @@ def read(path: str | Path) -> Tableau:
     InputError
         If the file cannot be read, a key or number is wrong, or a condition does not hold; the message names it.
     """
-    place = checks.path("path", path)
-    try:
-        try:
-            with place.open("rb") as file:
-                content = file.read(MOST_BYTES + 1)
-        except OSError as error:
-            raise InputError(f"cannot be read ({error.strerror})") from None
-        if len(content) > MOST_BYTES:
-            raise InputError(f"is over {MOST_BYTES} bytes long; a tableau is shorter")
-        try:
-            data = tomllib.loads(content.decode("utf-8-sig").replace("\r\n", "\n"))
-        except UnicodeDecodeError as error:
-            raise InputError(f"is not UTF-8 (byte {error.start})") from None
-        except (ValueError, RecursionError) as error:
-            raise InputError(f"is not TOML ({error})") from None
-    except InputError as error:
-        raise InputError(f"{path} {error}") from None
+    data = coefficient_files.content(path, "a tableau", MOST_BYTES)
     try:
         _check_keys(data)
-        name = _slug(data["name"])
+        name = coefficient_files.slug(data["name"])
         if name in TABLEAUX:
             raise InputError(f"name {data['name']!r} is that of the method {name}; another one is needed")
         tableau = replace(_tableau(data, name), file=checks.text("the name of the file", str(path)))
@@ -132,17 +116,7 @@ def read(path: str | Path) -> Tableau:
 
 
 def _check_keys(data: Mapping[str, Any]) -> None:
-    for key in data:
-        if key not in KEYS:
-            raise InputError(f"key {key!r} is not known; allowed: {', '.join(KEYS)}")
-    for key in KEYS:
-        if key not in data and key not in OPTIONAL:
-            raise InputError(
-                f"key {key} is missing; needed: {', '.join(k for k in KEYS if k not in OPTIONAL)}"
-            )
-    for key in ("name", "source"):
-        if not checks.text(key, data[key]).strip():
-            raise InputError(f"{key} is empty; a text is needed")
+    coefficient_files.check_keys(data, KEYS, OPTIONAL)
     order = data["order"]
     if not isinstance(order, int) or isinstance(order, bool) or not 1 <= order <= MOST_ORDER:
         raise InputError(
@@ -151,35 +125,21 @@ def _check_keys(data: Mapping[str, Any]) -> None:
         )
 
 
-def _slug(title: str) -> str:
-    """Return a title as a name on the command line.
-
-    Examples
-    --------
-    >>> _slug("Bogacki & Shampine 3(2)")
-    'bogacki-shampine-3-2'
-    """
-    name = re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-")
-    if not name[:1].isalpha():
-        raise InputError(f"name {title!r} must begin with a letter from a to z, for its name in code")
-    return name
-
-
 def _tableau(data: Mapping[str, Any], name: str) -> Tableau:
     """Return a tableau from the content of a file with all keys, after a check of its numbers and its shape."""
-    nodes = _numbers("nodes", _list("nodes", data["nodes"]))
+    nodes = _numbers("nodes", entries("nodes", data["nodes"]))
     stages = len(nodes)
     if not 1 <= stages <= MOST_STAGES:
         raise InputError(f"nodes has {stages} entries; from 1 to {MOST_STAGES} are allowed")
-    rows = _list("matrix", data["matrix"])
+    rows = entries("matrix", data["matrix"])
     if len(rows) != stages:
         raise InputError(f"matrix has {counted(len(rows), 'row')}; as many as nodes are needed: {stages}")
     for number, row in enumerate(rows, 1):
-        entries = len(_list(f"matrix row {number}", row))
-        if entries != number - 1:
-            why = "not explicit, " if entries >= number else ""
+        length = len(entries(f"matrix row {number}", row))
+        if length != number - 1:
+            why = "not explicit, " if length >= number else ""
             raise InputError(
-                f"matrix row {number} has {counted(entries, 'entry', 'entries')}: "
+                f"matrix row {number} has {counted(length, 'entry', 'entries')}: "
                 f"{why}{needed(number - 1)}, left of the diagonal"
             )
     embedded = data.get("embedded_weights")
@@ -199,18 +159,12 @@ def _tableau(data: Mapping[str, Any], name: str) -> Tableau:
     return tableau
 
 
-def _list(what: str, value: Any) -> list[Any]:
-    if not isinstance(value, list):
-        raise InputError(f"{what} is of type {type(value).__name__}; a list is needed")
-    return value
-
-
 def _numbers(what: str, values: list[Any]) -> tuple[Number, ...]:
     return tuple(coefficients.number(f"{what}, entry {k}", value) for k, value in enumerate(values, 1))
 
 
 def _weights(what: str, value: Any, stages: int) -> tuple[Number, ...]:
-    weights = _numbers(what, _list(what, value))
+    weights = _numbers(what, entries(what, value))
     if len(weights) != stages:
         raise InputError(
             f"{what} has {counted(len(weights), 'entry', 'entries')}; as many as nodes are needed: {stages}"

@@ -1,7 +1,4 @@
-"""Taylor series of the transition in time, for a rate that is a polynomial of time.
-
-With the rate sum_j g_j t^j and the transition sum_n P_n t^n, dP/dt = f(P, g), f bilinear, gives
-(n + 1) P_(n+1) = sum_j f(P_(n-j), g_j).
+"""Taylor series of the transition in time, for a rate that is a polynomial of time: see `polynomial_rotation`.
 
 With three samples or more, and a motion that is fast for the sampling, the polynomial's coefficients grow with the
 power of time and nearly cancel at the end of the step. A series that is cut off before they cancel is no rotation: the
@@ -11,15 +8,12 @@ so that time is at most half a step at both ends, and the result is normalized.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import sympy as sp
 
 from strapgen.catalogue.kinematics import DCM, EULER, Kinematics
+from strapgen.catalogue.methods import polynomial_rotation
 from strapgen.catalogue.methods.method import Method
 from strapgen.catalogue.methods.samples import Samples
-from strapgen.ir.signals import Signal
-from strapgen.symbolic import rotations
 from strapgen.symbolic.kernel import KernelBuilder
 
 #: Lowest degree of the polynomial for which the series is taken from the middle of the step.
@@ -39,7 +33,7 @@ def method(order: int) -> Method:
         if samples.fit.degree >= _CENTRED:
             return _centred(build, kinematics, samples, order)
         rates = _rates(samples, kinematics.scale, order)
-        terms = _terms(build, kinematics, rates, order)
+        terms = polynomial_rotation.terms(build, kinematics, rates, order)
         return sum(terms[1:], terms[0])
 
     def attitude_order(degree: int | None) -> int:
@@ -49,7 +43,7 @@ def method(order: int) -> Method:
     return Method(
         f"taylor{order}",
         f"Taylor series of order {order}",
-        "E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed. (1993), I.8",
+        polynomial_rotation.SOURCE,
         order,
         transition,
         attitude_order=attitude_order,
@@ -58,28 +52,12 @@ def method(order: int) -> Method:
 
 
 def _centred(build: KernelBuilder, kinematics: Kinematics, samples: Samples, order: int) -> sp.Matrix:
-    """Return the transition from the beginning of the step to its end by the series about its middle, normalized.
-
-    Direction cosines take the rotation of Euler parameters, which is exact for parameters of any length.
-    """
+    """Return the transition from the beginning of the step to its end by the series about its middle, normalized."""
     parameters = EULER if kinematics is DCM else kinematics
     rates = _rates(samples, parameters.scale, order, sp.Rational(1, 2))
-    terms = _terms(build, parameters, rates, order, "half a step")
-    even, odd = (sum(terms[k + 2 :: 2], terms[k]) for k in (0, 1))
-    even = build.stage(_named(parameters, "even", "terms of even order"), even)
-    odd = build.stage(_named(parameters, "odd", "terms of odd order"), odd)
-    # Backwards the terms of odd order change sign, and the inverse of unit parameters is the conjugate.
-    series = build.stage(
-        _named(parameters, "series", "transition before it is normalized"),
-        parameters.product(
-            parameters.identity.multiply_elementwise(even - odd) * 2 - (even - odd), even + odd
-        ),
+    return polynomial_rotation.normalized(
+        build, kinematics, polynomial_rotation.centred(build, parameters, rates, order)
     )
-    square = rotations.dot(series, series)
-    if kinematics is DCM:
-        factor = build.value("inverse_square", 1 / square, "1/(series . series)")
-        return factor * rotations.quaternion_matrix(series)
-    return build.value("inverse_length", 1 / sp.sqrt(square), "1/|series|") * series
 
 
 def _rates(
@@ -100,27 +78,3 @@ def _rates(
         meaning = f"coefficient of t^{power} in {of}the rate times {unit}{since}"
         rates.append(samples.combination(f"{half}rate_{power}", weights, meaning, factor))
     return rates
-
-
-def _terms(
-    build: KernelBuilder,
-    kinematics: Kinematics,
-    rates: Sequence[sp.Matrix],
-    order: int,
-    length: str = "the step length",
-) -> list[sp.Matrix]:
-    """Add stages for the terms of the series up to the order; the term of order 0 is the identity."""
-    terms = [kinematics.identity]
-    for power in range(1, order + 1):
-        total = sp.zeros(*kinematics.identity.shape)
-        for j, rate in enumerate(rates[:power]):
-            total += kinematics.derivative(terms[power - 1 - j], rate)
-        signal = _named(kinematics, f"term_{power}", f"term of order {power} in {length}")
-        terms.append(build.stage(signal, total / power))
-    return terms
-
-
-def _named(kinematics: Kinematics, name: str, meaning: str) -> Signal:
-    """Return a signal of the shape of a transition."""
-    elements = tuple(f"{name}_{element.rsplit('_', 1)[1]}" for element in kinematics.transition.elements)
-    return Signal(name, kinematics.transition.shape, elements, meaning=meaning)

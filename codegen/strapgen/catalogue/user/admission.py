@@ -69,7 +69,9 @@ def _require_names(kernel: Kernel) -> None:
         raise InputError(
             f"kernel {name!r} has no name for generated code; a-z, 0-9 and hyphens between them are allowed"
         )
-    if name in RESERVED or re.match(r"(dcm|euler|cayley-klein)-.*-(\d+|rates)(-previous\d)?$", name):
+    if name in RESERVED or re.match(
+        r"(dcm|euler|cayley-klein)-.*-(\d+|rates)(-previous\d+)?(-ahead\d+)?$", name
+    ):
         raise InputError(
             f"kernel {name} is in the catalogue, or looks like one of its steps; another name is needed"
         )
@@ -170,10 +172,11 @@ def _require_step(kernel: Kernel) -> None:
         return
     if not isinstance(step, Companions):
         _refuse(kernel, f"its companions are {step!r}; strapgen.Companions is needed")
-    if not isinstance(step.isometry, bool) or type(step.previous) is not int:
-        _refuse(
-            kernel, f"isometry {step.isometry!r} or previous {step.previous!r} is no truth value or no number"
-        )
+    if not isinstance(step.isometry, bool):
+        _refuse(kernel, f"isometry {step.isometry!r} is no truth value")
+    for name in ("previous", "ahead"):
+        if type(getattr(step, name)) is not int:
+            _refuse(kernel, f"{name} {getattr(step, name)!r} is no number")
     if kernel.order is not None and not isinstance(kernel.order, Order):
         _refuse(kernel, f"its order is {kernel.order!r}; strapgen.Order is needed")
     names = [signal.name for signal in kernel.inputs]
@@ -188,8 +191,11 @@ def _require_step(kernel: Kernel) -> None:
     for number in step.identity:
         if not hasattr(number, "numerator") or isinstance(number, bool):
             _refuse(kernel, f"identity holds {number!r}; whole numbers or fractions are needed")
-    if not 0 <= step.previous < samples[0]:
-        _refuse(kernel, f"{step.previous} of its {samples[0]} increments are previous ones")
+    if min(step.previous, step.ahead) < 0 or step.beside >= samples[0]:
+        _refuse(
+            kernel,
+            f"{step.previous} of its {samples[0]} increments are previous ones and {step.ahead} are ahead",
+        )
     if (step.product is None) != (kernel.transition is None):
         _refuse(kernel, "a product and a transition go together")
     stages = {stage.signal.name: stage.signal for stage in kernel.stages}

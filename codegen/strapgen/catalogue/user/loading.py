@@ -32,7 +32,7 @@ FUNCTION = "algorithm"
 #: What a user's code must do.
 DUTY = "return a Kernel"
 #: Parameters that the function may have: a `Tableau`, and numbers of increments.
-OPTIONS = ("method", "increments", "previous")
+OPTIONS = ("method", "increments", "previous", "ahead")
 
 
 def installed() -> dict[str, EntryPoint]:

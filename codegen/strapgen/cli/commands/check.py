@@ -34,7 +34,7 @@ def check(
     Example: strapgen check examples/check_foreign_c/correct.c --function integrator_update
     --arguments "state[4], increments[3] -> state[4]" --scalar first --init integrator_init
     """
-    output.check(algorithm, method.tableau)
+    output.check(algorithm, *method.files)
     from strapgen.toolchain.foreign_arguments import FOREIGN_SUFFIXES, is_foreign
 
     if is_foreign(algorithm):

@@ -77,7 +77,7 @@ def compare(
     Example: strapgen compare euler --method rk4 --increments 2 --backend numpy,c,c-fixed32,c-fixed16 --carry full
     --reference exact --motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 --step 0.125 --duration 180
     """
-    output.check(algorithm, methods.tableau, source.increments_csv, source.rates_csv)
+    output.check(algorithm, *methods.files, source.increments_csv, source.rates_csv)
     choices = methods.choices(algorithm)
     names = _backends(backend, reference, files)
     most = limit("--fail-above", fail_above)
@@ -94,7 +94,7 @@ def compare(
     kernels = []
     with np.errstate(all="ignore"):  # numbers that overflow are refused, in one line
         for choice in choices:
-            inputs = source.read(choice.increments_per_step, choice.previous)
+            inputs = source.read(choice.increments_per_step, choice.previous, choice.ahead)
             rows = comparison.compare(
                 choice,
                 backends=[*names, *_of_files(files, choice)],

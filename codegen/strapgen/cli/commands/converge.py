@@ -96,7 +96,7 @@ def converge(
 
     Example: strapgen converge euler --method rk1,rk2,rk4,butcher6 --increments enough --plot out/orders.png
     """
-    output.check(algorithm, methods.tableau)
+    output.check(algorithm, *methods.files)
     names = backends("--backend", backend, ())
     most = limit("--fail-beyond", fail_beyond)
     ladder.check()

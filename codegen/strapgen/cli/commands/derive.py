@@ -36,7 +36,7 @@ def derive(
 
     Example: strapgen derive euler --method rk4 --increments 2 --show operations
     """
-    output.check(algorithm, method.tableau)
+    output.check(algorithm, *method.files)
     checks.choice("show", show, _SHOWN)
     if output.format in ("csv", "markdown") and show in ("text", "latex"):
         raise InputError(f"--format {output.format} goes with --show program or --show operations")

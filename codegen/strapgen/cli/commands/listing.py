@@ -68,7 +68,7 @@ def _parts() -> dict[str, dict[str, str]]:
         "kernels": {name: recipe.title for name, recipe in catalogue.KERNELS.items()},
         "motions": {
             name: ", ".join(" or ".join(choices) for choices in keys(name).values())
-            for name in catalogue.MOTIONS
+            for name in (*catalogue.MOTIONS, *catalogue.RUN_MOTIONS)
         },
         "targets": titles(),
         "backends": {name: entry.title for name, entry in BACKENDS.items()},

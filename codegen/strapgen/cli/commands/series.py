@@ -63,7 +63,7 @@ class Versus:
     def choose(self, algorithm: str, method: MethodOptions) -> Choice:
         """Return the second algorithm; method and increments are those of the first one unless stated."""
         if self.versus_method is not None:
-            method = replace(method, method=self.versus_method, tableau=None)
+            method = replace(method, method=self.versus_method, tableau=None, window=None, coning=None)
         if self.versus_increments is not None:
             method = replace(method, increments=self.versus_increments)
         return method.choose(algorithm)
@@ -171,7 +171,7 @@ def series(
 
     Example: strapgen series dcm --method rk1 --motion constant --versus euler
     """
-    output.check(algorithm, methods.tableau)
+    output.check(algorithm, *methods.files)
     count = whole("terms", terms)
     if all_of_them:
         _overview(algorithm, methods, versus, output)
@@ -217,8 +217,11 @@ def _overview(algorithm: _Text, method: MethodOptions, versus: Versus, output: O
         "--versus": versus.versus,
         "--plot": output.plot,
         "--tableau": method.tableau,
+        "--window": method.window,
+        "--coning": method.coning,
         "--increments": method.increments,
         "--previous": method.previous,
+        "--ahead": method.ahead,
         "--rates": method.rates or None,
     }.items():
         if value is not None:

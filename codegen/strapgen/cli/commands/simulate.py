@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from strapgen.catalogue import MOTIONS
+from strapgen.catalogue import MOTIONS, RUN_MOTIONS
 from strapgen.cli.fixed_options import RUN_OPTIONS, FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import STEP_OPTIONS, MethodOptions, OneBackend, StepAlgorithm, one, option
@@ -102,8 +102,8 @@ def simulate(
     one("--backend", backend)
     checks.choice("backend", backend, BACKENDS)
     if source.motion is not None:
-        checks.choice("motion", source.motion, MOTIONS)
-    output.check(algorithm, method.tableau, source.increments_csv, source.rates_csv)
+        checks.choice("motion", source.motion, {**MOTIONS, **RUN_MOTIONS})
+    output.check(algorithm, *method.files, source.increments_csv, source.rates_csv)
     source.check()
     if matrices and source.motion is None:
         raise InputError("--matrices goes with --motion")
@@ -150,6 +150,8 @@ def _facts(backend: Backend, choice: Choice) -> dict[str, Any]:
     facts = {"algorithm": choice.name, "method": choice.method_name, "increments": backend.increments}
     if backend.previous:
         facts["previous"] = backend.previous
+    if backend.ahead:
+        facts["ahead"] = backend.ahead
     return facts | {"backend": backend.name}
 
 
@@ -170,12 +172,12 @@ def _on_motion(
     pulse = source.pulse
     profile = source.profile()
     step, duration = source.step or "", source.duration or ""
-    samples, previous = choice.increments_per_step, choice.previous
+    samples, beside = choice.increments_per_step, (choice.previous, choice.ahead)
     length = float(checks.number("step", step, positive=True))
     _refuse_many(float(checks.number("duration", duration, positive=True)) / length, length, intervals.record)
     backend = build(
         length,
-        lambda: runs.largest_increment(profile, step, duration, samples, pulse, previous),
+        lambda: runs.largest_increment(profile, step, duration, samples, pulse, beside),
     )
     pulse = pulse or backend.count
     with waiting(f"running {backend.kernel}"):

@@ -50,11 +50,11 @@ def stability(
 
     Example: strapgen stability dcm --method rk3,rk4,butcher5 --plot out/stability.png
     """
-    output.check(algorithm, methods.tableau)
+    output.check(algorithm, *methods.files)
     from strapgen import catalogue
 
     if algorithm in catalogue.ALGORITHMS:
-        if methods.method is None and methods.tableau is None:
+        if methods.method is None and not any(methods.files):
             methods = replace(methods, method=",".join(catalogue.STANDARD_METHODS))
         if methods.increments is None:
             methods = replace(methods, increments="enough")

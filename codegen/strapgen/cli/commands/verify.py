@@ -45,7 +45,8 @@ def verify(
     increments = None
     if source.stated:
         source.check()
-        increments = source.read(request.choice.increments_per_step, request.choice.previous).increments
+        choice = request.choice
+        increments = source.read(choice.increments_per_step, choice.previous, choice.ahead).increments
     result = verification.verify(file, request, increments)
     output.report(verification_report(result))
     if not result.holds:

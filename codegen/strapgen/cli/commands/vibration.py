@@ -227,7 +227,7 @@ def vibration(
     Example: strapgen vibration euler --method coning-compressed --increments 4 --frequency-hz 10 --step 0.04
     --theta-x-rad 0.01 --theta-y-rad 0.01 --phase-rad 1.5 --acceleration-y 5
     """
-    output.check(algorithm, methods.tableau, source.spectrum)
+    output.check(algorithm, *methods.files, source.spectrum)
     source.check(output)
     cases = [case for method in methods.each() for case in _assessed(algorithm, method, source)]
     outcomes, words = source.rates(cases)
@@ -287,7 +287,10 @@ def _check_plain(algorithm: str, method: MethodOptions) -> None:
     for name, value in (
         ("--method", method.method),
         ("--tableau", method.tableau),
+        ("--window", method.window),
+        ("--coning", method.coning),
         ("--previous", method.previous),
+        ("--ahead", method.ahead),
         ("--rates", method.rates or None),
     ):
         if value is not None:

@@ -24,6 +24,7 @@ from strapgen.fixedpoint.quantities import (
     Sum,
 )
 from strapgen.fixedpoint.quantization_context import Quantization
+from strapgen.fixedpoint.runs.singular_values import singular_value_bounds
 from strapgen.fixedpoint.series import Series, Truncated
 from strapgen.ir.fixed_interface import Argument, RoundingAccumulation
 from strapgen.ir.integer_program import IntegerSum, Value
@@ -128,8 +129,8 @@ def accumulation(context: Quantization, transition: Result, errors: StepErrors) 
     )
 
 
-def stretch(context: Quantization, transition: Result, width: int) -> Fraction | None:
-    """Return a bound of how far the squared singular values of any transition are from 1; None where none is known.
+def stretch(context: Quantization, transition: Result, width: int) -> Interval | None:
+    """Return bounds of the squared singular values of any transition, less 1; None where none are known.
 
     Parameters
     ----------
@@ -140,11 +141,11 @@ def stretch(context: Quantization, transition: Result, width: int) -> Fraction |
     """
     program, quantities = context.program, context.quantities
     if program.companions is not None and program.companions.isometry:
-        return Fraction(0)
+        return Interval.of(0)
     inputs = [name for signal in program.inputs[1:] for name in signal.elements]
     sizes = tuple(quantities.items[name].range.magnitude for name in inputs)
     try:
-        return _expanded_stretch(program, transition, sizes, width)
+        return _proved_stretch(program, transition, sizes, width)
     except NotImplementedError:  # it calls functions
         return None
 
@@ -180,7 +181,7 @@ def _local_errors(
     for name in result.values:
         value, definition = values[name], items[name].definition
         through = sum(
-            abs(coefficient) * items[factor].range.magnitude * values[other].error
+            abs(coefficient) * context.size(factor) * values[other].error
             for monomial, coefficient in (definition.terms if isinstance(definition, Sum) else ())
             if len(monomial) == 2
             for factor, other in (monomial, monomial[::-1])
@@ -246,14 +247,10 @@ def root(value: Fraction) -> Fraction:
 
 
 def _growth(context: Quantization, transition: Result, width: int) -> Fraction:
-    """Return a number that is not below the norm of any transition.
-
-    The transition is expanded in its inputs to a degree at which it stays short, the rest bounded; in T T' - 1 the
-    terms then cancel that a rotation does not have.
-    """
+    """Return a number that is not below the norm of any transition."""
     stretched = stretch(context, transition, width)
     if stretched is not None:
-        return root(1 + stretched)
+        return root(1 + stretched.highest)
     # The identity, and the length of what is added to it.
     return 1 + norm(_away(context, transition))
 
@@ -277,21 +274,33 @@ def transition_growth(
     if program.companions is not None and program.companions.isometry:
         return Fraction(1)
     try:
-        return root(1 + _expanded_stretch(program, transition, sizes, width))
+        return root(1 + _proved_stretch(program, transition, sizes, width).highest)
     except NotImplementedError:
         return coarse
 
 
 @lru_cache(maxsize=64)
-def _expanded_stretch(
+def _proved_stretch(
     program: Program, transition: Result, sizes: tuple[Fraction, ...], width: int
-) -> Fraction:
+) -> Interval:
     """Return what `stretch` does, which no word and no rounding changes.
 
     Raises
     ------
     NotImplementedError
         If the transition calls functions.
+    """
+    known = _expanded_stretch(program, transition, sizes, width)
+    return singular_value_bounds(program, transition, sizes, width, known)
+
+
+def _expanded_stretch(
+    program: Program, transition: Result, sizes: tuple[Fraction, ...], width: int
+) -> Fraction:
+    """Return a bound of the magnitude of the eigenvalues of T T' - 1.
+
+    The transition is expanded in its inputs to a degree at which it stays short, the rest bounded; terms that a
+    rotation does not have cancel.
     """
     series = Truncated(sizes, _MOST_TERMS)
     elements = _expanded(program, transition, series)

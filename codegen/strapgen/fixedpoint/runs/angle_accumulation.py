@@ -10,10 +10,8 @@ state with what will be fed back added to it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from itertools import product
 
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.fixedpoint.quantization_context import Quantization
@@ -21,6 +19,7 @@ from strapgen.fixedpoint.runs.accumulation import StepErrors, norm, root, stretc
 from strapgen.fixedpoint.terms import up
 from strapgen.ir.angle_accumulation import LARGEST_ERROR, AngleAccumulation
 from strapgen.ir.program import Constant, Node, Program, Reference, Result
+from strapgen.symbolic.polynomials import ONE, OPERATIONS, Polynomial, add, multiply, scale
 
 #: Elements of the vectors whose attitude turns by twice their angle: Euler and Cayley-Klein parameters.
 _PARAMETERS = 4
@@ -30,8 +29,6 @@ _SIDE = 3
 _START = Fraction(1, 8)
 #: Sines of angles of one step for which the bound is worth anything.
 _LARGEST_SINE = Fraction(1, 2)
-
-_Polynomial = dict[tuple[str, ...], Fraction]
 
 
 @dataclass(frozen=True)
@@ -110,10 +107,9 @@ def _sizes(context: Quantization, transition: Result, errors: StepErrors, is_mat
     state = context.program.inputs[0]
     stretched = stretch(context, transition, state.shape[-1])
     away = norm(errors.away)
-    if stretched is None or stretched >= 1:
-        contraction, expansion = max(Fraction(0), 1 - away), 1 + away
-    else:
-        contraction, expansion = _root_below(1 - stretched), root(1 + stretched)
+    contraction, expansion = max(Fraction(0), 1 - away), 1 + away
+    if stretched is not None and stretched.lowest > -1:
+        contraction, expansion = _root_below(1 + stretched.lowest), root(1 + stretched.highest)
     shortest = 1 - context.settings.allowance
     fed_back = errors.state_feedback if context.settings.carry != "none" else Fraction(0)
     # What is left is told from half a unit, also where it was cut off: a constant in it cancels from step to step.
@@ -176,6 +172,7 @@ def _parameter_angles(sizes: _Sizes, errors: StepErrors, rounding: Fraction) -> 
         Fraction(1),
         0,
         Fraction(0),
+        up(lost.added),
     )
 
 
@@ -244,6 +241,7 @@ def _matrix_angles(sizes: _Sizes, errors: StepErrors) -> AngleAccumulation:
         up((orthonormal or proper) / proper),
         apart,
         up(growth),
+        up(added),
     )
 
 
@@ -306,60 +304,33 @@ def _root_below(value: Fraction) -> Fraction:
 # What a step is
 
 
-def _products(program: Program, transition: Result) -> list[_Polynomial] | None:
+def _products(program: Program, transition: Result) -> list[Polynomial] | None:
     """Return the new state as polynomials of state "s0", ... and transition "t0", ...; None if it is none."""
     state, (result, *others) = program.inputs[0], program.outputs
     names = [node.name for node in transition.nodes if isinstance(node, Reference)]
     if others or len(set(names)) < len(transition.nodes) or len(names) != state.size != 0:
         return None
-    known: dict[str, _Polynomial] = {name: {(f"s{k}",): Fraction(1)} for k, name in enumerate(state.elements)}
+    known: dict[str, Polynomial] = {name: {(f"s{k}",): Fraction(1)} for k, name in enumerate(state.elements)}
     known |= {name: {(f"t{k}",): Fraction(1)} for k, name in enumerate(names)}
     values = {assignment.name: assignment.value for assignment in program.body}
 
-    def value(node: Node) -> _Polynomial:
+    def value(node: Node) -> Polynomial:
         if isinstance(node, Constant):
-            return {(): node.value}
+            return scale(ONE, node.value)
         if isinstance(node, Reference):
             if node.name not in known:
-                known[node.name] = value(values[node.name])  # KeyError for an increment
+                known[node.name] = value(values[node.name])
             return known[node.name]
-        return _operation(node.kind, [value(argument) for argument in node.arguments])
+        return OPERATIONS[node.kind](*(value(argument) for argument in node.arguments))
 
     try:
         terms = [value(node) for node in result.nodes]
-    except (KeyError, NotImplementedError):
+    except KeyError:  # an increment, or an operation that is not of polynomials
         return None
     return terms if _leaves_states_alone(program, terms) else None
 
 
-def _operation(kind: str, operands: list[_Polynomial]) -> _Polynomial:
-    """Return the result of an operation; NotImplementedError for one that is not of polynomials."""
-    match kind, operands:
-        case "negate", [one]:
-            return _sum({}, one, -1)
-        case (("add" | "subtract"), [one, other]):
-            return _sum(one, other, 1 if kind == "add" else -1)
-        case "multiply", [one, other]:
-            return _product(one, other)
-    raise NotImplementedError(kind)
-
-
-def _sum(one: Mapping[tuple[str, ...], Fraction], other: _Polynomial, factor: int) -> _Polynomial:
-    total = dict(one)
-    for key, coefficient in other.items():
-        total[key] = total.get(key, Fraction(0)) + factor * coefficient
-    return {key: coefficient for key, coefficient in total.items() if coefficient}
-
-
-def _product(one: _Polynomial, other: _Polynomial) -> _Polynomial:
-    total: _Polynomial = {}
-    for (left, a), (right, b) in product(one.items(), other.items()):
-        key = tuple(sorted(left + right))
-        total[key] = total.get(key, Fraction(0)) + a * b
-    return {key: coefficient for key, coefficient in total.items() if coefficient}
-
-
-def _leaves_states_alone(program: Program, terms: list[_Polynomial]) -> bool:
+def _leaves_states_alone(program: Program, terms: list[Polynomial]) -> bool:
     """Tell whether every term is a product of state and transition, and the identity returns the state."""
     kernels = program.companions
     if kernels is None or any([name[0] for name in key] != ["s", "t"] for term in terms for key in term):
@@ -373,22 +344,22 @@ def _leaves_states_alone(program: Program, terms: list[_Polynomial]) -> bool:
     return True
 
 
-def _multiplies_lengths(terms: list[_Polynomial]) -> bool:
+def _multiplies_lengths(terms: list[Polynomial]) -> bool:
     """Tell whether the length of a product is that of its factors: then multiplying leaves angles alone."""
     if len(terms) != _PARAMETERS:
         return False
-    square: _Polynomial = {}
+    square: Polynomial = {}
     for term in terms:
-        square = _sum(square, _product(term, term), 1)
+        square = add(square, multiply(term, term))
     state, transition = (_square_of_length(name) for name in ("s", "t"))
-    return square == _product(state, transition)
+    return square == multiply(state, transition)
 
 
-def _square_of_length(name: str) -> _Polynomial:
+def _square_of_length(name: str) -> Polynomial:
     return {(f"{name}{k}", f"{name}{k}"): Fraction(1) for k in range(_PARAMETERS)}
 
 
-def _multiplies_matrices(program: Program, terms: list[_Polynomial]) -> bool:
+def _multiplies_matrices(program: Program, terms: list[Polynomial]) -> bool:
     """Tell whether a step multiplies the matrix by the transition on the right."""
     places = range(_SIDE)
     return program.inputs[0].shape == (_SIDE, _SIDE) and terms == [

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 from strapgen.ir.program import Assignment, Node, Operation, Program, Reference, references
@@ -28,6 +28,18 @@ class _Many:
     members: list[tuple[bool, Node | _Many]]
 
 
+@dataclass
+class _Entry:
+    """An assignment, its value as sums and products, and in how many of these each pair occurs."""
+
+    assignment: Assignment
+    tree: Node | _Many
+    pairs: Counter[_Pair] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.pairs = _count(self.tree)
+
+
 def share_pairs(program: Program) -> Program:
     """Name the pairs of terms and of factors that occur more than once.
 
@@ -45,20 +57,26 @@ def share_pairs(program: Program) -> Program:
     """
     inlined = _inlined(program)
     names = shared_names(inlined)
-    trees = [(assignment, _flat(assignment.value)) for assignment in inlined.body]
-    while pair := _most_frequent(tree for _, tree in trees):
+    entries = [_Entry(assignment, _flat(assignment.value)) for assignment in inlined.body]
+    counts: Counter[_Pair] = Counter()
+    for entry in entries:
+        counts.update(entry.pairs)
+    while pair := _most_frequent(counts):
         name = next(names)
         kind, a, b, equal = pair
-        replaced = False
-        for place, (_, tree) in enumerate(trees):
-            if _replace(tree, pair, Reference(name)) and not replaced:
-                replaced = True
-                first = place
+        holders = [place for place, entry in enumerate(entries) if pair in entry.pairs]
+        for entry in (entries[place] for place in holders):
+            counts.subtract(entry.pairs)
+            _replace(entry.tree, pair, Reference(name))
+            entry.pairs = _count(entry.tree)
+            counts.update(entry.pairs)
         value = Operation(kind if equal else "subtract", (a, b))
-        trees.insert(first, (Assignment(name, value), _flat(value)))
-    if len(trees) == len(inlined.body):
+        shared = _Entry(Assignment(name, value), _flat(value))
+        counts.update(shared.pairs)
+        entries.insert(holders[0], shared)
+    if len(entries) == len(inlined.body):
         return program
-    body = tuple(replace(assignment, value=_tree(tree)) for assignment, tree in trees)
+    body = tuple(replace(entry.assignment, value=_tree(entry.tree)) for entry in entries)
     return replace(inlined, body=body)
 
 
@@ -133,22 +151,23 @@ def _pairs(many: _Many) -> Iterator[_Pair]:
             yield many.kind, a, b, one == other
 
 
-def _most_frequent(trees: Iterator[Node | _Many]) -> _Pair | None:
-    """Return the pair that occurs in most sums or products, the first of several; None if none occurs twice."""
+def _count(tree: Node | _Many) -> Counter[_Pair]:
+    """Return in how many sums and products of a tree each pair occurs."""
     counts: Counter[_Pair] = Counter()
-    for tree in trees:
-        for many in _inside(tree):
-            counts.update(set(_pairs(many)))
-    if not counts:
-        return None
-    most = max(counts.values())
+    for many in _inside(tree):
+        counts.update(set(_pairs(many)))
+    return counts
+
+
+def _most_frequent(counts: Counter[_Pair]) -> _Pair | None:
+    """Return the pair that occurs in most sums or products, the first of several; None if none occurs twice."""
+    most = max(counts.values(), default=0)
     return min((pair for pair, number in counts.items() if number == most), key=repr) if most > 1 else None
 
 
-def _replace(tree: Node | _Many, pair: _Pair, name: Reference) -> bool:
-    """Replace a pair once in each sum or product that holds it, and return whether there was one."""
+def _replace(tree: Node | _Many, pair: _Pair, name: Reference) -> None:
+    """Replace a pair once in each sum or product that holds it."""
     kind, a, b, equal = pair
-    replaced = False
     for many in list(_inside(tree)):
         if many.kind != kind:
             continue
@@ -161,5 +180,3 @@ def _replace(tree: Node | _Many, pair: _Pair, name: Reference) -> bool:
             i, j = places[0]
             many.members[i] = many.members[i][0], name
             del many.members[j]
-            replaced = True
-    return replaced

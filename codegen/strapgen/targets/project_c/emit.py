@@ -79,11 +79,12 @@ def cmake(sources: Sources, command: str, motion: Sequence[str], tests: Sequence
 def step_main(sources: Sources, command: str, run: MotionRun) -> str:
     """Return a main program that runs an attitude step on coning and prints the attitude and its error."""
     assert sources.companions is not None
-    previous = sources.companions.previous
+    beside = sources.companions
     return render(
         "project_c/main_step.c.j2",
-        samples=sources.function.inputs[-1].size // 3 - previous,
-        previous=previous,
+        samples=sources.function.inputs[-1].size // 3 - beside.beside,
+        previous=beside.previous,
+        ahead=beside.ahead,
         **_values(sources, command, run, sources.companions.identity),
         **_formats(sources),
     )

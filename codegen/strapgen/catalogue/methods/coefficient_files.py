@@ -1,0 +1,177 @@
+"""Reads files of exact coefficients, which are TOML: bytes, keys, rationals, and the name that a title gives."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Collection, Mapping
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from strapgen.catalogue.methods import coefficients
+from strapgen.catalogue.methods.window import GyroResponse
+from strapgen.support import checks
+from strapgen.support.exceptions import InputError
+
+_FRACTION = re.compile(r"-?[0-9]+(/[1-9][0-9]*)?")
+#: Most characters of a fraction; those of filters for a gyro are long.
+MOST_CHARACTERS = 4000
+
+
+def content(path: str | Path, what: str, most_bytes: int) -> dict[str, Any]:
+    """Return the content of a TOML file.
+
+    Parameters
+    ----------
+    path : path
+    what : str
+        What the file holds, for an error message: "a tableau".
+    most_bytes : int
+        A longer file is refused.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, is too long, not UTF-8 or not TOML.
+    """
+    place = checks.path("path", path)
+    try:
+        with place.open("rb") as file:
+            data = file.read(most_bytes + 1)
+    except OSError as error:
+        raise InputError(f"{path} cannot be read ({error.strerror})") from None
+    if len(data) > most_bytes:
+        raise InputError(f"{path} is over {most_bytes} bytes long; {what} is shorter")
+    try:
+        return tomllib.loads(data.decode("utf-8-sig").replace("\r\n", "\n"))
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path} is not UTF-8 (byte {error.start})") from None
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{path} is not TOML ({error})") from None
+
+
+def check_keys(data: Mapping[str, Any], keys: Collection[str], optional: Collection[str]) -> None:
+    """Check that a table has all keys that it needs, no other, and that its name and source are texts.
+
+    Raises
+    ------
+    InputError
+        If it does not; the message names the first key.
+    """
+    for key in data:
+        if key not in keys:
+            raise InputError(f"key {key!r} is not known; allowed: {', '.join(keys)}")
+    for key in keys:
+        if key not in data and key not in optional:
+            raise InputError(
+                f"key {key} is missing; needed: {', '.join(k for k in keys if k not in optional)}"
+            )
+    for key in ("name", "source"):
+        if key in keys and not checks.text(key, data[key]).strip():
+            raise InputError(f"{key} is empty; a text is needed")
+
+
+def entries(what: str, value: Any) -> list[Any]:
+    """Return a value that must be a list.
+
+    Raises
+    ------
+    InputError
+        If it is none.
+    """
+    if not isinstance(value, list):
+        raise InputError(f"{what} is of type {type(value).__name__}; a list is needed")
+    return value
+
+
+def slug(title: str) -> str:
+    """Return a title as a name on the command line.
+
+    Raises
+    ------
+    InputError
+        If it does not begin with a letter.
+
+    Examples
+    --------
+    >>> slug("Bogacki & Shampine 3(2)")
+    'bogacki-shampine-3-2'
+    """
+    name = re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-")
+    if not name[:1].isalpha():
+        raise InputError(f"name {title!r} must begin with a letter from a to z, for its name in code")
+    return name
+
+
+def rational(what: str, value: Any) -> Fraction:
+    """Return an entry that must be a rational number: a whole number or a text, see `coefficients.number`.
+
+    Raises
+    ------
+    InputError
+        If it is none.
+
+    Examples
+    --------
+    >>> rational("tap", "-7/30")
+    Fraction(-7, 30)
+    """
+    # The whole of a large family is read: what is plainly a fraction does not take the way of an expression.
+    if isinstance(value, str) and len(value) <= MOST_CHARACTERS and _FRACTION.fullmatch(value):
+        top, _, bottom = value.partition("/")
+        return Fraction(int(top), int(bottom or 1))
+    number = coefficients.number(what, value)
+    if not isinstance(number, Fraction):
+        raise InputError(f"{what} is {value!r}; a rational number is needed")
+    return number
+
+
+def not_negative(what: str, value: Any) -> Fraction:
+    """Return an entry that must be a rational number from 0 on.
+
+    Raises
+    ------
+    InputError
+        If it is none.
+    """
+    number = rational(what, value)
+    if number < 0:
+        raise InputError(f"{what} is {value}; a number that is not below 0 is needed")
+    return number
+
+
+def band(value: Any) -> Fraction:
+    """Return an entry that must be the highest angular frequency of a band, in rad a sample.
+
+    Raises
+    ------
+    InputError
+        If it is none, or not below half the sampling rate.
+    """
+    highest = rational("band", value)
+    if not 0 < highest < 3:
+        raise InputError(
+            f"band is {value} rad a sample; a number between 0 and 3 is needed, pi is half the sampling rate"
+        )
+    return highest
+
+
+def gyro(table: Any) -> GyroResponse | None:
+    """Return a table with a gyro of second order; None without a table.
+
+    Raises
+    ------
+    InputError
+        If it is no table, a key is wrong, or a number is not above 0.
+    """
+    if table is None:
+        return None
+    if not isinstance(table, dict):
+        raise InputError(f"gyro is of type {type(table).__name__}; a table is needed")
+    check_keys(table, GyroResponse._fields, ())
+    values = [not_negative(f"gyro {key}", table[key]) for key in GyroResponse._fields]
+    for key, value in zip(GyroResponse._fields, values, strict=True):
+        if not value:
+            raise InputError(f"gyro {key} is 0; a number above 0 is needed")
+    return GyroResponse(*values)

@@ -1,0 +1,186 @@
+"""The drift on coning of a step that crosses its newest sample with a weighted sum of older ones.
+
+The rotation vector is sum_j d_j + (sum_s K_s d_(-s)) x d_0, where d_0 is the newest sample and d_(-s) lies s samples
+before it. On a cone of half-angle alpha, seen through a gyro G, N samples a step, b = omega T, the drift is
+alpha^2 E / (N T) with
+
+    E(b) = H sum_s K_s 2 sin(s b) (1 - cos b) - (N b - H sin N b)/2,   H = |G|^2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from math import factorial
+from typing import Any, NamedTuple
+
+from mpmath.ctx_mp import MPContext
+
+from strapgen.catalogue.methods.window import GyroResponse
+from strapgen.catalogue.methods.window_conditions import PI
+
+#: Numbers of 60 digits: E cancels to 1e-20 of its terms and less.
+_REAL = MPContext()
+_REAL.dps = 60
+#: Frequencies at which the largest drift of a band is searched.
+_POINTS = 1200
+
+
+class ConingShape(NamedTuple):
+    """What determines the drift on coning beside the coefficients.
+
+    Parameters
+    ----------
+    samples, previous : int
+        N samples of the step, and samples from before it.
+    gyro : GyroResponse or None
+        None for increments that are integrals of the rate.
+    """
+
+    samples: int
+    previous: int
+    gyro: GyroResponse | None = None
+
+    @property
+    def unknowns(self) -> int:
+        """Number of coefficients K_s."""
+        return self.samples + self.previous - 1
+
+
+def terms(shape: ConingShape, b: Any, context: Any) -> tuple[list[Any], Any]:
+    """Return what a unit of each coefficient adds to E, and what E is without them, with the other sign.
+
+    Parameters
+    ----------
+    shape : ConingShape
+    b : mpf
+        Angular frequency in rad a sample.
+    context : mpmath context
+        Its digits are those of the result.
+
+    Returns
+    -------
+    list of mpf, (unknowns,)
+    mpf
+
+    Examples
+    --------
+    >>> columns, right = terms(ConingShape(1, 1), _REAL.mpf(1), _REAL)
+    >>> [round(float(value), 6) for value in (*columns, right)]
+    [0.773645, 0.079265]
+    """
+    power = context.mpf(1)
+    if shape.gyro is not None:
+        constant, square, fourth = (
+            context.mpf(c.numerator) / c.denominator for c in _inverse_power(shape.gyro)
+        )
+        power = 1 / (constant + b * b * (square + b * b * fourth))
+    factor = 2 * power * (1 - context.cos(b))
+    columns = [factor * context.sin(s * b) for s in range(1, shape.unknowns + 1)]
+    return columns, (shape.samples * b - power * context.sin(shape.samples * b)) / 2
+
+
+def _inverse_power(gyro: GyroResponse) -> tuple[Fraction, Fraction, Fraction]:
+    """Return the coefficients of 1, b^2 and b^4 in 1/H."""
+    ratio = gyro.sample_hz / (2 * PI * gyro.bandwidth_hz)  # b times it is omega by the natural frequency
+    return Fraction(1), (4 * gyro.damping**2 - 2) * ratio**2, ratio**4
+
+
+def powers(shape: ConingShape, count: int) -> list[tuple[list[Fraction], Fraction]]:
+    """Return the conditions that annul the lowest powers of b in E, exactly.
+
+    Parameters
+    ----------
+    shape : ConingShape
+    count : int
+        Number of powers: b^3, b^5, ...
+
+    Returns
+    -------
+    list of (list of Fraction, Fraction)
+        For each power its coefficient for every K_s, and what their sum has to be.
+
+    Examples
+    --------
+    >>> powers(ConingShape(1, 1), 1)
+    [([Fraction(-6, 1)], Fraction(-1, 2))]
+    """
+    from strapgen.catalogue.methods.coning_coefficients import power_of_coning
+
+    inverse = (Fraction(1),) if shape.gyro is None else _inverse_power(shape.gyro)
+    conditions = []
+    for q in range(1, count + 1):
+        power, n = 2 * q + 1, Fraction(shape.samples)
+        # The sum of K_s 2 sin(s b) (1 - cos b) is N b/(2 H) - sin(N b)/2.
+        right = -(n**power) / 2
+        if q < len(inverse):
+            right += n / 2 * (-1) ** q * factorial(power) * inverse[q]
+        conditions.append(([power_of_coning(s, power) for s in range(1, shape.unknowns + 1)], right))
+    return conditions
+
+
+def largest(shape: ConingShape, coefficients: Sequence[Fraction], band: Fraction) -> float:
+    """Return the largest magnitude of E over a band.
+
+    Parameters
+    ----------
+    shape : ConingShape
+    coefficients : sequence of Fraction, (unknowns,)
+        K_1, K_2, ...
+    band : Fraction
+        Highest angular frequency in rad a sample.
+
+    Returns
+    -------
+    float
+        In rad a step, for each squared radian of the half-angle.
+
+    Examples
+    --------
+    >>> f"{largest(ConingShape(1, 1), [Fraction(1, 12)], Fraction(1)):.3e}"
+    '1.479e-02'
+    """
+    beta = _REAL.mpf(band.numerator) / band.denominator
+    points = [beta * _REAL.sin(_REAL.pi * k / (2 * _POINTS)) for k in range(1, _POINTS + 1)]
+    values = [abs(value) for value in errors(shape, coefficients, points)]
+    peaks = [values[-1]]
+    for k in range(1, _POINTS - 1):
+        if values[k] >= max(values[k - 1], values[k + 1]):
+            # The height of the parabola through the point and its neighbours.
+            (x0, x1), (y0, y1) = (
+                [points[place] - points[k] for place in (k - 1, k + 1)],
+                [values[place] - values[k] for place in (k - 1, k + 1)],
+            )
+            curvature = (y1 / x1 - y0 / x0) / (x1 - x0)
+            slope = y0 / x0 - curvature * x0
+            peaks.append(values[k] - (slope * slope / (4 * curvature) if curvature else 0))
+    return float(max(peaks))
+
+
+def errors(shape: ConingShape, coefficients: Sequence[Fraction], points: Sequence[Any]) -> list[Any]:
+    """Return E at frequencies.
+
+    Parameters
+    ----------
+    shape : ConingShape
+    coefficients : sequence of Fraction, (unknowns,)
+        K_1, K_2, ...
+    points : sequence of number
+        b in rad a sample.
+
+    Returns
+    -------
+    list of mpf
+        In rad a step, for each squared radian of the half-angle.
+
+    Examples
+    --------
+    >>> [f"{float(value):.3e}" for value in errors(ConingShape(1, 1), [Fraction(1, 12)], [0.1, 0.2])]
+    ['-1.665e-07', '-5.308e-06']
+    """
+    weights = [_REAL.mpf(c.numerator) / c.denominator for c in coefficients]
+    result = []
+    for b in points:
+        columns, right = terms(shape, _REAL.mpf(b), _REAL)
+        result.append(_REAL.fdot(zip(weights, columns, strict=True)) - right)
+    return result

@@ -1,0 +1,204 @@
+"""The rotation over a step by a rate that is a polynomial of time, as a power series in time.
+
+With the rate sum_j g_j t^j and the transition sum_n P_n t^n, dP/dt = f(P, g), f bilinear, gives
+(n + 1) P_(n+1) = sum_j f(P_(n-j), g_j).
+
+A series about the middle of an interval meets time no further away than half the interval, at both ends. Where the rate
+turns far during a step, powers of time grow and cancel; the step is then cut into parts, each with a series of its own.
+The series of Euler parameters, cut off, is not of length 1: the result is normalized.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import sympy as sp
+
+from strapgen.catalogue.kinematics import DCM, EULER, Kinematics
+from strapgen.catalogue.methods import rate_fit
+from strapgen.ir.signals import Signal
+from strapgen.symbolic import rotations
+from strapgen.symbolic.kernel import KernelBuilder
+
+SOURCE = "E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed. (1993), I.8"
+
+
+def rotation(
+    build: KernelBuilder,
+    kinematics: Kinematics,
+    coefficients: Sequence[sp.Matrix],
+    order: int,
+    parts: int = 1,
+) -> sp.Matrix:
+    """Add stages for the rotation over a step, and return its transition.
+
+    Parameters
+    ----------
+    build : KernelBuilder
+        The kernel under construction.
+    kinematics : Kinematics
+    coefficients : sequence of Matrix, 3 x 1
+        Legendre coefficients c_m of the rate times the step, in rad, body axes: sum_m c_m P_m(2 t - 1), t from 0 to 1.
+        Symbols or expressions that are linear in them.
+    order : int
+        Power of time at which each series is cut off.
+    parts : int, optional
+        Number of equal parts of the step.
+
+    Returns
+    -------
+    Matrix
+        The transition; it is a rotation whatever the coefficients are.
+
+    Examples
+    --------
+    >>> build = KernelBuilder()
+    >>> still, turn = build.input(Signal.vector("c0", "c0")), build.input(Signal.vector("c1", "c1"))
+    >>> [element.is_Mul for element in rotation(build, EULER, [still, turn], 4)]
+    [True, True, True, True]
+    >>> [stage.signal.name for stage in build.stages][:4]
+    ['half_rate_0', 'half_rate_1', 'term_1', 'term_2']
+    """
+    parameters = EULER if kinematics is DCM else kinematics
+    total = None
+    for part in range(parts):
+        label = f"part{part + 1}_" if parts > 1 else ""
+        rates = _rates(build, parameters.scale, coefficients, order, (part, parts))
+        series = centred(build, parameters, rates, order, label)
+        total = (
+            series
+            if total is None
+            else build.stage(
+                named(parameters, f"{label}total", f"transition over the first {part + 1} parts"),
+                parameters.product(total, series),
+            )
+        )
+    assert total is not None, "a step has at least one part"
+    return normalized(build, kinematics, total)
+
+
+def _rates(
+    build: KernelBuilder,
+    scale: sp.Rational,
+    coefficients: Sequence[sp.Matrix],
+    order: int,
+    place: tuple[int, int],
+) -> list[sp.Matrix]:
+    """Add stages for the coefficients of the powers of time in the generator over one of several parts of the step.
+
+    Time counts from the middle of the part, in halves of the part.
+    """
+    part, parts = place
+    middle, half = sp.Rational(2 * part + 1, 2 * parts), sp.Rational(1, 2 * parts)
+    columns = [rate_fit.legendre(degree, middle) for degree in range(len(coefficients))]
+    label = f"part{part + 1}_" if parts > 1 else ""
+    of, prefix = ("half of ", "half_") if scale == sp.Rational(1, 2) else ("", "")
+    rates = []
+    for power in range(min(order, len(coefficients))):
+        total = sp.zeros(3, 1)
+        for coefficient, column in zip(coefficients[power:], columns[power:], strict=True):
+            total += scale * half ** (power + 1) * column[power] * coefficient
+        name = f"{label}{prefix}rate_{power}"
+        over = f"part {part + 1} of {parts} of the step" if parts > 1 else "the step"
+        meaning = f"coefficient of t^{power} in {of}the rate times half of {over}, t from its middle"
+        rates.append(build.stage(Signal.vector(name, name, unit="rad", meaning=meaning), total))
+    return rates
+
+
+def centred(
+    build: KernelBuilder, parameters: Kinematics, rates: Sequence[sp.Matrix], order: int, label: str = ""
+) -> sp.Matrix:
+    """Add stages for the transition from the beginning of an interval to its end by the series about its middle.
+
+    Parameters
+    ----------
+    build : KernelBuilder
+    parameters : Kinematics
+        Euler or Cayley-Klein parameters.
+    rates : sequence of Matrix, 3 x 1
+        Coefficients of the powers of time in the generator; time counts from the middle, in halves of the interval.
+    order : int
+        Power of time at which the series is cut off.
+    label : str, optional
+        Beginning of the names of the stages.
+
+    Returns
+    -------
+    Matrix
+        Parameters whose length is 1 but for what is cut off, as symbols.
+    """
+    powers = terms(build, parameters, rates, order, "half a step", label)
+    even, odd = (sum(powers[k + 2 :: 2], powers[k]) for k in (0, 1))
+    even = build.stage(named(parameters, f"{label}even", "terms of even order"), even)
+    odd = build.stage(named(parameters, f"{label}odd", "terms of odd order"), odd)
+    # Backwards the terms of odd order change sign, and the inverse of unit parameters is the conjugate.
+    return build.stage(
+        named(parameters, f"{label}series", "transition before it is normalized"),
+        parameters.product(
+            parameters.identity.multiply_elementwise(even - odd) * 2 - (even - odd), even + odd
+        ),
+    )
+
+
+def normalized(build: KernelBuilder, kinematics: Kinematics, series: sp.Matrix) -> sp.Matrix:
+    """Add stages that normalize Euler or Cayley-Klein parameters, and return them as a transition.
+
+    Parameters
+    ----------
+    build : KernelBuilder
+    kinematics : Kinematics
+        Direction cosines take the rotation of Euler parameters, which is exact for parameters of any length.
+    series : Matrix, 4 x 1
+
+    Returns
+    -------
+    Matrix
+    """
+    square = rotations.dot(series, series)
+    if kinematics is DCM:
+        factor = build.value("inverse_square", 1 / square, "1/(series . series)")
+        return factor * rotations.quaternion_matrix(series)
+    return build.value("inverse_length", 1 / sp.sqrt(square), "1/|series|") * series
+
+
+def terms(
+    build: KernelBuilder,
+    kinematics: Kinematics,
+    rates: Sequence[sp.Matrix],
+    order: int,
+    length: str = "the step length",
+    label: str = "",
+) -> list[sp.Matrix]:
+    """Add stages for the terms of the series up to an order.
+
+    Parameters
+    ----------
+    build : KernelBuilder
+    kinematics : Kinematics
+    rates : sequence of Matrix, 3 x 1
+        Coefficients of the powers of time in the generator.
+    order : int
+    length : str, optional
+        The unit of time, in words.
+    label : str, optional
+        Beginning of the names of the stages.
+
+    Returns
+    -------
+    list of Matrix
+        The term of order 0 is the identity.
+    """
+    series = [kinematics.identity]
+    for power in range(1, order + 1):
+        total = sp.zeros(*kinematics.identity.shape)
+        for j, rate in enumerate(rates[:power]):
+            total += kinematics.derivative(series[power - 1 - j], rate)
+        signal = named(kinematics, f"{label}term_{power}", f"term of order {power} in {length}")
+        series.append(build.stage(signal, total / power))
+    return series
+
+
+def named(kinematics: Kinematics, name: str, meaning: str) -> Signal:
+    """Return a signal of the shape of a transition."""
+    elements = tuple(f"{name}_{element.rsplit('_', 1)[1]}" for element in kinematics.transition.elements)
+    return Signal(name, kinematics.transition.shape, elements, meaning=meaning)

@@ -1,0 +1,254 @@
+"""Coning coefficients that are designed for a band or a spectrum of vibration; files hold them as exact rationals.
+
+`SHAPES` are those of the folder `coning_shapes`; a user's file is read by `read`. A step by them has the compressed
+form, the newest sample times a weighted sum of older ones. It suits coning, and no other motion.
+"""
+
+from __future__ import annotations
+
+import shlex
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from decimal import Decimal, InvalidOperation
+from fractions import Fraction
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from strapgen.catalogue.methods import coefficient_files
+from strapgen.catalogue.methods.coefficient_files import band, entries, gyro, rational
+from strapgen.catalogue.methods.window import GyroResponse
+from strapgen.catalogue.methods.windows import WINDOWS
+from strapgen.support import checks
+from strapgen.support.exceptions import InputError
+from strapgen.support.suggestions import counted
+
+#: Keys of a file, and those of them that are optional.
+KEYS = (
+    *("name", "source", "samples", "previous", "objective", "powers", "band", "level", "gyro"),
+    "coefficients",
+)
+OPTIONAL = ("powers", "band", "level", "gyro")
+
+#: What the coefficients are best at: the largest drift over a band, or the drift under a spectrum whose phases are
+#: unknown, or random.
+OBJECTIVES = ("band", "worst", "random")
+
+#: Most samples of a step, and most from before it.
+MOST_SAMPLES, MOST_KEPT = 8, 32
+#: Most bytes of a file, and most digits of a level.
+MOST_BYTES, MOST_DIGITS = 100_000, 12
+
+
+@dataclass(frozen=True)
+class ShapedConing:
+    """Coning coefficients for a band or a spectrum.
+
+    With the newest sample d_0 of a step, and d_(-s) the sample s before it, in rad, the rotation vector of the step is
+    the sum of its samples plus (sum_s K_s d_(-s)) x d_0.
+
+    Parameters
+    ----------
+    name, title, source : str
+        Name on the command line, name for a reader, and where the coefficients come from.
+    samples, previous : int
+        Samples of the step (N), and samples from before it (p).
+    objective : str
+        One of `OBJECTIVES`.
+    coefficients : tuple of Fraction, (N + p - 1,)
+        K_1, K_2, ...
+    powers : int
+        Number of powers of the frequency, from the third on, that the drift on coning has not.
+    band : Fraction or None
+        Highest angular frequency in rad a sample for which they are designed; None if that is a spectrum.
+    gyro : GyroResponse or None
+        The gyro through which the motion is seen; None for increments that are integrals of the rate.
+    level : Decimal or None
+        Largest drift over the band in rad a step, for each squared radian of the half-angle.
+    file : str
+        Path of the file; empty for one of the catalogue.
+
+    Examples
+    --------
+    >>> shape = SHAPES["coning-shaped-8"]
+    >>> shape.samples, shape.previous, float(shape.band), str(shape.level)
+    (1, 8, 1.3, '7.00799E-10')
+    """
+
+    name: str
+    title: str
+    source: str
+    samples: int
+    previous: int
+    objective: str
+    coefficients: tuple[Fraction, ...]
+    powers: int = 0
+    band: Fraction | None = None
+    gyro: GyroResponse | None = None
+    level: Decimal | None = None
+    file: str = field(default="", compare=False, repr=False)
+
+    @property
+    def option(self) -> str:
+        """The option that chooses it on the command line."""
+        return f"--coning {shlex.quote(self.file)}" if self.file else f"--method {self.name}"
+
+    @property
+    def pairs(self) -> dict[tuple[int, int], Fraction]:
+        """The coefficient of each cross product older x newest, by the numbers of the samples; the oldest is 0."""
+        newest = self.samples + self.previous - 1
+        return {(newest - s, newest): c for s, c in reversed([*enumerate(self.coefficients, 1)])}
+
+
+class _BuiltInShapes(Mapping[str, ShapedConing]):
+    """The coefficients of a folder by name; a file is read when it is first used."""
+
+    def __init__(self, folder: Path) -> None:
+        self._files = {path.stem: path for path in sorted(folder.glob("*.toml"))}
+        self._shapes: dict[str, ShapedConing] = {}
+
+    @cached_property
+    def titles(self) -> dict[str, str]:
+        """Titles by name."""
+        return {name: str(self._content(name)["name"]) for name in self}
+
+    def __getitem__(self, name: str) -> ShapedConing:
+        if name not in self._shapes:
+            self._shapes[name] = _shape(self._content(name), name)
+        return self._shapes[name]
+
+    def _content(self, name: str) -> dict[str, Any]:
+        return tomllib.loads(self._files[name].read_text("utf-8"))
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._files)
+
+    def __len__(self) -> int:
+        return len(self._files)
+
+
+_BUILT_IN = _BuiltInShapes(Path(__file__).resolve().parent / "coning_shapes")
+
+#: The coefficients that come with the package, by name, and their titles.
+SHAPES: Mapping[str, ShapedConing] = _BUILT_IN
+SHAPE_TITLES: Mapping[str, str] = _BUILT_IN.titles
+
+
+def named_shape(method: Any) -> ShapedConing | None:
+    """Return the coefficients that a method is or names; None for any other method.
+
+    Examples
+    --------
+    >>> named_shape("coning-shaped-8").previous, named_shape("rk4")
+    (8, None)
+    """
+    if isinstance(method, ShapedConing):
+        return method
+    return SHAPES.get(method) if isinstance(method, str) else None
+
+
+def read(path: str | Path) -> ShapedConing:
+    """Read coefficients from a file and check what they are said to be.
+
+    Parameters
+    ----------
+    path : path
+        A TOML file with the keys of `KEYS`; a coefficient is a whole number or a string, see `coefficients.number`.
+
+    Returns
+    -------
+    ShapedConing
+        Named after its key `name`, in lower case with hyphens.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, a key or number is wrong, a power of the frequency is not annulled, or the level is
+        another one.
+    """
+    data = coefficient_files.content(path, "a file of coning coefficients", MOST_BYTES)
+    try:
+        coefficient_files.check_keys(data, KEYS, OPTIONAL)
+        name = coefficient_files.slug(data["name"])
+        if name in SHAPES or name in WINDOWS:
+            raise InputError(f"name {data['name']!r} is that of the method {name}; another one is needed")
+        shape = _shape(data, name)
+        verify(shape)
+        file = checks.text("the name of the file", str(path))
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    return replace(shape, file=file)
+
+
+def verify(shape: ShapedConing) -> None:
+    """Check exactly that powers of the frequency are annulled, and that the level is right to its digits.
+
+    Parameters
+    ----------
+    shape : ShapedConing
+
+    Raises
+    ------
+    InputError
+        If it is not so.
+    """
+    from strapgen.catalogue.methods import coning_drift
+
+    of = coning_drift.ConingShape(shape.samples, shape.previous, shape.gyro)
+    for q, (row, right) in enumerate(coning_drift.powers(of, shape.powers), 1):
+        total = sum((a * c for a, c in zip(row, shape.coefficients, strict=True)), Fraction(0))
+        if total != right:
+            raise InputError(
+                f"powers is {shape.powers}, but the drift has the power {2 * q + 1} of the frequency "
+                f"(off by {float(total - right):.3g})"
+            )
+    if shape.band is not None and shape.level is not None:
+        largest = coning_drift.largest(of, shape.coefficients, shape.band)
+        unit = Decimal(1).scaleb(int(shape.level.as_tuple().exponent))
+        if abs(Decimal(largest) - shape.level) > unit:
+            raise InputError(f"level is {shape.level}; the coefficients have {largest:.6g} over their band")
+
+
+def _shape(data: Mapping[str, Any], name: str) -> ShapedConing:
+    """Return coefficients from the content of a file with all keys, after a check of its numbers and its shape."""
+    samples = checks.count("samples", data["samples"], largest=MOST_SAMPLES)
+    previous = checks.count("previous", data["previous"], smallest=0, largest=MOST_KEPT)
+    count = samples + previous - 1
+    if not count:
+        raise InputError("samples 1 and previous 0 have no coefficients; more samples are needed")
+    numbers = entries("coefficients", data["coefficients"])
+    if len(numbers) != count:
+        raise InputError(
+            f"coefficients has {counted(len(numbers), 'number')}; {count} are needed for {samples} samples "
+            f"and {previous} from before them"
+        )
+    objective = checks.choice("objective", data["objective"], OBJECTIVES)
+    for key in ("band", "level"):
+        if (key in data) != (objective == "band"):
+            raise InputError(f"key {key} goes with the objective band, and that needs it")
+    return ShapedConing(
+        name,
+        data["name"],
+        data["source"],
+        samples,
+        previous,
+        objective,
+        tuple(rational(f"coefficient {k}", number) for k, number in enumerate(numbers, 1)),
+        checks.count("powers", data.get("powers", 0), smallest=0, largest=count),
+        band(data["band"]) if "band" in data else None,
+        gyro(data.get("gyro")),
+        _level(data["level"]) if "level" in data else None,
+    )
+
+
+def _level(value: Any) -> Decimal:
+    try:
+        level = Decimal(checks.text("level", value))
+    except InvalidOperation:
+        level = Decimal("nan")
+    if not (level.is_finite() and level > 0 and len(level.as_tuple().digits) <= MOST_DIGITS):
+        raise InputError(
+            f"level is {value!r}; a decimal number above 0 of at most {MOST_DIGITS} digits is needed"
+        )
+    return level

@@ -1,0 +1,194 @@
+"""`Window` is the value type of a window: filters that estimate the rate over a step from samples on both sides."""
+
+from __future__ import annotations
+
+import shlex
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from typing import NamedTuple
+
+from strapgen.support.exceptions import InputError
+from strapgen.support.suggestions import counted
+
+#: A filter: a weight for each sample of the window, the oldest first.
+Taps = tuple[Fraction, ...]
+
+
+class GyroResponse(NamedTuple):
+    """A gyro of second order, whose transfer function is 1/(1 + 2 zeta s/w + s^2/w^2).
+
+    Parameters
+    ----------
+    bandwidth_hz : Fraction
+        Natural frequency w/(2 pi) in Hz.
+    damping : Fraction
+        zeta.
+    sample_hz : Fraction
+        Sampling frequency in Hz.
+    """
+
+    bandwidth_hz: Fraction
+    damping: Fraction
+    sample_hz: Fraction
+
+
+@dataclass(frozen=True)
+class Window:
+    """Filters that estimate the rate over a step from samples before it, in it and ahead of it.
+
+    With tau from 0 to 1 over the step, its rate times its length is sum_m c_m P_m(2 tau - 1), P_m the Legendre
+    polynomials. The filter m gives c_m in rad as a weighted sum of the increments d_j in rad, for each component.
+
+    Parameters
+    ----------
+    name, title, source : str
+        Name on the command line, name for a reader, and where the filters come from.
+    increments, previous, ahead : int
+        Samples of the step (N), before it (p) and after it (L).
+    conditions : int
+        The filters are exact for rates that are polynomials in time of a degree below this number (r).
+    band : Fraction
+        Highest angular frequency of the rate for which they are designed, in rad a sample.
+    objective : str
+        "minimax" or "mean square".
+    filters : tuple of tuple of Fraction, (M + 1, p + N + L)
+        Weights of the samples, the oldest first; for an ideal gyro row 0 is the sum of the samples of the step.
+    gyro : GyroResponse or None
+        The gyro whose response the filters take out; None for increments that are integrals of the rate.
+    noise : Fraction
+        Standard deviation of the noise of an increment, by that of the rate times the sampling interval; 0 for none.
+    rotation : str
+        How the rotation of the step follows from the c_m: "fourth", the rotation vector to fourth order, or "exact",
+        a power series of the quaternion.
+    terms : int
+        Terms of that power series.
+    one_sided : tuple of Window
+        Filters for the same samples with fewer samples ahead, from L - 1 down to none, and after them those with
+        fewer samples before the step, from none up to p - 1.
+    file : str
+        Path of the file; empty for a window of the catalogue.
+    sibling : bool
+        Whether it is one of the one-sided filters of another window.
+
+    Examples
+    --------
+    >>> from strapgen.catalogue.methods.windows import WINDOWS
+    >>> window = WINDOWS["window-3-3"]
+    >>> window.samples, window.degree, [float(round(tap, 4)) for tap in window.filters[1]]
+    (7, 4, [-0.0134, 0.0996, -0.4089, 0.0, 0.4089, -0.0996, 0.0134])
+    >>> [(one.name, one.previous, one.ahead) for one in window.one_sided][:2]
+    [('window-4-2', 4, 2), ('window-5-1', 5, 1)]
+    """
+
+    name: str
+    title: str
+    source: str
+    increments: int
+    previous: int
+    ahead: int
+    conditions: int
+    band: Fraction
+    objective: str
+    filters: tuple[Taps, ...]
+    gyro: GyroResponse | None = None
+    noise: Fraction = Fraction(0)
+    rotation: str = "fourth"
+    terms: int = 16
+    one_sided: tuple[Window, ...] = ()
+    file: str = field(default="", compare=False, repr=False)
+    sibling: bool = False
+
+    @property
+    def option(self) -> str:
+        """The options that choose it on the command line."""
+        if not self.file:
+            return f"--method {self.name}"
+        return f"--window {shlex.quote(self.file)}" + (f" --ahead {self.ahead}" if self.sibling else "")
+
+    @property
+    def samples(self) -> int:
+        """Number of samples that the filters take: p + N + L."""
+        return self.previous + self.increments + self.ahead
+
+    @property
+    def degree(self) -> int:
+        """Degree M of the polynomial of the rate over the step."""
+        return len(self.filters) - 1
+
+    @property
+    def parity(self) -> bool:
+        """Whether the filters of even m are symmetric in time and those of odd m antisymmetric."""
+        return self.previous == self.ahead and all(
+            row == _reversed(m, row) for m, row in enumerate(self.filters)
+        )
+
+    def mirrored(self) -> Window:
+        """Return the filters of the motion that runs backwards in time, without one-sided ones.
+
+        Raises
+        ------
+        InputError
+            If there is a gyro, whose response has no mirror image.
+        """
+        if self.gyro is not None:
+            raise InputError(f"{self.name} is designed for a gyro; it has no mirror image in time")
+        return replace(
+            self,
+            name=sibling_name(self.name, self.previous, self.ahead, self.ahead, self.previous),
+            title=self.title
+            if self.previous == self.ahead
+            else sibling_title(self.title, self.ahead, self.previous),
+            previous=self.ahead,
+            ahead=self.previous,
+            filters=tuple(_reversed(m, row) for m, row in enumerate(self.filters)),
+            one_sided=(),
+        )
+
+    def one_sided_with(self, ahead: int) -> Window:
+        """Return the filters for the same samples with another number of them ahead of the step.
+
+        Parameters
+        ----------
+        ahead : int
+            From 0 to p + L; with that of this window, it is returned itself.
+
+        Raises
+        ------
+        InputError
+            If there are none.
+        """
+        if ahead == self.ahead:
+            return self
+        for window in self.one_sided:
+            if window.ahead == ahead:
+                return window
+        raise InputError(f"{self.name} has no filters with {ahead} of its samples ahead")
+
+
+def sibling_name(name: str, previous: int, ahead: int, new_previous: int, new_ahead: int) -> str:
+    """Return the name of filters for the same samples, of which others lie before the step and ahead of it.
+
+    Examples
+    --------
+    >>> sibling_name("window-7-7", 7, 7, 8, 6), sibling_name("imu", 7, 7, 14, 0)
+    ('window-8-6', 'imu-14-0')
+    """
+    if (previous, ahead) == (new_previous, new_ahead):
+        return name
+    return f"{name.removesuffix(f'-{previous}-{ahead}')}-{new_previous}-{new_ahead}"
+
+
+def sibling_title(title: str, previous: int, ahead: int) -> str:
+    """Return the title of filters for the same samples with others before the step and ahead of it.
+
+    Examples
+    --------
+    >>> sibling_title(sibling_title("Window to 1.3 rad", 8, 6), 6, 8)
+    'Window to 1.3 rad; 6 samples before, 8 ahead'
+    """
+    return f"{title.partition('; ')[0]}; {counted(previous, 'sample')} before, {ahead} ahead"
+
+
+def _reversed(m: int, row: Taps) -> Taps:
+    """Return the filter of c_m for the reversed motion, whose odd coefficients have the other sign."""
+    return tuple(-tap if m % 2 else tap for tap in reversed(row))

@@ -1,0 +1,152 @@
+"""The conditions of a window's filters, exactly: E F = R holds for every rate that is a polynomial of low degree.
+
+Row k says what the filters do with the rate u^k, u the time from the middle of the step by its length: E has the
+increments of that rate, as the gyro shows them, and R its Legendre coefficients over the step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from math import comb, factorial
+
+from strapgen.catalogue.methods.window import GyroResponse, Taps, Window
+from strapgen.support.exceptions import InputError
+
+#: A rational that rounds to pi in double precision; with it the conditions of a gyro are rational.
+PI = Fraction(245850922, 78256779)
+
+
+def increments(
+    samples: tuple[int, int, int], conditions: int, gyro: GyroResponse | None = None
+) -> list[Taps]:
+    """Return the increments of the rates u^k times the length of the step.
+
+    Parameters
+    ----------
+    samples : (int, int, int)
+        N in the step, p before it, L ahead of it.
+    conditions : int
+        Number of powers k, from 0 on.
+    gyro : GyroResponse, optional
+        By default the increments are the integrals of the rate.
+
+    Returns
+    -------
+    list of tuple of Fraction, (conditions, p + N + L)
+        E; a row for each power, the oldest sample first.
+
+    Examples
+    --------
+    >>> increments((1, 1, 1), 2)
+    [(Fraction(1, 1), Fraction(1, 1), Fraction(1, 1)), (Fraction(-1, 1), Fraction(0, 1), Fraction(1, 1))]
+    """
+    number, previous, ahead = samples
+    series = gyro_series(gyro, conditions) if gyro else [Fraction(1)]
+    half = Fraction(number, 2)
+    ends = [Fraction(j) - half for j in range(-previous, number + ahead + 1)]
+    # (s T)^i turns t^k, t in samples, into k!/(k-i)! t^(k-i).
+    derivatives = [
+        [series[i] * factorial(k) / factorial(k - i) for i in range(min(k + 1, len(series)))]
+        for k in range(conditions)
+    ]
+    return [
+        tuple(
+            sum((g * _integral(k - i, low, low + 1) for i, g in enumerate(row)), Fraction(0))
+            / number ** (k + 1)
+            for low in ends[:-1]
+        )
+        for k, row in enumerate(derivatives)
+    ]
+
+
+def coefficients(m: int, conditions: int) -> Taps:
+    """Return the Legendre coefficient m over the step of the rates u^k times the length of the step.
+
+    Returns
+    -------
+    tuple of Fraction, (conditions,)
+        R_m; (2m + 1) times the integral of (tau - 1/2)^k P_m(2 tau - 1) over tau from 0 to 1.
+
+    Examples
+    --------
+    >>> [str(value) for value in coefficients(1, 4)]
+    ['0', '1/2', '0', '3/40']
+    """
+    # P_m(2u) has the coefficients below, in powers of u.
+    legendre = [Fraction(0)] * (m + 1)
+    for i in range(m // 2 + 1):
+        weight = Fraction((-1) ** i * comb(m, i) * comb(2 * m - 2 * i, m), 2**m)
+        legendre[m - 2 * i] = weight * 2 ** (m - 2 * i)
+    half = Fraction(1, 2)
+    return tuple(
+        (2 * m + 1) * sum((c * _integral(k + i, -half, half) for i, c in enumerate(legendre)), Fraction(0))
+        for k in range(conditions)
+    )
+
+
+def gyro_series(gyro: GyroResponse, terms: int) -> list[Fraction]:
+    """Return the gyro's transfer function as a power series in s T, T the sampling interval.
+
+    Examples
+    --------
+    >>> series = gyro_series(GyroResponse(Fraction(40), Fraction(7071, 10000), Fraction(100)), 3)
+    >>> [round(float(g), 4) for g in series]
+    [1.0, -0.5627, 0.1583]
+    """
+    inverse = gyro.sample_hz / (2 * PI * gyro.bandwidth_hz)  # 1/(w T)
+    series = [Fraction(1), -2 * gyro.damping * inverse]
+    while len(series) < terms:
+        series.append(-2 * gyro.damping * inverse * series[-1] - inverse**2 * series[-2])
+    return series[:terms]
+
+
+def first_failure(window: Window) -> tuple[int, int, Fraction, Fraction] | None:
+    """Return the first condition that does not hold: m, k, the sum and what it must be; None if all hold."""
+    samples = window.increments, window.previous, window.ahead
+    rows = increments(samples, window.conditions, window.gyro)
+    for m, taps in enumerate(window.filters):
+        for k, (row, right) in enumerate(zip(rows, coefficients(m, window.conditions), strict=True)):
+            total = sum((tap * d for tap, d in zip(taps, row, strict=True)), Fraction(0))
+            if total != right:
+                return m, k, total, right
+    return None
+
+
+def inner_taps(rows: Sequence[Taps], right: Sequence[Fraction]) -> list[Fraction]:
+    """Return the solution of as many equations as unknowns, exactly.
+
+    Parameters
+    ----------
+    rows : sequence of tuple of Fraction, (n, n)
+    right : sequence of Fraction, (n,)
+
+    Raises
+    ------
+    InputError
+        If the equations do not determine it.
+
+    Examples
+    --------
+    >>> inner_taps([(Fraction(2), Fraction(1)), (Fraction(0), Fraction(4))], [Fraction(1), Fraction(2)])
+    [Fraction(1, 4), Fraction(1, 2)]
+    """
+    count = len(rows)
+    table = [[*row, value] for row, value in zip(rows, right, strict=True)]
+    for column in range(count):
+        pivot = next((line for line in range(column, count) if table[line][column]), None)
+        if pivot is None:
+            raise InputError("the conditions of the filters do not determine their taps")
+        table[column], table[pivot] = table[pivot], table[column]
+        head = table[column][column]
+        table[column] = [value / head for value in table[column]]
+        for line in range(count):
+            factor = table[line][column]
+            if line != column and factor:
+                table[line] = [a - factor * b for a, b in zip(table[line], table[column], strict=True)]
+    return [row[-1] for row in table]
+
+
+def _integral(power: int, low: Fraction, high: Fraction) -> Fraction:
+    """Return the integral of t^power from one time to another."""
+    return (high ** (power + 1) - low ** (power + 1)) / (power + 1)

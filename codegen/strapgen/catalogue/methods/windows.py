@@ -1,0 +1,322 @@
+"""Reads the filters of windows from files, and verifies exactly that they hold their conditions.
+
+`WINDOWS` are those of the folder `window_filters`; a user's file is read by `read`. A file is a family: the filters
+that commit an attitude, and one-sided filters for the same samples.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from fractions import Fraction
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from strapgen.catalogue.methods import coefficient_files, coefficients, window_conditions
+from strapgen.catalogue.methods.coefficient_files import band, entries, gyro, not_negative, rational
+from strapgen.catalogue.methods.window import Taps, Window, sibling_name, sibling_title
+from strapgen.support import checks
+from strapgen.support.exceptions import InputError
+from strapgen.support.suggestions import counted
+
+#: Keys of a file, and those of them that are optional.
+KEYS = (
+    *("name", "source", "previous", "ahead", "increments", "conditions", "band", "objective", "noise"),
+    *("gyro", "rotation", "terms", "filters", "one_sided"),
+)
+OPTIONAL = ("increments", "noise", "gyro", "rotation", "terms")
+#: Keys of one-sided filters, and those of them that are optional.
+ONE_SIDED_KEYS = ("previous", "ahead", "objective", "noise", "band", "filters")
+ONE_SIDED_OPTIONAL = ("noise", "band")
+
+OBJECTIVES = ("minimax", "mean square")
+ROTATIONS = ("fourth", "exact")
+
+#: Most samples of a window, most conditions, the highest degree of the rate over a step, and most terms of the exact
+#: rotation.
+MOST_SAMPLES = 41
+MOST_CONDITIONS = 12
+MOST_DEGREE = 8
+MOST_TERMS = 40
+
+
+#: Most bytes of a file; the longest family takes less.
+MOST_BYTES = 4_000_000
+
+
+class _BuiltInWindows(Mapping[str, Window]):
+    """The windows of a folder by name, each family followed by its one-sided filters; a file is read when first used.
+
+    A file is called window-P-L, so that the names are known without reading it.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._windows: dict[str, Window] = {}
+
+    @cached_property
+    def families(self) -> dict[str, str]:
+        """The name of the family of every window, by name."""
+        sizes = [
+            (int(p), int(a)) for p, a in (path.stem.split("-")[1:] for path in self._folder.glob("*.toml"))
+        ]
+        return {
+            f"window-{before}-{after}": f"window-{previous}-{ahead}"
+            for previous, ahead in sorted(sizes)
+            for before, after in [(previous, ahead), *one_sided_sizes(previous, ahead)]
+        }
+
+    @cached_property
+    def titles(self) -> dict[str, str]:
+        """The titles of the families, by name; no filter is read for them."""
+        titles = {}
+        for name in dict.fromkeys(self.families.values()):
+            head, _, _ = (self._folder / f"{name}.toml").read_text("utf-8").partition("\nfilters")
+            titles[name] = str(tomllib.loads(head)["name"])
+        return titles
+
+    def __getitem__(self, name: str) -> Window:
+        if name not in self._windows:
+            family = self.families[name]
+            path = self._folder / f"{family}.toml"
+            window = _family(tomllib.loads(path.read_text("utf-8")), family)
+            self._windows |= {one.name: one for one in (window, *window.one_sided)}
+        return self._windows[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.families)
+
+    def __len__(self) -> int:
+        return len(self.families)
+
+
+def one_sided_sizes(previous: int, ahead: int) -> list[tuple[int, int]]:
+    """Return the samples before and ahead of the one-sided filters of a family, in the order of `Window.one_sided`.
+
+    Examples
+    --------
+    >>> one_sided_sizes(2, 2)
+    [(3, 1), (4, 0), (0, 4), (1, 3)]
+    """
+    total = previous + ahead
+    now = [(total - after, after) for after in range(ahead - 1, -1, -1)]
+    return now + [(before, total - before) for before in range(previous)]
+
+
+def stored_sizes(previous: int, ahead: int, ideal: bool) -> list[tuple[int, int]]:
+    """Return those sizes whose filters a file has to hold: with an ideal gyro and p = L the others are mirrored.
+
+    Examples
+    --------
+    >>> stored_sizes(2, 2, True), stored_sizes(2, 1, True)
+    ([(3, 1), (4, 0)], [(3, 0), (0, 3), (1, 2)])
+    """
+    sizes = one_sided_sizes(previous, ahead)
+    return sizes[:ahead] if ideal and previous == ahead else sizes
+
+
+_BUILT_IN = _BuiltInWindows(Path(__file__).resolve().parent / "window_filters")
+
+#: The windows that come with the package, by name.
+WINDOWS: Mapping[str, Window] = _BUILT_IN
+
+#: The titles of their families.
+WINDOW_TITLES: Mapping[str, str] = _BUILT_IN.titles
+
+#: Ending of the name of a window whose rotation is exact, and the terms of its power series.
+EXACT, EXACT_TERMS = "-exact", 16
+
+
+def named_window(method: str | Window) -> Window | None:
+    """Return the window that a method is or names; None for the name of any other method.
+
+    Examples
+    --------
+    >>> named_window("window-7-7-exact").rotation, named_window("rk4")
+    ('exact', None)
+    """
+    if isinstance(method, Window):
+        return method
+    name = method.removesuffix(EXACT)
+    if name not in WINDOWS:
+        return None
+    return WINDOWS[name] if name == method else with_exact_rotation(WINDOWS[name])
+
+
+def with_exact_rotation(window: Window) -> Window:
+    """Return a window of the catalogue with the exact rotation of its polynomial."""
+    one_sided = tuple(with_exact_rotation(one) for one in window.one_sided)
+    name, title = f"{window.name}{EXACT}", f"{window.title}; exact rotation"
+    return replace(window, name=name, title=title, rotation="exact", terms=EXACT_TERMS, one_sided=one_sided)
+
+
+def read(path: str | Path) -> Window:
+    """Read a family of filters from a file and check that every filter holds its conditions.
+
+    Parameters
+    ----------
+    path : path
+        A TOML file with the keys of `KEYS`; every tap is a whole number or a string, see `coefficients.number`.
+
+    Returns
+    -------
+    Window
+        Named after its key `name`, in lower case with hyphens.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, a key or number is wrong, or a condition does not hold; the message names it.
+    """
+    data = coefficient_files.content(path, "a family of filters", MOST_BYTES)
+    try:
+        coefficient_files.check_keys(data, KEYS, OPTIONAL)
+        name = coefficient_files.slug(data["name"])
+        if name in WINDOWS:
+            raise InputError(f"name {data['name']!r} is that of the method {name}; another one is needed")
+        window = _family(data, name)
+        verify(window)
+        file = checks.text("the name of the file", str(path))
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    return replace(window, file=file, one_sided=tuple(replace(one, file=file) for one in window.one_sided))
+
+
+def verify(window: Window) -> None:
+    """Check the conditions of every filter of a family exactly.
+
+    Parameters
+    ----------
+    window : Window
+
+    Raises
+    ------
+    InputError
+        If one does not hold; the message names the first.
+    """
+    for one in (window, *window.one_sided):
+        place = "" if one is window else f"{one.previous} before and {one.ahead} ahead: "
+        if one.gyro is None and one.filters[0] != _sum_of_step(one):
+            raise InputError(
+                f"{place}filters row 1, of c_0, is the sum of the step's samples for an ideal gyro: "
+                "ones there and zeros elsewhere are needed"
+            )
+        failure = window_conditions.first_failure(one)
+        if failure:
+            m, power, total, right = failure
+            raise InputError(
+                f"{place}the filter of c_{m} gives {_shown(total)} on the rate u^{power}, "
+                f"{right} is needed (off by {_shown(total - right)})"
+            )
+
+
+def _sum_of_step(window: Window) -> Taps:
+    """Return the filter of c_0 for an ideal gyro."""
+    zero, one = (Fraction(0),), (Fraction(1),)
+    return zero * window.previous + one * window.increments + zero * window.ahead
+
+
+def _family(data: Mapping[str, Any], name: str) -> Window:
+    """Return a family from the content of a file with all keys, after a check of its numbers and its shape."""
+    previous, ahead = (_count(key, data[key], 0, MOST_SAMPLES - 1) for key in ("previous", "ahead"))
+    increments = _count("increments", data.get("increments", 1), 1, MOST_SAMPLES)
+    samples = previous + increments + ahead
+    if samples > MOST_SAMPLES:
+        raise InputError(f"the window has {samples} samples; at most {MOST_SAMPLES} are allowed")
+    filters = entries("filters", data["filters"])
+    if not 2 <= len(filters) <= MOST_DEGREE + 1:
+        raise InputError(
+            f"filters has {counted(len(filters), 'row')}; from 2 to {MOST_DEGREE + 1} are allowed, of c_0, c_1, ..."
+        )
+    window = Window(
+        name,
+        data["name"],
+        data["source"],
+        increments,
+        previous,
+        ahead,
+        _count("conditions", data["conditions"], 1, min(samples, MOST_CONDITIONS)),
+        band(data["band"]),
+        checks.choice("objective", data["objective"], OBJECTIVES),
+        _filters("filters", filters, len(filters), samples),
+        gyro(data.get("gyro")),
+        not_negative("noise", data.get("noise", 0)),
+        checks.choice("rotation", data.get("rotation", "fourth"), ROTATIONS),
+        _count("terms", data.get("terms", 16), 1, MOST_TERMS),
+    )
+    return replace(window, one_sided=_all_one_sided(window, entries("one_sided", data["one_sided"])))
+
+
+def _all_one_sided(window: Window, tables: list[Any]) -> tuple[Window, ...]:
+    """Return the one-sided filters of a family, those with fewer samples before the step mirrored where it can be."""
+    sizes = one_sided_sizes(window.previous, window.ahead)
+    stored: dict[tuple[int, int], Window] = {}
+    for number, table in enumerate(tables, 1):
+        what = f"one_sided, table {number}"
+        if not isinstance(table, dict):
+            raise InputError(f"{what} is of type {type(table).__name__}; a table is needed")
+        try:
+            coefficient_files.check_keys(table, ONE_SIDED_KEYS, ONE_SIDED_OPTIONAL)
+            one = _one_sided(window, table)
+            size = one.previous, one.ahead
+            if size not in sizes or size in stored:
+                twice = "there twice" if size in stored else f"not among those for {window.samples} samples"
+                raise InputError(f"{counted(size[0], 'sample')} before and {size[1]} ahead are {twice}")
+        except InputError as error:
+            raise InputError(f"{what}: {error}") from None
+        stored[size] = one
+    for previous, ahead in sizes:
+        if (previous, ahead) not in stored and window.gyro is None and (ahead, previous) in stored:
+            stored[previous, ahead] = stored[ahead, previous].mirrored()
+    for previous, ahead in sizes:
+        if (previous, ahead) not in stored:
+            raise InputError(
+                f"one_sided lacks the filters with {counted(previous, 'sample')} before and {ahead} ahead"
+            )
+    return tuple(stored[size] for size in sizes)
+
+
+def _one_sided(window: Window, table: Mapping[str, Any]) -> Window:
+    """Return one-sided filters, which have of their family what they do not state."""
+    previous, ahead = (_count(key, table[key], 0, MOST_SAMPLES - 1) for key in ("previous", "ahead"))
+    samples = previous + window.increments + ahead
+    return replace(
+        window,
+        sibling=True,
+        name=sibling_name(window.name, window.previous, window.ahead, previous, ahead),
+        title=sibling_title(window.title, previous, ahead),
+        previous=previous,
+        ahead=ahead,
+        band=band(table["band"]) if "band" in table else window.band,
+        objective=checks.choice("objective", table["objective"], OBJECTIVES),
+        noise=not_negative("noise", table.get("noise", 0)),
+        filters=_filters("filters", entries("filters", table["filters"]), window.degree + 1, samples),
+    )
+
+
+def _filters(what: str, rows: list[Any], count: int, samples: int) -> tuple[Taps, ...]:
+    if len(rows) != count:
+        raise InputError(
+            f"{what} has {counted(len(rows), 'row')}; {count} are needed, of c_0 to c_{count - 1}"
+        )
+    result = []
+    for number, row in enumerate(rows, 1):
+        taps = entries(f"{what} row {number}", row)
+        if len(taps) != samples:
+            raise InputError(
+                f"{what} row {number} has {counted(len(taps), 'tap')}; as many as samples are needed: {samples}"
+            )
+        result.append(tuple(rational(f"{what} row {number}, tap {k}", tap) for k, tap in enumerate(taps, 1)))
+    return tuple(result)
+
+
+def _count(what: str, value: Any, smallest: int, largest: int) -> int:
+    return checks.count(what, value, smallest=smallest, largest=largest)
+
+
+def _shown(value: Fraction) -> str:
+    """Return a number as text, exact if that is short, otherwise rounded."""
+    exact = coefficients.text(value)
+    return exact if len(exact) <= 40 else f"about {float(value):.9g}"

@@ -1,0 +1,203 @@
+"""Frequencies of a band, with what the samples of a window answer there, in integers of `BITS` binary digits.
+
+A filter F of the Legendre coefficient m has, at the angular frequency b in rad a sample and up to a factor of
+modulus 1, the error  h(b) sum_j F_j e^{ibj} - i^m (2m + 1) j_m(b/2),  h = G(b) sin(b/2)/(b/2),  for each unit of rate
+times the sampling interval; j_m is the spherical Bessel function, G the response of the gyro. The integers make a
+design the same on every machine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from functools import lru_cache
+from math import factorial, isqrt
+from operator import mul
+from typing import Any
+
+from mpmath.ctx_mp import MPContext
+
+from strapgen.catalogue.methods.window import GyroResponse
+from strapgen.catalogue.methods.window_conditions import PI
+
+#: Binary digits behind the point of the integers, and the number 1 in them.
+BITS = 320
+ONE = 1 << BITS
+#: Numbers of more digits than that, for what is no sum of products.
+REAL = MPContext()
+REAL.prec = BITS + 24
+
+#: Frequencies of a mean, and of the search for a largest error.
+MEAN_POINTS, SEARCH_POINTS = 400, 1200
+
+
+def integer(value: Any) -> int:
+    """Return the integer for a number: a fraction, a whole number or one of `REAL`."""
+    if isinstance(value, Fraction):
+        return (value.numerator << BITS) // value.denominator
+    return int(REAL.nint(REAL.ldexp(value, BITS)))
+
+
+def real(value: int) -> Any:
+    """Return the number of `REAL` for an integer."""
+    return REAL.ldexp(REAL.mpf(value), -BITS)
+
+
+class BandGrid:
+    """Frequencies of a band, with the functions of the samples at each.
+
+    Parameters
+    ----------
+    points : sequence of mpf
+        b in rad a sample.
+    reach : int
+        Samples are j = -reach to reach, 0 that of the step.
+    gyro : GyroResponse, optional
+        By default the response is 1.
+
+    Examples
+    --------
+    >>> grid = BandGrid([REAL.mpf(1)], 2)
+    >>> round(grid.cosines[0][2] / ONE, 6), round(grid.sines[0][2] / ONE, 6), round(grid.gains[0][0] / ONE, 6)
+    (-0.416147, 0.909297, 0.958851)
+    """
+
+    def __init__(self, points: Sequence[Any], reach: int, gyro: GyroResponse | None = None) -> None:
+        self.points = points
+        #: cos(jb) and sin(jb) for j from 0 to the reach, by frequency.
+        self.cosines: list[list[int]] = []
+        self.sines: list[list[int]] = []
+        for b in points:
+            cosine, sine = map(integer, REAL.cos_sin(b))
+            self.cosines.append(_recurrence(ONE, cosine, cosine, reach))
+            self.sines.append(_recurrence(0, sine, cosine, reach))
+        #: h as real and imaginary part, by frequency.
+        self.gains = [_gain(b, gyro) for b in points]
+        self._bessel: dict[int, list[int]] = {}
+
+    def bessel(self, m: int) -> list[int]:
+        """Return (2m + 1) j_m(b/2) with the sign of i^m, or of i^(m-1) for odd m, by frequency."""
+        if m not in self._bessel:
+            sign = (-1) ** (m // 2) * (2 * m + 1)
+            self._bessel[m] = [sign * _bessel_integer(m, integer(b) // 2) for b in self.points]
+        return self._bessel[m]
+
+    def squares(self) -> list[int]:
+        """Return h squared in magnitude, by frequency."""
+        return [(x * x + y * y) >> BITS for x, y in self.gains]
+
+    def errors(self, m: int, taps: Sequence[int], previous: int) -> list[tuple[int, int]]:
+        """Return the error of a filter as real and imaginary part, by frequency.
+
+        Parameters
+        ----------
+        m : int
+            Degree of the Legendre coefficient.
+        taps : sequence of int
+            Integers of the taps, the oldest first.
+        previous : int
+            Samples before the step.
+        """
+        result = []
+        even, odd = _folded(taps, previous)
+        for cosines, sines, (x, y), right in zip(
+            self.cosines, self.sines, self.gains, self.bessel(m), strict=True
+        ):
+            c = sum(map(mul, even, cosines)) >> BITS
+            s = sum(map(mul, odd, sines)) >> BITS
+            re, im = (x * c - y * s) >> BITS, (x * s + y * c) >> BITS
+            result.append((re, im - right) if m % 2 else (re - right, im))
+        return result
+
+
+def _folded(taps: Sequence[int], previous: int) -> tuple[list[int], list[int]]:
+    """Return the weights of cos(jb) and of sin(jb), j from 0, in a sum over samples on both sides."""
+    reach = max(previous, len(taps) - 1 - previous)
+    even, odd = [0] * (reach + 1), [0] * (reach + 1)
+    for place, tap in enumerate(taps):
+        j = place - previous
+        even[abs(j)] += tap
+        odd[abs(j)] += tap if j > 0 else -tap
+    return even, odd
+
+
+def _recurrence(first: int, second: int, cosine: int, reach: int) -> list[int]:
+    """Return cosines or sines of the multiples of an angle."""
+    values = [first, second]
+    while len(values) <= reach:
+        values.append((2 * cosine * values[-1] >> BITS) - values[-2])
+    return values[: reach + 1]
+
+
+def _gain(b: Any, gyro: GyroResponse | None) -> tuple[int, int]:
+    sinc = _bessel_integer(0, integer(b) // 2)
+    if gyro is None:
+        return sinc, 0
+    # x = i omega/w, so that 1 + 2 zeta x + x^2 = 1 - (omega/w)^2 + 2 i zeta omega/w.
+    ratio = gyro.sample_hz / (2 * PI * gyro.bandwidth_hz)
+    x = b * ratio.numerator / ratio.denominator
+    damping = REAL.mpf(gyro.damping.numerator) / gyro.damping.denominator
+    response = real(sinc) / REAL.mpc(1 - x * x, 2 * damping * x)
+    return integer(response.real), integer(response.imag)
+
+
+@lru_cache
+def _series(m: int) -> tuple[Any, ...]:
+    """Return the coefficients of (b/2)^(m + 2k) in j_m(b/2)."""
+    coefficients = []
+    k = 0
+    while True:
+        # (-1)^k / (2^k k! (2m + 2k + 1)!!), the double factorial by two factorials.
+        n = m + k
+        double_factorial = factorial(2 * n + 1) // (2**n * factorial(n))
+        coefficients.append(REAL.mpf((-1) ** k) / (2**k * factorial(k) * double_factorial))
+        if k > 8 and abs(coefficients[-1]) * 2 ** (2 * k) < REAL.ldexp(1, -BITS - 24):
+            return tuple(coefficients)
+        k += 1
+
+
+@lru_cache
+def _series_integers(m: int) -> tuple[int, ...]:
+    return tuple(map(integer, _series(m)))
+
+
+def _bessel_integer(m: int, x: int) -> int:
+    """Return j_m(x), in integers."""
+    square, value = x * x >> BITS, 0
+    for c in reversed(_series_integers(m)):
+        value = (value * square >> BITS) + c
+    for _ in range(m):
+        value = value * x >> BITS
+    return value
+
+
+def magnitude(re: int, im: int) -> int:
+    """Return the magnitude of a complex number."""
+    return isqrt(re * re + im * im)
+
+
+def mean_points(band: Fraction) -> list[Any]:
+    """Return the frequencies of a mean over a band: b = beta cos(pi (k + 1/2)/800)."""
+    beta = REAL.mpf(band.numerator) / band.denominator
+    count = MEAN_POINTS
+    return [beta * REAL.cos(REAL.pi * (2 * k + 1) / (4 * count)) for k in range(count)]
+
+
+def search_points(band: Fraction, count: int = SEARCH_POINTS) -> list[Any]:
+    """Return the frequencies of a search, rising from 0 to the end of the band and closest there."""
+    beta = REAL.mpf(band.numerator) / band.denominator
+    return [beta * REAL.sin(REAL.pi * k / (2 * count)) for k in range(count + 1)]
+
+
+@lru_cache(maxsize=8)
+def mean_grid(band: Fraction, reach: int, gyro: GyroResponse | None) -> BandGrid:
+    """Return the grid of a mean over a band."""
+    return BandGrid(mean_points(band), reach, gyro)
+
+
+@lru_cache(maxsize=8)
+def search_grid(
+    band: Fraction, reach: int, gyro: GyroResponse | None, count: int = SEARCH_POINTS
+) -> BandGrid:
+    """Return the grid of a search for a largest error over a band."""
+    return BandGrid(search_points(band, count), reach, gyro)

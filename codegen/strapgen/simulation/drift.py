@@ -1,0 +1,77 @@
+"""Sums up the error of a run in one number: its drift in degrees per hour."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapgen.simulation.runs import Run
+
+#: Seconds in an hour.
+_HOUR = 3600
+#: Records of a run that its steady drift is measured from, as a fraction of all: at each end.
+_END = 10
+
+
+def angles(run: Run) -> NDArray[np.float64]:
+    """Return the angle between the computed and the true attitude at every record.
+
+    Parameters
+    ----------
+    run : Run
+        Of an algorithm whose attitudes are rotations, up to their length.
+
+    Returns
+    -------
+    array, (N,)
+        In rad, 0 to pi.
+    """
+    # The error matrix is s R - I with a rotation R and a length s: its sum with I has the norm s sqrt(3), its trace is
+    # s (1 + 2 cos) - 3, and the drift is as long as s sin.
+    length = np.sqrt(np.square(run.error + np.eye(3)).sum(axis=(1, 2)) / 3)
+    cosine = ((run.scale.sum(axis=1) + 3) / length - 1) / 2
+    result: NDArray[np.float64] = np.arctan2(np.linalg.norm(run.drift, axis=1) / length, cosine)
+    return result
+
+
+def drift(run: Run) -> float:
+    """Return the largest angle of a run from the true attitude, divided by the duration.
+
+    Parameters
+    ----------
+    run : Run
+
+    Returns
+    -------
+    float
+        In deg/h.
+
+    Examples
+    --------
+    >>> from strapgen import backend, motion, simulate
+    >>> cone = motion("cone", half_angle_deg=1, frequency_hz=5)
+    >>> round(drift(simulate(backend("euler", "coning-compressed", 2), cone, "0.02", 10)), 3)
+    0.317
+    """
+    return float(np.degrees(angles(run).max()) / run.time[-1] * _HOUR)
+
+
+def steady_drift(run: Run) -> float:
+    """Return the drift between the means of the error over the first and the last tenth of a run.
+
+    What only swings, as the lag of a gyro does on a vibration, is not part of it.
+
+    Parameters
+    ----------
+    run : Run
+        At least ten records, of small errors.
+
+    Returns
+    -------
+    float
+        In deg/h.
+    """
+    count = max(1, len(run.time) // _END)
+    change = run.drift[-count:].mean(axis=0) - run.drift[:count].mean(axis=0)
+    time = run.time[-count:].mean() - run.time[:count].mean()
+    return float(np.degrees(np.linalg.norm(change)) / time * _HOUR)
