@@ -29,6 +29,7 @@ from strapgen.catalogue.methods import coefficients, coning_coefficients
 from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.cli import main
 from strapgen.experiments.thesis_tables import TABLES
+from strapgen.library import standard_tree
 from strapgen.reports import formulas
 from strapgen.simulation.courses import NavigationFrame, course
 from strapgen.simulation.motions import motion as make_motion
@@ -604,8 +605,9 @@ def test_generate_writes_numpy_here_by_default(strapgen_says, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["euler_rk4_2.py"]
 
 
-@pytest.mark.long
-def test_generate_all_as_json(strapgen_says, tmp_path):
+def test_generate_all_as_json(strapgen_says, tmp_path, monkeypatch):
+    few = [derived.program(Choice(*choice)) for choice in (("euler", "rk4", 2), ("dcm-product",))]
+    monkeypatch.setattr(standard_tree, "programs", lambda: iter(few))  # of all, in tests/library
     data = json.loads(strapgen_says("generate --all --out out --format json"))
     assert list(data) == ["files"]
     written = {str(path.relative_to(tmp_path)) for path in (tmp_path / "out").rglob("*") if path.is_file()}
@@ -922,7 +924,12 @@ TABLE_KEYS = ["table", "backend", "algorithm", "order", "drift_deg", "normalised
 
 @pytest.mark.parametrize(
     "backend",
-    [pytest.param(b, marks=() if b in ("numpy", "c", "c-fixed32") else pytest.mark.long) for b in BACKENDS],
+    # Slow ones run the same tables in tests/experiments.
+    [
+        pytest.param(b, marks=() if b in ("numpy", "c", "c-fixed32") else pytest.mark.long)
+        for b, entry in BACKENDS.items()
+        if not entry.slow
+    ],
 )
 def test_tables_json(backend, strapgen_says):
     entries = json.loads(
