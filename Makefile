@@ -73,6 +73,9 @@ evidence-tools: firmware-tools $(READY)
 	apt-get install -y -qq --no-install-recommends $(EXAMINERS)
 	$(BIN)/python -m pip install --disable-pip-version-check -e '.[evidence]'
 
+# Python and pytest keep what they have compiled of the tests: a tenth of the next run.
+test test-long: export PYTHONDONTWRITEBYTECODE =
+
 test: $(TOOLS)
 	$(BIN)/python -m pytest -n auto --dist worksteal -m "not long"
 

@@ -55,6 +55,7 @@ COMMANDS = (
         "vibration",
     ),
     *("study word-length", "series", "stability", "rate-table", "frontier"),
+    *("window design", "window show"),
 )
 DATA = Path(__file__).resolve().parents[1] / "data"
 CONING = "--motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 --step 0.125 --duration 5"
@@ -108,6 +109,7 @@ COSTLY = (
     "rate-table",
     "generate",
     "frontier",
+    "window design",
 )
 
 

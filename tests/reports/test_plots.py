@@ -353,6 +353,7 @@ def test_no_screen_is_needed(run, figures, monkeypatch):
     assert pyplot.get_backend().lower() == "agg"
 
 
+@pytest.mark.long
 def test_a_screen_of_the_user_s_that_is_not_there_changes_nothing(tmp_path):
     code = "from strapgen.reports.plots import figures; figures.pyplot(); import os; print(os.environ['MPLBACKEND'])"
     environment = {**os.environ, "MPLBACKEND": "module://of_no_package"}

@@ -14,6 +14,8 @@ import numpy as np
 
 from strapgen.backends.evaluators import Array
 from strapgen.backends.late_unit import LateUnit, SampleKind
+from strapgen.backends.late_unit_in_c import LateUnitInC
+from strapgen.backends.registry import BACKENDS
 from strapgen.catalogue.methods.window import Window
 from strapgen.library import commit_late_sources
 from strapgen.support import checks
@@ -37,13 +39,22 @@ class CommitLate:
         A window of the catalogue by its name, or a family of filters.
     algorithm : str, optional
         "euler", Euler parameters, scalar last, or "dcm", the direction cosine matrix; body to reference.
+    backend : str, optional
+        "numpy", generated functions called from Python, or "c" or "c-float", generated C.
     sample_hz : number, optional
         Sampling rate in Hz; a family that is designed for a gyro needs it, and is refused at another one.
+
+    Attributes
+    ----------
+    identity : array
+        The attitude of zero rotation.
 
     Raises
     ------
     InputError
         If a name is unknown, or the window cannot be committed late.
+    CompilerError
+        If the back end needs a C compiler and there is none.
 
     Examples
     --------
@@ -60,12 +71,19 @@ class CommitLate:
         self,
         window: str | Window = "window-7-7",
         algorithm: str = "euler",
+        backend: str = "numpy",
         sample_hz: float | str | Fraction | None = None,
     ) -> None:
-        filters = commit_late_sources.family(window, sample_hz)
-        self._unit = LateUnit(commit_late_sources.parts(filters, algorithm, "numpy"))
-        self.identity: Array = np.eye(3) if algorithm == "dcm" else np.array([0.0, 0, 0, 1])
-        self._unit.begin(self.identity)
+        checks.choice("backend", backend, BACKENDS)
+        if BACKENDS[backend].target in commit_late_sources.TARGETS:
+            whole = commit_late_sources.sources(window, algorithm, BACKENDS[backend].target, sample_hz)
+            self._unit: LateUnit | LateUnitInC = LateUnitInC(whole)
+        elif backend == "numpy":
+            filters = commit_late_sources.family(window, sample_hz)
+            self._unit = LateUnit(commit_late_sources.parts(filters, algorithm, "numpy"))
+        else:
+            raise InputError(f"backend is {backend!r}; only numpy, c and c-float commit late")
+        self.identity = self._unit.attitude
 
     @property
     def attitude(self) -> Array:
@@ -76,6 +94,11 @@ class CommitLate:
     def pending(self) -> int:
         """Intervals that are not committed yet."""
         return self._unit.pending
+
+    @property
+    def committed(self) -> list[Array]:
+        """Attitudes at the ends of the intervals that the last call committed; of C the last of them alone."""
+        return self._unit.committed
 
     def push(self, sample: Any, kind: int = SampleKind.GOOD) -> int:
         """Take the sample of the next interval, and return how many intervals it commits.
@@ -94,10 +117,6 @@ class CommitLate:
         InputError
             If a number is not allowed.
         """
-        return len(self.pushed(sample, kind))
-
-    def pushed(self, sample: Any, kind: int = SampleKind.GOOD) -> list[Array]:
-        """Take a sample as `push` does, and return the attitudes at the ends of the intervals that it commits."""
         number = checks.count("kind", kind, smallest=0, largest=max(SampleKind))
         values = np.zeros(3) if number == SampleKind.LOST else checks.real_array("sample", sample, (3,))
         if values.shape != (3,):
@@ -110,10 +129,6 @@ class CommitLate:
 
     def flush(self) -> int:
         """Commit the intervals that are not committed yet, and return how many."""
-        return len(self.flushed())
-
-    def flushed(self) -> list[Array]:
-        """Commit as `flush` does, and return the attitudes at the ends of the intervals."""
         return self._unit.flush()
 
     def reset(self, attitude: Any) -> None:
@@ -127,4 +142,4 @@ class CommitLate:
         state = checks.real_array("attitude", attitude, self.identity.shape)
         if state.shape != self.identity.shape:
             raise InputError(f"attitude has shape {state.shape}; {self.identity.shape} is needed")
-        self._unit.attitude = state
+        self._unit.reset(state)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import shlex
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -13,6 +15,14 @@ from strapgen.ir.sources import Sources
 from strapgen.library import generated_sources
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
+from strapgen.targets.c.emit import real_of
+from strapgen.targets.commit_late_c.emit import whole
+
+#: Kinds of C that commit late.
+TARGETS = ("c", "c-float")
+#: Most characters that names begin with: C99 tells external names apart by 31, and ``_memory`` comes behind.
+MOST_CHARACTERS = 24
+_TITLES = {"dcm": "Direction cosine matrix", "euler": "Euler parameters"}
 
 #: Attitude algorithms that commit late, each with the kernel that removes rounding from a committed attitude.
 NORMALIZATIONS = {"dcm": "dcm-orthonormalize-first-order", "euler": "euler-normalize-first-order"}
@@ -125,3 +135,70 @@ def parts(filters: LateFilters, algorithm: str, target: str) -> LateSources:
         generated_sources.sources(choice, target) for choice in kernels(filters, algorithm)
     )
     return LateSources(filters, step, rotation, normalization)
+
+
+def sources(
+    window: str | Window,
+    algorithm: str = "euler",
+    target: str = "c",
+    sample_hz: float | str | Fraction | None = None,
+    name: str | None = None,
+) -> Sources:
+    """Return the C that commits an attitude late and answers it now.
+
+    Parameters
+    ----------
+    window, sample_hz
+        As for `family`.
+    algorithm : str, optional
+        A key of `NORMALIZATIONS`.
+    target : str, optional
+        "c" or "c-float".
+    name : str, optional
+        What the names of functions and files begin with; by default it follows from algorithm and window.
+
+    Returns
+    -------
+    Sources
+
+    Raises
+    ------
+    InputError
+        If a name is unknown or too long, or the window cannot be committed late.
+
+    Examples
+    --------
+    >>> list(sources("window-3-3").files)[:4]
+    ['euler_late_3_3.h', 'euler_late_3_3.c', 'euler_window_3_3.h', 'euler_window_3_3.c']
+    """
+    checks.choice("target", target, TARGETS)
+    filters = family(window, sample_hz)
+    late = parts(filters, algorithm, target)
+    chosen = filters.window
+    command = ["strapgen", "window", "generate", chosen.file or chosen.name]
+    command += ["--algorithm", algorithm, "--target", target]
+    command += [] if sample_hz is None else ["--sample-hz", str(sample_hz)]
+    command += [] if name is None else ["--name", name]
+    title = f"{_TITLES[algorithm]}, committed late and answered now: {chosen.title}"
+    return whole(
+        _identifier(chosen, algorithm, target, name),
+        title,
+        shlex.join(command),
+        filters,
+        (late.step, late.rotation, late.normalization),
+    )
+
+
+def _identifier(window: Window, algorithm: str, target: str, name: str | None) -> str:
+    """Return what the names of functions and files begin with."""
+    infix = real_of(target).infix
+    default = f"{algorithm}_late_{window.name.removeprefix('window-')}".replace("-", "_") + infix
+    identifier = default if name is None else name
+    if name is not None and not re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII):
+        raise InputError(f"--name is {name!r}; letters, digits and underscores are needed, a letter first")
+    if len(identifier) > MOST_CHARACTERS:
+        raise InputError(
+            f"names would begin with {identifier}, which has more than {MOST_CHARACTERS} characters; --name chooses "
+            "shorter ones"
+        )
+    return identifier
