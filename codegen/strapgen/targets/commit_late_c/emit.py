@@ -18,7 +18,7 @@ _COUNTED = ("multiply", "add")
 
 
 @dataclass(frozen=True)
-class Cost:
+class Work:
     """Multiplications and additions.
 
     Parameters
@@ -29,25 +29,25 @@ class Cost:
     multiply: int = 0
     add: int = 0
 
-    def __add__(self, other: Cost) -> Cost:
-        """Return the sum of two costs."""
-        return Cost(self.multiply + other.multiply, self.add + other.add)
+    def __add__(self, other: Work) -> Work:
+        """Return the sum of two amounts."""
+        return Work(self.multiply + other.multiply, self.add + other.add)
 
-    def __rmul__(self, times: int) -> Cost:
+    def __rmul__(self, times: int) -> Work:
         """Return the cost of doing it several times."""
-        return Cost(times * self.multiply, times * self.add)
+        return Work(times * self.multiply, times * self.add)
 
     def __str__(self) -> str:
         """Return the cost in words."""
         return f"{self.multiply:,} multiply and {self.add:,} add"
 
     @classmethod
-    def of(cls, sources: Sources) -> Cost:
+    def of(cls, sources: Sources) -> Work:
         """Return the cost of a generated function."""
         return cls(*(sources.operations.get(kind, 0) for kind in _COUNTED))
 
     @classmethod
-    def of_sum(cls, taps: int) -> Cost:
+    def of_sum(cls, taps: int) -> Work:
         """Return the cost of a sum of vectors, each times its tap."""
         return cls(3 * taps, 3 * (taps - 1))
 
@@ -58,30 +58,30 @@ class LateCosts:
 
     Parameters
     ----------
-    commit : Cost
+    commit : Work
         A commit with all samples ahead, which nearly every sample is.
-    start, gap : Cost
+    start, gap : Work
         The most in one call of ``_push``, at the start and after a gap, both where a gap ends the start.
-    now, now_gap : Cost
+    now, now_gap : Work
         The attitude of now, without a gap and with one.
     """
 
-    commit: Cost
-    start: Cost
-    gap: Cost
-    now: Cost
-    now_gap: Cost
+    commit: Work
+    start: Work
+    gap: Work
+    now: Work
+    now_gap: Work
 
     @classmethod
     def of(cls, filters: LateFilters, step: Sources, rotation: Sources, normalization: Sources) -> LateCosts:
         """Return the costs with filters and the generated functions."""
         window = filters.window
         rows = len(_sums(filters))
-        single = Cost.of(step)
-        other = rows * Cost.of_sum(filters.samples) + Cost.of(rotation)
-        normal = Cost.of(normalization)
+        single = Work.of(step)
+        other = rows * Work.of_sum(filters.samples) + Work.of(rotation)
+        normal = Work.of(normalization)
         commit = single + normal
-        restored = Cost.of_sum(2 * REACH + 1) + Cost(0, 6)
+        restored = Work.of_sum(2 * REACH + 1) + Work(0, 6)
         before = (
             filters.most_commits - REACH - 1
         )  # at the start, where the gap is the last sample that is waited for
