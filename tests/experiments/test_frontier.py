@@ -35,7 +35,7 @@ def test_every_candidate_can_be_chosen():
 
 
 def test_names_stand_for_candidates():
-    assert [one.name for one in candidates(["magnus6"])] == ["magnus6:3", "magnus6:4"]
+    assert [one.name for one in candidates(["magnus6"])] == ["magnus6:3", "magnus6:4", "magnus6:3+3"]
     # A method without candidates has its own samples; what is named twice is compared once.
     assert [one.name for one in candidates(["rk2", "rk2:2", "rk4:1+2"])] == ["rk2:2", "rk4:1+2"]
     assert (

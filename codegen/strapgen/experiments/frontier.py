@@ -93,19 +93,19 @@ class Candidate:
 CANDIDATES = tuple(
     Candidate(method, *samples)
     for method, several in {
-        "rk4": ((2,), (4,)),
+        "rk4": ((2,), (4,), (1, 3)),
         "taylor4": ((2,),),
         "taylor6": ((4,),),
         "munthe-kaas4": ((2,),),
         "magnus4": ((2,), (3,), (1, 3)),
-        "magnus6": ((3,), (4,)),
+        "magnus6": ((3,), (4,), (3, 3)),
         "coning-uncompressed": ((3,), (4,)),
         "coning-compressed": ((1, 1), (2,), (3,), (4,), (1, 3)),
         "coning-combined": ((2, 1), (3,), (3, 3), (5, 3)),
         "crouch-grossman3": ((2,), (3,)),
         "coning-least-squares": ((4,), (3, 3), (1, 8)),
         "coning-shaped-8": ((1, 8),),
-        "fit-exact": ((1, 1), (2,), (3,), (4,)),
+        "fit-exact": ((1, 1), (2,), (3,), (4,), (3, 3)),
         "window-3-3": ((1, 3, 3),),
         "window-5-5": ((1, 5, 5),),
         "window-7-7": ((1, 7, 7),),
@@ -183,7 +183,7 @@ def candidates(names: Iterable[str] | None = None) -> list[Candidate]:
     Examples
     --------
     >>> [candidate.name for candidate in candidates(["magnus6", "rk2:1+1"])]
-    ['magnus6:3', 'magnus6:4', 'rk2:1+1']
+    ['magnus6:3', 'magnus6:4', 'magnus6:3+3', 'rk2:1+1']
     """
     if names is None:
         return list(CANDIDATES)
