@@ -18,7 +18,7 @@ _COUNTED = ("multiply", "add")
 
 
 @dataclass(frozen=True)
-class Work:
+class CallCost:
     """Multiplications and additions.
 
     Parameters
@@ -29,25 +29,25 @@ class Work:
     multiply: int = 0
     add: int = 0
 
-    def __add__(self, other: Work) -> Work:
+    def __add__(self, other: CallCost) -> CallCost:
         """Return the sum of two amounts."""
-        return Work(self.multiply + other.multiply, self.add + other.add)
+        return CallCost(self.multiply + other.multiply, self.add + other.add)
 
-    def __rmul__(self, times: int) -> Work:
+    def __rmul__(self, times: int) -> CallCost:
         """Return the cost of doing it several times."""
-        return Work(times * self.multiply, times * self.add)
+        return CallCost(times * self.multiply, times * self.add)
 
     def __str__(self) -> str:
         """Return the cost in words."""
         return f"{self.multiply:,} multiply and {self.add:,} add"
 
     @classmethod
-    def of(cls, sources: Sources) -> Work:
+    def of(cls, sources: Sources) -> CallCost:
         """Return the cost of a generated function."""
         return cls(*(sources.operations.get(kind, 0) for kind in _COUNTED))
 
     @classmethod
-    def of_sum(cls, taps: int) -> Work:
+    def of_sum(cls, taps: int) -> CallCost:
         """Return the cost of a sum of vectors, each times its tap."""
         return cls(3 * taps, 3 * (taps - 1))
 
@@ -58,30 +58,30 @@ class LateCosts:
 
     Parameters
     ----------
-    commit : Work
+    commit : CallCost
         A commit with all samples ahead, which nearly every sample is.
-    start, gap : Work
+    start, gap : CallCost
         The most in one call of ``_push``, at the start and after a gap, both where a gap ends the start.
-    now, now_gap : Work
+    now, now_gap : CallCost
         The attitude of now, without a gap and with one.
     """
 
-    commit: Work
-    start: Work
-    gap: Work
-    now: Work
-    now_gap: Work
+    commit: CallCost
+    start: CallCost
+    gap: CallCost
+    now: CallCost
+    now_gap: CallCost
 
     @classmethod
     def of(cls, filters: LateFilters, step: Sources, rotation: Sources, normalization: Sources) -> LateCosts:
         """Return the costs with filters and the generated functions."""
         window = filters.window
         rows = len(_sums(filters))
-        single = Work.of(step)
-        other = rows * Work.of_sum(filters.samples) + Work.of(rotation)
-        normal = Work.of(normalization)
+        single = CallCost.of(step)
+        other = rows * CallCost.of_sum(filters.samples) + CallCost.of(rotation)
+        normal = CallCost.of(normalization)
         commit = single + normal
-        restored = Work.of_sum(2 * REACH + 1) + Work(0, 6)
+        restored = CallCost.of_sum(2 * REACH + 1) + CallCost(0, 6)
         before = (
             filters.most_commits - REACH - 1
         )  # at the start, where the gap is the last sample that is waited for
