@@ -143,17 +143,18 @@ def largest(shape: ConingShape, coefficients: Sequence[Fraction], band: Fraction
     beta = _REAL.mpf(band.numerator) / band.denominator
     points = [beta * _REAL.sin(_REAL.pi * k / (2 * _POINTS)) for k in range(1, _POINTS + 1)]
     values = [abs(value) for value in errors(shape, coefficients, points)]
-    place = max(range(_POINTS), key=lambda k: values[k])
-    peak = values[place]
-    if 0 < place < _POINTS - 1:  # the rest of the height by a parabola through the point and its neighbours
-        (x0, x1), (y0, y1) = (
-            (points[place - 1] - points[place], points[place + 1] - points[place]),
-            (values[place - 1] - peak, values[place + 1] - peak),
-        )
-        curvature = (y1 / x1 - y0 / x0) / (x1 - x0)
-        slope = y0 / x0 - curvature * x0
-        peak -= slope * slope / (4 * curvature) if curvature else 0
-    return float(peak)
+    peaks = [values[-1]]
+    for k in range(1, _POINTS - 1):
+        if values[k] >= max(values[k - 1], values[k + 1]):
+            # The height of the parabola through the point and its neighbours.
+            (x0, x1), (y0, y1) = (
+                [points[place] - points[k] for place in (k - 1, k + 1)],
+                [values[place] - values[k] for place in (k - 1, k + 1)],
+            )
+            curvature = (y1 / x1 - y0 / x0) / (x1 - x0)
+            slope = y0 / x0 - curvature * x0
+            peaks.append(values[k] - (slope * slope / (4 * curvature) if curvature else 0))
+    return float(max(peaks))
 
 
 def errors(shape: ConingShape, coefficients: Sequence[Fraction], points: Sequence[Any]) -> list[Any]:

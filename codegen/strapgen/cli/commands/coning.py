@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
-from strapgen.cli.band_options import BandOptions, command_line
+from strapgen.cli.band_options import BandOptions, command_line, not_negative
 from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import option, whole
 from strapgen.cli.output import TEXT_OUTPUT, Output, format_option
@@ -112,8 +112,8 @@ class ConingDesign(BandOptions):
             lines,
             checks.count("--powers", powers, smallest=0, largest=unknowns),
             self.gyro(),
-            checks.number("--noise-rad", self.noise_rad or "0"),
-            checks.number("--pulse-rad", self.pulse_rad or "0"),
+            not_negative("--noise-rad", self.noise_rad or "0"),
+            not_negative("--pulse-rad", self.pulse_rad or "0"),
             self.name or "",
         )
 
@@ -180,7 +180,7 @@ def coning(
 
     Example: strapgen coning --samples 4 --form combined
 
-    Example: strapgen coning --samples 1 --previous 8 --objective band --band 1.3 --format toml --out shaped.toml
+    Example: strapgen coning --samples 1 --previous 8 --objective band --band 1.3 --out out/shaped.toml --format toml
     """
     output.check(design.spectrum)
     from strapgen import catalogue

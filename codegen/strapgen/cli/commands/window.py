@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import typer
 
-from strapgen.cli.band_options import BandOptions, command_line
+from strapgen.cli.band_options import BandOptions, command_line, not_negative
 from strapgen.cli.help import PlainCommand, PlainGroup
 from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import option, whole
@@ -136,7 +136,7 @@ def design(
     The file holds the filters that commit an attitude and one-sided ones, with fewer samples ahead, for the attitude of
     now. Each is exact for polynomial rates, and the best one over the band. A second design gives the same file.
 
-    Example: strapgen window design --previous 7 --ahead 7 --band 1.3 --out window.toml
+    Example: strapgen window design --previous 7 --ahead 7 --band 1.3 --out out/window.toml
     """
     output.check(band.spectrum)
     brief = _brief(size, band, name)
@@ -189,8 +189,8 @@ def _brief(size: WindowSize, band: Band, name: str | None) -> FamilyBrief:
             "--coefficients", whole("--coefficients", size.coefficients), largest=windows.MOST_DEGREE
         ),
         gyro,
-        _ratio("--noise", band.noise),
-        _ratio("--now-noise", band.now_noise),
+        not_negative("--noise", band.noise),
+        not_negative("--now-noise", band.now_noise),
         band.densities(radians),
         rotation,
         checks.count(
@@ -209,13 +209,6 @@ def _title(name: str | None) -> str:
     if coefficient_files.slug(checks.text("--name", name)) in windows.WINDOWS:
         raise InputError(f"--name {name} is that of a window of the catalogue; another one is needed")
     return name
-
-
-def _ratio(what: str, value: str) -> Fraction:
-    number = checks.number(what, value)
-    if number < 0:
-        raise InputError(f"{what} is {value}; a number that is not below 0 is needed")
-    return number
 
 
 def _command(size: WindowSize, band: Band, name: str | None, out: Path | None) -> str:

@@ -33,7 +33,7 @@ class CallCost:
     add: int = 0
 
     def __add__(self, other: CallCost) -> CallCost:
-        """Return the sum of two costs."""
+        """Return the sum of two amounts."""
         return CallCost(self.multiply + other.multiply, self.add + other.add)
 
     def __rmul__(self, times: int) -> CallCost:
