@@ -17,7 +17,7 @@ from strapgen.catalogue.methods.late_filters import LateFilters, polynomial
 from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.catalogue.methods.windows import WINDOWS
 from strapgen.ir.fixed_settings import Settings
-from strapgen.library.commit_late_sources import sources
+from strapgen.library.commit_late_sources import family, parts, sources
 from strapgen.simulation.runs import drift_between
 from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.toolchain import compiler
@@ -475,3 +475,30 @@ def test_c_on_integers_refuses_what_its_header_says():
     assert list(state) == [0, 0, 0, 1 << 30]
     assert lib.euler_late_3_3_w32_reset(memory, state) == 0
     assert lib.euler_late_3_3_w32_flush(memory) == 17
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "window"),
+    [
+        ("euler", WINDOW),
+        pytest.param("dcm", WINDOW, marks=pytest.mark.long),
+        pytest.param("euler", "window-7-7", marks=pytest.mark.long),
+    ],
+)
+def test_the_attitude_of_now_stays_within_its_certified_bound(algorithm, window):
+    """Against double precision from the same integers, on samples that are drawn and on those of motions."""
+    filters = family(window)
+    bound = float(parts(filters, algorithm, "c-fixed", Settings(carry="full")).fixed.now_error)
+    fixed = CommitLate(window, algorithm, "c-fixed32", settings=Settings(carry="full"))
+    double = CommitLate(window, algorithm, "c")
+    drawn = np.random.default_rng(7).uniform(-0.125, 0.125, (300, 3))
+    largest = 0.0
+    for sample in np.concatenate([drawn, np.sign(drawn) / 8, samples(200) / 2]):
+        rounded = np.rint(np.ldexp(sample, 32)) / 2.0**32
+        fixed.push(rounded)
+        double.push(rounded)
+        if fixed.pending == filters.window.ahead:
+            double.reset(fixed.attitude)
+            difference = (fixed.now() - double.now()).reshape(-1, 3 if algorithm == "dcm" else 4)
+            largest = max(largest, np.linalg.norm(difference, axis=1).max())
+    assert bound / 200 < largest < bound

@@ -42,7 +42,7 @@ def test_restoring_filters_leave_a_constant_rate_as_it_is():
     assert merged[lost_samples.REACH] != 0
 
 
-@pytest.mark.parametrize("angle", [Fraction(1, 100), Fraction(1, 7), Fraction(1, 2)])
+@pytest.mark.parametrize("angle", [Fraction(1, 100), Fraction(1, 7), Fraction(1, 4)])
 def test_formats_fit_together_and_sums_have_room(angle):
     (step, rotation, normalization), integers = fixed(largest_angle=angle, carry="full")
     state, samples = interface_of(step).inputs
@@ -77,6 +77,7 @@ def test_moments_are_exact_and_taps_near(moments, count):
         ({"ranges": {"legendre_1": Fraction(1)}}, "ranges or formats"),
         ({"formats": {"state": "Q2.29"}}, "ranges or formats"),
         ({"input_bits": 24}, "increments in rad"),
+        ({"largest_angle": Fraction(1, 2)}, "up to 0.5 rad; a smaller largest angle"),
     ],
 )
 def test_other_settings_are_refused(settings, reason):

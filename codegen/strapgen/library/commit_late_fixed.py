@@ -16,7 +16,7 @@ from strapgen.ir.fixed_interface import Argument, Interface
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.formats import finest
 from strapgen.ir.sources import Sources
-from strapgen.library import generated_sources
+from strapgen.library import commit_late_bounds, generated_sources
 from strapgen.support.exceptions import InputError
 from strapgen.targets.commit_late_c.fixed_filters import FixedFilters, Integers
 
@@ -97,7 +97,17 @@ def functions(
         bits,
     )
     _require_room(fixed, inputs)
-    return (step, rotation, normalization), fixed
+    companions = generated_sources.program(choices[0]).companions
+    assert companions is not None
+    assert companions.truncation is not None, "the rotation is a series"
+    error = commit_late_bounds.now_error(
+        filters,
+        fixed,
+        generated_sources.program(choices[1]),
+        interface_of(rotation),
+        companions.truncation,
+    )
+    return (step, rotation, normalization), replace(fixed, now_error=error)
 
 
 #: What rounding may add to a sum.

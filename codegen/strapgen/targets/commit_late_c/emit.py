@@ -13,6 +13,7 @@ from strapgen.ir.sources import Function, Sources
 from strapgen.support.version import VERSION
 from strapgen.targets.c.emit import CPrinter, real_of
 from strapgen.targets.commit_late_c.fixed_filters import NORMALIZED_EVERY, FixedFilters
+from strapgen.targets.contract import decimal_above
 from strapgen.targets.rendering import render
 
 _Tap = TypeVar("_Tap", int, Fraction)
@@ -195,6 +196,7 @@ def _in_fixed_point(
         "residuals": [{"place": place, "fresh": word.fresh} for place, word in enumerate(feedback)],
         "normalized_residuals": bool(normalization.fixed.residuals),
         "every": NORMALIZED_EVERY,
+        "now_error": decimal_above(fixed.now_error),
         "state_argument": state,
         "sample_argument": samples,
         "type": f"int{state.format.word}_t",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 
 #: Taps as integers.
 Integers = tuple[int, ...]
@@ -30,6 +31,8 @@ class FixedFilters:
         The filters of a lost sample, and of one whose sum with the next is known.
     restoring_shift : int
         Bits by which their sums are shifted down.
+    now_error : Fraction
+        Bound of the distance of the attitude of now from exact arithmetic, see `library.commit_late_bounds`.
     """
 
     limit: int
@@ -40,3 +43,4 @@ class FixedFilters:
     shifts: Integers
     restoring: tuple[Integers, Integers]
     restoring_shift: int
+    now_error: Fraction = Fraction(0)
