@@ -54,7 +54,7 @@ def generate(
     Each sample is passed to a function, which commits the attitude a few samples late, by filters on both sides of it;
     another function answers the attitude of now. A lost sample is restored.
 
-    Example: strapgen window generate window-7-7 --target c --out firmware
+    Example: strapgen window generate window-7-7 --target c --out out/late
     """
     check_format(format)
     from strapgen.library import commit_late_sources
