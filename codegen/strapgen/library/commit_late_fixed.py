@@ -12,6 +12,7 @@ from fractions import Fraction
 
 from strapgen.catalogue import Choice
 from strapgen.catalogue.methods.late_filters import LateFilters, Rows
+from strapgen.ir.attitude_step import Truncation
 from strapgen.ir.fixed_interface import Argument, Interface
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.formats import finest
@@ -52,62 +53,64 @@ def functions(
         )
     step = generated_sources.sources(choices[0], target, settings)
     interface = interface_of(step)
-    state, samples = interface.inputs
+    samples = interface.inputs[1]
     sums = range(0 if filters.window.gyro else 1, filters.degree + 1)
-    limit, rows = samples.high, [*filters.sets, *filters.short]
-    largest = {
-        m: max(sum(map(abs, row[m]), Fraction(0)) for row in rows) * limit * samples.unit * _SPARE
-        for m in sums
+    fractions = {
+        m: _fraction([row[m] for row in (*filters.sets, *filters.short)], samples.high) for m in sums
     }
-    fractions = {m: _fraction([row[m] for row in rows], limit) for m in sums}
-    formats = {"state": str(state.format), "next": str(state.format)}
-    if sums.start:
-        formats["legendre_0"] = str(samples.format)
-        largest[0] = limit * samples.unit
-    rotation = generated_sources.sources(
-        choices[1],
-        target,
-        replace(
-            settings,
-            carry="none",
-            ranges={f"legendre_{m}": size for m, size in sorted(largest.items())},
-            formats=formats,
-        ),
-    )
+    rotation = generated_sources.sources(choices[1], target, _of_rotation(filters, interface, sums))
     normalization = generated_sources.sources(choices[2], target, interface.companion_settings)
     inputs = {argument.signal.name: argument for argument in interface_of(rotation).inputs}
     moments = 2 if filters.window.gyro is None else 1
-    shifts = tuple(
-        fractions[m] + samples.format.fraction - inputs[f"legendre_{m}"].format.fraction for m in sums
-    )
 
     def integers(groups: Sequence[Rows]) -> tuple[tuple[Integers, ...], ...]:
         return tuple(tuple(rounded(group[m], fractions[m], moments) for m in sums) for group in groups)
 
     restoration = filters.restoration
-    bits = _fraction(restoration, limit)
+    bits = _fraction(restoration, samples.high)
     fixed = FixedFilters(
-        limit,
+        samples.high,
         samples.format.fraction,
         sums,
         integers(filters.sets),
         integers(filters.short),
-        shifts,
+        tuple(fractions[m] + samples.format.fraction - inputs[f"legendre_{m}"].format.fraction for m in sums),
         (rounded(restoration.lost, bits, 1), rounded(restoration.merged, bits, 1)),
         bits,
     )
     _require_room(fixed, inputs)
-    companions = generated_sources.program(choices[0]).companions
-    assert companions is not None
-    assert companions.truncation is not None, "the rotation is a series"
     error = commit_late_bounds.now_error(
         filters,
         fixed,
         generated_sources.program(choices[1]),
         interface_of(rotation),
-        companions.truncation,
+        _truncation(choices[0]),
     )
     return (step, rotation, normalization), replace(fixed, now_error=error)
+
+
+def _of_rotation(filters: LateFilters, interface: Interface, sums: range) -> Settings:
+    """Return the settings of the step from Legendre coefficients: it takes any sums, and samples in their format."""
+    state, samples = interface.inputs
+    size = samples.high * samples.unit
+    largest = {
+        m: max(sum(map(abs, row[m]), Fraction(0)) for row in (*filters.sets, *filters.short)) * size * _SPARE
+        for m in sums
+    }
+    formats = {"state": str(state.format), "next": str(state.format)}
+    if sums.start:
+        formats["legendre_0"] = str(samples.format)
+        largest[0] = size
+    ranges = {f"legendre_{m}": largest[m] for m in sorted(largest)}
+    return replace(interface.settings, carry="none", ranges=ranges, formats=formats)
+
+
+def _truncation(step: Choice) -> Truncation:
+    """Return what the series of the rotation of a step leaves out."""
+    kernels = generated_sources.program(step).companions
+    assert kernels is not None
+    assert kernels.truncation is not None, "the rotation is a series"
+    return kernels.truncation
 
 
 #: What rounding may add to a sum.
