@@ -43,8 +43,14 @@ def functions(
     Raises
     ------
     InputError
-        If the settings have other words, counts of a gyro, a state that saturates, or ranges or formats.
+        If the rotation is exact, or the settings have other words, counts of a gyro, a state that saturates, or
+        ranges or formats.
     """
+    if filters.exact:
+        raise InputError(
+            f"the rotation of {filters.window.name} is exact; in fixed point only that to fourth order can be "
+            "committed late"
+        )
     if settings.word != WORD:
         raise InputError(f"word is {settings.word}; words of {WORD} bits commit late")
     if settings.input_bits is not None or settings.state or settings.ranges or settings.formats:

@@ -79,7 +79,7 @@ def kernels(filters: LateFilters, algorithm: str) -> tuple[Choice, Choice, Choic
     checks.choice("algorithm", algorithm, NORMALIZATIONS)
     return (
         choose_step(algorithm, filters.window),
-        Choice(f"{algorithm}-legendre-{filters.degree}"),
+        Choice(f"{algorithm}-legendre-{'exact-' if filters.exact else ''}{filters.degree}"),
         Choice(NORMALIZATIONS[algorithm]),
     )
 
