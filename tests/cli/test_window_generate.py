@@ -9,11 +9,13 @@ from fractions import Fraction
 
 import pytest
 
+import strapgen
 from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.catalogue.methods.windows import WINDOWS
 from strapgen.cli import main
 from strapgen.design import family_file
 from strapgen.library.commit_late_sources import sources
+from strapgen.library.generated_files import command_of
 
 
 @pytest.fixture
@@ -84,6 +86,7 @@ def test_filters_for_a_gyro_are_refused_at_another_rate(run, tmp_path):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
+        ("window-3-3 --target c-fixed --word 16", "words of 32 bits"),
         ("window-3-4", "window 'window-3-4' is not known"),
         ("window-4-2", "whole family"),
         ("window-3-3 --algorithm quaternion", "algorithm 'quaternion'"),
@@ -98,3 +101,34 @@ def test_wrong_options_are_refused_in_one_line(options, message, run, tmp_path):
     assert (status, said) == (2, "")
     assert message in warned and warned.count("\n") == 1
     assert not (tmp_path / "out").exists()
+
+
+def test_fixed_point_has_its_options_in_the_command(run, tmp_path):
+    options = "--target c-fixed --max-rate-deg-s 400 --sample-hz 100 --carry full"
+    status, said, _ = run(f"window generate window-3-3 {options} --out out")
+    assert status == 0
+    assert "out/euler_late_3_3_w32.h" in said
+    header = (tmp_path / "out" / "euler_late_3_3_w32.h").read_text()
+    assert command_of(header) == (
+        "strapgen window generate window-3-3 --algorithm euler --target c-fixed --word 32 --max-rate-deg-s 400 "
+        "--sample-hz 100 --rounding nearest --carry full --drift-allowance 1/16"
+    )
+    # The command of the header writes the same files.
+    again = command_of(header).removeprefix("strapgen ")
+    assert run(f"{again} --out out --check")[:2] == (0, "")
+    status, said, warned = run("window generate window-3-3 --carry full --out other")
+    assert (status, said) == (2, "")
+    assert "c-fixed" in warned
+
+
+def test_a_window_runs_over_a_recording_from_end_to_end(run, tmp_path):
+    row = strapgen.motion("random", rate_deg_s=200).samples(Fraction(1, 100), 0, 20)
+    lines = [f"{0.01 * (k + 1):.2f},{','.join(map(repr, sample.tolist()))}" for k, sample in enumerate(row)]
+    (tmp_path / "log.csv").write_text("\n".join(["t,dx,dy,dz", *lines]))
+    command = "simulate euler --method window-3-3 --increments-csv log.csv --backend numpy --format json"
+    status, said, warned = run(command)
+    assert status == 0, warned
+    data = json.loads(said)
+    times = data["time_s"]
+    assert len(times) == 21
+    assert times[-1] - times[0] == pytest.approx(0.2)

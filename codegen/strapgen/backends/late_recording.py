@@ -14,6 +14,7 @@ import numpy as np
 from strapgen.backends import backend as attitude_backend
 from strapgen.backends import evaluator
 from strapgen.backends.evaluators import Array, Evaluator
+from strapgen.backends.increments import StepWindows
 from strapgen.backends.late_unit import GapError, SampleKind, refusal
 from strapgen.catalogue.methods.late_filters import NEXT, SHORT, LateFilters, short_place
 from strapgen.catalogue.methods.lost_samples import REACH
@@ -83,22 +84,25 @@ def recording_attitudes(
     turn = evaluator(rotation, backend)
     start = loop.identity if initial is None else initial
     start = checks.real_array("initial", start, loop.identity.shape, loop.dtype)
-    states = [start]
     if len(row) < filters.samples:
+        few = [start]
         for place in range(len(row)):
-            states.append(turn(states[-1], *_few(row, place, filters)))
-        return np.stack(states)
-    previous, ahead = filters.window.previous, filters.window.ahead
+            few.append(turn(few[-1], *_few(row, place, filters)))
+        return np.stack(few)
+    previous, ahead, count = filters.window.previous, filters.window.ahead, filters.samples
+    first = [start]
     for place in range(previous):
-        states.append(_turned(turn, states[-1], row[: filters.samples], place, filters))
-    inside = np.lib.stride_tricks.sliding_window_view(row, filters.samples, axis=0)
-    states += list(loop.propagate(np.moveaxis(inside, -1, 1), initial=states[-1])[1:])
-    for place in range(filters.samples - ahead, filters.samples):
-        states.append(_turned(turn, states[-1], row[-filters.samples :], place, filters))
+        first.append(_turned(turn, first[-1], row[:count], place, filters))
+    part = StepWindows(lambda begin, stop: row[begin:stop], 1, previous + ahead)
+    inside = loop.propagate_parts(part, len(row) - previous - ahead)
+    inside = evaluator(f"{algorithm}-product", backend)(first[-1], inside)
+    last = [inside[-1]]
+    for place in range(count - ahead, count):
+        last.append(_turned(turn, last[-1], row[-count:], place, filters))
+    states: Array = np.concatenate([np.stack(first[:-1] or [start])[:previous], inside, np.stack(last)[1:]])
     # Rounding alone takes the states off their constraint, so that it can be taken out of each by itself.
-    result = np.stack(states)
-    result[1:] = evaluator(normalization, backend)(result[1:])
-    return result
+    states[1:] = evaluator(normalization, backend)(states[1:])
+    return states
 
 
 def _turned(turn: Evaluator, state: Array, samples: Array, place: int, filters: LateFilters) -> Array:

@@ -44,7 +44,7 @@ def generate(
     ] = None,
     fixed: Annotated[
         FixedOptions,
-        Shown(only=("max_rate_deg_s", "max_angle_rad", "rounding", "carry", "drift_allowance")),
+        Shown(only=("word", "max_rate_deg_s", "max_angle_rad", "rounding", "carry", "drift_allowance")),
     ],
     output: Annotated[SourceOptions, Shown(only=("out", "name", "check", "force"))],
     format: Format = "text",
