@@ -16,7 +16,8 @@ from strapgen.backends.late_unit import GapError, SampleKind
 from strapgen.catalogue.methods.late_filters import LateFilters, polynomial
 from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.catalogue.methods.windows import WINDOWS
-from strapgen.library.commit_late_sources import sources
+from strapgen.ir.fixed_settings import Settings
+from strapgen.library.commit_late_sources import family, parts, sources
 from strapgen.simulation.runs import drift_between
 from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.toolchain import compiler
@@ -286,7 +287,8 @@ def test_samples_and_attitudes_are_finite_numbers_of_their_shape(sample):
         (("window-2-2",), "window is 'window-2-2'"),
         ((WINDOW, "cayley-klein"), "algorithm"),
         (("window-4-2",), "whole family"),
-        ((WINDOW, "euler", "exact"), "only numpy, c and c-float"),
+        (("window-9-9", "euler", "c-fixed32"), "only that to fourth order"),
+        ((WINDOW, "euler", "exact"), "these commit late: numpy, c, c-float, c-fixed32"),
     ],
 )
 def test_unknown_names_are_refused(arguments, reason):
@@ -391,3 +393,132 @@ def test_attitudes_are_as_accurate_as_published(name, settings, largest, largest
     current = drift_between(matrices[1], true[8:])
     assert np.linalg.norm(late, axis=1).max() == pytest.approx(largest, rel=0.1)
     assert np.linalg.norm(current, axis=1).max() == pytest.approx(largest_now, rel=0.1)
+
+
+# Fixed point
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "carry"),
+    [
+        ("euler", "full"),
+        pytest.param("euler", "none", marks=pytest.mark.long),
+        pytest.param("dcm", "full", marks=pytest.mark.long),
+    ],
+)
+def test_c_on_integers_has_the_bits_of_the_model(algorithm, carry):
+    settings = Settings(carry=carry)
+    model, c = (
+        CommitLate(WINDOW, algorithm, name, settings=settings) for name in ("fixed-model", "c-fixed32")
+    )
+    increments = samples(60)
+    kinds = {9: LOST, 25: LOST, 26: MERGED, 40: LOST, 56: LOST}
+    for number, sample in enumerate(increments):
+        if number == 33:
+            start = model.attitude.T if algorithm == "dcm" else model.attitude * [-1, -1, -1, 1]
+            model.reset(start)
+            c.reset(start)
+        if number == 45:
+            assert model.flush() == c.flush() > 0
+        kind = kinds.get(number, GOOD)
+        value = sample + increments[number - 1] if kind == MERGED else sample
+        assert model.push(value, kind) == c.push(value, kind)
+        np.testing.assert_array_equal(model.attitude, c.attitude)
+        np.testing.assert_array_equal(model.now(), c.now())
+
+
+@pytest.mark.long
+def test_normalizations_on_the_way_are_those_of_the_model():
+    settings = Settings(carry="state")
+    model, c = (CommitLate(WINDOW, "euler", name, settings=settings) for name in ("fixed-model", "c-fixed32"))
+    for sample in np.tile(samples(60), (36, 1)):
+        assert model.push(sample) == c.push(sample)
+    np.testing.assert_array_equal(model.attitude, c.attitude)
+    assert abs(np.linalg.norm(c.attitude) - 1) < 1e-8
+
+
+@pytest.mark.parametrize("backend", ["c-fixed32", "fixed-model"])
+def test_samples_and_states_outside_their_ranges_are_refused(backend):
+    unit = CommitLate(WINDOW, backend=backend)
+    for sample in samples(20):
+        unit.push(sample)
+    before = unit.now()
+    with pytest.raises(InputError, match="sample holds 0"):
+        unit.push([0.0, 0.126, 0.0])
+    unit.push([0.0, 0.0, 0.0], LOST)
+    unit.push([0.0, 0.2, 0.0], MERGED)
+    with pytest.raises(InputError, match="attitude"):
+        unit.reset([0.0, 0.0, 0.0, 1.2])
+    assert unit.pending == L + 2
+    assert not np.array_equal(unit.now(), before)
+
+
+def test_c_on_integers_refuses_what_its_header_says():
+    module = compiler.load(sources(WINDOW, "euler", "c-fixed"))
+    ffi, lib = module.ffi, module.lib
+    memory, sample = ffi.new("euler_late_3_3_w32_memory *"), ffi.new("int32_t[3]")
+    state = ffi.new("int32_t[4]", [0, 0, 0, 1 << 30])
+    lib.euler_late_3_3_w32_init(memory)
+    for _ in range(20):
+        assert lib.euler_late_3_3_w32_push(memory, sample, 0) >= 0
+    before = bytes(ffi.buffer(memory))
+    sample[1] = (1 << 29) + 1
+    assert lib.euler_late_3_3_w32_push(memory, sample, 0) == -1
+    sample[1] = -sample[1]
+    assert lib.euler_late_3_3_w32_push(memory, sample, 0) == -1
+    assert bytes(ffi.buffer(memory)) == before
+    sample[1] = 1 << 29
+    # A state that no step takes: samples are held until there is no room, and a reset lets them go.
+    assert lib.euler_late_3_3_w32_reset(memory, ffi.new("int32_t[4]", [0, 0, 0, 2**31 - 1])) == 0
+    assert [lib.euler_late_3_3_w32_push(memory, sample, 0) for _ in range(20)] == [-2] * 20
+    assert memory.pending == 17
+    assert lib.euler_late_3_3_w32_now(memory, state) == lib.euler_late_3_3_w32_flush(memory) == -2
+    assert list(state) == [0, 0, 0, 1 << 30]
+    assert lib.euler_late_3_3_w32_reset(memory, state) == 0
+    assert lib.euler_late_3_3_w32_flush(memory) == 17
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "window"),
+    [
+        ("euler", WINDOW),
+        pytest.param("dcm", WINDOW, marks=pytest.mark.long),
+        pytest.param("euler", "window-7-7", marks=pytest.mark.long),
+    ],
+)
+def test_the_attitude_of_now_stays_within_its_certified_bound(algorithm, window):
+    """Against double precision from the same integers, on samples that are drawn and on those of motions."""
+    filters = family(window)
+    bound = float(parts(filters, algorithm, "c-fixed", Settings(carry="full")).fixed.now_error)
+    fixed = CommitLate(window, algorithm, "c-fixed32", settings=Settings(carry="full"))
+    double = CommitLate(window, algorithm, "c")
+    drawn = np.random.default_rng(7).uniform(-0.125, 0.125, (300, 3))
+    largest = 0.0
+    for sample in np.concatenate([drawn, np.sign(drawn) / 8, samples(200) / 2]):
+        rounded = np.rint(np.ldexp(sample, 32)) / 2.0**32
+        fixed.push(rounded)
+        double.push(rounded)
+        if fixed.pending == filters.window.ahead:
+            double.reset(fixed.attitude)
+            difference = (fixed.now() - double.now()).reshape(-1, 3 if algorithm == "dcm" else 4)
+            largest = max(largest, np.linalg.norm(difference, axis=1).max())
+    assert bound / 200 < largest < bound
+
+
+@pytest.mark.long
+def test_the_exact_rotation_is_committed_late_too():
+    """Its errors of now are those of its filters; committed, it is the best of the catalogue."""
+    motion = strapgen.motion("random", rate_deg_s=200)
+    increments, true = motion.samples(Fraction(1, 100), 0, 1000), motion.attitude(np.arange(1001) / 100)
+    unit, python = (CommitLate("window-9-9", backend=name) for name in ("c", "numpy"))
+    start = Rotation.from_matrix(true[0]).as_quat()
+    unit.reset(start)
+    python.reset(start)
+    for number, sample in enumerate(increments):
+        assert unit.push(sample) == (0 if number < 18 else 10 if number == 18 else 1)
+        if number < 40:
+            python.push(sample)
+            np.testing.assert_array_equal(unit.now(), python.now())
+    # The start is committed with one-sided filters, whose errors stay.
+    error = drift_between(Rotation.from_quat(unit.attitude).as_matrix(), true[991])
+    assert np.linalg.norm(error) < 1e-7

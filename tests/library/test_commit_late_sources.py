@@ -12,6 +12,7 @@ from c_programs import complaints, needed, written
 from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.catalogue.methods.windows import WINDOWS
 from strapgen.evidence import style
+from strapgen.ir.fixed_settings import Settings
 from strapgen.library.commit_late_sources import NORMALIZATIONS, TARGETS, family, kernels, sources
 from strapgen.library.generated_files import command_of
 from strapgen.library.generated_sources import program
@@ -25,7 +26,7 @@ UNITS = [(a, t) for a in NORMALIZATIONS for t in TARGETS]
 @pytest.mark.parametrize(("algorithm", "target"), UNITS)
 def test_files_are_narrow_plain_text_that_says_its_command(algorithm, target):
     unit = sources(WINDOW, algorithm, target)
-    ending = {"c": "", "c-float": "_float"}[target]
+    ending = {"c": "", "c-float": "_float", "c-fixed": "_w32"}[target]
     name = f"{algorithm}_late_3_3{ending}"
     assert unit.function.name == name
     assert list(unit.files)[:2] == [f"{name}.h", f"{name}.c"]
@@ -34,11 +35,13 @@ def test_files_are_narrow_plain_text_that_says_its_command(algorithm, target):
         assert text.isascii()
         assert all(line == line.rstrip() and len(line) < 100 for line in text.splitlines()), file
     for file in (f"{name}.h", f"{name}.c"):
+        fixed = " --word 32 --max-angle-rad 1/8 --rounding nearest --carry none --drift-allowance 1/16"
         assert command_of(unit.files[file]) == (
             f"strapgen window generate window-3-3 --algorithm {algorithm} --target {target}"
+            + (fixed if target == "c-fixed" else "")
         )
     externals = re.findall(rf"\b{name}_[a-z]+\b", unit.files[f"{name}.h"])
-    assert len(set(externals)) == 6
+    assert len(set(externals)) >= 6
     assert max(map(len, externals)) <= 31
     assert sources(WINDOW, algorithm, target).files == unit.files
 
@@ -47,14 +50,14 @@ def test_files_are_narrow_plain_text_that_says_its_command(algorithm, target):
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 def test_compilers_do_not_complain(algorithm, target, compiler, tmp_path):
     needed(compiler)
-    files = (
-        sources(WINDOW, algorithm, target).files | sources(GYRO, algorithm, target, 100, "gyro_late").files
-    )
-    written(tmp_path, files)
-    code = [name for name in files if name.endswith(".c")]
-    assert complaints(compiler, tmp_path, code) == ""
-    if compiler == "clang":
-        assert style.found_by_clang(tmp_path) == []
+    settings = Settings(carry="full") if target == "c-fixed" else None
+    gyro = sources(GYRO, algorithm, target, 100, "gyro_late", settings)
+    for folder, unit in (("ideal", sources(WINDOW, algorithm, target)), ("gyro", gyro)):
+        place = written(tmp_path, {f"{folder}/{name}": text for name, text in unit.files.items()}) / folder
+        code = [name for name in unit.files if name.endswith(".c")]
+        assert complaints(compiler, place, code) == ""
+        if compiler == "clang":
+            assert style.found_by_clang(place) == []
 
 
 def test_the_header_counts_operations_and_memory():

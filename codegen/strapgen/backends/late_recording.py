@@ -73,8 +73,7 @@ def recording_attitudes(
            [0.      , 0.      , 0.707107, 0.707107]])
     """
     filters = commit_late_sources.family(window, sample_hz)
-    names = ("numpy", *commit_late_sources.TARGETS)
-    checks.choice("backend", backend, dict.fromkeys(names))
+    checks.choice("backend", backend, ("numpy", "c", "c-float"))
     row = checks.real_array("increments", increments, (3,))
     if row.ndim != 2:
         raise InputError(f"increments has shape {row.shape}; (N, 3) is needed")

@@ -84,11 +84,7 @@ class LateUnit:
         self._normalization = of_sources(sources.normalization)
         self._sets = [_table(rows) for rows in self.filters.sets]
         self._short = [_table(rows) for rows in self.filters.short]
-        restoration = self.filters.restoration
-        self._restoring = {
-            False: _table([restoration.lost])[0],
-            True: _table([restoration.merged])[0],
-        }
+        self._restoring = _table(self.filters.restoration)
         self._next = _table([NEXT])[0]
         self._ideal = self.filters.window.gyro is None
         size = self._step.function.inputs[0].size
@@ -122,7 +118,8 @@ class LateUnit:
         elif self._gap:
             self._gap += 1
             if kind == SampleKind.MERGED:
-                sample, self._merged = sample - self._samples[-1], True
+                self._samples[-1], sample = self._split(sample, self._samples[-1])
+                self._merged = True
         self._samples = np.concatenate([self._samples[1 - self.filters.capacity :], sample[None]])
         self.pending += 1
         if self._gap > REACH:
@@ -156,20 +153,33 @@ class LateUnit:
         """Put the lost sample in place of its estimate, and take it out of the sum where there is one."""
         around = self._samples[-2 * REACH - 1 :]
         both = around[REACH] + around[REACH + 1]
-        around[REACH] = _weighted(self._restoring[self._merged], around)
+        around[REACH] = self._restored(around)
         if self._merged:
-            around[REACH + 1] = both - around[REACH]
+            around[REACH], around[REACH + 1] = self._split(both, around[REACH])
         self._gap, self._merged = 0, False
+
+    def _restored(self, around: Array) -> Array:
+        """Return the lost sample in the middle of others."""
+        return _weighted(self._restoring[int(self._merged)], around)
+
+    def _split(self, both: Array, lost: Array) -> tuple[Array, Array]:
+        """Return a lost sample and the next one, whose sum is known."""
+        return lost, both - lost
 
     def _commit(self, count: int) -> int:
         """Commit the oldest intervals that are not."""
         self.committed = []
         for _ in range(count):
             advanced = self._advanced(self.attitude, len(self._samples) - self.pending)
-            self.attitude = self._normalization(advanced)
             self.pending -= 1
+            self.attitude = self._normalized(advanced)
             self.committed.append(self.attitude)
         return count
+
+    def _normalized(self, attitude: Array) -> Array:
+        """Return a committed attitude without its rounding."""
+        result: Array = self._normalization(attitude)
+        return result
 
     def _advanced(self, attitude: Array, place: int) -> Array:
         """Return an attitude after the interval of the sample at a place, with the samples that are there."""
@@ -178,19 +188,24 @@ class LateUnit:
         if count < self.filters.samples:
             width = min(count, SHORT)
             first = min(max(place - 1, 0), count - width)
-            return self._rotated(attitude, self._short[short_place(width, place - first)], first, place)
+            rows = self._short[short_place(width, place - first)]
+            return self._rotated(attitude, rows, self._samples[first : first + width], place)
         if place >= window.previous and after >= window.ahead:
             samples = self._samples[place - window.previous : place + window.ahead + 1]
-            result: Array = self._step(attitude, samples)
-            return result
+            return self._stepped(attitude, samples)
         before = place if after > window.ahead else self.filters.samples - 1 - after
-        return self._rotated(attitude, self._sets[before], place - before, place)
+        samples = self._samples[place - before : place - before + self.filters.samples]
+        return self._rotated(attitude, self._sets[before], samples, place)
 
-    def _rotated(self, attitude: Array, rows: Array, first: int, place: int) -> Array:
-        """Return an attitude after an interval, by filters on samples from the first one on."""
-        samples = self._samples[first : first + rows.shape[1]]
-        first_row = self._samples[place] if self._ideal else _weighted(rows[0], samples)
-        coefficients = [first_row, *(_weighted(taps, samples) for taps in rows[1:])]
+    def _stepped(self, attitude: Array, samples: Array) -> Array:
+        """Return an attitude after an interval with all samples ahead."""
+        result: Array = self._step(attitude, samples)
+        return result
+
+    def _rotated(self, attitude: Array, rows: Array, samples: Array, place: int) -> Array:
+        """Return an attitude after an interval, by filters on samples."""
+        rate = self._samples[place] if self._ideal else _weighted(rows[0], samples)
+        coefficients = [rate, *(_weighted(taps, samples) for taps in rows[1:])]
         result: Array = self._rotation(attitude, *coefficients)
         return result
 

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from strapgen.catalogue.methods.shaped_coning import SHAPE_TITLES
 from strapgen.catalogue.methods.tableaux import TITLES
-from strapgen.catalogue.methods.windows import WINDOW_TITLES
+from strapgen.catalogue.methods.windows import EXACT_TERMS, WINDOW_TITLES
 
 #: Attitude algorithms, by the state they integrate.
 ALGORITHMS = {
@@ -123,8 +123,8 @@ class Recipe(NamedTuple):
     standard: bool = True
 
 
-#: Degrees of the rate for which there are steps from its Legendre coefficients.
-LEGENDRE_DEGREES = range(1, 5)
+#: Degrees of the rate for which there are steps from its Legendre coefficients: to fourth order, and exact.
+LEGENDRE_DEGREES, EXACT_DEGREES = range(1, 5), range(1, 9)
 
 #: Orders at which the series of an update can be cut off.
 UPDATE_ORDERS = range(1, 21)
@@ -249,15 +249,17 @@ KERNELS = {
         for algorithm, title in ALGORITHMS.items()
     },
     **{
-        f"{name}-legendre-{degree}": Recipe(
-            f"{ALGORITHMS[name]}: step from the Legendre coefficients of the rate to degree {degree}",
+        f"{name}-legendre-{exact}{degree}": Recipe(
+            f"{ALGORITHMS[name]}: step from the Legendre coefficients of the rate to degree {degree}"
+            + (", exact rotation" if exact else ""),
             "legendre_step",
             "step",
-            (name, degree),
+            (name, degree, EXACT_TERMS) if exact else (name, degree),
             False,
         )
         for name in ("dcm", "euler")
-        for degree in LEGENDRE_DEGREES
+        for exact, degrees in (("", LEGENDRE_DEGREES), ("exact-", EXACT_DEGREES))
+        for degree in degrees
     },
     "dcm-orthonormalize": Recipe(
         "orthonormalization by dual rows, the thesis's scheme", "orthonormal", "dcm"

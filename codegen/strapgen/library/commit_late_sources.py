@@ -7,19 +7,24 @@ import shlex
 from dataclasses import dataclass
 from fractions import Fraction
 
+from strapgen import targets
 from strapgen.catalogue import Choice, choose_step
 from strapgen.catalogue.methods.late_filters import LateFilters
 from strapgen.catalogue.methods.window import Window
 from strapgen.catalogue.methods.windows import named_window
+from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
-from strapgen.library import generated_sources
+from strapgen.library import commit_late_fixed, generated_sources
+from strapgen.library.commit_late_fixed import WORD
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
+from strapgen.targets import BUILT_IN, contract
 from strapgen.targets.c.emit import real_of
 from strapgen.targets.commit_late_c.emit import whole
+from strapgen.targets.commit_late_c.fixed_filters import FixedFilters
 
 #: Kinds of C that commit late.
-TARGETS = ("c", "c-float")
+TARGETS = ("c", "c-float", "c-fixed")
 #: Most characters that names begin with: C99 tells external names apart by 31, and ``_memory`` comes behind.
 MOST_CHARACTERS = 24
 _TITLES = {"dcm": "Direction cosine matrix", "euler": "Euler parameters"}
@@ -41,15 +46,15 @@ class LateSources:
         The step from Legendre coefficients, which all other filters share.
     normalization : Sources
         Removes rounding from a committed attitude.
-    whole : Sources or None
-        C of all of it; None where the functions are called from Python.
+    fixed : FixedFilters or None
+        The taps as integers, in fixed point.
     """
 
     filters: LateFilters
     step: Sources
     rotation: Sources
     normalization: Sources
-    whole: Sources | None = None
+    fixed: FixedFilters | None = None
 
 
 def kernels(filters: LateFilters, algorithm: str) -> tuple[Choice, Choice, Choice]:
@@ -74,7 +79,7 @@ def kernels(filters: LateFilters, algorithm: str) -> tuple[Choice, Choice, Choic
     checks.choice("algorithm", algorithm, NORMALIZATIONS)
     return (
         choose_step(algorithm, filters.window),
-        Choice(f"{algorithm}-legendre-{filters.degree}"),
+        Choice(f"{algorithm}-legendre-{'exact-' if filters.exact else ''}{filters.degree}"),
         Choice(NORMALIZATIONS[algorithm]),
     )
 
@@ -115,7 +120,7 @@ def family(window: str | Window, sample_hz: float | str | Fraction | None = None
     return LateFilters(chosen)
 
 
-def parts(filters: LateFilters, algorithm: str, target: str) -> LateSources:
+def parts(filters: LateFilters, algorithm: str, target: str, settings: Settings | None = None) -> LateSources:
     """Return the generated functions with their filters.
 
     Parameters
@@ -124,16 +129,21 @@ def parts(filters: LateFilters, algorithm: str, target: str) -> LateSources:
     algorithm : str
         A key of `NORMALIZATIONS`.
     target : str
-        A key of `strapgen.targets.TARGETS` in floating point.
+        A key of `strapgen.targets.TARGETS`.
+    settings : Settings, optional
+        Of fixed point.
 
     Raises
     ------
     InputError
-        If a name is unknown.
+        If a name is unknown, or the settings do not go with the target.
     """
-    step, rotation, normalization = (
-        generated_sources.sources(choice, target) for choice in kernels(filters, algorithm)
-    )
+    choices = kernels(filters, algorithm)
+    targets.require(target, settings)
+    if targets.TARGETS[target].fixed:
+        functions, fixed = commit_late_fixed.functions(filters, choices, target, settings or Settings())
+        return LateSources(filters, *functions, fixed)
+    step, rotation, normalization = (generated_sources.sources(choice, target) for choice in choices)
     return LateSources(filters, step, rotation, normalization)
 
 
@@ -143,6 +153,7 @@ def sources(
     target: str = "c",
     sample_hz: float | str | Fraction | None = None,
     name: str | None = None,
+    settings: Settings | None = None,
 ) -> Sources:
     """Return the C that commits an attitude late and answers it now.
 
@@ -153,9 +164,11 @@ def sources(
     algorithm : str, optional
         A key of `NORMALIZATIONS`.
     target : str, optional
-        "c" or "c-float".
+        "c", "c-float" or "c-fixed".
     name : str, optional
         What the names of functions and files begin with; by default it follows from algorithm and window.
+    settings : Settings, optional
+        Of fixed point, with words of 32 bits; by default increments are up to 1/8 rad.
 
     Returns
     -------
@@ -173,25 +186,24 @@ def sources(
     """
     checks.choice("target", target, TARGETS)
     filters = family(window, sample_hz)
-    late = parts(filters, algorithm, target)
+    late = parts(filters, algorithm, target, settings)
     chosen = filters.window
     command = ["strapgen", "window", "generate", chosen.file or chosen.name]
     command += ["--algorithm", algorithm, "--target", target]
-    command += [] if sample_hz is None else ["--sample-hz", str(sample_hz)]
+    stated = settings is not None and "--sample-hz" in settings.stated
+    command += [] if sample_hz is None or stated else ["--sample-hz", str(sample_hz)]
     command += [] if name is None else ["--name", name]
     title = f"{_TITLES[algorithm]}, committed late and answered now: {chosen.title}"
-    return whole(
-        _identifier(chosen, algorithm, target, name),
-        title,
-        shlex.join(command),
-        filters,
-        (late.step, late.rotation, late.normalization),
-    )
+    text = shlex.join(command)
+    if late.step.fixed is not None:
+        text += f" {contract.options(late.step.fixed.settings, late.step.function.inputs)}"
+    functions = late.step, late.rotation, late.normalization
+    return whole(_identifier(chosen, algorithm, target, name), title, text, filters, functions, late.fixed)
 
 
 def _identifier(window: Window, algorithm: str, target: str, name: str | None) -> str:
     """Return what the names of functions and files begin with."""
-    infix = real_of(target).infix
+    infix = f"_w{WORD}" if BUILT_IN[target].fixed else real_of(target).infix
     default = f"{algorithm}_late_{window.name.removeprefix('window-')}".replace("-", "_") + infix
     identifier = default if name is None else name
     if name is not None and not re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII):

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated
 
 import typer
 
 from strapgen.cli.commands.window import app
+from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.help import PlainCommand
 from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import option
@@ -29,17 +31,21 @@ def generate(
     ] = "euler",
     target: Annotated[
         str,
-        option("--target", metavar="NAME", help="Kind of code: c or c-float.", panel="Algorithm"),
+        option("--target", metavar="NAME", help="Kind of code: c, c-float or c-fixed.", panel="Algorithm"),
     ] = "c",
     sample_hz: Annotated[
         str | None,
         option(
             "--sample-hz",
             metavar="HZ",
-            help="Samples of the gyro in a second; filters that are designed for a gyro need it.",
+            help="Samples of the gyro in a second: filters for a gyro need it, and --max-rate-deg-s does.",
             panel="Algorithm",
         ),
     ] = None,
+    fixed: Annotated[
+        FixedOptions,
+        Shown(only=("max_rate_deg_s", "max_angle_rad", "rounding", "carry", "drift_allowance")),
+    ],
     output: Annotated[SourceOptions, Shown(only=("out", "name", "check", "force"))],
     format: Format = "text",
 ) -> None:
@@ -53,8 +59,11 @@ def generate(
     check_format(format)
     from strapgen.library import commit_late_sources
 
+    rated = sample_hz if fixed.max_rate_deg_s is not None else None
+    settings = replace(fixed, sample_hz=rated).settings(1)
     with waiting("generating"):
-        sources = commit_late_sources.sources(window_of(window), algorithm, target, sample_hz, output.name)
+        family = window_of(window)
+        sources = commit_late_sources.sources(family, algorithm, target, sample_hz, output.name, settings)
     files = sources.step_files
     if output.check:
         difference = output.compare(files)
