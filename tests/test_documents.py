@@ -235,6 +235,10 @@ def test_the_python_of_a_page(page, monkeypatch):
 LONG_COMMANDS = (
     "strapgen check ",
     "strapgen compare ",
+    "strapgen cost ",
+    "strapgen frontier ",
+    "strapgen generate euler --method window",
+    "strapgen window ",
     "strapgen converge euler --method rk1,rk2,rk4,butcher6",
     "strapgen derive dcm --method butcher6",
     "strapgen evidence ",

@@ -11,7 +11,7 @@
  * Operations of one call: 21 add, 21 multiply, 3 negate; 6 temporaries.
  * Rounding: against exact arithmetic on the same inputs, next is off by at most 5.62051e-16,
  *     2.53125 units in the last place of 1; the row of the error after N steps is at most
- *     9.735e-16 N exp(0.414214 N) long. This holds for state up to 1.0625; increments up to
+ *     9.735e-16 N exp(0.331774 N) long. This holds for state up to 1.0625; increments up to
  *     0.125; IEEE 754, each operation rounded to the nearest; -ffp-contract=off.
  *
  * No heap, no global state, reentrant. In one call every input is read before any output is

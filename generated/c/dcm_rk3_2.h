@@ -11,7 +11,7 @@
  * Operations of one call: 66 add, 76 multiply; 42 temporaries.
  * Rounding: against exact arithmetic on the same inputs, next is off by at most 1.13936e-15,
  *     5.13119 units in the last place of 1; the row of the error after N steps is at most
- *     1.9419e-15 N exp(0.199827 N) long. This holds for state up to 1.0625; increments up to
+ *     1.9419e-15 N exp(0.00179873 N) long. This holds for state up to 1.0625; increments up to
  *     0.125; IEEE 754, each operation rounded to the nearest; -ffp-contract=off.
  *
  * No heap, no global state, reentrant. In one call every input is read before any output is

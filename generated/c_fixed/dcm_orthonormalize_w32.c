@@ -146,17 +146,17 @@ int dcm_orthonormalize_w32(const int32_t computed[9], int32_t orthonormalized[9]
         dcm_orthonormalize_w32_sqr(row_1_x), 1)
         + dcm_orthonormalize_w32_shr(dcm_orthonormalize_w32_sqr(row_1_y), 1)
         + dcm_orthonormalize_w32_shr(dcm_orthonormalize_w32_sqr(row_1_z), 1);
-        /* Q6.57, 2 .. 8, error 1.9e-08 */
+        /* Q6.57, 2 .. 8, error 1.6e-08 */
     if ((inverse_length_1_radicand < INT64_C(288230378825580548))
         || (inverse_length_1_radicand > INT64_C(1152921501932978172))) {
         return 2;
     }
     const int32_t inverse_length_1_root = dcm_orthonormalize_w32_rt(inverse_length_1_radicand
-        * 2); /* Q2.29, 1.41 .. 2.83, error 7.5e-09 */
+        * 2); /* Q2.29, 1.41 .. 2.83, error 6.6e-09 */
     /* 1/|row 1| */
     const int32_t inverse_length_1 = dcm_orthonormalize_w32_fit(dcm_orthonormalize_w32_div(
         (INT64_C(1) << 60), inverse_length_1_root), 0);
-        /* Q0.31, 0.353 .. 0.708, error 4e-09 */
+        /* Q0.31, 0.353 .. 0.708, error 3.5e-09 */
     /* row 2 and its dual, added */
     const int32_t row_2_x = dcm_orthonormalize_w32_fit((int64_t)C_21 * (INT32_C(1) << 30)
         - dcm_orthonormalize_w32_mul(C_12, C_33) + dcm_orthonormalize_w32_mul(C_13, C_32)
@@ -171,17 +171,17 @@ int dcm_orthonormalize_w32(const int32_t computed[9], int32_t orthonormalized[9]
         dcm_orthonormalize_w32_sqr(row_2_x), 1)
         + dcm_orthonormalize_w32_shr(dcm_orthonormalize_w32_sqr(row_2_y), 1)
         + dcm_orthonormalize_w32_shr(dcm_orthonormalize_w32_sqr(row_2_z), 1);
-        /* Q6.57, 2 .. 8, error 1.9e-08 */
+        /* Q6.57, 2 .. 8, error 1.6e-08 */
     if ((inverse_length_2_radicand < INT64_C(288230378825580548))
         || (inverse_length_2_radicand > INT64_C(1152921501932978172))) {
         return 2;
     }
     const int32_t inverse_length_2_root = dcm_orthonormalize_w32_rt(inverse_length_2_radicand
-        * 2); /* Q2.29, 1.41 .. 2.83, error 7.5e-09 */
+        * 2); /* Q2.29, 1.41 .. 2.83, error 6.6e-09 */
     /* 1/|row 2| */
     const int32_t inverse_length_2 = dcm_orthonormalize_w32_fit(dcm_orthonormalize_w32_div(
         (INT64_C(1) << 60), inverse_length_2_root), 0);
-        /* Q0.31, 0.353 .. 0.708, error 4e-09 */
+        /* Q0.31, 0.353 .. 0.708, error 3.5e-09 */
     /* row 3 and its dual, added */
     const int32_t row_3_x = dcm_orthonormalize_w32_fit((int64_t)C_31 * (INT32_C(1) << 30)
         + dcm_orthonormalize_w32_mul(C_12, C_23) - dcm_orthonormalize_w32_mul(C_13, C_22)
@@ -196,17 +196,17 @@ int dcm_orthonormalize_w32(const int32_t computed[9], int32_t orthonormalized[9]
         dcm_orthonormalize_w32_sqr(row_3_x), 1)
         + dcm_orthonormalize_w32_shr(dcm_orthonormalize_w32_sqr(row_3_y), 1)
         + dcm_orthonormalize_w32_shr(dcm_orthonormalize_w32_sqr(row_3_z), 1);
-        /* Q6.57, 2 .. 8, error 1.9e-08 */
+        /* Q6.57, 2 .. 8, error 1.6e-08 */
     if ((inverse_length_3_radicand < INT64_C(288230378825580548))
         || (inverse_length_3_radicand > INT64_C(1152921501932978172))) {
         return 2;
     }
     const int32_t inverse_length_3_root = dcm_orthonormalize_w32_rt(inverse_length_3_radicand
-        * 2); /* Q2.29, 1.41 .. 2.83, error 7.5e-09 */
+        * 2); /* Q2.29, 1.41 .. 2.83, error 6.6e-09 */
     /* 1/|row 3| */
     const int32_t inverse_length_3 = dcm_orthonormalize_w32_fit(dcm_orthonormalize_w32_div(
         (INT64_C(1) << 60), inverse_length_3_root), 0);
-        /* Q0.31, 0.353 .. 0.708, error 4e-09 */
+        /* Q0.31, 0.353 .. 0.708, error 3.5e-09 */
     /* direction cosine matrix, body to reference, orthonormalized */
     const int64_t next_11_raw = dcm_orthonormalize_w32_shr(dcm_orthonormalize_w32_mul(
         inverse_length_1, row_1_x) + (INT32_C(1) << 29), 30);
@@ -214,63 +214,63 @@ int dcm_orthonormalize_w32(const int32_t computed[9], int32_t orthonormalized[9]
         return 2;
     }
     const int32_t next_11 = dcm_orthonormalize_w32_fit(next_11_raw, 0);
-        /* Q1.30, -1.07 .. 1.07, error 1.5e-08 */
+        /* Q1.30, -1.07 .. 1.07, error 1.2e-08 */
     const int64_t next_12_raw = dcm_orthonormalize_w32_shr(dcm_orthonormalize_w32_mul(
         inverse_length_1, row_1_y) + (INT32_C(1) << 29), 30);
     if ((next_12_raw < (-INT32_C(1140850688))) || (next_12_raw > INT32_C(1140850688))) {
         return 2;
     }
     const int32_t next_12 = dcm_orthonormalize_w32_fit(next_12_raw, 0);
-        /* Q1.30, -1.07 .. 1.07, error 1.5e-08 */
+        /* Q1.30, -1.07 .. 1.07, error 1.2e-08 */
     const int64_t next_13_raw = dcm_orthonormalize_w32_shr(dcm_orthonormalize_w32_mul(
         inverse_length_1, row_1_z) + (INT32_C(1) << 29), 30);
     if ((next_13_raw < (-INT32_C(1140850688))) || (next_13_raw > INT32_C(1140850688))) {
         return 2;
     }
     const int32_t next_13 = dcm_orthonormalize_w32_fit(next_13_raw, 0);
-        /* Q1.30, -1.07 .. 1.07, error 1.5e-08 */
+        /* Q1.30, -1.07 .. 1.07, error 1.2e-08 */
     const int64_t next_21_raw = dcm_orthonormalize_w32_shr(dcm_orthonormalize_w32_mul(
         inverse_length_2, row_2_x) + (INT32_C(1) << 29), 30);
     if ((next_21_raw < (-INT32_C(1140850688))) || (next_21_raw > INT32_C(1140850688))) {
         return 2;
     }
     const int32_t next_21 = dcm_orthonormalize_w32_fit(next_21_raw, 0);
-        /* Q1.30, -1.07 .. 1.07, error 1.5e-08 */
+        /* Q1.30, -1.07 .. 1.07, error 1.2e-08 */
     const int64_t next_22_raw = dcm_orthonormalize_w32_shr(dcm_orthonormalize_w32_mul(
         inverse_length_2, row_2_y) + (INT32_C(1) << 29), 30);
     if ((next_22_raw < (-INT32_C(1140850688))) || (next_22_raw > INT32_C(1140850688))) {
         return 2;
     }
     const int32_t next_22 = dcm_orthonormalize_w32_fit(next_22_raw, 0);
-        /* Q1.30, -1.07 .. 1.07, error 1.5e-08 */
+        /* Q1.30, -1.07 .. 1.07, error 1.2e-08 */
     const int64_t next_23_raw = dcm_orthonormalize_w32_shr(dcm_orthonormalize_w32_mul(
         inverse_length_2, row_2_z) + (INT32_C(1) << 29), 30);
     if ((next_23_raw < (-INT32_C(1140850688))) || (next_23_raw > INT32_C(1140850688))) {
         return 2;
     }
     const int32_t next_23 = dcm_orthonormalize_w32_fit(next_23_raw, 0);
-        /* Q1.30, -1.07 .. 1.07, error 1.5e-08 */
+        /* Q1.30, -1.07 .. 1.07, error 1.2e-08 */
     const int64_t next_31_raw = dcm_orthonormalize_w32_shr(dcm_orthonormalize_w32_mul(
         inverse_length_3, row_3_x) + (INT32_C(1) << 29), 30);
     if ((next_31_raw < (-INT32_C(1140850688))) || (next_31_raw > INT32_C(1140850688))) {
         return 2;
     }
     const int32_t next_31 = dcm_orthonormalize_w32_fit(next_31_raw, 0);
-        /* Q1.30, -1.07 .. 1.07, error 1.5e-08 */
+        /* Q1.30, -1.07 .. 1.07, error 1.2e-08 */
     const int64_t next_32_raw = dcm_orthonormalize_w32_shr(dcm_orthonormalize_w32_mul(
         inverse_length_3, row_3_y) + (INT32_C(1) << 29), 30);
     if ((next_32_raw < (-INT32_C(1140850688))) || (next_32_raw > INT32_C(1140850688))) {
         return 2;
     }
     const int32_t next_32 = dcm_orthonormalize_w32_fit(next_32_raw, 0);
-        /* Q1.30, -1.07 .. 1.07, error 1.5e-08 */
+        /* Q1.30, -1.07 .. 1.07, error 1.2e-08 */
     const int64_t next_33_raw = dcm_orthonormalize_w32_shr(dcm_orthonormalize_w32_mul(
         inverse_length_3, row_3_z) + (INT32_C(1) << 29), 30);
     if ((next_33_raw < (-INT32_C(1140850688))) || (next_33_raw > INT32_C(1140850688))) {
         return 2;
     }
     const int32_t next_33 = dcm_orthonormalize_w32_fit(next_33_raw, 0);
-        /* Q1.30, -1.07 .. 1.07, error 1.5e-08 */
+        /* Q1.30, -1.07 .. 1.07, error 1.2e-08 */
     orthonormalized[0] = next_11;
     orthonormalized[1] = next_12;
     orthonormalized[2] = next_13;

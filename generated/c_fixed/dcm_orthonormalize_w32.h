@@ -48,7 +48,7 @@ extern "C" {
  *         format Q1.30, unit 2^-30; range -1140850688 to 1140850688 (-1.0625 to 1.0625).
  * out     orthonormalized[9]: direction cosine matrix, body to reference, orthonormalized;
  *         next_11, ..., next_33; format Q1.30, unit 2^-30; range -1140850688 to 1140850688
- *         (-1.0625 to 1.0625); error at most 1.43336e-08, 15.3906 of the last place.
+ *         (-1.0625 to 1.0625); error at most 1.10024e-08, 11.8137 of the last place.
  * Returns 0; or, with the outputs left alone, 1 if an input lies outside its range,
  * 2 if it is too far from a proper one, so that something leaves its limits:
  *   inverse_length_1_radicand, inverse_length_2_radicand, inverse_length_3_radicand from 2 to
@@ -91,15 +91,15 @@ int dcm_orthonormalize_w32(const int32_t computed[9], int32_t orthonormalized[9]
  * let: next_31 = inverse_length_3 * row_3_x
  * let: next_32 = inverse_length_3 * row_3_y
  * let: next_33 = inverse_length_3 * row_3_z
- * ensures: |orthonormalized[0] / 2^30 - next_11| <= 1.43336e-08
- * ensures: |orthonormalized[1] / 2^30 - next_12| <= 1.43336e-08
- * ensures: |orthonormalized[2] / 2^30 - next_13| <= 1.43336e-08
- * ensures: |orthonormalized[3] / 2^30 - next_21| <= 1.43336e-08
- * ensures: |orthonormalized[4] / 2^30 - next_22| <= 1.43336e-08
- * ensures: |orthonormalized[5] / 2^30 - next_23| <= 1.43336e-08
- * ensures: |orthonormalized[6] / 2^30 - next_31| <= 1.43336e-08
- * ensures: |orthonormalized[7] / 2^30 - next_32| <= 1.43336e-08
- * ensures: |orthonormalized[8] / 2^30 - next_33| <= 1.43336e-08
+ * ensures: |orthonormalized[0] / 2^30 - next_11| <= 1.10024e-08
+ * ensures: |orthonormalized[1] / 2^30 - next_12| <= 1.10024e-08
+ * ensures: |orthonormalized[2] / 2^30 - next_13| <= 1.10024e-08
+ * ensures: |orthonormalized[3] / 2^30 - next_21| <= 1.10024e-08
+ * ensures: |orthonormalized[4] / 2^30 - next_22| <= 1.10024e-08
+ * ensures: |orthonormalized[5] / 2^30 - next_23| <= 1.10024e-08
+ * ensures: |orthonormalized[6] / 2^30 - next_31| <= 1.10024e-08
+ * ensures: |orthonormalized[7] / 2^30 - next_32| <= 1.10024e-08
+ * ensures: |orthonormalized[8] / 2^30 - next_33| <= 1.10024e-08
  * ensures: -1140850688 <= orthonormalized[0..8] <= 1140850688
  */
 

@@ -19,7 +19,7 @@
  * rows.
  *
  * Over a run of N steps without orthonormalization the distance from exact arithmetic on the same
- * increments is at most (1.8561e-09 N), times exp(0.414214 N), in the length of a row.
+ * increments is at most (1.8561e-09 N), times exp(0.331773 N), in the length of a row.
  *
  * A proper state is orthogonal with rows of length 1; the range of the output is wider than that
  * of the input because it holds for every input in its range. Normalize it before, with the

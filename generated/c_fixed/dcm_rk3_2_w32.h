@@ -30,7 +30,8 @@
  * - N = 1000000: 0.002227 rad
  *
  * A proper state is orthogonal with rows of length 1; the range of the output is wider than that
- * of the input because it holds for every input in its range. Normalize it before, with the
+ * of the input because it holds for every input in its range. From a proper state it takes at
+ * least 33 calls until one is refused for the size of the state. Normalize it before, with the
  * function of `strapgen generate dcm-orthonormalize --target c-fixed --word 32 --rounding
  * nearest --carry none --drift-allowance 1/16 --fix state=Q1.30`. After an error code, the
  * state is that before the call: normalize it and go on, with the rotation of that step lost,

@@ -18,13 +18,13 @@
  * any output is written: an output may be the same memory as an input. Matrices are stored by
  * rows.
  *
- * Over a run of N steps rounding turns the attitude by at most 2.274e-09 N rad from that of exact
+ * Over a run of N steps rounding turns the attitude by at most 2.245e-09 N rad from that of exact
  * arithmetic on the same increments, while the length of the state is at least 0.9375. From a
- * length of at least 0.9922 that is proved for 0 steps. M normalizations on the way, which
- * multiply the words of the state by one factor and round each of them once, add at most
+ * length of at least 0.9922 that is proved for 51,137,049 steps. M normalizations on the way,
+ * which multiply the words of the state by one factor and round each of them once, add at most
  * 1.987e-09 M rad.
- * - N = 10000: 2.274e-05 rad
- * - N = 1000000: 0.002274 rad
+ * - N = 10000: 2.245e-05 rad
+ * - N = 1000000: 0.002245 rad
  *
  * A proper state is of length 1; the range of the output is wider than that of the input because
  * it holds for every input in its range. Normalize it before, with the function of `strapgen

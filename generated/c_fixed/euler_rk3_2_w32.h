@@ -28,9 +28,9 @@
  * - N = 1000000: 0.002296 rad; normalized every 1 steps: 0.004283 rad
  *
  * A proper state is of length 1; the range of the output is wider than that of the input because
- * it holds for every input in its range. From a proper state it takes at least 1 calls until
- * one is refused for the size of the state. Normalize it before, with the function of
- * `strapgen generate euler-normalize --target c-fixed --word 32 --rounding nearest --carry
+ * it holds for every input in its range. From a proper state it takes at least 50,024,584
+ * calls until one is refused for the size of the state. Normalize it before, with the function
+ * of `strapgen generate euler-normalize --target c-fixed --word 32 --rounding nearest --carry
  * none --drift-allowance 1/16 --fix state=Q1.30`. After an error code, the state is that
  * before the call: normalize it and go on, with the rotation of that step lost, or begin again
  * from a known attitude.

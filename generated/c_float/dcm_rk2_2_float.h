@@ -11,7 +11,7 @@
  * Operations of one call: 39 add, 49 multiply; 26 temporaries.
  * Rounding: against exact arithmetic on the same inputs, next is off by at most 6.26926e-07,
  *     5.25904 units in the last place of 1; the row of the error after N steps is at most
- *     1.06894e-06 N exp(0.546086 N) long. This holds for state up to 1.0625; increments up to
+ *     1.06894e-06 N exp(0.385465 N) long. This holds for state up to 1.0625; increments up to
  *     0.125; IEEE 754, each operation rounded to the nearest; -ffp-contract=off.
  *
  * No heap, no global state, reentrant. In one call every input is read before any output is

@@ -11,8 +11,8 @@
  * Operations of one call: 66 add, 76 multiply; 42 temporaries.
  * Rounding: against exact arithmetic on the same inputs, next is off by at most 6.11685e-07,
  *     5.13119 units in the last place of 1; the row of the error after N steps is at most
- *     1.04255e-06 N exp(0.199827 N) long. This holds for state up to 1.0625; increments up to
- *     0.125; IEEE 754, each operation rounded to the nearest; -ffp-contract=off.
+ *     1.04255e-06 N exp(0.00179873 N) long. This holds for state up to 1.0625; increments up
+ *     to 0.125; IEEE 754, each operation rounded to the nearest; -ffp-contract=off.
  *
  * No heap, no global state, reentrant. In one call every input is read before any output is
  * written: an output may be the same memory as an input. Matrices are stored by rows.

@@ -12,7 +12,7 @@
  * Operations of one call: 63 add, 74 multiply; 36 temporaries.
  * Rounding: against exact arithmetic on the same inputs, next is off by at most 5.50947e-07,
  *     4.62168 units in the last place of 1; the row of the error after N steps is at most
- *     9.37377e-07 N exp(0.00511674 N) long. This holds for state up to 1.0625; increments up
+ *     9.37377e-07 N exp(0.00048682 N) long. This holds for state up to 1.0625; increments up
  *     to 0.125; IEEE 754, each operation rounded to the nearest; -ffp-contract=off.
  *
  * No heap, no global state, reentrant. In one call every input is read before any output is

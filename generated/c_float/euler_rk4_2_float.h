@@ -11,7 +11,7 @@
  * Operations of one call: 30 add, 38 multiply; 14 temporaries.
  * Rounding: against exact arithmetic on the same inputs, next is off by at most 3.6979e-07,
  *     3.10203 units in the last place of 1; the error after N steps is at most 5.72317e-07 N
- *     exp(0.000134886 N) long. This holds for state up to 1.0625; increments up to 0.125; IEEE
+ *     exp(3.10223e-05 N) long. This holds for state up to 1.0625; increments up to 0.125; IEEE
  *     754, each operation rounded to the nearest; -ffp-contract=off.
  *
  * No heap, no global state, reentrant. In one call every input is read before any output is

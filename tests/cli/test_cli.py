@@ -29,6 +29,7 @@ from strapgen.catalogue.methods import coefficients, coning_coefficients
 from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.cli import main
 from strapgen.experiments.thesis_tables import TABLES
+from strapgen.library import standard_tree
 from strapgen.reports import formulas
 from strapgen.simulation.courses import NavigationFrame, course
 from strapgen.simulation.motions import motion as make_motion
@@ -54,7 +55,8 @@ COMMANDS = (
         "strapdown",
         "vibration",
     ),
-    *("study word-length", "series", "stability", "rate-table"),
+    *("study word-length", "series", "stability", "rate-table", "frontier"),
+    *("window design", "window show"),
 )
 DATA = Path(__file__).resolve().parents[1] / "data"
 CONING = "--motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 --step 0.125 --duration 5"
@@ -107,6 +109,8 @@ COSTLY = (
     "stability",
     "rate-table",
     "generate",
+    "frontier",
+    "window design",
 )
 
 
@@ -601,8 +605,9 @@ def test_generate_writes_numpy_here_by_default(strapgen_says, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["euler_rk4_2.py"]
 
 
-@pytest.mark.long
-def test_generate_all_as_json(strapgen_says, tmp_path):
+def test_generate_all_as_json(strapgen_says, tmp_path, monkeypatch):
+    few = [derived.program(Choice(*choice)) for choice in (("euler", "rk4", 2), ("dcm-product",))]
+    monkeypatch.setattr(standard_tree, "programs", lambda: iter(few))  # of all, in tests/library
     data = json.loads(strapgen_says("generate --all --out out --format json"))
     assert list(data) == ["files"]
     written = {str(path.relative_to(tmp_path)) for path in (tmp_path / "out").rglob("*") if path.is_file()}
@@ -861,6 +866,21 @@ def test_study_word_length(strapgen_says, tmp_path):
     assert "the method itself drifts by" in strapgen_says(command)
 
 
+def test_frontier(strapgen_says, tmp_path):
+    pytest.importorskip("matplotlib")
+    command = "frontier --method coning-compressed:1+1,rk4:2 --duration 1 --jobs 1 --results results.jsonl"
+    data = json.loads(
+        strapgen_says(f"{command} --format json --plot frontier.png"), parse_constant=pytest.fail
+    )
+    assert [row["algorithm"] for row in data["algorithms"]] == ["coning-compressed:1+1", "rk4:2"]
+    assert (tmp_path / "frontier.png").read_bytes().startswith(b"\x89PNG")
+    content = (tmp_path / "results.jsonl").read_bytes()
+    text = strapgen_says(command)
+    assert "every figure is measured here" in text
+    assert (tmp_path / "results.jsonl").read_bytes() == content  # nothing was run again
+    assert strapgen_says(f"{command} --format csv").count("\n") == 3
+
+
 @pytest.mark.long
 def test_an_interrupt_stops_a_study_at_once(tmp_path):
     # Cases that take minutes each, in two processes.
@@ -904,7 +924,12 @@ TABLE_KEYS = ["table", "backend", "algorithm", "order", "drift_deg", "normalised
 
 @pytest.mark.parametrize(
     "backend",
-    [pytest.param(b, marks=() if b in ("numpy", "c", "c-fixed32") else pytest.mark.long) for b in BACKENDS],
+    # Slow ones run the same tables in tests/experiments.
+    [
+        pytest.param(b, marks=() if b in ("numpy", "c", "c-fixed32") else pytest.mark.long)
+        for b, entry in BACKENDS.items()
+        if not entry.slow
+    ],
 )
 def test_tables_json(backend, strapgen_says):
     entries = json.loads(

@@ -24,6 +24,7 @@ TABLES = {
     "list backends": ("name", 7),
     "tableau rk4": ("row", 5),
     "coning --samples 3": ("older", 2),
+    "window show window-3-3": ("name", 35),
     "derive dcm --method rk1 --show operations": ("operation", None),
     "derive dcm --method rk1 --show program": ("name", None),
     f"simulate euler {RUN}": ("time_s", 3),
@@ -34,6 +35,7 @@ TABLES = {
     f"vibration euler --method rk1,rk2 {WAVE}": ("kernel", 2),
     "rate-table --algorithm dcm --backend numpy --duration 1": ("motion", 12),
     "study word-length --method rk1 --word 16 --carry none --duration 1": ("algorithm", 1),
+    "frontier --method rk4:2,rk4:4 --duration 1 --jobs 1": ("algorithm", 2),
 }
 
 

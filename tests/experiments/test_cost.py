@@ -33,7 +33,10 @@ def needed(cpu: str) -> None:
             pytest.skip(f"{program} is not on this machine")
 
 
-@pytest.mark.parametrize(("kernel", "cpu"), EXECUTED)
+@pytest.mark.parametrize(
+    ("kernel", "cpu"),
+    [pytest.param(*case, marks=pytest.mark.long if case[1] == "cortex-m0" else ()) for case in EXECUTED],
+)
 def test_a_call_executes_few_instructions(kernel, cpu):
     needed(cpu)
     settings = Settings.of(word=32, max_rate_deg_s=400, step="0.01", increments=2)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from itertools import product
 from types import SimpleNamespace
 
 import pytest
@@ -17,6 +19,7 @@ EXACT = Known(4, -7, 7)
 OFF = Known(4, -9, 9, Fraction(1, 40))
 LESS = Known(3, -5, 5, Fraction(1, 30))
 AB = ("a", "b")
+ONE = Fraction(1)
 
 
 def terms(*pairs: tuple[tuple[str, ...], object]) -> Sum:
@@ -170,6 +173,15 @@ def test_what_error_feedback_loses_is_attained(places, fraction, rounding):
         assert max(errors) >= two - 2 * finest
 
 
+def test_no_shift_drops_all_bits_of_a_wide_number_but_its_sign():
+    known = {"a": Known(15, -99, 99, wide=True)}
+    item = quantity("y", terms((("a",), 1)), *at_corners(known, lambda a: a))
+    value, walk = lowered(known, item, words=["y"], forced={"y": 0})
+    measured = worst(walk, "y", known, lambda a: a)
+    assert (value.definition.shift, [term.shift for term in value.definition.fine]) == (14, [-1])
+    assert measured.error <= value.error
+
+
 #: A value that is only added up, one that is rounded, and a word that is not.
 FORMS = {"wide": {}, "rounded": {"forced": {"y": 2}}, "word": {"forced": {"y": 4}}}
 
@@ -224,3 +236,73 @@ def test_only_elements_of_an_output_that_is_an_attitude_saturate(constraint, nam
     walk.quantities.results["next"] = ("a",)
     walk.program.outputs = (SimpleNamespace(signal=SimpleNamespace(name="next", constraint=constraint)),)
     assert _is_attitude(walk, name) is attitude
+
+
+# What a check of a sum of squares says of its parts
+
+
+def in_accepted_calls(walk, name: str, known: dict[str, Known], exact) -> tuple[Fraction, Fraction]:
+    """Return the largest error of a value, and the largest exact sum of squares, where the check of "y" passes."""
+    check, value = walk.values["y"], walk.values[name]
+    error = largest = Fraction(0)
+    for integers in product(*(range(item.low, item.high + 1) for item in known.values())):
+        whole = dict(zip(known, integers, strict=True))
+        whole["y"], _ = computed(check.definition, whole, nearest=True)
+        if not check.low <= whole["y"] <= check.high:
+            continue
+        integer, _ = computed(value.definition, whole, nearest=True)
+        for row in product(*(item.exact(whole[key]) for key, item in known.items())):
+            error = max(error, abs(integer * Fraction(2) ** -value.fraction - exact(*row)))
+            largest = max(largest, sum((x * x for x in row[:2]), Fraction(0)))
+    return error, largest
+
+
+def test_what_passes_the_check_of_a_sum_of_squares_has_the_error_of_smaller_factors():
+    """An element of 15/4 is possible, but with squares of 4 together none above 2 is accepted."""
+    known = {name: Known(2, -15, 15, Fraction(1, 50)) for name in "ab"} | {
+        "c": Known(3, -7, 7, Fraction(1, 90))
+    }
+    check = quantity("y", Sum(((("a", "a"), ONE), (("b", "b"), ONE))), 1, 4, guarded=True)
+    scaled = quantity("z", Sum(((("a", "c"), ONE),)), -4, 4)
+    walk = context(known, check, scaled)
+    lower_sum(walk, check, check.definition)
+    lower_sum(walk, scaled, scaled.definition)
+    assert walk.size("a") == 2
+    error, largest = in_accepted_calls(walk, "y", known, lambda a, b, c: a * a + b * b)
+    assert largest <= 4  # which is what the check promises
+    # Two elements of 2 each would be accepted by none: those of root 2 have the largest error together.
+    assert Fraction(3, 5) * walk.values["y"].error < error <= walk.values["y"].error < Fraction(1, 6)
+    error, _ = in_accepted_calls(walk, "z", known, lambda a, b, c: a * c)
+    assert Fraction(9, 10) * walk.values["z"].error < error <= walk.values["z"].error
+    unchecked = context(known, scaled)
+    lower_sum(unchecked, scaled, scaled.definition)
+    assert walk.values["z"].error < unchecked.values["z"].error
+
+
+@pytest.mark.parametrize(
+    ("terms", "size"),
+    [
+        (((("a", "a"), ONE), ((), ONE)), math.sqrt(3)),  # 1 is there already
+        (((("a", "a"), 4 * ONE), (("b", "b"), ONE)), 1),
+        (((("a", "a"), ONE), (("b", "b"), -ONE)), 3.745),  # a difference of squares may be small all the same
+        (((("a", "b"), ONE), (("b", "b"), ONE)), 3.745),
+        (((("a",), ONE), (("b", "b"), ONE)), 3.745),
+    ],
+)
+def test_only_sums_of_squares_bound_what_is_squared(terms, size):
+    known = {name: Known(2, -15, 15, Fraction(1, 200)) for name in "ab"}
+    check = quantity("y", Sum(terms), 1, 4, guarded=True)
+    walk = context(known, check)
+    lower_sum(walk, check, check.definition)
+    assert float(walk.size("a")) == pytest.approx(size, rel=1e-2)
+
+
+def test_a_check_whose_value_is_taken_as_exact_says_nothing_of_its_parts(monkeypatch):
+    known = {name: Known(2, -15, 15, Fraction(1, 2)) for name in "ab"}
+    check = quantity("y", Sum(((("a", "a"), ONE), (("b", "b"), ONE))), Fraction(1, 64), 4, guarded=True)
+    walk = context(known, check)
+    monkeypatch.setattr(
+        "strapgen.fixedpoint.quantization_context._reset", lambda walk, item: walk.resets.add(item.name)
+    )
+    lower_sum(walk, check, check.definition)
+    assert walk.size("a") > 3

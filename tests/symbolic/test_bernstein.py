@@ -97,5 +97,10 @@ def test_coefficients_are_rounded_down_and_their_slack_counts():
     assert upper.coefficients.tolist() == [[3, 4, 4]]
     assert [part.cube for part in (lower, upper)] == [((0, ONE / 2),), ((ONE / 2, ONE),)]
     assert lower.slack >= 1
-    assert not lower.is_below(4)
-    assert lower.is_below(lower.slack + 100)
+
+
+def test_a_limit_exceeds_coefficients_by_their_slack_and_by_what_rounding_needs():
+    """Rounding in double needs 2^-45 of what a coefficient of 2^50 lacks: 32 units, and one."""
+    form = bernstein._BernsteinForm(np.array([[1000, -1000]]), ((Fraction(0), ONE),), 100)
+    assert not form.is_below(1000 + 100 + 33)
+    assert form.is_below(1000 + 100 + 34)

@@ -43,6 +43,14 @@ INTEGRATORS = {
         "polynomial through the increments, integrated exactly", "fit_exact", 16, takes_rates=False
     ),
     "munthe-kaas4": Integrator("Runge-Kutta-Munthe-Kaas method of order 4", "munthe_kaas", 4),
+    "crouch-grossman3": Integrator("Crouch-Grossman method of order 3", "crouch_grossman", 3),
+    "coning-least-squares": Integrator(
+        "compressed coning coefficients, by least squares over a band",
+        "frequency_shaping",
+        2,
+        takes_rates=False,
+        takes_ahead=False,
+    ),
     "coning-compressed": Integrator(
         "compressed coning coefficients, made for coning", "coning", 4, False, ("compressed",), False
     ),
@@ -121,6 +129,9 @@ class Recipe(NamedTuple):
     arguments: tuple[Any, ...] = ()
     standard: bool = True
 
+
+#: Degrees of the rate for which there are steps from its Legendre coefficients.
+LEGENDRE_DEGREES = range(1, 5)
 
 #: Orders at which the series of an update can be cut off.
 UPDATE_ORDERS = range(1, 21)
@@ -243,6 +254,17 @@ KERNELS = {
             f"{title}: state after a transition", "attitude_step", "product", (algorithm,)
         )
         for algorithm, title in ALGORITHMS.items()
+    },
+    **{
+        f"{name}-legendre-{degree}": Recipe(
+            f"{ALGORITHMS[name]}: step from the Legendre coefficients of the rate to degree {degree}",
+            "legendre_step",
+            "step",
+            (name, degree),
+            False,
+        )
+        for name in ("dcm", "euler")
+        for degree in LEGENDRE_DEGREES
     },
     "dcm-orthonormalize": Recipe(
         "orthonormalization by dual rows, the thesis's scheme", "orthonormal", "dcm"

@@ -18,6 +18,7 @@ from strapgen.cli.commands import (
     cost,
     derive,
     evidence,
+    frontier,
     generate,
     listing,
     rate_table,
@@ -32,7 +33,7 @@ from strapgen.cli.commands import (
     vectors,
     verify,
     vibration,
-    window,
+    window_generate,
 )
 from strapgen.cli.help import PlainCommand, PlainGroup, explanation
 from strapgen.support.exceptions import StrapgenError
@@ -44,7 +45,7 @@ COMMANDS: dict[str, dict[str, Any]] = {
         "derive": derive.derive,
         "tableau": tableau.tableau,
         "coning": coning.coning,
-        "window": window.app,
+        "window": window_generate.app,
     },
     "Generate": {
         "generate": generate.generate,
@@ -61,6 +62,7 @@ COMMANDS: dict[str, dict[str, Any]] = {
         "converge": converge.converge,
         "check": check.check,
         "cost": cost.cost,
+        "frontier": frontier.frontier,
     },
     "Reproduce": {"tables": tables.tables, "rate-table": rate_table.rate_table, "study": study.app},
 }

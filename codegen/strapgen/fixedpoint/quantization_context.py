@@ -44,6 +44,8 @@ class Quantization:
         The integers so far, in the order of the code.
     resets : set of str
         Quantities whose computed value is taken as exact from there on.
+    checked : dict of str to Fraction
+        Largest magnitudes of quantities in calls that pass the checks so far, where these bound them.
     """
 
     program: Program
@@ -57,6 +59,7 @@ class Quantization:
     values: dict[str, Value] = field(init=False)
     body: list[Value] = field(default_factory=list)
     resets: set[str] = field(default_factory=set)
+    checked: dict[str, Fraction] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.word, self.rounding_error = self.settings.word, ROUNDINGS[self.settings.rounding]
@@ -65,6 +68,11 @@ class Quantization:
     def largest(self, fraction: int) -> int:
         """Return the largest integer that a word of so many fraction bits holds."""
         return Format(self.word, fraction).largest
+
+    def size(self, name: str) -> Fraction:
+        """Return the largest magnitude of a quantity in calls that pass the checks so far."""
+        proved = self.quantities.items[name].range.magnitude
+        return min(proved, self.checked.get(name, proved))
 
     def too_short(self, name: str) -> InputError:
         """Return the error that says that a word does not hold a quantity."""

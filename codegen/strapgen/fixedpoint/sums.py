@@ -39,11 +39,25 @@ def lower_sum(context: Quantization, quantity: Quantity, definition: Sum) -> Non
     InputError
         If a format that the user states does not hold it, or the word is too short.
     """
+    value = _lowered(context, quantity, definition)
+    if (
+        quantity.guarded
+        and quantity.name not in context.resets
+        and _note_squares(context, quantity, definition)
+    ):
+        # In calls that pass, errors are smaller; the limits of the check are those of any call.
+        again = _lowered(context, quantity, definition)
+        if again.fraction == value.fraction:
+            value = replace(value, error=min(value.error, again.error))
+    context.add(value)
+
+
+def _lowered(context: Quantization, quantity: Quantity, definition: Sum) -> Value:
+    """Return the integer of a sum."""
     terms = _integer_terms(context, definition)
     followed = _followed_error(context, quantity)
     if quantity.name not in context.plan.words:
-        context.add(_wide(context, quantity, terms, followed))
-        return
+        return _wide(context, quantity, terms, followed)
     natural = finest(quantity.range.magnitude, context.word)
     places = [item.place for item in terms]
     useful = natural if _counts_alone(context, terms) else max(places, default=natural)
@@ -52,10 +66,20 @@ def lower_sum(context: Quantization, quantity: Quantity, definition: Sum) -> Non
     value = _rounded(context, quantity, terms, fraction, followed)
     while value.magnitude > context.largest(value.fraction):
         if quantity.name in context.plan.forced:
-            value = _limited(context, quantity, value)
-            break
+            return _limited(context, quantity, value)
         value = _rounded(context, quantity, terms, value.fraction - 1, followed)
-    context.add(value)
+    return value
+
+
+def _note_squares(context: Quantization, quantity: Quantity, definition: Sum) -> bool:
+    """Note how large squared quantities can be where the sum of their squares has passed its check; False of others."""
+    terms = dict(definition.terms)
+    room = quantity.range.highest + quantity.inexact - terms.pop((), Fraction(0))
+    if not terms or any(len({*m}) != 1 or len(m) != 2 or c <= 0 for m, c in terms.items()):
+        return False
+    for (name, _), coefficient in terms.items():
+        context.checked[name] = min(context.size(name), Interval.of(room / coefficient).sqrt().highest)
+    return True
 
 
 def word_of(context: Quantization, name: str) -> str:
@@ -122,7 +146,7 @@ def _product_error(context: Quantization, values: Sequence[Value], monomial: Mon
     if len(values) == 1:
         return values[0].error
     a, b = values
-    size_a, size_b = (context.quantities.items[name].range.magnitude for name in monomial)
+    size_a, size_b = map(context.size, monomial)
     return size_a * b.error + size_b * a.error + a.error * b.error
 
 

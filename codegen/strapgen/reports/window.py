@@ -191,7 +191,7 @@ def window_warnings(window: Window) -> list[str]:
     if gain > _HIGH_GAIN:
         warnings.append(
             f"F_0 with {_sides(where)} amplifies rates beyond the band by up to {gain:.3g}, over {_HIGH_GAIN:g}; "
-            "there must be no motion"
+            "there must be no motion there"
         )
     gains = [(responses.noise_gain(one, 1), one) for one in window.one_sided]
     noise_gain, where = max(gains, key=lambda pair: pair[0], default=(0.0, window))

@@ -19,16 +19,18 @@ def angles(run: Run) -> NDArray[np.float64]:
     Parameters
     ----------
     run : Run
-        Of an algorithm whose attitudes are rotations.
+        Of an algorithm whose attitudes are rotations, up to their length.
 
     Returns
     -------
     array, (N,)
         In rad, 0 to pi.
     """
-    # The error matrix is a rotation less the identity: its trace is 2 cos - 2, and the drift is as long as the sine.
-    cosine = 1 + run.scale.sum(axis=1) / 2
-    result: NDArray[np.float64] = np.arctan2(np.linalg.norm(run.drift, axis=1), cosine)
+    # The error matrix is s R - I with a rotation R and a length s: its sum with I has the norm s sqrt(3), its trace is
+    # s (1 + 2 cos) - 3, and the drift is as long as s sin.
+    length = np.sqrt(np.square(run.error + np.eye(3)).sum(axis=(1, 2)) / 3)
+    cosine = ((run.scale.sum(axis=1) + 3) / length - 1) / 2
+    result: NDArray[np.float64] = np.arctan2(np.linalg.norm(run.drift, axis=1) / length, cosine)
     return result
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from fractions import Fraction
+from itertools import product
 
 import numpy as np
 import pytest
@@ -77,6 +78,7 @@ def test_a_coarser_bound_counts_where_no_closer_one_is_proved(monkeypatch):
     assert bounds(step, known=known) == Interval.symmetric(known)
     three = program(choose_step("euler", "rk4", 3))
     assert bounds(three, known=known) == Interval.symmetric(known)
+    assert singular_value_bounds(step, step.transition, (), 4, FAR) == Interval.symmetric(FAR)
     monkeypatch.setattr(singular_values, "_MOST_PRODUCTS", 10)
     assert bounds(step) == Interval.symmetric(FAR)
 
@@ -118,6 +120,20 @@ def test_a_quaternion_turns_with_its_vectors_if_its_scalar_stays():
     assert singular_values._turns_with_vectors(elements)
     assert not singular_values._turns_with_vectors([*elements[:3], elements[0]])
     assert not singular_values._turns_with_vectors([elements[1], elements[0], *elements[2:]])
+
+
+@pytest.mark.parametrize("longer", [0, 1])
+def test_either_increment_may_be_the_longer_one(longer, monkeypatch):
+    """A scalar of 1 and the difference of two squared lengths is largest where one of them is zero."""
+    step = program(choose_step("euler", "rk4", 2))
+    scalar = {(): Fraction(1)}
+    for vector, axis in product(range(2), range(3)):
+        scalar[(vector, axis), (vector, axis)] = Fraction(1 if vector == longer else -1)
+    monkeypatch.setattr(singular_values, "_polynomials", lambda *_: [{}, {}, {}, scalar])
+    most = 3 * float(LIMIT) ** 2
+    proved = bounds(step)
+    assert (1 + most) ** 2 - 1 <= float(proved.highest) <= 1.04 * ((1 + most) ** 2 - 1)
+    assert 1.04 * ((1 - most) ** 2 - 1) <= float(proved.lowest) <= (1 - most) ** 2 - 1
 
 
 # What the header states of it

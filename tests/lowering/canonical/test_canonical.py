@@ -7,6 +7,9 @@ from derived import kernel, program
 from strapgen.catalogue import ALGORITHMS, STANDARD_METHODS, Choice
 from strapgen.ir.program import Program
 from strapgen.lowering import candidates, canonical
+from strapgen.lowering.arithmetic import operation_count
+from strapgen.lowering.canonical import search
+from strapgen.lowering.canonical.core import decompose
 from strapgen.lowering.names import is_temporary
 from strapgen.lowering.passes import optimize
 
@@ -62,6 +65,20 @@ def test_every_candidate_is_exact_not_only_the_one_that_is_taken(choice):
     for candidate in made:
         canonical.verify(core, candidate)
         assert is_the_kernel(candidate, choice)
+
+
+def test_plans_that_are_not_written_are_exact_too_and_nearly_as_long_as_estimated(monkeypatch):
+    """In a step on three increments some vectors are multiples of those that have a name."""
+    choice = Choice("euler", "rk2", 3)
+    core = canonical.extract_core(kernel(choice))
+    plans = search.plans(core, decompose(core))
+    monkeypatch.setattr(canonical, "_WRITTEN", len(plans))
+    _, *written = candidates(kernel(choice), core)
+    for plan, form, candidate in zip(plans, canonical.forms(core), written, strict=True):
+        canonical.verify(core, candidate)
+        count = sum(operation_count(assignment.value) for assignment in form)
+        # An estimate knows neither the scalar products that a polynomial shares nor the signs that a sum absorbs.
+        assert abs(search._estimate(plan) - count) <= 2
 
 
 @pytest.mark.parametrize(

@@ -87,6 +87,12 @@ def test_stages_that_are_linear(stage, form):
     assert core.vectors["d1"][1] == (1, 0)
 
 
+@pytest.mark.parametrize(("method", "degree"), [("rk1", 1), ("rk2", 2), ("rk4", 4)])
+def test_the_degree_is_that_of_the_longest_product_in_any_element(method, degree):
+    """In (delta / 2, 1) and (delta / 2, 1 - delta^2 / 8) the degree of the scalar differs from that of the vector."""
+    assert extract(derive("euler", method=method, increments=1)).degree() == degree
+
+
 def test_vectors_may_come_one_by_one():
     build = KernelBuilder()
     state = build.input(Signal.labelled("state", "e", "xyzs"))

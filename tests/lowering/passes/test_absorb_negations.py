@@ -1,10 +1,12 @@
 """The pass `absorb_negations`: signs become subtractions, without a change of any value."""
 
 import itertools
+from dataclasses import replace
 from fractions import Fraction
 
 import pytest
 
+from strapgen.ir.program import Assignment, Constant, Operation, Reference
 from strapgen.lowering.passes import absorb_negations
 
 
@@ -128,6 +130,12 @@ def test_a_sign_becomes_part_of_a_number(parse, show):
     assert show(absorb_negations(parse("y = a * -(-(-3))"))) == "y = a * -3"
     program = parse("shared_1 = 2; y = shared_1 - x")
     assert absorb_negations(program) == program
+
+
+def test_the_negative_of_a_number_is_a_number(parse, show):
+    minus = Operation("negate", (Constant(Fraction(3)),))
+    body = (Assignment("y", Operation("multiply", (Reference("a"), minus))),)
+    assert show(absorb_negations(replace(parse("y = a"), body=body))) == "y = a * -3"
 
 
 def test_signs_move_through_several_names(parse):

@@ -135,7 +135,9 @@ class Window:
         return replace(
             self,
             name=sibling_name(self.name, self.previous, self.ahead, self.ahead, self.previous),
-            title=sibling_title(self.title, self.ahead, self.previous),
+            title=self.title
+            if self.previous == self.ahead
+            else sibling_title(self.title, self.ahead, self.previous),
             previous=self.ahead,
             ahead=self.previous,
             filters=tuple(_reversed(m, row) for m, row in enumerate(self.filters)),

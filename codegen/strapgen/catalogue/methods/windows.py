@@ -41,7 +41,6 @@ MOST_CONDITIONS = 12
 MOST_DEGREE = 8
 MOST_TERMS = 40
 
-
 #: Most bytes of a file; the longest family takes less.
 MOST_BYTES = 4_000_000
 
@@ -149,7 +148,8 @@ def with_exact_rotation(window: Window) -> Window:
     """Return a window of the catalogue with the exact rotation of its polynomial."""
     one_sided = tuple(with_exact_rotation(one) for one in window.one_sided)
     name, title = f"{window.name}{EXACT}", f"{window.title}; exact rotation"
-    return replace(window, name=name, title=title, rotation="exact", terms=EXACT_TERMS, one_sided=one_sided)
+    terms = max(window.terms, EXACT_TERMS)  # a family may state more
+    return replace(window, name=name, title=title, rotation="exact", terms=terms, one_sided=one_sided)
 
 
 def read(path: str | Path) -> Window:
@@ -263,7 +263,7 @@ def _all_one_sided(window: Window, tables: list[Any]) -> tuple[Window, ...]:
             size = one.previous, one.ahead
             if size not in sizes or size in stored:
                 twice = "there twice" if size in stored else f"not among those for {window.samples} samples"
-                raise InputError(f"{size[0]} samples before and {size[1]} ahead are {twice}")
+                raise InputError(f"{counted(size[0], 'sample')} before and {size[1]} ahead are {twice}")
         except InputError as error:
             raise InputError(f"{what}: {error}") from None
         stored[size] = one
@@ -272,7 +272,9 @@ def _all_one_sided(window: Window, tables: list[Any]) -> tuple[Window, ...]:
             stored[previous, ahead] = stored[ahead, previous].mirrored()
     for previous, ahead in sizes:
         if (previous, ahead) not in stored:
-            raise InputError(f"one_sided lacks the filters with {previous} samples before and {ahead} ahead")
+            raise InputError(
+                f"one_sided lacks the filters with {counted(previous, 'sample')} before and {ahead} ahead"
+            )
     return tuple(stored[size] for size in sizes)
 
 

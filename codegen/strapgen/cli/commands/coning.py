@@ -180,7 +180,7 @@ def coning(
 
     Example: strapgen coning --samples 4 --form combined
 
-    Example: strapgen coning --samples 1 --previous 8 --objective band --band 1.3 --format toml --out shaped.toml
+    Example: strapgen coning --samples 1 --previous 8 --objective band --band 1.3 --out out/shaped.toml --format toml
     """
     output.check(design.spectrum)
     from strapgen import catalogue

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -16,6 +15,7 @@ from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import option, whole
 from strapgen.cli.output import Output
 from strapgen.cli.progress import waiting
+from strapgen.cli.window_file import WindowArgument, window_of
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 
@@ -136,7 +136,7 @@ def design(
     The file holds the filters that commit an attitude and one-sided ones, with fewer samples ahead, for the attitude of
     now. Each is exact for polynomial rates, and the best one over the band. A second design gives the same file.
 
-    Example: strapgen window design --previous 7 --ahead 7 --band 1.3 --out window.toml
+    Example: strapgen window design --previous 7 --ahead 7 --band 1.3 --out out/window.toml
     """
     output.check(band.spectrum)
     brief = _brief(size, band, name)
@@ -220,10 +220,7 @@ def _command(size: WindowSize, band: Band, name: str | None, out: Path | None) -
 @app.command("show", cls=PlainCommand)
 @grouped
 def show(
-    window: Annotated[
-        str,
-        typer.Argument(metavar="NAME|FILE", help="A window as window-7-7, or a TOML file with one."),
-    ],
+    window: WindowArgument,
     *,
     output: Output,
 ) -> None:
@@ -235,15 +232,10 @@ def show(
     Example: strapgen window show window-7-7
     """
     output.check(window)
-    from strapgen.catalogue.methods import windows
     from strapgen.reports import plots
     from strapgen.reports.window import window_report
 
-    if window.endswith(".toml") or any(separator in window for separator in (os.sep, os.altsep) if separator):
-        family = windows.read(window)
-    else:
-        family = windows.WINDOWS[checks.choice("window", window, windows.WINDOWS)]
-        windows.verify(family)
+    family = window_of(window)
     if family.increments != 1:
         raise InputError(
             f"{window} has steps of {family.increments} samples; only filters for steps of one are shown"

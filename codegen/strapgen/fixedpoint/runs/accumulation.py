@@ -181,7 +181,7 @@ def _local_errors(
     for name in result.values:
         value, definition = values[name], items[name].definition
         through = sum(
-            abs(coefficient) * items[factor].range.magnitude * values[other].error
+            abs(coefficient) * context.size(factor) * values[other].error
             for monomial, coefficient in (definition.terms if isinstance(definition, Sum) else ())
             if len(monomial) == 2
             for factor, other in (monomial, monomial[::-1])

@@ -4,6 +4,7 @@ from strapgen.reports.plots.agreement import agreement_image as agreement_image
 from strapgen.reports.plots.comparison import comparison_image as comparison_image
 from strapgen.reports.plots.convergence import convergence_image as convergence_image
 from strapgen.reports.plots.figures import require_kind as require_kind
+from strapgen.reports.plots.frontier import frontier_image as frontier_image
 from strapgen.reports.plots.rate_table import rate_table_image as rate_table_image
 from strapgen.reports.plots.runs import course_image as course_image
 from strapgen.reports.plots.runs import history_image as history_image

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import math
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -147,6 +147,50 @@ def labels_at_the_right(axes: Any, labels: Iterable[tuple[float, str, Any]]) -> 
         axes.text(
             1.01, place, printable(text), transform=axes.transAxes, fontsize=9, color=colour, va="center"
         )
+
+
+#: Where a label can stand beside its point, in points of 1/72 inch: left and below, and so on.
+_PLACES = [(x, y) for x in (-7, 7) for y in (-11, -2, -21, -31, -41, 5, 15, 25)]
+
+
+def labels_beside_points(axes: Any, points: Mapping[str, tuple[float, float]], colour: Any) -> None:
+    """Write labels beside points, each where it covers no other label and leaves the axes as little as can be.
+
+    Parameters
+    ----------
+    axes : Axes
+        With their final place and limits.
+    points : mapping of str to (float, float)
+        Points in data by their labels.
+    colour : colour
+    """
+    boxes: list[Any] = []
+    frame = axes.get_window_extent()
+    for text, point in points.items():
+        best: tuple[float, Any, Any] | None = None
+        for place in _PLACES:
+            label = axes.annotate(
+                printable(text),
+                point,
+                xytext=place,
+                textcoords="offset points",
+                ha="left" if place[0] > 0 else "right",
+                fontsize=8,
+                color=colour,
+            )
+            box = label.get_window_extent()
+            outside = max(0.0, box.x1 - frame.x1) + max(0.0, frame.x0 - box.x0)
+            cost = outside + 1000 * sum(box.overlaps(other) for other in boxes)
+            if best is None or cost < best[0]:
+                if best is not None:
+                    best[1].remove()
+                best = cost, label, box
+            else:
+                label.remove()
+            if not best[0]:
+                break
+        assert best is not None, "there are places"
+        boxes.append(best[2])
 
 
 def _height(axes: Any, value: float) -> float:

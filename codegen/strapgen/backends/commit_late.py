@@ -1,0 +1,145 @@
+"""An attitude that is committed a few samples late, with filters of samples on both sides, and answered now.
+
+The committed attitude is L samples old and has the small error of symmetric filters. The attitude of now is the
+committed one times the last intervals, by filters with fewer samples ahead; it is an answer only, so that its errors do
+not add up.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from strapgen.backends.evaluators import Array
+from strapgen.backends.late_unit import LateUnit, SampleKind
+from strapgen.backends.late_unit_in_c import LateUnitInC
+from strapgen.backends.registry import BACKENDS
+from strapgen.catalogue.methods.window import Window
+from strapgen.library import commit_late_sources
+from strapgen.support import checks
+from strapgen.support.exceptions import InputError
+
+
+class CommitLate:
+    """Integrates samples as they come: an attitude that is committed late, and the attitude of now on request.
+
+    The first p + 1 + L samples are waited for; the intervals before the first whole window then have filters with fewer
+    samples before them. Until then, `now` and `flush` have the rate from polynomials through up to four samples.
+
+    A lost sample is restored within the band of the window when 8 samples after it are there; until then nothing is
+    committed, and `now` goes on with the cubic estimate from the four samples before the gap, which `flush` commits.
+    Where the next sample is the sum of the lost interval and its own, that is used. A sample can be restored if none of
+    the 8 before it was lost too, and if there are so many.
+
+    Parameters
+    ----------
+    window : str or Window
+        A window of the catalogue by its name, or a family of filters.
+    algorithm : str, optional
+        "euler", Euler parameters, scalar last, or "dcm", the direction cosine matrix; body to reference.
+    backend : str, optional
+        "numpy", generated functions called from Python, or "c" or "c-float", generated C.
+    sample_hz : number, optional
+        Sampling rate in Hz; a family that is designed for a gyro needs it, and is refused at another one.
+
+    Attributes
+    ----------
+    identity : array
+        The attitude of zero rotation.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown, or the window cannot be committed late.
+    CompilerError
+        If the back end needs a C compiler and there is none.
+
+    Examples
+    --------
+    >>> unit = CommitLate("window-3-3")
+    >>> [unit.push([0.0, 0.0, 0.02]) for _ in range(8)]
+    [0, 0, 0, 0, 0, 0, 4, 1]
+    >>> unit.attitude.round(6), unit.now().round(6)  # 5 and 8 intervals of 0.02 rad about z
+    (array([0.      , 0.      , 0.049979, 0.99875 ]), array([0.      , 0.      , 0.079915, 0.996802]))
+    >>> unit.flush(), bool((unit.attitude == unit.now()).all())
+    (3, True)
+    """
+
+    def __init__(
+        self,
+        window: str | Window = "window-7-7",
+        algorithm: str = "euler",
+        backend: str = "numpy",
+        sample_hz: float | str | Fraction | None = None,
+    ) -> None:
+        checks.choice("backend", backend, BACKENDS)
+        if BACKENDS[backend].target in commit_late_sources.TARGETS:
+            whole = commit_late_sources.sources(window, algorithm, BACKENDS[backend].target, sample_hz)
+            self._unit: LateUnit | LateUnitInC = LateUnitInC(whole)
+        elif backend == "numpy":
+            filters = commit_late_sources.family(window, sample_hz)
+            self._unit = LateUnit(commit_late_sources.parts(filters, algorithm, "numpy"))
+        else:
+            raise InputError(f"backend is {backend!r}; only numpy, c and c-float commit late")
+        self.identity = self._unit.attitude
+
+    @property
+    def attitude(self) -> Array:
+        """The committed attitude, at the end of the last committed interval."""
+        return self._unit.attitude
+
+    @property
+    def pending(self) -> int:
+        """Intervals that are not committed yet."""
+        return self._unit.pending
+
+    @property
+    def committed(self) -> list[Array]:
+        """Attitudes at the ends of the intervals that the last call committed; of C the last of them alone."""
+        return self._unit.committed
+
+    def push(self, sample: Any, kind: int = SampleKind.GOOD) -> int:
+        """Take the sample of the next interval, and return how many intervals it commits.
+
+        Parameters
+        ----------
+        sample : array_like, (3,)
+            Angle increment of the interval in rad, body axes; of no meaning if it was lost.
+        kind : int, optional
+            0 if it is good, 1 if it was lost, 2 if it is the sum of this and the last interval, whose sample was lost.
+
+        Raises
+        ------
+        GapError
+            If a lost sample cannot be restored; nothing has changed then.
+        InputError
+            If a number is not allowed.
+        """
+        number = checks.count("kind", kind, smallest=0, largest=max(SampleKind))
+        values = np.zeros(3) if number == SampleKind.LOST else checks.real_array("sample", sample, (3,))
+        if values.shape != (3,):
+            raise InputError(f"sample has shape {values.shape}; (3,) is needed")
+        return self._unit.push(values, number)
+
+    def now(self) -> Array:
+        """Return the attitude at the end of the last interval, by filters for the samples that are there."""
+        return self._unit.now()
+
+    def flush(self) -> int:
+        """Commit the intervals that are not committed yet, and return how many."""
+        return self._unit.flush()
+
+    def reset(self, attitude: Any) -> None:
+        """Replace the committed attitude, for instance by that of an alignment; the samples stay.
+
+        Parameters
+        ----------
+        attitude : array_like, (state shape)
+            At the end of the last committed interval.
+        """
+        state = checks.real_array("attitude", attitude, self.identity.shape)
+        if state.shape != self.identity.shape:
+            raise InputError(f"attitude has shape {state.shape}; {self.identity.shape} is needed")
+        self._unit.reset(state)

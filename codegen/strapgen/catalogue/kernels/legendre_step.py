@@ -1,0 +1,77 @@
+"""Derives attitude steps from the Legendre coefficients of the rate, which any filters of samples estimate."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import sympy as sp
+
+from strapgen.catalogue.kinematics import KINEMATICS
+from strapgen.catalogue.methods import rate_fit, rotation_series, windowed
+from strapgen.catalogue.methods.samples import Samples
+from strapgen.catalogue.methods.window import Window
+from strapgen.ir.signals import Signal
+from strapgen.symbolic.kernel import Kernel, KernelBuilder
+
+
+def step(name: str, degree: int) -> Kernel:
+    """Derive the step of a window after its filters: from the Legendre coefficients of the rate to the next state.
+
+    Parameters
+    ----------
+    name : str
+        Name of the attitude algorithm.
+    degree : int
+        Degree of the polynomial of the rate.
+
+    Returns
+    -------
+    Kernel
+        Inputs ``state`` and ``legendre_0``, ``legendre_1``, ... (3,) in rad, the coefficients of the rate times the
+        step in body axes; output ``next``.
+    """
+    kinematics = KINEMATICS[name]
+    build = KernelBuilder()
+    state = build.input(kinematics.state)
+    samples = _Coefficients(build, degree)
+    transition = windowed.method(_unfiltered(degree)).transition(build, kinematics, samples)
+    build.output(kinematics.next, kinematics.product(state, build.stage(kinematics.transition, transition)))
+    return build.kernel(
+        f"{name}-legendre-{degree}",
+        f"{kinematics.title}: step from the Legendre coefficients of the rate to degree {degree}",
+        f"{kinematics.source}; {rotation_series.SOURCE}",
+    )
+
+
+def coefficient_name(m: int) -> str:
+    """Return the name of the input for a Legendre coefficient."""
+    return f"legendre_{m}"
+
+
+class _Coefficients(Samples):
+    """Legendre coefficients as the samples of a step, each an input."""
+
+    def __init__(self, build: KernelBuilder, degree: int) -> None:
+        rows = []
+        for m in range(degree + 1):
+            signal = Signal.vector(
+                coefficient_name(m),
+                f"c{m}",
+                unit="rad",
+                meaning=f"Legendre coefficient {m} of the body rate times the step, body axes",
+                bound=Fraction(1),
+            )
+            rows.append(build.input(signal).T)
+        self._build = build
+        self._labels = {}
+        self._symbols = sp.Matrix.vstack(*rows)
+        self.increments, self.previous, self.ahead = degree + 1, 0, 0
+        self.fit = rate_fit.from_legendre(_unfiltered(degree).filters)
+
+
+def _unfiltered(degree: int) -> Window:
+    """Return the window whose samples are the Legendre coefficients themselves."""
+    count = degree + 1
+    filters = tuple(tuple(Fraction(row == column) for column in range(count)) for row in range(count))
+    title = "the rotation of a polynomial rate"
+    return Window("legendre", title, "", count, 0, 0, count, Fraction(1), "minimax", filters)

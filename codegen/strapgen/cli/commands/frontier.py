@@ -1,0 +1,107 @@
+"""The command ``strapgen frontier`` compares the drift of algorithms on many motions with what they cost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, ClassVar
+
+from strapgen.cli.option_groups import grouped
+from strapgen.cli.options import listed, option, whole
+from strapgen.cli.output import Output
+from strapgen.support import checks
+from strapgen.support.exceptions import InputError
+
+
+@dataclass(frozen=True)
+class StudyRun:
+    """Options of the runs of a study."""
+
+    panel: ClassVar[str] = "Run"
+
+    sample_hz: Annotated[
+        str, option("--sample-hz", metavar="HZ", help="Sampling rate of the gyro in Hz.")
+    ] = "100"
+    duration: Annotated[str, option("--duration", metavar="S", help="Duration of each run in s.")] = "60"
+    results: Annotated[
+        Path | None,
+        option(
+            "--results",
+            metavar="FILE",
+            help="File that keeps each result when it is there; a study that was stopped goes on from it.",
+        ),
+    ] = None
+    jobs: Annotated[
+        str | None,
+        option(
+            "--jobs",
+            metavar="N",
+            help="Number of processes that run side by side.  [default: one for each processor]",
+        ),
+    ] = None
+
+    def check(self, output: Output) -> None:
+        """Check that the output is not written over the results."""
+        for name, path in (("--out", output.file), ("--plot", output.plot)):
+            if path is not None and self.results is not None and path.resolve() == self.results.resolve():
+                raise InputError(f"{name} and --results are both {path}; two files are needed")
+
+    def count(self) -> int | None:
+        """Return the number of processes, checked."""
+        count = whole("jobs", self.jobs)
+        return None if count is None else checks.count("jobs", count, largest=1024)
+
+
+@grouped
+def frontier(
+    *,
+    methods: Annotated[
+        str | None,
+        option(
+            *("--method", "--methods"),
+            metavar="NAME,...",
+            help="Methods, each with all of its samples or one choice of them, as in magnus6:3 or "
+            "coning-combined:8+3.  [default: those of the catalogue and of the literature]",
+            panel="Algorithm",
+        ),
+    ] = None,
+    run: StudyRun,
+    output: Output,
+) -> None:
+    """Compare the drift of algorithms on many motions with their cost.
+
+    All algorithms get the same samples, of cones, cones on a spinning body, random rates, and slews with soft and with
+    sharp onsets. You see the largest angle from the true attitude, divided by the duration, beside the multiplications
+    and additions for each sample. The plot shows which algorithms drift less than all that cost less.
+
+    A method:N+P+L takes N samples in a step, P from before it and L from after it. The method fit-exact integrates the
+    polynomial through its samples exactly, as iterations on it do in the limit.
+
+    Example: strapgen frontier --method coning-compressed:1+1,coning-combined:3+3 --duration 6
+
+    Example: strapgen frontier --method coning-least-squares,window-7-7 --duration 6 --results out/frontier.jsonl --plot
+    out/frontier.png
+    """
+    output.check(run.results)
+    run.check(output)
+    jobs = run.count()
+    from strapgen.cli.progress import track
+    from strapgen.experiments import frontier as study
+
+    several = study.candidates(None if methods is None else listed("--method", methods))
+    runs = study.frontier(several, run.sample_hz, run.duration, run.results, jobs)
+    standings = study.in_order(track(runs, "running", len(several)), several)
+    from strapgen.reports import plots
+    from strapgen.reports.frontier import frontier_report
+
+    hertz, seconds = (
+        float(checks.number("sample_hz", run.sample_hz)),
+        float(checks.number("duration", run.duration)),
+    )
+    title = (
+        f"drift over {seconds:g} s at {hertz:g} Hz; a line joins what drifts less than all that costs less"
+    )
+    output.report(
+        frontier_report(standings, hertz, seconds),
+        lambda path: plots.frontier_image(standings, hertz, title, path),
+    )

@@ -1,0 +1,107 @@
+"""Plots the drift of attitude algorithms against the multiplications that they take, and the frontier of the best."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from strapgen.experiments.frontier import Standing, pareto
+from strapgen.reports.plots import figures
+
+#: The motions of the panels.
+PANELS = ("cone 1/10", "cone 1/20", "cone 15/20", "random 200", "slew 50 ms", "ramps 50 ms")
+#: Smallest drift that is drawn, in deg/h: what is below is rounding.
+_LEAST = 1e-9
+_COLUMNS = 2
+#: Space at the left of the points, for labels, and at their right, as factors.
+_LEFT, _RIGHT = 9.0, 1.5
+#: Gain from which an algorithm that costs more is on the frontier.
+_GAIN = 0.05
+
+
+def frontier_image(standings: Sequence[Standing], sample_hz: float, title: str, path: str | Path) -> bytes:
+    """Return the drift over the multiplications a second: a panel a motion, a point an algorithm.
+
+    A line of steps joins the algorithms that drift less than all that cost less; only they have a label.
+
+    Parameters
+    ----------
+    standings : sequence of Standing
+    sample_hz : float
+        Sampling rate in Hz.
+    title : str
+    path : path
+        File for the image; its ending says which kind.
+
+    Returns
+    -------
+    bytes
+        The content of the file.
+
+    Raises
+    ------
+    MissingExtraError
+        If matplotlib is not installed.
+    InputError
+        If the kind of image is unknown.
+    """
+    rows = -(-len(PANELS) // _COLUMNS)
+    figure, grid = figures.grid_of_axes(rows, _COLUMNS, (6.2 * _COLUMNS, 0.6 + 3.7 * rows))
+    labels = [
+        (axes, _draw_panel(axes, standings, label, sample_hz))
+        for axes, label in zip(grid.flat, PANELS, strict=True)
+    ]
+    for axes in grid[-1]:
+        axes.set_xlabel("multiplications a second")
+    rates = [one.per_second(sample_hz) for one in standings]
+    grid[0, 0].set_xlim(min(rates) / _LEFT, max(rates) * _RIGHT)  # of all
+    figure.draw_without_rendering()  # axes have their places
+    for axes, names in labels:
+        figures.labels_beside_points(axes, names, figures.COLOURS[0])
+    for axes in grid[:, 0]:
+        axes.set_ylabel("drift, deg/h")
+    figures.title(figure, title)
+    return figures.image(figure, path)
+
+
+def _draw_panel(
+    axes: Any, standings: Sequence[Standing], label: str, sample_hz: float
+) -> dict[str, tuple[float, float]]:
+    """Draw the algorithms on one motion; return the points on the frontier by their names."""
+    points = {
+        one.name: (one.per_second(sample_hz), max(value, _LEAST))
+        for one in standings
+        if (value := one.drifts[label]) is not None
+    }
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_title(_title(label), loc="left", fontsize=10)
+    figures.style(axes)
+    axes.margins(y=0.15)
+    if not points:
+        return {}
+    axes.plot(*zip(*points.values(), strict=True), "o", markersize=4, color="0.75", zorder=1)
+    front = {name: points[name] for name in pareto(points, _GAIN)}
+    axes.plot(
+        *zip(*front.values(), strict=True),
+        "o-",
+        drawstyle="steps-post",
+        color=figures.COLOURS[0],
+        markersize=5,
+        linewidth=1,
+    )
+    return front
+
+
+def _title(label: str) -> str:
+    """Return the label of a motion in words."""
+    kind, _, rest = label.partition(" ")
+    if kind == "cone":
+        angle, _, frequency = rest.partition("/")
+        return f"cone of {angle} deg at {frequency} Hz"
+    return {
+        "random": f"random rate of {rest} deg/s",
+        "slew": f"slews of 300 deg/s, onset of {rest}",
+        "ramps": f"slews of 300 deg/s, ramps of {rest}",
+    }[kind]

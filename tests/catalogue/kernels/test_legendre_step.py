@@ -1,0 +1,41 @@
+"""The step from Legendre coefficients is the step of every window after its filters."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import strapgen
+from strapgen.catalogue.methods.late_filters import LateFilters
+from strapgen.catalogue.methods.windows import WINDOWS
+
+
+@pytest.mark.parametrize("name", ["dcm", "euler"])
+@pytest.mark.parametrize("previous", [0, 3, 5, 6])
+def test_filters_before_it_give_the_step_of_each_window_of_a_family(name, previous):
+    family = WINDOWS["window-3-3"]
+    window = family.one_sided_with(6 - previous)
+    backend = strapgen.backend(name, window.name)
+    samples = np.random.default_rng(previous).uniform(-0.1, 0.1, (20, 7, 3))
+    rows = np.array(LateFilters(family).sets[previous], float)
+    coefficients = np.moveaxis(rows @ samples, -2, 0)
+    state = backend.step(backend.identity, samples[0])
+    ours = strapgen.evaluator(f"{name}-legendre-4")(state, *coefficients)
+    theirs = np.array([backend.step(state, each) for each in samples])
+    # Some hundred operations on numbers up to 1.
+    np.testing.assert_allclose(ours, theirs, rtol=0, atol=3e-15)
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3])
+def test_without_the_highest_coefficients_it_is_that_of_a_lower_degree(degree):
+    rows = np.random.default_rng(degree).uniform(-0.1, 0.1, (degree + 1, 3))
+    state = np.array([0.5, -0.5, 0.5, 0.5])
+    zeros = np.zeros((4 - degree, 3))
+    # From degree 1 to 2, terms of the order of those that are left out of the rotation vector come with c_2.
+    allowed = 1e-6 if degree == 1 else 1e-15
+    np.testing.assert_allclose(
+        strapgen.evaluator(f"euler-legendre-{degree}")(state, *rows),
+        strapgen.evaluator("euler-legendre-4")(state, *rows, *zeros),
+        rtol=0,
+        atol=allowed,
+    )

@@ -1,0 +1,95 @@
+"""Families of filters: what is designed, written, read again and the same every time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from strapgen.catalogue.methods import windows
+from strapgen.catalogue.methods.window import GyroResponse
+from strapgen.design import family_file, spectra
+from strapgen.design.band_grid import BITS, ONE
+from strapgen.design.family import FamilyBrief, design
+from strapgen.support.exceptions import InputError
+from strapgen.vibration.spectrum import Spectrum
+
+GYRO = GyroResponse(Fraction(40), Fraction(7071, 10000), Fraction(100))
+SMALL = FamilyBrief(2, 2, Fraction(1), conditions=3, degree=2)
+
+BRIEFS = {
+    "minimax": SMALL,
+    "noise": replace(SMALL, noise=Fraction(1, 1000), one_sided_noise=Fraction(0)),
+    "more before": replace(SMALL, previous=3, ahead=1),
+    "more ahead": replace(SMALL, previous=0, ahead=3),
+    "none ahead": replace(SMALL, previous=3, ahead=0),
+    "exact": replace(SMALL, rotation="exact", terms=20, title="Exact 7"),
+    "gyro": pytest.param(
+        replace(SMALL, gyro=GYRO, noise=Fraction(1, 10**6)),
+    ),
+    "gyro, minimax": pytest.param(replace(SMALL, gyro=GYRO), marks=pytest.mark.long),
+}
+
+
+@pytest.mark.parametrize("brief", BRIEFS.values(), ids=BRIEFS)
+def test_what_is_written_is_read_again(brief, tmp_path):
+    window = design(brief)
+    (tmp_path / "w.toml").write_text(family_file.written(window, "a command"))
+    again = windows.read(tmp_path / "w.toml")
+    assert again == window
+    assert (again.conditions, again.degree, again.gyro) == (3, 2, brief.gyro)
+    assert (again.rotation, again.noise) == (brief.rotation, brief.noise)
+    assert again.parity == (brief.previous == brief.ahead and brief.gyro is None)
+    sizes = [(one.previous, one.ahead) for one in again.one_sided]
+    assert sizes == windows.one_sided_sizes(brief.previous, brief.ahead)
+    assert {one.noise for one in again.one_sided} <= {brief.one_sided_noise}
+    assert {one.objective for one in again.one_sided} <= {"mean square"}
+    assert again.objective == ("mean square" if brief.noise else "minimax")
+
+
+def test_noise_makes_the_filters_smaller():
+    quiet, noisy = (design(replace(SMALL, noise=noise)) for noise in (Fraction(0), Fraction(1, 10)))
+    for m in (1, 2):
+        assert sum(tap**2 for tap in noisy.filters[m]) < sum(tap**2 for tap in quiet.filters[m])
+
+
+def test_a_spectrum_is_the_density_of_the_rate():
+    # An angle of density f^-2 has a rate of flat density; the line at 10 to 11 Hz of 100 is all there is of the other.
+    flat = Spectrum(lambda f: f**-2.0, {"angle_x": np.ones_like, "angle_y": np.ones_like}, (1e-4, 50.0))
+    assert {weight / ONE for weight in spectra.weights(flat, Fraction(1), Fraction(100))} == {1.0}
+    line = Spectrum(np.ones_like, {"angle_y": np.ones_like}, (10.0, 11.0))
+    weights = spectra.weights(line, Fraction(1), Fraction(100))
+    b = np.cos(np.pi * (np.arange(400) + 0.5) / 800)
+    inside = (b > 0.2 * np.pi) & (b < 0.22 * np.pi)
+    expected = b**2 * inside / np.mean(b**2 * inside)
+    # Weights are rounded to 2^-30.
+    np.testing.assert_allclose([weight / ONE for weight in weights], expected, atol=2**-30)
+    assert all(weight % (1 << (BITS - 30)) == 0 for weight in weights)
+
+
+@pytest.mark.parametrize(
+    ("spectrum", "message"),
+    [
+        (Spectrum(np.ones_like, {"acceleration_x": np.ones_like}, (1.0, 2.0)), "the spectrum turns nothing"),
+        (
+            Spectrum(np.ones_like, {"angle_x": np.ones_like}, (40.0, 50.0)),
+            "has no motion below 1 rad a sample",
+        ),
+    ],
+)
+def test_a_spectrum_without_rate_is_refused(spectrum, message):
+    with pytest.raises(InputError, match=message):
+        spectra.weights(spectrum, Fraction(1), Fraction(100))
+
+
+def test_numbers_of_a_file_are_exact():
+    for value in (Fraction(1, 3), Fraction(13, 10), Fraction(-1, 2**13), Fraction(10**14), Fraction(0)):
+        assert Fraction(family_file.number(value)) == value
+
+
+def test_titles_say_what_the_filters_are_for():
+    assert replace(SMALL, gyro=GYRO, noise=Fraction(1, 100), spectrum=()).full_title == (
+        "Window 1+2+2 to 1 rad, gyro 40 Hz, noise 0.01, for a spectrum"
+    )
