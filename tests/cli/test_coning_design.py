@@ -35,6 +35,7 @@ def run(capsys, tmp_path, monkeypatch):
     [
         ("band --band-hz 20 --sample-hz 100 --powers 1", {"largest_rad_step", "largest_annulling_rad_step"}),
         (f"worst {SPECTRUM}", {"worst_deg_h", "worst_annulling_deg_h"}),
+        ("band --band 1.3 --products 1", {"largest_rad_step"}),
         (f"random {SPECTRUM} --noise-rad 1e-6 --pulse-rad 1e-6", {"random_deg_h", "random_annulling_deg_h"}),
         (f"worst {SPECTRUM} --gyro-bandwidth-hz 40 --gyro-damping 0.7071", {"worst_deg_h"}),
     ],
@@ -90,6 +91,7 @@ def test_a_design_goes_wherever_a_method_goes(run, tmp_path):
             "--sample-hz goes with --band-hz, --gyro-bandwidth-hz or --spectrum",
         ),
         ("band --band 1 --powers 4", "--powers is 4; a whole number from 0 to 3 is needed"),
+        ("band --band 1 --products 3", "the conditions on 3 coefficients contradict each other"),
         ("band --band 1 --terms", "--objective designs the compressed form, without terms"),
         ("band --band 1 --form combined", "--objective designs the compressed form, without terms"),
         ("worst", "--objective worst needs a --spectrum"),

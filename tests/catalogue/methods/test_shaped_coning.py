@@ -93,6 +93,7 @@ WRONG = {
     ),
     "coefficient": ('"99157974445826439/', '"99157974545826439/', "the coefficients have"),
     "powers": ("powers = 0", "powers = 1", "powers is 1, but the drift has the power 3 of the frequency"),
+    "products": ("powers = 0", "products = 1", "products is 1, but a step is not exact for all products"),
     "count": ("previous = 8", "previous = 7", "coefficients has 8 numbers; 7 are needed for 1 samples and 7"),
     "no coefficients": ("previous = 8", "previous = 0", "samples 1 and previous 0 have no coefficients"),
     "float": (
