@@ -70,6 +70,13 @@ INTEGRATORS = {
         ("combined",),
         False,
     ),
+    "coning-exact-rest": Integrator(
+        "coning coefficients for both, with all other terms of the polynomial through the increments",
+        "exact_rest",
+        16,
+        False,
+        takes_ahead=False,
+    ),
     "coning-polynomial": Integrator(
         "uncompressed coning coefficients, with the terms of third and fourth order",
         "coning",
