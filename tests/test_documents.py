@@ -131,6 +131,7 @@ def new_clone(tmp_path_factory: pytest.TempPathFactory) -> tuple[set[str], dict[
     return files_of(clone) - before, answer["done"]
 
 
+@pytest.mark.long
 def test_the_commands_of_the_readme_run_in_a_new_clone(new_clone):
     written, done = new_clone
     assert len(done) >= 8

@@ -33,5 +33,5 @@ def test_rows():
 def test_the_whole_catalogue_is_offered():
     names = methods()
     assert {choice.method for choice in choices()} == set(names)
-    series = {f"taylor{order}" for order in range(9, 21)} | {"fit-exact"}
+    series = {f"taylor{order}" for order in range(9, 21)} | {"fit-exact", "coning-exact-rest"}
     assert set(METHODS) - set(names) == series | set(WINDOW_TITLES) | set(SHAPE_TITLES)

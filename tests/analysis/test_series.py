@@ -26,6 +26,7 @@ def test_the_order_is_that_of_theory_or_better(algorithm, motion, method):
     assert order == rank if motion in ("general", "coning") else order >= rank
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("motion", "terms"), [("constant", 2), ("general", 1)])
 def test_json_is_what_was_agreed(motion, terms):
     data = json.loads(json.dumps(analyse(choose("euler", "rk4", 2), motion, terms).as_dict()))

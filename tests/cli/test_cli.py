@@ -114,6 +114,7 @@ COSTLY = (
 )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "command", [pytest.param(c, marks=pytest.mark.long if c in COSTLY else ()) for c in COMMANDS]
 )
@@ -325,6 +326,7 @@ def test_vibration_of_a_fast_loop_says_what_its_rates_are(strapgen_says):
     assert "the slow loop adds that to both" in " ".join(strapgen_says("vibration --help").split())
 
 
+@pytest.mark.long
 def test_vibration_of_several(strapgen_says, tmp_path):
     several = f"vibration euler --method rk2,rk4 --increments 1,2 {ONE}"
     data = json.loads(strapgen_says(f"{several} --format json"))
@@ -866,6 +868,7 @@ def test_study_word_length(strapgen_says, tmp_path):
     assert "the method itself drifts by" in strapgen_says(command)
 
 
+@pytest.mark.long
 def test_frontier(strapgen_says, tmp_path):
     pytest.importorskip("matplotlib")
     command = "frontier --method coning-compressed:1+1,rk4:2 --duration 1 --jobs 1 --results results.jsonl"
@@ -922,6 +925,7 @@ def test_an_interrupt_stops_a_study_at_once(tmp_path):
 TABLE_KEYS = ["table", "backend", "algorithm", "order", "drift_deg", "normalised", "thesis", "agrees"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "backend",
     # Slow ones run the same tables in tests/experiments.
@@ -1011,6 +1015,7 @@ def test_help_is_quick():
     assert any(seconds() < 0.5 for _ in range(5))
 
 
+@pytest.mark.long
 def test_quick_answers_load_no_heavy_library():
     code = """
 import sys
@@ -1027,6 +1032,7 @@ for words in (["--help"], ["simulate", "--help"], ["generate", "--check"]):
     assert loaded == ["loaded"] * 3
 
 
+@pytest.mark.long
 def test_simulation_loads_no_computer_algebra(strapgen_says):
     """Once the sources are in the cache."""
     command = f"simulate euler {CONING} --backend numpy".split()
@@ -1044,6 +1050,7 @@ print("loaded", *sorted({{"sympy", "jinja2"}} & sys.modules.keys()))
     assert done.stdout.splitlines()[-1] == "loaded"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "command",
     [
@@ -1069,6 +1076,7 @@ def test_reader_that_is_gone_before_is_no_error():
     assert process.returncode == 1
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "command",
     [
@@ -1128,6 +1136,7 @@ def test_converge_is_a_gate(limit, status, capsys):
     assert capsys.readouterr().err.count("\n") == status
 
 
+@pytest.mark.long
 def test_check_fails_with_the_names_of_what_fails(capsys, tmp_path):
     text = (DATA / "algorithms" / "picard.py").read_text()
     claimed = text.replace(
@@ -1146,6 +1155,7 @@ def test_check_fails_with_the_names_of_what_fails(capsys, tmp_path):
     assert {finding["name"] for finding in data["findings"] if finding["holds"] is False} == {"order"}
 
 
+@pytest.mark.long
 def test_series_prints_what_was_agreed(strapgen_says):
     said = strapgen_says("series euler --method rk4 --increments 2 --motion constant --terms 2 --format json")
     data = json.loads(said)
@@ -1167,6 +1177,7 @@ def test_series_versus_and_all(strapgen_says):
     assert [row["kernel"] for row in rows] == ["euler-rk1-1", "euler-magnus2-1"]
 
 
+@pytest.mark.long
 def test_series_latex_and_files(strapgen_says, tmp_path):
     said = strapgen_says("series dcm --method rk1 --format latex")
     assert said.rstrip().endswith(r"\end{align*}")

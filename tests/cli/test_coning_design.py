@@ -30,11 +30,13 @@ def run(capsys, tmp_path, monkeypatch):
     return answer
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("options", "keys"),
     [
         ("band --band-hz 20 --sample-hz 100 --powers 1", {"largest_rad_step", "largest_annulling_rad_step"}),
         (f"worst {SPECTRUM}", {"worst_deg_h", "worst_annulling_deg_h"}),
+        ("band --band 1.3 --products 1", {"largest_rad_step"}),
         (f"random {SPECTRUM} --noise-rad 1e-6 --pulse-rad 1e-6", {"random_deg_h", "random_annulling_deg_h"}),
         (f"worst {SPECTRUM} --gyro-bandwidth-hz 40 --gyro-damping 0.7071", {"worst_deg_h"}),
     ],
@@ -59,6 +61,7 @@ def test_a_design_is_shown_with_its_drift_and_written_as_a_file(run, options, ke
     assert (tmp_path / "mine.toml").read_text() == first
 
 
+@pytest.mark.long
 def test_a_design_goes_wherever_a_method_goes(run, tmp_path):
     assert run(f"{DESIGN} band --band 1.3 --name Mine --format toml --out mine.toml")[0] == 0
     wave = "--step 0.01 --frequency-hz 10 --theta-x-rad 0.01 --theta-y-rad 0.01 --phase-rad 1.5"
@@ -90,6 +93,7 @@ def test_a_design_goes_wherever_a_method_goes(run, tmp_path):
             "--sample-hz goes with --band-hz, --gyro-bandwidth-hz or --spectrum",
         ),
         ("band --band 1 --powers 4", "--powers is 4; a whole number from 0 to 3 is needed"),
+        ("band --band 1 --products 3", "the conditions on 3 coefficients contradict each other"),
         ("band --band 1 --terms", "--objective designs the compressed form, without terms"),
         ("band --band 1 --form combined", "--objective designs the compressed form, without terms"),
         ("worst", "--objective worst needs a --spectrum"),

@@ -58,6 +58,7 @@ def answer(capsys, tmp_path, monkeypatch):
 DRAWN = {"compare": "time, s", "rate-table": "largest drift of the run, deg"}
 
 
+@pytest.mark.long
 def test_a_table_has_the_same_rows_in_every_format(answer, tmp_path, monkeypatch):
     def label_of_x(figure, path):
         figures.pyplot().close(figure)
@@ -91,6 +92,7 @@ def test_a_dash_is_the_terminal_and_a_file_holds_the_same(answer, tmp_path):
     assert (tmp_path / "pairs.md").read_text() == printed
 
 
+@pytest.mark.long
 def test_a_course_is_plotted_and_written_as_a_table(answer, tmp_path):
     pytest.importorskip("matplotlib")
     log = Path(__file__).resolve().parents[2] / "examples" / "inertial_log.csv"

@@ -15,6 +15,7 @@ from scipy.optimize import linprog
 
 import strapgen
 from strapgen.catalogue.methods import coning_drift, shaped_coning
+from strapgen.catalogue.methods.coning_coefficients import Design
 from strapgen.catalogue.methods.coning_drift import ConingShape
 from strapgen.catalogue.methods.shaped_coning import SHAPES, ShapedConing
 from strapgen.catalogue.methods.window import GyroResponse
@@ -57,6 +58,7 @@ def worst_drift(shape: ConingShape, coefficients: tuple[Fraction, ...], of: Line
     return math.degrees(total / (shape.samples / float(of.sample_hz))) * 3600
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("of", "samples", "previous", "before", "after"),
     [
@@ -81,6 +83,7 @@ def shaped() -> ShapedConing:
     return design(ConingBrief(1, 8, "band", BAND))
 
 
+@pytest.mark.long
 def test_the_built_in_file_is_what_its_command_writes(shaped):
     built_in = SHAPES["coning-shaped-8"]
     assert replace(built_in, name=shaped.name) == shaped
@@ -92,6 +95,7 @@ def test_the_built_in_file_is_what_its_command_writes(shaped):
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("shape", "powers", "band"),
     [
@@ -139,6 +143,7 @@ def _unit(problem: coning.ConingProblem, points: list) -> float:
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("objective", ["worst", "random"])
 @pytest.mark.parametrize("powers", [0, 2])
 def test_no_coefficients_nearby_are_better_for_a_spectrum(objective, powers):
@@ -290,6 +295,27 @@ def test_a_spectrum_that_does_not_cone_is_refused():
     )
     with pytest.raises(InputError, match="there is no coning"):
         of_spectrum(apart, Fraction(100))
+
+
+def test_products_of_powers_of_time_are_integrated_exactly():
+    """The degree is that of the page on coefficients, which counts what a step of them integrates exactly."""
+    plain, exact = (design(ConingBrief(1, 5, "band", BAND, products=n)) for n in (0, 2))
+    degrees = [Design("shaped", 1, 5, dict(shape.pairs)).degree for shape in (plain, exact)]
+    assert degrees == [0, 2]
+    assert exact.level > plain.level
+    shaped_coning.verify(exact)
+    # Products of degree 1 say what the first power of the frequency says: both together are one condition.
+    assert coning.ConingProblem(ConingShape(1, 5), 1, 1).free == 4
+    assert coning.ConingProblem(ConingShape(1, 5), 1, 2).free == 3
+
+
+def test_conditions_that_contradict_each_other_are_refused():
+    with pytest.raises(
+        InputError, match="the conditions on 8 coefficients contradict each other; fewer powers or"
+    ):
+        coning.ConingProblem(ConingShape(1, 8), 0, 3)
+    with pytest.raises(InputError, match="products of powers of time go with an ideal gyro"):
+        coning.ConingProblem(ConingShape(1, 8, GYRO), 0, 1)
 
 
 def test_one_sample_alone_has_no_coefficients():

@@ -43,6 +43,7 @@ def with_fault(subject: Subject, pattern: str, change: str) -> Subject:
     return changed
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=() if name in FEW else pytest.mark.long) for name in RUNNERS]
 )
@@ -54,6 +55,7 @@ def test_a_processor_returns_the_integers_of_the_model(name, monkeypatch, tmp_pa
     assert verdict.version
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("kernel", "settings"),
     [

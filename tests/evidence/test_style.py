@@ -72,6 +72,7 @@ KINDS = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "kind", [kind if kind == "project" else pytest.param(kind, marks=pytest.mark.long) for kind in KINDS]
 )
@@ -130,6 +131,7 @@ def test_a_fault_is_found(body, tmp_path):
     assert [line for line in getattr(style, FAULTS[body])(tmp_path) if line.startswith("fault.c:")]
 
 
+@pytest.mark.long
 def test_a_finding_fails_the_claim(monkeypatch, tmp_path):
     subject = Subject(choose("euler-product"))
     name = "euler_product_w32.c"

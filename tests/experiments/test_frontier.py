@@ -147,6 +147,7 @@ def test_reports_have_every_figure(study, tmp_path):
     assert report.written("markdown").count("\n") == 4
 
 
+@pytest.mark.long
 def test_the_plot_is_an_image(study, tmp_path):
     _, _, standings = study
     assert plots.frontier_image(standings, 100.0, "title", tmp_path / "a.png").startswith(b"\x89PNG")

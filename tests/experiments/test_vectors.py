@@ -47,6 +47,7 @@ def files_of(table: VectorTable) -> dict[str, str]:
     return {**table.sources.step_files, **table_files(table)}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("kernel", "target", "settings"), TABLES)
 def test_the_c_returns_what_the_vectors_say(kernel, target, settings, tmp_path):
     table = table_of(kernel, target, settings)

@@ -62,6 +62,7 @@ def command(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, 
     return int(stop.value.code or 0), said.out, said.err
 
 
+@pytest.mark.long
 def test_checked_in_tree_is_in_step():
     assert standard_tree.difference(resources.folder("generated"), files()) == ""
 

@@ -300,6 +300,7 @@ def calls(draw: st.DrawFn) -> list[Names]:
     return result
 
 
+@pytest.mark.long
 @settings(
     max_examples=2,
     phases=[Phase.generate],  # a failure shows all that it is about; smaller ones would take minutes

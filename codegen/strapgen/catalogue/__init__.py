@@ -11,6 +11,7 @@ from strapgen.catalogue.choosing import choose, choose_step, standard
 from strapgen.catalogue.derivation import companion, derive, enough, nodes, rounding
 from strapgen.catalogue.names import (
     ALGORITHMS,
+    COMPENSATION,
     INTEGRATORS,
     KERNELS,
     METHODS,
@@ -30,6 +31,7 @@ from strapgen.catalogue.names import (
 
 __all__ = [
     "ALGORITHMS",
+    "COMPENSATION",
     "INTEGRATORS",
     "KERNELS",
     "METHODS",

@@ -70,6 +70,13 @@ INTEGRATORS = {
         ("combined",),
         False,
     ),
+    "coning-exact-rest": Integrator(
+        "coning coefficients for both, with all other terms of the polynomial through the increments",
+        "exact_rest",
+        16,
+        False,
+        takes_ahead=False,
+    ),
     "coning-polynomial": Integrator(
         "uncompressed coning coefficients, with the terms of third and fourth order",
         "coning",
@@ -240,6 +247,28 @@ TWO_SPEED = {
     name: recipe._replace(standard=name in _STANDARD_TWO_SPEED) for name, recipe in _TWO_SPEED.items()
 }
 
+#: Kernels that correct the increments of sensors, and those that make their errors; they take no method.
+COMPENSATION = {
+    name: Recipe(title, module, function, tuple(arguments), standard=False)
+    for name, title, module, function, *arguments in (
+        ("imu-compensate", "compensation of a measurement unit", "imu_errors", "imu_compensate"),
+        ("imu-compensate-2", "compensation in two passes", "imu_errors", "imu_compensate", 2),
+        ("imu-errors", "errors of a measurement unit", "imu_errors", "imu_errors"),
+        ("pulse-compensate", "compensation of pulses by polarity", "pulses", "pulse_compensate"),
+        ("pulse-compensate-exact", "the exact inverse of the sensor", "pulses", "pulse_compensate", True),
+        ("pulse-errors", "pulses of a sensor with its errors", "pulses", "pulse_errors"),
+        ("gyro-pulse-compensate", "the same for a gyro", "pulses", "pulse_compensate", False, "gyro"),
+        ("gyro-pulse-errors", "pulses of a gyro with its errors", "pulses", "pulse_errors", "gyro"),
+        ("temperature-coefficient", "coefficient by two slopes", "pulses", "temperature_coefficient"),
+        ("scale-factor-heating", "scale factor by heat", "torquer_heating", "scale_factor_heating"),
+        ("scale-factor-heating-errors", "its errors", "torquer_heating", "scale_factor_heating", True),
+        ("separate-canonical", "rate and acceleration from torques", "separation", "separate", "canonical"),
+        ("separate-45", "the same, torquers at 45 degrees", "separation", "separate", "45"),
+        ("torques-canonical", "torques of unbalanced gyros", "separation", "measure", "canonical"),
+        ("torques-45", "the same, torquers at 45 degrees", "separation", "measure", "45"),
+    )
+}
+
 #: Kernels that take no method.
 KERNELS = {
     **{
@@ -297,6 +326,7 @@ KERNELS = {
         for motion in MOTIONS
     },
     **TWO_SPEED,
+    **COMPENSATION,
 }
 
 

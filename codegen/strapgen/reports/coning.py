@@ -222,6 +222,7 @@ def shaped_data(drift: ShapedDrift) -> dict[str, Any]:
         "previous": shape.previous,
         "objective": shape.objective,
         "powers": shape.powers,
+        "products": shape.products,
         "band_rad_sample": None if shape.band is None else float(shape.band),
         "gyro": None
         if shape.gyro is None

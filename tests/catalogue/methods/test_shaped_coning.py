@@ -91,8 +91,19 @@ WRONG = {
         'level = "7.00801E-10"',
         "level is 7.00801E-10; the coefficients have 7.00799e-10",
     ),
+    "one digit": (
+        'level = "7.00799E-10"',
+        'level = "1E-8"',
+        "level is 1E-8; the coefficients have 7.00799e-10",
+    ),
+    "high level": (
+        'level = "7.00799E-10"',
+        'level = "1E+400"',
+        "level is 1E+400; the coefficients have 7.00799e-10",
+    ),
     "coefficient": ('"99157974445826439/', '"99157974545826439/', "the coefficients have"),
     "powers": ("powers = 0", "powers = 1", "powers is 1, but the drift has the power 3 of the frequency"),
+    "products": ("powers = 0", "products = 1", "products is 1, but a step is not exact for all products"),
     "count": ("previous = 8", "previous = 7", "coefficients has 8 numbers; 7 are needed for 1 samples and 7"),
     "no coefficients": ("previous = 8", "previous = 0", "samples 1 and previous 0 have no coefficients"),
     "float": (

@@ -119,6 +119,37 @@ def powers(shape: ConingShape, count: int) -> list[tuple[list[Fraction], Fractio
     return conditions
 
 
+def products(shape: ConingShape, degree: int) -> list[tuple[list[Fraction], Fraction]]:
+    """Return the conditions of a step that is exact for products of two powers of time in the rate.
+
+    Parameters
+    ----------
+    shape : ConingShape
+        Of an ideal gyro.
+    degree : int
+        Highest total degree of the products; 0 for none.
+
+    Returns
+    -------
+    list of (list of Fraction, Fraction)
+        For each product its coefficient for every K_s, and what their sum has to be. Those of degree 1 say the same as
+        the first of `powers`.
+
+    Examples
+    --------
+    >>> [str(value) for row, value in products(ConingShape(1, 2), 2) for value in (*row, value)]
+    ['1', '2', '1/12', '0', '-2', '1/12']
+    """
+    from strapgen.catalogue.methods.coning_coefficients import polynomial_conditions
+
+    newest = shape.unknowns
+    return [
+        ([row[newest - s, newest] for s in range(1, newest + 1)], value)
+        for total in range(1, degree + 1)
+        for row, value in polynomial_conditions(shape.samples, shape.previous, total)
+    ]
+
+
 def largest(shape: ConingShape, coefficients: Sequence[Fraction], band: Fraction) -> float:
     """Return the largest magnitude of E over a band.
 
