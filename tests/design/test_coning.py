@@ -306,7 +306,9 @@ def test_products_of_powers_of_time_are_integrated_exactly():
 
 
 def test_conditions_that_contradict_each_other_are_refused():
-    with pytest.raises(InputError, match="the conditions on 8 coefficients contradict each other; fewer powers or"):
+    with pytest.raises(
+        InputError, match="the conditions on 8 coefficients contradict each other; fewer powers or"
+    ):
         coning.ConingProblem(ConingShape(1, 8), 0, 3)
     with pytest.raises(InputError, match="products of powers of time go with an ideal gyro"):
         coning.ConingProblem(ConingShape(1, 8, GYRO), 0, 1)
