@@ -220,6 +220,7 @@ BAD = {
     "coning --samples 2 --form optimal": "form 'optimal' is not known; allowed: compressed, uncompressed, combined",
     "coning --samples 6 --previous 1 --terms": "are listed for up to 6 samples; 7 are given",
     "coning --samples 2 --format yaml": "format 'yaml' is not known; allowed: text, json, csv, markdown, toml",
+    "coning --samples 2 --format toml": "--format toml writes a design; it goes with --objective",
     "derive rotation-vector --method rk4": "method of rotation-vector 'rk4' is not known; allowed: magnus2, magnus4",
     "derive rotation-vector --tableau kutta.toml": "rotation-vector goes with no tableau; allowed methods: magnus2",
     "derive sculling --method magnus4": "method of sculling 'magnus4' is not known; allowed: coning-compressed",

@@ -130,3 +130,12 @@ def test_wrong_options_get_one_line(run, command, words):
     status, out, error = run(command)
     assert (status, out) == (2, "")
     assert words in error and error.count("\n") == 1
+
+
+def test_a_band_too_narrow_for_so_many_samples_is_refused(run):
+    status, out, error = run("coning --samples 1 --previous 8 --objective band --band 0.001")
+    assert (status, out) == (2, "")
+    assert (
+        "the drift on coning over 0.001 rad a sample does not converge; a wider band or fewer samples"
+        in error
+    )

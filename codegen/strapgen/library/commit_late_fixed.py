@@ -146,7 +146,7 @@ def rounded(taps: Sequence[Fraction], fraction: int, moments: int) -> Integers:
     Examples
     --------
     >>> rounded([Fraction(-1, 3), Fraction(0), Fraction(1, 3)], 4, 1)
-    (-5, -1, 6)
+    (-5, 0, 5)
     """
     exact = [tap * (1 << fraction) for tap in taps]
     result: list[int] = []

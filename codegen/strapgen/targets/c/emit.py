@@ -191,7 +191,7 @@ def _code(
     real, used, indices = printer.real.name, program.used(program.outputs), indices or {}
 
     def place(signal: Signal, number: int) -> str:
-        return signal.name + indices.get(signal.name, "[{}]").format(number) if signal.shape else signal.name
+        return signal.name + indices.get(signal.name, "[{}]").format(number)
 
     return {
         "loads": [

@@ -1,0 +1,134 @@
+"""Torquer heating: the printed protocol of 360 s of rate and 540 s of rest, and what words can hold of it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import sympy as sp
+
+import strapgen
+from strapgen import derive
+from strapgen.ir.fixed_settings import Settings
+
+GAIN, TAU = -2.6e-4, 150.0
+RATE = np.radians(100) / np.sqrt(2)  # rad/s about each torquer axis, 100 deg/s in all
+#: Seconds of rate and of rest, and the deviation of the scale factor.
+PROTOCOL = [(150, 0, -5.00643e-4), (360, 0, -7.20156e-4), (360, 540, -1.96773e-5)]
+
+
+def deviation_after(moving, resting, step=1.0):
+    """Return the deviation after seconds of rate and of rest, by the kernel in double."""
+    kernel = strapgen.evaluator("scale-factor-heating")
+    u, decay = np.float64(0), -np.expm1(-step / TAU)
+    for rate, seconds in ((RATE, moving), (0.0, resting)):
+        for _ in range(round(seconds / step)):
+            u, _ = kernel(u, np.full(2, rate * step), decay, GAIN, 1 / step)
+    return float(u)
+
+
+@pytest.mark.parametrize(("moving", "resting", "printed"), PROTOCOL)
+def test_the_deviation_is_that_of_the_protocol(moving, resting, printed):
+    half_a_digit = 0.5 * 10.0 ** (np.floor(np.log10(-printed)) - 5)
+    assert abs(deviation_after(moving, resting) - printed) <= half_a_digit
+
+
+def test_the_steady_deviation_and_its_share_after_a_time_constant():
+    steady = GAIN * np.radians(100) ** 2
+    assert abs(steady - -7.92005e-4) <= 0.5e-9
+    assert abs(deviation_after(150, 0) / steady - 0.632) <= 0.0005
+    assert abs(deviation_after(360, 540) / deviation_after(360, 0) - 0.0273) <= 0.00005
+
+
+def test_the_recursion_is_the_differential_equation_for_a_rate_held_over_a_cycle():
+    u, w, k, tau, T = sp.symbols("u w k tau T", positive=True)
+    time = sp.Symbol("t", positive=True)
+    function = sp.Function("u")
+    solution = sp.dsolve(function(time) + tau * function(time).diff(time) - k * w**2, ics={function(0): u})
+    values = {"deviation": u, "d_x": w * T, "d_y": sp.S.Zero, "heating_gain": k, "cycle_rate": 1 / T}
+    outputs = derive("scale-factor-heating").expand(values | {"decay": 1 - sp.exp(-T / tau)})
+    assert sp.simplify(outputs["next_deviation"][0] - solution.rhs.subs(time, T)) == 0
+    assert outputs["compensated_increment"] == [(1 + u) * w * T, 0]
+
+
+def test_the_errors_are_undone(rng):
+    first, second = (strapgen.evaluator(f"scale-factor-heating{end}") for end in ("-errors", ""))
+    u = v = np.float64(0)
+    for increment in rng.uniform(-0.03, 0.03, size=(200, 2)):
+        u, indicated = first(u, increment, 0.01, GAIN, 100.0)
+        v, compensated = second(v, indicated, 0.01, GAIN, 100.0)
+        np.testing.assert_allclose(compensated, increment, rtol=0, atol=1e-16)
+    assert u != 0 and abs(u - v) < 1e-18
+
+
+# In fixed point, at the printed 93 Hz
+
+
+def run_in_fixed_point(name, carry, moving, resting):
+    """Return the deviations after cycles of rate and of rest at 93 Hz, the exact one beside, and the evaluator."""
+    step = 1 / 93
+    settings = Settings(word=int(name.removeprefix("c-fixed")), carry=carry)
+    evaluator = strapgen.evaluator("scale-factor-heating", name, settings)
+    values = (0.0, np.full(2, RATE * step), -np.expm1(-step / TAU), GAIN, 93.0)
+    inputs = [
+        evaluator.integers(argument, np.asarray(value, float)).reshape(1, -1)
+        for argument, value in zip(evaluator.interface.inputs, values, strict=True)
+    ]
+    d, decay, gain, rate = (
+        float(evaluator.numbers(a, array).ravel()[0])
+        for a, array in zip(evaluator.interface.inputs[1:], inputs[1:], strict=True)
+    )
+    feedback, exact = evaluator.fresh(1), 0.0
+    for turning, cycles in ((1, moving), (0, resting)):
+        inputs[1] = inputs[1] * turning
+        for _ in range(cycles):
+            (inputs[0], _), feedback = evaluator.run(inputs, feedback)
+            exact += decay * (turning * gain * 2 * (d * rate) ** 2 - exact)
+    result = float(evaluator.numbers(evaluator.interface.outputs[0], inputs[0]).ravel()[0])
+    return result, exact, evaluator
+
+
+def allowed(evaluator, carry):
+    """Return by how much a run may be off: what a call adds, over what decays in a cycle.
+
+    With error feedback the state is off by its rounding once, and by the error of the deviation that the rate leads to.
+    """
+    (argument, *_) = evaluator.interface.outputs
+    decay = -np.expm1(-1 / 93 / TAU)
+    if carry == "none":
+        return float(max(argument.errors)) / decay
+    fixed = evaluator.sources.fixed_program if hasattr(evaluator.sources, "fixed_program") else None
+    assert fixed is None
+    word = argument.format.word
+    # Rates of 2.6 rad/s in formats of 32, squares of 8, gains of 2^-11 and less: a unit each, and the product's unit.
+    return float(argument.format.unit) + 2.0 ** (1 - word) * 2 * (2 * 32 * 2 * 1.24 * 2.6e-4 + 8 * 2.0**-8)
+
+
+@pytest.mark.parametrize(
+    ("name", "carry"), [("c-fixed32", "none"), ("c-fixed32", "state"), ("c-fixed16", "state")]
+)
+def test_a_run_at_93_hz_follows_the_recursion(name, carry):
+    result, exact, evaluator = run_in_fixed_point(name, carry, 1500, 500)
+    assert exact < -7e-5
+    assert abs(result - exact) <= allowed(evaluator, carry)
+
+
+def test_16_bits_never_move_without_error_feedback():
+    # A cycle adds 5.7e-8; half a unit of the deviation is 1.2e-7.
+    result, exact, evaluator = run_in_fixed_point("c-fixed16", "none", 1500, 0)
+    assert result == 0 and exact < -8e-5
+    unit = float(evaluator.interface.outputs[0].format.unit)
+    assert -np.expm1(-1 / 93 / TAU) * 7.92005e-4 < unit / 2
+    assert abs(exact) <= allowed(evaluator, "none"), "its bound says so"
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("name", "carry", "digits"),
+    [("c-fixed32", "none", 2e-10), ("c-fixed32", "state", 1e-10), ("c-fixed16", "state", 1e-5)],
+)
+@pytest.mark.parametrize(("moving", "resting", "printed"), PROTOCOL)
+def test_the_protocol_at_93_hz(name, carry, digits, moving, resting, printed):
+    result, exact, evaluator = run_in_fixed_point(name, carry, 93 * moving, 93 * resting)
+    assert abs(result - exact) <= allowed(evaluator, carry)
+    # Beside the rounding of the run: half a digit of the printed value and what the inputs' formats leave.
+    assert abs(result - printed) <= digits + 0.5e-9
