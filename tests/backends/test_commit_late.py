@@ -522,3 +522,12 @@ def test_the_exact_rotation_is_committed_late_too():
     # The start is committed with one-sided filters, whose errors stay.
     error = drift_between(Rotation.from_quat(unit.attitude).as_matrix(), true[991])
     assert np.linalg.norm(error) < 1e-7
+
+
+def test_samples_are_counted_so_that_no_angle_is_lost():
+    unit = CommitLate(WINDOW, backend="c-fixed32", settings=Settings(carry="full"))
+    for _ in range(300):
+        unit.push([0.0, 0.0, 1000.3 * 2.0**-32])
+    unit.flush()
+    # A third of a unit a sample is 100 units in all; the state has units of 2^-30, and error feedback below them.
+    assert apart(unit.attitude, np.array([0.0, 0.0, 150045 * 2.0**-32, 1.0])) < 4 * 2.0**-30
