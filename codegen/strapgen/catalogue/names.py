@@ -261,7 +261,7 @@ COMPENSATION = {
         ("gyro-pulse-errors", "pulses of a gyro with its errors", "pulses", "pulse_errors", "gyro"),
         ("temperature-coefficient", "coefficient by two slopes", "pulses", "temperature_coefficient"),
         ("scale-factor-heating", "scale factor by heat", "torquer_heating", "scale_factor_heating"),
-        ("scale-factor-heating-errors", "its errors", "torquer_heating", "scale_factor_heating", True),
+        ("torquer-heating-errors", "its errors", "torquer_heating", "scale_factor_heating", True),
         ("separate-canonical", "rate and acceleration from torques", "separation", "separate", "canonical"),
         ("separate-45", "the same, torquers at 45 degrees", "separation", "separate", "45"),
         ("torques-canonical", "torques of unbalanced gyros", "separation", "measure", "canonical"),

@@ -5,12 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import sympy as sp
+from derived import quantized
 
 import strapgen
 from strapgen import derive
+from strapgen.catalogue import Choice
 from strapgen.ir.fixed_settings import Settings
 
 GAIN, TAU = -2.6e-4, 150.0
+GAINS = np.full(3, GAIN)
 RATE = np.radians(100) / np.sqrt(2)  # rad/s about each torquer axis, 100 deg/s in all
 #: Seconds of rate and of rest, and the deviation of the scale factor.
 PROTOCOL = [(150, 0, -5.00643e-4), (360, 0, -7.20156e-4), (360, 540, -1.96773e-5)]
@@ -19,11 +22,12 @@ PROTOCOL = [(150, 0, -5.00643e-4), (360, 0, -7.20156e-4), (360, 540, -1.96773e-5
 def deviation_after(moving, resting, step=1.0):
     """Return the deviation after seconds of rate and of rest, by the kernel in double."""
     kernel = strapgen.evaluator("scale-factor-heating")
-    u, decay = np.float64(0), -np.expm1(-step / TAU)
+    u, decay = np.zeros(3), -np.expm1(-step / TAU)
     for rate, seconds in ((RATE, moving), (0.0, resting)):
         for _ in range(round(seconds / step)):
-            u, _ = kernel(u, np.full(2, rate * step), decay, GAIN, 1 / step)
-    return float(u)
+            u, _ = kernel(u, np.full(6, rate * step), decay, GAINS, 1 / step)
+    assert u[0] == u[1] == u[2]
+    return float(u[0])
 
 
 @pytest.mark.parametrize(("moving", "resting", "printed"), PROTOCOL)
@@ -44,20 +48,23 @@ def test_the_recursion_is_the_differential_equation_for_a_rate_held_over_a_cycle
     time = sp.Symbol("t", positive=True)
     function = sp.Function("u")
     solution = sp.dsolve(function(time) + tau * function(time).diff(time) - k * w**2, ics={function(0): u})
-    values = {"deviation": u, "d_x": w * T, "d_y": sp.S.Zero, "heating_gain": k, "cycle_rate": 1 / T}
+    torques = dict.fromkeys(("M_x1", "M_y2", "M_y3", "M_x3"), sp.S.Zero) | {"M_y1": w * T, "M_x2": w * T}
+    values = {"u_1": u, "u_2": u, "u_3": u, "k_1": k, "k_2": k, "k_3": k, "cycle_rate": 1 / T} | torques
     outputs = derive("scale-factor-heating").expand(values | {"decay": 1 - sp.exp(-T / tau)})
     assert sp.simplify(outputs["next_deviation"][0] - solution.rhs.subs(time, T)) == 0
-    assert outputs["compensated_increment"] == [(1 + u) * w * T, 0]
+    assert sp.simplify(outputs["next_deviation"][1] - outputs["next_deviation"][0]) == 0
+    assert sp.simplify(outputs["next_deviation"][2] - u * sp.exp(-T / tau)) == 0
+    assert outputs["compensated_torque_increment"] == [0, (1 + u) * w * T, (1 + u) * w * T, 0, 0, 0]
 
 
 def test_the_errors_are_undone(rng):
     first, second = (strapgen.evaluator(f"scale-factor-heating{end}") for end in ("-errors", ""))
-    u = v = np.float64(0)
-    for increment in rng.uniform(-0.03, 0.03, size=(200, 2)):
-        u, indicated = first(u, increment, 0.01, GAIN, 100.0)
-        v, compensated = second(v, indicated, 0.01, GAIN, 100.0)
+    u = v = np.zeros(3)
+    for increment in rng.uniform(-0.03, 0.03, size=(200, 6)):
+        u, indicated = first(u, increment, 0.01, GAINS, 100.0)
+        v, compensated = second(v, indicated, 0.01, GAINS, 100.0)
         np.testing.assert_allclose(compensated, increment, rtol=0, atol=1e-16)
-    assert u != 0 and abs(u - v) < 1e-18
+    assert np.all(u != 0) and np.abs(u - v).max() < 1e-18
 
 
 # In fixed point, at the printed 93 Hz
@@ -68,7 +75,7 @@ def run_in_fixed_point(name, carry, moving, resting):
     step = 1 / 93
     settings = Settings(word=int(name.removeprefix("c-fixed")), carry=carry)
     evaluator = strapgen.evaluator("scale-factor-heating", name, settings)
-    values = (0.0, np.full(2, RATE * step), -np.expm1(-step / TAU), GAIN, 93.0)
+    values = (np.zeros(3), np.full(6, RATE * step), -np.expm1(-step / TAU), GAINS, 93.0)
     inputs = [
         evaluator.integers(argument, np.asarray(value, float)).reshape(1, -1)
         for argument, value in zip(evaluator.interface.inputs, values, strict=True)
@@ -90,17 +97,15 @@ def run_in_fixed_point(name, carry, moving, resting):
 def allowed(evaluator, carry):
     """Return by how much a run may be off: what a call adds, over what decays in a cycle.
 
-    With error feedback the state is off by its rounding once, and by the error of the deviation that the rate leads to.
+    With error feedback the rounding of the state enters with its change, two units in all, and what the deviation tends
+    to with its certified error.
     """
-    (argument, *_) = evaluator.interface.outputs
-    decay = -np.expm1(-1 / 93 / TAU)
+    interface = evaluator.interface
     if carry == "none":
-        return float(max(argument.errors)) / decay
-    fixed = evaluator.sources.fixed_program if hasattr(evaluator.sources, "fixed_program") else None
-    assert fixed is None
-    word = argument.format.word
-    # Rates of 2.6 rad/s in formats of 32, squares of 8, gains of 2^-11 and less: a unit each, and the product's unit.
-    return float(argument.format.unit) + 2.0 ** (1 - word) * 2 * (2 * 32 * 2 * 1.24 * 2.6e-4 + 8 * 2.0**-8)
+        return float(max(interface.outputs[0].errors)) / -np.expm1(-1 / 93 / TAU)
+    body = quantized(Choice("scale-factor-heating"), interface.settings).body
+    (factor,) = [value for value in body if value.name == "next_u_1_factor"]
+    return float(factor.error + 2 * interface.outputs[0].unit)
 
 
 @pytest.mark.parametrize(

@@ -1,41 +1,50 @@
-"""Derives the scale factor of a gyro whose torquers heat up, as a recursion on its deviation."""
+"""Derives the scale factors of gyros whose torquers heat up, as a recursion on their deviations."""
 
 from __future__ import annotations
 
 from fractions import Fraction
 
+import sympy as sp
+
 from strapgen.catalogue.kernels.imu_errors import CYCLE_RATE
-from strapgen.catalogue.kernels.separation import MICHELIN
+from strapgen.catalogue.kernels.separation import MICHELIN, TORQUES
 from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import Signal, after
 from strapgen.symbolic.kernel import Kernel, KernelBuilder
 
-DEVIATION = Signal.scalar(
+DEVIATION = Signal.labelled(
     "deviation",
+    "u",
+    "123",
     unit="1",
-    meaning="u, relative deviation of the scale factor by heating; zero at switch-on",
+    meaning="relative deviations of the scale factors of gyros 1, 2 and 3 by heating; zero at switch-on",
     bound=Fraction(1, 256),
 )
-FRACTION = Signal.scalar(
+DECAY = Signal.scalar(
     "decay",
     unit="1",
-    meaning="1 - exp(-T/tau), what decays of the deviation in a cycle",
+    meaning="1 - exp(-T/tau), what decays of the deviations in a cycle",
     bound=Fraction(1, 8192),
 )
-GAIN = Signal.scalar(
+GAIN = Signal.labelled(
     "heating_gain",
+    "k",
+    "123",
     unit="(rad/s)^-2",
-    meaning="k_inf, steady deviation of the scale factor by the square of the rate",
+    meaning="k_inf, steady deviations of the scale factors of gyros 1, 2 and 3 by the square of the rate",
     bound=Fraction(1, 2048),
 )
 
 
-def _torqued(name: str, prefix: str, meaning: str, bound: Fraction | None) -> Signal:
-    return Signal.labelled(name, prefix, "xy", unit="rad", meaning=f"{meaning}, torquer axes", bound=bound)
+def _torque(name: str, prefix: str, meaning: str, bound: Fraction | None) -> Signal:
+    """Return a signal like `TORQUES`, with other names."""
+    labels = [element.partition("_")[2] for element in TORQUES.elements]
+    about = f"{meaning} of the cycle about the torquer axes x and y of gyros 1, 2 and 3"
+    return Signal.labelled(name, prefix, labels, unit="rad", meaning=about, bound=bound)
 
 
 def scale_factor_heating(errors: bool = False) -> Kernel:
-    """Return the scale factor correction of one gyro for the heat of its torquers, equations (6.6) and (6.7).
+    """Return the scale factor correction of three gyros for the heat of their torquers, equations (6.6) and (6.7).
 
     Parameters
     ----------
@@ -45,32 +54,42 @@ def scale_factor_heating(errors: bool = False) -> Kernel:
     Returns
     -------
     Kernel
-        Inputs ``deviation``, a state, ``increment`` (2,) in rad about both torquer axes, ``decay``,
-        ``heating_gain`` in (rad/s)^-2 and ``cycle_rate`` in 1/s; outputs ``next_deviation`` and
-        ``compensated_increment`` (2,) in rad, or ``indicated_increment`` where it makes the errors.
+        Inputs ``deviation`` (3,), a state, ``torque_increment`` (6,) in rad about both torquer axes of each gyro,
+        ``decay``, ``heating_gain`` (3,) in (rad/s)^-2 and ``cycle_rate`` in 1/s; outputs ``next_deviation`` (3,) and
+        ``compensated_torque_increment`` (6,) in rad, or ``indicated_torque_increment`` where it makes the errors.
     """
     build = KernelBuilder()
-    u = build.scalar(DEVIATION)
+    u = build.input(DEVIATION)
     kind = "true" if errors else "indicated"
-    d = build.input(_torqued("increment", "d", f"{kind} angle increment of the cycle", Fraction(3, 80)))
-    decay, gain, cycle_rate = (build.scalar(signal) for signal in (FRACTION, GAIN, CYCLE_RATE))
-    torqued = d
+    d = build.input(_torque("torque_increment", "M", f"{kind} angle increments", Fraction(3, 80)))
+    decay = build.scalar(DECAY)
+    gain = build.input(GAIN)
+    cycle_rate = build.scalar(CYCLE_RATE)
+    scale = sp.Matrix([1 + u[number // 2] for number in range(6)])
     if errors:
-        torqued = build.stage(_torqued("torqued", "torqued", "torqued angle increment", None), d / (1 + u))
-    rate = build.stage(
-        Signal.labelled("rate", "w", "xy", unit="rad/s", meaning="torquer rate"), cycle_rate * torqued
-    )
-    steady = build.value(
-        "steady", gain * (rate[0] ** 2 + rate[1] ** 2), "deviation that the rate would lead to"
-    )
-    build.output(after(DEVIATION), [u + decay * (steady - u)])
-    if errors:
-        build.output(_torqued("indicated_increment", "indicated", "indicated angle increment", None), torqued)
+        signal = _torque("indicated", "indicated", "indicated angle increments", None)
+        torqued = build.stage(signal, [x / factor for x, factor in zip(d, scale, strict=True)])
     else:
-        build.output(_torqued("compensated_increment", "true", "true angle increment", None), (1 + u) * d)
+        torqued = d
+    labels = [element.partition("_")[2] for element in TORQUES.elements]
+    rate = build.stage(
+        Signal.labelled("rate", "w", labels, unit="rad/s", meaning="torquer rates"), cycle_rate * torqued
+    )
+    squares = [rate[2 * number] ** 2 + rate[2 * number + 1] ** 2 for number in range(3)]
+    steady = build.stage(
+        Signal.labelled("steady", "steady", "123", meaning="deviations that the rates would lead to"),
+        gain.multiply_elementwise(sp.Matrix(squares)),
+    )
+    build.output(after(DEVIATION), u + decay * (steady - u))
+    if errors:
+        signal = _torque("indicated_torque_increment", "measured", "indicated angle increments", None)
+        build.output(signal, torqued)
+    else:
+        signal = _torque("compensated_torque_increment", "true", "true angle increments", None)
+        build.output(signal, scale.multiply_elementwise(d))
     return build.kernel(
-        "scale-factor-heating-errors" if errors else "scale-factor-heating",
-        "Gyro whose torquers heat up" if errors else "Scale factor of a gyro whose torquers heat up",
+        "torquer-heating-errors" if errors else "scale-factor-heating",
+        "Gyros whose torquers heat up" if errors else "Scale factors of gyros whose torquers heat up",
         f"{MICHELIN}, (6.2), (6.6) and (6.7), printed; recursion on the deviation derived",
         recursion=Recursion(((DEVIATION.name, after(DEVIATION).name),), kept=(DEVIATION.name,)),
         notes=(
