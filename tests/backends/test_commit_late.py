@@ -522,3 +522,33 @@ def test_the_exact_rotation_is_committed_late_too():
     # The start is committed with one-sided filters, whose errors stay.
     error = drift_between(Rotation.from_quat(unit.attitude).as_matrix(), true[991])
     assert np.linalg.norm(error) < 1e-7
+
+
+def test_samples_are_counted_so_that_no_angle_is_lost():
+    unit = CommitLate(WINDOW, backend="c-fixed32", settings=Settings(carry="full"))
+    for _ in range(300):
+        unit.push([0.0, 0.0, 1000.3 * 2.0**-32])
+    unit.flush()
+    # A third of a unit a sample is 100 units in all; the state has units of 2^-30, and error feedback below them.
+    assert apart(unit.attitude, np.array([0.0, 0.0, 150045 * 2.0**-32, 1.0])) < 4 * 2.0**-30
+
+
+@pytest.mark.parametrize("carry", ["none", "full"])
+def test_the_committed_attitude_stays_within_the_bounds_of_its_steps(carry):
+    settings = Settings(carry=carry)
+    late = parts(family(WINDOW), "euler", "c-fixed", settings)
+    fixed, double = (
+        CommitLate(WINDOW, backend="c-fixed32", settings=settings),
+        CommitLate(WINDOW, backend="c"),
+    )
+    drawn = np.random.default_rng(3).uniform(-0.125, 0.125, (500, 3))
+    commits, largest = 0, 0.0
+    for sample in np.rint(np.ldexp(drawn, 32)) / 2.0**32:
+        commits += fixed.push(sample)
+        double.push(sample)
+        largest = max(largest, apart(fixed.attitude, double.attitude))
+    # The start has P steps by other filters, each with a share of the bound of now, as a length of half the angle.
+    start = 2 * float(late.fixed.now_error) * P / L
+    bound = start + late.step.fixed.angle_accumulation.bound(commits)
+    assert commits == 497
+    assert 0 < largest < bound

@@ -47,6 +47,7 @@ class CommitLate:
         "euler", Euler parameters, scalar last, or "dcm", the direction cosine matrix; body to reference.
     backend : str, optional
         "numpy" or "fixed-model", generated functions called from Python, or "c", "c-float" or "c-fixed32", generated C.
+        In fixed point what rounding a sample leaves goes on to the next one, as in a gyro that counts pulses.
     sample_hz : number, optional
         Sampling rate in Hz; a family that is designed for a gyro needs it, and is refused at another one.
     settings : Settings, optional
@@ -84,6 +85,7 @@ class CommitLate:
         settings: Settings | None = None,
     ) -> None:
         self._state: Argument | None = None
+        self._rest = np.zeros(3)
         self._unit = self._loaded(window, algorithm, backend, sample_hz, settings)
         self.identity = self.attitude
 
@@ -154,9 +156,12 @@ class CommitLate:
         values = np.zeros(3) if number == SampleKind.LOST else checks.real_array("sample", sample, (3,))
         if values.shape != (3,):
             raise InputError(f"sample has shape {values.shape}; (3,) is needed")
-        if self._state is not None:
-            values = sample_integers(self._sample, values, number)
-        return self._unit.push(values, number)
+        if self._state is None:
+            return self._unit.push(values, number)
+        values, rest = sample_integers(self._sample, values, number, self._rest)
+        commits = self._unit.push(values, number)
+        self._rest = rest
+        return commits
 
     def now(self) -> Array:
         """Return the attitude at the end of the last interval, by filters for the samples that are there."""

@@ -132,8 +132,20 @@ def state_argument(step: Sources) -> Argument:
     return step.fixed.inputs[0]
 
 
-def sample_integers(argument: Argument, values: Any, kind: int) -> Array:
-    """Return a sample in rad as integers, each rounded to the nearest.
+def sample_integers(argument: Argument, values: Any, kind: int, rest: Array) -> tuple[Array, Array]:
+    """Return a sample in rad as integers, each rounded to the nearest, and what rounding leaves for the next one.
+
+    As from a gyro that counts pulses, the error of a sum of samples is at most a unit.
+
+    Parameters
+    ----------
+    argument : Argument
+        The format.
+    values : array_like, (3,)
+    kind : int
+        A `SampleKind`.
+    rest : array, (3,)
+        What the rounding of the samples before left, in units.
 
     Raises
     ------
@@ -141,10 +153,13 @@ def sample_integers(argument: Argument, values: Any, kind: int) -> Array:
         If it lies outside the range of a sample, or of the sum of two.
     """
     limit = argument.high * (2 if kind == SampleKind.MERGED else 1)
-    scaled = np.rint(np.ldexp(np.asarray(values, np.float64), argument.format.fraction))
-    if (np.abs(scaled) > limit).any():
+    scaled = np.ldexp(np.asarray(values, np.float64), argument.format.fraction)
+    if (np.abs(np.rint(scaled)) > limit).any():
         raise InputError(
             f"sample holds {float(np.abs(values).max()):.9g}; formats were chosen for at most "
             f"{float(limit * argument.unit):.9g} in magnitude"
         )
-    return scaled.astype(np.int64)
+    if kind == SampleKind.LOST:
+        return np.zeros(3, np.int64), rest
+    counts = np.clip(np.rint(scaled + rest), -limit, limit)
+    return counts.astype(np.int64), scaled + rest - counts
