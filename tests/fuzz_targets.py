@@ -16,7 +16,7 @@ from typing import Any
 import typer.main
 
 from strapgen import cli
-from strapgen.catalogue.methods import tableaux
+from strapgen.catalogue.methods import tableaux, windows
 from strapgen.ir.formats import Format
 from strapgen.ir.sensor import Sensor
 from strapgen.simulation import recording
@@ -232,6 +232,12 @@ def seeds(name: str) -> list[bytes]:
     rates = b"t,x,y,z\n0,0,0,1\n1,0,0,3\n2,0,0,3\n"
     header = (root / "generated" / "c_fixed" / "euler_product_w32.h").read_bytes()
     tableau = (Path(tableaux.__file__).parent / "butcher_tableaux" / "rk3.toml").read_bytes()
+    window = (
+        b'name = "W"\nsource = "s"\nprevious = 1\nahead = 1\nconditions = 2\nband = "1.3"\nobjective = "minimax"\n'
+        b'filters = [[0, 1, 0], ["-1/4", 0, "1/4"]]\n'
+        b'[[one_sided]]\nprevious = 2\nahead = 0\nobjective = "mean square"\nnoise = "3e-4"\n'
+        b'filters = [[0, 0, 1], [0, "-1/2", "1/2"]]\n'
+    )
     return {
         "increments": [b"0.1,0,0,1e-3\n0.2,0,0,2e-3\n0.3,0,0,0\n", rows],
         "inertial": [rows],
@@ -239,6 +245,7 @@ def seeds(name: str) -> list[bytes]:
         "resampled": [rates, rates.replace(b"1,0,0,3", b"1.1,0,0,3")],
         "spectrum": [spectrum],
         "tableau": [tableau, tableau.replace(b"name = ", b"name = 'My '+").replace(b"'My '+\"", b'"My ')],
+        "window": [window],
         "arguments": [b"state[4], increments[2][3] -> next[4]", b"struct filter *f, rates[3], dt -> f.q[4]"],
         "format": [b"Q1.30", b"Q-5.36"],
         "sensor": [b"0.0175dps", b"3e-6rad", b"1/1000rad"],
@@ -255,6 +262,7 @@ TARGETS: dict[str, Callable[[bytes], None]] = {
     "resampled": _of_file(lambda path: recording.read_rates(path, "deg/s", 3)),
     "spectrum": _of_file(read_spectrum),
     "tableau": _of_file(tableaux.read, ".toml"),
+    "window": _of_file(windows.read, ".toml"),
     "arguments": _of_text(read_arguments),
     "format": _of_text(lambda text: Format.parse(text, 32)),
     "sensor": _of_text(lambda text: Sensor.of(text, Fraction(1, 100))),

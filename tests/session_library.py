@@ -10,7 +10,9 @@ from __future__ import annotations
 
 import fcntl
 import json
+import os
 import re
+import shutil
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import cache as memoized
@@ -128,6 +130,21 @@ def folder(name: str, parts: Iterable[str], fill: Callable[[Path], None]) -> Pat
     key = cache.digest([cache.generator_digest(), *parts])
     with _lock(locks / f"{name}-{key}.lock", wait=True):
         return cache.entry(name, key, fill)
+
+
+def place(factory: pytest.TempPathFactory, name: str, fill: Callable[[Path], None]) -> Path:
+    """Return a temporary folder that one process of the session fills for all, and that is never moved."""
+    base = factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:  # each process has its folder in that of the session
+        base = base.parent
+    folder = base / name
+    with _lock(base / f"{name}.lock", wait=True):
+        if not (base / f"{name}.done").exists():
+            shutil.rmtree(folder, ignore_errors=True)
+            folder.mkdir()
+            fill(folder)
+            (base / f"{name}.done").touch()
+    return folder
 
 
 def provide(forecast: Path) -> None:

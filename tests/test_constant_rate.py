@@ -155,6 +155,7 @@ def true_turn(steps: int = 1, terms: int = TERMS) -> sp.Matrix:
     return sp.Matrix([[cosine, 0, sine], [0, 1, 0], [-sine, 0, cosine]])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("method", STANDARD_METHODS)
 def test_claim_1_on_one_axis(method):
     """There is no skew; drift and scale grow linearly.
@@ -265,6 +266,7 @@ def halves_cut_off_and_normalized(algorithm: str, order: int, angles: list[sp.Ra
     return list(sp.eye(3) + 2 * s * skew + 2 * skew**2)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("method", ["taylor2", "taylor5", "taylor8"])
 @pytest.mark.parametrize("algorithm", STEP_NAMES)
 def test_at_a_constant_rate_a_centred_step_is_two_half_exponentials_cut_off_and_normalized(algorithm, method):

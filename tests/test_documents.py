@@ -131,6 +131,7 @@ def new_clone(tmp_path_factory: pytest.TempPathFactory) -> tuple[set[str], dict[
     return files_of(clone) - before, answer["done"]
 
 
+@pytest.mark.long
 def test_the_commands_of_the_readme_run_in_a_new_clone(new_clone):
     written, done = new_clone
     assert len(done) >= 8
@@ -235,6 +236,10 @@ def test_the_python_of_a_page(page, monkeypatch):
 LONG_COMMANDS = (
     "strapgen check ",
     "strapgen compare ",
+    "strapgen cost ",
+    "strapgen frontier ",
+    "strapgen generate euler --method window",
+    "strapgen window ",
     "strapgen converge euler --method rk1,rk2,rk4,butcher6",
     "strapgen derive dcm --method butcher6",
     "strapgen evidence ",

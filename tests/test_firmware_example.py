@@ -57,6 +57,7 @@ def hand_off() -> list[str]:
     raise AssertionError("no page shows the hand-off")
 
 
+@pytest.mark.long
 def test_the_hand_off_takes_four_commands(tmp_path):
     needed("cmake", "ctest")
     commands = hand_off()

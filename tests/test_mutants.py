@@ -43,6 +43,7 @@ def statements(source: str) -> list[tuple[int, int]]:
     return [(starts[node.lineno - 1], starts[node.end_lineno or 0]) for node in ast.parse(source).body]
 
 
+@pytest.mark.long
 def test_every_written_fault_applies_once_and_leaves_a_file_that_can_be_read():
     written = mutants.seeded()
     assert len({site for site, _ in written}) == len(written) >= 40
@@ -115,6 +116,7 @@ def test_templates_change_in_their_code_and_not_in_comments():
     }
 
 
+@pytest.mark.long
 def test_a_draw_has_all_folders_and_all_kinds_and_is_the_same_for_the_same_seed():
     sites = mutation_operators.sites(mutants.ROOT)
     drawn = mutation_operators.drawn(sites, mutants.ROOT, 40, 1)

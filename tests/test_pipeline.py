@@ -72,6 +72,7 @@ def modules_with_a_choice(*words: str) -> set[str]:
     return modules
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("algorithm", ["euler", str(EXAMPLE)])
 def test_a_choice_passes_through_few_modules(algorithm, empty_cache):
     words = ("generate", algorithm, "--method", "rk1", "--increments", "1", "--target", "c")

@@ -38,6 +38,7 @@ def after_imports() -> list[str]:
     ).splitlines()
 
 
+@pytest.mark.long
 def test_dir_shows_the_public_names_and_nothing_else(after_imports):
     shown = after_imports[0].split()
     assert shown == sorted(strapgen.__all__)

@@ -8,6 +8,7 @@ import sympy as sp
 
 from strapgen.analysis.overview import choices, methods, overview
 from strapgen.catalogue import METHODS, choose
+from strapgen.catalogue.methods.shaped_coning import SHAPE_TITLES
 from strapgen.catalogue.methods.windows import WINDOW_TITLES
 from strapgen.reports.overview import overview_text
 
@@ -32,4 +33,5 @@ def test_rows():
 def test_the_whole_catalogue_is_offered():
     names = methods()
     assert {choice.method for choice in choices()} == set(names)
-    assert set(METHODS) - set(names) == {f"taylor{order}" for order in range(9, 21)} | set(WINDOW_TITLES)
+    series = {f"taylor{order}" for order in range(9, 21)} | {"fit-exact", "coning-exact-rest"}
+    assert set(METHODS) - set(names) == series | set(WINDOW_TITLES) | set(SHAPE_TITLES)

@@ -16,7 +16,11 @@ from strapgen.backends.late_unit import GapError, SampleKind
 from strapgen.catalogue.methods.late_filters import LateFilters, polynomial
 from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.catalogue.methods.windows import WINDOWS
+from strapgen.ir.fixed_settings import Settings
+from strapgen.library.commit_late_sources import family, parts, sources
+from strapgen.simulation.runs import drift_between
 from strapgen.support.exceptions import InputError, InputTypeError
+from strapgen.toolchain import compiler
 
 WINDOW = "window-3-3"
 P, L, W = 3, 3, 7
@@ -66,10 +70,14 @@ def apart(one: np.ndarray, other: np.ndarray) -> float:
 def test_every_interval_has_the_filters_of_the_catalogue_for_its_place_in_the_recording():
     increments = samples(16)
     unit = CommitLate(WINDOW)
-    committed = [q for sample in increments for q in unit.pushed(sample)]
+    committed: list[np.ndarray] = []
+    for sample in increments:
+        assert unit.push(sample) == len(unit.committed)
+        committed += unit.committed
     assert len(committed) == len(increments) - L
     now = unit.now()
-    committed += unit.flushed()
+    assert unit.flush() == len(unit.committed) == L
+    committed += unit.committed
     transitions = steps(increments)
     for number, attitude in enumerate(committed, 1):
         np.testing.assert_allclose(attitude, product(transitions[:number]), rtol=0, atol=ROUNDING)
@@ -98,7 +106,8 @@ def test_now_is_an_answer_and_changes_nothing():
 def test_now_is_what_is_committed_l_samples_later_but_for_its_filters():
     unit, now, committed = CommitLate("window-5-5"), [], []
     for sample in samples(60, "cone"):
-        committed += unit.pushed(sample)
+        unit.push(sample)
+        committed += unit.committed
         now.append(unit.now())
     errors = [apart(one, other) for one, other in zip(now[15:], committed[15:], strict=False)]
     assert 1e-9 < max(errors) < 1e-5
@@ -163,9 +172,9 @@ def test_samples_after_a_flush_go_on():
     assert apart(unit.attitude, through.attitude) < 1e-4
 
 
-def run(name: str, window: str, kinds: dict[int, int], count: int = 44) -> CommitLate:
+def run(name: str, window: str, kinds: dict[int, int], count: int = 44, backend: str = "c") -> CommitLate:
     """Return a unit after a motion whose samples are lost or merged at some numbers."""
-    unit = CommitLate(window)
+    unit = CommitLate(window, backend=backend)
     increments = samples(count, name)
     for number, sample in enumerate(increments):
         kind = kinds.get(number, GOOD)
@@ -225,8 +234,9 @@ def test_an_open_gap_is_flushed_with_its_estimate():
     ],
     ids=["at once", "within eight", "without a gap", "too late"],
 )
-def test_gaps_that_no_filter_restores_are_refused_and_change_nothing(before, kind, reason):
-    unit, other = (run("random", WINDOW, before, 13) for _ in range(2))
+@pytest.mark.parametrize("backend", ["numpy", "c"])
+def test_gaps_that_no_filter_restores_are_refused_and_change_nothing(before, kind, reason, backend):
+    unit, other = (run("random", WINDOW, before, 13, backend) for _ in range(2))
     with pytest.raises(GapError, match=reason):
         unit.push([0.0, 0.0, 0.0], kind)
     for sample in samples(30)[13:]:
@@ -277,8 +287,238 @@ def test_samples_and_attitudes_are_finite_numbers_of_their_shape(sample):
         (("window-2-2",), "window is 'window-2-2'"),
         ((WINDOW, "cayley-klein"), "algorithm"),
         (("window-4-2",), "whole family"),
+        (("window-9-9", "euler", "c-fixed32"), "only that to fourth order"),
+        ((WINDOW, "euler", "exact"), "these commit late: numpy, c, c-float, c-fixed32"),
     ],
 )
 def test_unknown_names_are_refused(arguments, reason):
     with pytest.raises(InputError, match=reason):
         CommitLate(*arguments)
+
+
+# Generated C
+
+
+@pytest.mark.parametrize("algorithm", ["euler", "dcm"])
+@pytest.mark.parametrize("window", ["window-3-3", pytest.param("window-7-7", marks=pytest.mark.long)])
+@pytest.mark.parametrize("name", ["random", "cone", "slew"])
+def test_c_has_the_bits_of_python(algorithm, window, name):
+    """Operations have one order, so that nothing may differ, with gaps, resets and flushes too."""
+    python, c = (CommitLate(window, algorithm, backend) for backend in ("numpy", "c"))
+    increments = samples(60, name)
+    kinds = {9: LOST, 25: LOST, 26: MERGED, 40: LOST, 56: LOST}
+    for number, sample in enumerate(increments):
+        if number == 33:
+            start = python.attitude.T if algorithm == "dcm" else python.attitude * [-1, -1, -1, 1]
+            python.reset(start)
+            c.reset(start)
+        if number == 45:
+            assert python.flush() == c.flush() > 0
+        kind = kinds.get(number, GOOD)
+        value = sample + increments[number - 1] if kind == MERGED else sample
+        assert python.push(value, kind) == c.push(value, kind)
+        np.testing.assert_array_equal(python.attitude, c.attitude)
+        np.testing.assert_array_equal(python.now(), c.now())
+        assert python.pending == c.pending
+
+
+@pytest.mark.long
+def test_c_in_float_is_that_in_double_but_for_rounding():
+    double, single = CommitLate(WINDOW, backend="c"), CommitLate(WINDOW, backend="c-float")
+    for number, sample in enumerate(samples(60)):
+        kind = LOST if number == 20 else GOOD
+        assert double.push(sample, kind) == single.push(sample, kind)
+        # Units of 2^-24 in each of up to 60 steps.
+        np.testing.assert_allclose(double.now(), single.now(), rtol=0, atol=60 * 2**-24)
+    assert single.attitude.dtype == np.float32
+
+
+def test_c_refuses_what_its_header_says_and_writes_nothing():
+    built = sources(WINDOW)
+    module = compiler.load(built)
+    ffi, lib = module.ffi, module.lib
+    memory = ffi.new("euler_late_3_3_memory *")
+    sample, state = ffi.new("double[3]"), ffi.new("double[4]")
+    null = ffi.NULL
+    assert lib.euler_late_3_3_init(null) == lib.euler_late_3_3_flush(null) == -4
+    assert lib.euler_late_3_3_init(memory) == 0
+    for _ in range(20):
+        assert lib.euler_late_3_3_push(memory, sample, 0) >= 0
+    before = bytes(ffi.buffer(memory))
+    assert lib.euler_late_3_3_push(null, sample, 0) == lib.euler_late_3_3_push(memory, null, 0) == -4
+    assert lib.euler_late_3_3_push(memory, sample, 3) == lib.euler_late_3_3_push(memory, sample, -1) == -5
+    assert lib.euler_late_3_3_push(memory, sample, 2) == -3
+    assert lib.euler_late_3_3_now(memory, null) == lib.euler_late_3_3_now(null, state) == -4
+    assert lib.euler_late_3_3_reset(memory, null) == lib.euler_late_3_3_reset(null, state) == -4
+    assert bytes(ffi.buffer(memory)) == before
+    assert lib.euler_late_3_3_push(memory, null, 1) == 0  # a lost sample need not be there
+    assert lib.euler_late_3_3_push(memory, sample, 1) == -3
+    for name, value in {"GAP": -3, "NULL": -4, "KIND": -5, "LOST": 1, "MERGED": 2, "LATENCY": 3}.items():
+        text = f"({value})" if value < 0 else str(value)
+        assert f"#define EULER_LATE_3_3_{name} {text}\n" in built.files["euler_late_3_3.h"]
+
+
+#: Largest errors in rad over 60 s at 100 Hz: of the committed attitude, and of that of now.
+LARGEST = [
+    ("cone", {"half_angle_deg": 1, "frequency_hz": 10}, 1.9e-9, 3.7e-9),
+    ("cone", {"half_angle_deg": 1, "frequency_hz": 20}, 4.2e-8, 7.5e-8),
+    ("random", {"rate_deg_s": 200}, 2.2e-7, 5.2e-6),
+    ("slew", {"onset_s": 0.05}, 2.6e-12, 6.5e-9),
+    ("slew", {"onset_s": 0.01}, 4e-7, 6.2e-6),
+    ("ramps", {"onset_s": 0.05}, 9e-7, 5.0e-6),
+]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("name", "settings", "largest", "largest_now"), LARGEST, ids=[str(row[:2]) for row in LARGEST]
+)
+def test_attitudes_are_as_accurate_as_published(name, settings, largest, largest_now):
+    motion = strapgen.motion(name, **settings)
+    before, count = 14, 6000
+    increments = motion.samples(Fraction(1, 100), -before, count)
+    true = motion.attitude(np.arange(count + 1) / 100)
+    unit = CommitLate("window-7-7", backend="c")
+    for sample in increments[: before + 7]:
+        unit.push(sample)
+    assert unit.pending == 7  # sample 0 of the motion, and six more
+    unit.reset(Rotation.from_matrix(true[0]).as_quat())
+    committed, now = [], []
+    for sample in increments[before + 7 :]:
+        assert unit.push(sample) == 1
+        committed.append(unit.attitude)
+        now.append(unit.now())
+    matrices = [Rotation.from_quat(np.array(attitudes)).as_matrix() for attitudes in (committed, now)]
+    late = drift_between(matrices[0], true[1 : count - 6])
+    current = drift_between(matrices[1], true[8:])
+    assert np.linalg.norm(late, axis=1).max() == pytest.approx(largest, rel=0.1)
+    assert np.linalg.norm(current, axis=1).max() == pytest.approx(largest_now, rel=0.1)
+
+
+# Fixed point
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "carry"),
+    [
+        ("euler", "full"),
+        pytest.param("euler", "none", marks=pytest.mark.long),
+        pytest.param("dcm", "full", marks=pytest.mark.long),
+    ],
+)
+def test_c_on_integers_has_the_bits_of_the_model(algorithm, carry):
+    settings = Settings(carry=carry)
+    model, c = (
+        CommitLate(WINDOW, algorithm, name, settings=settings) for name in ("fixed-model", "c-fixed32")
+    )
+    increments = samples(60)
+    kinds = {9: LOST, 25: LOST, 26: MERGED, 40: LOST, 56: LOST}
+    for number, sample in enumerate(increments):
+        if number == 33:
+            start = model.attitude.T if algorithm == "dcm" else model.attitude * [-1, -1, -1, 1]
+            model.reset(start)
+            c.reset(start)
+        if number == 45:
+            assert model.flush() == c.flush() > 0
+        kind = kinds.get(number, GOOD)
+        value = sample + increments[number - 1] if kind == MERGED else sample
+        assert model.push(value, kind) == c.push(value, kind)
+        np.testing.assert_array_equal(model.attitude, c.attitude)
+        np.testing.assert_array_equal(model.now(), c.now())
+
+
+@pytest.mark.long
+def test_normalizations_on_the_way_are_those_of_the_model():
+    settings = Settings(carry="state")
+    model, c = (CommitLate(WINDOW, "euler", name, settings=settings) for name in ("fixed-model", "c-fixed32"))
+    for sample in np.tile(samples(60), (36, 1)):
+        assert model.push(sample) == c.push(sample)
+    np.testing.assert_array_equal(model.attitude, c.attitude)
+    assert abs(np.linalg.norm(c.attitude) - 1) < 1e-8
+
+
+@pytest.mark.parametrize("backend", ["c-fixed32", "fixed-model"])
+def test_samples_and_states_outside_their_ranges_are_refused(backend):
+    unit = CommitLate(WINDOW, backend=backend)
+    for sample in samples(20):
+        unit.push(sample)
+    before = unit.now()
+    with pytest.raises(InputError, match="sample holds 0"):
+        unit.push([0.0, 0.126, 0.0])
+    unit.push([0.0, 0.0, 0.0], LOST)
+    unit.push([0.0, 0.2, 0.0], MERGED)
+    with pytest.raises(InputError, match="attitude"):
+        unit.reset([0.0, 0.0, 0.0, 1.2])
+    assert unit.pending == L + 2
+    assert not np.array_equal(unit.now(), before)
+
+
+def test_c_on_integers_refuses_what_its_header_says():
+    module = compiler.load(sources(WINDOW, "euler", "c-fixed"))
+    ffi, lib = module.ffi, module.lib
+    memory, sample = ffi.new("euler_late_3_3_w32_memory *"), ffi.new("int32_t[3]")
+    state = ffi.new("int32_t[4]", [0, 0, 0, 1 << 30])
+    lib.euler_late_3_3_w32_init(memory)
+    for _ in range(20):
+        assert lib.euler_late_3_3_w32_push(memory, sample, 0) >= 0
+    before = bytes(ffi.buffer(memory))
+    sample[1] = (1 << 29) + 1
+    assert lib.euler_late_3_3_w32_push(memory, sample, 0) == -1
+    sample[1] = -sample[1]
+    assert lib.euler_late_3_3_w32_push(memory, sample, 0) == -1
+    assert bytes(ffi.buffer(memory)) == before
+    sample[1] = 1 << 29
+    # A state that no step takes: samples are held until there is no room, and a reset lets them go.
+    assert lib.euler_late_3_3_w32_reset(memory, ffi.new("int32_t[4]", [0, 0, 0, 2**31 - 1])) == 0
+    assert [lib.euler_late_3_3_w32_push(memory, sample, 0) for _ in range(20)] == [-2] * 20
+    assert memory.pending == 17
+    assert lib.euler_late_3_3_w32_now(memory, state) == lib.euler_late_3_3_w32_flush(memory) == -2
+    assert list(state) == [0, 0, 0, 1 << 30]
+    assert lib.euler_late_3_3_w32_reset(memory, state) == 0
+    assert lib.euler_late_3_3_w32_flush(memory) == 17
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "window"),
+    [
+        ("euler", WINDOW),
+        pytest.param("dcm", WINDOW, marks=pytest.mark.long),
+        pytest.param("euler", "window-7-7", marks=pytest.mark.long),
+    ],
+)
+def test_the_attitude_of_now_stays_within_its_certified_bound(algorithm, window):
+    """Against double precision from the same integers, on samples that are drawn and on those of motions."""
+    filters = family(window)
+    bound = float(parts(filters, algorithm, "c-fixed", Settings(carry="full")).fixed.now_error)
+    fixed = CommitLate(window, algorithm, "c-fixed32", settings=Settings(carry="full"))
+    double = CommitLate(window, algorithm, "c")
+    drawn = np.random.default_rng(7).uniform(-0.125, 0.125, (300, 3))
+    largest = 0.0
+    for sample in np.concatenate([drawn, np.sign(drawn) / 8, samples(200) / 2]):
+        rounded = np.rint(np.ldexp(sample, 32)) / 2.0**32
+        fixed.push(rounded)
+        double.push(rounded)
+        if fixed.pending == filters.window.ahead:
+            double.reset(fixed.attitude)
+            difference = (fixed.now() - double.now()).reshape(-1, 3 if algorithm == "dcm" else 4)
+            largest = max(largest, np.linalg.norm(difference, axis=1).max())
+    assert bound / 200 < largest < bound
+
+
+@pytest.mark.long
+def test_the_exact_rotation_is_committed_late_too():
+    """Its errors of now are those of its filters; committed, it is the best of the catalogue."""
+    motion = strapgen.motion("random", rate_deg_s=200)
+    increments, true = motion.samples(Fraction(1, 100), 0, 1000), motion.attitude(np.arange(1001) / 100)
+    unit, python = (CommitLate("window-9-9", backend=name) for name in ("c", "numpy"))
+    start = Rotation.from_matrix(true[0]).as_quat()
+    unit.reset(start)
+    python.reset(start)
+    for number, sample in enumerate(increments):
+        assert unit.push(sample) == (0 if number < 18 else 10 if number == 18 else 1)
+        if number < 40:
+            python.push(sample)
+            np.testing.assert_array_equal(unit.now(), python.now())
+    # The start is committed with one-sided filters, whose errors stay.
+    error = drift_between(Rotation.from_quat(unit.attitude).as_matrix(), true[991])
+    assert np.linalg.norm(error) < 1e-7

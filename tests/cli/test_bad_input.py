@@ -116,7 +116,7 @@ BAD = {
     "generate euler --target float": "target 'float' is not known (did you mean c-float?)",
     f"simulate ck {CONSTANT}": "algorithm 'ck' is not known (did you mean cayley-klein?)",
     f"simulate euler --backend c-fixed {CONSTANT}": "(did you mean c-fixed32 or c-fixed16?)",
-    "simulate euler --motion cone --step 1 --duration 1": "motion 'cone' is not known (did you mean coning?)",
+    "simulate euler --motion conical --step 1 --duration 1": "motion 'conical' is not known (did you mean coning?)",
     "integrate": "No such command 'integrate'",
     "list --formatt json": "No such option: --formatt (did you mean --format?); --help shows all",
     "list euler": "kind 'euler' is not known; allowed: algorithms, methods",
@@ -219,7 +219,8 @@ BAD = {
     "coning --samples 8 --previous 10 --form combined": "at most 17 are allowed for combined coefficients",
     "coning --samples 2 --form optimal": "form 'optimal' is not known; allowed: compressed, uncompressed, combined",
     "coning --samples 6 --previous 1 --terms": "are listed for up to 6 samples; 7 are given",
-    "coning --samples 2 --format toml": "format 'toml' is not known; allowed: text, json, csv, markdown",
+    "coning --samples 2 --format yaml": "format 'yaml' is not known; allowed: text, json, csv, markdown, toml",
+    "coning --samples 2 --format toml": "--format toml writes a design; it goes with --objective",
     "derive rotation-vector --method rk4": "method of rotation-vector 'rk4' is not known; allowed: magnus2, magnus4",
     "derive rotation-vector --tableau kutta.toml": "rotation-vector goes with no tableau; allowed methods: magnus2",
     "derive sculling --method magnus4": "method of sculling 'magnus4' is not known; allowed: coning-compressed",
@@ -359,6 +360,15 @@ BAD = {
     f"compare error-matrix {CONSTANT}": "algorithm 'error-matrix' is no attitude step",
     "compare euler --motion constant --step 1 --duration 2": "motion constant needs parameters",
     "compare euler --motion constant --set x_deg_s=1 --step 1": "--motion needs --duration in s",
+    # frontier
+    "frontier --method rk9": "method 'rk9' is not known",
+    "frontier --method rk4:2+x": "number of samples in rk4:2+x is 'x'; a whole number is needed",
+    "frontier --method rk4:2 --sample-hz 0": "sample-hz is 0; a number above 0 is needed",
+    "frontier --method rk4:2 --duration 0.001": "duration 0.001 s is shorter than a step of rk4:2 at 100 Hz",
+    "frontier --method rk4:2 --jobs 0": "jobs is 0; a whole number from 1 to 1024 is needed",
+    "frontier --method rk4:2 --results r.txt --out r.txt": "--out and --results are both r.txt; two files are needed",
+    f"simulate euler --motion slew --set onset_s=9 {TIMES}": "onset_s is 9; 0.0001 to 1.2 is needed",
+    f"simulate euler --motion vibration --set gyro_hz=4 {TIMES}": "motion vibration lacks angle_deg or angle_rad",
     # study
     "study": "Missing command. Allowed: word-length",
     "study length": "No such command 'length'",
@@ -670,6 +680,7 @@ def test_run_that_the_memory_does_not_hold(folder, capsys, monkeypatch):
     assert said.err == "strapgen: the memory does not hold a run of so many steps\n"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "command",
     [

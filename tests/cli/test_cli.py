@@ -29,6 +29,7 @@ from strapgen.catalogue.methods import coefficients, coning_coefficients
 from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.cli import main
 from strapgen.experiments.thesis_tables import TABLES
+from strapgen.library import standard_tree
 from strapgen.reports import formulas
 from strapgen.simulation.courses import NavigationFrame, course
 from strapgen.simulation.motions import motion as make_motion
@@ -54,7 +55,8 @@ COMMANDS = (
         "strapdown",
         "vibration",
     ),
-    *("study word-length", "series", "stability", "rate-table"),
+    *("study word-length", "series", "stability", "rate-table", "frontier"),
+    *("window design", "window show"),
 )
 DATA = Path(__file__).resolve().parents[1] / "data"
 CONING = "--motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 --step 0.125 --duration 5"
@@ -107,9 +109,12 @@ COSTLY = (
     "stability",
     "rate-table",
     "generate",
+    "frontier",
+    "window design",
 )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "command", [pytest.param(c, marks=pytest.mark.long if c in COSTLY else ()) for c in COMMANDS]
 )
@@ -321,6 +326,7 @@ def test_vibration_of_a_fast_loop_says_what_its_rates_are(strapgen_says):
     assert "the slow loop adds that to both" in " ".join(strapgen_says("vibration --help").split())
 
 
+@pytest.mark.long
 def test_vibration_of_several(strapgen_says, tmp_path):
     several = f"vibration euler --method rk2,rk4 --increments 1,2 {ONE}"
     data = json.loads(strapgen_says(f"{several} --format json"))
@@ -601,8 +607,9 @@ def test_generate_writes_numpy_here_by_default(strapgen_says, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["euler_rk4_2.py"]
 
 
-@pytest.mark.long
-def test_generate_all_as_json(strapgen_says, tmp_path):
+def test_generate_all_as_json(strapgen_says, tmp_path, monkeypatch):
+    few = [derived.program(Choice(*choice)) for choice in (("euler", "rk4", 2), ("dcm-product",))]
+    monkeypatch.setattr(standard_tree, "programs", lambda: iter(few))  # of all, in tests/library
     data = json.loads(strapgen_says("generate --all --out out --format json"))
     assert list(data) == ["files"]
     written = {str(path.relative_to(tmp_path)) for path in (tmp_path / "out").rglob("*") if path.is_file()}
@@ -862,6 +869,22 @@ def test_study_word_length(strapgen_says, tmp_path):
 
 
 @pytest.mark.long
+def test_frontier(strapgen_says, tmp_path):
+    pytest.importorskip("matplotlib")
+    command = "frontier --method coning-compressed:1+1,rk4:2 --duration 1 --jobs 1 --results results.jsonl"
+    data = json.loads(
+        strapgen_says(f"{command} --format json --plot frontier.png"), parse_constant=pytest.fail
+    )
+    assert [row["algorithm"] for row in data["algorithms"]] == ["coning-compressed:1+1", "rk4:2"]
+    assert (tmp_path / "frontier.png").read_bytes().startswith(b"\x89PNG")
+    content = (tmp_path / "results.jsonl").read_bytes()
+    text = strapgen_says(command)
+    assert "every figure is measured here" in text
+    assert (tmp_path / "results.jsonl").read_bytes() == content  # nothing was run again
+    assert strapgen_says(f"{command} --format csv").count("\n") == 3
+
+
+@pytest.mark.long
 def test_an_interrupt_stops_a_study_at_once(tmp_path):
     # Cases that take minutes each, in two processes.
     words = [
@@ -902,9 +925,15 @@ def test_an_interrupt_stops_a_study_at_once(tmp_path):
 TABLE_KEYS = ["table", "backend", "algorithm", "order", "drift_deg", "normalised", "thesis", "agrees"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "backend",
-    [pytest.param(b, marks=() if b in ("numpy", "c", "c-fixed32") else pytest.mark.long) for b in BACKENDS],
+    # Slow ones run the same tables in tests/experiments.
+    [
+        pytest.param(b, marks=() if b in ("numpy", "c", "c-fixed32") else pytest.mark.long)
+        for b, entry in BACKENDS.items()
+        if not entry.slow
+    ],
 )
 def test_tables_json(backend, strapgen_says):
     entries = json.loads(
@@ -986,6 +1015,7 @@ def test_help_is_quick():
     assert any(seconds() < 0.5 for _ in range(5))
 
 
+@pytest.mark.long
 def test_quick_answers_load_no_heavy_library():
     code = """
 import sys
@@ -1002,6 +1032,7 @@ for words in (["--help"], ["simulate", "--help"], ["generate", "--check"]):
     assert loaded == ["loaded"] * 3
 
 
+@pytest.mark.long
 def test_simulation_loads_no_computer_algebra(strapgen_says):
     """Once the sources are in the cache."""
     command = f"simulate euler {CONING} --backend numpy".split()
@@ -1019,6 +1050,7 @@ print("loaded", *sorted({{"sympy", "jinja2"}} & sys.modules.keys()))
     assert done.stdout.splitlines()[-1] == "loaded"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "command",
     [
@@ -1044,6 +1076,7 @@ def test_reader_that_is_gone_before_is_no_error():
     assert process.returncode == 1
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "command",
     [
@@ -1103,6 +1136,7 @@ def test_converge_is_a_gate(limit, status, capsys):
     assert capsys.readouterr().err.count("\n") == status
 
 
+@pytest.mark.long
 def test_check_fails_with_the_names_of_what_fails(capsys, tmp_path):
     text = (DATA / "algorithms" / "picard.py").read_text()
     claimed = text.replace(
@@ -1121,6 +1155,7 @@ def test_check_fails_with_the_names_of_what_fails(capsys, tmp_path):
     assert {finding["name"] for finding in data["findings"] if finding["holds"] is False} == {"order"}
 
 
+@pytest.mark.long
 def test_series_prints_what_was_agreed(strapgen_says):
     said = strapgen_says("series euler --method rk4 --increments 2 --motion constant --terms 2 --format json")
     data = json.loads(said)
@@ -1142,6 +1177,7 @@ def test_series_versus_and_all(strapgen_says):
     assert [row["kernel"] for row in rows] == ["euler-rk1-1", "euler-magnus2-1"]
 
 
+@pytest.mark.long
 def test_series_latex_and_files(strapgen_says, tmp_path):
     said = strapgen_says("series dcm --method rk1 --format latex")
     assert said.rstrip().endswith(r"\end{align*}")

@@ -19,6 +19,7 @@ def status(command: str) -> int:
     return stop.value.code
 
 
+@pytest.mark.long
 @needs_gappa
 def test_the_list_and_the_page_of_a_kernel(capsys, tmp_path):
     page, folder = tmp_path / "page.md", tmp_path / "files"

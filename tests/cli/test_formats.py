@@ -24,6 +24,7 @@ TABLES = {
     "list backends": ("name", 7),
     "tableau rk4": ("row", 5),
     "coning --samples 3": ("older", 2),
+    "window show window-3-3": ("name", 35),
     "derive dcm --method rk1 --show operations": ("operation", None),
     "derive dcm --method rk1 --show program": ("name", None),
     f"simulate euler {RUN}": ("time_s", 3),
@@ -34,6 +35,7 @@ TABLES = {
     f"vibration euler --method rk1,rk2 {WAVE}": ("kernel", 2),
     "rate-table --algorithm dcm --backend numpy --duration 1": ("motion", 12),
     "study word-length --method rk1 --word 16 --carry none --duration 1": ("algorithm", 1),
+    "frontier --method rk4:2,rk4:4 --duration 1 --jobs 1": ("algorithm", 2),
 }
 
 
@@ -56,6 +58,7 @@ def answer(capsys, tmp_path, monkeypatch):
 DRAWN = {"compare": "time, s", "rate-table": "largest drift of the run, deg"}
 
 
+@pytest.mark.long
 def test_a_table_has_the_same_rows_in_every_format(answer, tmp_path, monkeypatch):
     def label_of_x(figure, path):
         figures.pyplot().close(figure)
@@ -89,6 +92,7 @@ def test_a_dash_is_the_terminal_and_a_file_holds_the_same(answer, tmp_path):
     assert (tmp_path / "pairs.md").read_text() == printed
 
 
+@pytest.mark.long
 def test_a_course_is_plotted_and_written_as_a_table(answer, tmp_path):
     pytest.importorskip("matplotlib")
     log = Path(__file__).resolve().parents[2] / "examples" / "inertial_log.csv"

@@ -34,6 +34,7 @@ def test_back_ends_keep_their_names():
     assert {"numpy", "c", "c-float", "c-q31", "c-q15", "fixed-model", "exact"} <= BACKENDS.keys()
 
 
+@pytest.mark.long
 def test_every_line_answers_with_the_keys_that_it_had(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "data").symlink_to(DATA)

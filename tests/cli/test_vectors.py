@@ -72,6 +72,7 @@ def test_what_does_not_go_together_is_refused_in_one_line(command, message, tmp_
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("command", [f"generate euler --target c-fixed {FIXED}", "two-speed dcm --target c"])
 def test_a_changed_main_program_stays(command, tmp_path, capsys):
     folder = tmp_path / "firmware"

@@ -34,6 +34,7 @@ def run(capsys, tmp_path, monkeypatch):
 # Design
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "name",
     [
@@ -49,6 +50,7 @@ def test_a_second_design_gives_the_same_file(name, run, tmp_path):
     assert (tmp_path / f"{name}.toml").read_bytes() == text.encode()
 
 
+@pytest.mark.long
 def test_the_file_goes_to_the_terminal_and_warnings_do_not(run, tmp_path):
     status, said, warned = run("window design --kept 2 --ahead 1 --band 2 --now-noise 0 --name 'My gyro'")
     assert status == 0
@@ -80,6 +82,7 @@ def test_options_reach_the_file(run):
     assert "wrote w.toml" in warned
 
 
+@pytest.mark.long
 def test_a_window_that_amplifies_is_told(run):
     command = "window design --previous 6 --ahead 0 --band 1.9 --powers 2 --coefficients 1 --noise 1e-9"
     gyro = "--gyro-bandwidth-hz 40 --gyro-damping 0.7071 --sample-hz 100 --now-noise 1e-9"
@@ -186,6 +189,7 @@ def test_a_window_is_shown_with_its_errors_and_taps(run):
     assert lines[-1].split()[:3] == ["3", "0", "0.0134378948971269"]
 
 
+@pytest.mark.long
 def test_data_have_the_exact_taps(run):
     status, said, _ = run("window show window-7-7 --format json")
     data = json.loads(said)
@@ -207,6 +211,7 @@ def test_a_table_has_a_row_for_every_filter(run):
     assert status == 0 and len(said.splitlines()) == 7
 
 
+@pytest.mark.long
 def test_a_file_is_shown_and_plotted(run, tmp_path):
     pytest.importorskip("matplotlib")
     (tmp_path / "mine.toml").write_text((FOLDER / "window-3-3.toml").read_text())

@@ -33,6 +33,7 @@ BRIEFS = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("brief", BRIEFS.values(), ids=BRIEFS)
 def test_what_is_written_is_read_again(brief, tmp_path):
     window = design(brief)

@@ -19,6 +19,7 @@ def script(name: str = "euler-product") -> Script:
     return fixed_script(quantized(choose(name), Settings()))
 
 
+@pytest.mark.long
 def test_a_product_of_quaternions_is_proved_from_the_axioms_of_real_numbers(tmp_path):
     result, detail = coq_proof.checked(script(), tmp_path / "product.v")
     assert (result, detail) == (
@@ -30,6 +31,7 @@ def test_a_product_of_quaternions_is_proved_from_the_axioms_of_real_numbers(tmp_
     assert text.startswith("(* Run: coqc product.v *)")
 
 
+@pytest.mark.long
 def test_a_rule_that_is_no_identity_has_no_proof(tmp_path):
     off = script()
     off.rules += [f"{goal} -> 0;" for goal in off.goals]

@@ -74,6 +74,7 @@ def faulty(subject: Subject, pattern: str, change: str) -> Subject:
     return changed
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("pattern", "change", "report"), FAULTS)
 def test_a_fault_is_found(pattern, change, report, fuzzer, monkeypatch, tmp_path):
     monkeypatch.setattr(fuzzing, "INPUTS", 20_000)
@@ -83,6 +84,7 @@ def test_a_fault_is_found(pattern, change, report, fuzzer, monkeypatch, tmp_path
     assert "; input in base 64: " in verdict.detail
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("kernel", "settings"),
     [

@@ -49,6 +49,7 @@ def test_the_error_bound_of_the_header_is_proved_and_is_as_small_as_gappas(choic
     assert judged(smaller, tmp_path)[0] == "fails"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("settings", [{"word": 16}, {"carry": "full"}, {"rounding": "truncation"}], ids=str)
 def test_other_words_error_feedback_and_truncation_are_followed(settings, tmp_path):
     assert judged(fixed_script(fixed(EULER, **settings)), tmp_path)[0] == "proved"
@@ -93,6 +94,7 @@ FAULTS = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("fault", FAULTS)
 @pytest.mark.parametrize("choice", [EULER, PRODUCT], ids=lambda choice: choice.name)
 def test_gappa_proves_nothing_of_a_program_with_a_fault(choice, fault, tmp_path):

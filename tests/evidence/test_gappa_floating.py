@@ -32,6 +32,7 @@ def judged(text: Script, folder) -> tuple[str, str]:
     return gappa.judged(text, gappa.answered(file))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("number", NUMBERS)
 @pytest.mark.parametrize(
     "choice",

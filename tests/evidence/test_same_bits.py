@@ -20,6 +20,8 @@ from strapgen.toolchain.runners import RUNNERS, Runner
 
 #: The machine itself: a program that runs its argument stands for an emulator.
 HOST = Runner("host", ("cc",), ("env",), "cc", "gcc")
+#: Processors of quick tests: an int of 16 bits, no operating system, and the most significant byte first.
+FEW = ("avr", "cortex-m3", "powerpc")
 
 
 def on(monkeypatch: pytest.MonkeyPatch, *runners: Runner) -> None:
@@ -41,7 +43,10 @@ def with_fault(subject: Subject, pattern: str, change: str) -> Subject:
     return changed
 
 
-@pytest.mark.parametrize("name", RUNNERS)
+@pytest.mark.long
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if name in FEW else pytest.mark.long) for name in RUNNERS]
+)
 def test_a_processor_returns_the_integers_of_the_model(name, monkeypatch, tmp_path):
     on(monkeypatch, RUNNERS[name])
     (verdict,) = same_bits.same_bits(Subject(choose("euler-product")), tmp_path)
@@ -50,6 +55,7 @@ def test_a_processor_returns_the_integers_of_the_model(name, monkeypatch, tmp_pa
     assert verdict.version
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("kernel", "settings"),
     [

@@ -27,6 +27,7 @@ def stretch() -> Stretch:
     return bounds
 
 
+@pytest.mark.long
 def test_the_bounds_of_the_length_hold_and_come_near_values_that_are_reached(stretch):
     transition = program(EULER).transition_program()
     rng = np.random.default_rng(3)
@@ -51,6 +52,7 @@ def test_numbers_that_do_not_follow_from_the_length_are_not_proved(stretch):
     assert state_lengths.is_proper(subject, wider)[0] == "fails"
 
 
+@pytest.mark.long
 def test_proved_steps_are_near_those_of_the_header(stretch):
     """The header's bound is a thirtieth above what samples reach, and FLINT's a hundredth above what it reaches."""
     subject = Subject(EULER)

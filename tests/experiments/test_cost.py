@@ -33,7 +33,11 @@ def needed(cpu: str) -> None:
             pytest.skip(f"{program} is not on this machine")
 
 
-@pytest.mark.parametrize(("kernel", "cpu"), EXECUTED)
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("kernel", "cpu"),
+    [pytest.param(*case, marks=pytest.mark.long if case[1] == "cortex-m0" else ()) for case in EXECUTED],
+)
 def test_a_call_executes_few_instructions(kernel, cpu):
     needed(cpu)
     settings = Settings.of(word=32, max_rate_deg_s=400, step="0.01", increments=2)
@@ -47,6 +51,7 @@ def test_a_call_executes_few_instructions(kernel, cpu):
     assert measured.stack_bytes > 0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kernel", COUNTS)
 def test_counts_of_a_gyro_cost_little_more_than_angles(kernel):
     needed("cortex-m3")

@@ -178,6 +178,7 @@ def test_the_right_example_holds():
     assert outcome.drift_deg_h == pytest.approx(outcome.closed_form_deg_h, rel=1e-3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", FAULTS)
 def test_a_fault_is_seen_and_named(name):
     outcome = check_foreign(example(name))

@@ -35,7 +35,7 @@ def test_every_candidate_can_be_chosen():
 
 
 def test_names_stand_for_candidates():
-    assert [one.name for one in candidates(["magnus6"])] == ["magnus6:3", "magnus6:4"]
+    assert [one.name for one in candidates(["magnus6"])] == ["magnus6:3", "magnus6:4", "magnus6:3+3"]
     # A method without candidates has its own samples; what is named twice is compared once.
     assert [one.name for one in candidates(["rk2", "rk2:2", "rk4:1+2"])] == ["rk2:2", "rk4:1+2"]
     assert (
@@ -93,10 +93,10 @@ def test_results_come_in_the_order_of_the_candidates(study):
 def test_a_study_goes_on_where_it_was(study, monkeypatch):
     several, path, standings = study
 
-    def never(case):
+    def never(trial):
         raise AssertionError("a result that is there is not worked out again")
 
-    monkeypatch.setattr(frontier, "run_case", never)
+    monkeypatch.setattr(frontier, "run_trial", never)
     assert in_order(frontier.frontier(several, "100", "2", path, 1), several) == standings
     with pytest.raises(InputError, match='holds another study: duration_s is "2" there and "3" here'):
         list(frontier.frontier(several, "100", "3", path, 1))
@@ -114,8 +114,8 @@ def test_a_step_longer_than_the_run_is_refused():
 
 
 def test_a_run_that_leaves_its_numbers_has_no_drift():
-    case = frontier.Case(Candidate("rk4", 1), "1", "600")
-    assert frontier._drift(case.candidate.choice, "cone 15/20", case) is None
+    trial = frontier.Trial(Candidate("rk4", 1), "1", "600")
+    assert frontier._drift(trial.candidate.choice, "cone 15/20", trial) is None
 
 
 def test_the_frontier_is_what_nothing_undercuts():
@@ -147,6 +147,7 @@ def test_reports_have_every_figure(study, tmp_path):
     assert report.written("markdown").count("\n") == 4
 
 
+@pytest.mark.long
 def test_the_plot_is_an_image(study, tmp_path):
     _, _, standings = study
     assert plots.frontier_image(standings, 100.0, "title", tmp_path / "a.png").startswith(b"\x89PNG")

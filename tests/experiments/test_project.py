@@ -66,6 +66,7 @@ def run_of(folder: Path, files: dict[str, str], largest: float | None) -> str:
     return printed
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("kernel", "target", "settings", "largest"), PROJECTS)
 def test_the_main_program_runs_and_is_near_the_truth(kernel, target, settings, largest, tmp_path):
     files = files_of(kernel, target, settings)
@@ -75,6 +76,7 @@ def test_the_main_program_runs_and_is_near_the_truth(kernel, target, settings, l
     assert {line.split()[0] for line in printed.splitlines()} >= {*shown.elements}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("algorithm", "target", "settings", "largest"), LOOPS)
 def test_all_loops_run_and_return_what_their_vectors_say(algorithm, target, settings, largest, tmp_path):
     files = loop_files(algorithm, target, settings)
@@ -99,6 +101,7 @@ def test_a_fault_in_the_wiring_of_the_loops_is_seen(tmp_path):
     assert status == 1 and "slow cycle 1 failed" in printed
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "compiler", [name for name in COMPILERS if name != "gcc"]
 )  # which has compiled all above

@@ -47,6 +47,7 @@ def files_of(table: VectorTable) -> dict[str, str]:
     return {**table.sources.step_files, **table_files(table)}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("kernel", "target", "settings"), TABLES)
 def test_the_c_returns_what_the_vectors_say(kernel, target, settings, tmp_path):
     table = table_of(kernel, target, settings)
@@ -158,9 +159,10 @@ def test_a_fault_in_the_c_is_seen(fault, tmp_path):
     assert status == 1 and failed > 0 and passed + failed == 200
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "compiler", [name for name in COMPILERS if name != "gcc"]
-)  # which has compiled all above
+)  # which has compiled all above; projects, which have tests of vectors too, are quick
 def test_strict_compilers_are_silent(compiler, tmp_path):
     needed(compiler)
     sources = []

@@ -43,6 +43,7 @@ def changed(path: Path, old: str, new: str) -> int:
     return text[: place.start()].count("\n") + 1
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("ending", ["c", "h"])
 def test_a_file_as_generated_holds(ending, folder, capsys):
     status, data = verified(folder / f"{NAME}.{ending}", capsys)
@@ -50,6 +51,7 @@ def test_a_file_as_generated_holds(ending, folder, capsys):
     assert 0.5 <= data["max_ulp"] <= data["bound_ulp"] < 0.6
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("ending", "old", "new", "reason", "computes"),
     [
@@ -72,6 +74,7 @@ def test_a_change_is_found_with_its_line(ending, old, new, reason, computes, fol
     assert bool(data["wrong_calls"]) is not computes
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("target", ["c", "c-float"])
 def test_floating_point_is_held_to_its_bound(target, tmp_path, capsys):
     assert says(f"generate dcm --method rk2 --target {target} --out {tmp_path}".split(), capsys)[0] == 0
@@ -105,6 +108,7 @@ def test_a_file_is_compared_as_a_back_end_in_its_own_formats(folder, capsys):
     assert status == 2 and "is euler-rk4-2, and dcm-rk4-2 is compared" in error
 
 
+@pytest.mark.long
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not on this machine")
 def test_two_variants_with_names_of_their_own_link_together(tmp_path, capsys):
     for prefix, rate in (("slow_", 40), ("fast_", 400)):

@@ -269,6 +269,7 @@ def in_many_places(increments: np.ndarray, places: int = 128) -> np.ndarray:
     return np.array([[value / 2**places for value in state] for state in states])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("steps", "limits"),
     [

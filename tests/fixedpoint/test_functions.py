@@ -184,6 +184,7 @@ def _precise(value: Fraction) -> Any:
 # One function
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "words",
     [(16, 64), pytest.param((24, 32), marks=pytest.mark.long)],

@@ -63,3 +63,6 @@ def test_ends_are_rounded_outward():
     assert third.lowest < Fraction(1, 3) < third.highest
     assert third.high - third.low == 1
     assert math.isclose(float(third.lowest), 1 / 3)
+    root = Interval.of(2).sqrt()
+    assert root.lowest**2 < 2 < root.highest**2
+    assert root.high - root.low == 1

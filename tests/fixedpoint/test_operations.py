@@ -68,6 +68,16 @@ def test_a_divisor_below_zero_is_checked_to_stay_there():
     assert (s.range.lowest, s.range.highest, s.guarded) == (-2, Fraction(-1, 2), True)
 
 
+@pytest.mark.parametrize(("least", "guarded"), [(Fraction(3, 10), False), (Fraction(1, 5), True)])
+def test_a_limit_that_is_proved_within_a_factor_of_two_is_not_checked(least, guarded):
+    """Of about 1 on unit vectors half is the limit; a proof of 3/10 is near it, and one of 1/5 is not."""
+    squares = [node("multiply", name, name) for name in "abcd"]
+    total = node("add", node("add", *squares[:2]), node("add", *squares[2:]))
+    divisor = node("add", node("multiply", Fraction(95, 100) - least, total), least)
+    code = program({"s": divisor, "y": node("divide", "a", "s")}, dict.fromkeys("abcd", 1))
+    assert derived(replace(code, inputs=(UNIT_VECTOR,)))["s"].guarded is guarded
+
+
 def test_nothing_is_checked_where_proper_inputs_come_near_zero():
     near = node("subtract", "a", Fraction(1, 2))
     divisor = node("add", node("multiply", near, near), Fraction(1, 512))

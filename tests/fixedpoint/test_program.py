@@ -254,6 +254,7 @@ FEW = [
 ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("word", "few"),
     [(16, True), *(pytest.param(word, False, marks=pytest.mark.long) for word in (8, 16, 32, 64))],

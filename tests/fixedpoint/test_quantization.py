@@ -7,9 +7,12 @@ from fractions import Fraction
 from types import SimpleNamespace
 
 import pytest
+from small_programs import node, program
 
+from strapgen import quantize
 from strapgen.fixedpoint.quantities import Quantities
-from strapgen.fixedpoint.quantization import _errors, _output
+from strapgen.fixedpoint.quantization import _MOST_GUARD_BITS, _errors, _is_worse, _output
+from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.integer_program import IntegerInput, IntegerSum, Term, Value
 from strapgen.ir.signals import Signal
 from strapgen.support.exceptions import InputError
@@ -48,3 +51,22 @@ def test_an_output_has_the_range_of_all_of_its_elements_and_one_format():
     context.values["z"] = replace(second, fraction=5)
     with pytest.raises(InputError, match="elements of out share one format"):
         _output(context, signal)
+
+
+@pytest.mark.parametrize("bits", [1, _MOST_GUARD_BITS, _MOST_GUARD_BITS + 1])
+def test_inputs_have_up_to_so_many_bits_less_that_their_sum_is_exact(bits):
+    largest = {"a": Fraction(1, 2), "b": Fraction(1, 2) / 2**bits}
+    code = program({"s": node("add", "a", "b"), "y": node("multiply", "s", "s")}, largest)
+    b = quantize(code, Settings(16)).interface.inputs[1]
+    # The sum, of 1/2 to 1, has 15 places; an input of up to 1/2 has as many, and a smaller one more.
+    assert b.format.fraction == (15 if bits <= _MOST_GUARD_BITS else 15 + bits)
+
+
+@pytest.mark.parametrize(("percent", "worse"), [(100, False), (101, False), (102, True)])
+def test_an_error_that_is_a_hundredth_larger_is_no_worse(percent, worse):
+    def told(*errors) -> SimpleNamespace:
+        outputs = (SimpleNamespace(errors=(ZERO,)), SimpleNamespace(errors=errors))
+        return SimpleNamespace(interface=SimpleNamespace(outputs=outputs))
+
+    one, other = (Fraction(1), Fraction(percent, 100)), (Fraction(2), Fraction(1))
+    assert _is_worse(told(*one), told(*other)) is worse

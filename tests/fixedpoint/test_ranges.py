@@ -96,19 +96,21 @@ def test_a_product_with_a_factor_of_its_own_has_the_range_of_a_square():
 
 @pytest.mark.parametrize("sign", [1, -1])
 def test_all_parts_of_a_box_that_is_cut_count(sign):
-    """x (1 - y) - y (1 - x) is x - y on the box from 0 to 1; plain intervals see twice that."""
-    box = dict.fromkeys("xy", Interval.of(0, 1))
-    items = quantities([], box)
-    ranges = Ranges(items, box)
-    ranges.expanded = dict.fromkeys("xy")  # no expansion, so that only a cut helps
-    terms = {
-        ("x",): Fraction(sign),
-        ("y",): Fraction(-sign),
-        ("x", "y"): Fraction(3),
-        ("x", "x"): Fraction(-3),
-    }
-    points = [(Fraction(x, 64), Fraction(y, 64)) for x in range(65) for y in range(65)]
-    values = [sign * (x - y) + 3 * x * (y - x) for x, y in points]
-    known = ranges.of_sum("v", terms, float(max(map(abs, values))))
-    assert known.magnitude <= 4
-    assert known.lowest <= min(values) <= max(values) <= known.highest
+    """x - 5/4 x^2 is -3 at x = 2 and 1/5 at x = 2/5; a cut between them proves that 4 is not exceeded."""
+    side = Interval.of(min(0, 2 * sign), max(0, 2 * sign))
+    items = quantities([], {"x": side})
+    terms = {("x",): Fraction(sign), ("x", "x"): Fraction(-5, 4)}
+    ranges = Ranges(items, {"x": side})
+    assert ranges.enclosure(terms.items()) == Interval.of(-5, 2)
+    known = ranges.of_sum("v", terms, 3.0)
+    assert -4 <= known.lowest <= -3
+    assert Fraction(1, 5) <= known.highest <= 2
+
+
+def test_the_side_that_is_cut_is_the_one_of_which_most_is_left():
+    box = {"x": Interval.of(-4, 0), "y": Interval.of(0, 1)}
+    parts = _Parts(box, [*quantities([], box).values()], Sum(((("x", "y"), Fraction(1)),)))
+    _, upper = parts.halves(parts.whole(), "y")
+    assert parts.widest(upper, box) == "x"
+    for half in parts.halves(parts.whole(), "x"):
+        assert parts.widest(half, box) == "y"

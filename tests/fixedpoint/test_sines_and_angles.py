@@ -15,7 +15,7 @@ from small_integers import quantity
 
 from strapgen.fixedpoint import functions
 from strapgen.fixedpoint.chain import Chain
-from strapgen.fixedpoint.function_series import PI_ERROR, pi
+from strapgen.fixedpoint.function_series import PI_ERROR, arctangent_series, pi
 from strapgen.fixedpoint.quantities import (
     Computed,
     InputElement,
@@ -308,3 +308,19 @@ def test_links_stay_in_their_ranges_and_lead_to_the_function(kind, ranges):
         wrapped = row[0] - 2 * PI * round(row[0] / (2 * PI))
         exact = wrapped if function is None else fraction(function(*map(real, row)))
         assert abs(known[links.links[-1].name] - exact) <= inexact
+
+
+@pytest.mark.parametrize(("digits", "terms"), [(1, 3), (5, 3), (6, 4), (12, 8)])
+def test_an_arctangent_has_as_many_terms_as_its_tolerance_needs(digits, terms):
+    coefficients, left_out = arctangent_series(Fraction(1, 10**digits))
+    assert len(coefficients) == terms
+    assert left_out <= Fraction(1, 10**digits)
+    # With p = 21/100, one term less would leave out more than 1/p^2 times as much, which is above the tolerance.
+    assert terms == 3 or left_out > Fraction(1, 10**digits) * Fraction(21, 100) ** 2 / 2
+    # That is nearly attained where the argument is largest.
+    largest = 0.42 / (1 - 0.21**2)
+    errors = [
+        abs(math.atan(u) - u * sum(float(c) * u ** (2 * k) for k, c in enumerate(coefficients)))
+        for u in (largest * n / 50 for n in range(51))
+    ]
+    assert left_out / 2 < max(errors) <= left_out + 1e-15

@@ -173,6 +173,15 @@ def test_what_error_feedback_loses_is_attained(places, fraction, rounding):
         assert max(errors) >= two - 2 * finest
 
 
+def test_no_shift_drops_all_bits_of_a_wide_number_but_its_sign():
+    known = {"a": Known(15, -99, 99, wide=True)}
+    item = quantity("y", terms((("a",), 1)), *at_corners(known, lambda a: a))
+    value, walk = lowered(known, item, words=["y"], forced={"y": 0})
+    measured = worst(walk, "y", known, lambda a: a)
+    assert (value.definition.shift, [term.shift for term in value.definition.fine]) == (14, [-1])
+    assert measured.error <= value.error
+
+
 #: A value that is only added up, one that is rounded, and a word that is not.
 FORMS = {"wide": {}, "rounded": {"forced": {"y": 2}}, "word": {"forced": {"y": 4}}}
 

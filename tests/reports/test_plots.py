@@ -15,6 +15,7 @@ from gathering import each
 import strapgen
 from strapgen.experiments.comparison import AngleHistory, Comparison
 from strapgen.experiments.convergence import Convergence, Rung
+from strapgen.experiments.frontier import MOTIONS, Standing
 from strapgen.experiments.predicted_tables import PredictedEntry
 from strapgen.experiments.rate_table import Row
 from strapgen.experiments.thesis_tables import ALGORITHMS, ORDERS, TABLES, TableEntry
@@ -185,6 +186,48 @@ def test_labels_at_the_right_cover_none_another():
     assert all(other - one > 0.04 for one, other in pairwise(heights))
 
 
+def test_labels_beside_points_cover_none_another_and_stay_inside():
+    figure, axes = pyplot.subplots()
+    points = {f"algorithm {k}": (0.5 + 0.01 * k, 0.5 - 0.01 * k) for k in range(5)} | {
+        "at the left": (0.0, 0.2)
+    }
+    axes.set(xlim=(0, 1), ylim=(0, 1))
+    figure.draw_without_rendering()
+    drawing.labels_beside_points(axes, points, "black")
+    assert [text.get_text() for text in axes.texts] == list(points)  # one for each
+    boxes = [text.get_window_extent() for text in axes.texts]
+    assert not [1 for k, one in enumerate(boxes) for other in boxes[:k] if one.overlaps(other)]
+    frame = axes.get_window_extent()
+    assert all(frame.x0 <= box.x0 and box.x1 <= frame.x1 for box in boxes)
+    pyplot.close(figure)
+
+
+def standing(name: str, multiply: int, drift: float | None) -> Standing:
+    return Standing(name, name, "source", 1, multiply, 0, 0, dict.fromkeys(MOTIONS, drift))
+
+
+def test_the_frontier_has_a_panel_a_motion_and_labels_for_the_best(figures):
+    standings = [
+        standing("cheap", 10, 5.0),
+        standing("worse", 20, 6.0),
+        standing("little better", 30, 4.9),
+        standing("good", 40, 1e-3),
+        standing("lost", 50, None),
+    ]
+    plots.frontier_image(standings, 100.0, "title", "a.png")
+    (figure,) = figures
+    assert [axes.get_title("left") for axes in figure.axes][:2] == [
+        "cone of 1 deg at 10 Hz",
+        "cone of 1 deg at 20 Hz",
+    ]
+    for axes in figure.axes:
+        assert [text.get_text() for text in axes.texts] == ["cheap", "good"]
+        every, front = axes.get_lines()
+        np.testing.assert_array_equal(every.get_xdata(), [1000, 2000, 3000, 4000])
+        np.testing.assert_array_equal(front.get_ydata(), [5.0, 1e-3])
+        assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
+
+
 def test_thesis_tables_have_a_panel_each_with_printed_and_computed_figures(figures):
     entries = [
         TableEntry(
@@ -310,6 +353,7 @@ def test_no_screen_is_needed(run, figures, monkeypatch):
     assert pyplot.get_backend().lower() == "agg"
 
 
+@pytest.mark.long
 def test_a_screen_of_the_user_s_that_is_not_there_changes_nothing(tmp_path):
     code = "from strapgen.reports.plots import figures; figures.pyplot(); import os; print(os.environ['MPLBACKEND'])"
     environment = {**os.environ, "MPLBACKEND": "module://of_no_package"}

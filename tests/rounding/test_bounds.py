@@ -207,6 +207,15 @@ def test_the_error_of_a_step_is_that_of_its_product_and_what_its_transition_make
     assert float(_accumulation(code, limits, step, small).per_step / scale) == pytest.approx(length / 2)
 
 
+def test_a_transition_that_calls_functions_stretches_by_no_more_than_its_distance_from_the_identity():
+    code = strapgen.lower(strapgen.derive("euler", method="magnus2", increments=1))
+    code = replace(code, companions=replace(code.companions, isometry=False))
+    zero, away = (Fraction(0),) * 4, tuple(map(Fraction, (0, 3, 4, 0)))
+    limits = {s.name: size for s, size in zip(code.inputs, LARGEST.values(), strict=True)}
+    growth = _accumulation(code, limits, StepRounding(zero, zero, away), zero).growth
+    assert 0 <= growth - (1 + 5) < Fraction(1, 10**30)
+
+
 def adversarial_run(code, number: str, steps: int, rng: np.random.Generator) -> list[float]:
     """Return the error after every step when of 64 increments those are taken that make it longest."""
     state, samples = code.inputs[0], code.inputs[1]

@@ -183,6 +183,7 @@ COARSE = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("body", COARSE.values(), ids=COARSE)
 def test_no_input_at_all_of_four_bits_is_rounded_by_more_than_the_bound(body, monkeypatch):
     monkeypatch.setitem(NUMBERS, "coarse", FOUR_BITS)

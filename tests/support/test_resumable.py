@@ -143,7 +143,8 @@ def test_other_files_are_refused_and_left_alone(content, words, tmp_path):
 
 
 def test_places_that_cannot_be_written(tmp_path):
-    for path in (tmp_path, tmp_path / "missing" / "results.jsonl"):
+    (tmp_path / "file").write_text("")
+    for path in (tmp_path, tmp_path / "file" / "results.jsonl"):
         with pytest.raises(InputError, match="cannot be written"):
             list(resume(square, CASES, path, IDENTITY, 1))
     with pytest.raises(InputError, match="/dev/null is no ordinary file"):
@@ -206,6 +207,12 @@ def test_no_process_is_left_behind(tmp_path):
     # The pipe ends when the last process that holds it does.
     assert process.stdout.read() == ""
     process.stdout.close()
+
+
+def test_folders_are_made_for_the_file(tmp_path):
+    path = tmp_path / "out" / "deep" / "results.jsonl"
+    list(resume(square, CASES, path, IDENTITY, 1))
+    assert len(path.read_text().splitlines()) == 1 + len(CASES)
 
 
 def test_the_file_can_be_read_while_the_study_runs(tmp_path):

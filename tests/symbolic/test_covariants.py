@@ -259,6 +259,7 @@ def bases(draw: st.DrawFn, count: int) -> list[list[Fraction]]:
     return draw(st.permutations(rows))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("count", [2, 3])
 @SETTINGS
 @given(data=st.data())
@@ -269,6 +270,7 @@ def test_other_vectors_and_back(count, data):
     assert transform(transform(decomposition, rows), back) == decomposition
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("count", [2, 3])
 @SETTINGS
 @given(data=st.data(), new=vectors)

@@ -37,6 +37,7 @@ def expected(expression: sp.Expr) -> sp.Expr:
 a, b = sp.symbols("a b", real=True)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "expression",
     [

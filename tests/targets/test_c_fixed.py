@@ -379,6 +379,7 @@ def built(folder: Path, every, flags: list[str]) -> Path:
     return folder / "main"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("word", "methods", "builds"),
     [

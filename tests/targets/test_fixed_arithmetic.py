@@ -94,6 +94,7 @@ def test_narrowing_and_shifts_round_down(arithmetic, data):
         assert arithmetic.lib.fit(x, shift) == x >> shift
 
 
+@pytest.mark.long
 @given(data=st.data())
 def test_a_number_is_out_if_it_is_larger_than_the_limit(arithmetic, data):
     x, limit = data.draw(signed(arithmetic.word)), data.draw(signed(arithmetic.word, 0).map(abs))

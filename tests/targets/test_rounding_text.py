@@ -20,6 +20,7 @@ def said(name: str, number: str = "double") -> tuple[RoundingBounds, str]:
     return bounds, rounding_text(bounds, code)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("target", ["c", "c-float"])
 def test_every_header_has_a_line_on_rounding_beside_the_operations(target):
     for name, code in programs().items():

@@ -203,6 +203,7 @@ def many() -> list[Sources]:
     return [pipeline.generate(program, target) for target in ("c", "c-float", "numpy") for program in lowered]
 
 
+@pytest.mark.long
 def test_many_sources_become_one_module_in_three_commands(many, counting, root, monkeypatch, tmp_path):
     """One compiles all kernels, one the wrapper, and one links; each function is the one that it is alone."""
     compiler.compile_together(many)

@@ -20,8 +20,8 @@ from strapgen.catalogue import Choice
 from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.library import generated_sources
 
-#: Highest order of a Taylor method in the overview; with higher orders the error is far below that of any gyro.
-_HIGHEST_TAYLOR = 8
+#: Highest order of a series in the overview; with higher orders the error is far below that of any gyro.
+_HIGHEST_SERIES = 8
 #: Rates a, b and g of coning in deg/s, and step in s, for numerical values: those of table 5 of the thesis.
 CONING_DEG_S, STEP_S = 10.0, 0.125
 #: Operations per second at equal work: those of the fourth-order step of Euler parameters at `STEP_S`.
@@ -116,11 +116,9 @@ class OverviewRow:
 
 
 def methods() -> list[str]:
-    """Return the methods of the catalogue, without Taylor methods of very high order."""
+    """Return the methods of the catalogue, without series of very high order."""
     others = [
-        name
-        for name in catalogue.INTEGRATORS
-        if not name.startswith("taylor") or catalogue.INTEGRATORS[name].order <= _HIGHEST_TAYLOR
+        name for name, integrator in catalogue.INTEGRATORS.items() if integrator.order <= _HIGHEST_SERIES
     ]
     return [*TABLEAUX, *others]
 

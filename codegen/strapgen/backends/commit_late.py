@@ -12,9 +12,17 @@ from typing import Any
 
 import numpy as np
 
+from strapgen.backends import fitted
 from strapgen.backends.evaluators import Array
+from strapgen.backends.fixed_numbers import integers, numbers
 from strapgen.backends.late_unit import LateUnit, SampleKind
+from strapgen.backends.late_unit_fixed import LateUnitInFixedC, LateUnitOnIntegers, sample_integers
+from strapgen.backends.late_unit_in_c import LateUnitInC
+from strapgen.backends.registry import BACKENDS
 from strapgen.catalogue.methods.window import Window
+from strapgen.ir.fixed_interface import Argument
+from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.sources import Sources
 from strapgen.library import commit_late_sources
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
@@ -37,13 +45,24 @@ class CommitLate:
         A window of the catalogue by its name, or a family of filters.
     algorithm : str, optional
         "euler", Euler parameters, scalar last, or "dcm", the direction cosine matrix; body to reference.
+    backend : str, optional
+        "numpy" or "fixed-model", generated functions called from Python, or "c", "c-float" or "c-fixed32", generated C.
     sample_hz : number, optional
         Sampling rate in Hz; a family that is designed for a gyro needs it, and is refused at another one.
+    settings : Settings, optional
+        Settings of fixed point, with words of 32 bits.
+
+    Attributes
+    ----------
+    identity : array
+        The attitude of zero rotation.
 
     Raises
     ------
     InputError
         If a name is unknown, or the window cannot be committed late.
+    CompilerError
+        If the back end needs a C compiler and there is none.
 
     Examples
     --------
@@ -60,22 +79,59 @@ class CommitLate:
         self,
         window: str | Window = "window-7-7",
         algorithm: str = "euler",
+        backend: str = "numpy",
         sample_hz: float | str | Fraction | None = None,
+        settings: Settings | None = None,
     ) -> None:
+        self._state: Argument | None = None
+        self._unit = self._loaded(window, algorithm, backend, sample_hz, settings)
+        self.identity = self.attitude
+
+    def _loaded(
+        self,
+        window: str | Window,
+        algorithm: str,
+        backend: str,
+        sample_hz: float | str | Fraction | None,
+        settings: Settings | None,
+    ) -> LateUnit | LateUnitInC:
+        """Return the unit on a back end; in fixed point, note its formats."""
+        checks.choice("backend", backend, BACKENDS)
+        target, settings = BACKENDS[backend].target, fitted(backend, settings)
+        if target in commit_late_sources.TARGETS:
+            whole = commit_late_sources.sources(window, algorithm, target, sample_hz, settings=settings)
+            self._note(whole)
+            return LateUnitInC(whole) if settings is None else LateUnitInFixedC(whole)
+        if target not in ("numpy", "fixed-model"):
+            names = [name for name, entry in BACKENDS.items() if not entry.many_digits]
+            raise InputError(f"backend is {backend!r}; these commit late: {', '.join(names)}")
         filters = commit_late_sources.family(window, sample_hz)
-        self._unit = LateUnit(commit_late_sources.parts(filters, algorithm, "numpy"))
-        self.identity: Array = np.eye(3) if algorithm == "dcm" else np.array([0.0, 0, 0, 1])
-        self._unit.begin(self.identity)
+        parts = commit_late_sources.parts(filters, algorithm, target, settings)
+        self._note(parts.step)
+        return LateUnit(parts) if settings is None else LateUnitOnIntegers(parts)
+
+    def _note(self, step: Sources) -> None:
+        if step.fixed is not None:
+            self._state, self._sample = step.fixed.inputs
+
+    def _numbers(self, attitude: Array) -> Array:
+        """Return an attitude of the unit as numbers."""
+        return attitude if self._state is None else numbers(self._state, attitude)
 
     @property
     def attitude(self) -> Array:
         """The committed attitude, at the end of the last committed interval."""
-        return self._unit.attitude
+        return self._numbers(self._unit.attitude)
 
     @property
     def pending(self) -> int:
         """Intervals that are not committed yet."""
         return self._unit.pending
+
+    @property
+    def committed(self) -> list[Array]:
+        """Attitudes at the ends of the intervals that the last call committed; of C the last of them alone."""
+        return [self._numbers(attitude) for attitude in self._unit.committed]
 
     def push(self, sample: Any, kind: int = SampleKind.GOOD) -> int:
         """Take the sample of the next interval, and return how many intervals it commits.
@@ -94,26 +150,20 @@ class CommitLate:
         InputError
             If a number is not allowed.
         """
-        return len(self.pushed(sample, kind))
-
-    def pushed(self, sample: Any, kind: int = SampleKind.GOOD) -> list[Array]:
-        """Take a sample as `push` does, and return the attitudes at the ends of the intervals that it commits."""
         number = checks.count("kind", kind, smallest=0, largest=max(SampleKind))
         values = np.zeros(3) if number == SampleKind.LOST else checks.real_array("sample", sample, (3,))
         if values.shape != (3,):
             raise InputError(f"sample has shape {values.shape}; (3,) is needed")
+        if self._state is not None:
+            values = sample_integers(self._sample, values, number)
         return self._unit.push(values, number)
 
     def now(self) -> Array:
         """Return the attitude at the end of the last interval, by filters for the samples that are there."""
-        return self._unit.now()
+        return self._numbers(self._unit.now())
 
     def flush(self) -> int:
         """Commit the intervals that are not committed yet, and return how many."""
-        return len(self.flushed())
-
-    def flushed(self) -> list[Array]:
-        """Commit as `flush` does, and return the attitudes at the ends of the intervals."""
         return self._unit.flush()
 
     def reset(self, attitude: Any) -> None:
@@ -127,4 +177,6 @@ class CommitLate:
         state = checks.real_array("attitude", attitude, self.identity.shape)
         if state.shape != self.identity.shape:
             raise InputError(f"attitude has shape {state.shape}; {self.identity.shape} is needed")
-        self._unit.attitude = state
+        if self._state is not None:
+            state = integers(self._state, state, "the attitude")
+        self._unit.reset(state)

@@ -36,6 +36,29 @@ class GapError(InputError):
     """A lost sample that cannot be restored; the state is that before the call."""
 
 
+def refusal(kind: int, gap: int, count: int) -> str:
+    """Return why a sample is refused; "" if it is not.
+
+    Parameters
+    ----------
+    kind : int
+        A `SampleKind`.
+    gap : int
+        Samples from a lost one on; 0 without a gap.
+    count : int
+        Samples that are held.
+    """
+    if kind == SampleKind.LOST and gap:
+        return (
+            f"a sample is lost {gap} after another one; at least {REACH + 1} are needed from one to the other"
+        )
+    if kind == SampleKind.LOST and count < REACH:
+        return f"a sample is lost after {count} samples; {REACH} before it are needed to restore it"
+    if kind == SampleKind.MERGED and gap != 1:
+        return "the sum of two intervals follows no lost sample; one is needed right before it"
+    return ""
+
+
 class LateUnit:
     """Commits late and answers now, in double.
 
@@ -50,6 +73,8 @@ class LateUnit:
         The committed attitude, at the end of the last committed interval.
     pending : int
         Intervals that are not committed.
+    committed : list of array
+        Attitudes at the ends of the intervals that the last call committed, the oldest first.
     """
 
     def __init__(self, sources: LateSources) -> None:
@@ -59,25 +84,22 @@ class LateUnit:
         self._normalization = of_sources(sources.normalization)
         self._sets = [_table(rows) for rows in self.filters.sets]
         self._short = [_table(rows) for rows in self.filters.short]
-        restoration = self.filters.restoration
-        self._restoring = {
-            False: _table([restoration.lost])[0],
-            True: _table([restoration.merged])[0],
-        }
+        self._restoring = _table(self.filters.restoration)
         self._next = _table([NEXT])[0]
         self._ideal = self.filters.window.gyro is None
-        self.attitude = np.array([])
-        self.begin(np.array([]))
-
-    def begin(self, attitude: Array) -> None:
-        """Begin with an attitude and no samples."""
-        self.attitude = attitude
+        size = self._step.function.inputs[0].size
+        self.attitude: Array = np.eye(3) if size == 9 else np.array([0.0, 0, 0, 1])
+        self.committed: list[Array] = []
         self.pending = 0
         self._samples = np.empty((0, 3))
         self._gap, self._merged = 0, False
 
-    def push(self, sample: Array, kind: int) -> list[Array]:
-        """Take a sample and return the attitudes that it commits, the oldest first.
+    def reset(self, attitude: Array) -> None:
+        """Replace the committed attitude."""
+        self.attitude = attitude
+
+    def push(self, sample: Array, kind: int) -> int:
+        """Take a sample and return how many intervals it commits.
 
         Parameters
         ----------
@@ -96,14 +118,15 @@ class LateUnit:
         elif self._gap:
             self._gap += 1
             if kind == SampleKind.MERGED:
-                sample, self._merged = sample - self._samples[-1], True
+                self._samples[-1], sample = self._split(sample, self._samples[-1])
+                self._merged = True
         self._samples = np.concatenate([self._samples[1 - self.filters.capacity :], sample[None]])
         self.pending += 1
         if self._gap > REACH:
             self._restore()
         if self._gap or len(self._samples) < self.filters.samples:
-            return []
-        return [self._commit() for _ in range(self.pending - self.filters.window.ahead)]
+            return self._commit(0)
+        return self._commit(max(0, self.pending - self.filters.window.ahead))
 
     def now(self) -> Array:
         """Return the attitude at the end of the last interval; nothing is stored."""
@@ -112,22 +135,15 @@ class LateUnit:
             attitude = self._advanced(attitude, place)
         return attitude
 
-    def flush(self) -> list[Array]:
-        """Commit all intervals with the samples that are there, and return the attitudes."""
-        return [self._commit() for _ in range(self.pending)]
+    def flush(self) -> int:
+        """Commit all intervals with the samples that are there, and return how many."""
+        return self._commit(self.pending)
 
     def _require(self, kind: int) -> None:
         """Refuse a sample that leaves a gap which cannot be restored."""
-        if kind == SampleKind.LOST and self._gap:
-            raise GapError(
-                f"a sample is lost {self._gap} after another one; at least {REACH + 1} are needed from one to the other"
-            )
-        if kind == SampleKind.LOST and len(self._samples) < REACH:
-            raise GapError(
-                f"a sample is lost after {len(self._samples)} samples; {REACH} before it are needed to restore it"
-            )
-        if kind == SampleKind.MERGED and self._gap != 1:
-            raise GapError("the sum of two intervals follows no lost sample; one is needed right before it")
+        reason = refusal(kind, self._gap, len(self._samples))
+        if reason:
+            raise GapError(reason)
 
     def _estimate(self) -> Array:
         """Return an estimate of the next sample, from the last ones."""
@@ -137,17 +153,33 @@ class LateUnit:
         """Put the lost sample in place of its estimate, and take it out of the sum where there is one."""
         around = self._samples[-2 * REACH - 1 :]
         both = around[REACH] + around[REACH + 1]
-        around[REACH] = _weighted(self._restoring[self._merged], around)
+        around[REACH] = self._restored(around)
         if self._merged:
-            around[REACH + 1] = both - around[REACH]
+            around[REACH], around[REACH + 1] = self._split(both, around[REACH])
         self._gap, self._merged = 0, False
 
-    def _commit(self) -> Array:
-        """Commit the oldest interval that is not."""
-        advanced = self._advanced(self.attitude, len(self._samples) - self.pending)
-        self.attitude = self._normalization(advanced)
-        self.pending -= 1
-        return self.attitude
+    def _restored(self, around: Array) -> Array:
+        """Return the lost sample in the middle of others."""
+        return _weighted(self._restoring[int(self._merged)], around)
+
+    def _split(self, both: Array, lost: Array) -> tuple[Array, Array]:
+        """Return a lost sample and the next one, whose sum is known."""
+        return lost, both - lost
+
+    def _commit(self, count: int) -> int:
+        """Commit the oldest intervals that are not."""
+        self.committed = []
+        for _ in range(count):
+            advanced = self._advanced(self.attitude, len(self._samples) - self.pending)
+            self.pending -= 1
+            self.attitude = self._normalized(advanced)
+            self.committed.append(self.attitude)
+        return count
+
+    def _normalized(self, attitude: Array) -> Array:
+        """Return a committed attitude without its rounding."""
+        result: Array = self._normalization(attitude)
+        return result
 
     def _advanced(self, attitude: Array, place: int) -> Array:
         """Return an attitude after the interval of the sample at a place, with the samples that are there."""
@@ -156,19 +188,24 @@ class LateUnit:
         if count < self.filters.samples:
             width = min(count, SHORT)
             first = min(max(place - 1, 0), count - width)
-            return self._rotated(attitude, self._short[short_place(width, place - first)], first, place)
+            rows = self._short[short_place(width, place - first)]
+            return self._rotated(attitude, rows, self._samples[first : first + width], place)
         if place >= window.previous and after >= window.ahead:
             samples = self._samples[place - window.previous : place + window.ahead + 1]
-            result: Array = self._step(attitude, samples)
-            return result
+            return self._stepped(attitude, samples)
         before = place if after > window.ahead else self.filters.samples - 1 - after
-        return self._rotated(attitude, self._sets[before], place - before, place)
+        samples = self._samples[place - before : place - before + self.filters.samples]
+        return self._rotated(attitude, self._sets[before], samples, place)
 
-    def _rotated(self, attitude: Array, rows: Array, first: int, place: int) -> Array:
-        """Return an attitude after an interval, by filters on samples from the first one on."""
-        samples = self._samples[first : first + rows.shape[1]]
-        first_row = self._samples[place] if self._ideal else _weighted(rows[0], samples)
-        coefficients = [first_row, *(_weighted(taps, samples) for taps in rows[1:])]
+    def _stepped(self, attitude: Array, samples: Array) -> Array:
+        """Return an attitude after an interval with all samples ahead."""
+        result: Array = self._step(attitude, samples)
+        return result
+
+    def _rotated(self, attitude: Array, rows: Array, samples: Array, place: int) -> Array:
+        """Return an attitude after an interval, by filters on samples."""
+        rate = self._samples[place] if self._ideal else _weighted(rows[0], samples)
+        coefficients = [rate, *(_weighted(taps, samples) for taps in rows[1:])]
         result: Array = self._rotation(attitude, *coefficients)
         return result
 

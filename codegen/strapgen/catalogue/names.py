@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from strapgen.catalogue.methods.shaped_coning import SHAPE_TITLES
 from strapgen.catalogue.methods.tableaux import TITLES
-from strapgen.catalogue.methods.windows import WINDOW_TITLES
+from strapgen.catalogue.methods.windows import EXACT_TERMS, WINDOW_TITLES
 
 #: Attitude algorithms, by the state they integrate.
 ALGORITHMS = {
@@ -70,6 +70,13 @@ INTEGRATORS = {
         ("combined",),
         False,
     ),
+    "coning-exact-rest": Integrator(
+        "coning coefficients for both, with all other terms of the polynomial through the increments",
+        "exact_rest",
+        16,
+        False,
+        takes_ahead=False,
+    ),
     "coning-polynomial": Integrator(
         "uncompressed coning coefficients, with the terms of third and fourth order",
         "coning",
@@ -123,8 +130,8 @@ class Recipe(NamedTuple):
     standard: bool = True
 
 
-#: Degrees of the rate for which there are steps from its Legendre coefficients.
-LEGENDRE_DEGREES = range(1, 5)
+#: Degrees of the rate for which there are steps from its Legendre coefficients: to fourth order, and exact.
+LEGENDRE_DEGREES, EXACT_DEGREES = range(1, 5), range(1, 9)
 
 #: Orders at which the series of an update can be cut off.
 UPDATE_ORDERS = range(1, 21)
@@ -248,13 +255,26 @@ COMPENSATION = {
         ("imu-compensate-2", "compensation in two passes", "imu_errors", "imu_compensate", 2),
         ("imu-errors", "errors of a measurement unit", "imu_errors", "imu_errors"),
         ("pulse-compensate", "compensation of pulses by polarity", "pulses", "pulse_compensate"),
-        ("pulse-compensate-exact", "compensation of pulses, exact inverse", "pulses", "pulse_compensate", True),
+        (
+            "pulse-compensate-exact",
+            "compensation of pulses, exact inverse",
+            "pulses",
+            "pulse_compensate",
+            True,
+        ),
         ("pulse-errors", "pulses of a sensor with its errors", "pulses", "pulse_errors"),
-        ("gyro-pulse-compensate", "compensation of the pulses of a gyro", "pulses", "pulse_compensate", False, "gyro"),
+        (
+            "gyro-pulse-compensate",
+            "compensation of the pulses of a gyro",
+            "pulses",
+            "pulse_compensate",
+            False,
+            "gyro",
+        ),
         ("gyro-pulse-errors", "pulses of a gyro with its errors", "pulses", "pulse_errors", "gyro"),
         ("temperature-coefficient", "coefficient by two slopes", "pulses", "temperature_coefficient"),
-        ("scale-factor-heating", "scale factor by heat of the torquers", "torquer_heating", "scale_factor_heating"),
-        ("scale-factor-heating-errors", "errors by heat of the torquers", "torquer_heating", "scale_factor_heating", True),
+        ("scale-factor-heating", "scale factor by torquer heat", "torquer_heating", "scale_factor_heating"),
+        ("torquer-heating-errors", "errors by torquer heat", "torquer_heating", "scale_factor_heating", True),
         ("separate-canonical", "rate and acceleration from torques", "separation", "separate", "canonical"),
         ("separate-45", "separation, torquers at 45 degrees", "separation", "separate", "45"),
         ("torques-canonical", "torques of mass-unbalanced gyros", "separation", "measure", "canonical"),
@@ -271,15 +291,17 @@ KERNELS = {
         for algorithm, title in ALGORITHMS.items()
     },
     **{
-        f"{name}-legendre-{degree}": Recipe(
-            f"{ALGORITHMS[name]}: step from the Legendre coefficients of the rate to degree {degree}",
+        f"{name}-legendre-{exact}{degree}": Recipe(
+            f"{ALGORITHMS[name]}: step from the Legendre coefficients of the rate to degree {degree}"
+            + (", exact rotation" if exact else ""),
             "legendre_step",
             "step",
-            (name, degree),
+            (name, degree, EXACT_TERMS) if exact else (name, degree),
             False,
         )
         for name in ("dcm", "euler")
-        for degree in LEGENDRE_DEGREES
+        for exact, degrees in (("", LEGENDRE_DEGREES), ("exact-", EXACT_DEGREES))
+        for degree in degrees
     },
     "dcm-orthonormalize": Recipe(
         "orthonormalization by dual rows, the thesis's scheme", "orthonormal", "dcm"

@@ -33,7 +33,7 @@ from strapgen.cli.commands import (
     vectors,
     verify,
     vibration,
-    window,
+    window_generate,
 )
 from strapgen.cli.help import PlainCommand, PlainGroup, explanation
 from strapgen.support.exceptions import StrapgenError
@@ -45,7 +45,7 @@ COMMANDS: dict[str, dict[str, Any]] = {
         "derive": derive.derive,
         "tableau": tableau.tableau,
         "coning": coning.coning,
-        "window": window.app,
+        "window": window_generate.app,
     },
     "Generate": {
         "generate": generate.generate,

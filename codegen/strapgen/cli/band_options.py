@@ -121,3 +121,11 @@ def command_line(words: Sequence[str], groups: Sequence[Any], **others: str | No
     for name, value in options.items():
         line += [f"--{name.replace('_', '-')}", value.name if isinstance(value, Path) else str(value)]
     return shlex.join(line)
+
+
+def not_negative(what: str, value: str) -> Fraction:
+    """Read an option that takes a number from 0 on, exactly."""
+    number = checks.number(what, value)
+    if number < 0:
+        raise InputError(f"{what} is {value}; a number that is not below 0 is needed")
+    return number

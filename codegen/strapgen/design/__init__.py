@@ -1,1 +1,1 @@
-"""Design of coefficients for a band or a spectrum of motion; it begins with the filters of windows."""
+"""Design of coefficients for a band or a spectrum of motion: filters of windows, and coning coefficients."""

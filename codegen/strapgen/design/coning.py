@@ -14,7 +14,7 @@ from functools import cached_property
 from operator import mul
 from typing import Any
 
-from strapgen.catalogue.methods import coning_drift, window_conditions
+from strapgen.catalogue.methods import coning_drift
 from strapgen.catalogue.methods.coefficient_files import slug
 from strapgen.catalogue.methods.coning_drift import ConingShape
 from strapgen.catalogue.methods.shaped_coning import ShapedConing
@@ -60,6 +60,8 @@ class ConingBrief:
         Standard deviation of the noise of an increment, and the pulse of the gyro, in rad, for "random".
     title : str, optional
         By default it says the samples and the band.
+    products : int, optional
+        Highest total degree of products of two powers of time for which a step is exact.
     """
 
     samples: int
@@ -72,6 +74,7 @@ class ConingBrief:
     noise: Fraction = Fraction(0)
     pulse: Fraction = Fraction(0)
     title: str = ""
+    products: int = 0
 
     @property
     def shape(self) -> ConingShape:
@@ -116,7 +119,7 @@ def design(brief: ConingBrief) -> ShapedConing:
     """
     if not brief.shape.unknowns:
         raise InputError("samples 1 and previous 0 have no pairs of samples, hence no coefficients")
-    problem = ConingProblem(brief.shape, brief.powers)
+    problem = ConingProblem(brief.shape, brief.powers, brief.products)
     if brief.objective == "band":
         assert brief.band is not None, "a band is checked before"
         free = exchange.least_largest(problem, brief.band).free
@@ -142,6 +145,7 @@ def design(brief: ConingBrief) -> ShapedConing:
         brief.objective,
         coefficients,
         brief.powers,
+        brief.products,
         brief.band,
         brief.gyro,
         level,
@@ -166,26 +170,37 @@ class ConingProblem:
     ----------
     shape : ConingShape
     powers : int
-        Number of powers of the frequency that are annulled; they determine the first coefficients.
+        Number of powers of the frequency that are annulled.
+    products : int, optional
+        Highest total degree of the products of powers of time for which a step is exact.
+
+    Raises
+    ------
+    InputError
+        If the conditions contradict each other, or products go with a gyro.
     """
 
     title = "the drift on coning"
 
-    def __init__(self, shape: ConingShape, powers: int) -> None:
+    def __init__(self, shape: ConingShape, powers: int, products: int = 0) -> None:
+        if products and shape.gyro is not None:
+            raise InputError(
+                "products of powers of time go with an ideal gyro, whose samples are integrals of the rate"
+            )
         self._shape = shape
-        self._powers = powers
-        self._conditions = coning_drift.powers(shape, powers)
-        self.free = shape.unknowns - powers
+        conditions = [*coning_drift.powers(shape, powers), *coning_drift.products(shape, products)]
+        self._pivots, self._reduced = _reduced(conditions, shape.unknowns)
+        self._outer = [k for k in range(shape.unknowns) if k not in self._pivots]
+        self.free = len(self._outer)
 
     def complete(self, outer: Sequence[Fraction]) -> list[Fraction]:
         """Return all coefficients from the free ones, exactly."""
-        inner = self._powers
-        right = [
-            value - sum((a * x for a, x in zip(row[inner:], outer, strict=True)), Fraction(0))
-            for row, value in self._conditions
-        ]
-        square = [tuple(row[:inner]) for row, _ in self._conditions]
-        return [*(window_conditions.inner_taps(square, right) if inner else ()), *outer]
+        values = dict(zip(self._outer, outer, strict=True))
+        for pivot, row in zip(self._pivots, self._reduced, strict=True):
+            values[pivot] = row[-1] - sum(
+                (row[k] * x for k, x in values.items() if k in self._outer), Fraction(0)
+            )
+        return [values[k] for k in range(self._shape.unknowns)]
 
     @cached_property
     def base(self) -> list[Fraction]:
@@ -215,6 +230,31 @@ class ConingProblem:
     def rounded(self, free: Sequence[Any], bits: int = TABLE_BITS) -> tuple[Fraction, ...]:
         """Return all coefficients as rationals: the free ones as nearest multiples of 2^-bits, the rest exactly."""
         return tuple(self.complete([nearest(value, bits) for value in free]))
+
+
+def _reduced(
+    conditions: Sequence[tuple[list[Fraction], Fraction]], unknowns: int
+) -> tuple[list[int], list[list[Fraction]]]:
+    """Return which unknowns conditions determine, and each of these in the others and a constant."""
+    table = [[*row, right] for row, right in conditions]
+    pivots: list[int] = []
+    for column in range(unknowns + 1):
+        done = len(pivots)
+        place = next((line for line in range(done, len(table)) if table[line][column]), None)
+        if place is None:
+            continue
+        if column == unknowns:
+            raise InputError(
+                f"the conditions on {unknowns} coefficients contradict each other; fewer powers or products are needed"
+            )
+        table[done], table[place] = table[place], table[done]
+        head = [value / table[done][column] for value in table[done]]
+        table = [
+            head if line == done else [a - row[column] * b for a, b in zip(row, head, strict=True)]
+            for line, row in enumerate(table)
+        ]
+        pivots.append(column)
+    return pivots, table[: len(pivots)]
 
 
 def _mean_square(problem: ConingProblem, answers: Answers, brief: ConingBrief) -> list[Any]:

@@ -40,6 +40,8 @@ def written(shape: ShapedConing, command: str, figures: Sequence[str] = ()) -> s
         "objective": shape.objective,
         "powers": shape.powers,
     }
+    if shape.products:
+        head["products"] = shape.products
     if shape.band is not None:
         head["band"] = number(shape.band)
     if shape.level is not None:

@@ -152,6 +152,7 @@ def _sibling(committed: Window, size: tuple[int, int], filters: tuple[Taps, ...]
     previous, ahead = size
     return replace(
         committed,
+        sibling=True,
         name=sibling_name(committed.name, committed.previous, committed.ahead, previous, ahead),
         title=sibling_title(committed.title, previous, ahead),
         previous=previous,

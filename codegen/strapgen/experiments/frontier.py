@@ -93,18 +93,19 @@ class Candidate:
 CANDIDATES = tuple(
     Candidate(method, *samples)
     for method, several in {
-        "rk4": ((2,), (4,)),
+        "rk4": ((2,), (4,), (1, 3)),
         "taylor4": ((2,),),
         "taylor6": ((4,),),
         "munthe-kaas4": ((2,),),
         "magnus4": ((2,), (3,), (1, 3)),
-        "magnus6": ((3,), (4,)),
+        "magnus6": ((3,), (4,), (3, 3)),
         "coning-uncompressed": ((3,), (4,)),
         "coning-compressed": ((1, 1), (2,), (3,), (4,), (1, 3)),
         "coning-combined": ((2, 1), (3,), (3, 3), (5, 3)),
         "crouch-grossman3": ((2,), (3,)),
         "coning-least-squares": ((4,), (3, 3), (1, 8)),
-        "fit-exact": ((1, 1), (2,), (3,), (4,)),
+        "coning-shaped-8": ((1, 8),),
+        "fit-exact": ((1, 1), (2,), (3,), (4,), (3, 3)),
         "window-3-3": ((1, 3, 3),),
         "window-5-5": ((1, 5, 5),),
         "window-7-7": ((1, 7, 7),),
@@ -146,7 +147,7 @@ class Standing:
 
 
 @dataclass(frozen=True)
-class Case:
+class Trial:
     """What a process needs to run a candidate on all motions.
 
     Parameters
@@ -182,7 +183,7 @@ def candidates(names: Iterable[str] | None = None) -> list[Candidate]:
     Examples
     --------
     >>> [candidate.name for candidate in candidates(["magnus6", "rk2:1+1"])]
-    ['magnus6:3', 'magnus6:4', 'rk2:1+1']
+    ['magnus6:3', 'magnus6:4', 'magnus6:3+3', 'rk2:1+1']
     """
     if names is None:
         return list(CANDIDATES)
@@ -264,11 +265,11 @@ def frontier(
                 f"duration {float(length):g} s is shorter than a step of {candidate.name} at {float(rate):g} Hz"
             )
     checks.multiple("duration", length, "sampling interval", 1 / rate)
-    cases = {one.name: Case(one, str(rate), str(length)) for one in several}
+    cases = {one.name: Trial(one, str(rate), str(length)) for one in several}
     if results is None:
-        finished = side_by_side(run_case, cases, jobs)
+        finished = side_by_side(run_trial, cases, jobs)
     else:
-        finished = resume(run_case, cases, results, identity(str(rate), str(length)), jobs)
+        finished = resume(run_trial, cases, results, identity(str(rate), str(length)), jobs)
     for _, data in finished:
         yield Standing(**data)
 
@@ -279,29 +280,29 @@ def in_order(standings: Iterable[Standing], several: Sequence[Candidate]) -> lis
     return [by_name[candidate.name] for candidate in several]
 
 
-def run_case(case: Case) -> dict[str, Any]:
+def run_trial(trial: Trial) -> dict[str, Any]:
     """Run a candidate on all motions; return its standing as plain JSON data."""
-    choice = case.candidate.choice
+    choice = trial.candidate.choice
     program = generated_sources.program(choice)
     operations = program.operations
     return asdict(
         Standing(
-            case.candidate.name,
+            trial.candidate.name,
             program.title,
             program.source,
-            case.candidate.increments,
+            trial.candidate.increments,
             operations["multiply"],
             operations["add"],
             sum(number for kind, number in operations.items() if kind not in ("multiply", "add", "negate")),
-            {label: _drift(choice, label, case) for label in MOTIONS},
+            {label: _drift(choice, label, trial) for label in MOTIONS},
         )
     )
 
 
-def _drift(choice: Choice, label: str, case: Case) -> float | None:
+def _drift(choice: Choice, label: str, trial: Trial) -> float | None:
     """Return the drift on a motion over as many whole steps as the duration holds, in deg/h."""
-    rate, duration = Fraction(case.sample_hz), Fraction(case.duration)
-    step = case.candidate.increments / rate
+    rate, duration = Fraction(trial.sample_hz), Fraction(trial.duration)
+    step = trial.candidate.increments / rate
     with np.errstate(all="ignore"):
         try:
             run = simulate(backend(choice), _motion(label), step, duration // step * step)

@@ -17,6 +17,7 @@ from strapgen.backends import DEFAULT_BACKENDS as DEFAULT_BACKENDS
 from strapgen.backends import backend as attitude_backend
 from strapgen.backends.increments import pulses, windows
 from strapgen.catalogue import Choice
+from strapgen.catalogue.methods.windows import named_window
 from strapgen.ir.fixed_settings import Settings
 from strapgen.library import two_speed_sources
 from strapgen.simulation.runs import attitude, drift_between
@@ -96,6 +97,7 @@ def stress(
     backends: Sequence[str] = DEFAULT_BACKENDS,
     algorithms: Sequence[str] = ALGORITHMS,
     settings: Settings | None = None,
+    methods: Sequence[str] | None = None,
 ) -> Iterator[Row]:
     """Run the test on every algorithm and back end.
 
@@ -111,6 +113,9 @@ def stress(
         Attitude algorithms, and "two-speed" for both algorithms in two speeds.
     settings : Settings, optional
         Settings of fixed point: rounding and error feedback.
+    methods : sequence of str, optional
+        Methods of the attitude steps; by default those of `METHODS`. A step takes as many samples as it needs for the
+        order of its method.
 
     Yields
     ------
@@ -129,22 +134,26 @@ def stress(
     >>> rows[3].drift_deg < 1e-5 < rows[0].drift_deg
     True
     """
-    chosen = list(cases(algorithms, backends))
+    chosen = list(cases(algorithms, backends, methods))
     total = checks.number("duration", duration, positive=True)
     width = checks.number("sample", sample, positive=True)
     interval = checks.number("record", record, positive=True)
     count = checks.multiple("duration", total, "sample", width)
     every = checks.multiple("record", interval, "sample", width)
     checks.multiple("duration", total, "record", interval)
-    if every % _FAST_CYCLES:
-        raise InputError(
-            f"record is {every} samples; a multiple of {_FAST_CYCLES}, which a step may take, is needed"
-        )
+    for step in {case[3] for case in chosen} | {_FAST_CYCLES}:
+        if every % step:
+            raise InputError(
+                f"record is {every} samples; a multiple of {step}, which a step takes, is needed"
+            )
     for motion in MOTIONS:
-        turned = angles(motion, np.arange(count + 1, dtype=np.float64) * float(width))
+        # A step may take samples from before the run and from after it.
+        instants = np.arange(-catalogue.MOST_BESIDE, count + catalogue.MOST_BESIDE + 1, dtype=np.float64)
+        turned = angles(motion, instants * float(width))
         samples = np.diff(turned, axis=0)
         truth = evaluator("dcm-update")
-        true = truth(np.broadcast_to(np.eye(3), (count // every + 1, 3, 3)), turned[::every])
+        recorded = turned[catalogue.MOST_BESIDE :][: count + 1 : every]
+        true = truth(np.broadcast_to(np.eye(3), (count // every + 1, 3, 3)), recorded)
         for case in chosen:
             if case[0] == motion:
                 yield _row(case, samples, every, true, settings)
@@ -154,12 +163,14 @@ def stress(
 Case = tuple[str, str, str, int, str]
 
 
-def cases(algorithms: Sequence[str], backends: Sequence[str]) -> Iterator[Case]:
+def cases(
+    algorithms: Sequence[str], backends: Sequence[str], methods: Sequence[str] | None = None
+) -> Iterator[Case]:
     """Yield the cases of the test.
 
     Parameters
     ----------
-    algorithms, backends : sequence of str
+    algorithms, backends, methods : sequence of str
         As for `stress`.
 
     Yields
@@ -175,11 +186,19 @@ def cases(algorithms: Sequence[str], backends: Sequence[str]) -> Iterator[Case]:
         checks.choice("backend", name, BACKENDS)
     for name in algorithms:
         checks.choice("algorithm", name, ALGORITHMS)
+    steps = METHODS if methods is None else [(name, _samples(name)) for name in methods]
     for motion in MOTIONS:
         for algorithm in algorithms:
-            for method, count in _TWO_SPEEDS if algorithm == TWO_SPEED else METHODS:
+            for method, count in _TWO_SPEEDS if algorithm == TWO_SPEED else steps:
                 for backend in backends:
                     yield motion, algorithm, method, count, backend
+
+
+def _samples(method: str) -> int:
+    """Return the samples of a step by a method."""
+    if named_window(method) is None:
+        checks.choice("method", method, catalogue.METHODS)
+    return dict(METHODS).get(method) or catalogue.enough(method)
 
 
 def _row(case: Case, samples: Array, every: int, true: Array, settings: Settings | None) -> Row:
@@ -211,9 +230,11 @@ def _in_steps(
 ) -> Callable[[], Array]:
     """Return the run of an attitude step, which returns one matrix per record."""
     stepper = attitude_backend(choice, backend=backend, settings=settings)
-    increments = windows(samples, stepper.increments)
+    before, beside = catalogue.MOST_BESIDE, stepper.previous + stepper.ahead
+    row = samples[before - stepper.previous : len(samples) - before + stepper.ahead]
+    increments = windows(row, stepper.increments, beside)
     if stepper.increment_unit is not None:
-        increments = pulses(increments, stepper.increment_unit)
+        increments = pulses(increments, stepper.increment_unit, beside)
     steps = every // stepper.increments
     return lambda: attitude(stepper, stepper.propagate(increments, steps, steps))
 
@@ -225,6 +246,7 @@ def _in_two_speeds(
     if settings is not None:
         ranges = two_speed_sources.ranges(float(np.abs(samples).max()), fast_cycles=_FAST_CYCLES)
         settings = replace(settings, ranges=ranges)
+    samples = samples[catalogue.MOST_BESIDE : -catalogue.MOST_BESIDE]
     loops = two_speed.TwoSpeed(algorithm, backend=backend, settings=settings)
     stride = every // _FAST_CYCLES
 

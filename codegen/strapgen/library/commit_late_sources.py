@@ -2,17 +2,32 @@
 
 from __future__ import annotations
 
+import re
+import shlex
 from dataclasses import dataclass
 from fractions import Fraction
 
+from strapgen import targets
 from strapgen.catalogue import Choice, choose_step
 from strapgen.catalogue.methods.late_filters import LateFilters
 from strapgen.catalogue.methods.window import Window
 from strapgen.catalogue.methods.windows import named_window
+from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
-from strapgen.library import generated_sources
+from strapgen.library import commit_late_fixed, generated_sources
+from strapgen.library.commit_late_fixed import WORD
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
+from strapgen.targets import BUILT_IN, contract
+from strapgen.targets.c.emit import real_of
+from strapgen.targets.commit_late_c.emit import whole
+from strapgen.targets.commit_late_c.fixed_filters import FixedFilters
+
+#: Kinds of C that commit late.
+TARGETS = ("c", "c-float", "c-fixed")
+#: Most characters that names begin with: C99 tells external names apart by 31, and ``_memory`` comes behind.
+MOST_CHARACTERS = 24
+_TITLES = {"dcm": "Direction cosine matrix", "euler": "Euler parameters"}
 
 #: Attitude algorithms that commit late, each with the kernel that removes rounding from a committed attitude.
 NORMALIZATIONS = {"dcm": "dcm-orthonormalize-first-order", "euler": "euler-normalize-first-order"}
@@ -31,15 +46,15 @@ class LateSources:
         The step from Legendre coefficients, which all other filters share.
     normalization : Sources
         Removes rounding from a committed attitude.
-    whole : Sources or None
-        C of all of it; None where the functions are called from Python.
+    fixed : FixedFilters or None
+        The taps as integers, in fixed point.
     """
 
     filters: LateFilters
     step: Sources
     rotation: Sources
     normalization: Sources
-    whole: Sources | None = None
+    fixed: FixedFilters | None = None
 
 
 def kernels(filters: LateFilters, algorithm: str) -> tuple[Choice, Choice, Choice]:
@@ -64,7 +79,7 @@ def kernels(filters: LateFilters, algorithm: str) -> tuple[Choice, Choice, Choic
     checks.choice("algorithm", algorithm, NORMALIZATIONS)
     return (
         choose_step(algorithm, filters.window),
-        Choice(f"{algorithm}-legendre-{filters.degree}"),
+        Choice(f"{algorithm}-legendre-{'exact-' if filters.exact else ''}{filters.degree}"),
         Choice(NORMALIZATIONS[algorithm]),
     )
 
@@ -105,7 +120,7 @@ def family(window: str | Window, sample_hz: float | str | Fraction | None = None
     return LateFilters(chosen)
 
 
-def parts(filters: LateFilters, algorithm: str, target: str) -> LateSources:
+def parts(filters: LateFilters, algorithm: str, target: str, settings: Settings | None = None) -> LateSources:
     """Return the generated functions with their filters.
 
     Parameters
@@ -114,14 +129,88 @@ def parts(filters: LateFilters, algorithm: str, target: str) -> LateSources:
     algorithm : str
         A key of `NORMALIZATIONS`.
     target : str
-        A key of `strapgen.targets.TARGETS` in floating point.
+        A key of `strapgen.targets.TARGETS`.
+    settings : Settings, optional
+        Of fixed point.
 
     Raises
     ------
     InputError
-        If a name is unknown.
+        If a name is unknown, or the settings do not go with the target.
     """
-    step, rotation, normalization = (
-        generated_sources.sources(choice, target) for choice in kernels(filters, algorithm)
-    )
+    choices = kernels(filters, algorithm)
+    targets.require(target, settings)
+    if targets.TARGETS[target].fixed:
+        functions, fixed = commit_late_fixed.functions(filters, choices, target, settings or Settings())
+        return LateSources(filters, *functions, fixed)
+    step, rotation, normalization = (generated_sources.sources(choice, target) for choice in choices)
     return LateSources(filters, step, rotation, normalization)
+
+
+def sources(
+    window: str | Window,
+    algorithm: str = "euler",
+    target: str = "c",
+    sample_hz: float | str | Fraction | None = None,
+    name: str | None = None,
+    settings: Settings | None = None,
+) -> Sources:
+    """Return the C that commits an attitude late and answers it now.
+
+    Parameters
+    ----------
+    window, sample_hz
+        As for `family`.
+    algorithm : str, optional
+        A key of `NORMALIZATIONS`.
+    target : str, optional
+        "c", "c-float" or "c-fixed".
+    name : str, optional
+        What the names of functions and files begin with; by default it follows from algorithm and window.
+    settings : Settings, optional
+        Of fixed point, with words of 32 bits; by default increments are up to 1/8 rad.
+
+    Returns
+    -------
+    Sources
+
+    Raises
+    ------
+    InputError
+        If a name is unknown or too long, or the window cannot be committed late.
+
+    Examples
+    --------
+    >>> list(sources("window-3-3").files)[:4]
+    ['euler_late_3_3.h', 'euler_late_3_3.c', 'euler_window_3_3.h', 'euler_window_3_3.c']
+    """
+    checks.choice("target", target, TARGETS)
+    filters = family(window, sample_hz)
+    late = parts(filters, algorithm, target, settings)
+    chosen = filters.window
+    command = ["strapgen", "window", "generate", chosen.file or chosen.name]
+    command += ["--algorithm", algorithm, "--target", target]
+    stated = settings is not None and "--sample-hz" in settings.stated
+    command += [] if sample_hz is None or stated else ["--sample-hz", str(sample_hz)]
+    command += [] if name is None else ["--name", name]
+    title = f"{_TITLES[algorithm]}, committed late and answered now: {chosen.title}"
+    text = shlex.join(command)
+    if late.step.fixed is not None:
+        text += f" {contract.options(late.step.fixed.settings, late.step.function.inputs)}"
+    functions = late.step, late.rotation, late.normalization
+    return whole(_identifier(chosen, algorithm, target, name), title, text, filters, functions, late.fixed)
+
+
+def _identifier(window: Window, algorithm: str, target: str, name: str | None) -> str:
+    """Return what the names of functions and files begin with."""
+    infix = f"_w{WORD}" if BUILT_IN[target].fixed else real_of(target).infix
+    default = f"{algorithm}_late_{window.name.removeprefix('window-')}".replace("-", "_") + infix
+    identifier = default if name is None else name
+    if name is not None and not re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII):
+        raise InputError(f"--name is {name!r}; letters, digits and underscores are needed, a letter first")
+    if len(identifier) > MOST_CHARACTERS:
+        raise InputError(
+            f"names would begin with {identifier}, which has more than {MOST_CHARACTERS} characters; --name chooses "
+            "shorter ones"
+        )
+    return identifier

@@ -23,6 +23,9 @@ from strapgen.symbolic.rational_constants import rationalized
 
 __all__ = ["PASSES", "candidates", "lower"]
 
+#: Elements of stages from which on common subexpressions are not searched.
+_MANY_ELEMENTS = 400
+
 
 def lower(kernel: Kernel) -> Program:
     """Turn a kernel into straight-line code; of several candidates the one with the fewest operations.
@@ -78,12 +81,15 @@ def candidates(kernel: Kernel, core: canonical.Core | None) -> Iterator[Program]
     ------
     Program
         First the formulas with common subexpressions shared; then the formulas without sharing if there is no core,
-        otherwise one program for each canonical form.
+        otherwise one program for each canonical form. Without a core, formulas of many elements are not shared: they
+        stand in small stages already, and the passes find what is common to them in less time and operations.
     """
-    yield gate(kernel, share(kernel))
     if core is None:
+        if sum(stage.signal.size for stage in kernel.stages) < _MANY_ELEMENTS:
+            yield gate(kernel, share(kernel))
         yield gate(kernel, share(kernel, common=False))
         return
+    yield gate(kernel, share(kernel))
     update = replace(
         kernel, inputs=(*kernel.inputs, core.transition), stages=_behind(kernel, core), transition=None
     )

@@ -21,8 +21,7 @@ from strapgen.catalogue.methods.shaped_coning import ShapedConing
 from strapgen.design.coning import annulling
 from strapgen.design.lines import Lines
 from strapgen.reports.report import Report
-from strapgen.reports.table import Column, TextTable
-from strapgen.reports.units import READABLE_UNITS
+from strapgen.reports.table import READABLE_UNITS, Column, TextTable
 
 _PAIR_COLUMNS = (Column(align="<"), Column(), Column(spec=".9f", least=12))
 #: Where the terms of third and fourth order are to be found, for the forms that have some.
@@ -223,6 +222,7 @@ def shaped_data(drift: ShapedDrift) -> dict[str, Any]:
         "previous": shape.previous,
         "objective": shape.objective,
         "powers": shape.powers,
+        "products": shape.products,
         "band_rad_sample": None if shape.band is None else float(shape.band),
         "gyro": None
         if shape.gyro is None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
@@ -11,6 +12,8 @@ from typing import Any
 
 #: How numbers of a kind are written: angles in deg or rad, errors, times and steps in s.
 ANGLE, ERROR, SECONDS = ".3g", ".3e", ".6g"
+#: For each unit of a mean rate the unit that a person reads, and the factor to it.
+READABLE_UNITS = {"rad/s": ("deg/h", math.degrees(3600)), "m/s^2": ("micro-g", 1e6 / 9.80665)}
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,7 @@ import sympy as sp
 
 from strapgen.reports.latex import align_environment
 from strapgen.reports.report import Report, flat_table
-from strapgen.reports.table import Column, TextTable
-from strapgen.reports.units import READABLE_UNITS
+from strapgen.reports.table import READABLE_UNITS, Column, TextTable
 from strapgen.support.exceptions import InputError
 from strapgen.vibration import Assessment
 from strapgen.vibration.mean_rates import Rates

@@ -359,8 +359,8 @@ def propagate(
         raise InputError(
             f"the recording holds {len(recording.increments)} increments; a step needs {backend.samples}"
         )
-    record_every = 1 if record is None else _multiple("record", record, step)
-    every = None if orthonormalize is None else _multiple("orthonormalize", orthonormalize, step)
+    record_every = 1 if record is None else record_interval("record", record, step)
+    every = None if orthonormalize is None else record_interval("orthonormalize", orthonormalize, step)
     if record_every > steps:
         raise InputError(f"record {record} s is longer than the recording, {steps * step:.6g} s")
 
@@ -376,7 +376,8 @@ def propagate(
     return History(time, states, step, unused)
 
 
-def _multiple(what: str, value: float | str, step: float) -> int:
+def record_interval(what: str, value: float | str, step: float) -> int:
+    """Return how many steps an interval in s is, to a hundredth of a step."""
     ratio = float(checks.number(what, value, positive=True)) / step
     if not 0.5 < ratio <= checks.MOST or abs(ratio - round(ratio)) > 0.01:
         raise InputError(f"{what} {value} s is not a whole multiple of the step {step:.6g} s")

@@ -89,16 +89,15 @@ class ReferenceAttitude:
 
     def _extend(self, last: int) -> None:
         """Store the states up to a knot."""
-        while len(self._states) <= last:
-            first = len(self._states) - 1
+        parts = [self._states]
+        for first in range(len(self._states) - 1, last, _PART):
             count = min(_PART, last - first)
             starts = (first + np.arange(count * self._substeps) / self._substeps) * KNOT
             turns = self._turns(starts, np.full(starts.shape, KNOT / self._substeps))
-            states = _magnus().propagate(turns, self._substeps, initial=self._states[-1])
+            states = _magnus().propagate(turns, self._substeps, initial=parts[-1][-1])[1:]
             # The length of a product of rotations is 1 but for rounding.
-            self._states = np.concatenate(
-                [self._states, states[1:] / np.linalg.norm(states[1:], axis=1, keepdims=True)]
-            )
+            parts.append(states / np.linalg.norm(states, axis=1, keepdims=True))
+        self._states = np.concatenate(parts)
 
     def _from_knots(self, states: Array, knots: NDArray[np.int_], times: Array) -> Array:
         """Return the states at times between knots, each from its knot on."""

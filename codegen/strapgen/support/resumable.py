@@ -125,6 +125,7 @@ def resume(
 def _opened(path: Path) -> Iterator[IO[bytes]]:
     """Open a results file, which no other process may write at the same time."""
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | getattr(os, "O_BINARY", 0), 0o666)
     except OSError as error:
         raise InputError(f"{path} cannot be written ({error.strerror})") from None

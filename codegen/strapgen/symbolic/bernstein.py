@@ -51,8 +51,8 @@ class _BernsteinForm:
     def is_below(self, limit: int) -> bool:
         """Tell whether the eigenvalues of all coefficients are below a limit: what they lack of it has none below 0.
 
-        A matrix has none if the Cholesky decomposition of less than the matrix succeeds in double. On the diagonal, its
-        rounding needs (n + 1)/(1 - ...) 2^-53 times the trace (S. M. Rump, BIT 46 (2006) 433-452); 2^-45 are taken.
+        A matrix of n rows has none if the Cholesky decomposition in double succeeds after (n + 2) 2^-53 of its trace
+        were subtracted from the diagonal (S. M. Rump, BIT 46 (2006) 433-452); here it is 2^-45 of it.
         """
         size = _size(len(self.coefficients))
         rows, columns = np.triu_indices(size)

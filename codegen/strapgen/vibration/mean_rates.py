@@ -166,7 +166,7 @@ class Assessment:
                 (form.real, size * sp.cos(alpha - beta)),
                 (-form.imaginary, size * sp.sin(alpha - beta)),
             ):
-                ratio = sp.Add(*(sp.expand(2 * term / omega) for term in sp.Add.make_args(value)))
+                ratio = sp.Add(*(sp.expand(2 * term / omega, deep=False) for term in sp.Add.make_args(value)))
                 if ratio != 0 and wave != 0:
                     terms.append((wave, ratio))
         return terms

@@ -39,3 +39,13 @@ def test_without_the_highest_coefficients_it_is_that_of_a_lower_degree(degree):
         rtol=0,
         atol=allowed,
     )
+
+
+def test_the_exact_rotation_is_that_of_the_window():
+    family = WINDOWS["window-9-9"]
+    backend = strapgen.backend("euler", family.name)
+    samples = np.random.default_rng(9).uniform(-0.1, 0.1, (5, 19, 3))
+    coefficients = np.moveaxis(np.array(family.filters, float) @ samples, -2, 0)
+    ours = strapgen.evaluator("euler-legendre-exact-5")(backend.identity, *coefficients)
+    theirs = np.array([backend.step(backend.identity, each) for each in samples])
+    np.testing.assert_allclose(ours, theirs, rtol=0, atol=3e-15)

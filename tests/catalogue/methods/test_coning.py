@@ -187,7 +187,7 @@ def test_combined_coefficients_are_the_nearest_to_uncompressed_ones(samples, pre
         *(
             row
             for degree in range(1, total)
-            for row, _ in coning_coefficients._polynomial(samples, previous, degree)
+            for row, _ in coning_coefficients.polynomial_conditions(samples, previous, degree)
         ),
         *(row for row, _ in coning_coefficients._coning(samples, previous)),
     ]

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 
+import mpmath
 import numpy as np
 import pytest
 
 import strapgen
 from strapgen.catalogue.methods import coning_coefficients
+from strapgen.catalogue.methods.coning_drift import ConingShape, terms
 from strapgen.catalogue.methods.frequency_shaping import BAND, weights
 from strapgen.simulation.drift import drift
 
@@ -68,3 +70,11 @@ def test_one_sample_has_nothing_to_be_crossed_with():
     turn = np.array([[[0.1, 0.2, 0.3]]])
     single, plain = (strapgen.backend("euler", m, 1) for m in ("coning-least-squares", "coning-compressed"))
     np.testing.assert_array_equal(single.propagate(turn), plain.propagate(turn))
+
+
+def test_the_drift_that_is_made_small_is_the_one_that_all_designs_use():
+    shape = ConingShape(3, 2)
+    b = mpmath.mpf("0.7")
+    unit, constant = terms(shape, b, mpmath)
+    np.testing.assert_allclose(np.array(unit, float), columns(3, 2, np.array(0.7)), rtol=1e-14)
+    assert float(constant) == pytest.approx(target(3, np.array(0.7)), rel=1e-14)

@@ -55,7 +55,7 @@ def test_the_estimate_of_the_next_sample_is_exact_for_cubic_rates():
     ("window", "reason"),
     [
         (replace(WINDOW, increments=2), "steps of one sample"),
-        (with_exact_rotation(WINDOW), "fourth order"),
+        (replace(with_exact_rotation(WINDOW), terms=18), "18 terms; one of 16"),
         (WINDOWS["window-8-6"], "whole family"),
     ],
 )

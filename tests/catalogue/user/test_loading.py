@@ -312,6 +312,7 @@ def test_the_step_of_the_refusals_is_right(tmp_path):
     assert strapgen.derive(str(tmp_path / "mine.py")).name == "mine"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("case", WRONG)
 def test_what_cannot_be_used_is_refused_in_one_line(case, tmp_path, monkeypatch, capsys):
     old, new, said = WRONG[case]

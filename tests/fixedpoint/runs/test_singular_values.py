@@ -78,6 +78,7 @@ def test_a_coarser_bound_counts_where_no_closer_one_is_proved(monkeypatch):
     assert bounds(step, known=known) == Interval.symmetric(known)
     three = program(choose_step("euler", "rk4", 3))
     assert bounds(three, known=known) == Interval.symmetric(known)
+    assert singular_value_bounds(step, step.transition, (), 4, FAR) == Interval.symmetric(FAR)
     monkeypatch.setattr(singular_values, "_MOST_PRODUCTS", 10)
     assert bounds(step) == Interval.symmetric(FAR)
 

@@ -97,6 +97,7 @@ def stages(program: Program, point: dict[str, Fraction]) -> dict[str, list[Fract
     return replace(program, outputs=outputs, transition=None).run(point)
 
 
+@pytest.mark.long
 @EVERY
 @SETTINGS
 @given(program=programs(), point=points)

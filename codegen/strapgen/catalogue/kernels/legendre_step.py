@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 
 import sympy as sp
 
 from strapgen.catalogue.kinematics import KINEMATICS
-from strapgen.catalogue.methods import rate_fit, rotation_series, windowed
+from strapgen.catalogue.methods import rate_fit, windowed
 from strapgen.catalogue.methods.samples import Samples
 from strapgen.catalogue.methods.window import Window
 from strapgen.ir.signals import Signal
 from strapgen.symbolic.kernel import Kernel, KernelBuilder
 
+_SOURCE = "the rate as a Legendre series"
 
-def step(name: str, degree: int) -> Kernel:
+
+def step(name: str, degree: int, terms: int = 0) -> Kernel:
     """Derive the step of a window after its filters: from the Legendre coefficients of the rate to the next state.
 
     Parameters
@@ -23,6 +26,8 @@ def step(name: str, degree: int) -> Kernel:
         Name of the attitude algorithm.
     degree : int
         Degree of the polynomial of the rate.
+    terms : int, optional
+        Terms of the power series of the exact rotation; by default the rotation vector is to fourth order.
 
     Returns
     -------
@@ -34,13 +39,26 @@ def step(name: str, degree: int) -> Kernel:
     build = KernelBuilder()
     state = build.input(kinematics.state)
     samples = _Coefficients(build, degree)
-    transition = windowed.method(_unfiltered(degree)).transition(build, kinematics, samples)
+    method = windowed.method(_unfiltered(degree, terms))
+    transition = method.transition(build, kinematics, samples)
     build.output(kinematics.next, kinematics.product(state, build.stage(kinematics.transition, transition)))
     return build.kernel(
-        f"{name}-legendre-{degree}",
-        f"{kinematics.title}: step from the Legendre coefficients of the rate to degree {degree}",
-        f"{kinematics.source}; {rotation_series.SOURCE}",
+        kernel_name(name, degree, terms),
+        f"{kinematics.title}: step from the Legendre coefficients of the rate to degree {degree}"
+        + (", exact rotation" if terms else ""),
+        f"{kinematics.source}; {method.source}",
     )
+
+
+def kernel_name(name: str, degree: int, terms: int) -> str:
+    """Return the name of the kernel, see `step`.
+
+    Examples
+    --------
+    >>> kernel_name("euler", 4, 0), kernel_name("euler", 5, 16)
+    ('euler-legendre-4', 'euler-legendre-exact-5')
+    """
+    return f"{name}-legendre-{'exact-' if terms else ''}{degree}"
 
 
 def coefficient_name(m: int) -> str:
@@ -69,9 +87,9 @@ class _Coefficients(Samples):
         self.fit = rate_fit.from_legendre(_unfiltered(degree).filters)
 
 
-def _unfiltered(degree: int) -> Window:
+def _unfiltered(degree: int, terms: int = 0) -> Window:
     """Return the window whose samples are the Legendre coefficients themselves."""
     count = degree + 1
     filters = tuple(tuple(Fraction(row == column) for column in range(count)) for row in range(count))
-    title = "the rotation of a polynomial rate"
-    return Window("legendre", title, "", count, 0, 0, count, Fraction(1), "minimax", filters)
+    window = Window("legendre", "", _SOURCE, 1, 0, degree, count, Fraction(1), "minimax", filters)
+    return replace(window, rotation="exact", terms=terms) if terms else window

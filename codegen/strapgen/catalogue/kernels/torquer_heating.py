@@ -88,7 +88,7 @@ def scale_factor_heating(errors: bool = False) -> Kernel:
         signal = _torque("compensated_torque_increment", "true", "true angle increments", None)
         build.output(signal, scale.multiply_elementwise(d))
     return build.kernel(
-        "scale-factor-heating-errors" if errors else "scale-factor-heating",
+        "torquer-heating-errors" if errors else "scale-factor-heating",
         "Gyros whose torquers heat up" if errors else "Scale factors of gyros whose torquers heat up",
         f"{MICHELIN}, (6.2), (6.6) and (6.7), printed; recursion on the deviation derived",
         recursion=Recursion(((DEVIATION.name, after(DEVIATION).name),), kept=(DEVIATION.name,)),

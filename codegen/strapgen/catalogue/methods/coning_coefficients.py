@@ -66,7 +66,7 @@ class Design:
     def degree(self) -> int:
         """Return the total degree up to which products of two powers of time in the rate are integrated exactly."""
         for total in count(1):
-            for row, value in _polynomial(self.samples, self.previous, total):
+            for row, value in polynomial_conditions(self.samples, self.previous, total):
                 if sum(row[pair] * c for pair, c in self.pairs.items()) != value:
                     return total - 1
         raise AssertionError("the samples are finite in number")
@@ -222,17 +222,32 @@ def _combined(samples: int, previous: int) -> Scalars:
     total = samples + previous
     pairs, plain = _pairs(total), _uncompressed(samples, previous)
     conditions = [
-        *(condition for degree in range(1, total) for condition in _polynomial(samples, previous, degree)),
+        *(
+            condition
+            for degree in range(1, total)
+            for condition in polynomial_conditions(samples, previous, degree)
+        ),
         *_coning(samples, previous),
     ]
     rows = [([row[pair] for pair in pairs], value) for row, value in conditions]
     return dict(zip(pairs, _nearest(rows, [plain[pair] for pair in pairs]), strict=True))
 
 
-def _polynomial(samples: int, previous: int, total: int) -> Iterator[tuple[Scalars, Fraction]]:
+def polynomial_conditions(samples: int, previous: int, total: int) -> Iterator[tuple[Scalars, Fraction]]:
     """Yield conditions for polynomial rates: the coefficients of the pairs of samples and the true value.
 
-    There is one condition for each product of two different powers of time with the given total degree.
+    There is one condition for each product of two different powers of time with a total degree.
+
+    Parameters
+    ----------
+    samples, previous : int
+        Samples of the slow cycle, and samples from before it.
+    total : int
+        Total degree of the product.
+
+    Yields
+    ------
+    dict, Fraction
     """
     truth = rotation_series.pairs(rotation_series.terms(total + 1, 2)[1])
     for j in range((total + 1) // 2):

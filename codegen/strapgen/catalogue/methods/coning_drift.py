@@ -119,6 +119,37 @@ def powers(shape: ConingShape, count: int) -> list[tuple[list[Fraction], Fractio
     return conditions
 
 
+def products(shape: ConingShape, degree: int) -> list[tuple[list[Fraction], Fraction]]:
+    """Return the conditions of a step that is exact for products of two powers of time in the rate.
+
+    Parameters
+    ----------
+    shape : ConingShape
+        Of an ideal gyro.
+    degree : int
+        Highest total degree of the products; 0 for none.
+
+    Returns
+    -------
+    list of (list of Fraction, Fraction)
+        For each product its coefficient for every K_s, and what their sum has to be. Those of degree 1 say the same as
+        the first of `powers`.
+
+    Examples
+    --------
+    >>> [str(value) for row, value in products(ConingShape(1, 2), 2) for value in (*row, value)]
+    ['1', '2', '1/12', '0', '-2', '1/12']
+    """
+    from strapgen.catalogue.methods.coning_coefficients import polynomial_conditions
+
+    newest = shape.unknowns
+    return [
+        ([row[newest - s, newest] for s in range(1, newest + 1)], value)
+        for total in range(1, degree + 1)
+        for row, value in polynomial_conditions(shape.samples, shape.previous, total)
+    ]
+
+
 def largest(shape: ConingShape, coefficients: Sequence[Fraction], band: Fraction) -> float:
     """Return the largest magnitude of E over a band.
 
@@ -143,17 +174,18 @@ def largest(shape: ConingShape, coefficients: Sequence[Fraction], band: Fraction
     beta = _REAL.mpf(band.numerator) / band.denominator
     points = [beta * _REAL.sin(_REAL.pi * k / (2 * _POINTS)) for k in range(1, _POINTS + 1)]
     values = [abs(value) for value in errors(shape, coefficients, points)]
-    place = max(range(_POINTS), key=lambda k: values[k])
-    peak = values[place]
-    if 0 < place < _POINTS - 1:  # the rest of the height by a parabola through the point and its neighbours
-        (x0, x1), (y0, y1) = (
-            (points[place - 1] - points[place], points[place + 1] - points[place]),
-            (values[place - 1] - peak, values[place + 1] - peak),
-        )
-        curvature = (y1 / x1 - y0 / x0) / (x1 - x0)
-        slope = y0 / x0 - curvature * x0
-        peak -= slope * slope / (4 * curvature) if curvature else 0
-    return float(peak)
+    peaks = [values[-1]]
+    for k in range(1, _POINTS - 1):
+        if values[k] >= max(values[k - 1], values[k + 1]):
+            # The height of the parabola through the point and its neighbours.
+            (x0, x1), (y0, y1) = (
+                [points[place] - points[k] for place in (k - 1, k + 1)],
+                [values[place] - values[k] for place in (k - 1, k + 1)],
+            )
+            curvature = (y1 / x1 - y0 / x0) / (x1 - x0)
+            slope = y0 / x0 - curvature * x0
+            peaks.append(values[k] - (slope * slope / (4 * curvature) if curvature else 0))
+    return float(max(peaks))
 
 
 def errors(shape: ConingShape, coefficients: Sequence[Fraction], points: Sequence[Any]) -> list[Any]:

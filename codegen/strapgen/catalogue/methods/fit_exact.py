@@ -28,17 +28,7 @@ def method(order: int) -> Method:
     """
 
     def transition(build: KernelBuilder, kinematics: Kinematics, samples: Samples) -> sp.Matrix:
-        coefficients = [
-            samples.combination(
-                f"legendre_{m}",
-                samples.fit.legendre(m),
-                f"Legendre coefficient {m} of the rate times the step",
-            )
-            for m in range(samples.fit.degree + 1)
-        ]
-        assert samples.increments is not None, "rates are refused before"
-        parts = -(-samples.increments // _INCREMENTS)
-        return polynomial_rotation.rotation(build, kinematics, coefficients, order, parts)
+        return polynomial_rotation.rotation(build, kinematics, coefficients(samples), order, parts(samples))
 
     return Method(
         "fit-exact",
@@ -48,3 +38,21 @@ def method(order: int) -> Method:
         transition,
         isometry=lambda count: True,
     )
+
+
+def coefficients(samples: Samples) -> list[sp.Matrix]:
+    """Add stages for the Legendre coefficients of the rate times the step, in rad, and return them."""
+    return [
+        samples.combination(
+            f"legendre_{m}",
+            samples.fit.legendre(m),
+            f"Legendre coefficient {m} of the rate times the step",
+        )
+        for m in range(samples.fit.degree + 1)
+    ]
+
+
+def parts(samples: Samples) -> int:
+    """Return into how many equal parts a step is cut, each with a series of its own."""
+    assert samples.increments is not None, "rates are refused before"
+    return -(-samples.increments // _INCREMENTS)

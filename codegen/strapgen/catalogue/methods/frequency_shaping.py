@@ -1,12 +1,8 @@
 """Coning coefficients that are shaped over a band of frequencies, in place of being exact at low ones.
 
-On coning of angular frequency w the rotation vector d_0 + ... + d_(N-1) + (sum_s K_s d_(N-1-s)) x d_(N-1) drifts, per
-square of the half-angle and per step, by
-
-    E(b) = sum_s K_s 2 sin(s b) (1 - cos b) - (N b - sin N b)/2,   b = w times the sampling interval.
-
-The weights K_s are those of the least mean square of E over the band 0 < b <= 1.3, which ends at a fifth of the
-sampling rate. They are rounded to multiples of 2^-60.
+The rotation vector is d_0 + ... + d_(N-1) + (sum_s K_s d_(N-1-s)) x d_(N-1); `coning_drift` has its drift E(b) on
+coning of the angular frequency b in rad a sample. The weights K_s are those of the least mean square of E over the band
+0 < b <= 1.3, which ends at a fifth of the sampling rate. They are rounded to multiples of 2^-60.
 """
 
 from __future__ import annotations

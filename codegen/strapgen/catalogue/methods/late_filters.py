@@ -13,7 +13,8 @@ from functools import cached_property
 from strapgen.catalogue.methods import lost_samples, window_conditions
 from strapgen.catalogue.methods.lost_samples import REACH, Restoration
 from strapgen.catalogue.methods.window import Taps, Window
-from strapgen.catalogue.names import LEGENDRE_DEGREES
+from strapgen.catalogue.methods.windows import EXACT_TERMS
+from strapgen.catalogue.names import EXACT_DEGREES, LEGENDRE_DEGREES
 from strapgen.support.exceptions import InputError
 
 #: Most samples that a polynomial goes through.
@@ -37,7 +38,8 @@ class LateFilters:
     Raises
     ------
     InputError
-        If the family has steps of several samples, its rotation is exact, or one-sided filters are missing.
+        If the family has steps of several samples or an exact rotation of another number of terms than the
+        catalogue's, or one-sided filters are missing.
 
     Examples
     --------
@@ -56,13 +58,18 @@ class LateFilters:
                 f"{self.window.name} has steps of {self.window.increments} samples; only steps of one sample can be "
                 "committed late"
             )
-        if self.window.rotation != "fourth":
+        if self.exact and self.window.terms != EXACT_TERMS:
             raise InputError(
-                f"the rotation of {self.window.name} is {self.window.rotation}; only that to fourth order can be "
+                f"the rotation of {self.window.name} has {self.window.terms} terms; one of {EXACT_TERMS} can be "
                 "committed late"
             )
         if len(self.window.one_sided) + 1 != self.window.samples:
             raise InputError(f"{self.window.name} has no one-sided filters; a whole family is needed")
+
+    @property
+    def exact(self) -> bool:
+        """Whether the rotation of the rate's polynomial is exact."""
+        return self.window.rotation == "exact"
 
     @property
     def samples(self) -> int:
@@ -84,7 +91,7 @@ class LateFilters:
     @property
     def degree(self) -> int:
         """Highest Legendre coefficient that a step takes."""
-        return min(self.window.degree, max(LEGENDRE_DEGREES))
+        return min(self.window.degree, max(EXACT_DEGREES if self.exact else LEGENDRE_DEGREES))
 
     @cached_property
     def sets(self) -> tuple[Rows, ...]:

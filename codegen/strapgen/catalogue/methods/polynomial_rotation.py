@@ -60,21 +60,46 @@ def rotation(
     ['half_rate_0', 'half_rate_1', 'term_1', 'term_2']
     """
     parameters = EULER if kinematics is DCM else kinematics
+    return normalized(build, kinematics, series(build, parameters, coefficients, order, parts))
+
+
+def series(
+    build: KernelBuilder,
+    parameters: Kinematics,
+    coefficients: Sequence[sp.Matrix],
+    order: int,
+    parts: int = 1,
+) -> sp.Matrix:
+    """Add stages for the rotation over a step before it is normalized, and return it.
+
+    Parameters
+    ----------
+    build : KernelBuilder
+    parameters : Kinematics
+        Euler or Cayley-Klein parameters.
+    coefficients, order, parts
+        As for `rotation`.
+
+    Returns
+    -------
+    Matrix, 4 x 1
+        As symbols.
+    """
     total = None
     for part in range(parts):
         label = f"part{part + 1}_" if parts > 1 else ""
         rates = _rates(build, parameters.scale, coefficients, order, (part, parts))
-        series = centred(build, parameters, rates, order, label)
+        one = centred(build, parameters, rates, order, label)
         total = (
-            series
+            one
             if total is None
             else build.stage(
                 named(parameters, f"{label}total", f"transition over the first {part + 1} parts"),
-                parameters.product(total, series),
+                parameters.product(total, one),
             )
         )
     assert total is not None, "a step has at least one part"
-    return normalized(build, kinematics, total)
+    return total
 
 
 def _rates(

@@ -26,10 +26,10 @@ from strapgen.support.suggestions import counted
 
 #: Keys of a file, and those of them that are optional.
 KEYS = (
-    *("name", "source", "samples", "previous", "objective", "powers", "band", "level", "gyro"),
+    *("name", "source", "samples", "previous", "objective", "powers", "products", "band", "level", "gyro"),
     "coefficients",
 )
-OPTIONAL = ("powers", "band", "level", "gyro")
+OPTIONAL = ("powers", "products", "band", "level", "gyro")
 
 #: What the coefficients are best at: the largest drift over a band, or the drift under a spectrum whose phases are
 #: unknown, or random.
@@ -39,6 +39,8 @@ OBJECTIVES = ("band", "worst", "random")
 MOST_SAMPLES, MOST_KEPT = 8, 32
 #: Most bytes of a file, and most digits of a level.
 MOST_BYTES, MOST_DIGITS = 100_000, 12
+#: How far the largest drift may be missed, by itself, by the parabola through three of many points.
+_MISSED = Decimal("1e-6")
 
 
 @dataclass(frozen=True)
@@ -60,6 +62,8 @@ class ShapedConing:
         K_1, K_2, ...
     powers : int
         Number of powers of the frequency, from the third on, that the drift on coning has not.
+    products : int
+        Highest total degree of products of two powers of time in the rate for which a step is exact; 0 for none.
     band : Fraction or None
         Highest angular frequency in rad a sample for which they are designed; None if that is a spectrum.
     gyro : GyroResponse or None
@@ -84,6 +88,7 @@ class ShapedConing:
     objective: str
     coefficients: tuple[Fraction, ...]
     powers: int = 0
+    products: int = 0
     band: Fraction | None = None
     gyro: GyroResponse | None = None
     level: Decimal | None = None
@@ -182,7 +187,7 @@ def read(path: str | Path) -> ShapedConing:
 
 
 def verify(shape: ShapedConing) -> None:
-    """Check exactly that powers of the frequency are annulled, and that the level is right to its digits.
+    """Check that the conditions hold exactly, and that the level is right to its digits.
 
     Parameters
     ----------
@@ -203,10 +208,18 @@ def verify(shape: ShapedConing) -> None:
                 f"powers is {shape.powers}, but the drift has the power {2 * q + 1} of the frequency "
                 f"(off by {float(total - right):.3g})"
             )
+    for row, right in coning_drift.products(of, shape.products):
+        total = sum((a * c for a, c in zip(row, shape.coefficients, strict=True)), Fraction(0))
+        if total != right:
+            raise InputError(
+                f"products is {shape.products}, but a step is not exact for all products of powers of time to that "
+                f"degree (off by {float(total - right):.3g})"
+            )
     if shape.band is not None and shape.level is not None:
         largest = coning_drift.largest(of, shape.coefficients, shape.band)
-        unit = Decimal(1).scaleb(int(shape.level.as_tuple().exponent))
-        if abs(Decimal(largest) - shape.level) > unit:
+        # Half a unit of the last digit, and what the search for the largest drift may miss.
+        allowed = Decimal(1).scaleb(int(shape.level.as_tuple().exponent)) / 2 + Decimal(largest) * _MISSED
+        if abs(Decimal(largest) - shape.level) > allowed:
             raise InputError(f"level is {shape.level}; the coefficients have {largest:.6g} over their band")
 
 
@@ -236,6 +249,7 @@ def _shape(data: Mapping[str, Any], name: str) -> ShapedConing:
         objective,
         tuple(rational(f"coefficient {k}", number) for k, number in enumerate(numbers, 1)),
         checks.count("powers", data.get("powers", 0), smallest=0, largest=count),
+        checks.count("products", data.get("products", 0), smallest=0, largest=count),
         band(data["band"]) if "band" in data else None,
         gyro(data.get("gyro")),
         _level(data["level"]) if "level" in data else None,

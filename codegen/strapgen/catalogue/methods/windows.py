@@ -41,7 +41,6 @@ MOST_CONDITIONS = 12
 MOST_DEGREE = 8
 MOST_TERMS = 40
 
-
 #: Most bytes of a file; the longest family takes less.
 MOST_BYTES = 4_000_000
 
@@ -149,7 +148,8 @@ def with_exact_rotation(window: Window) -> Window:
     """Return a window of the catalogue with the exact rotation of its polynomial."""
     one_sided = tuple(with_exact_rotation(one) for one in window.one_sided)
     name, title = f"{window.name}{EXACT}", f"{window.title}; exact rotation"
-    return replace(window, name=name, title=title, rotation="exact", terms=EXACT_TERMS, one_sided=one_sided)
+    terms = max(window.terms, EXACT_TERMS)  # a family may state more
+    return replace(window, name=name, title=title, rotation="exact", terms=terms, one_sided=one_sided)
 
 
 def read(path: str | Path) -> Window:

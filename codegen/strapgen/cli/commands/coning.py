@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
-from strapgen.cli.band_options import BandOptions, command_line
+from strapgen.cli.band_options import BandOptions, command_line, not_negative
 from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import option, whole
 from strapgen.cli.output import TEXT_OUTPUT, Output, format_option
@@ -52,6 +52,15 @@ class ConingDesign(BandOptions):
             help="Powers of the frequency, from the third on, that the drift of the design has not.  [default: 0]",
         ),
     ] = None
+    products: Annotated[
+        _Text,
+        option(
+            "--products",
+            metavar="N",
+            help="Highest total degree of products of two powers of time in the rate for which the design is exact.  "
+            "[default: 0]",
+        ),
+    ] = None
     noise_rad: Annotated[
         _Text,
         option(
@@ -82,7 +91,15 @@ class ConingDesign(BandOptions):
         from strapgen.catalogue.methods.shaped_coning import OBJECTIVES
 
         checks.choice("objective", self.objective, OBJECTIVES)
-        allowed = {"objective", "powers", "name", "sample_hz", "gyro_bandwidth_hz", "gyro_damping"}
+        allowed = {
+            "objective",
+            "powers",
+            "products",
+            "name",
+            "sample_hz",
+            "gyro_bandwidth_hz",
+            "gyro_damping",
+        }
         allowed |= {"band", "band_hz"} if self.objective == "band" else {"spectrum"}
         allowed |= {"noise_rad", "pulse_rad"} if self.objective == "random" else set()
         for name in sorted(stated - allowed):
@@ -103,18 +120,22 @@ class ConingDesign(BandOptions):
         if self.spectrum is not None:
             lines = of_spectrum(read_spectrum(self.spectrum), self.sampling("--spectrum"))
         unknowns = max(0, samples + previous - 1)
-        powers = 0 if self.powers is None else whole("--powers", self.powers)
+        powers, products = (
+            checks.count(f"--{what}", whole(f"--{what}", value or "0"), smallest=0, largest=unknowns)
+            for what, value in (("powers", self.powers), ("products", self.products))
+        )
         return ConingBrief(
             samples,
             previous,
             self.objective or "",
             None if lines is not None else self.radians(),
             lines,
-            checks.count("--powers", powers, smallest=0, largest=unknowns),
+            powers,
             self.gyro(),
-            checks.number("--noise-rad", self.noise_rad or "0"),
-            checks.number("--pulse-rad", self.pulse_rad or "0"),
+            not_negative("--noise-rad", self.noise_rad or "0"),
+            not_negative("--pulse-rad", self.pulse_rad or "0"),
             self.name or "",
+            products,
         )
 
 
@@ -180,7 +201,7 @@ def coning(
 
     Example: strapgen coning --samples 4 --form combined
 
-    Example: strapgen coning --samples 1 --previous 8 --objective band --band 1.3 --format toml --out shaped.toml
+    Example: strapgen coning --samples 1 --previous 8 --objective band --band 1.3 --out out/shaped.toml --format toml
     """
     output.check(design.spectrum)
     from strapgen import catalogue

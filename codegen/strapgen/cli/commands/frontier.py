@@ -10,6 +10,7 @@ from strapgen.cli.option_groups import grouped
 from strapgen.cli.options import listed, option, whole
 from strapgen.cli.output import Output
 from strapgen.support import checks
+from strapgen.support.exceptions import InputError
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,12 @@ class StudyRun:
         ),
     ] = None
 
+    def check(self, output: Output) -> None:
+        """Check that the output is not written over the results."""
+        for name, path in (("--out", output.file), ("--plot", output.plot)):
+            if path is not None and self.results is not None and path.resolve() == self.results.resolve():
+                raise InputError(f"{name} and --results are both {path}; two files are needed")
+
     def count(self) -> int | None:
         """Return the number of processes, checked."""
         count = whole("jobs", self.jobs)
@@ -61,7 +68,7 @@ def frontier(
     run: StudyRun,
     output: Output,
 ) -> None:
-    """Compare the drift of algorithms on many motions with the operations that they take.
+    """Compare the drift of algorithms on many motions with their cost.
 
     All algorithms get the same samples, of cones, cones on a spinning body, random rates, and slews with soft and with
     sharp onsets. You see the largest angle from the true attitude, divided by the duration, beside the multiplications
@@ -70,11 +77,13 @@ def frontier(
     A method:N+P+L takes N samples in a step, P from before it and L from after it. The method fit-exact integrates the
     polynomial through its samples exactly, as iterations on it do in the limit.
 
-    Example: strapgen frontier --method coning-compressed,coning-combined:3+3 --duration 6
+    Example: strapgen frontier --method coning-compressed:1+1,coning-combined:3+3 --duration 6
 
-    Example: strapgen frontier --results out/frontier.jsonl --plot out/frontier.png
+    Example: strapgen frontier --method coning-least-squares,window-7-7 --duration 6 --results out/frontier.jsonl --plot
+    out/frontier.png
     """
     output.check(run.results)
+    run.check(output)
     jobs = run.count()
     from strapgen.cli.progress import track
     from strapgen.experiments import frontier as study

@@ -24,6 +24,15 @@ def rate_table(
             panel="Algorithm",
         ),
     ] = None,
+    method: Annotated[
+        str | None,
+        option(
+            "--method",
+            metavar="NAME,...",
+            help="Methods of the attitude steps, with commas between; strapgen list methods shows all.  [default: six]",
+            panel="Algorithm",
+        ),
+    ] = None,
     backend: FastBackends = None,
     duration: Duration = "3600",
     sample: Annotated[
@@ -47,8 +56,9 @@ def rate_table(
 
     names = experiment.ALGORITHMS if algorithm is None else listed("--algorithm", algorithm)
     places = backends("--backend", backend, experiment.DEFAULT_BACKENDS)
-    count = len(list(experiment.cases(names, places)))
-    runs = experiment.stress(duration, sample, 1, places, names, fixed.settings(1))
+    methods = None if method is None else listed("--method", method)
+    count = len(list(experiment.cases(names, places, methods)))
+    runs = experiment.stress(duration, sample, 1, places, names, fixed.settings(1), methods)
     rows = list(track(runs, "running", count))
     output.report(
         rate_table_report(rows, duration, sample),

@@ -203,7 +203,7 @@ def _on_recording(
     from strapgen.cli.progress import waiting
     from strapgen.reports import plots
     from strapgen.reports.runs import history_report
-    from strapgen.simulation import recording
+    from strapgen.simulation import recording, whole_recordings
 
     pulse = source.pulse
     data = source.recording()
@@ -212,7 +212,11 @@ def _on_recording(
     backend = build(length, lambda: data.largest + (pulse or 0.0))
     pulse = pulse or backend.count
     with waiting(f"running {backend.kernel}"):
-        history = recording.propagate(backend, data, intervals.orthonormalize, intervals.record, pulse)
+        options = (intervals.orthonormalize, intervals.record, pulse)
+        if whole_recordings.covers(choice, backend.name):
+            history = whole_recordings.propagate_whole(choice, backend.name, data, *options)
+        else:
+            history = recording.propagate(backend, data, *options)
     title = f"{backend.kernel}, {backend.name}: attitude along {source.file.name}"
     facts = _facts(backend, choice) | {"source": str(source.file)}
     replace(output, format=output.format or "csv").report(

@@ -18,6 +18,7 @@ from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
     from strapgen.reports.vibration import AssessedCase, CaseRates
+    from strapgen.vibration import Assessment
 
 _Text = str | None
 
@@ -86,8 +87,38 @@ class VibrationSource:
         ),
     ] = None
 
+    gyro_bandwidth_hz: Annotated[
+        _Text,
+        option(
+            "--gyro-bandwidth-hz",
+            metavar="HZ",
+            help="Natural frequency of a gyro of second order, through which the algorithm sees the angles.",
+        ),
+    ] = None
+    gyro_damping: Annotated[
+        _Text, option("--gyro-damping", metavar="RATIO", help="Damping of that gyro, as 0.7071.")
+    ] = None
+
+    def through_gyro(self, assessment: Assessment) -> Assessment:
+        """Return the assessment of an algorithm that sees the vibration through the gyro, if there is one."""
+        if self.gyro_bandwidth_hz is None or self.gyro_damping is None:
+            return assessment
+        from strapgen import vibration
+
+        return vibration.through_gyro(assessment, self.gyro_bandwidth_hz, self.gyro_damping)
+
+    @property
+    def gyro_words(self) -> str:
+        """The gyro for a reader; empty without one."""
+        if self.gyro_bandwidth_hz is None:
+            return ""
+        return f", through a gyro of {self.gyro_bandwidth_hz} Hz, damping {self.gyro_damping}"
+
     def check(self, output: VibrationOutput) -> None:
         """Check that there is one frequency or a spectrum, with all that goes with it."""
+        if (self.gyro_bandwidth_hz is None) != (self.gyro_damping is None):
+            missing = "--gyro-damping" if self.gyro_damping is None else "--gyro-bandwidth-hz"
+            raise InputError(f"--gyro-bandwidth-hz and --gyro-damping go together; {missing} is missing")
         if self.step is None:
             raise InputError("--step in s is needed")
         needed = {
@@ -131,7 +162,7 @@ class VibrationSource:
         words = f"amplitudes {self.theta_x} rad about x"
         words += "" if self.theta_y is None else f", {self.theta_y} rad about y"
         words += "" if self.acceleration is None else f", {self.acceleration} m/s^2 along y"
-        return f"{words}, phase {self.phase} rad"
+        return f"{words}, phase {self.phase} rad{self.gyro_words}"
 
     def rates(self, cases: list[AssessedCase]) -> tuple[list[CaseRates], str]:
         """Return the mean rates of every case that the vibration moves, and what it is in words."""
@@ -160,7 +191,7 @@ class VibrationSource:
             )
         return (
             outcomes,
-            f"spectrum {self.spectrum.name}, {shaken.edges[0]:g} to {shaken.edges[-1]:g} Hz",
+            f"spectrum {self.spectrum.name}, {shaken.edges[0]:g} to {shaken.edges[-1]:g} Hz{self.gyro_words}",
         )
 
 
@@ -263,7 +294,10 @@ def _assessed(algorithm: str, method: MethodOptions, source: VibrationSource) ->
         cycles = _cycles(algorithm, method, "is in two speeds")
         _check_plain(algorithm, method)
         quantities = _quantities(algorithm, ("drift", "sculling"), source)
-        return [AssessedCase(assessment.two_speed(quantity), cycles, cycles) for quantity in quantities]
+        return [
+            AssessedCase(source.through_gyro(assessment.two_speed(quantity)), cycles, cycles)
+            for quantity in quantities
+        ]
     fast = None
     if algorithm in systems.RECURSIONS:
         fast = _cycles(algorithm, method, "is a recursion")
@@ -272,7 +306,7 @@ def _assessed(algorithm: str, method: MethodOptions, source: VibrationSource) ->
     of = partial(assessment.of, choice)
     quantities = _quantities(algorithm, assessment.quantities(choice), source)
     samples = fast or choice.increments_per_step
-    return [AssessedCase(of(quantity), fast, samples) for quantity in quantities]
+    return [AssessedCase(source.through_gyro(of(quantity)), fast, samples) for quantity in quantities]
 
 
 def _cycles(algorithm: str, method: MethodOptions, loop: str) -> int:

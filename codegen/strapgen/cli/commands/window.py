@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -10,12 +9,13 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import typer
 
-from strapgen.cli.band_options import BandOptions, command_line
+from strapgen.cli.band_options import BandOptions, command_line, not_negative
 from strapgen.cli.help import PlainCommand, PlainGroup
 from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import option, whole
 from strapgen.cli.output import Output
 from strapgen.cli.progress import waiting
+from strapgen.cli.window_file import WindowArgument, window_of
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 
@@ -136,7 +136,7 @@ def design(
     The file holds the filters that commit an attitude and one-sided ones, with fewer samples ahead, for the attitude of
     now. Each is exact for polynomial rates, and the best one over the band. A second design gives the same file.
 
-    Example: strapgen window design --previous 7 --ahead 7 --band 1.3 --out window.toml
+    Example: strapgen window design --previous 7 --ahead 7 --band 1.3 --out out/window.toml
     """
     output.check(band.spectrum)
     brief = _brief(size, band, name)
@@ -189,8 +189,8 @@ def _brief(size: WindowSize, band: Band, name: str | None) -> FamilyBrief:
             "--coefficients", whole("--coefficients", size.coefficients), largest=windows.MOST_DEGREE
         ),
         gyro,
-        _ratio("--noise", band.noise),
-        _ratio("--now-noise", band.now_noise),
+        not_negative("--noise", band.noise),
+        not_negative("--now-noise", band.now_noise),
         band.densities(radians),
         rotation,
         checks.count(
@@ -211,13 +211,6 @@ def _title(name: str | None) -> str:
     return name
 
 
-def _ratio(what: str, value: str) -> Fraction:
-    number = checks.number(what, value)
-    if number < 0:
-        raise InputError(f"{what} is {value}; a number that is not below 0 is needed")
-    return number
-
-
 def _command(size: WindowSize, band: Band, name: str | None, out: Path | None) -> str:
     """Return the command that designs the filters, with what differs from its defaults."""
     out_name = None if out is None else out.name
@@ -227,10 +220,7 @@ def _command(size: WindowSize, band: Band, name: str | None, out: Path | None) -
 @app.command("show", cls=PlainCommand)
 @grouped
 def show(
-    window: Annotated[
-        str,
-        typer.Argument(metavar="NAME|FILE", help="A window as window-7-7, or a TOML file with one."),
-    ],
+    window: WindowArgument,
     *,
     output: Output,
 ) -> None:
@@ -242,17 +232,10 @@ def show(
     Example: strapgen window show window-7-7
     """
     output.check(window)
-    from strapgen.catalogue.methods import windows
     from strapgen.reports import plots
     from strapgen.reports.window import window_report
 
-    if window.endswith(".toml") or any(separator in window for separator in (os.sep, os.altsep) if separator):
-        family = windows.read(window)
-    else:
-        if window not in windows.WINDOWS:
-            checks.choice("window", window, windows.WINDOW_TITLES, "their one-sided filters, as window-14-0")
-        family = windows.WINDOWS[window]
-        windows.verify(family)
+    family = window_of(window)
     if family.increments != 1:
         raise InputError(
             f"{window} has steps of {family.increments} samples; only filters for steps of one are shown"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from strapgen.reports.plots import figures
-from strapgen.reports.units import READABLE_UNITS
+from strapgen.reports.table import READABLE_UNITS
 
 if TYPE_CHECKING:
     from strapgen.vibration.curves import Curve

@@ -1,0 +1,1 @@
+"""The target that prints C which commits an attitude late and answers it now."""
