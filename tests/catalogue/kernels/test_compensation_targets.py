@@ -26,7 +26,7 @@ NO_FRAME = (
 
 
 def settings(name: str, word: int) -> Settings:
-    return Settings(word=word, carry="state" if name.startswith("scale-factor") else "none")
+    return Settings(word=word, carry="state" if "heating" in name else "none")
 
 
 def evaluators(name, word):

@@ -140,3 +140,27 @@ def test_squares_are_refused():
     tilted = (first, TwoAxisGyro(X, (4 * Y - 3 * Z) / 5, second.unbalance), third)
     with pytest.raises(InputError, match=r"the errors of this layout hold [WA]_.\*\*2, which"):
         error_structure(tilted, 1)
+
+
+def as_scanned(W, A, unbalance, error):
+    """Return the torques with a minus before the second bracket of (4.2), as both scans print it."""
+    elastic_y = (error["D"] * A[0] + error["E"] * A[1]) * A[2]
+    return gyro_torques(W, A, unbalance, error) - sp.Matrix([2 * elastic_y, 0])
+
+
+def test_with_the_sign_of_the_scans_figure_20_does_not_follow(monkeypatch):
+    monkeypatch.setattr(gyro_model, "gyro_torques", as_scanned)
+    structure = error_structure(diagonal_layout(), 1)
+    forms = structure.matrices["E"].subs(structure.forms)
+    D, E = symbol("D1"), symbol("E1")
+    assert forms[1:, :] == sp.Matrix([[0, D, E], [0, -E, D]])
+    assert structure.matrices["E"] != source_structure().matrices["E"]
+
+
+def test_with_the_sign_of_the_scans_the_torques_do_not_turn_with_the_gyro():
+    angle = sp.pi / 2
+    turn = sp.Matrix([[sp.cos(angle), sp.sin(angle), 0], [-sp.sin(angle), sp.cos(angle), 0], [0, 0, 1]])
+    error = dict.fromkeys(PARAMETERS, sp.S.Zero) | {"E": symbol("E")}
+    W, A = gyro_model.RATE, gyro_model.ACCELERATION
+    turned = as_scanned(turn * W, turn * A, B, error) - turn[:2, :2] * as_scanned(W, A, B, error)
+    assert turned.applyfunc(sp.simplify) != sp.zeros(2, 1)

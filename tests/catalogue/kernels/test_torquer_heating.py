@@ -58,7 +58,8 @@ def test_the_recursion_is_the_differential_equation_for_a_rate_held_over_a_cycle
 
 
 def test_the_errors_are_undone(rng):
-    first, second = (strapgen.evaluator(f"scale-factor-heating{end}") for end in ("-errors", ""))
+    names = "torquer-heating-errors", "scale-factor-heating"
+    first, second = map(strapgen.evaluator, names)
     u = v = np.zeros(3)
     for increment in rng.uniform(-0.03, 0.03, size=(200, 6)):
         u, indicated = first(u, increment, 0.01, GAINS, 100.0)
