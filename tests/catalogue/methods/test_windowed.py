@@ -11,12 +11,13 @@ import pytest
 import strapgen
 from strapgen import choose, derive, lower
 from strapgen.analysis.series import series
-from strapgen.catalogue.methods.window import Window
+from strapgen.catalogue.methods.window import GyroResponse, Window
 from strapgen.catalogue.methods.windows import WINDOWS, named_window, read
+from strapgen.design.family import FamilyBrief, design
 from strapgen.ir.attitude_step import Truncation
 from strapgen.ir.fixed_settings import Settings
 from strapgen.rounding.bounds import rounding_bounds
-from strapgen.simulation.drift import drift
+from strapgen.simulation.drift import angles, drift, steady_drift
 from strapgen.simulation.runs import largest_increment
 from strapgen.support.exceptions import InputError
 
@@ -285,3 +286,15 @@ def test_drift_of_a_window_in_words_of_32_bits(motions):
 def test_the_stated_order_of_a_window_is_that_of_its_error(method, order):
     choice = choose("euler", method)
     assert derive(choice).order.step == order == series(choice, terms=1).order
+
+
+@pytest.mark.long
+def test_a_window_for_a_gyro_takes_out_its_response():
+    # A gyro of second order sees a vibration of forty lines; the window is designed for its bandwidth.
+    gyro = GyroResponse(Fraction(40), Fraction(7071, 10000), Fraction(100))
+    window = design(FamilyBrief(7, 7, Fraction("1.9"), conditions=2, gyro=gyro))
+    vibration = strapgen.motion("vibration", angle_deg=0.1, gyro_hz=40)
+    run = strapgen.simulate(strapgen.backend("euler", window, backend="c"), vibration, "0.01", 60)
+    assert steady_drift(run) < 1e-3 and angles(run).max() < 1e-6
+    ideal = strapgen.simulate(strapgen.backend("euler", "window-7-7", backend="c"), vibration, "0.01", 60)
+    assert steady_drift(ideal) > 1 and angles(ideal).max() > 1e-3
