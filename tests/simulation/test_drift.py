@@ -41,7 +41,7 @@ def test_known_algorithms_drift_as_tabulated(method, name, settings):
     increments, previous, ahead = ALGORITHMS[method]
     expected = DRIFTS[name, settings][list(ALGORITHMS).index(method)]
     motion = strapgen.motion(name, **dict(setting.split("=") for setting in settings.split()))
-    backend = strapgen.backend("euler", method, increments, previous=previous, ahead=ahead)
+    backend = strapgen.backend("euler", method, increments, "c", previous=previous, ahead=ahead)
     found = drift(strapgen.simulate(backend, motion, Fraction(increments, 100), 60))
     assert found <= FLOOR if expected < FLOOR else found == pytest.approx(expected, rel=0.1)
 

@@ -18,6 +18,11 @@ if TYPE_CHECKING:
 
 _Text = str | None
 
+#: The damping of a gyro of second order, beside its natural frequency.
+GyroDamping = Annotated[
+    str | None, option("--gyro-damping", metavar="RATIO", help="Damping of that gyro, as 0.7071.")
+]
+
 
 @dataclass(frozen=True)
 class BandOptions:
@@ -48,9 +53,7 @@ class BandOptions:
             help="Natural frequency of a gyro of second order, whose response the design takes out.",
         ),
     ] = None
-    gyro_damping: Annotated[
-        _Text, option("--gyro-damping", metavar="RATIO", help="Damping of that gyro, as 0.7071.")
-    ] = None
+    gyro_damping: GyroDamping = None
 
     def radians(self) -> Fraction:
         """Return the band in rad a sample."""

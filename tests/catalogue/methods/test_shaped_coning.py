@@ -11,22 +11,9 @@ import strapgen
 from strapgen import choose, derive
 from strapgen.catalogue.methods import shaped_coning
 from strapgen.catalogue.methods.shaped_coning import SHAPES, read
-from strapgen.simulation.drift import drift
 from strapgen.support.exceptions import InputError
 
 FOLDER = Path(shaped_coning.__file__).parent / "coning_shapes"
-
-#: At 100 Hz over 60 s: motion, its parameters, and the drift in deg/h, which others computed from the formulas.
-DRIFTS = [
-    ("cone", {"half_angle_deg": 1, "frequency_hz": 10}, 1.3e-4),
-    ("cone", {"half_angle_deg": 1, "frequency_hz": 20}, 1.2e-3),
-    ("cone", {"half_angle_deg": 5, "frequency_hz": 5}, 2.6e-3),
-    ("cone", {"half_angle_deg": 15, "frequency_hz": 20}, 49),
-    ("random", {"rate_deg_s": 200}, 2.9),
-    ("slew", {"onset_s": 0.05}, 2.4e-3),
-    ("slew", {"onset_s": 0.01}, 1.1e-2),
-    ("ramps", {"onset_s": 0.05}, 9.5e-3),
-]
 
 
 @pytest.fixture
@@ -34,14 +21,6 @@ def text() -> str:
     """The file of the built-in coefficients, under another name."""
     content = (FOLDER / "coning-shaped-8.toml").read_text()
     return content.replace('name = "', 'name = "My ')
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(("name", "settings", "expected"), DRIFTS, ids=[f"{n} {s}" for n, s, _ in DRIFTS])
-def test_the_built_in_coefficients_drift_as_published(name, settings, expected):
-    backend = strapgen.backend("euler", "coning-shaped-8", backend="c")
-    run = strapgen.simulate(backend, strapgen.motion(name, **settings), Fraction(1, 100), 60)
-    assert drift(run) == pytest.approx(expected, rel=0.1)
 
 
 @pytest.mark.parametrize("name", SHAPES)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import typer
 
+from strapgen.cli.band_options import GyroDamping
 from strapgen.cli.option_groups import grouped
 from strapgen.cli.options import MethodOptions, SeveralMethods, option, whole
 from strapgen.cli.output import Output, format_option, plot_option
@@ -95,9 +96,7 @@ class VibrationSource:
             help="Natural frequency of a gyro of second order, through which the algorithm sees the angles.",
         ),
     ] = None
-    gyro_damping: Annotated[
-        _Text, option("--gyro-damping", metavar="RATIO", help="Damping of that gyro, as 0.7071.")
-    ] = None
+    gyro_damping: GyroDamping = None
 
     def through_gyro(self, assessment: Assessment) -> Assessment:
         """Return the assessment of an algorithm that sees the vibration through the gyro, if there is one."""
