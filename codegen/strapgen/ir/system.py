@@ -70,7 +70,7 @@ class SystemStage:
     word : int or None
         Bits of a word in fixed point; None for those that the target is generated with.
     carry : str
-        Error feedback in fixed point, a key of `CARRIES`.
+        Error feedback in fixed point, a key of `CARRIES`; "" for that of the settings.
     """
 
     name: str
@@ -79,7 +79,7 @@ class SystemStage:
     wires: tuple[Wire, ...]
     results: tuple[tuple[str, str], ...]
     word: int | None = None
-    carry: str = "none"
+    carry: str = ""
 
 
 @dataclass(frozen=True)

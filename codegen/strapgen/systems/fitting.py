@@ -17,6 +17,7 @@ from strapgen.support.exceptions import InputError
 from strapgen.systems.wiring import Description
 from strapgen.targets import TARGETS
 from strapgen.targets.names import UNNAMED, Naming
+from strapgen.targets.system_c.emit import unit_name
 
 
 @dataclass(frozen=True)
@@ -74,15 +75,11 @@ def fitted(description: Description, target: str, settings: Settings | None = No
     return Fitted(description, target, None, sources)
 
 
-def function_name(description: Description, stage: SystemStage) -> str:
-    """Return the name of a stage's function in C."""
-    return f"{description.system.name}_{stage.name}"
-
-
 def _generated(
     description: Description, stage: SystemStage, target: str, settings: Settings | None
 ) -> Sources:
-    naming = Naming(name=function_name(description, stage)) if TARGETS[target].compiled else UNNAMED
+    name = f"{unit_name(description.system, target)}_{stage.name}"
+    naming = Naming(name=name) if TARGETS[target].compiled else UNNAMED
     return generated_sources.sources(description.choices[stage.name], target, settings, naming)
 
 
@@ -150,12 +147,17 @@ class _Fit:
         return replace(
             self.settings,
             word=stage.word or self.settings.word,
-            carry=stage.carry if stage.carry != "none" else self.settings.carry,
+            carry=self._carry(stage),
             ranges=ranges,
             formats={},
             largest_angle=angle,
             stated="",
         )
+
+    def _carry(self, stage: SystemStage) -> str:
+        """Return the error feedback of a stage: in full it is that of all that goes on, sums and increments too."""
+        carry = stage.carry or self.settings.carry
+        return "all" if carry == "full" and self.description.programs[stage.name].companions is None else carry
 
     def _signals(self, stage: SystemStage) -> tuple[Signal, ...]:
         return self.description.programs[stage.name].inputs

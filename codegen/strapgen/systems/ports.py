@@ -104,7 +104,7 @@ def ports(text: StageText, place: int) -> Ports:
         stage.
     """
     try:
-        choice = catalogue.choose(text.kernel, constants=text.constants, **text.options)
+        choice = catalogue.choose(text.kernel, **({"constants": text.constants} if text.constants else {}), **text.options)
         program = generated_sources.program(choice)
     except (InputError, InputTypeError) as error:
         raise InputError(f"stage {text.name}: {error}") from None

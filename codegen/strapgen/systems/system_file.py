@@ -208,7 +208,7 @@ def _stage(number: int, value: Any) -> StageText:
     _check_keys(where, table, _STAGE_KEYS, ("name", "kernel", "every"))
     word = table.get("word")
     try:
-        carry = checks.choice("carry", table.get("carry", "none"), CARRIES)
+        carry = checks.choice("carry", table["carry"], CARRIES) if "carry" in table else ""
         every = checks.count("every", table["every"], largest=MOST_CYCLES)
         word = None if word is None else check_word(word)
     except InputError as error:
