@@ -137,7 +137,7 @@ def _external(steps: tuple[Push | SystemStage, ...]) -> Iterator[str]:
 
 
 @dataclass(frozen=True)
-class System:
+class DescribedSystem:
     """Stages with their wires, checked.
 
     Parameters

@@ -111,19 +111,19 @@ class _Fit:
     def _stage(self, stage: SystemStage) -> Sources:
         """Return the sources of a stage, in the formats of what is wired to it as far as they fit."""
         stated = self.description.formats[stage.name]
-        taken = {name: text for name, text in self._formats(stage).items() if name not in stated}
+        wired = {name: text for name, text in self._formats(stage).items() if name not in stated}
         settings = self._settings(stage)
         while True:
             try:
-                return self._without_needless_feedback(stage, replace(settings, formats={**stated, **taken}))
+                return self._without_needless_feedback(stage, replace(settings, formats={**stated, **wired}))
             except InputError:
-                if not taken:
+                if not wired:
                     raise
             # The formats of states are shared; those of wires give way, the last first.
-            movable = [name for name in taken if name not in self._shared(stage)]
+            movable = [name for name in wired if name not in self._shared(stage)]
             if not movable:
-                return self._without_needless_feedback(stage, replace(settings, formats={**stated, **taken}))
-            del taken[movable[-1]]
+                return self._without_needless_feedback(stage, replace(settings, formats={**stated, **wired}))
+            del wired[movable[-1]]
 
     def _without_needless_feedback(self, stage: SystemStage, settings: Settings) -> Sources:
         """Return a stage; without error feedback where it rounds nothing that goes on to the next call."""
@@ -157,7 +157,9 @@ class _Fit:
     def _carry(self, stage: SystemStage) -> str:
         """Return the error feedback of a stage: in full it is that of all that goes on, sums and increments too."""
         carry = stage.carry or self.settings.carry
-        return "all" if carry == "full" and self.description.programs[stage.name].companions is None else carry
+        return (
+            "all" if carry == "full" and self.description.programs[stage.name].companions is None else carry
+        )
 
     def _signals(self, stage: SystemStage) -> tuple[Signal, ...]:
         return self.description.programs[stage.name].inputs
@@ -190,19 +192,19 @@ class _Fit:
     def _formats(self, stage: SystemStage) -> dict[str, str]:
         """Return the formats of what is wired to a stage, and of the cells that its outputs replace, in its word."""
         word = stage.word or self.settings.word
-        taken: dict[str, str] = {}
+        wired: dict[str, str] = {}
         for wire, signal in zip(stage.wires, self._signals(stage), strict=True):
             argument = self.arguments.get(wire.source)
             if argument is None or argument.format.word != word or wire.source in self.pushed:
                 continue
             if not signal.constraint or wire.input in self._shared(stage):
-                taken[wire.input] = str(argument.format)
+                wired[wire.input] = str(argument.format)
         states = {output for output, cell in stage.results if cell in {w.source for w in stage.wires}}
         for output, cell in stage.results:
             argument = self.arguments.get(cell)
             if argument is not None and argument.format.word == word and output not in states:
-                taken[output] = str(argument.format)
-        return taken
+                wired[output] = str(argument.format)
+        return wired
 
     def _note(self, stage: SystemStage, sources: Sources) -> None:
         """Note the formats of a stage's cells, and of the inputs and samples that it is the first to take."""

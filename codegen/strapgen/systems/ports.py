@@ -80,9 +80,9 @@ class Ports:
 
     def identity(self, signal: Signal) -> tuple[Fraction, ...]:
         """Return what a state is before the first cycle if the file does not say so: no rotation, or zero."""
-        companions = self.program.companions
-        if companions is not None and signal.name == self.program.inputs[0].name:
-            return companions.identity
+        step = self.program.companions
+        if step is not None and signal.name == self.program.inputs[0].name:
+            return step.identity
         if signal.constraint and signal.size in _IDENTITIES:
             return _IDENTITIES[signal.size]
         return (Fraction(0),) * signal.size
@@ -104,7 +104,7 @@ def ports(text: StageText, place: int) -> Ports:
         stage.
     """
     try:
-        choice = catalogue.choose(text.kernel, **({"constants": text.constants} if text.constants else {}), **text.options)
+        choice = catalogue.choose(text.kernel, constants=text.constants or None, **text.options)
         program = generated_sources.program(choice)
     except (InputError, InputTypeError) as error:
         raise InputError(f"stage {text.name}: {error}") from None

@@ -176,11 +176,10 @@ def parsed(tables: Mapping[str, Any], name: str = "system") -> SystemText:
 
 def _check_unique(described: SystemText) -> None:
     """Check that every name of an input or a stage stands once."""
-    seen: set[str] = set()
-    for entry in (*described.inputs, *described.stages):
-        if entry.name in seen:
-            raise InputError(f"the name {entry.name!r} stands twice; every input and stage needs its own name")
-        seen.add(entry.name)
+    names = [entry.name for entry in described.inputs] + [stage.name for stage in described.stages]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"the name {name!r} stands twice; every input and stage needs its own name")
 
 
 def _input(name: str, value: Any) -> InputText:
@@ -288,5 +287,5 @@ def _flat(what: str, value: Any) -> list[Fraction]:
 
 def _plain(what: str, value: Any) -> Any:
     if isinstance(value, bool) or not isinstance(value, (int, str, Fraction)):
-        raise InputError(f"{what} is {value!r}; a number is needed, or a text as \"1/3\"")
+        raise InputError(f'{what} is {value!r}; a number is needed, or a text as "1/3"')
     return value

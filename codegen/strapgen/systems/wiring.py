@@ -11,12 +11,13 @@ from strapgen.catalogue import Choice
 from strapgen.ir.fixed_settings import TURNING
 from strapgen.ir.program import Program
 from strapgen.ir.signals import ANY, FRAMES, Signal
-from strapgen.ir.system import Cell, Push, Rate, System, SystemStage, Wire
+from strapgen.ir.system import Cell, Push, Rate, DescribedSystem, SystemStage, Wire
 from strapgen.support.exceptions import InputError
 from strapgen.support.suggestions import unknown
-from strapgen.systems import system_file
+from strapgen.systems import system_file, wire_checks
 from strapgen.systems.ports import Ports, ports
 from strapgen.systems.system_file import SystemText
+from strapgen.systems.wire_checks import Source
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,7 @@ class Description:
 
     Parameters
     ----------
-    system : System
+    system : DescribedSystem
     choices : mapping of str to Choice
         The kernel of each stage, with its constants, by the name of the stage.
     programs : mapping of str to Program
@@ -35,7 +36,7 @@ class Description:
         Stated formats, by stage and argument.
     """
 
-    system: System
+    system: DescribedSystem
     choices: Mapping[str, Choice]
     programs: Mapping[str, Program]
     ranges: Mapping[str, Mapping[str, Fraction]]
@@ -71,7 +72,7 @@ def wired(text: SystemText) -> Description:
     wiring = _Wiring(text, stages)
     wiring.run()
     names = [stage.name for stage in stages]
-    system = System(
+    system = DescribedSystem(
         text.name,
         text.title,
         text.sample_hz,
@@ -89,16 +90,6 @@ def wired(text: SystemText) -> Description:
     )
 
 
-@dataclass(frozen=True)
-class _Source:
-    """What a wire comes from: an input of the system, or a value of a stage."""
-
-    name: str
-    signal: Signal
-    stage: Ports | None = None
-    sum: bool = False
-
-
 @dataclass
 class _Wiring:
     """The wiring while it is worked out."""
@@ -114,7 +105,7 @@ class _Wiring:
 
     def run(self) -> None:
         """Wire all stages."""
-        self._check_order()
+        wire_checks.check_order(self.stages)
         self.by_name = {stage.name: stage for stage in self.stages}
         self.described = {entry.name: entry for entry in self.text.inputs}
         self.shared: dict[tuple[str, str], str] = {}
@@ -176,22 +167,6 @@ class _Wiring:
             stage.text.carry,
         )
 
-    def _check_order(self) -> None:
-        """Check that stages stand from the fastest to the slowest, and that each rate divides the next."""
-        for before, stage in zip(self.stages, self.stages[1:], strict=False):
-            if stage.text.every < before.text.every:
-                raise InputError(
-                    f"stage {stage.name} (every {stage.text.every}) stands after {before.name} "
-                    f"(every {before.text.every}); stages stand from the fastest to the slowest"
-                )
-            if stage.text.every % before.text.every:
-                raise InputError(
-                    f"stage {stage.name}: every {stage.text.every} is no multiple of the {before.text.every} "
-                    f"of {before.name}; rates divide"
-                )
-        if self.stages[0].text.every != 1:
-            raise InputError(f"stage {self.stages[0].name}: the fastest stage has every 1")
-
     def _share_states(self, stage: Ports) -> None:
         """Note the states that are those of another stage, and the outputs that replace them."""
         for state in stage.states:
@@ -199,10 +174,14 @@ class _Wiring:
                 self.shared[stage.name, state] = self._shared_state(stage, "wires", state)
         for output, reference in stage.text.writes.items():
             if stage.state_of(output) is not None:
-                raise InputError(f"stage {stage.name}: writes: {output} is the next {stage.state_of(output)} already")
+                raise InputError(
+                    f"stage {stage.name}: writes: {output} is the next {stage.state_of(output)} already"
+                )
             self.shared[stage.name, output] = self._shared_state(stage, "writes", output)
             target = self._source(f"stage {stage.name}: writes: {output}", reference)
-            self._check_shape(f"stage {stage.name}: writes: {output}", stage.outputs[output], target.signal)
+            wire_checks.check_shape(
+                f"stage {stage.name}: writes: {output}", stage.outputs[output], target.signal
+            )
 
     def _shared_state(self, stage: Ports, table: str, name: str) -> str:
         """Return the cell of a state that belongs to another stage."""
@@ -212,9 +191,11 @@ class _Wiring:
         other = source.stage
         state = None if other is None else other.state_of(reference.partition(".")[2])
         if other is None or state is None or other.name == stage.name:
-            raise InputError(f"{where} = {reference!r} is no state of another stage, as a state can be wired to")
+            raise InputError(
+                f"{where} = {reference!r} is no state of another stage, as a state can be wired to"
+            )
         if table == "wires":
-            self._check_shape(where, stage.inputs[name], source.signal)
+            wire_checks.check_shape(where, stage.inputs[name], source.signal)
         earlier = self.shared.get((other.name, state))
         return earlier or f"{other.name}_{state}"
 
@@ -230,7 +211,7 @@ class _Wiring:
                 if there != needed:
                     raise InputError(f"{where}: {what} {there or 'none'} meets {what} {needed or 'none'}")
 
-    def _source(self, where: str, reference: str) -> _Source:
+    def _source(self, where: str, reference: str) -> Source:
         """Return what a reference names: "input", "stage.output" or "stage.state"."""
         name, _, signal = reference.partition(".")
         if not signal:
@@ -241,14 +222,16 @@ class _Wiring:
                 raise InputError(
                     f"input {name}: frame {entry.frame!r} is not known; allowed: {', '.join(filter(None, FRAMES))}"
                 )
-            return _Source(name, Signal.scalar(name, unit=entry.unit, frame=entry.frame, meaning=entry.meaning))
+            return Source(
+                name, Signal.scalar(name, unit=entry.unit, frame=entry.frame, meaning=entry.meaning)
+            )
         if name not in self.by_name:
             raise InputError(f"{where}: {unknown('stage', name, self.by_name)}")
         stage = self.by_name[name]
         values = stage.outputs | {state: stage.inputs[state] for state in stage.states}
         if signal not in values:
             raise InputError(f"{where}: {unknown(f'value of stage {name}', signal, values)}")
-        return _Source(
+        return Source(
             reference, stage.settled(values[signal]), stage, (stage.state_of(signal) or "") in stage.sums
         )
 
@@ -266,7 +249,9 @@ class _Wiring:
                 if (stage.name, name) not in self.shared:
                     self._add(stage, cell, name, signal)
                 elif name in stage.text.initial:
-                    raise InputError(f"stage {stage.name}: initial {name} is that of another stage; state it there")
+                    raise InputError(
+                        f"stage {stage.name}: initial {name} is that of another stage; state it there"
+                    )
         for name, signal in stage.outputs.items():
             if stage.state_of(name) is None and (stage.name, name) not in self.shared:
                 self._add(stage, f"{stage.name}_{name}", name, signal)
@@ -284,7 +269,9 @@ class _Wiring:
         """Wire an input that is no state."""
         where, signal = f"stage {stage.name}: {name}", stage.settled(stage.inputs[name])
         if name not in stage.text.wires:
-            raise InputError(f"{where} is not wired; wire it to an input or a stage.output, or state a constant")
+            raise InputError(
+                f"{where} is not wired; wire it to an input or a stage.output, or state a constant"
+            )
         reference = stage.text.wires[name]
         where = f"{where} = {reference!r}"
         source = self._source(where, reference)
@@ -293,27 +280,31 @@ class _Wiring:
             self._add_input(where, reference, signal, many)
         else:
             if not many:
-                self._check_shape(where, signal, source.signal)
-            self._check_direction(stage, name, source)
-        self._check_rates(where, stage, signal, source, many)
-        self._check_range(stage, name, signal, source)
+                wire_checks.check_shape(where, signal, source.signal)
+            wire_checks.check_direction(stage, name, source)
+        wire_checks.check_rates(where, stage, signal, source, many)
+        if source.sum:
+            self._clear(where, stage, source)
+        wire_checks.check_range(stage, name, signal, source)
         cell = reference if source.stage is None else self._cell(source.stage, reference.partition(".")[2])
         self.read.add(cell)
         if many:
             cell = self._add_samples(stage, name, signal, source, cell)
         self.wires[stage.name, name] = Wire(name, cell, source.stage is None and not many)
 
-    def _samples(self, stage: Ports, signal: Signal, source: _Source) -> int:
+    def _samples(self, stage: Ports, signal: Signal, source: Source) -> int:
         """Return how many samples of its source an input collects; 0 if it takes one."""
         if len(signal.shape) == 2 and stage.program.companions is not None:
             return signal.shape[0]
         return 0
 
-    def _add_samples(self, stage: Ports, name: str, signal: Signal, source: _Source, cell: str) -> str:
+    def _add_samples(self, stage: Ports, name: str, signal: Signal, source: Source, cell: str) -> str:
         """Add a cell that collects the samples of a wire, and return its name."""
         collected = f"{stage.name}_{name}"
         if collected in self.cells:
-            raise InputError(f"stage {stage.name}: {name} would be called {collected} in code, which is taken")
+            raise InputError(
+                f"stage {stage.name}: {name} would be called {collected} in code, which is taken"
+            )
         self.cells[collected] = Cell(collected, signal, (Fraction(0),) * signal.size, signal.shape[0])
         every = 1 if source.stage is None else source.stage.text.every
         place = -1 if source.stage is None else source.stage.place
@@ -325,69 +316,32 @@ class _Wiring:
         entry = self.described[reference]
         shape = signal.shape[1:] if many else signal.shape
         labels = [f"{reference}_{axis}" for axis in "xyz"] if shape == (3,) else None
-        elements = tuple(labels or ([reference] if not shape else [f"{reference}_{k}" for k in range(_size(shape))]))
+        elements = tuple(
+            labels or ([reference] if not shape else [f"{reference}_{k}" for k in range(_size(shape))])
+        )
         stated = Signal(
-            reference, shape, elements, entry.unit, entry.meaning, entry.range, frame=entry.frame, over=signal.over
+            reference,
+            shape,
+            elements,
+            entry.unit,
+            entry.meaning,
+            entry.range,
+            frame=entry.frame,
+            over=signal.over,
         )
         known = self.inputs.setdefault(reference, stated)
         if known.shape != stated.shape:
             raise InputError(f"{where}: shape {stated.shape} meets shape {known.shape}")
 
-    def _check_shape(self, where: str, needed: Signal, there: Signal) -> None:
-        if needed.shape != there.shape:
-            raise InputError(f"{where}: shape {there.shape} meets shape {needed.shape}")
-
-    def _check_direction(self, stage: Ports, name: str, source: _Source) -> None:
-        """Check that a wire to an earlier stage, or to the stage itself, is delayed, and no other is."""
+    def _clear(self, where: str, stage: Ports, source: Source) -> None:
+        """Note that a sum is cleared when a stage has taken it, which is one rate for all that take it."""
         assert source.stage is not None
-        back = source.stage.place >= stage.place
-        if back and name not in stage.text.delay:
+        cell = self._cell(source.stage, source.name.partition(".")[2])
+        every = stage.text.every
+        if self.cleared.setdefault(cell, every) != every:
             raise InputError(
-                f"stage {stage.name}: {name} = {source.name!r} goes back to an earlier stage; state its delay, "
-                f"delay = {{ {name} = 1 }}"
+                f"{where}: a sum that is cleared every {self.cleared[cell]} cycles is taken every {every} too"
             )
-        if not back and name in stage.text.delay:
-            raise InputError(
-                f"stage {stage.name}: delay of {name}, which comes from the earlier stage {source.stage.name}; "
-                "only wires that go back are delayed"
-            )
-
-    def _check_rates(self, where: str, stage: Ports, signal: Signal, source: _Source, many: int) -> None:
-        """Check that what is summed over cycles passes between stages of one rate."""
-        there = 1 if source.stage is None else source.stage.text.every
-        here = stage.text.every
-        if many:
-            companions = stage.program.companions
-            assert companions is not None
-            due = there * (many - companions.beside)
-            if here != due:
-                raise InputError(
-                    f"{where}: a step takes {many - companions.beside} increments of every {there} cycles; "
-                    f"every {due} is needed, not {here}"
-                )
-            return
-        if source.sum:
-            if here < there:
-                raise InputError(f"{where}: a sum is taken by a stage that is not faster; every is {here}, below {there}")
-            assert source.stage is not None
-            cell = self._cell(source.stage, source.name.partition(".")[2])
-            if self.cleared.setdefault(cell, here) != here:
-                raise InputError(
-                    f"{where}: a sum that is cleared every {self.cleared[cell]} cycles is taken every {here} too"
-                )
-            return
-        if signal.over == "cycle" and here != there:
-            raise InputError(
-                f"{where}: increments of every {there} cycles meet a stage of every {here}; sum-3 sums them, "
-                "hold-3 shares them out"
-            )
-
-    def _check_range(self, stage: Ports, name: str, signal: Signal, source: _Source) -> None:
-        """Check that the range of an input is known before its stage is generated."""
-        known = signal.bound is not None or signal.constraint or name in stage.text.ranges
-        forward = source.stage is None or source.stage.place < stage.place
-        if not known and not forward:
-            raise InputError(f"stage {stage.name}: the range of {name} is missing; state it under ranges")
 
     def _check_used(self) -> None:
         """Check that every input is taken, every sum too, and every state has a range."""
@@ -401,7 +355,9 @@ class _Wiring:
                     raise InputError(f"stage {stage.name}: {state} is a sum that no stage takes")
                 known = signal.bound is not None or signal.constraint or state in TURNING
                 if not known and state not in stage.text.ranges:
-                    raise InputError(f"stage {stage.name}: the range of {state} is missing; state it under ranges")
+                    raise InputError(
+                        f"stage {stage.name}: the range of {state} is missing; state it under ranges"
+                    )
 
 
 def _size(shape: tuple[int, ...]) -> int:

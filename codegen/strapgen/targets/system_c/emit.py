@@ -9,7 +9,7 @@ from fractions import Fraction
 from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Function, Sources
-from strapgen.ir.system import Cell, Push, Rate, System, SystemStage
+from strapgen.ir.system import Cell, Push, Rate, DescribedSystem, SystemStage
 from strapgen.support.version import VERSION
 from strapgen.targets.c.emit import real_of
 from strapgen.targets.contract import argument_text, range_text
@@ -20,7 +20,7 @@ from strapgen.targets.rendering import render_c, runs_of
 NULL = 4
 
 
-def unit_name(system: System, target: str) -> str:
+def unit_name(system: DescribedSystem, target: str) -> str:
     """Return the name of a system in C; code in other numbers has another, so that both link into one program."""
     return system.name + ("_fixed" if BUILT_IN[target].fixed else real_of(target).infix)
 
@@ -54,7 +54,7 @@ def places_between(source: Argument | None, destination: Argument | None) -> int
 
 
 def whole(
-    system: System,
+    system: DescribedSystem,
     title_and_command: tuple[str, str],
     stages: Mapping[str, Sources],
     arguments: Mapping[str, Argument],
@@ -64,7 +64,7 @@ def whole(
 
     Parameters
     ----------
-    system : System
+    system : DescribedSystem
     title_and_command : tuple of str
         A line for the head of the files, and the command line that generates them.
     stages : mapping of str to Sources
@@ -104,7 +104,7 @@ def whole(
 class _Printer:
     """Prints the parts of a system that templates put together."""
 
-    system: System
+    system: DescribedSystem
     name: str
     target: str
     stages: Mapping[str, Sources]
@@ -124,8 +124,12 @@ class _Printer:
             "headers": [f"{sources.function.name}.h" for sources in self.stages.values()],
             "cells": [(cell, self._stored(cell.name).type, self._told(cell)) for cell in system.cells],
             "feedback": list(self._feedback()),
-            "inputs": [(signal, self._stored(signal.name).type, self._told_input(signal)) for signal in system.inputs],
-            "outputs": [(system.cell(name), self._stored(name).type, system.every(name)) for name in system.outputs],
+            "inputs": [
+                (signal, self._stored(signal.name).type, self._told_input(signal)) for signal in system.inputs
+            ],
+            "outputs": [
+                (system.cell(name), self._stored(name).type, system.every(name)) for name in system.outputs
+            ],
             "rates": [(rate, self._parameters(rate), bodies[rate.every]) for rate in system.rates],
             "rescales": sorted(set(self._rescales())),
             "initial": [(cell.name, self._numbers(cell)) for cell in system.cells if any(cell.initial)],
@@ -142,8 +146,8 @@ class _Printer:
     def _told(self, cell: Cell) -> str:
         """Return a line about a cell."""
         signal = cell.signal
-        kept = f"the last {cell.samples} samples, the newest last: " if cell.samples else ""
-        return f"{cell.name}: {kept}{signal.meaning or signal.name}; {self._about(signal, cell.name)}."
+        history = f"the last {cell.samples} samples, the newest last: " if cell.samples else ""
+        return f"{cell.name}: {history}{signal.meaning or signal.name}; {self._about(signal, cell.name)}."
 
     def _told_input(self, signal: Signal) -> str:
         """Return a line about an input."""
@@ -202,7 +206,9 @@ class _Printer:
         place = f"memory->{cell.name}"
         if rest:
             yield f"(void)memmove({place}, {place} + {size}, {rest} * sizeof *{place});"
-        yield self._moved(f"{place} + {rest}", push.cell, self._place(push.source, push.external), push.source, size)
+        yield self._moved(
+            f"{place} + {rest}", push.cell, self._place(push.source, push.external), push.source, size
+        )
 
     def _moved(self, to: str, destination: str, source: str, name: str, size: int) -> str:
         """Return the statement that copies a value, rescaled where the formats differ."""
@@ -243,7 +249,9 @@ class _Printer:
                 local = f"{signal.name}_"
                 before.append(f"{there.type} {local}[{signal.size}];")
                 places = places_between(there.argument, here.argument)
-                after.append(f"{self._rescale(there, here)}(memory->{cell}, {local}, {signal.size}, {places});")
+                after.append(
+                    f"{self._rescale(there, here)}(memory->{cell}, {local}, {signal.size}, {places});"
+                )
                 outputs.append(local)
             else:
                 outputs.append(f"memory->{cell}")
@@ -281,8 +289,12 @@ class _Printer:
                 if isinstance(step, Push):
                     pairs = [(self.arguments.get(step.source), self.arguments.get(step.cell))]
                 else:
-                    pairs = [(self.arguments.get(w.source), self._argument(step, w.input)) for w in step.wires]
-                    pairs += [(self._argument(step, name), self.arguments.get(cell)) for name, cell in step.results]
+                    pairs = [
+                        (self.arguments.get(w.source), self._argument(step, w.input)) for w in step.wires
+                    ]
+                    pairs += [
+                        (self._argument(step, name), self.arguments.get(cell)) for name, cell in step.results
+                    ]
                 for there, here in pairs:
                     if there is not None and here is not None and there.format != here.format:
                         yield str(there.format.word), str(here.format.word)

@@ -1,75 +1,28 @@
-"""Runs described systems on every back end: cycle by cycle from Python, or as one generated C unit."""
+"""Runs a described system on the generated functions of its stages, cycle by cycle or one rate on many memories."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from strapgen.backends import fitted as fitted_settings
-from strapgen.backends.c import real_type
 from strapgen.backends.evaluators import Array, Evaluator
 from strapgen.backends.exact import in_digits, rounded
 from strapgen.backends.fixed_numbers import integers, numbers
 from strapgen.backends.increments import pulses
-from strapgen.backends.kernel_sources import sources_of_choice
 from strapgen.backends.registry import BACKENDS, evaluator_class
+from strapgen.backends.systems.memory import SystemMemory, SystemRun, rescaled
 from strapgen.ir.fixed_interface import Argument
-from strapgen.ir.fixed_settings import Settings
-from strapgen.ir.formats import Format
 from strapgen.ir.signals import CYCLE
 from strapgen.ir.system import Push, Rate, SystemStage
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
-from strapgen.systems import generation
-from strapgen.systems.fitting import Fitted, fitted
-from strapgen.systems.wiring import Description
-from strapgen.targets import BUILT_IN
-from strapgen.toolchain import compiler
+from strapgen.systems.fitting import Fitted
 
 #: From this word length on, a word resolves what a double does, and samples are not rounded as sums.
 _EXACT_BITS = 53
-
-
-@dataclass
-class Memory:
-    """What a system stores, in the numbers of its back end.
-
-    Parameters
-    ----------
-    cells : dict of str to array, (runs, elements)
-    feedback : dict of str to array, (runs, number of words)
-        Error feedback of each stage.
-    cycle : int
-        Cycles since all rates last fell together.
-    """
-
-    cells: dict[str, Array]
-    feedback: dict[str, Array]
-    cycle: int = 0
-
-    def copy(self) -> Memory:
-        """Return a memory that changes by itself."""
-        return Memory(dict(self.cells), dict(self.feedback), self.cycle)
-
-
-@dataclass(frozen=True)
-class SystemRun:
-    """The result of a run.
-
-    Parameters
-    ----------
-    values : mapping of str to array, (times, shape)
-        What was recorded, by the name of the cell, in SI units.
-    memory : Memory
-        What is stored at the end, from which a next run goes on.
-    """
-
-    values: Mapping[str, Array]
-    memory: Memory = field(repr=False)
 
 
 class SystemRunner(ABC):
@@ -91,7 +44,7 @@ class SystemRunner(ABC):
         self.evaluators: dict[str, Evaluator] = {name: make(s) for name, s in fit.sources.items()}
         self.many_digits = BACKENDS[backend].many_digits
 
-    def begin(self, runs: int = 1) -> Memory:
+    def begin(self, runs: int = 1) -> SystemMemory:
         """Return the memory with which a run begins."""
         cells = {}
         for cell in self.system.cells:
@@ -105,17 +58,19 @@ class SystemRunner(ABC):
                 row = np.array([[float(value) for value in cell.initial]], self._dtype)
             cells[cell.name] = np.repeat(row, runs, axis=0)
         feedback = {name: evaluator.fresh(runs) for name, evaluator in self.evaluators.items()}
-        return Memory(cells, feedback)
+        return SystemMemory(cells, feedback)
 
     @property
     def _dtype(self) -> Any:
         return next(iter(self.evaluators.values())).dtype
 
-    def set(self, memory: Memory, cell: str, value: Any) -> None:
+    def set(self, memory: SystemMemory, cell: str, value: Any) -> None:
         """Set a cell to a value in SI units, for instance an attitude at the start."""
         held = self.system.cell(cell)
         array = checks.real_array(cell, value, held.signal.shape, np.float64).reshape(-1, held.signal.size)
-        memory.cells[cell] = np.repeat(self._converted(cell, array), len(memory.cells[cell]) // len(array), axis=0)
+        memory.cells[cell] = np.repeat(
+            self._converted(cell, array), len(memory.cells[cell]) // len(array), axis=0
+        )
 
     def _converted(self, name: str, values: Array) -> Array:
         """Return numbers in SI units as the system stores them."""
@@ -152,7 +107,9 @@ class SystemRunner(ABC):
         names = [signal.name for signal in self.system.inputs]
         for name in [*inputs, *names]:
             if name not in names or name not in inputs:
-                raise InputError(f"inputs are {', '.join(sorted(inputs))}; the system has: {', '.join(names)}")
+                raise InputError(
+                    f"inputs are {', '.join(sorted(inputs))}; the system has: {', '.join(names)}"
+                )
         result, counts = {}, set()
         for signal in self.system.inputs:
             values = checks.real_array(signal.name, inputs[signal.name], signal.shape, np.float64)
@@ -163,17 +120,19 @@ class SystemRunner(ABC):
             result[signal.name] = self._converted(signal.name, values)
             counts.add(len(values))
         if len(counts) > 1:
-            raise InputError(f"the inputs have {' and '.join(map(str, sorted(counts)))} samples; one number is needed")
+            raise InputError(
+                f"the inputs have {' and '.join(map(str, sorted(counts)))} samples; one number is needed"
+            )
         return result
 
-    def run(self, inputs: Mapping[str, Any], memory: Memory | None = None) -> SystemRun:
+    def run(self, inputs: Mapping[str, Any], memory: SystemMemory | None = None) -> SystemRun:
         """Run cycles of the fastest rate.
 
         Parameters
         ----------
         inputs : mapping of str to array_like, (cycles, shape)
             Samples of every input in SI units.
-        memory : Memory, optional
+        memory : SystemMemory, optional
             What a run before has left; by default `begin`.
 
         Returns
@@ -196,15 +155,17 @@ class SystemRunner(ABC):
         return SystemRun(shaped, after)
 
     @abstractmethod
-    def _run(self, samples: Mapping[str, Array], count: int, memory: Memory) -> tuple[dict[str, Array], Memory]:
+    def _run(
+        self, samples: Mapping[str, Array], count: int, memory: SystemMemory
+    ) -> tuple[dict[str, Array], SystemMemory]:
         """Run checked samples, and return the outputs after each of their cycles and the memory."""
 
-    def call(self, memory: Memory, samples: Mapping[str, Array], rates: Sequence[Rate]) -> None:
+    def call(self, memory: SystemMemory, samples: Mapping[str, Array], rates: Sequence[Rate]) -> None:
         """Run some rates once on every row of a memory, each with its samples.
 
         Parameters
         ----------
-        memory : Memory
+        memory : SystemMemory
             With one row a run; it is changed.
         samples : mapping of str to array, (runs, elements)
             As `samples` returns them.
@@ -219,14 +180,14 @@ class SystemRunner(ABC):
             for name in rate.cleared:
                 memory.cells[name] = np.zeros_like(memory.cells[name])
 
-    def _push(self, memory: Memory, push: Push, samples: Mapping[str, Array]) -> None:
+    def _push(self, memory: SystemMemory, push: Push, samples: Mapping[str, Array]) -> None:
         """Add a sample to a cell that holds several."""
         new = samples[push.source] if push.external else memory.cells[push.source]
         new = self._moved(new, self.fit.arguments.get(push.source), self.fit.arguments.get(push.cell))
         held = memory.cells[push.cell]
         memory.cells[push.cell] = np.concatenate([held[:, new.shape[1] :], new], axis=1)
 
-    def _call_stage(self, memory: Memory, stage: SystemStage, samples: Mapping[str, Array]) -> None:
+    def _call_stage(self, memory: SystemMemory, stage: SystemStage, samples: Mapping[str, Array]) -> None:
         """Call a stage on every row."""
         evaluator, fixed = self.evaluators[stage.name], self.fit.sources[stage.name].fixed
         arguments: dict[str, Argument] = {}
@@ -250,25 +211,12 @@ class SystemRunner(ABC):
         return rescaled(values, there.format, here.format)
 
 
-def rescaled(values: Array, there: Format, here: Format) -> Array:
-    """Return integers of one format as those of another: to the nearest, halves up, and at most what the word holds.
-
-    Examples
-    --------
-    >>> rescaled(np.array([[3, -3, 40000]]), Format(32, 20), Format(16, 19)).tolist()
-    [[2, -1, 20000]]
-    """
-    places = here.fraction - there.fraction
-    top = here.largest
-    whole = np.asarray(values, object)
-    moved = whole << places if places >= 0 else (whole + (1 << (-places - 1))) >> -places
-    return np.asarray(np.clip(moved, -top - 1, top), object if here.word > 32 else np.int64)
-
-
 class InterpretedSystem(SystemRunner):
     """Calls one generated function for each stage, from Python."""
 
-    def _run(self, samples: Mapping[str, Array], count: int, memory: Memory) -> tuple[dict[str, Array], Memory]:
+    def _run(
+        self, samples: Mapping[str, Array], count: int, memory: SystemMemory
+    ) -> tuple[dict[str, Array], SystemMemory]:
         recorded: dict[str, list[Array]] = {name: [] for name in self.system.outputs}
         every = {name: self.system.every(name) for name in self.system.outputs}
         for k in range(count):
@@ -279,114 +227,6 @@ class InterpretedSystem(SystemRunner):
                 if memory.cycle % every[name] == 0:
                     rows.append(memory.cells[name])
         empty = {name: memory.cells[name][:0] for name in recorded}
-        return {name: np.concatenate(rows) if rows else empty[name] for name, rows in recorded.items()}, memory
-
-
-class CompiledSystem(SystemRunner):
-    """Runs the generated C unit of a system."""
-
-    def __init__(self, fit: Fitted, backend: str) -> None:
-        super().__init__(fit, backend)
-        self.sources = generation.unit(fit, f"strapgen system {self.system.name}")
-        self.module = compiler.load(self.sources)
-        self.name = self.sources.function.name
-
-    def _type(self, name: str) -> np.dtype[Any]:
-        argument = self.fit.arguments.get(name)
-        if argument is None:
-            return np.dtype(real_type(self.fit.target)[1])
-        return np.dtype(f"int{argument.format.word}")
-
-    def struct(self, memory: Memory) -> Any:
-        """Return a memory as the struct of the generated C."""
-        held = self.module.ffi.new(f"{self.name}_memory *")
-        for name, rows in memory.cells.items():
-            setattr(held, name, rows[0].tolist())
-        for name, rows in memory.feedback.items():
-            if rows.shape[1]:
-                setattr(held, f"residuals_{name}", rows[0].tolist())
-        held.cycle = memory.cycle
-        return held
-
-    def memory(self, held: Any) -> Memory:
-        """Return the struct of the generated C as a memory."""
-        cells = {
-            cell.name: np.array([list(getattr(held, cell.name))], self._number(cell.name))
-            for cell in self.system.cells
-        }
-        feedback = {}
-        for name, evaluator in self.evaluators.items():
-            words = evaluator.fresh(1)
-            if words.shape[1]:
-                words = np.array([list(getattr(held, f"residuals_{name}"))], words.dtype)
-            feedback[name] = words
-        return Memory(cells, feedback, int(held.cycle))
-
-    def _number(self, name: str) -> Any:
-        argument = self.fit.arguments.get(name)
-        if argument is None:
-            return self._type(name)
-        return object if argument.format.word > 32 else np.int64
-
-    def _run(self, samples: Mapping[str, Array], count: int, memory: Memory) -> tuple[dict[str, Array], Memory]:
-        ffi, system = self.module.ffi, self.system
-        held = self.struct(memory)
-        inputs = [np.ascontiguousarray(samples[s.name], self._type(s.name)) for s in system.inputs]
-        outputs = [
-            np.empty(
-                ((memory.cycle + count) // system.every(name) - memory.cycle // system.every(name),
-                 system.cell(name).signal.size),
-                self._type(name),
-            )
-            for name in system.outputs
-        ]
-        done = ffi.new("size_t *")
-        pointers = [ffi.from_buffer(f"{_c_type(array)}[]", array) for array in (*inputs, *outputs)]
-        status = getattr(self.module.lib, f"{self.name}_run")(count, held, *pointers, done)
-        if status:
-            raise self._refused(status, held, int(done[0]))
-        values = {
-            name: array.astype(self._number(name)) for name, array in zip(system.outputs, outputs, strict=True)
-        }
-        return values, self.memory(held)
-
-    def _refused(self, status: int, held: Any, done: int) -> InputError:
-        """Return the error of a stage that has refused its input."""
-        stage = self.system.stages[held.refused - 1].name
-        why = "an input lies outside its range" if status == 1 else "its input is too far from a proper one"
-        return InputError(f"stage {stage} refuses its input in cycle {done + 1} ({why})")
-
-
-def _c_type(array: Array) -> str:
-    return f"{array.dtype.name}_t" if array.dtype.kind == "i" else {4: "float", 8: "double"}[array.dtype.itemsize]
-
-
-def system_runner(
-    description: Description, backend: str = "numpy", settings: Settings | None = None
-) -> SystemRunner:
-    """Return a described system on a back end.
-
-    Parameters
-    ----------
-    description : Description
-        What `strapgen.systems.wiring.described` returned.
-    backend : str, optional
-        A key of `strapgen.BACKENDS`.
-    settings : Settings, optional
-        Word, rounding and error feedback in fixed point where a stage states none.
-
-    Raises
-    ------
-    InputError
-        If a name is not known, or a stage does not go with the settings.
-    CompilerError
-        If the back end needs a C compiler and there is none.
-    """
-    entry = BACKENDS[checks.choice("backend", backend, BACKENDS)]
-    chosen = fitted_settings(backend, settings)
-    if entry.target not in BUILT_IN:
-        sources = {name: sources_of_choice(c, entry.target) for name, c in description.choices.items()}
-        return InterpretedSystem(Fitted(description, entry.target, None, sources), backend)
-    fit = fitted(description, entry.target, chosen)
-    compiled = BUILT_IN[entry.target].compiled
-    return (CompiledSystem if compiled else InterpretedSystem)(fit, backend)
+        return {
+            name: np.concatenate(rows) if rows else empty[name] for name, rows in recorded.items()
+        }, memory
