@@ -11,7 +11,7 @@ from strapgen.catalogue import Choice
 from strapgen.ir.fixed_settings import TURNING
 from strapgen.ir.program import Program
 from strapgen.ir.signals import ANY, FRAMES, Signal
-from strapgen.ir.system import Cell, Push, Rate, DescribedSystem, SystemStage, Wire
+from strapgen.ir.system import Cell, DescribedSystem, Push, Rate, SystemStage, Wire
 from strapgen.support.exceptions import InputError
 from strapgen.support.suggestions import unknown
 from strapgen.systems import system_file, wire_checks

@@ -9,7 +9,7 @@ from fractions import Fraction
 from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Function, Sources
-from strapgen.ir.system import Cell, Push, Rate, DescribedSystem, SystemStage
+from strapgen.ir.system import Cell, DescribedSystem, Push, Rate, SystemStage
 from strapgen.support.version import VERSION
 from strapgen.targets.c.emit import real_of
 from strapgen.targets.contract import argument_text, range_text
