@@ -57,7 +57,9 @@ def faults(choice: Choice) -> list[str]:
         wrong += [
             f"{choice.kernel}: {name}: {words}, but frame {signal.frame!r}"
             for name, signal in signals.items()
-            if words in signal.meaning and signal.frame != frame
+            if words in signal.meaning
+            and signal.frame != frame
+            and (" to " in words) == (" to " in signal.frame)
         ]
     for state, output in derived.recursion.states if derived.recursion else ():
         pair = [(s.unit, s.frame, s.over, s.shape) for s in (signals[state], signals[output])]
