@@ -9,6 +9,7 @@ from fractions import Fraction
 from strapgen import targets
 from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.fixed_settings import DEFAULT_ANGLE, TURNING, Settings
+from strapgen.ir.program import Reference
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Sources
 from strapgen.ir.system import Push, SystemStage
@@ -135,9 +136,11 @@ class _Fit:
     def _settings(self, stage: SystemStage) -> Settings:
         """Return word, error feedback and the ranges of a stage's inputs."""
         ranges: dict[str, Fraction] = {}
-        angle = DEFAULT_ANGLE
+        angle, sources = DEFAULT_ANGLE, {wire.input: wire.source for wire in stage.wires}
+        copied = self._copies(stage)
         for wire, signal in zip(stage.wires, self._signals(stage), strict=True):
-            largest = self._range(stage, wire.input, wire.source, signal)
+            known = copied.get(wire.input, wire.input)
+            largest = self._range(stage, known, sources[known], signal)
             if signal.constraint or largest is None:
                 continue
             if wire.input in TURNING:
@@ -153,6 +156,20 @@ class _Fit:
             largest_angle=angle,
             stated="",
         )
+
+    def _copies(self, stage: SystemStage) -> dict[str, str]:
+        """Return the states that are copies of inputs of the call before, with these inputs; not those with ranges."""
+        program = self.description.programs[stage.name]
+        if program.recursion is None:
+            return {}
+        inputs = {signal.elements: signal.name for signal in program.inputs}
+        outputs = {result.signal.name: result.nodes for result in program.outputs}
+        copies = {}
+        for state, output in program.recursion.states:
+            elements = tuple(node.name for node in outputs[output] if isinstance(node, Reference))
+            if elements in inputs and state not in self.description.ranges[stage.name]:
+                copies[state] = inputs[elements]
+        return copies
 
     def _carry(self, stage: SystemStage) -> str:
         """Return the error feedback of a stage: in full it is that of all that goes on, sums and increments too."""
@@ -199,6 +216,7 @@ class _Fit:
                 continue
             if not signal.constraint or wire.input in self._shared(stage):
                 wired[wire.input] = str(argument.format)
+        wired |= {state: wired[name] for state, name in self._copies(stage).items() if name in wired}
         states = {output for output, cell in stage.results if cell in {w.source for w in stage.wires}}
         for output, cell in stage.results:
             argument = self.arguments.get(cell)
