@@ -85,7 +85,7 @@ class _Pass:
         return SystemBounds(known, {name: self.reasons[name] for name in cells if name in self.reasons})
 
     def _push(self, push: Push) -> None:
-        """A new sample comes last; those before move."""
+        """Put a new sample last; those before move."""
         new = self._wired(push.source, self.fit.arguments.get(push.cell))
         self.errors[push.cell] = self.errors[push.cell][len(new) :] + new
         if push.source in self.reasons:
