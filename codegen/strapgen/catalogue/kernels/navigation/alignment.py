@@ -27,7 +27,7 @@ ANGLE_SUM = Signal.vector(
     "beta",
     unit="rad",
     meaning="sum of the angle increments at rest, body axes b",
-    bound=Fraction(1, 64),
+    bound=Fraction(1, 65),
 )
 LEVEL = Signal(
     "level", (2,), ("roll", "pitch"), unit="rad", meaning="roll and pitch, body axes b", bound=ANGLES.bound
@@ -38,10 +38,10 @@ LEVEL_ANGLES = Signal(
     ("ahead", "right", "down"),
     unit="rad",
     meaning="sum of the angle increments at rest, axes ahead, right and down, level with heading 0",
-    bound=Fraction(1, 32),
+    bound=Fraction(1, 33),
 )
 TIME = Signal.scalar(
-    "time", unit="s", meaning="time of the alignment without latitude, no frame", bound=Fraction(4096)
+    "time", unit="s", meaning="time of the alignment without latitude, no frame", bound=Fraction(4000)
 )
 
 

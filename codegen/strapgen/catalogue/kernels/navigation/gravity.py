@@ -22,31 +22,31 @@ GRAVITATION = Signal.scalar(
     "gravitation",
     unit="m/s^2",
     meaning="mu/R^2, gravitation on the sphere, along -z of n",
-    bound=Fraction(16),
+    bound=Fraction(12),
 )
 CENTRIFUGAL = Signal.scalar(
     "centrifugal",
     unit="m/s^2",
     meaning="We^2 R, centrifugal acceleration at the equator",
-    bound=Fraction(1, 16),
+    bound=Fraction(1, 20),
 )
 EQUATOR = Signal.scalar(
     "equator_gravity",
     unit="m/s^2",
     meaning="normal gravity at the equator, along -z of n",
-    bound=Fraction(16),
+    bound=Fraction(12),
 )
 INCREASE = Signal.scalar(
     "gravity_increase",
     unit="1",
     meaning="k of Somigliana's formula, b gamma_p/(a gamma_e) - 1, no frame",
-    bound=Fraction(1, 64),
+    bound=Fraction(1, 100),
 )
 FLATTENING = Signal.scalar(
-    "flattening", unit="1", meaning="f of the meridian's ellipse, no frame", bound=Fraction(1, 64)
+    "flattening", unit="1", meaning="f of the meridian's ellipse, no frame", bound=Fraction(1, 100)
 )
 RATIO = Signal.scalar(
-    "centrifugal_ratio", unit="1", meaning="m, We^2 a^2 b/mu, no frame", bound=Fraction(1, 64)
+    "centrifugal_ratio", unit="1", meaning="m, We^2 a^2 b/mu, no frame", bound=Fraction(1, 100)
 )
 
 

@@ -25,50 +25,50 @@ VELOCITY = Signal.vector(
     "v",
     unit="m/s",
     meaning="velocity relative to the earth, navigation axes n",
-    bound=Fraction(1024),
+    bound=Fraction(1000),
 )
 HEIGHT = Signal.scalar(
-    "height", unit="m", meaning="height above the sphere or ellipsoid, along z of n", bound=Fraction(1 << 16)
+    "height", unit="m", meaning="height above the sphere or ellipsoid, along z of n", bound=Fraction(60000)
 )
 SIDEREAL_RATE = Signal.scalar(
     "sidereal_rate",
     unit="rad/s",
     meaning="earth rate about z of e, against inertial axes i",
-    bound=Fraction(1, 8192),
+    bound=Fraction(1, 8200),
 )
 EARTH_RATE = Signal.vector(
     "earth_rate",
     "W",
     unit="rad/s",
     meaning="rate of the earth e against inertial axes i, navigation axes n",
-    bound=Fraction(1, 8192),
+    bound=Fraction(1, 8200),
 )
 TRANSPORT_RATE = Signal.vector(
     "transport_rate",
     "rho",
     unit="rad/s",
     meaning="rate of the navigation frame n against the earth e, navigation axes n",
-    bound=Fraction(1, 2048),
+    bound=Fraction(1, 4200),
 )
 CURVATURE = Signal.scalar(
-    "curvature", unit="1/m", meaning="1 over the (equatorial) radius of the earth", bound=Fraction(1, 1 << 22)
+    "curvature", unit="1/m", meaning="1 over the (equatorial) radius of the earth", bound=Fraction(1, 6_000_000)
 )
 ECCENTRICITY = Signal.scalar(
-    "eccentricity_squared", unit="1", meaning="e^2 of the meridian's ellipse, no frame", bound=Fraction(1, 64)
+    "eccentricity_squared", unit="1", meaning="e^2 of the meridian's ellipse, no frame", bound=Fraction(1, 100)
 )
 GRAVITY = Signal.vector(
     "gravity",
     "g",
     unit="m/s^2",
     meaning="plumb-bob gravity, gravitation with the centrifugal acceleration, navigation axes n",
-    bound=Fraction(16),
+    bound=Fraction(12),
 )
 ACCELERATION = Signal.vector(
     "acceleration",
     "a",
     unit="m/s^2",
     meaning="gravity and Coriolis acceleration at the start of the cycle, navigation axes n",
-    bound=Fraction(16),
+    bound=Fraction(12),
 )
 GEOGRAPHIC = Signal(
     "geographic",

@@ -30,7 +30,7 @@ VELOCITY_CHANGE = Signal.vector(
     "change",
     unit="m/s",
     meaning="integral of the specific force over the navigation cycle, navigation axes n as they turn",
-    bound=Fraction(64),
+    bound=Fraction(60),
 )
 _START = (
     "The states named previous begin with the rates of the start; a zero there costs an error of first order."
