@@ -20,6 +20,7 @@ ANGLES = Signal(
     unit="rad",
     meaning="Euler angles: roll, pitch, heading",
     bound=Fraction(355, 113),
+    frame="b to n",
 )
 #: Squared cosine of pitch below which heading is computed from its sum or difference with roll.
 _STEEP = sp.Rational(1, 4)
@@ -109,13 +110,11 @@ def euler_angles_from_dcm() -> Kernel:
     build = KernelBuilder()
     C = build.input(DCM.state)
     before = build.input(
-        Signal(
-            "previous",
-            (3,),
-            ("last_roll", "last_pitch", "last_heading"),
-            "rad",
-            "the angles before",
-            ANGLES.bound,
+        replace(
+            ANGLES,
+            name="previous",
+            elements=tuple(f"last_{e}" for e in ANGLES.elements),
+            meaning="the angles before",
         )
     )
     roll, pitch, heading = followed_angles(build, C, before[0], ("roll", "pitch", "heading"))
