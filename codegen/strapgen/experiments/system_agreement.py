@@ -20,7 +20,7 @@ _BLOCK = 20_000
 
 
 @dataclass(frozen=True)
-class Agreement:
+class PassAgreement:
     """How far one pass of a back end is from one of another, from equal memories and samples.
 
     Parameters
@@ -54,7 +54,7 @@ def agreement(
     reference: SystemRunner,
     inputs: Mapping[str, Any],
     memory: SystemMemory | None = None,
-) -> Agreement:
+) -> PassAgreement:
     """Run a system on one back end, and every single cycle of it on another from the memory before.
 
     Parameters
@@ -92,7 +92,7 @@ def agreement(
                 if name in share:
                     share[name] = max(share[name], _share(difference, certified[name]))
     worst = {name: float(max(errors)) for name, errors in certified.items()}
-    return Agreement(count, largest, worst, share, dict(limits.reasons))
+    return PassAgreement(count, largest, worst, share, dict(limits.reasons))
 
 
 def _own(reference: SystemRunner, name: str) -> tuple[Fraction, ...] | None:

@@ -17,8 +17,8 @@ from strapgen.library import generated_sources
 from strapgen.support.exceptions import InputError
 from strapgen.systems.wiring import Description
 from strapgen.targets import TARGETS
-from strapgen.targets.names import UNNAMED, Naming
-from strapgen.targets.system_c.emit import unit_name
+from strapgen.targets.c.emit import real_of
+from strapgen.targets.names import MOST_CHOSEN, UNNAMED, Naming
 
 
 @dataclass(frozen=True)
@@ -43,6 +43,11 @@ class Fitted:
     settings: Settings | None
     sources: Mapping[str, Sources]
     arguments: Mapping[str, Argument] = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """Name of the unit in C; code in other numbers has another, so that both link into one program."""
+        return self.description.system.name + _suffix(self.target, self.settings)
 
 
 def fitted(description: Description, target: str, settings: Settings | None = None) -> Fitted:
@@ -76,11 +81,22 @@ def fitted(description: Description, target: str, settings: Settings | None = No
     return Fitted(description, target, None, sources)
 
 
+def _suffix(target: str, settings: Settings | None) -> str:
+    """Return the ending of names in C for a kind of numbers."""
+    if settings is not None:
+        return f"_w{settings.word}"
+    return real_of(target).infix if TARGETS[target].compiled else ""
+
+
 def _generated(
     description: Description, stage: SystemStage, target: str, settings: Settings | None
 ) -> Sources:
-    name = f"{unit_name(description.system, target)}_{stage.name}"
-    naming = Naming(name=name) if TARGETS[target].compiled else UNNAMED
+    if not TARGETS[target].compiled:
+        return generated_sources.sources(description.choices[stage.name], target, settings, UNNAMED)
+    name = f"{description.system.name}_{stage.name}{_suffix(target, settings)}"
+    if len(name) > MOST_CHOSEN:
+        raise InputError(f"its function would be called {name}; at most {MOST_CHOSEN} characters are allowed")
+    naming = Naming(name=name)
     return generated_sources.sources(description.choices[stage.name], target, settings, naming)
 
 
