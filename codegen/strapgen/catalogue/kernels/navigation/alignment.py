@@ -21,6 +21,7 @@ VERTICAL = Signal.vector(
     meaning="mean specific force at rest over gravity, which points up, body axes b",
     bound=Fraction(1),
     constraint="unit",
+    frame="b",
 )
 ANGLE_SUM = Signal.vector(
     "angle_sum",
@@ -28,9 +29,16 @@ ANGLE_SUM = Signal.vector(
     unit="rad",
     meaning="sum of the angle increments at rest, body axes b",
     bound=Fraction(1, 65),
+    frame="b",
 )
 LEVEL = Signal(
-    "level", (2,), ("roll", "pitch"), unit="rad", meaning="roll and pitch, body axes b", bound=ANGLES.bound
+    "level",
+    (2,),
+    ("roll", "pitch"),
+    unit="rad",
+    meaning="roll and pitch of body axes b",
+    bound=ANGLES.bound,
+    frame="b to g",
 )
 LEVEL_ANGLES = Signal(
     "level_angles",
@@ -94,6 +102,7 @@ def coarse_azimuth() -> Kernel:
             ANGLES,
             elements=elements,
             meaning="roll, pitch and heading of body axes b, from north, east, down",
+            frame="b to g",
         ),
         [*level, sp.atan2(-beta[1], beta[0])],
     )

@@ -19,6 +19,7 @@ POSITION = Signal.matrix(
     meaning="position C_n^e, direction cosine matrix from navigation axes n to earth-fixed axes e",
     bound=Fraction(1),
     constraint="rotation",
+    frame="n to e",
 )
 VELOCITY = Signal.vector(
     "velocity",
@@ -26,6 +27,7 @@ VELOCITY = Signal.vector(
     unit="m/s",
     meaning="velocity relative to the earth, navigation axes n",
     bound=Fraction(1000),
+    frame="n",
 )
 HEIGHT = Signal.scalar(
     "height", unit="m", meaning="height above the sphere or ellipsoid, along z of n", bound=Fraction(60000)
@@ -42,6 +44,7 @@ EARTH_RATE = Signal.vector(
     unit="rad/s",
     meaning="rate of the earth e against inertial axes i, navigation axes n",
     bound=Fraction(1, 8200),
+    frame="n",
 )
 TRANSPORT_RATE = Signal.vector(
     "transport_rate",
@@ -49,12 +52,19 @@ TRANSPORT_RATE = Signal.vector(
     unit="rad/s",
     meaning="rate of the navigation frame n against the earth e, navigation axes n",
     bound=Fraction(1, 4200),
+    frame="n",
 )
 CURVATURE = Signal.scalar(
-    "curvature", unit="1/m", meaning="1 over the (equatorial) radius of the earth", bound=Fraction(1, 6_000_000)
+    "curvature",
+    unit="1/m",
+    meaning="1 over the (equatorial) radius of the earth",
+    bound=Fraction(1, 6_000_000),
 )
 ECCENTRICITY = Signal.scalar(
-    "eccentricity_squared", unit="1", meaning="e^2 of the meridian's ellipse, no frame", bound=Fraction(1, 100)
+    "eccentricity_squared",
+    unit="1",
+    meaning="e^2 of the meridian's ellipse, no frame",
+    bound=Fraction(1, 100),
 )
 GRAVITY = Signal.vector(
     "gravity",
@@ -62,6 +72,7 @@ GRAVITY = Signal.vector(
     unit="m/s^2",
     meaning="plumb-bob gravity, gravitation with the centrifugal acceleration, navigation axes n",
     bound=Fraction(12),
+    frame="n",
 )
 ACCELERATION = Signal.vector(
     "acceleration",
@@ -69,6 +80,7 @@ ACCELERATION = Signal.vector(
     unit="m/s^2",
     meaning="gravity and Coriolis acceleration at the start of the cycle, navigation axes n",
     bound=Fraction(12),
+    frame="n",
 )
 GEOGRAPHIC = Signal(
     "geographic",
@@ -77,4 +89,5 @@ GEOGRAPHIC = Signal(
     unit="rad",
     meaning="latitude, longitude and wander angle, from east to x of n, positive about up; axes n against e",
     bound=Fraction(355, 113),
+    frame="n to e",
 )

@@ -31,6 +31,8 @@ VELOCITY_CHANGE = Signal.vector(
     unit="m/s",
     meaning="integral of the specific force over the navigation cycle, navigation axes n as they turn",
     bound=Fraction(60),
+    frame="n",
+    over="cycle",
 )
 _START = (
     "The states named previous begin with the rates of the start; a zero there costs an error of first order."
@@ -113,10 +115,10 @@ def position_step() -> Kernel:
     build = KernelBuilder()
     position, before, rho = map(build.input, (POSITION, PREVIOUS_TRANSPORT_RATE, TRANSPORT_RATE))
     zeta = build.stage(
-        Signal.vector("zeta", "zeta", unit="rad", meaning="rotation of n over the earth, axes n"),
+        Signal.vector("zeta", "zeta", unit="rad", meaning="rotation of n over the earth, axes n", frame="n"),
         build.scalar(CYCLE) * midpoint(rho, before),
     )
-    turned = build.stage(replace(DCM.transition, constraint=""), DCM.exponential(zeta, 2))
+    turned = build.stage(replace(DCM.transition, constraint="", frame="n to n"), DCM.exponential(zeta, 2))
     build.output(after(POSITION), position * turned)
     build.output(after(PREVIOUS_TRANSPORT_RATE), rho)
     return build.kernel(
