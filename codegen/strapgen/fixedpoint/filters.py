@@ -22,7 +22,7 @@ from strapgen.ir.signals import Signal
 #: Fewest coefficients of a filter that are rounded.
 _FEWEST = 3
 #: What a missed moment costs, in the same error of a coefficient.
-_MOMENT = 16
+_MOMENT = 1024
 
 #: A coefficient as a word, and its fraction bits.
 Factor = tuple[int, int]
