@@ -14,7 +14,7 @@ from strapgen.library.commit_late_fixed import functions, interface_of, rounded
 from strapgen.library.commit_late_sources import kernels
 from strapgen.support.exceptions import InputError
 
-FILTERS = LateFilters(WINDOWS["window-7-7"])
+FILTERS = LateFilters(WINDOWS["window-7-7"], calm_start=True)
 
 
 def fixed(**settings):

@@ -57,6 +57,7 @@ def functions(
         raise InputError(
             "what commits late takes increments in rad, and neither a state that saturates nor ranges or formats"
         )
+    filters = replace(filters, calm_start=True)
     step = generated_sources.sources(choices[0], target, settings)
     interface = interface_of(step)
     samples = interface.inputs[1]

@@ -34,6 +34,9 @@ class LateFilters:
     ----------
     window : Window
         A family with steps of one sample.
+    calm_start : bool, optional
+        Whether the first intervals of a recording have filters of small noise gain too, which words can hold, in place
+        of the family's own for its start.
 
     Raises
     ------
@@ -50,6 +53,7 @@ class LateFilters:
     """
 
     window: Window
+    calm_start: bool = False
 
     def __post_init__(self) -> None:
         """Refuse windows for which there are no such filters."""
@@ -96,7 +100,8 @@ class LateFilters:
     @cached_property
     def sets(self) -> tuple[Rows, ...]:
         """The filters by the number of samples before the interval, from none to p + L."""
-        by_previous = {one.previous: one for one in (self.window, *self.window.one_sided)}
+        start = () if self.calm_start else self.window.start
+        by_previous = {one.previous: one for one in (self.window, *self.window.one_sided, *start)}
         return tuple(by_previous[k].filters[: self.degree + 1] for k in range(self.samples))
 
     @cached_property
