@@ -8,7 +8,6 @@ from fractions import Fraction
 from typing import Any
 
 from strapgen.fixedpoint import derivation
-from strapgen.fixedpoint.alignment import aligning
 from strapgen.fixedpoint.comparisons import (
     lower_computed,
     lower_maximum,
@@ -33,6 +32,7 @@ from strapgen.fixedpoint.quotients_and_roots import lower_quotient, lower_root
 from strapgen.fixedpoint.runs.accumulation import accumulation, step_errors
 from strapgen.fixedpoint.runs.angle_accumulation import angle_accumulation
 from strapgen.fixedpoint.sums import lower_sum
+from strapgen.fixedpoint.words.alignment import aligning
 from strapgen.ir.fixed_interface import Argument, ErrorFeedback, Interface
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.formats import Format

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
-from strapgen.fixedpoint.filters import Factor, filter_words, nearest_word
 from strapgen.fixedpoint.format_plan import carried_input
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.fixedpoint.quantities import (
@@ -20,6 +19,7 @@ from strapgen.fixedpoint.quantities import (
 )
 from strapgen.fixedpoint.quantization_context import Quantization, integer_value
 from strapgen.fixedpoint.terms import Aligned, Placed, aligned, largest_wide, nearest, up
+from strapgen.fixedpoint.words.filters import Factor, filter_words, nearest_word
 from strapgen.ir.fixed_interface import ErrorFeedback
 from strapgen.ir.formats import Format, finest
 from strapgen.ir.integer_program import Coefficient, IntegerSum, Term, Value
@@ -127,7 +127,7 @@ def _integer_terms(context: Quantization, definition: Sum) -> list[Placed]:
 
 
 def _product_term(
-    context: Quantization, monomial: Monomial, coefficient: Fraction, stored: Factor | None = None
+    context: Quantization, monomial: Monomial, coefficient: Fraction, rounded: Factor | None = None
 ) -> Placed:
     """Return a multiple of one or two values as an integer term, of the nearest coefficient or of a stated one."""
     shifts = is_power_of_two(coefficient)
@@ -138,11 +138,11 @@ def _product_term(
     if shifts:
         sign = 1 if coefficient > 0 else -1
         return Placed(Term(names, sign), places - exponent(coefficient), up(error))
-    factor, bits = stored or nearest_word(coefficient, context.word)
+    factor, bits = rounded or nearest_word(coefficient, context.word)
     wrong = abs(Fraction(factor, 1) / Fraction(2) ** bits - coefficient)
-    largest = values[0].magnitude / Fraction(2) ** values[0].fraction
+    stored = values[0].magnitude / Fraction(2) ** values[0].fraction
     term = Term(names, factor, coefficient=Coefficient(coefficient, bits))
-    return Placed(term, places + bits, up(error + wrong * largest))
+    return Placed(term, places + bits, up(error + wrong * stored))
 
 
 def _product_error(context: Quantization, values: Sequence[Value], monomial: Monomial) -> Fraction:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from strapgen import Settings, backend, choose, motion, quantize, simulate
 from strapgen.catalogue.methods.windows import WINDOWS
 from strapgen.fixedpoint import sums
-from strapgen.fixedpoint.filters import nearest_word, rounded_together
+from strapgen.fixedpoint.words.filters import nearest_word, rounded_together
 from strapgen.ir.integer_program import FixedProgram, IntegerSum
 from strapgen.simulation.drift import angles
 
