@@ -28,6 +28,8 @@ P, L, W = 3, 3, 7
 #: The same without filters of its own for the start, as words have it.
 CALM = replace(WINDOWS[WINDOW], start=())
 GOOD, LOST, MERGED = SampleKind
+#: A gyro that counts 0.03 deg/s a unit, up to 700 deg/s.
+COUNTS = {"lsb": "0.03dps", "sample_hz": 100, "max_rate_deg_s": 700}
 #: Rounding of a few dozen steps, each of some hundred operations on numbers up to 1.
 ROUNDING = 2e-14
 
@@ -420,15 +422,16 @@ def test_the_start_of_a_recording_is_as_accurate_as_published():
 
 
 @pytest.mark.parametrize(
-    ("algorithm", "carry"),
+    ("algorithm", "carry", "counts"),
     [
-        ("euler", "full"),
-        pytest.param("euler", "none", marks=pytest.mark.long),
-        pytest.param("dcm", "full", marks=pytest.mark.long),
+        ("euler", "full", {}),
+        pytest.param("euler", "none", {}, marks=pytest.mark.long),
+        pytest.param("dcm", "full", {}, marks=pytest.mark.long),
+        pytest.param("euler", "full", COUNTS, marks=pytest.mark.long),
     ],
 )
-def test_c_on_integers_has_the_bits_of_the_model(algorithm, carry):
-    settings = Settings(carry=carry)
+def test_c_on_integers_has_the_bits_of_the_model(algorithm, carry, counts):
+    settings = Settings.of(carry=carry, **counts)
     model, c = (
         CommitLate(WINDOW, algorithm, name, settings=settings) for name in ("fixed-model", "c-fixed32")
     )
@@ -500,23 +503,26 @@ def test_c_on_integers_refuses_what_its_header_says():
 
 
 @pytest.mark.parametrize(
-    ("algorithm", "window"),
+    ("algorithm", "window", "counts"),
     [
-        ("euler", WINDOW),
-        pytest.param("dcm", WINDOW, marks=pytest.mark.long),
-        pytest.param("euler", "window-7-7", marks=pytest.mark.long),
+        ("euler", WINDOW, {}),
+        pytest.param("dcm", WINDOW, {}, marks=pytest.mark.long),
+        pytest.param("euler", "window-7-7", {}, marks=pytest.mark.long),
+        pytest.param("euler", WINDOW, COUNTS, marks=pytest.mark.long),
     ],
 )
-def test_the_attitude_of_now_stays_within_its_certified_bound(algorithm, window):
+def test_the_attitude_of_now_stays_within_its_certified_bound(algorithm, window, counts):
     """Against double precision from the same integers, on samples that are drawn and on those of motions."""
-    filters = family(window)
-    bound = float(parts(filters, algorithm, "c-fixed", Settings(carry="full")).fixed.now_error)
-    fixed = CommitLate(window, algorithm, "c-fixed32", settings=Settings(carry="full"))
+    filters, settings = family(window), Settings.of(carry="full", **counts)
+    late = parts(filters, algorithm, "c-fixed", settings)
+    bound, unit = float(late.fixed.now_error), float(late.step.fixed.inputs[1].unit)
+    most = late.fixed.limit * unit
+    fixed = CommitLate(window, algorithm, "c-fixed32", settings=settings)
     double = CommitLate(window, algorithm, "c")
-    drawn = np.random.default_rng(7).uniform(-0.125, 0.125, (300, 3))
+    drawn = np.random.default_rng(7).uniform(-most, most, (300, 3))
     largest = 0.0
-    for sample in np.concatenate([drawn, np.sign(drawn) / 8, samples(200) / 2]):
-        rounded = np.rint(np.ldexp(sample, 32)) / 2.0**32
+    for sample in np.concatenate([drawn, np.sign(drawn) * most, samples(200) / 2]):
+        rounded = np.rint(np.clip(sample, -most, most) / unit) * unit
         fixed.push(rounded)
         double.push(rounded)
         if fixed.pending == filters.window.ahead:
