@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, fields, replace
+from functools import lru_cache
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from strapgen import catalogue
+from strapgen.analysis.quantization_noise import QuantizationNoise, quantization_noise
 from strapgen.backends import backend
 from strapgen.backends.increments import pulses
 from strapgen.experiments.comparison import certified_angle
@@ -86,6 +88,9 @@ class Outcome:
         Effect of the method: the drift of the run in double on exact increments.
     bound_deg : float or None
         Certified bound of `rounding_deg`; None where no useful bound is known.
+    expected_deg : float or None
+        Root mean square of the angle that pulses cause at the end of the run, if the errors of the counted angles are
+        independent; None without pulses. See `quantization_noise`.
     """
 
     case: Case
@@ -94,6 +99,7 @@ class Outcome:
     quantization_deg: float
     truncation_deg: float
     bound_deg: float | None
+    expected_deg: float | None = None
 
     @property
     def dominates(self) -> str:
@@ -283,7 +289,35 @@ def _run(case: Case) -> Outcome:
         largest(same_attitude, plain_attitude),
         largest(plain_attitude, truth),
         None if bound is None else math.degrees(bound),
+        expected_noise(case, math.radians(pulse), exact) if pulse else None,
     )
+
+
+def expected_noise(case: Case, pulse: float, increments: Any) -> float:
+    """Return the root mean square of the angle that pulses cause in a run, if their errors are independent.
+
+    Parameters
+    ----------
+    case : Case
+    pulse : float
+        Angle of a pulse in rad.
+    increments : array, (N, K, 3)
+        Exact increments of the run in rad.
+
+    Returns
+    -------
+    float
+        In degrees, at the end of the run.
+    """
+    noise = noise_of(case.algorithm, case.method, case.increments)
+    turned = np.square(increments.sum(axis=1)).sum()
+    return math.degrees(math.sqrt(noise.mean_square(pulse, float(turned), len(increments))))
+
+
+@lru_cache(maxsize=64)
+def noise_of(algorithm: str, method: str, increments: int) -> QuantizationNoise:
+    """Return the noise that quantized increments cause in a step; see `quantization_noise`."""
+    return quantization_noise(catalogue.choose_step(algorithm, method, increments))
 
 
 def run(planned: Sequence[Case], jobs: int | None = None) -> Iterator[Outcome]:

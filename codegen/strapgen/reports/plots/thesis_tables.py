@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from strapgen.experiments.thesis_tables import ALGORITHMS, ORDERS, TABLES, Table
 from strapgen.reports.plots import figures
-from strapgen.reports.thesis_tables import NAMES
+from strapgen.reports.thesis.tables import NAMES
 
 if TYPE_CHECKING:
     from strapgen.experiments.predicted_tables import PredictedEntry
