@@ -88,7 +88,7 @@ def test_rates_at_the_nodes():
         (1, sp.Rational(26, 12)),
     ):
         assert sp.expand(extraction_noise(2, sp.sympify(node)) ** 2 - variance * PULSE**2 / STEP**2) == 0
-    numbers = [float((extraction_noise(2, sp.sympify(node)) * STEP / PULSE)) for node in (0, "1/2", 1)]
+    numbers = [float(extraction_noise(2, sp.sympify(node)) * STEP / PULSE) for node in (0, "1/2", 1)]
     assert numbers == pytest.approx([1.47196, 0.408248, 1.47196], abs=5e-6)
 
 

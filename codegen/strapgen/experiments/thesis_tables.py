@@ -140,8 +140,9 @@ def entries(
             except InputError:  # the matrix grows out of the format
                 plain = "not in this format: the matrix grows to twice its size"
             note = (
-                f"The thesis prints 2.391 deg for this drift. That it is the run without orthonormalization is an "
-                f"inference, which the run proves ({plain}). With it, which the ratios of the table need, it is {value:.3f} deg."
+                "The thesis prints 2.391 deg for this drift. That it is the run without orthonormalization is an "
+                f"inference, which the run proves ({plain}). With it, which the ratios of the table need, it is "
+                f"{value:.3f} deg."
             )
         double = value if backend_name == "numpy" else run(backend(algorithm, f"rk{order}", 2, "numpy"))
         yield TableEntry(

@@ -19,8 +19,9 @@ from strapgen.backends import backend
 from strapgen.backends.increments import pulses
 from strapgen.experiments.comparison import certified_angle
 from strapgen.ir.fixed_settings import Settings
-from strapgen.simulation.motions import Motion, motion
+from strapgen.simulation.motions import Motion
 from strapgen.simulation.runs import attitude, drift_between
+from strapgen.simulation.users_motions import any_motion, is_file
 from strapgen.support import cache, checks
 from strapgen.support.exceptions import InputError
 from strapgen.support.resumable import side_by_side
@@ -67,7 +68,7 @@ class Case:
     @property
     def profile(self) -> Motion:
         """The motion with its parameters."""
-        return motion(self.motion, **dict(self.settings))
+        return any_motion(self.motion, self.duration, dict(self.settings))
 
 
 @dataclass(frozen=True)
@@ -135,7 +136,7 @@ class Study:
         In s.
     motion_name : str
     settings : dict of str to str, optional
-        Parameters of the motion; by default those of the thesis's table 5.
+        Parameters of the motion; by default those of the thesis's table 5, and none for the file of a motion.
     """
 
     algorithm: str = "euler"
@@ -152,7 +153,8 @@ class Study:
 
     def cases(self) -> list[Case]:
         """Return every combination, unchecked."""
-        parameters = tuple((self.settings or {"a_deg_s": "10", "b_deg_s": "10", "g_deg_s": "10"}).items())
+        default = {} if is_file(self.motion_name) else {"a_deg_s": "10", "b_deg_s": "10", "g_deg_s": "10"}
+        parameters = tuple((self.settings or default).items())
         swept = product(
             self.methods, self.steps, self.pulses_arcsec, self.roundings, self.carries, self.words
         )
@@ -248,7 +250,8 @@ def run_case(case: Case) -> Outcome:
             json.dumps({f.name: getattr(outcome, f.name) for f in fields(outcome) if f.name != "case"})
         )
 
-    key = cache.digest([cache.generator_digest(), json.dumps(asdict(case), sort_keys=True)])
+    source = Path(case.motion).read_bytes() if is_file(case.motion) else b""
+    key = cache.digest([cache.generator_digest(), json.dumps(asdict(case), sort_keys=True), source])
 
     def read() -> bytes:
         return cache.read(cache.entry("studies", key, fill), "outcome.json")

@@ -53,8 +53,8 @@ def word_length_text(outcomes: Sequence[Outcome]) -> str:
         case = first.case
         gyro = "increments rounded to their format" if float(pulse) == 0 else f"pulses of {pulse} arcsec"
         lines += [
-            f"{case.algorithm} {method}, step {step} s, {case.duration} s of {case.motion} motion "
-            f"({settings_text(first)}), {gyro}",
+            f"{case.algorithm} {method}, step {step} s, {case.duration} s of {case.motion} motion"
+            f"{f' ({settings_text(first)})' if case.settings else ''}, {gyro}",
             f"the method itself drifts by {first.truncation_deg:{ANGLE}} deg",
             *_expected(first),
             "",
