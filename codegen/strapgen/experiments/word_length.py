@@ -9,12 +9,11 @@ from dataclasses import asdict, dataclass, fields, replace
 from functools import lru_cache
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from strapgen import catalogue
-from strapgen.analysis.quantization_noise import QuantizationNoise, quantization_noise
 from strapgen.backends import backend
 from strapgen.backends.increments import pulses
 from strapgen.experiments.comparison import certified_angle
@@ -25,6 +24,9 @@ from strapgen.simulation.users_motions import any_motion, is_file
 from strapgen.support import cache, checks
 from strapgen.support.exceptions import InputError
 from strapgen.support.resumable import side_by_side
+
+if TYPE_CHECKING:
+    from strapgen.analysis.quantization_noise import QuantizationNoise
 
 #: Most cases of one study.
 _MOST_CASES = 5000
@@ -320,6 +322,8 @@ def expected_noise(case: Case, pulse: float, increments: Any) -> float:
 @lru_cache(maxsize=64)
 def noise_of(algorithm: str, method: str, increments: int) -> QuantizationNoise:
     """Return the noise that quantized increments cause in a step; see `quantization_noise`."""
+    from strapgen.analysis.quantization_noise import quantization_noise
+
     return quantization_noise(catalogue.choose_step(algorithm, method, increments))
 
 

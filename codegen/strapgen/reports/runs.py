@@ -60,7 +60,7 @@ def run_data(run: Run, settings: dict[str, Any]) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class Shape:
+class RunLayout:
     """How a run is reported.
 
     Parameters
@@ -80,7 +80,7 @@ class Shape:
     every: int | None = None
 
 
-def run_report(run: Run, settings: dict[str, Any], shape: Shape) -> Report:
+def run_report(run: Run, settings: dict[str, Any], layout: RunLayout) -> Report:
     """Return a run as a report.
 
     Parameters
@@ -88,16 +88,16 @@ def run_report(run: Run, settings: dict[str, Any], shape: Shape) -> Report:
     run : Run
     settings : dict
         Settings that the run was made with.
-    shape : Shape
+    layout : RunLayout
     """
 
     def text() -> str:
-        lines = [] if shape.title is None else [shape.title, ""]
-        return "\n".join([*lines, run_text(run, settings | {"motion": shape.motion}, shape.every)])
+        lines = [] if layout.title is None else [layout.title, ""]
+        return "\n".join([*lines, run_text(run, settings | {"motion": layout.motion}, layout.every)])
 
     def data() -> dict[str, Any]:
-        title = {} if shape.title is None else {"title": shape.title}
-        return title | run_data(run, settings) | (matrices_data(run) if shape.matrices else {})
+        title = {} if layout.title is None else {"title": layout.title}
+        return title | run_data(run, settings) | (matrices_data(run) if layout.matrices else {})
 
     def markdown() -> TextTable:
         return TextTable(_ERROR_COLUMNS, _error_rows(run, range(len(run.time))))

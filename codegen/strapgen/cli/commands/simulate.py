@@ -210,7 +210,7 @@ def _on_motion(
     """Simulate, and deliver the run."""
     from strapgen.cli.progress import waiting
     from strapgen.reports import plots
-    from strapgen.reports.runs import Shape, run_report
+    from strapgen.reports.runs import RunLayout, run_report
     from strapgen.simulation import runs
 
     pulse, step, duration = source.pulse, source.step or "", source.duration or ""
@@ -240,7 +240,7 @@ def _on_motion(
         "duration_s": float(checks.number("duration", duration)),
     }
     title = f"{backend.kernel}, {backend.name}: {source.described(profile.name, ' motion')}, step {step} s"
-    shown = Shape(source.described(profile.name), output.title, output.matrices, every)
+    shown = RunLayout(source.described(profile.name), output.title, output.matrices, every)
     output.report(
         run_report(run, facts, shown), lambda path: plots.run_image(run, output.title or title, path)
     )
