@@ -249,6 +249,7 @@ LONG_COMMANDS = (
     "strapgen series euler ",
     "strapgen simulate ",
     "strapgen stability ",
+    "strapgen statements",
     "strapgen strapdown dcm ",
     "strapgen study ",
     "strapgen tables",
@@ -337,6 +338,15 @@ def test_the_tables_of_the_thesis_are_those_of_the_command(capsys):
         # Round-off differs from one mathematical library to the next: it rules the figures of single precision
         # at fourth order, and touches double precision below 1e-10 degrees.
         assert float(ours) == pytest.approx(value, rel=1e-3 if value > 1e-3 else 0.5)
+
+
+@pytest.mark.long
+def test_the_statements_of_the_thesis_are_those_of_the_command(capsys):
+    printed = run("strapgen statements --format markdown", capsys).strip().splitlines()
+    shown = [line for line in DOCS["thesis-statements"].splitlines() if line.startswith("|")]
+    # Round-off rules the smallest of the numbers, which the tests of the statements hold to their digits.
+    words = [[re.sub(r"[\d.]+(e-\d+)?", "#", line) for line in lines] for lines in (shown, printed)]
+    assert words[0] == words[1]
 
 
 @pytest.fixture
@@ -454,6 +464,9 @@ def test_example(path, capsys, monkeypatch):
     namespace = runpy.run_path(str(path))
     if "algorithm" in namespace:  # for strapgen to load, see `strapgen check`
         assert namespace["algorithm"]().companions is not None
+        return
+    if "attitude" in namespace:  # a motion, which is checked as it is read
+        assert strapgen.read_motion(path).functions.keys() == {"increments", "attitude", "rate"}
         return
     if path.stem.startswith("make_"):
         assert namespace["text"]() == namespace["LOG"].read_text()
