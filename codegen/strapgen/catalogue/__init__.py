@@ -7,7 +7,7 @@ loaded when it is derived.
 from __future__ import annotations
 
 from strapgen.catalogue.choice import Choice, increments, orthonormalizations, previous
-from strapgen.catalogue.choosing import choose, choose_step, standard
+from strapgen.catalogue.choosing import choose, choose_step, standard, with_constants
 from strapgen.catalogue.derivation import companion, derive, enough, nodes, rounding
 from strapgen.catalogue.names import (
     ALGORITHMS,
@@ -59,4 +59,5 @@ __all__ = [
     "previous",
     "rounding",
     "standard",
+    "with_constants",
 ]

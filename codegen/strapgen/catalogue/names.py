@@ -282,6 +282,16 @@ COMPENSATION = {
     )
 }
 
+#: Kernels between stages of different rates, and from counts; they take no method.
+SAMPLING = {
+    "sum-3": Recipe("sum of increments for a slower cycle", "sampling", "increment_sum", (), False),
+    "hold-3": Recipe("increments shared out to faster cycles", "sampling", "held_increment", (), False),
+    "angle-counts": Recipe("angle increments from counts", "sampling", "scaled_counts", ("angle",), False),
+    "velocity-counts": Recipe(
+        "velocity increments from counts", "sampling", "scaled_counts", ("velocity",), False
+    ),
+}
+
 #: Kernels that take no method.
 KERNELS = {
     **{
@@ -338,6 +348,7 @@ KERNELS = {
         )
         for motion in MOTIONS
     },
+    **SAMPLING,
     **TWO_SPEED,
     **COMPENSATION,
 }

@@ -20,6 +20,7 @@ ANGLES = Signal(
     unit="rad",
     meaning="Euler angles: roll, pitch, heading",
     bound=Fraction(355, 113),
+    frame="b to n",
 )
 #: Squared cosine of pitch below which heading is computed from its sum or difference with roll.
 _STEEP = sp.Rational(1, 4)
@@ -68,13 +69,11 @@ def euler_angles_from_dcm() -> Kernel:
     build = KernelBuilder()
     C = build.input(DCM.state)
     before = build.input(
-        Signal(
-            "previous",
-            (3,),
-            ("last_roll", "last_pitch", "last_heading"),
-            "rad",
-            "the angles before",
-            ANGLES.bound,
+        replace(
+            ANGLES,
+            name="previous",
+            elements=tuple(f"last_{e}" for e in ANGLES.elements),
+            meaning="the angles before",
         )
     )
     square = build.value("cosine_squared", C[0, 0] ** 2 + C[1, 0] ** 2, "square of the cosine of pitch")
