@@ -60,7 +60,10 @@ class StepSources:
         if self.step.function.inputs[1].name == "increments":
             return ()
         if self.choice is None or not (nodes := catalogue.nodes(self.choice)):
-            raise InputError(f"kernel {self.step.kernel} does not say at which nodes it takes the rate")
+            raise InputError(
+                f"kernel {self.step.kernel} takes turns at nodes that its sources do not tell; "
+                "strapgen.backend knows them from a choice"
+            )
         return tuple(float(node) for node in nodes)
 
     def sources(self, kernel: str, target: str) -> Sources:
