@@ -239,6 +239,7 @@ def _on_motion(
         "step_s": float(checks.number("step", step)),
         "duration_s": float(checks.number("duration", duration)),
     }
+    facts |= {} if intervals.initial is None else {"initial_deg": intervals.initial}
     title = f"{backend.kernel}, {backend.name}: {source.described(profile.name, ' motion')}, step {step} s"
     shown = RunLayout(source.described(profile.name), output.title, output.matrices, every)
     output.report(
