@@ -15,6 +15,8 @@ WITHOUT = {
         "each element is about another torquer axis",
     ),
     **dict.fromkeys(("deviation", "next_deviation", "heating_gain"), "there is one number for each gyro"),
+    "ground_velocity": "its axes point to east, north and up",
+    "level_angles": "its axes point ahead, right and down",
 }
 #: Words of a meaning that name the frame.
 WORDS = {
