@@ -25,6 +25,7 @@ from strapgen.cli.commands import (
     series,
     simulate,
     stability,
+    statements,
     strapdown,
     study,
     tableau,
@@ -64,7 +65,12 @@ COMMANDS: dict[str, dict[str, Any]] = {
         "cost": cost.cost,
         "frontier": frontier.frontier,
     },
-    "Reproduce": {"tables": tables.tables, "rate-table": rate_table.rate_table, "study": study.app},
+    "Reproduce": {
+        "tables": tables.tables,
+        "statements": statements.statements,
+        "rate-table": rate_table.rate_table,
+        "study": study.app,
+    },
 }
 
 #: Most characters of a word that a message repeats, what is left of a longer one, and most characters of a message.
