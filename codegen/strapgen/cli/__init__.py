@@ -28,6 +28,7 @@ from strapgen.cli.commands import (
     statements,
     strapdown,
     study,
+    study_system,
     tableau,
     tables,
     two_speed,
@@ -84,6 +85,8 @@ class _Strapgen(PlainGroup):
         heading: tuple(commands) for heading, commands in COMMANDS.items()
     }
 
+
+study.app.command("system", cls=PlainCommand)(study_system.study_system)
 
 app = typer.Typer(
     name="strapgen",
