@@ -68,13 +68,13 @@ def test_the_great_circle_begins_as_the_table_says():
 def test_the_error_on_a_great_circle_falls_with_the_square_of_the_cycle(azimuth):
     # Two cycles as long as these show the order; without its term of second order the result is the closed form.
     seconds, place, velocity, heading = GREAT_CIRCLES[50]
-    ends = [great_circle_end(50, seconds, cycle, azimuth)[0] for cycle in (12.0, 6.0)]
+    ends = [great_circle_end(50, seconds, cycle, azimuth)[0] for cycle in (24.0, 12.0)]
     rows = [np.concatenate([e["geographic"][:2], e["ground_velocity"][1::-1], [e["heading"]]]) for e in ends]
     errors = [row - [*place, *velocity, heading] for row in rows]
-    np.testing.assert_allclose(errors[0] / errors[1], 4, atol=0.05)
-    # What is left is of third order: a fortieth of the errors at 6 s.
+    np.testing.assert_allclose(errors[0] / errors[1], 4, atol=0.1)
+    # What is left is of third order: a twentieth of the errors at 12 s.
     left = (4 * rows[1] - rows[0]) / 3 - [*place, *velocity, heading]
-    assert np.all(np.abs(left) < np.abs(errors[1]) / 40 + 1e-9)
+    assert np.all(np.abs(left) < np.abs(errors[1]) / 20 + 1e-9)
 
 
 @pytest.mark.long
