@@ -9,7 +9,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen import backends
+from strapgen import backends, catalogue
 from strapgen.backends.systems import SystemMemory, SystemRunner, system_runner
 from strapgen.experiments.turning_vehicle import TurningVehicle, counts
 from strapgen.ir.fixed_settings import Settings
@@ -113,7 +113,8 @@ def samples(description: Description, vehicle: TurningVehicle, seconds: Fraction
     """Return what a system measures on a vehicle, by the names of its inputs.
 
     An input in rad or m/s takes increments. One of counts takes those of the unit that the stage has to which it is
-    wired, angle-counts or velocity-counts.
+    wired, angle-counts or velocity-counts. Where a stage compensates the errors of a measurement unit, the sensors have
+    these errors: the kernel that is its inverse makes them.
 
     Raises
     ------
@@ -127,7 +128,7 @@ def samples(description: Description, vehicle: TurningVehicle, seconds: Fraction
             f"{float(seconds):g} s are no whole number of cycles of the slowest rate, "
             f"{float(system.cycle / system.sample_hz):g} s"
         )
-    angle, velocity = vehicle.increments(float(1 / system.sample_hz), int(cycles))
+    angle, velocity = _sensed(description, *vehicle.increments(float(1 / system.sample_hz), int(cycles)))
     result = {}
     for signal in system.inputs:
         if signal.frame != "b" or signal.over != CYCLE or signal.shape != (3,):
@@ -138,6 +139,17 @@ def samples(description: Description, vehicle: TurningVehicle, seconds: Fraction
         exact = {"rad": angle, "m/s": velocity}[unit]
         result[signal.name] = exact if scale is None else counts(exact, scale)
     return result
+
+
+def _sensed(description: Description, angle: Array, velocity: Array) -> tuple[Array, Array]:
+    """Return increments with the errors that the system compensates."""
+    for stage in description.system.stages:
+        if stage.kernel.startswith("imu-compensate"):
+            constants = dict(description.choices[stage.name].constants)
+            errors = backends.evaluator(catalogue.choose("imu-errors", constants=constants))
+            measured: tuple[Array, Array] = errors(angle, velocity)
+            return measured
+    return angle, velocity
 
 
 def _measured(description: Description, signal: Signal) -> tuple[str, float | None]:
