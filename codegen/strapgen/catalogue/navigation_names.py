@@ -26,6 +26,9 @@ NAVIGATION = {
         for azimuth, words in _AZIMUTHS.items()
     },
     "navigation-turn": _recipe("rate of the navigation frame times the cycle", "rates", "navigation_turn"),
+    "navigation-turn-ahead": _recipe(
+        "rate of the navigation frame, extrapolated", "rates", "navigation_turn", True
+    ),
     "gravity-sphere": _recipe("gravity of a turning sphere", "gravity", "gravity_sphere"),
     "gravity-ellipsoid": _recipe("normal gravity of an ellipsoid", "gravity", "gravity_ellipsoid"),
     "coriolis-gravity": _recipe("gravity and Coriolis acceleration", "steps", "coriolis_gravity"),

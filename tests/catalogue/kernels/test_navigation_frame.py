@@ -202,6 +202,33 @@ def test_velocity_and_height_take_what_they_say():
     assert (turn - T * (vector("W") + vector("rho"))).expand() == sp.zeros(3, 1)
 
 
+@pytest.mark.parametrize("slow_cycles", [1, 2, 5])
+def test_a_turn_that_is_held_ahead_makes_the_trapezoidal_rule_exact(slow_cycles):
+    # The rate is w0 + w1 t; navigation cycles of T begin at -T, 0 and T, and hold their turns over m slow cycles.
+    T, w0, w1 = sp.Symbol("T"), vector("w0"), vector("w1")
+    lead = sp.Rational(1, 2) + sp.Rational(1, 2 * slow_cycles)
+    turns = []
+    for start in (-T, 0, T):
+        rate, before = (w0 + w1 * t for t in (start, start - T))
+        values = dict(zip([f"before_{k}" for k in "xyz"], before, strict=True))
+        values |= dict(zip([f"rho_{k}" for k in "xyz"], rate, strict=True)) | dict.fromkeys(
+            ("W_x", "W_y", "W_z"), 0
+        )
+        turn, handed_on = expressions(
+            derive("navigation-turn-ahead"), **values, cycle=T / slow_cycles, lead=lead
+        )
+        assert (handed_on - rate).expand() == sp.zeros(3, 1)
+        turns.append(turn)
+    rule = derive("navigation-rotation")
+    for before, held, start in ((turns[0], turns[1], 0), (turns[1], turns[2], T)):
+        theta = sp.zeros(3, 1)
+        for _ in range(slow_cycles):
+            signals = zip(rule.inputs, (theta, before, held), strict=True)
+            values = {n: x for s, array in signals for n, x in zip(s.elements, array, strict=True)}
+            theta, before = expressions(rule, **values)
+        assert (theta - w0 * T - w1 * ((start + T) ** 2 - start**2) / 2).expand() == sp.zeros(3, 1)
+
+
 def test_the_direction_cosines_of_a_position_are_those_of_the_frame(rng):
     position, angles = (
         strapgen.evaluator("position-from-geographic"),
