@@ -27,6 +27,7 @@ from strapgen.cli.commands import (
     stability,
     strapdown,
     study,
+    system,
     tableau,
     tables,
     two_speed,
@@ -50,6 +51,7 @@ COMMANDS: dict[str, dict[str, Any]] = {
     "Generate": {
         "generate": generate.generate,
         "two-speed": two_speed.two_speed,
+        "system": system.system,
         "vectors": vectors.vectors,
         "verify": verify.verify,
         "evidence": evidence.evidence,
