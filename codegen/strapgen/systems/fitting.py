@@ -9,12 +9,12 @@ from fractions import Fraction
 from strapgen import targets
 from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.fixed_settings import DEFAULT_ANGLE, TURNING, Settings
-from strapgen.ir.program import Reference
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Sources
 from strapgen.ir.system import Push, SystemStage
 from strapgen.library import generated_sources
 from strapgen.support.exceptions import InputError
+from strapgen.systems.sums import copies
 from strapgen.systems.wiring import Description
 from strapgen.targets import TARGETS
 from strapgen.targets.c.emit import real_of
@@ -175,17 +175,9 @@ class _Fit:
 
     def _copies(self, stage: SystemStage) -> dict[str, str]:
         """Return the states that are copies of inputs of the call before, with these inputs; not those with ranges."""
-        program = self.description.programs[stage.name]
-        if program.recursion is None:
-            return {}
-        inputs = {signal.elements: signal.name for signal in program.inputs}
-        outputs = {result.signal.name: result.nodes for result in program.outputs}
-        copies = {}
-        for state, output in program.recursion.states:
-            elements = tuple(node.name for node in outputs[output] if isinstance(node, Reference))
-            if elements in inputs and state not in self.description.ranges[stage.name]:
-                copies[state] = inputs[elements]
-        return copies
+        stated = self.description.ranges[stage.name]
+        known = copies(self.description.programs[stage.name])
+        return {state: name for state, name in known.items() if state not in stated}
 
     def _carry(self, stage: SystemStage) -> str:
         """Return the error feedback of a stage: in full it is that of all that goes on, sums and increments too."""
