@@ -78,6 +78,7 @@ if _typing.TYPE_CHECKING:
     from strapgen.simulation.recording import read_rates as read_rates
     from strapgen.simulation.runs import Run as Run
     from strapgen.simulation.runs import simulate as simulate
+    from strapgen.simulation.users_motions import read_motion as read_motion
     from strapgen.support.exceptions import CompilerError as CompilerError
     from strapgen.support.exceptions import InputError as InputError
     from strapgen.support.exceptions import InputTypeError as InputTypeError
@@ -184,6 +185,7 @@ _NAMES = {
         "Run",
         "simulate",
     ),
+    "simulation.users_motions": ("read_motion",),
     "support.exceptions": (
         "CompilerError",
         "InputError",

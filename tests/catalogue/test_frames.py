@@ -14,6 +14,7 @@ WITHOUT = {
         ("torque_increment", "compensated_torque_increment", "indicated_torque_increment"),
         "each element is about another torquer axis",
     ),
+    "level_angles": "its axes, level with heading 0, are those of no other signal",
     **dict.fromkeys(("deviation", "next_deviation", "heating_gain"), "there is one number for each gyro"),
 }
 #: Words of a meaning that name the frame.

@@ -262,6 +262,8 @@ def test_thesis_tables_have_a_panel_each_with_printed_and_computed_figures(figur
         bars = [bar.get_segments()[0][0][1] for bar in axes.collections]
         printed = [float(Fraction(figure)) for name in ALGORITHMS for figure in table.printed[name]]
         assert bars == printed
+        brackets = [line for text in axes.texts for line in text.get_text().splitlines()[1:]]
+        assert brackets == [f"[{each.scan}]" for each in table.repairs if each.algorithm]
         marks = [
             (float(line.get_ydata()[0]), line.get_markerfacecolor() == "white") for line in axes.get_lines()
         ]

@@ -25,9 +25,10 @@ from strapgen.catalogue.names import (
     UPDATE_ORDERS,
     VECTORS,
     Integrator,
-    Recipe,
     StepVector,
 )
+from strapgen.catalogue.navigation_names import NAVIGATION
+from strapgen.catalogue.recipe import Recipe
 
 __all__ = [
     "ALGORITHMS",
@@ -38,6 +39,7 @@ __all__ = [
     "MOST_BESIDE",
     "MOST_INCREMENTS",
     "MOTIONS",
+    "NAVIGATION",
     "RESERVED",
     "RUN_MOTIONS",
     "STANDARD_METHODS",

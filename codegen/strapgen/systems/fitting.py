@@ -9,6 +9,7 @@ from fractions import Fraction
 from strapgen import targets
 from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.fixed_settings import DEFAULT_ANGLE, TURNING, Settings
+from strapgen.ir.program import Reference
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Sources
 from strapgen.ir.system import Push, SystemStage
@@ -16,8 +17,8 @@ from strapgen.library import generated_sources
 from strapgen.support.exceptions import InputError
 from strapgen.systems.wiring import Description
 from strapgen.targets import TARGETS
-from strapgen.targets.names import UNNAMED, Naming
-from strapgen.targets.system_c.emit import unit_name
+from strapgen.targets.c.emit import real_of
+from strapgen.targets.names import MOST_CHOSEN, UNNAMED, Naming
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,11 @@ class Fitted:
     settings: Settings | None
     sources: Mapping[str, Sources]
     arguments: Mapping[str, Argument] = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """Name of the unit in C; code in other numbers has another, so that both link into one program."""
+        return self.description.system.name + _suffix(self.target, self.settings)
 
 
 def fitted(description: Description, target: str, settings: Settings | None = None) -> Fitted:
@@ -75,11 +81,22 @@ def fitted(description: Description, target: str, settings: Settings | None = No
     return Fitted(description, target, None, sources)
 
 
+def _suffix(target: str, settings: Settings | None) -> str:
+    """Return the ending of names in C for a kind of numbers."""
+    if settings is not None:
+        return f"_w{settings.word}"
+    return real_of(target).infix if TARGETS[target].compiled else ""
+
+
 def _generated(
     description: Description, stage: SystemStage, target: str, settings: Settings | None
 ) -> Sources:
-    name = f"{unit_name(description.system, target)}_{stage.name}"
-    naming = Naming(name=name) if TARGETS[target].compiled else UNNAMED
+    if not TARGETS[target].compiled:
+        return generated_sources.sources(description.choices[stage.name], target, settings, UNNAMED)
+    name = f"{description.system.name}_{stage.name}{_suffix(target, settings)}"
+    if len(name) > MOST_CHOSEN:
+        raise InputError(f"its function would be called {name}; at most {MOST_CHOSEN} characters are allowed")
+    naming = Naming(name=name)
     return generated_sources.sources(description.choices[stage.name], target, settings, naming)
 
 
@@ -135,9 +152,11 @@ class _Fit:
     def _settings(self, stage: SystemStage) -> Settings:
         """Return word, error feedback and the ranges of a stage's inputs."""
         ranges: dict[str, Fraction] = {}
-        angle = DEFAULT_ANGLE
+        angle, sources = DEFAULT_ANGLE, {wire.input: wire.source for wire in stage.wires}
+        copied = self._copies(stage)
         for wire, signal in zip(stage.wires, self._signals(stage), strict=True):
-            largest = self._range(stage, wire.input, wire.source, signal)
+            known = copied.get(wire.input, wire.input)
+            largest = self._range(stage, known, sources[known], signal)
             if signal.constraint or largest is None:
                 continue
             if wire.input in TURNING:
@@ -153,6 +172,20 @@ class _Fit:
             largest_angle=angle,
             stated="",
         )
+
+    def _copies(self, stage: SystemStage) -> dict[str, str]:
+        """Return the states that are copies of inputs of the call before, with these inputs; not those with ranges."""
+        program = self.description.programs[stage.name]
+        if program.recursion is None:
+            return {}
+        inputs = {signal.elements: signal.name for signal in program.inputs}
+        outputs = {result.signal.name: result.nodes for result in program.outputs}
+        copies = {}
+        for state, output in program.recursion.states:
+            elements = tuple(node.name for node in outputs[output] if isinstance(node, Reference))
+            if elements in inputs and state not in self.description.ranges[stage.name]:
+                copies[state] = inputs[elements]
+        return copies
 
     def _carry(self, stage: SystemStage) -> str:
         """Return the error feedback of a stage: in full it is that of all that goes on, sums and increments too."""
@@ -199,6 +232,7 @@ class _Fit:
                 continue
             if not signal.constraint or wire.input in self._shared(stage):
                 wired[wire.input] = str(argument.format)
+        wired |= {state: wired[name] for state, name in self._copies(stage).items() if name in wired}
         states = {output for output, cell in stage.results if cell in {w.source for w in stage.wires}}
         for output, cell in stage.results:
             argument = self.arguments.get(cell)

@@ -21,7 +21,7 @@ def unit(fit: Fitted, command: str) -> Sources:
         The command line that generates it.
     """
     system = fit.description.system
-    return emit.whole(system, (system.title, command), fit.sources, fit.arguments)
+    return emit.whole(system, fit.name, (system.title, command), fit.sources, fit.arguments)
 
 
 def sources(

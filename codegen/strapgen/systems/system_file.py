@@ -105,13 +105,15 @@ class SystemText:
     outputs: tuple[str, ...] = field(default=())
 
 
-def read(path: str | Path) -> SystemText:
+def read(path: str | Path, sample_hz: Fraction | None = None) -> SystemText:
     """Read the file of a system.
 
     Parameters
     ----------
     path : path
         A TOML file.
+    sample_hz : Fraction, optional
+        Cycles of the fastest rate in a second, in place of those in the file.
 
     Raises
     ------
@@ -133,7 +135,7 @@ def read(path: str | Path) -> SystemText:
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path} is not TOML ({error})") from None
     try:
-        return parsed(tables, re.sub(r"[^a-z0-9]+", "_", place.stem.lower()).strip("_"))
+        return parsed(tables, re.sub(r"[^a-z0-9]+", "_", place.stem.lower()).strip("_"), sample_hz)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
 
@@ -143,7 +145,7 @@ def _decimal(text: str) -> Fraction:
     return checks.number("number", text)
 
 
-def parsed(tables: Mapping[str, Any], name: str = "system") -> SystemText:
+def parsed(tables: Mapping[str, Any], name: str = "system", sample_hz: Fraction | None = None) -> SystemText:
     """Return the description that tables hold.
 
     Parameters
@@ -152,6 +154,8 @@ def parsed(tables: Mapping[str, Any], name: str = "system") -> SystemText:
         The content of the file.
     name : str, optional
         Name of the system if the file states none.
+    sample_hz : Fraction, optional
+        As for `read`.
     """
     _check_keys("the system", tables, _SYSTEM_KEYS, ("sample_hz", "inputs", "stage"))
     stages = tables["stage"]
@@ -162,12 +166,14 @@ def parsed(tables: Mapping[str, Any], name: str = "system") -> SystemText:
     outputs = tables.get("outputs", [])
     if not isinstance(outputs, list) or not all(isinstance(entry, str) for entry in outputs):
         raise InputError('outputs is no list of texts; ["stage.output"] is needed')
+    rate = _positive("sample_hz", tables["sample_hz"])
+    rate = rate if sample_hz is None else sample_hz
     described = SystemText(
         _name("name", tables.get("name", name)),
         checks.text("title", tables.get("title", "A described system")),
-        _positive("sample_hz", tables["sample_hz"]),
-        tuple(_input(key, value) for key, value in _table("inputs", tables["inputs"]).items()),
-        tuple(_stage(number, value) for number, value in enumerate(stages, 1)),
+        rate,
+        tuple(_input(key, value, 1 / rate) for key, value in _table("inputs", tables["inputs"]).items()),
+        tuple(_stage(number, value, rate) for number, value in enumerate(stages, 1)),
         tuple(outputs),
     )
     _check_unique(described)
@@ -182,7 +188,7 @@ def _check_unique(described: SystemText) -> None:
             raise InputError(f"the name {name!r} stands twice; every input and stage needs its own name")
 
 
-def _input(name: str, value: Any) -> InputText:
+def _input(name: str, value: Any, cycle: Fraction) -> InputText:
     """Return an input of the system."""
     where = f"input {name}"
     _name("inputs", name)
@@ -194,12 +200,12 @@ def _input(name: str, value: Any) -> InputText:
         name,
         checks.text(f"{where}: unit", table["unit"]),
         checks.text(f"{where}: frame", table.get("frame", "")),
-        _positive(f"{where}: range", table["range"]),
+        _positive(f"{where}: range", table["range"], cycle),
         checks.text(f"{where}: meaning", table.get("meaning", name.replace("_", " "))),
     )
 
 
-def _stage(number: int, value: Any) -> StageText:
+def _stage(number: int, value: Any, sample_hz: Fraction) -> StageText:
     """Return a stage."""
     table = _table(f"stage {number}", value)
     name = _name(f"name of stage {number}", table.get("name", ""))
@@ -208,10 +214,11 @@ def _stage(number: int, value: Any) -> StageText:
     word = table.get("word")
     try:
         carry = checks.choice("carry", table["carry"], CARRIES) if "carry" in table else ""
-        every = checks.count("every", table["every"], largest=MOST_CYCLES)
+        every = _every(table["every"], sample_hz)
         word = None if word is None else check_word(word)
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
+    cycle = every / sample_hz
     options = {key: table[key] for key in ("method", "increments", "previous", "ahead") if key in table}
     return StageText(
         name,
@@ -223,10 +230,10 @@ def _stage(number: int, value: Any) -> StageText:
         _texts(f"{where}: wires", table.get("wires", {})),
         _texts(f"{where}: writes", table.get("writes", {})),
         _delays(f"{where}: delay", table.get("delay", {})),
-        _numbers(f"{where}: constants", table.get("constants", {})),
-        _numbers(f"{where}: initial", table.get("initial", {})),
+        _numbers(f"{where}: constants", table.get("constants", {}), cycle),
+        _numbers(f"{where}: initial", table.get("initial", {}), cycle),
         {
-            key: _positive(f"{where}: range of {key}", entry)
+            key: _positive(f"{where}: range of {key}", entry, cycle)
             for key, entry in _table(f"{where}: ranges", table.get("ranges", {})).items()
         },
         _texts(f"{where}: formats", table.get("formats", {})),
@@ -270,22 +277,51 @@ def _delays(what: str, value: Any) -> dict[str, int]:
     return dict(value)
 
 
-def _positive(what: str, value: Any) -> Fraction:
-    return checks.number(what, _plain(what, value), positive=True)
+def _every(value: Any, sample_hz: Fraction) -> int:
+    """Return the cycles of the fastest rate from one call to the next, of a number or a text as "50 Hz"."""
+    match = re.fullmatch(r"([0-9.]+) ?Hz", value) if isinstance(value, str) else None
+    if match is None:
+        return checks.count("every", value, largest=MOST_CYCLES)
+    rate = checks.number("every", match[1], positive=True)
+    cycles = sample_hz / rate
+    if cycles.denominator != 1:
+        raise InputError(
+            f"every is {value!r}, which does not divide the {float(sample_hz):g} Hz of the samples"
+        )
+    return checks.count("every", int(cycles), largest=MOST_CYCLES)
 
 
-def _numbers(what: str, value: Any) -> dict[str, tuple[Fraction, ...]]:
-    return {key: tuple(_flat(f"{what}: {key}", entry)) for key, entry in _table(what, value).items()}
+def _positive(what: str, value: Any, cycle: Fraction = Fraction(1)) -> Fraction:
+    number = _quantity(what, value, cycle)
+    if number <= 0:
+        raise InputError(f"{what} is {value}; a number above 0 is needed")
+    return number
 
 
-def _flat(what: str, value: Any) -> list[Fraction]:
+def _numbers(what: str, value: Any, cycle: Fraction) -> dict[str, tuple[Fraction, ...]]:
+    return {key: tuple(_flat(f"{what}: {key}", entry, cycle)) for key, entry in _table(what, value).items()}
+
+
+def _flat(what: str, value: Any, cycle: Fraction) -> list[Fraction]:
     """Return the numbers of an entry, which may be nested lists, row-major."""
     if isinstance(value, list):
-        return [number for entry in value for number in _flat(what, entry)]
-    return [checks.number(what, _plain(what, value))]
+        return [number for entry in value for number in _flat(what, entry, cycle)]
+    return [_quantity(what, value, cycle)]
 
 
-def _plain(what: str, value: Any) -> Any:
+def _quantity(what: str, value: Any, cycle: Fraction) -> Fraction:
+    """Return a number, or a product or quotient of numbers and T, the cycle of the stage in s."""
     if isinstance(value, bool) or not isinstance(value, (int, str, Fraction)):
-        raise InputError(f'{what} is {value!r}; a number is needed, or a text as "1/3"')
-    return value
+        raise InputError(f'{what} is {value!r}; a number is needed, or a text as "1/3" or "90*T"')
+    if not isinstance(value, str):
+        return Fraction(value)
+    result, inverse = Fraction(1), False
+    for part in re.split(r"([*/])", value):
+        if part in ("*", "/"):
+            inverse = part == "/"
+            continue
+        factor = cycle if part.strip() == "T" else checks.number(what, part)
+        if inverse and not factor:
+            raise InputError(f"{what} is {value!r}, which divides by 0")
+        result = result / factor if inverse else result * factor
+    return result

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
 
@@ -43,12 +43,14 @@ class Description:
     formats: Mapping[str, Mapping[str, str]]
 
 
-def described(path: str | Path) -> Description:
+def described(path: str | Path, sample_hz: Fraction | None = None) -> Description:
     """Read the file of a system and wire it.
 
     Parameters
     ----------
     path : path
+    sample_hz : Fraction, optional
+        Cycles of the fastest rate in a second, in place of those in the file.
 
     Returns
     -------
@@ -59,7 +61,7 @@ def described(path: str | Path) -> Description:
     InputError
         If anything in the file is wrong; the message names the stage and the wire.
     """
-    text = system_file.read(path)
+    text = system_file.read(path, sample_hz)
     try:
         return wired(text)
     except InputError as error:
@@ -365,8 +367,3 @@ def _size(shape: tuple[int, ...]) -> int:
     for count in shape:
         size *= count
     return size
-
-
-def with_sample_hz(description: Description, sample_hz: Fraction) -> Description:
-    """Return a description at another rate of samples."""
-    return replace(description, system=replace(description.system, sample_hz=sample_hz))

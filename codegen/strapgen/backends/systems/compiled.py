@@ -91,6 +91,49 @@ class CompiledSystem(SystemRunner):
         }
         return values, self.memory(held)
 
+    def trace(self, samples: Mapping[str, Array], memory: SystemMemory | None = None) -> dict[str, Array]:
+        """Run checked samples cycle by cycle, and return every cell before the first cycle and after each.
+
+        Parameters
+        ----------
+        samples : mapping of str to array, (cycles, elements)
+            What `samples` returned.
+        memory : SystemMemory, optional
+
+        Returns
+        -------
+        dict of str to array, (cycles + 1, elements)
+            In the numbers of the C.
+
+        Raises
+        ------
+        InputError
+            If a stage refuses its input.
+        """
+        ffi = self.module.ffi
+        held = self.struct(memory or self.begin())
+        rows = [np.ascontiguousarray(samples[s.name], self._type(s.name)) for s in self.system.inputs]
+        first = [ffi.from_buffer(f"{_c_type(array)}[]", array) for array in rows]
+        sizes = [signal.size for signal in self.system.inputs]
+        cycle, view = getattr(self.module.lib, f"{self.name}_cycle"), ffi.buffer(held)
+        states = bytearray(view)
+        for k in range(len(rows[0])):
+            pointers = [pointer + k * size for pointer, size in zip(first, sizes, strict=True)]
+            status = cycle(held, *pointers)
+            if status:
+                raise self._refused(status, held, k)
+            states += view
+        return self._cells_of(np.frombuffer(states, np.uint8).reshape(len(rows[0]) + 1, len(view)))
+
+    def _cells_of(self, structs: Array) -> dict[str, Array]:
+        """Return the cells of many structs in memory, one a row of bytes."""
+        ffi, result = self.module.ffi, {}
+        for cell in self.system.cells:
+            place, kind = ffi.offsetof(f"{self.name}_memory", cell.name), self._type(cell.name)
+            columns = structs[:, place : place + kind.itemsize * cell.signal.size]
+            result[cell.name] = np.ascontiguousarray(columns).view(kind).astype(self._number(cell.name))
+        return result
+
     def _refused(self, status: int, held: Any, done: int) -> InputError:
         """Return the error of a stage that has refused its input."""
         stage = self.system.stages[held.refused - 1].name

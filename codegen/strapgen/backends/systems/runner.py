@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from strapgen.ir.signals import CYCLE
 from strapgen.ir.system import Push, Rate, SystemStage
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
+from strapgen.systems.bounds import SystemBounds, bounds
 from strapgen.systems.fitting import Fitted
 
 #: From this word length on, a word resolves what a double does, and samples are not rounded as sums.
@@ -60,6 +62,11 @@ class SystemRunner(ABC):
         feedback = {name: evaluator.fresh(runs) for name, evaluator in self.evaluators.items()}
         return SystemMemory(cells, feedback)
 
+    @cached_property
+    def rounding(self) -> SystemBounds:
+        """Error bounds of one pass."""
+        return bounds(self.fit)
+
     @property
     def _dtype(self) -> Any:
         return next(iter(self.evaluators.values())).dtype
@@ -69,10 +76,10 @@ class SystemRunner(ABC):
         held = self.system.cell(cell)
         array = checks.real_array(cell, value, held.signal.shape, np.float64).reshape(-1, held.signal.size)
         memory.cells[cell] = np.repeat(
-            self._converted(cell, array), len(memory.cells[cell]) // len(array), axis=0
+            self.stored(cell, array), len(memory.cells[cell]) // len(array), axis=0
         )
 
-    def _converted(self, name: str, values: Array) -> Array:
+    def stored(self, name: str, values: Array) -> Array:
         """Return numbers in SI units as the system stores them."""
         argument = self.fit.arguments.get(name)
         if argument is not None:
@@ -117,7 +124,7 @@ class SystemRunner(ABC):
             argument = self.fit.arguments.get(signal.name)
             if argument is not None and signal.over == CYCLE and argument.format.word < _EXACT_BITS:
                 values = pulses(values[:, None], argument.unit)[:, 0]
-            result[signal.name] = self._converted(signal.name, values)
+            result[signal.name] = self.stored(signal.name, values)
             counts.add(len(values))
         if len(counts) > 1:
             raise InputError(

@@ -13,16 +13,10 @@ from strapgen.ir.system import Cell, DescribedSystem, Push, Rate, SystemStage
 from strapgen.support.version import VERSION
 from strapgen.targets.c.emit import real_of
 from strapgen.targets.contract import argument_text, range_text
-from strapgen.targets.registry import BUILT_IN
 from strapgen.targets.rendering import render_c, runs_of
 
 #: Status of a null pointer.
 NULL = 4
-
-
-def unit_name(system: DescribedSystem, target: str) -> str:
-    """Return the name of a system in C; code in other numbers has another, so that both link into one program."""
-    return system.name + ("_fixed" if BUILT_IN[target].fixed else real_of(target).infix)
 
 
 @dataclass(frozen=True)
@@ -55,6 +49,7 @@ def places_between(source: Argument | None, destination: Argument | None) -> int
 
 def whole(
     system: DescribedSystem,
+    name: str,
     title_and_command: tuple[str, str],
     stages: Mapping[str, Sources],
     arguments: Mapping[str, Argument],
@@ -65,10 +60,12 @@ def whole(
     Parameters
     ----------
     system : DescribedSystem
+    name : str
+        Name of the unit in C.
     title_and_command : tuple of str
         A line for the head of the files, and the command line that generates them.
     stages : mapping of str to Sources
-        The C of each stage, whose functions have the names that `unit_name` gives.
+        The C of each stage.
     arguments : mapping of str to Argument
         Formats of cells and inputs; empty in floating point.
     budget : sequence of str, optional
@@ -80,7 +77,7 @@ def whole(
         The files of the whole, and those of the stages.
     """
     first = stages[system.stages[0].name]
-    printer = _Printer(system, unit_name(system, first.target), first.target, stages, arguments)
+    printer = _Printer(system, name, first.target, stages, arguments)
     files = render_c("system_c", printer.name, **printer.values(*title_and_command), budget=budget)
     for stage in stages.values():
         files |= stage.step_files
