@@ -9,12 +9,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from itertools import combinations
 
-from strapgen.ir.program import Assignment, Node, Operation, Program, Reference, references
+from strapgen.ir.program import Assignment, Node, Operation, Program, Reference, names_in
 from strapgen.lowering.arithmetic import Term, chain, plain, signed_sum
 from strapgen.lowering.names import is_temporary, shared_names
-from strapgen.lowering.passes.rewriting import rewritten, uses
+from strapgen.lowering.passes.rewriting import REMEMBERED, rewritten, uses
 
 #: The kind of the sum or product, two members, and whether their signs are equal; those of factors always are.
 _Pair = tuple[str, Node, Node, bool]
@@ -37,7 +38,7 @@ class _Entry:
     pairs: Counter[_Pair] = field(init=False)
 
     def __post_init__(self) -> None:
-        self.pairs = _count(self.tree)
+        self.pairs = _pairs_of(self.assignment.value)
 
 
 def share_pairs(program: Program) -> Program:
@@ -83,7 +84,7 @@ def share_pairs(program: Program) -> Program:
 def _inlined(program: Program) -> Program:
     """Put temporaries that are used once back into the tree that uses them."""
     counts = uses(program)
-    held = {name for result in program.results for node in result.nodes for name in references(node)}
+    held = {name for result in program.results for node in result.nodes for name in names_in(node)}
     values: dict[str, Node] = {}
     body = []
 
@@ -149,6 +150,12 @@ def _pairs(many: _Many) -> Iterator[_Pair]:
         members = sorted(((_tree(member), sign) for sign, member in many.members), key=repr)
         for (a, one), (b, other) in combinations(members, 2):
             yield many.kind, a, b, one == other
+
+
+@lru_cache(REMEMBERED)
+def _pairs_of(value: Node) -> Counter[_Pair]:
+    """Return in how many sums and products of a value each pair occurs; nobody changes it."""
+    return _count(_flat(value))
 
 
 def _count(tree: Node | _Many) -> Counter[_Pair]:
