@@ -28,6 +28,7 @@ ORDER = (
     "targets",
     "pipeline",
     "library",
+    "systems",
     "toolchain",
     "backends",
     "simulation",
@@ -41,7 +42,8 @@ ORDER = (
 )
 #: Folders that import without SymPy: what is in the cache runs without computer algebra.
 WITHOUT_SYMPY = (
-    *("support", "ir", "fixedpoint", "rounding", "targets", "library", "toolchain", "backends", "simulation"),
+    *("support", "ir", "fixedpoint", "rounding", "targets", "library", "systems", "toolchain"),
+    *("backends", "simulation"),
     *("cli", "catalogue/__init__.py", "catalogue/names.py", "catalogue/choice.py", "catalogue/choosing.py"),
 )
 #: The functions that do the work of a stage, and the folder to which each belongs.

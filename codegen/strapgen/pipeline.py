@@ -9,7 +9,7 @@ proved ranges and error bounds. `strapgen.build` makes a back end of the sources
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from strapgen import catalogue, fixedpoint, targets
@@ -54,6 +54,7 @@ def derive(
     rates: bool = False,
     previous: int | None = None,
     ahead: int | None = None,
+    constants: Mapping[str, Any] | None = None,
 ) -> Kernel:
     """Derive an algorithm exactly.
 
@@ -70,6 +71,9 @@ def derive(
         Whether the step takes the body rate at every node of its method, times the step length, in place of increments.
     previous, ahead : int, optional
         Increments from before the step and from after it that it takes too, together at most 32 (default 0).
+    constants : mapping of str to number, or to an array or nested sequence of numbers, optional
+        Values of inputs of a kernel that is no attitude algorithm, in their units and row by row, by name. These are
+        then no inputs; what is multiplied by zero vanishes.
 
     Raises
     ------
@@ -82,11 +86,13 @@ def derive(
     'euler-rk4-2'
     >>> derive("euler", method="rk4", rates=True).inputs[1].elements[:4]
     ('turn_0_x', 'turn_0_y', 'turn_0_z', 'turn_1_2_x')
+    >>> derive("temperature-coefficient", constants={"slope_above": 0.5, "slope_below": "1/2"}).outputs[0].expressions
+    (difference/2 + nominal,)
     """
     if not isinstance(algorithm, Choice):
         stages.require("derive", algorithm, str, os.PathLike, Choice)
-        algorithm = catalogue.choose(algorithm, method, increments, rates, previous, ahead)
-    elif (method, increments, rates, previous, ahead) != (None, None, False, None, None):
+        algorithm = catalogue.choose(algorithm, method, increments, rates, previous, ahead, constants)
+    elif (method, increments, rates, previous, ahead, constants) != (None, None, False, None, None, None):
         raise InputError(f"the choice of {algorithm.kernel} is complete; derive takes it alone")
     with timed("derive", algorithm.kernel):
         return catalogue.derive(algorithm)

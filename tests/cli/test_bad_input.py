@@ -44,6 +44,14 @@ BAD = {
     "two-speed dcm --target c-fixed --word 24": "word",
     "two-speed dcm --target c-fixed --range arm=1": "no loop has an input 'arm'",
     "two-speed dcm --format csv": "format 'csv' is not known",
+    # Constants
+    "derive temperature-coefficient --constant nominal": "--constant 'nominal' is no setting; NAME=VALUE is needed",
+    "derive temperature-coefficient --constant nominal=1,": "constant nominal is ''; a finite number is needed",
+    "generate imu-compensate --constant cylce=1": "constant 'cylce' is not known (did you mean cycle?)",
+    "generate imu-compensate --constant cycle=1 --constant cycle=2": "--constant cycle is given twice; one is needed",
+    "generate --all --constant cycle=1": "--all generates the whole catalogue; --constant does not go with it",
+    "cost --all --constant cycle=1": "--all measures the whole catalogue in fixed point; --constant does not go with",
+    "vectors euler --constant state=0,0,0,1": "algorithm euler takes no constants (got state)",
     # Numbers as Python alone writes them
     "two-speed dcm --sculling 0_2": "sculling is '0_2'; a whole number is needed",
     "derive euler --increments 0_2": "increments is '0_2'; a whole number is needed",

@@ -27,6 +27,10 @@ def generated_by(path: Path) -> str:
 
 LOOSE = "--rounding truncation --drift-allowance 1/100 --range angle_sum=0.25 --fix state=Q2.29"
 
+CONSTANTS = (
+    "--constant cycle=0.02 --constant cycle_rate=50 --constant 'rate_scale=1/3, -2e-9,0,0,0,0,0,0, 0.333333'"
+)
+
 
 @pytest.mark.parametrize(
     "command",
@@ -43,6 +47,8 @@ LOOSE = "--rounding truncation --drift-allowance 1/100 --range angle_sum=0.25 --
         "generate euler --method rk2 --target c-fixed --lsb-rad 1/100000000 --input-bits 24 --carry full",
         "generate euler --method rk2 --target c-fixed --max-rate-deg-s 400 --step 0.01 --input-bits 16",
         "generate dcm-two-speed-slow-2 --target fixed-model --word 24 --carry state --drift-allowance 0.1",
+        f"generate imu-compensate --target c-fixed {CONSTANTS} --range increment=0.1",
+        f"generate imu-compensate --target numpy {CONSTANTS}",
     ],
 )
 def test_the_command_of_every_file_makes_it_again(command, tmp_path):

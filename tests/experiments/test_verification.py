@@ -51,6 +51,20 @@ def test_a_file_as_generated_holds(ending, folder, capsys):
     assert 0.5 <= data["max_ulp"] <= data["bound_ulp"] < 0.6
 
 
+@pytest.mark.parametrize("target", ["c-fixed", pytest.param("c", marks=pytest.mark.long)])
+def test_a_file_with_constants_holds_and_one_with_others_does_not(target, tmp_path, capsys):
+    """The constants in the header choose what the file is held to."""
+    stated = "--constant slope_above=0.001 --constant slope_below=-1/3000"
+    command = f"generate temperature-coefficient {stated} --target {target} --out {tmp_path}"
+    assert says(command.split(), capsys)[0] == 0
+    (path,) = tmp_path.glob("*.h")
+    status, data = verified(path, capsys)
+    assert status == 0 and data["holds"]
+    changed(path, "-1/3000", "-1/2000")
+    status, data = verified(path, capsys)
+    assert status == 1 and not data["in_step"]
+
+
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("ending", "old", "new", "reason", "computes"),

@@ -6,7 +6,8 @@ from fractions import Fraction
 
 import pytest
 
-from strapgen.ir.signals import Signal
+from strapgen.ir.signals import FRAMES, Signal, after
+from strapgen.support.exceptions import InputError
 
 
 def test_a_matrix_names_its_elements_row_by_row():
@@ -37,7 +38,8 @@ def test_shape_and_elements_must_agree(shape, elements):
     "signal",
     [
         Signal.vector("rate", "w", unit="rad/s", meaning="body rate", bound=Fraction(1, 3)),
-        Signal.matrix("attitude", "C", bound=Fraction(1)),
+        Signal.matrix("attitude", "C", bound=Fraction(1), frame="b to n"),
+        Signal.vector("increment", "d", unit="any", frame="any", over="cycle"),
         Signal.scalar("time", unit="s"),
     ],
 )
@@ -46,6 +48,32 @@ def test_plain_data_holds_all_of_a_signal(signal):
     assert restored == signal
     assert isinstance(restored.shape, tuple) and isinstance(restored.elements, tuple)
     assert type(restored.bound) is type(signal.bound)  # 1/3 must not come back as a decimal
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        (
+            {"frame": "q"},
+            "frame of rate 'q' is not known; allowed: b, n, e, i, any, or an attitude such as 'b to n'",
+        ),
+        ({"frame": "b to q"}, "frame of rate 'b to q' is not known"),
+        ({"frame": "b to n to e"}, "frame of rate 'b to n to e' is not known"),
+        ({"frame": "any to b"}, "frame of rate 'any to b' is not known"),
+        ({"over": "step"}, "over of rate 'step' is not known; allowed: cycle, or nothing"),
+    ],
+)
+def test_a_frame_is_one_of_the_table_or_leads_from_one_to_another(fields, words):
+    with pytest.raises(InputError) as caught:
+        Signal.vector("rate", "w", **fields)
+    assert str(caught.value).startswith(words)
+    for frame in (*FRAMES, "any", "b to n", "n to n", ""):
+        assert Signal.vector("rate", "w", frame=frame).frame == frame
+
+
+def test_a_state_after_a_call_has_unit_frame_and_cycle_of_the_state():
+    state = Signal.vector("sum", "s", unit="rad", frame="b", over="cycle")
+    assert (after(state).unit, after(state).frame, after(state).over) == ("rad", "b", "cycle")
 
 
 def test_a_signal_does_not_change():

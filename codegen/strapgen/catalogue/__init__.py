@@ -7,7 +7,7 @@ loaded when it is derived.
 from __future__ import annotations
 
 from strapgen.catalogue.choice import Choice, increments, orthonormalizations, previous
-from strapgen.catalogue.choosing import choose, choose_step, standard
+from strapgen.catalogue.choosing import choose, choose_step, standard, with_constants
 from strapgen.catalogue.derivation import companion, derive, enough, nodes, rounding
 from strapgen.catalogue.names import (
     ALGORITHMS,
@@ -25,9 +25,10 @@ from strapgen.catalogue.names import (
     UPDATE_ORDERS,
     VECTORS,
     Integrator,
-    Recipe,
     StepVector,
 )
+from strapgen.catalogue.navigation_names import NAVIGATION
+from strapgen.catalogue.recipe import Recipe
 
 __all__ = [
     "ALGORITHMS",
@@ -38,6 +39,7 @@ __all__ = [
     "MOST_BESIDE",
     "MOST_INCREMENTS",
     "MOTIONS",
+    "NAVIGATION",
     "RESERVED",
     "RUN_MOTIONS",
     "STANDARD_METHODS",
@@ -59,4 +61,5 @@ __all__ = [
     "previous",
     "rounding",
     "standard",
+    "with_constants",
 ]

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, TypeAlias
 
+from strapgen.catalogue.constants import Constants, options
 from strapgen.catalogue.methods.shaped_coning import ShapedConing, named_shape
 from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.catalogue.methods.window import Window
@@ -37,6 +38,9 @@ class Choice:
         Numbers of increments from before the step and from after it that it takes in addition to its own.
     user_kernel : Kernel, optional
         A user's kernel itself, with the kernels that it brings; None for one of the catalogue.
+    constants : tuple of (str, tuple of Fraction), optional
+        Inputs that are constants, sorted by name, each with its numbers in row-major order; of kernels that are no
+        attitude steps.
     """
 
     name: str
@@ -46,6 +50,7 @@ class Choice:
     ahead: int = 0
     # Equality compares the kernels; the hash leaves them out, because most choices differ in name or numbers.
     user_kernel: Kernel | None = field(default=None, hash=False, repr=False)
+    constants: Constants = ()
 
     @classmethod
     def of_user(cls, kernel: Kernel) -> Choice:
@@ -86,13 +91,14 @@ class Choice:
     def identity(self) -> str:
         """Text that differs between choices with different kernels or generated files: the key of the library's cache.
 
-        It is the name of the kernel and, where that is a user's to choose, the tableau with its file or the kernel.
+        It is the name of the kernel with its constants and, where that is a user's to choose, the tableau with its file
+        or the kernel.
         """
         if self.user_kernel is not None:
             return f"{self.kernel} {_text(self.user_kernel)}"
         if self.method is not None and not isinstance(self.method, str):
             return f"{self.kernel} {self.method!r} {self.method.file}"
-        return self.kernel
+        return f"{self.kernel} {options(self.constants)}" if self.constants else self.kernel
 
     @property
     def increments_per_step(self) -> int:

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
+from strapgen.catalogue import constants as constant_values
 from strapgen.catalogue.choice import AnyMethod, Choice
 from strapgen.catalogue.methods.shaped_coning import ShapedConing, named_shape
 from strapgen.catalogue.methods.tableau import Tableau
@@ -38,6 +41,7 @@ def choose(
     rates: bool = False,
     previous: int | None = None,
     ahead: int | None = None,
+    constants: Mapping[str, Any] | None = None,
 ) -> Choice:
     """Check a choice of kernel and fill in the defaults: fourth order, two increments.
 
@@ -53,6 +57,9 @@ def choose(
         they choose the filters with so many of its samples on that side.
     rates : bool, optional
         Whether the step takes the rate at the nodes of its method in place of increments.
+    constants : mapping of str to number, or to an array or nested sequence of numbers, optional
+        Values of inputs of a kernel that is no attitude step, in their units and row by row; they are then constants
+        of its code. A float stands for its shortest decimal form. `derive` refuses what the kernel has no input for.
 
     Raises
     ------
@@ -63,7 +70,33 @@ def choose(
     --------
     >>> choose("euler").kernel
     'euler-rk4-2'
+    >>> choose("temperature-coefficient", constants={"slope_above": 0}).constants
+    (('slope_above', (Fraction(0, 1),)),)
     """
+    choice = _choose(name, method, increments, rates, previous, ahead)
+    return choice if constants is None else with_constants(choice, constants)
+
+
+def with_constants(choice: Choice, constants: Mapping[str, Any]) -> Choice:
+    """Return a choice with constants in place of inputs; `constants` and errors are those of `choose`."""
+    values = constant_values.read(constants)
+    if values and (choice.name in ALGORITHMS or choice.name in VECTORS or choice.user_kernel is not None):
+        raise InputError(
+            f"algorithm {choice.name} takes no constants (got {values[0][0]}); kernels without a method do, such as "
+            "imu-compensate"
+        )
+    return replace(choice, constants=values)
+
+
+def _choose(
+    name: str,
+    method: AnyMethod | None,
+    increments: int | None,
+    rates: bool,
+    previous: int | None,
+    ahead: int | None,
+) -> Choice:
+    """Return the choice without constants."""
     if isinstance(name, os.PathLike):
         name = os.fspath(name)
     if not isinstance(name, str):

@@ -63,7 +63,22 @@ def derive(choice: Choice) -> Kernel:
     ----------
     choice : Choice
         What `choose` returned.
+
+    Raises
+    ------
+    InputError
+        If the kernel has no input for a constant of the choice, see `folding.fold`.
     """
+    kernel = _derived(choice)
+    if not choice.constants:
+        return kernel
+    from strapgen.catalogue.folding import fold
+
+    return fold(kernel, choice.constants)
+
+
+def _derived(choice: Choice) -> Kernel:
+    """Return the kernel of a choice with all its inputs."""
     if choice.user_kernel is not None:
         return choice.user_kernel
     if choice.method is None:

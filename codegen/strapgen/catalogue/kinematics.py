@@ -92,12 +92,22 @@ DCM = Kinematics(
     name="dcm",
     title="Direction cosine matrix",
     source=f"{THESIS}, chapter 2, equation (2.1): dC/dt = C skew(w)",
-    state=Signal.matrix("state", "C", meaning=DCM_MEANING, bound=UNIT, constraint="rotation"),
+    state=Signal.matrix("state", "C", meaning=DCM_MEANING, bound=UNIT, constraint="rotation", frame="b to n"),
     transition=Signal.matrix(
-        "transition", "A", meaning="the step applied to the identity", bound=UNIT, constraint="rotation"
+        "transition",
+        "A",
+        meaning="the step applied to the identity",
+        bound=UNIT,
+        constraint="rotation",
+        frame="b to b",
     ),
     next=Signal.matrix(
-        "next", "next", meaning=f"{DCM_MEANING}, after the step", bound=UNIT, constraint="rotation"
+        "next",
+        "next",
+        meaning=f"{DCM_MEANING}, after the step",
+        bound=UNIT,
+        constraint="rotation",
+        frame="b to n",
     ),
     identity=sp.eye(3),
     scale=sp.Integer(1),
@@ -113,12 +123,26 @@ EULER = Kinematics(
     name="euler",
     title="Euler parameters",
     source=f"{THESIS}, chapter 2: de/dt = 1/2 e (w, 0), quaternion product",
-    state=Signal.labelled("state", "e", "xyzs", meaning=EULER_MEANING, bound=UNIT, constraint="unit"),
+    state=Signal.labelled(
+        "state", "e", "xyzs", meaning=EULER_MEANING, bound=UNIT, constraint="unit", frame="b to n"
+    ),
     transition=Signal.labelled(
-        "transition", "p", "xyzs", meaning="the step applied to the identity", bound=UNIT, constraint="unit"
+        "transition",
+        "p",
+        "xyzs",
+        meaning="the step applied to the identity",
+        bound=UNIT,
+        constraint="unit",
+        frame="b to b",
     ),
     next=Signal.labelled(
-        "next", "next", "xyzs", meaning=f"{EULER_MEANING}, after the step", bound=UNIT, constraint="unit"
+        "next",
+        "next",
+        "xyzs",
+        meaning=f"{EULER_MEANING}, after the step",
+        bound=UNIT,
+        constraint="unit",
+        frame="b to n",
     ),
     identity=sp.Matrix([0, 0, 0, 1]),
     scale=sp.Rational(1, 2),
@@ -134,9 +158,17 @@ CAYLEY_KLEIN = Kinematics(
     name="cayley-klein",
     title="Cayley-Klein parameters",
     source=f"{THESIS}, chapter 2: dU/dt = (i/2) (w . s) U, s the Pauli matrices",
-    state=Signal.labelled("state", "a", "sxyz", meaning=CAYLEY_KLEIN_MEANING, bound=UNIT, constraint="unit"),
+    state=Signal.labelled(
+        "state", "a", "sxyz", meaning=CAYLEY_KLEIN_MEANING, bound=UNIT, constraint="unit", frame="b to n"
+    ),
     transition=Signal.labelled(
-        "transition", "p", "sxyz", meaning="the step applied to the identity", bound=UNIT, constraint="unit"
+        "transition",
+        "p",
+        "sxyz",
+        meaning="the step applied to the identity",
+        bound=UNIT,
+        constraint="unit",
+        frame="b to b",
     ),
     next=Signal.labelled(
         "next",
@@ -145,6 +177,7 @@ CAYLEY_KLEIN = Kinematics(
         meaning=f"{CAYLEY_KLEIN_MEANING}, after the step",
         bound=UNIT,
         constraint="unit",
+        frame="b to n",
     ),
     identity=sp.Matrix([1, 0, 0, 0]),
     scale=sp.Rational(1, 2),

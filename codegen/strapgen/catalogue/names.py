@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from strapgen.catalogue.methods.shaped_coning import SHAPE_TITLES
 from strapgen.catalogue.methods.tableaux import TITLES
 from strapgen.catalogue.methods.windows import EXACT_TERMS, WINDOW_TITLES
+from strapgen.catalogue.navigation_names import NAVIGATION
+from strapgen.catalogue.recipe import Recipe
 
 #: Attitude algorithms, by the state they integrate.
 ALGORITHMS = {
@@ -118,16 +120,6 @@ RUN_MOTIONS = {
     "ramps": {"onset": "s", "rate": "rad/s"},
     "vibration": {"angle": "rad", "gyro": "Hz"},
 }
-
-
-class Recipe(NamedTuple):
-    """A kernel that takes no method: the module, the function and its arguments that derive it."""
-
-    title: str
-    module: str
-    function: str
-    arguments: tuple[Any, ...] = ()
-    standard: bool = True
 
 
 #: Degrees of the rate for which there are steps from its Legendre coefficients: to fourth order, and exact.
@@ -282,6 +274,16 @@ COMPENSATION = {
     )
 }
 
+#: Kernels between stages of different rates, and from counts; they take no method.
+SAMPLING = {
+    "sum-3": Recipe("sum of increments for a slower cycle", "sampling", "increment_sum", (), False),
+    "hold-3": Recipe("increments shared out to faster cycles", "sampling", "held_increment", (), False),
+    "angle-counts": Recipe("angle increments from counts", "sampling", "scaled_counts", ("angle",), False),
+    "velocity-counts": Recipe(
+        "velocity increments from counts", "sampling", "scaled_counts", ("velocity",), False
+    ),
+}
+
 #: Kernels that take no method.
 KERNELS = {
     **{
@@ -338,8 +340,10 @@ KERNELS = {
         )
         for motion in MOTIONS
     },
+    **SAMPLING,
     **TWO_SPEED,
     **COMPENSATION,
+    **NAVIGATION,
 }
 
 

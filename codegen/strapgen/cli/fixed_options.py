@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from strapgen.cli.options import one, option, whole
+from strapgen.cli.options import one, option, pair, whole
 from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
@@ -185,7 +185,7 @@ class FixedOptions:
             carry="none" if self.carry is None else self.carry,
             **allowance,
             ranges=_numbers(self.ranges or ()),
-            formats=dict(_pair("--fix", text) for text in self.formats or ()),
+            formats=dict(pair("--fix", text) for text in self.formats or ()),
         )
 
     def _check_pairs(self) -> None:
@@ -293,12 +293,5 @@ class FixedOptions:
 def _numbers(texts: Iterable[str]) -> dict[str, Fraction]:
     from strapgen.support import checks
 
-    pairs = (_pair("--range", text) for text in texts)
+    pairs = (pair("--range", text) for text in texts)
     return {name: checks.number(f"range of {name}", value, positive=True) for name, value in pairs}
-
-
-def _pair(option: str, text: str) -> tuple[str, str]:
-    name, equals, value = text.partition("=")
-    if not equals or not name or not value:
-        raise InputError(f"{option} {text!r} is no setting; NAME=VALUE is needed")
-    return name, value

@@ -196,6 +196,40 @@ class MethodOptions:
             return choose(algorithm, method, count, self.rates, before, after)
 
 
+@dataclass(frozen=True)
+class KernelOptions(MethodOptions):
+    """Options that choose a kernel: those of an attitude step, and the constants of any other."""
+
+    constant: Annotated[
+        list[str] | None,
+        option(
+            "--constant",
+            metavar="NAME=VALUE,...",
+            help="Value of the input NAME in its unit, row by row, which the code then has as a constant.",
+        ),
+    ] = None
+
+    @property
+    def stated(self) -> list[str]:
+        """The options that the command line has."""
+        return [name for name in super().stated if name != "--constant" or self.constant]
+
+    def choose(self, algorithm: str, *, step: bool = True) -> Choice:
+        """Return the kernel that the options choose of an algorithm, with its constants."""
+        choice = super().choose(algorithm, step=step)
+        if not self.constant:
+            return choice
+        from strapgen import catalogue
+
+        constants: dict[str, list[str]] = {}
+        for text in self.constant:
+            name, numbers = pair("--constant", text)
+            if name in constants:
+                raise InputError(f"--constant {name} is given twice; one is needed")
+            constants[name] = [number.strip() for number in numbers.split(",")]
+        return catalogue.with_constants(choice, constants)
+
+
 #: The options of an attitude step, which takes increments.
 STEP_OPTIONS = ("method", "tableau", "window", "coning", "increments", "previous", "ahead")
 
@@ -287,6 +321,20 @@ def backends(option: str, text: str | None, default: Sequence[str]) -> list[str]
     if text is None:
         return list(default)
     return [checks.choice("backend", name, BACKENDS) for name in listed(option, text)]
+
+
+def pair(option: str, text: str) -> tuple[str, str]:
+    """Return the name and the value of a setting.
+
+    Raises
+    ------
+    InputError
+        If the text is none.
+    """
+    name, equals, value = text.partition("=")
+    if not equals or not name or not value:
+        raise InputError(f"{option} {text!r} is no setting; NAME=VALUE is needed")
+    return name, value
 
 
 def _parts(option: str, text: str | None) -> list[str | None]:

@@ -133,16 +133,23 @@ def samples(
             # Turns by quarters and corners first, where the extremes are, then random ones.
             vectors = rng.normal(size=(_COUNT, 4))
             vectors[:200] = vectors[:200].round()
-            vectors[~vectors.any(axis=1)] = [0, 0, 0, 1]
-            unit = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
             if signal.constraint == "rotation":
+                unit = _of_length_one(vectors)
                 v, s = unit[:, :3], unit[:, 3:, None]
                 skew = np.cross(np.eye(3), v[:, None, :])
                 rotation = np.eye(3) * (2 * s**2 - 1) + 2 * v[:, :, None] * v[:, None, :] - 2 * s * skew
                 inside = rotation.reshape(_COUNT, 9)
             else:
-                inside = unit[:, : signal.size] if signal.size <= 4 else box
+                inside = _of_length_one(vectors[:, : signal.size]) if signal.size <= 4 else box
         for k, name in enumerate(signal.elements):
             proper[name], anywhere[name] = inside[:, k], box[:, k]
     assert all(math.isfinite(float(values.max())) for values in anywhere.values())
     return proper, anywhere
+
+
+def _of_length_one(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return vectors divided by their lengths; the last axis stands for a vector of zeros."""
+    vectors = vectors.copy()
+    vectors[~vectors.any(axis=1), -1] = 1
+    unit: NDArray[np.float64] = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+    return unit

@@ -37,8 +37,8 @@ from strapgen.ir.fixed_interface import Argument, ErrorFeedback, Interface
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.formats import Format
 from strapgen.ir.integer_program import FixedProgram, IntegerSum, Value, operation_counts, used_by
-from strapgen.ir.program import Program
-from strapgen.ir.signals import Signal
+from strapgen.ir.program import Program, Result
+from strapgen.ir.signals import CYCLE, Signal
 from strapgen.support.exceptions import InputError
 
 #: Bits that inputs may be stored below their finest format, so that sums of them are exact.
@@ -132,13 +132,22 @@ def _feedback_names(program: Program, settings: Settings, quantities: Quantities
     """Return the name of the error feedback of every quantity whose rounding error goes into the next call."""
     if settings.carry == "none":
         return {}
-    first, result = program.inputs[0], program.outputs[0]
-    if (first.shape, first.constraint) != (result.signal.shape, result.signal.constraint):
-        return {}
-    elements = [*quantities.results[result.signal.name]]
-    if settings.carry == "full" and program.transition is not None:
-        elements += quantities.results[program.transition.signal.name]
+    elements = [name for result in _handed_on(program, settings) for name in quantities.results[result.signal.name]]
     return {name: f"residual_{name}" for name in elements if isinstance(name, str)}
+
+
+def _handed_on(program: Program, settings: Settings) -> list[Result]:
+    """Return the results whose rounding errors go into the next call."""
+    first, result = program.inputs[0], program.outputs[0]
+    is_state = (first.shape, first.constraint) == (result.signal.shape, result.signal.constraint)
+    handed_on = [result] if is_state else []
+    if settings.carry == "all":
+        states = program.recursion.inputs if program.recursion else {}
+        others = [r for r in program.outputs if r.signal.name in states or r.signal.over == CYCLE]
+        handed_on += [other for other in others if other not in handed_on]
+    if settings.carry != "state" and handed_on and program.transition is not None:
+        handed_on.append(program.transition)
+    return handed_on
 
 
 def _is_worse(one: FixedProgram, other: FixedProgram) -> bool:

@@ -18,6 +18,7 @@ CARRIES = {
     "none": "nothing",
     "state": "the rounding of the state",
     "full": "the rounding of the state and of the transition",
+    "all": "that, and the rounding of every other value that is handed on and of every increment that goes out",
 }
 
 #: Formats of the state that hold no magnitude of 1, as CMSIS has them, with the word that each goes with.
@@ -50,7 +51,8 @@ class Settings:
     rounding : str
         "nearest" (halves up) or "truncation" (down).
     carry : str
-        Rounding errors that are fed back from call to call: "none", "state", or "full", those of state and transition.
+        Rounding errors that are fed back from call to call: "none", "state", "full", those of state and transition, or
+        "all", those of every value that goes into the next call and of every increment that goes out too.
     allowance : Fraction
         By how much an element of a state may exceed 1 in magnitude.
     ranges : mapping of str to Fraction

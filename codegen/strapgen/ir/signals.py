@@ -8,6 +8,22 @@ from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from typing import Any
 
+from strapgen.support import checks
+
+#: Frames that the components of a signal can be in.
+FRAMES = {
+    "b": "body",
+    "n": "navigation",
+    "e": "earth-fixed",
+    "i": "inertial",
+}
+
+#: What stands for the unit or the frame of a signal that takes those of whatever is wired to it.
+ANY = "any"
+
+#: The value of `Signal.over` of an increment.
+CYCLE = "cycle"
+
 
 @dataclass(frozen=True)
 class Signal:
@@ -22,7 +38,8 @@ class Signal:
     elements : tuple of str
         Name of every element, in row-major order.
     unit : str
-        Unit, "1" for a pure number.
+        Unit, "1" for a pure number; "any" for that of the signal that is wired to it, which all signals of a kernel
+        with the unit "any" share.
     meaning : str
         Description in the terms of the field, with the frame.
     bound : Fraction or None
@@ -30,11 +47,19 @@ class Signal:
     constraint : str
         Relation between the elements in proper use: "unit" (a vector of length 1), "rotation" (a rotation
         matrix), or "" if there is none.
+    frame : str
+        Frame of the components, a key of `FRAMES`; of an attitude "b to n", which turns components in the first frame
+        into those in the second; "any" as for the unit; "" for scalars and for what has no frame.
+    over : str
+        "cycle" for an increment: a change over the cycle of the stage that the signal is part of, which must not be
+        sampled at another rate. "" for a value at an instant; a sum that a slower stage resets is one.
 
     Raises
     ------
     ValueError
         If the shape does not have as many elements as are named.
+    InputError
+        If the frame is not known, or `over` is neither "cycle" nor "".
 
     Examples
     --------
@@ -49,10 +74,16 @@ class Signal:
     meaning: str = ""
     bound: Fraction | None = None
     constraint: str = ""
+    frame: str = ""
+    over: str = ""
 
     def __post_init__(self) -> None:
         if math.prod(self.shape) != len(self.elements):
             raise ValueError(f"signal {self.name!r}: shape {self.shape} with {len(self.elements)} elements")
+        if not set(self.frame.split(" to ", maxsplit=1)) <= set(FRAMES) and self.frame not in ("", ANY):
+            checks.choice(f"frame of {self.name}", self.frame, [*FRAMES, ANY], "an attitude such as 'b to n'")
+        if self.over:
+            checks.choice(f"over of {self.name}", self.over, [CYCLE], "nothing")
 
     @classmethod
     def labelled(cls, name: str, prefix: str, labels: Iterable[str], **rest: Any) -> Signal:

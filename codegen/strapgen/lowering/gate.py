@@ -99,6 +99,9 @@ class _Writer:
             for argument in rest:
                 first = Operation("maximum", (first, argument))
             return first
+        if isinstance(expression, sp.Abs):
+            value = self._named(self.node(expression.args[0]))
+            return Operation("maximum", (value, Operation("negate", (value,))))
         if isinstance(expression, sp.Piecewise):
             return self._choice(list(expression.args))
         if expression.func in (sp.asin, sp.acos):

@@ -15,7 +15,12 @@ from strapgen.symbolic.kernel import Kernel, KernelBuilder
 from strapgen.symbolic.rotations import cross
 
 TRANSFORMED = Signal.vector(
-    "transformed", "v", unit="m/s", meaning="velocity increment of the slow cycle, navigation axes"
+    "transformed",
+    "v",
+    unit="m/s",
+    meaning="velocity increment of the slow cycle, navigation axes",
+    frame="n",
+    over="cycle",
 )
 NAVIGATION_VELOCITY = Signal.vector(
     "navigation_velocity",
@@ -23,6 +28,7 @@ NAVIGATION_VELOCITY = Signal.vector(
     unit="m/s",
     meaning="sum of the velocity increments over the navigation cycle, navigation axes",
     bound=Fraction(64),
+    frame="n",
 )
 
 
@@ -45,7 +51,9 @@ def rotated(build: KernelBuilder, name: str, state: sp.Matrix, u: sp.Matrix) -> 
     """
     if name == "dcm":
         return state * u
-    matrix = Signal.matrix("attitude", "C", meaning=DCM_MEANING, bound=UNIT, constraint="rotation")
+    matrix = Signal.matrix(
+        "attitude", "C", meaning=DCM_MEANING, bound=UNIT, constraint="rotation", frame="b to n"
+    )
     return build.stage(matrix, rotations.quaternion_matrix(state).applyfunc(sp.expand)) * u
 
 
@@ -86,11 +94,16 @@ def transformation(name: str) -> Kernel:
     state = build.input(KINEMATICS[name].state)
     a = build.input(
         Signal.vector(
-            "acceleration", "a", unit="m/s^2", meaning="specific force, body axes", bound=Fraction(128)
+            "acceleration",
+            "a",
+            unit="m/s^2",
+            meaning="specific force, body axes",
+            bound=Fraction(128),
+            frame="b",
         )
     )
     build.output(
-        Signal.vector("transformed", "v", unit="m/s^2", meaning="specific force, navigation axes"),
+        Signal.vector("transformed", "v", unit="m/s^2", meaning="specific force, navigation axes", frame="n"),
         rotated(build, name, state, a),
     )
     return build.kernel(
@@ -144,7 +157,14 @@ def navigation_velocity() -> Kernel:
     build = KernelBuilder()
     theta, v = build.input(NAVIGATION_ROTATION), build.input(NAVIGATION_VELOCITY)
     build.output(
-        Signal.vector("correction", "correction", unit="m/s", meaning="to be added to the velocity"),
+        Signal.vector(
+            "correction",
+            "correction",
+            unit="m/s",
+            meaning="to be added to the velocity",
+            frame="n",
+            over="cycle",
+        ),
         frame_correction(theta, v),
     )
     return build.kernel(

@@ -109,6 +109,8 @@ def rotation_vector(method: Method, increments: int | None, previous: int = 0, a
             "rotation_vector",
             unit="rad",
             meaning="rotation vector of the step, body axes",
+            frame="b",
+            over="cycle",
         ),
         vector,
     )

@@ -19,6 +19,8 @@ INCREMENT = Signal.vector(
     unit="rad",
     meaning="angle increment of the fast cycle, body axes: exact integral of the body rate",
     bound=Fraction(1, 8),
+    frame="b",
+    over="cycle",
 )
 PREVIOUS = Signal.vector(
     "previous_increment",
@@ -26,6 +28,8 @@ PREVIOUS = Signal.vector(
     unit="rad",
     meaning="angle increment of the fast cycle before; zero at the start",
     bound=Fraction(1, 8),
+    frame="b",
+    over="cycle",
 )
 ANGLE_SUM = Signal.vector(
     "angle_sum",
@@ -33,6 +37,7 @@ ANGLE_SUM = Signal.vector(
     unit="rad",
     meaning="sum of the angle increments since the slow cycle began",
     bound=Fraction(1),
+    frame="b",
 )
 CONING = Signal.vector(
     "coning",
@@ -40,6 +45,7 @@ CONING = Signal.vector(
     unit="rad",
     meaning="coning correction since the slow cycle began",
     bound=Fraction(1, 8),
+    frame="b",
 )
 VELOCITY_INCREMENT = Signal.vector(
     "velocity_increment",
@@ -47,6 +53,8 @@ VELOCITY_INCREMENT = Signal.vector(
     unit="m/s",
     meaning="velocity increment of the fast cycle, body axes: exact integral of the specific force",
     bound=Fraction(1),
+    frame="b",
+    over="cycle",
 )
 VELOCITY_SUM = Signal.vector(
     "velocity_sum",
@@ -54,6 +62,7 @@ VELOCITY_SUM = Signal.vector(
     unit="m/s",
     meaning="sum of the velocity increments since the slow cycle began",
     bound=Fraction(8),
+    frame="b",
 )
 SCULLING = Signal.vector(
     "sculling",
@@ -61,6 +70,7 @@ SCULLING = Signal.vector(
     unit="m/s",
     meaning="sculling integral since the slow cycle began",
     bound=Fraction(4),
+    frame="b",
 )
 
 

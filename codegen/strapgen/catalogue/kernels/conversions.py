@@ -15,7 +15,7 @@ from strapgen.symbolic import rotations
 from strapgen.symbolic.kernel import Kernel, KernelBuilder
 
 _CONVERTED = Signal.matrix(
-    "attitude", "C", meaning=DCM.state.meaning, bound=DCM.state.bound, constraint="rotation"
+    "attitude", "C", meaning=DCM.state.meaning, bound=DCM.state.bound, constraint="rotation", frame="b to n"
 )
 
 
@@ -23,14 +23,7 @@ def _result(kinematics: Kinematics) -> Signal:
     """Return the signal of a state that results from a conversion."""
     state = kinematics.state
     elements = tuple(f"next_{element.split('_')[1]}" for element in state.elements)
-    return Signal(
-        "converted",
-        state.shape,
-        elements,
-        meaning=state.meaning,
-        bound=state.bound,
-        constraint=state.constraint,
-    )
+    return replace(state, name="converted", elements=elements)
 
 
 def dcm_from_euler() -> Kernel:

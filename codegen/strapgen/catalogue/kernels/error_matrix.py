@@ -23,19 +23,30 @@ def error_matrix() -> Kernel:
     """
     build = KernelBuilder()
     computed = build.input(
-        Signal.matrix("computed", "C", meaning=f"{DCM_MEANING}, computed", bound=UNIT, constraint="rotation")
+        Signal.matrix(
+            "computed",
+            "C",
+            meaning=f"{DCM_MEANING}, computed",
+            bound=UNIT,
+            constraint="rotation",
+            frame="b to n",
+        )
     )
     truth = build.input(
-        Signal.matrix("truth", "T", meaning=f"{DCM_MEANING}, true", bound=UNIT, constraint="rotation")
+        Signal.matrix(
+            "truth", "T", meaning=f"{DCM_MEANING}, true", bound=UNIT, constraint="rotation", frame="b to n"
+        )
     )
     E = build.output(
-        Signal.matrix("error", "E", meaning="error matrix, reference axes"),
+        Signal.matrix("error", "E", meaning="error matrix, reference axes", frame="n"),
         computed * truth.T - sp.eye(3),
     )
     symmetric, turning = (E + E.T) / 2, (E - E.T) / 2
-    build.output(Signal.vector("scale", "scale", meaning="scale errors, reference axes"), E.diagonal())
     build.output(
-        Signal.vector("skew", "skew", unit="rad", meaning="skew errors, reference axes"),
+        Signal.vector("scale", "scale", meaning="scale errors, reference axes", frame="n"), E.diagonal()
+    )
+    build.output(
+        Signal.vector("skew", "skew", unit="rad", meaning="skew errors, reference axes", frame="n"),
         [symmetric[1, 2], symmetric[0, 2], symmetric[0, 1]],
     )
     build.output(
@@ -44,6 +55,7 @@ def error_matrix() -> Kernel:
             "drift",
             unit="rad",
             meaning="drift errors, reference axes: the rotation from the computed frame to the true one",
+            frame="n",
         ),
         [-turning[2, 1], -turning[0, 2], -turning[1, 0]],
     )

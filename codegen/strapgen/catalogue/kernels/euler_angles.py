@@ -20,6 +20,7 @@ ANGLES = Signal(
     unit="rad",
     meaning="Euler angles: roll, pitch, heading",
     bound=Fraction(355, 113),
+    frame="b to n",
 )
 #: Squared cosine of pitch below which heading is computed from its sum or difference with roll.
 _STEEP = sp.Rational(1, 4)
@@ -52,6 +53,47 @@ def dcm_from_euler_angles() -> Kernel:
     )
 
 
+def followed_angles(
+    build: KernelBuilder, C: sp.Matrix, before: sp.Symbol, names: tuple[str, str, str]
+) -> tuple[sp.Symbol, sp.Symbol, sp.Symbol]:
+    """Name roll, pitch and heading of a rotation, and return their symbols, equations (61) to (63).
+
+    Parameters
+    ----------
+    build : KernelBuilder
+    C : Matrix, 3 x 3
+    before : Symbol
+        Roll in the call before, which is held where pitch is vertical, in rad.
+    names : tuple of str
+        What stands for roll, pitch and heading.
+    """
+    square = build.value("cosine_squared", C[0, 0] ** 2 + C[1, 0] ** 2, f"square of the cosine of {names[1]}")
+    pitch = build.value(f"next_{names[1]}", sp.atan2(-C[2, 0], sp.sqrt(square)), names[1])
+    vertical = (_VERTICAL * resolution) ** 2
+    roll = build.value(
+        f"next_{names[0]}",
+        sp.Piecewise((before, square <= vertical), (sp.atan2(C[2, 1], C[2, 2]), True)),
+        f"{names[0]}; held where {names[1]} is vertical",
+    )
+    up = C[2, 0] <= 0
+    sine = build.value(
+        "steep_sine",
+        sp.Piecewise((C[1, 2] - C[0, 1], up), (-C[1, 2] - C[0, 1], True)),
+        f"{names[2]} - {names[0]}, or +",
+    )
+    cosine = build.value("steep_cosine", sp.Piecewise((C[1, 1] + C[0, 2], up), (C[1, 1] - C[0, 2], True)))
+    apart = build.value("apart", Direction(sine, cosine), "the angle between or together")
+    heading = build.value(
+        f"next_{names[2]}",
+        sp.Piecewise(
+            (sp.atan2(C[1, 0], C[0, 0]), square >= _STEEP),
+            (Wrapped(apart + sp.Piecewise((roll, up), (-roll, True))), True),
+        ),
+        names[2],
+    )
+    return roll, pitch, heading
+
+
 def euler_angles_from_dcm() -> Kernel:
     """Return the Euler angles of a direction cosine matrix, equations (61) to (63).
 
@@ -68,39 +110,14 @@ def euler_angles_from_dcm() -> Kernel:
     build = KernelBuilder()
     C = build.input(DCM.state)
     before = build.input(
-        Signal(
-            "previous",
-            (3,),
-            ("last_roll", "last_pitch", "last_heading"),
-            "rad",
-            "the angles before",
-            ANGLES.bound,
+        replace(
+            ANGLES,
+            name="previous",
+            elements=tuple(f"last_{e}" for e in ANGLES.elements),
+            meaning="the angles before",
         )
     )
-    square = build.value("cosine_squared", C[0, 0] ** 2 + C[1, 0] ** 2, "square of the cosine of pitch")
-    pitch = build.value("next_pitch", sp.atan2(-C[2, 0], sp.sqrt(square)), "pitch")
-    vertical = (_VERTICAL * resolution) ** 2
-    roll = build.value(
-        "next_roll",
-        sp.Piecewise((before[0], square <= vertical), (sp.atan2(C[2, 1], C[2, 2]), True)),
-        "roll; held where pitch is vertical",
-    )
-    up = C[2, 0] <= 0
-    sine = build.value(
-        "steep_sine",
-        sp.Piecewise((C[1, 2] - C[0, 1], up), (-C[1, 2] - C[0, 1], True)),
-        "heading - roll, or +",
-    )
-    cosine = build.value("steep_cosine", sp.Piecewise((C[1, 1] + C[0, 2], up), (C[1, 1] - C[0, 2], True)))
-    apart = build.value("apart", Direction(sine, cosine), "the angle between or together")
-    heading = build.value(
-        "next_heading",
-        sp.Piecewise(
-            (sp.atan2(C[1, 0], C[0, 0]), square >= _STEEP),
-            (Wrapped(apart + sp.Piecewise((roll, up), (-roll, True))), True),
-        ),
-        "heading",
-    )
+    roll, pitch, heading = followed_angles(build, C, before[0], ("roll", "pitch", "heading"))
     build.output(
         replace(ANGLES, name="next", elements=tuple(f"found_{e}" for e in ANGLES.elements)),
         [roll, pitch, heading],

@@ -91,7 +91,9 @@ class ErrorModel:
             labels = [symbol.name.partition("_")[2] for symbol in members]
             if labels:
                 about = f"{meaning}, body axes"
-                self.build.input(Signal.labelled(name, letter, labels, unit=unit, meaning=about, bound=bound))
+                self.build.input(
+                    Signal.labelled(name, letter, labels, unit=unit, meaning=about, bound=bound, frame="b")
+                )
 
     def errors(self, d: sp.Matrix, dv: sp.Matrix, suffix: str = "") -> tuple[sp.Matrix, sp.Matrix]:
         """Return the errors of an angle increment in rad and of a velocity increment in m/s.
@@ -111,6 +113,7 @@ class ErrorModel:
                     ("yz", "zx", "xy"),
                     unit=unit,
                     meaning=about,
+                    frame="b",
                 ),
                 self.cycle_rate * products(vector),
             )

@@ -78,6 +78,8 @@ class _Coefficients(Samples):
                 unit="rad",
                 meaning=f"Legendre coefficient {m} of the body rate times the step, body axes",
                 bound=Fraction(1),
+                frame="b",
+                over="cycle",
             )
             rows.append(build.input(signal).T)
         self._build = build

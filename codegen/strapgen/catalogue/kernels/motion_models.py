@@ -135,10 +135,12 @@ def truth(name: str) -> Kernel:
     t = build.scalar(Signal.scalar("time", unit="s", meaning="time since the identity attitude"))
     parameters = _parameters(build, motion)
     build.output(
-        Signal.vector("rate", "rate", unit="rad/s", meaning="body rate, body axes"),
+        Signal.vector("rate", "rate", unit="rad/s", meaning="body rate, body axes", frame="b"),
         motion.rate(t, *parameters),
     )
-    build.output(Signal.matrix("attitude", "C", meaning=DCM_MEANING), motion.attitude(t, *parameters))
+    build.output(
+        Signal.matrix("attitude", "C", meaning=DCM_MEANING, frame="b to n"), motion.attitude(t, *parameters)
+    )
     return build.kernel(
         f"{name}-truth", f"True attitude: {motion.title}", f"{THESIS}, chapter 4 B and appendix A"
     )
@@ -165,7 +167,12 @@ def increments(name: str) -> Kernel:
     parameters = _parameters(build, motion)
     build.output(
         Signal.vector(
-            "increment", "increment", unit="rad", meaning="angle increment over the interval, body axes"
+            "increment",
+            "increment",
+            unit="rad",
+            meaning="angle increment over the interval, body axes",
+            frame="b",
+            over="cycle",
         ),
         motion.increment(m, d, *parameters),
     )

@@ -10,10 +10,15 @@ from strapgen.symbolic import rotations
 from strapgen.symbolic.kernel import Kernel, KernelBuilder
 
 _COMPUTED = Signal.matrix(
-    "computed", "C", meaning=f"{DCM_MEANING}, as computed", bound=UNIT, constraint="rotation"
+    "computed", "C", meaning=f"{DCM_MEANING}, as computed", bound=UNIT, constraint="rotation", frame="b to n"
 )
 _RESULT = Signal.matrix(
-    "orthonormalized", "next", meaning=f"{DCM_MEANING}, orthonormalized", bound=UNIT, constraint="rotation"
+    "orthonormalized",
+    "next",
+    meaning=f"{DCM_MEANING}, orthonormalized",
+    bound=UNIT,
+    constraint="rotation",
+    frame="b to n",
 )
 _NEAR = "Made for a matrix near a rotation: all products of its transpose and itself near the identity."
 

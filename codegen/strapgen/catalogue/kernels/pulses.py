@@ -55,7 +55,7 @@ def pulse_compensate(exact_bias: bool = False, sensor: str = "") -> Kernel:
     unit, rate, word, bound = _UNITS[sensor]
     build = KernelBuilder()
     meaning = f"raw {word} increment, count times quantum, sensor axis"
-    raw = build.scalar(Signal.scalar("count", unit=unit, meaning=meaning, bound=bound))
+    raw = build.scalar(Signal.scalar("count", unit=unit, meaning=meaning, bound=bound, over="cycle"))
     cycle = build.scalar(CYCLE)
     values = _coefficients(build, rate, not sensor)
     polar = sp.Piecewise((values["dK1VF+"], raw >= 0), (values["dK1VF-"], True))
@@ -64,7 +64,9 @@ def pulse_compensate(exact_bias: bool = False, sensor: str = "") -> Kernel:
     electronic = values["Vos"] / (1 + values["dK1a"]) if exact_bias else converter * values["Vos"]
     correction = build.value("scale_correction", 1 / gain - 1, "dSF")
     bias = build.value("bias_correction", -(values["K0a"] + electronic), f"Bc in {rate}")
-    signal = Signal.scalar("compensated", unit=unit, meaning=f"compensated {word} increment, sensor axis")
+    signal = Signal.scalar(
+        "compensated", unit=unit, meaning=f"compensated {word} increment, sensor axis", over="cycle"
+    )
     build.output(signal, [raw + correction * raw + bias * cycle])
     name = "-".join(filter(None, (sensor, "pulse-compensate", "exact" if exact_bias else "")))
     return build.kernel(
@@ -93,7 +95,7 @@ def pulse_errors(sensor: str = "") -> Kernel:
     unit, rate, word, bound = _UNITS[sensor]
     build = KernelBuilder()
     meaning = f"true {word} increment, sensor axis"
-    true = build.scalar(Signal.scalar("increment", unit=unit, meaning=meaning, bound=bound))
+    true = build.scalar(Signal.scalar("increment", unit=unit, meaning=meaning, bound=bound, over="cycle"))
     cycle = build.scalar(CYCLE)
     values = _coefficients(build, rate, not sensor)
     voltage = (1 + values["dK1a"]) * (values["K0a"] * cycle + true) + values["Vos"] * cycle
@@ -106,7 +108,7 @@ def pulse_errors(sensor: str = "") -> Kernel:
     )
     count = voltage + values["dK1VF-"] * voltage + (values["dK1VF+"] - values["dK1VF-"]) * positive
     meaning = f"raw {word} increment, count times quantum, sensor axis"
-    build.output(Signal.scalar("count", unit=unit, meaning=meaning), [count])
+    build.output(Signal.scalar("count", unit=unit, meaning=meaning, over="cycle"), [count])
     return build.kernel(
         "-".join(filter(None, (sensor, "pulse-errors"))),
         f"Pulses of {'a gyro' if sensor else 'an accelerometer'} with its errors",

@@ -46,6 +46,8 @@ def sculling(method: Method, increments: int, previous: int = 0) -> Kernel:
         unit="m/s",
         meaning="velocity increments of the step, body axes, oldest first: exact integrals of the specific force"
         + beside(previous),
+        frame="b",
+        over="cycle",
     )
     d, v = build.input(angles), build.input(velocities)
     rows = [d[k, :].T for k in range(d.rows)], [v[k, :].T for k in range(v.rows)]
@@ -66,7 +68,12 @@ def sculling(method: Method, increments: int, previous: int = 0) -> Kernel:
             total += cross(lever, rows[crossed][newer])
     build.output(
         Signal.vector(
-            "sculling", "sculling", unit="m/s", meaning="sculling term of the velocity change, body axes"
+            "sculling",
+            "sculling",
+            unit="m/s",
+            meaning="sculling term of the velocity change, body axes",
+            frame="b",
+            over="cycle",
         ),
         total,
     )

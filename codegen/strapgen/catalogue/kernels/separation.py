@@ -29,6 +29,7 @@ TORQUES = Signal.labelled(
     unit="rad",
     meaning="angle increments of the cycle about the torquer axes x and y of gyros 1, 2 and 3, mass unbalance included",
     bound=Fraction(1, 2),
+    over="cycle",
 )
 RECIPROCAL = Signal.scalar(
     "unbalance_reciprocal",
@@ -43,7 +44,13 @@ UNBALANCE_INPUT = Signal.scalar(
     bound=Fraction(1, 32),
 )
 INCREMENT = Signal.vector(
-    "increment", "d", unit="rad", meaning="angle increment of the cycle, body axes", bound=Fraction(3, 10)
+    "increment",
+    "d",
+    unit="rad",
+    meaning="angle increment of the cycle, body axes",
+    bound=Fraction(3, 10),
+    frame="b",
+    over="cycle",
 )
 VELOCITY_INCREMENT = Signal.vector(
     "velocity_increment",
@@ -51,6 +58,8 @@ VELOCITY_INCREMENT = Signal.vector(
     unit="m/s",
     meaning="velocity increment of the cycle, body axes",
     bound=Fraction(4),
+    frame="b",
+    over="cycle",
 )
 
 

@@ -40,7 +40,7 @@ def _torque(name: str, prefix: str, meaning: str, bound: Fraction | None) -> Sig
     """Return a signal like `TORQUES`, with other names."""
     labels = [element.partition("_")[2] for element in TORQUES.elements]
     about = f"{meaning} of the cycle about the torquer axes x and y of gyros 1, 2 and 3"
-    return Signal.labelled(name, prefix, labels, unit="rad", meaning=about, bound=bound)
+    return Signal.labelled(name, prefix, labels, unit="rad", meaning=about, bound=bound, over="cycle")
 
 
 def scale_factor_heating(errors: bool = False) -> Kernel:

@@ -139,6 +139,7 @@ def navigation(name: str) -> Kernel:
         name="velocity_change",
         elements=tuple(f"change_{axis}" for axis in "xyz"),
         meaning="integral of the specific force over the navigation cycle, navigation axes as they turn",
+        over="cycle",
     )
     build.output(gained, v + frame_correction(theta, v))
     return build.kernel(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 
 import sympy as sp
@@ -13,7 +14,13 @@ from strapgen.symbolic import rotations
 from strapgen.symbolic.kernel import Kernel, KernelBuilder
 
 ROTATION_VECTOR = Signal.vector(
-    "rotation_vector", "phi", unit="rad", meaning="rotation vector of the cycle, body axes", bound=Fraction(1)
+    "rotation_vector",
+    "phi",
+    unit="rad",
+    meaning="rotation vector of the cycle, body axes",
+    bound=Fraction(1),
+    frame="b",
+    over="cycle",
 )
 NAVIGATION_ROTATION = Signal.vector(
     "navigation_rotation",
@@ -21,6 +28,7 @@ NAVIGATION_ROTATION = Signal.vector(
     unit="rad",
     meaning="rotation of the navigation frame over its cycle, navigation axes",
     bound=Fraction(1, 8),
+    frame="n",
 )
 TURN, PREVIOUS_TURN = (
     Signal.vector(
@@ -29,6 +37,7 @@ TURN, PREVIOUS_TURN = (
         unit="rad",
         meaning=f"rate of the navigation frame {when} times the slow cycle, navigation axes",
         bound=Fraction(1, 64),
+        frame="n",
     )
     for name, prefix, when in (("turn", "turn", "at its end"), ("previous_turn", "before", "at its start"))
 )
@@ -37,7 +46,7 @@ _EQUATIONS = {9: ("(2) to (4)", "(5) and (6)"), 4: ("(9) to (14)", "(15)")}
 
 
 def transition(
-    build: KernelBuilder, kinematics: Kinematics, phi: sp.Matrix, order: int | None = None
+    build: KernelBuilder, kinematics: Kinematics, phi: sp.Matrix, order: int | None = None, frame: str = "b"
 ) -> sp.Matrix:
     """Name the transition of a rotation vector, and return its symbols.
 
@@ -49,9 +58,12 @@ def transition(
         Rotation vector in rad.
     order : int, optional
         Highest degree of products of its elements in the transition; exact by default.
+    frame : str, optional
+        The frame that rotates, in which the rotation vector is; by default the body.
     """
     square = build.value("angle_squared", rotations.dot(phi, phi), "square of the angle")
-    return build.stage(kinematics.transition, kinematics.exponential(phi, order, square))
+    turning = replace(kinematics.transition, frame=f"{frame} to {frame}")
+    return build.stage(turning, kinematics.exponential(phi, order, square))
 
 
 def _described(kinematics: Kinematics, order: int | None, which: int) -> tuple[str, str, tuple[str, ...]]:
@@ -112,7 +124,7 @@ def turned_frame(
     order : int, optional
         As for `transition`.
     """
-    turn = transition(build, kinematics, -theta, order)
+    turn = transition(build, kinematics, -theta, order, "n")
     return kinematics.product(turn, state)
 
 

@@ -56,6 +56,8 @@ def increments_signal(count: int, previous: int = 0, ahead: int = 0) -> Signal:
         meaning="angle increments of the step, body axes, oldest first: exact integrals of the body rate"
         + beside(previous, ahead),
         bound=Fraction(1),
+        frame="b",
+        over="cycle",
     )
 
 
@@ -74,6 +76,7 @@ def turns_signal(nodes: Sequence[Number]) -> Signal:
         unit="rad",
         meaning=f"body rate times the step length, body axes, at nodes {', '.join(map(str, nodes))} of the step",
         bound=Fraction(1),
+        frame="b",
     )
 
 

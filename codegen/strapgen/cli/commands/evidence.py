@@ -11,7 +11,7 @@ import typer
 
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import grouped
-from strapgen.cli.options import MethodOptions, option
+from strapgen.cli.options import KernelOptions, option
 from strapgen.cli.output import format_option
 from strapgen.cli.progress import track
 from strapgen.support.exceptions import InputError
@@ -38,7 +38,7 @@ def evidence(
         bool,
         option("--all", help="Examine the standard catalogue in 32-bit fixed point.", panel="Algorithm"),
     ] = False,
-    method: MethodOptions,
+    method: KernelOptions,
     fixed: FixedOptions,
     tool: Annotated[
         str | None,
@@ -101,7 +101,7 @@ def evidence(
 
 
 def _subjects(
-    kernels: list[str], all_: bool, method: MethodOptions, fixed: FixedOptions
+    kernels: list[str], all_: bool, method: KernelOptions, fixed: FixedOptions
 ) -> Iterator[Subject]:
     from strapgen.evidence import subjects
 

@@ -9,7 +9,7 @@ import typer
 
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import grouped
-from strapgen.cli.options import MethodOptions, OptionalAlgorithm, one, option
+from strapgen.cli.options import KernelOptions, OptionalAlgorithm, one, option
 from strapgen.cli.output import Format, check_format, print_json
 from strapgen.cli.progress import track
 from strapgen.cli.source_options import SourceOptions, refuse_out_of_step
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 def generate(
     algorithm: OptionalAlgorithm = None,
     *,
-    method: MethodOptions,
+    method: KernelOptions,
     target: Annotated[
         str | None,
         option(
@@ -79,7 +79,7 @@ def generate(
 
 
 def request(
-    algorithm: str, method: MethodOptions, target: str | None, fixed: FixedOptions, output: SourceOptions
+    algorithm: str, method: KernelOptions, target: str | None, fixed: FixedOptions, output: SourceOptions
 ) -> Request:
     """Return what the options of the command ask for.
 
@@ -131,7 +131,7 @@ def _check_files(files: dict[str, str], output: SourceOptions, format: str) -> N
 
 def _check_alone(
     algorithm: str | None,
-    method: MethodOptions,
+    method: KernelOptions,
     target: str | None,
     fixed: FixedOptions,
     output: SourceOptions,
@@ -147,6 +147,7 @@ def _check_alone(
         ("--previous", method.previous),
         ("--ahead", method.ahead),
         ("--rates", method.rates or None),
+        ("--constant", method.constant or None),
         ("--target", target),
         ("a fixed-point option", fixed.stated or None),
         (output.for_c, output.for_c),

@@ -74,7 +74,7 @@ def read_command(command: str) -> Request:
 
     from strapgen.cli.commands import generate
     from strapgen.cli.fixed_options import FixedOptions
-    from strapgen.cli.options import MethodOptions
+    from strapgen.cli.options import KernelOptions
     from strapgen.cli.source_options import SourceOptions
 
     words = shlex.split(command)
@@ -92,5 +92,5 @@ def read_command(command: str) -> Request:
         return kind(**{name: None if value == () else value for name, value in values.items()})
 
     return generate.request(
-        stated["algorithm"], group(MethodOptions), stated["target"], group(FixedOptions), group(SourceOptions)
+        stated["algorithm"], group(KernelOptions), stated["target"], group(FixedOptions), group(SourceOptions)
     )

@@ -1,0 +1,239 @@
+"""Runs a described system on the generated functions of its stages, cycle by cycle or one rate on many memories."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from strapgen.backends.evaluators import Array, Evaluator
+from strapgen.backends.exact import in_digits, rounded
+from strapgen.backends.fixed_numbers import integers, numbers
+from strapgen.backends.increments import pulses
+from strapgen.backends.registry import BACKENDS, evaluator_class
+from strapgen.backends.systems.memory import SystemMemory, SystemRun, rescaled
+from strapgen.ir.fixed_interface import Argument
+from strapgen.ir.signals import CYCLE
+from strapgen.ir.system import Push, Rate, SystemStage
+from strapgen.support import checks
+from strapgen.support.exceptions import InputError
+from strapgen.systems.bounds import SystemBounds, bounds
+from strapgen.systems.fitting import Fitted
+
+#: From this word length on, a word resolves what a double does, and samples are not rounded as sums.
+_EXACT_BITS = 53
+
+
+class SystemRunner(ABC):
+    """A described system on a back end.
+
+    Parameters
+    ----------
+    fit : Fitted
+        Its generated stages.
+    backend : str
+        Name of the back end.
+    """
+
+    def __init__(self, fit: Fitted, backend: str) -> None:
+        self.fit = fit
+        self.backend = backend
+        self.system = fit.description.system
+        make = evaluator_class(BACKENDS[backend].target)
+        self.evaluators: dict[str, Evaluator] = {name: make(s) for name, s in fit.sources.items()}
+        self.many_digits = BACKENDS[backend].many_digits
+
+    def begin(self, runs: int = 1) -> SystemMemory:
+        """Return the memory with which a run begins."""
+        cells = {}
+        for cell in self.system.cells:
+            argument = self.fit.arguments.get(cell.name)
+            if argument is not None:
+                words = [argument.format.nearest(value) for value in cell.initial]
+                row: Array = np.array([words], object if argument.format.word > 32 else np.int64)
+            elif self.many_digits:
+                row = in_digits(np.array([[float(value) for value in cell.initial]]))
+            else:
+                row = np.array([[float(value) for value in cell.initial]], self._dtype)
+            cells[cell.name] = np.repeat(row, runs, axis=0)
+        feedback = {name: evaluator.fresh(runs) for name, evaluator in self.evaluators.items()}
+        return SystemMemory(cells, feedback)
+
+    @cached_property
+    def rounding(self) -> SystemBounds:
+        """Error bounds of one pass."""
+        return bounds(self.fit)
+
+    @property
+    def _dtype(self) -> Any:
+        return next(iter(self.evaluators.values())).dtype
+
+    def set(self, memory: SystemMemory, cell: str, value: Any) -> None:
+        """Set a cell to a value in SI units, for instance an attitude at the start."""
+        held = self.system.cell(cell)
+        array = checks.real_array(cell, value, held.signal.shape, np.float64).reshape(-1, held.signal.size)
+        memory.cells[cell] = np.repeat(
+            self.stored(cell, array), len(memory.cells[cell]) // len(array), axis=0
+        )
+
+    def stored(self, name: str, values: Array) -> Array:
+        """Return numbers in SI units as the system stores them."""
+        argument = self.fit.arguments.get(name)
+        if argument is not None:
+            return integers(argument, values, self.system.name)
+        if self.many_digits:
+            return in_digits(values)
+        with np.errstate(over="ignore"):
+            return np.ascontiguousarray(values, self._dtype)
+
+    def in_si(self, name: str, values: Array) -> Array:
+        """Return stored values of a cell as numbers in SI units, (count, elements)."""
+        argument = self.fit.arguments.get(name)
+        if argument is not None:
+            return numbers(argument, values)
+        return np.asarray(rounded(values)) if self.many_digits else np.asarray(values, np.float64)
+
+    def samples(self, inputs: Mapping[str, Any]) -> dict[str, Array]:
+        """Return samples of the inputs as the system takes them, checked.
+
+        In fixed point an increment takes over the rounding error of the one before, as from a sensor that counts
+        pulses.
+
+        Parameters
+        ----------
+        inputs : mapping of str to array_like, (cycles, shape)
+
+        Raises
+        ------
+        InputError
+            If an input is missing or unknown, or has another shape or range.
+        """
+        names = [signal.name for signal in self.system.inputs]
+        for name in [*inputs, *names]:
+            if name not in names or name not in inputs:
+                raise InputError(
+                    f"inputs are {', '.join(sorted(inputs))}; the system has: {', '.join(names)}"
+                )
+        result, counts = {}, set()
+        for signal in self.system.inputs:
+            values = checks.real_array(signal.name, inputs[signal.name], signal.shape, np.float64)
+            values = values.reshape(-1, signal.size)
+            argument = self.fit.arguments.get(signal.name)
+            if argument is not None and signal.over == CYCLE and argument.format.word < _EXACT_BITS:
+                values = pulses(values[:, None], argument.unit)[:, 0]
+            result[signal.name] = self.stored(signal.name, values)
+            counts.add(len(values))
+        if len(counts) > 1:
+            raise InputError(
+                f"the inputs have {' and '.join(map(str, sorted(counts)))} samples; one number is needed"
+            )
+        return result
+
+    def run(self, inputs: Mapping[str, Any], memory: SystemMemory | None = None) -> SystemRun:
+        """Run cycles of the fastest rate.
+
+        Parameters
+        ----------
+        inputs : mapping of str to array_like, (cycles, shape)
+            Samples of every input in SI units.
+        memory : SystemMemory, optional
+            What a run before has left; by default `begin`.
+
+        Returns
+        -------
+        SystemRun
+            The system's outputs after each of their cycles.
+
+        Raises
+        ------
+        InputError
+            If a sample is refused; the message names the stage.
+        """
+        samples = self.samples(inputs)
+        count = len(next(iter(samples.values())))
+        values, after = self._run(samples, count, (memory or self.begin()).copy())
+        shaped = {
+            name: self.in_si(name, rows).reshape(-1, *self.system.cell(name).signal.shape)
+            for name, rows in values.items()
+        }
+        return SystemRun(shaped, after)
+
+    @abstractmethod
+    def _run(
+        self, samples: Mapping[str, Array], count: int, memory: SystemMemory
+    ) -> tuple[dict[str, Array], SystemMemory]:
+        """Run checked samples, and return the outputs after each of their cycles and the memory."""
+
+    def call(self, memory: SystemMemory, samples: Mapping[str, Array], rates: Sequence[Rate]) -> None:
+        """Run some rates once on every row of a memory, each with its samples.
+
+        Parameters
+        ----------
+        memory : SystemMemory
+            With one row a run; it is changed.
+        samples : mapping of str to array, (runs, elements)
+            As `samples` returns them.
+        rates : sequence of Rate
+        """
+        for rate in rates:
+            for step in rate.steps:
+                if isinstance(step, Push):
+                    self._push(memory, step, samples)
+                else:
+                    self._call_stage(memory, step, samples)
+            for name in rate.cleared:
+                memory.cells[name] = np.zeros_like(memory.cells[name])
+
+    def _push(self, memory: SystemMemory, push: Push, samples: Mapping[str, Array]) -> None:
+        """Add a sample to a cell that holds several."""
+        new = samples[push.source] if push.external else memory.cells[push.source]
+        new = self._moved(new, self.fit.arguments.get(push.source), self.fit.arguments.get(push.cell))
+        held = memory.cells[push.cell]
+        memory.cells[push.cell] = np.concatenate([held[:, new.shape[1] :], new], axis=1)
+
+    def _call_stage(self, memory: SystemMemory, stage: SystemStage, samples: Mapping[str, Array]) -> None:
+        """Call a stage on every row."""
+        evaluator, fixed = self.evaluators[stage.name], self.fit.sources[stage.name].fixed
+        arguments: dict[str, Argument] = {}
+        if fixed is not None:
+            arguments = {a.signal.name: a for a in (*fixed.inputs, *fixed.outputs)}
+        rows = []
+        for wire in stage.wires:
+            held = samples[wire.source] if wire.external else memory.cells[wire.source]
+            rows.append(self._moved(held, self.fit.arguments.get(wire.source), arguments.get(wire.input)))
+        try:
+            outputs, memory.feedback[stage.name] = evaluator.run(rows, memory.feedback[stage.name])
+        except InputError as error:
+            raise InputError(f"stage {stage.name}: {error}") from None
+        for (name, cell), output in zip(stage.results, outputs, strict=True):
+            memory.cells[cell] = self._moved(output, arguments.get(name), self.fit.arguments.get(cell))
+
+    def _moved(self, values: Array, there: Argument | None, here: Argument | None) -> Array:
+        """Return integers in another format, rounded as the generated C rounds them."""
+        if there is None or here is None or there.format == here.format:
+            return values
+        return rescaled(values, there.format, here.format)
+
+
+class InterpretedSystem(SystemRunner):
+    """Calls one generated function for each stage, from Python."""
+
+    def _run(
+        self, samples: Mapping[str, Array], count: int, memory: SystemMemory
+    ) -> tuple[dict[str, Array], SystemMemory]:
+        recorded: dict[str, list[Array]] = {name: [] for name in self.system.outputs}
+        every = {name: self.system.every(name) for name in self.system.outputs}
+        for k in range(count):
+            memory.cycle = (memory.cycle + 1) % self.system.cycle
+            due = [rate for rate in self.system.rates if memory.cycle % rate.every == 0]
+            self.call(memory, {name: rows[k : k + 1] for name, rows in samples.items()}, due)
+            for name, rows in recorded.items():
+                if memory.cycle % every[name] == 0:
+                    rows.append(memory.cells[name])
+        empty = {name: memory.cells[name][:0] for name in recorded}
+        return {
+            name: np.concatenate(rows) if rows else empty[name] for name, rows in recorded.items()
+        }, memory

@@ -1,0 +1,47 @@
+"""The names of the kernels of the navigation frame, as plain data."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from strapgen.catalogue.recipe import Recipe
+
+_SHAPES = {"sphere": "a sphere", "ellipsoid": "an ellipsoid"}
+_AZIMUTHS = {"wander": "wander azimuth", "free": "free azimuth", "north": "north-slaved"}
+
+
+def _recipe(title: str, module: str, function: str, *arguments: Any) -> Recipe:
+    """Return the recipe of a kernel of the package ``navigation``."""
+    return Recipe(title, f"navigation.{module}", function, arguments, standard=False)
+
+
+#: Kernels of the navigation frame: its rate, gravity, velocity and position, and its alignment; they take no method.
+NAVIGATION = {
+    "earth-rate": _recipe("earth rate in navigation axes", "rates", "earth_rate"),
+    **{
+        f"transport-rate-{shape}" + ("" if azimuth == "wander" else f"-{azimuth}"): _recipe(
+            f"transport rate over {body}, {words}", "rates", "transport_rate", shape, azimuth
+        )
+        for shape, body in _SHAPES.items()
+        for azimuth, words in _AZIMUTHS.items()
+    },
+    "navigation-turn": _recipe("rate of the navigation frame times the cycle", "rates", "navigation_turn"),
+    "gravity-sphere": _recipe("gravity of a turning sphere", "gravity", "gravity_sphere"),
+    "gravity-ellipsoid": _recipe("normal gravity of an ellipsoid", "gravity", "gravity_ellipsoid"),
+    "coriolis-gravity": _recipe("gravity and Coriolis acceleration", "steps", "coriolis_gravity"),
+    "velocity-step": _recipe("velocity after a cycle", "steps", "velocity_step"),
+    "velocity-step-level": _recipe("velocity after a cycle, vertical held", "steps", "velocity_step", True),
+    "position-step": _recipe("position after a cycle", "steps", "position_step"),
+    "height-step": _recipe("height after a cycle", "steps", "height_step"),
+    "geographic-from-position": _recipe(
+        "latitude, longitude and wander angle", "geographic", "geographic_from_position"
+    ),
+    "position-from-geographic": _recipe(
+        "position of latitude, longitude, wander angle", "geographic", "position_from_geographic"
+    ),
+    "dcm-north-east-down": _recipe("attitude against north, east, down", "geographic", "north_east_down"),
+    "ground-velocity": _recipe("velocity to east, north and up", "geographic", "ground_velocity"),
+    "coarse-leveling": _recipe("coarse alignment: roll and pitch", "alignment", "coarse_leveling"),
+    "coarse-azimuth": _recipe("coarse alignment: analytic gyrocompass", "alignment", "coarse_azimuth"),
+    "late-latitude": _recipe("attitude for a latitude entered late", "alignment", "late_latitude"),
+}

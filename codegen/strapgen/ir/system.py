@@ -1,0 +1,190 @@
+"""A system is a set of stages, each a kernel at a rate of its own, and the values that pass between them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+
+from strapgen.ir.signals import Signal
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A value that the system stores between calls.
+
+    Parameters
+    ----------
+    name : str
+        Name in generated code: stage and signal.
+    signal : Signal
+        Shape, unit, frame and meaning.
+    initial : tuple of Fraction
+        The elements before the first cycle, row-major.
+    samples : int
+        Number of samples that it holds, the newest last; 0 for a value that is replaced as a whole.
+    """
+
+    name: str
+    signal: Signal
+    initial: tuple[Fraction, ...]
+    samples: int = 0
+
+
+@dataclass(frozen=True)
+class Wire:
+    """Where an input of a stage comes from.
+
+    Parameters
+    ----------
+    input : str
+        Name of the input of the kernel.
+    source : str
+        Name of a cell, or of an input of the system.
+    external : bool
+        Whether the source is an input of the system.
+    """
+
+    input: str
+    source: str
+    external: bool = False
+
+
+@dataclass(frozen=True)
+class SystemStage:
+    """A kernel that runs at the end of every so many cycles.
+
+    Parameters
+    ----------
+    name : str
+        Name in the description.
+    kernel : str
+        Name of the kernel.
+    every : int
+        Cycles of the fastest rate from one call to the next.
+    wires : tuple of Wire
+        One for each input of the kernel, in its order.
+    results : tuple of (str, str)
+        For each output of the kernel the name of the cell that takes it.
+    word : int or None
+        Bits of a word in fixed point; None for those that the target is generated with.
+    carry : str
+        Error feedback in fixed point, a key of `CARRIES`; "" for that of the settings.
+    """
+
+    name: str
+    kernel: str
+    every: int
+    wires: tuple[Wire, ...]
+    results: tuple[tuple[str, str], ...]
+    word: int | None = None
+    carry: str = ""
+
+
+@dataclass(frozen=True)
+class Push:
+    """A sample that is added to a cell that holds several.
+
+    Parameters
+    ----------
+    cell : str
+    source : str
+        Name of a cell, or of an input of the system.
+    external : bool
+        Whether it is an input.
+    """
+
+    cell: str
+    source: str
+    external: bool = False
+
+
+@dataclass(frozen=True)
+class Rate:
+    """What happens at one rate, in this order: samples are stored, stages are called, sums are cleared.
+
+    Parameters
+    ----------
+    every : int
+        Cycles of the fastest rate from one time to the next.
+    steps : tuple of Push or SystemStage
+    cleared : tuple of str
+        Cells that are set to zero at the end.
+    """
+
+    every: int
+    steps: tuple[Push | SystemStage, ...]
+    cleared: tuple[str, ...] = ()
+
+    @property
+    def stages(self) -> tuple[SystemStage, ...]:
+        """The stages alone."""
+        return tuple(step for step in self.steps if isinstance(step, SystemStage))
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the system's inputs that it reads, each once."""
+        return tuple(dict.fromkeys(_external(self.steps)))
+
+
+def _external(steps: tuple[Push | SystemStage, ...]) -> Iterator[str]:
+    """Return the names of the inputs that steps read."""
+    for step in steps:
+        for wire in [step] if isinstance(step, Push) else step.wires:
+            if wire.external:
+                yield wire.source
+
+
+@dataclass(frozen=True)
+class DescribedSystem:
+    """Stages with their wires, checked.
+
+    Parameters
+    ----------
+    name : str
+        Name in generated code, an identifier.
+    title : str
+        One line that says what it computes.
+    sample_hz : Fraction
+        Cycles of the fastest rate in a second.
+    inputs : tuple of Signal
+        What is measured in every cycle of the fastest rate; each has a bound.
+    cells : tuple of Cell
+        What is stored.
+    rates : tuple of Rate
+        From the fastest to the slowest, in the order in which they run when they fall together.
+    outputs : tuple of str
+        Names of the cells that a run records.
+    """
+
+    name: str
+    title: str
+    sample_hz: Fraction
+    inputs: tuple[Signal, ...]
+    cells: tuple[Cell, ...]
+    rates: tuple[Rate, ...]
+    outputs: tuple[str, ...]
+
+    @property
+    def stages(self) -> tuple[SystemStage, ...]:
+        """All stages, in the order in which they run when all rates fall together."""
+        return tuple(stage for rate in self.rates for stage in rate.stages)
+
+    @property
+    def cycle(self) -> int:
+        """Cycles of the fastest rate after which all rates fall together."""
+        return math.lcm(*(rate.every for rate in self.rates))
+
+    def cell(self, name: str) -> Cell:
+        """Return the cell of a name."""
+        return next(cell for cell in self.cells if cell.name == name)
+
+    def every(self, cell: str) -> int:
+        """Return the cycles from one change of a cell to the next, by the fastest stage that writes it."""
+        return min(
+            rate.every
+            for rate in self.rates
+            for step in rate.steps
+            if (step.cell == cell if isinstance(step, Push) else cell in dict(step.results).values())
+        )

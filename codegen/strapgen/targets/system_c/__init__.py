@@ -1,0 +1,1 @@
+"""The target that prints the C of a described system."""

@@ -1,0 +1,97 @@
+"""The frames of the catalogue: every vector and matrix states its own, and a feedback pair agrees in it."""
+
+from __future__ import annotations
+
+import pytest
+from derived import kernel
+
+from strapgen.catalogue import KERNELS, MOST_INCREMENTS, VECTORS, Choice, choose
+from strapgen.ir.signals import Signal
+
+#: Signals that have no frame, with the reason.
+WITHOUT = {
+    **dict.fromkeys(
+        ("torque_increment", "compensated_torque_increment", "indicated_torque_increment"),
+        "each element is about another torquer axis",
+    ),
+    **dict.fromkeys(("deviation", "next_deviation", "heating_gain"), "there is one number for each gyro"),
+    "ground_velocity": "its axes point to east, north and up",
+    "level_angles": "its axes point ahead, right and down",
+}
+#: Words of a meaning that name the frame.
+WORDS = {
+    "body axes": "b",
+    "navigation axes": "n",
+    "reference axes": "n",
+    "body to reference": "b to n",
+}
+#: Kernels that differ in the order of a series alone; the first and the last stand for all.
+_FAMILIES = {(recipe.module, recipe.function): [] for recipe in KERNELS.values()}
+for _name, _recipe in KERNELS.items():
+    _FAMILIES[_recipe.module, _recipe.function].append(_name)
+SHORT = [
+    *(
+        choose(name)
+        for names in _FAMILIES.values()
+        for name in dict.fromkeys((names[0], names[1 % len(names)]))
+    ),
+    *(choose(name) for name in VECTORS),
+    choose("euler"),
+    choose("dcm", "rk4", rates=True),
+]
+LONG = [
+    *(choose(name) for name in KERNELS),
+    *(choose(name, increments=count, previous=1) for name in VECTORS for count in (2, MOST_INCREMENTS // 2)),
+]
+
+
+def faults(choice: Choice) -> list[str]:
+    """Return what is wrong with the frames of a kernel."""
+    derived = kernel(choice)
+    signals: dict[str, Signal] = {signal.name: signal for signal in derived.inputs}
+    signals |= {stage.signal.name: stage.signal for stage in derived.outputs}
+    wrong = [
+        f"{choice.kernel}: {name}: frame {signal.frame!r}"
+        for name, signal in signals.items()
+        if (bool(signal.frame) != bool(signal.shape)) != (name in WITHOUT)
+    ]
+    for words, frame in WORDS.items():
+        wrong += [
+            f"{choice.kernel}: {name}: {words}, but frame {signal.frame!r}"
+            for name, signal in signals.items()
+            if words in signal.meaning
+            and signal.frame != frame
+            and (" to " in words) == (" to " in signal.frame)
+        ]
+    for state, output in derived.recursion.states if derived.recursion else ():
+        pair = [(s.unit, s.frame, s.over, s.shape) for s in (signals[state], signals[output])]
+        wrong += [f"{choice.kernel}: {state}, {output}: {pair}"] if pair[0] != pair[1] else []
+    return wrong
+
+
+def test_every_vector_states_its_frame_and_a_state_keeps_it():
+    assert [fault for choice in SHORT for fault in faults(choice)] == []
+
+
+@pytest.mark.long
+def test_every_vector_of_all_kernels_states_its_frame_and_a_state_keeps_it():
+    assert [fault for choice in LONG for fault in faults(choice)] == []
+    present = {signal.name for choice in LONG for signal in kernel(choice).signals}
+    assert set(WITHOUT) <= present
+
+
+@pytest.mark.parametrize(
+    ("name", "over"),
+    [
+        ("imu-compensate", {"increment", "velocity_increment"}),
+        ("pulse-compensate", {"count"}),
+        ("two-speed-fast-2", {"increment", "velocity_increment", "previous_increment"}),
+        ("dcm-two-speed-slow-2", set()),  # sums that the slow cycle resets are values at its end
+        ("navigation-velocity", set()),
+        ("euler-update", {"rotation_vector"}),
+        ("dcm-acceleration", set()),
+        ("euler", {"increments"}),
+    ],
+)
+def test_increments_are_over_a_cycle_and_sums_are_not(name, over):
+    assert {signal.name for signal in kernel(choose(name)).inputs if signal.over == "cycle"} == over
