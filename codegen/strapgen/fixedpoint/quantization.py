@@ -132,7 +132,9 @@ def _feedback_names(program: Program, settings: Settings, quantities: Quantities
     """Return the name of the error feedback of every quantity whose rounding error goes into the next call."""
     if settings.carry == "none":
         return {}
-    elements = [name for result in _handed_on(program, settings) for name in quantities.results[result.signal.name]]
+    elements = [
+        name for result in _handed_on(program, settings) for name in quantities.results[result.signal.name]
+    ]
     return {name: f"residual_{name}" for name in elements if isinstance(name, str)}
 
 
