@@ -104,7 +104,7 @@ def study(
     if outputs.attitude is not None:
         every = runner.system.every(outputs.attitude.name)
         attitudes = matrices(outputs.attitude.signal, values[outputs.attitude.name])
-        times = (1 + np.arange(len(attitudes))) * float(every / runner.system.sample_hz)
+        times = np.arange(1.0, len(attitudes) + 1) * float(every / runner.system.sample_hz)
         truth = angles(attitudes, vehicle.attitude(times))
     return SystemStudy(description, float(seconds), truth, errors)
 

@@ -70,7 +70,7 @@ def study_system(
     from strapgen.backends import BACKENDS
     from strapgen.experiments.system_study import study
     from strapgen.experiments.turning_vehicle import TurningVehicle
-    from strapgen.reports.system_study import system_study_report
+    from strapgen.reports.systems.study import system_study_report
     from strapgen.systems.wiring import described
     from strapgen.vibration.spectrum import read_spectrum
 
