@@ -9,7 +9,8 @@ from fractions import Fraction
 from strapgen import targets
 from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.fixed_settings import DEFAULT_ANGLE, TURNING, Settings
-from strapgen.ir.signals import Signal
+from strapgen.ir.formats import Format
+from strapgen.ir.signals import CYCLE, Signal
 from strapgen.ir.sources import Sources
 from strapgen.ir.system import Push, SystemStage
 from strapgen.library import generated_sources
@@ -219,6 +220,9 @@ class _Fit:
         word = stage.word or self.settings.word
         wired: dict[str, str] = {}
         for wire, signal in zip(stage.wires, self._signals(stage), strict=True):
+            if wire.external and self.inputs[wire.source].unit == "1" and signal.over == CYCLE:
+                wired[wire.input] = str(Format(word, 0))  # counts are whole numbers
+                continue
             argument = self.arguments.get(wire.source)
             if argument is None or argument.format.word != word or wire.source in self.pushed:
                 continue
