@@ -58,7 +58,8 @@ def study_system(
         option(
             "--cpu",
             metavar="NAME",
-            help="Count the instructions of the C in fixed point on this processor, as strapgen cost does; cortex-m3 is one.",
+            help="Count the instructions of the C in fixed point on this processor, as strapgen cost does, for "
+            "instance cortex-m3.",
             panel="Run",
         ),
     ] = None,
