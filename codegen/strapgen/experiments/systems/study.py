@@ -12,14 +12,13 @@ from numpy.typing import NDArray
 from strapgen import backends
 from strapgen.backends.systems import SystemMemory, SystemRunner, system_runner
 from strapgen.backends.systems.compiled import CompiledSystem
-from strapgen.experiments.system_cost import measured_budget
-from strapgen.experiments.turning_vehicle import TurningVehicle
+from strapgen.experiments.systems.cost import measured_budget
+from strapgen.experiments.systems.turning_vehicle import TurningVehicle
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.system import Cell
-from strapgen.support.exceptions import InputError
-from strapgen.systems.budget import Budget, budget
 from strapgen.simulation import system_inputs
 from strapgen.simulation.system_runs import matrices
+from strapgen.systems.budget import Budget, budget
 from strapgen.systems.wiring import Description
 
 Array = NDArray[np.float64]

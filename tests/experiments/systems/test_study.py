@@ -9,9 +9,9 @@ import pytest
 
 from strapgen.backends.systems import system_runner
 from strapgen.cli import main
-from strapgen.experiments import system_study
-from strapgen.experiments.system_agreement import agreement
-from strapgen.experiments.turning_vehicle import TurningVehicle, counts
+from strapgen.experiments.systems import study as system_study
+from strapgen.experiments.systems.agreement import agreement
+from strapgen.experiments.systems.turning_vehicle import TurningVehicle, counts
 from strapgen.support.exceptions import InputError
 from strapgen.systems.wiring import described
 from strapgen.vibration.spectrum import read_spectrum
