@@ -90,7 +90,7 @@ class Navigator:
         values["state"] = self.call("dcm-navigation-update", state=state, navigation_rotation=rotation)
 
     def shown(self) -> dict[str, np.ndarray]:
-        """Return latitude, longitude, wander angle and heading in degrees, and the velocity to east, north and up."""
+        """Return latitude, longitude, wander angle and heading in degrees, and the velocity to north, east and down."""
         self.values["previous"] = self.values["geographic"] = self.call("geographic-from-position")
         attitude = self.call("dcm-north-east-down")
         angles = kernel("euler-angles-from-dcm")[0](attitude, np.zeros(3))

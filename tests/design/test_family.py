@@ -21,7 +21,9 @@ SMALL = FamilyBrief(2, 2, Fraction(1), conditions=3, degree=2)
 
 BRIEFS = {
     "minimax": SMALL,
-    "noise": replace(SMALL, noise=Fraction(1, 1000), one_sided_noise=Fraction(0)),
+    "noise": replace(
+        SMALL, noise=Fraction(1, 1000), one_sided_noise=Fraction(0), start_noise=Fraction(1, 10)
+    ),
     "more before": replace(SMALL, previous=3, ahead=1),
     "more ahead": replace(SMALL, previous=0, ahead=3),
     "none ahead": replace(SMALL, previous=3, ahead=0),
@@ -46,6 +48,9 @@ def test_what_is_written_is_read_again(brief, tmp_path):
     sizes = [(one.previous, one.ahead) for one in again.one_sided]
     assert sizes == windows.one_sided_sizes(brief.previous, brief.ahead)
     assert {one.noise for one in again.one_sided} <= {brief.one_sided_noise}
+    assert [(one.previous, one.ahead, one.noise) for one in again.start] == [
+        (*size, brief.start_noise) for size in windows.start_sizes(brief.previous, brief.ahead)
+    ]
     assert {one.objective for one in again.one_sided} <= {"mean square"}
     assert again.objective == ("mean square" if brief.noise else "minimax")
 

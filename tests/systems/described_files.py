@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from strapgen.systems.wiring import Description, described
+from strapgen.systems.wiring import Description, read_system
 
 #: Two speeds with a navigation frame: sums, states that two rates share, words of two lengths, inputs of two frames.
 TWO_SPEEDS = """
@@ -114,7 +114,7 @@ def description(folder: Path, text: str, name: str = "case.toml") -> Description
     """Return the system of a text, which is written into a file first."""
     path = folder / name
     path.write_text(text)
-    return described(path)
+    return read_system(path)
 
 
 def samples(

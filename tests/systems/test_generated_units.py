@@ -214,7 +214,7 @@ def _nothing() -> dict[str, object]:
     system = type("System", (), {"cycle": 1})()
     empty = ("rates", "initial", "feedback", "everything")
     return {
-        **dict.fromkeys(empty, []),
+        **{key: [] for key in empty},
         "types": {},
         "title": "",
         "command": "",

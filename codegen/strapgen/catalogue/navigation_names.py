@@ -40,7 +40,10 @@ NAVIGATION = {
         "position of latitude, longitude, wander angle", "geographic", "position_from_geographic"
     ),
     "dcm-north-east-down": _recipe("attitude against north, east, down", "geographic", "north_east_down"),
-    "ground-velocity": _recipe("velocity to east, north and up", "geographic", "ground_velocity"),
+    "dcm-from-north-east-down": _recipe(
+        "attitude against navigation axes", "geographic", "north_east_down", True
+    ),
+    "ground-velocity": _recipe("velocity to north, east and down", "geographic", "ground_velocity"),
     "coarse-leveling": _recipe("coarse alignment: roll and pitch", "alignment", "coarse_leveling"),
     "coarse-azimuth": _recipe("coarse alignment: analytic gyrocompass", "alignment", "coarse_azimuth"),
     "late-latitude": _recipe("attitude for a latitude entered late", "alignment", "late_latitude"),

@@ -9,7 +9,7 @@ from typing import Any
 
 from strapgen.catalogue.methods.coefficient_files import slug
 from strapgen.catalogue.methods.window import GyroResponse, Taps, Window, sibling_name, sibling_title
-from strapgen.catalogue.methods.windows import one_sided_sizes, stored_sizes
+from strapgen.catalogue.methods.windows import one_sided_sizes, start_sizes, stored_sizes
 from strapgen.design import lawson, mean_square, minimax
 from strapgen.design.rounding import rounded
 from strapgen.design.unknowns import Shape, Unknowns
@@ -34,9 +34,9 @@ class FamilyBrief:
         Highest Legendre coefficient of the rate that is estimated.
     gyro : GyroResponse, optional
         By default the increments are integrals of the rate.
-    noise, one_sided_noise : Fraction, optional
+    noise, one_sided_noise, start_noise : Fraction, optional
         Standard deviation of the noise of an increment, by that of the rate times the sampling interval, for the
-        committed filters and for the one-sided ones.
+        committed filters, for the one-sided ones and for those of the first intervals of a recording.
     spectrum : tuple of int, optional
         Density of the rate, see `spectra.weights`; by default it is flat over the band.
     rotation : str, optional
@@ -58,6 +58,7 @@ class FamilyBrief:
     rotation: str = "fourth"
     terms: int = 16
     title: str = ""
+    start_noise: Fraction = Fraction(0)
 
     @property
     def objective(self) -> str:
@@ -112,7 +113,7 @@ def design(
     >>> [one.name for one in window.one_sided]
     ['window-1-2-2-to-1-rad-3-1', 'window-1-2-2-to-1-rad-4-0', 'window-1-2-2-to-1-rad-0-4', 'window-1-2-2-to-1-rad-1-3']
     """
-    designed = {size: _filters(brief, size) for size in track(brief.sizes)}
+    designed = {size: _filters(brief, size, brief.one_sided_noise) for size in track(brief.sizes)}
     committed = Window(
         slug(brief.full_title),
         brief.full_title,
@@ -135,7 +136,11 @@ def design(
             windows[size] = _sibling(committed, size, designed[size], brief.one_sided_noise)
         else:
             windows[size] = windows[size[::-1]].mirrored()
-    return replace(committed, one_sided=tuple(windows.values()))
+    start = tuple(
+        _sibling(committed, size, _filters(brief, size, brief.start_noise), brief.start_noise)
+        for size in start_sizes(brief.previous, brief.ahead)
+    )
+    return replace(committed, one_sided=tuple(windows.values()), start=start)
 
 
 def _source(brief: FamilyBrief) -> str:
@@ -163,7 +168,7 @@ def _sibling(committed: Window, size: tuple[int, int], filters: tuple[Taps, ...]
     )
 
 
-def _filters(brief: FamilyBrief, size: tuple[int, int]) -> tuple[Taps, ...]:
+def _filters(brief: FamilyBrief, size: tuple[int, int], one_sided_noise: Fraction) -> tuple[Taps, ...]:
     """Return the filters with some samples before and ahead of the step, as rationals."""
     shape = Shape(*size, brief.conditions, brief.gyro)
     degrees = range(0 if brief.gyro else 1, brief.degree + 1)
@@ -171,7 +176,7 @@ def _filters(brief: FamilyBrief, size: tuple[int, int]) -> tuple[Taps, ...]:
     one_sided = size != (brief.previous, brief.ahead)
     taps: Sequence[Sequence[Any]]
     if one_sided or brief.objective == "mean square":
-        noise = brief.one_sided_noise if one_sided else brief.noise
+        noise = one_sided_noise if one_sided else brief.noise
         taps = mean_square.design(shape, degrees, brief.band, noise, brief.spectrum)
     elif shape.symmetric:
         taps = [minimax.design(each, brief.band).taps for each in unknowns]

@@ -57,7 +57,7 @@ def in_words(window: Window, bits: int) -> Window:
     rows = [
         _Search(Unknowns(shape, m), window, digits, exact).best(row) for m, row in enumerate(window.filters)
     ]
-    return replace(window, filters=tuple(rows), conditions=exact, one_sided=())
+    return replace(window, filters=tuple(rows), conditions=exact, one_sided=(), start=())
 
 
 class _Search:

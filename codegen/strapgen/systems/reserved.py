@@ -10,10 +10,7 @@ from strapgen.targets.names import PYTHON, C
 
 #: Headers and modules that generated files include or import, or that a file of the same name would hide.
 _HEADERS = frozenset(
-    """
-    assert complex ctype errno fenv float inttypes iso646 limits locale math setjmp signal stdalign stdarg stdatomic
-    stdbool stdckdint stddef stdint stdio stdlib stdnoreturn string tgmath threads time uchar wchar wctype numpy
-    """.split()
+    ["assert", "complex", "ctype", "errno", "fenv", "float", "inttypes", "iso646", "limits", "locale", "math", "setjmp", "signal", "stdalign", "stdarg", "stdatomic", "stdbool", "stdckdint", "stddef", "stdint", "stdio", "stdlib", "stdnoreturn", "string", "tgmath", "threads", "time", "uchar", "wchar", "wctype", "numpy"]
 )
 #: What the functions of a system are called behind its name, and members of its memory.
 _FUNCTIONS = re.compile(r"begin|cycle|memory|residuals|runs?|every_\d+")

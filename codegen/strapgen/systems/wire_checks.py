@@ -82,8 +82,8 @@ def check_direction(stage: Ports, name: str, source: Source) -> None:
         )
     if back and name not in stage.text.delay:
         raise InputError(
-            f"stage {stage.name}: {name} = {source.name!r} goes back from a later stage to an earlier one; state its delay, "
-            f"delay = {{ {name} = 1 }}"
+            f"stage {stage.name}: {name} = {source.name!r} goes back from a later stage to an earlier one; "
+            f"state its delay, delay = {{ {name} = 1 }}"
         )
     if not back and name in stage.text.delay:
         raise InputError(

@@ -43,7 +43,7 @@ class Description:
     formats: Mapping[str, Mapping[str, str]]
 
 
-def described(path: str | Path, sample_hz: Fraction | None = None) -> Description:
+def read_system(path: str | Path, sample_hz: Fraction | None = None) -> Description:
     """Read the file of a system and wire it.
 
     Parameters
@@ -68,8 +68,12 @@ def described(path: str | Path, sample_hz: Fraction | None = None) -> Descriptio
         raise InputError(f"{path}: {error}") from None
 
 
+#: The name by which modules of the package call it.
+described = read_system
+
+
 def wired(text: SystemText) -> Description:
-    """Return a described system with its stages wired; parameters and errors are those of `described`."""
+    """Return a described system with its stages wired; parameters and errors are those of `read_system`."""
     stages = [ports(stage, place) for place, stage in enumerate(text.stages)]
     wiring = _Wiring(text, stages)
     wiring.run()

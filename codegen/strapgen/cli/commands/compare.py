@@ -77,7 +77,7 @@ def compare(
     Example: strapgen compare euler --method rk4 --increments 2 --backend numpy,c,c-fixed32,c-fixed16 --carry full
     --reference exact --motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 --step 0.125 --duration 180
     """
-    output.check(algorithm, *methods.files, source.increments_csv, source.rates_csv)
+    output.check(algorithm, *methods.files, *source.files)
     choices = methods.choices(algorithm)
     names = _backends(backend, reference, files)
     most = limit("--fail-above", fail_above)

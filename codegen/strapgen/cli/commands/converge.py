@@ -21,8 +21,7 @@ from strapgen.cli.options import (
 )
 from strapgen.cli.output import Output
 from strapgen.cli.progress import track
-from strapgen.cli.sample_source import MOTION_NAMES, MotionSettings, pairs
-from strapgen.support import checks
+from strapgen.cli.sample_source import MOTION_FILE, MOTION_NAMES, MotionSettings, check_motion, pairs
 
 if TYPE_CHECKING:
     from strapgen.experiments.convergence import Convergence
@@ -38,7 +37,8 @@ class Ladder:
     panel: ClassVar[str] = "Input"
 
     motion: Annotated[
-        _Text, option("--motion", metavar="NAME", help=f"Motion: {MOTION_NAMES}.  [default: coning]")
+        _Text,
+        option("--motion", metavar="NAME", help=f"Motion: {MOTION_NAMES}{MOTION_FILE}.  [default: coning]"),
     ] = None
     settings: MotionSettings = None
     steps: Annotated[
@@ -53,21 +53,18 @@ class Ladder:
 
     def check(self) -> None:
         """Check the name of the motion."""
-        from strapgen.catalogue import MOTIONS
-
-        if self.motion is not None:
-            checks.choice("motion", self.motion, MOTIONS)
+        check_motion(self.motion)
 
     def profile(self) -> tuple[Motion, str]:
         """Return the motion, and a description of the runs in words."""
-        from strapgen.simulation import motions
+        from strapgen.simulation import motions, users_motions
 
         parameters = pairs(self.settings or [])
         if self.motion is None and not self.settings:
             parameters = motions.GENERAL
-        profile = motions.motion(self.motion or "coning", **parameters)
+        profile = users_motions.any_motion(self.motion or "coning", self.duration, parameters)
         words = ", ".join(f"{key}={value}" for key, value in parameters.items())
-        return profile, f"{self.duration} s of {profile.name} motion, {words}"
+        return profile, f"{self.duration} s of {profile.name} motion" + (f", {words}" if words else "")
 
 
 @grouped

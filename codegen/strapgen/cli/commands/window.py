@@ -88,6 +88,10 @@ class Band(BandOptions):
         str,
         option("--now-noise", metavar="RATIO", help="The same for the filters of the attitude of now."),
     ] = "3e-4"
+    start_noise: Annotated[
+        str,
+        option("--start-noise", metavar="RATIO", help="The same for the first intervals of a recording."),
+    ] = "0"
     spectrum: Annotated[
         Path | None,
         option(
@@ -197,6 +201,7 @@ def _brief(size: WindowSize, band: Band, name: str | None) -> FamilyBrief:
             "--series-terms", whole("--series-terms", size.series_terms or "16"), largest=windows.MOST_TERMS
         ),
         _title(name),
+        not_negative("--start-noise", band.start_noise),
     )
 
 

@@ -85,29 +85,37 @@ def position_from_geographic() -> Kernel:
     )
 
 
-def north_east_down() -> Kernel:
+def north_east_down(inverse: bool = False) -> Kernel:
     """Return the attitude against north, east and down, of which `euler-angles-from-dcm` has roll, pitch and heading.
 
-    The matrix between n and these axes is its own inverse: the kernel also takes an attitude against north, east and
-    down to one against n.
+    Parameters
+    ----------
+    inverse : bool
+        Whether to return the attitude against axes n instead; the matrix between both is its own inverse.
 
     Returns
     -------
     Kernel
         Inputs ``state`` (3, 3), C_b^n, and ``geographic`` (3,) in rad; output ``attitude`` (3, 3), body to north, east
-        and down.
+        and down. For the inverse the input is ``attitude`` and the output ``state``.
     """
     build = KernelBuilder()
-    C = build.input(ATTITUDE)
+    words = "attitude, direction cosine matrix from body axes b to north, east and down"
+    other = replace(ATTITUDE, name="attitude", elements=_renamed("D"), meaning=words, frame="b to g")
+    before, result = (other, ATTITUDE) if inverse else (ATTITUDE, other)
+    C = build.input(before)
     cosine, sine = _wander(build)
     exchange = sp.Matrix([[sine, cosine, 0], [cosine, -sine, 0], [0, 0, -1]])
-    meaning = "attitude, direction cosine matrix from body axes b to north, east and down"
-    build.output(replace(ATTITUDE, name="attitude", elements=_renamed("D"), meaning=meaning), exchange * C)
-    return build.kernel("dcm-north-east-down", "Attitude against north, east and down", DERIVED)
+    build.output(result, exchange * C)
+    return build.kernel(
+        "dcm-from-north-east-down" if inverse else "dcm-north-east-down",
+        f"Attitude against {'navigation axes' if inverse else 'north, east and down'}",
+        DERIVED,
+    )
 
 
 def ground_velocity() -> Kernel:
-    """Return the velocity to east, north and up.
+    """Return the velocity to north, east and down.
 
     Returns
     -------
@@ -120,12 +128,13 @@ def ground_velocity() -> Kernel:
     signal = Signal(
         "ground_velocity",
         (3,),
-        ("east_velocity", "north_velocity", "up_velocity"),
+        ("north_velocity", "east_velocity", "down_velocity"),
         unit="m/s",
-        meaning="velocity relative to the earth, axes to east, north and up",
+        meaning="velocity relative to the earth, axes to north, east and down",
+        frame="g",
     )
-    build.output(signal, [cosine * v[0] - sine * v[1], sine * v[0] + cosine * v[1], v[2]])
-    return build.kernel("ground-velocity", "Velocity to east, north and up", DERIVED)
+    build.output(signal, [sine * v[0] + cosine * v[1], cosine * v[0] - sine * v[1], -v[2]])
+    return build.kernel("ground-velocity", "Velocity to north, east and down", DERIVED)
 
 
 def _renamed(prefix: str) -> tuple[str, ...]:

@@ -55,10 +55,16 @@ TRANSPORT_RATE = Signal.vector(
     frame="n",
 )
 CURVATURE = Signal.scalar(
-    "curvature", unit="1/m", meaning="1 over the (equatorial) radius of the earth", bound=Fraction(1, 6_000_000)
+    "curvature",
+    unit="1/m",
+    meaning="1 over the (equatorial) radius of the earth",
+    bound=Fraction(1, 6_000_000),
 )
 ECCENTRICITY = Signal.scalar(
-    "eccentricity_squared", unit="1", meaning="e^2 of the meridian's ellipse, no frame", bound=Fraction(1, 100)
+    "eccentricity_squared",
+    unit="1",
+    meaning="e^2 of the meridian's ellipse, no frame",
+    bound=Fraction(1, 100),
 )
 GRAVITY = Signal.vector(
     "gravity",
