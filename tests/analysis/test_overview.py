@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import json
 
+import pytest
 import sympy as sp
 
 from strapgen.analysis.overview import choices, methods, overview
 from strapgen.catalogue import METHODS, choose
 from strapgen.catalogue.methods.shaped_coning import SHAPE_TITLES
 from strapgen.catalogue.methods.windows import WINDOW_TITLES
-from strapgen.reports.overview import overview_text
+from strapgen.reports.error_analysis.overview import overview_text
 
 
+@pytest.mark.long
 def test_rows():
     rows = list(overview([choose("dcm", "rk1", 1), choose("euler", "rk4", 2), choose("euler", "magnus2", 1)]))
     first, fourth, magnus = rows

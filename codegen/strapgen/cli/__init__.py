@@ -29,6 +29,7 @@ from strapgen.cli.commands import (
     strapdown,
     study,
     study_system,
+    system,
     tableau,
     tables,
     two_speed,
@@ -52,6 +53,7 @@ COMMANDS: dict[str, dict[str, Any]] = {
     "Generate": {
         "generate": generate.generate,
         "two-speed": two_speed.two_speed,
+        "system": system.system,
         "vectors": vectors.vectors,
         "verify": verify.verify,
         "evidence": evidence.evidence,
