@@ -24,9 +24,10 @@ from strapgen.design import responses
 from strapgen.design.family import FamilyBrief, design
 from strapgen.simulation.drift import angles, drift, steady_drift
 from strapgen.simulation.motions import PROFILES, Motion
-from strapgen.simulation.runs import Run
+from strapgen.simulation.runs import Run, attitude, drift_between
 
 INTERVAL = Fraction(1, 100)
+BAND = Fraction(13, 10)
 #: The algorithms beside which windows stand: method, samples of a step, samples from before it.
 COMBINED, TWO_SAMPLES = ("coning-combined", 3, 3), ("coning-compressed", 1, 1)
 #: Seeds of the runs with noise, whose drifts are averaged as root mean squares.
@@ -192,6 +193,33 @@ def gyro() -> Rows:
         yield name, shown(steady_drift(run(stepper(*method), motion)))
 
 
+def start() -> Rows:
+    """Begin a recording with filters of the start that are designed for several noises."""
+    cone_attitude = cone(1, 20).attitude(np.arange(6001) / 100)
+    for noise in ("0", "1e-5", "3e-4"):
+        chosen = replace(
+            window("1.3"), start=design(FamilyBrief(7, 7, BAND, start_noise=Fraction(noise))).start
+        )
+        samples = cone(1, 20).samples(INTERVAL, 0, 6000)
+        whole = attitude(stepper("window-7-7"), strapgen.recording_attitudes(chosen, samples, backend="c"))
+        off = drift_between(cone_attitude[0] @ whole[:-7], cone_attitude[:-7])
+        pulsed = np.sqrt(np.mean([_left_by_pulses(chosen, seed) ** 2 for seed in SEEDS]))
+        gain = responses.noise_gain(chosen.start[0], 1)
+        yield noise, *map(shown, (gain, np.linalg.norm(off, axis=1).max(), pulsed))
+
+
+def _left_by_pulses(chosen: Window, seed: int) -> float:
+    """Return what a start on pulses of 5 arcsec, in a turn, is off from the run that has samples before it, in rad."""
+    turn, size = strapgen.motion("constant", x_deg_s=20, y_deg_s=7, z_deg_s=300), np.radians(5 / 3600)
+    samples = turn.samples(INTERVAL, -7, 47)
+    samples[0] += np.random.default_rng(seed).uniform(0, size, 3)
+    counted = pulses(samples[:, None], size)[:, 0]
+    step = stepper("window-7-7")
+    before = step.propagate(np.lib.stride_tricks.sliding_window_view(counted, 15, axis=0).swapaxes(1, 2))
+    begun = strapgen.recording_attitudes(chosen, counted[7:], backend="c")
+    return float(np.linalg.norm(drift_between(attitude(step, begun[40]), attitude(step, before[40]))))
+
+
 TABLES = {
     "Above the band": (("cone of 1°", "window-7-7", "coning-combined 3+3", "coning-compressed 1+1"), outside),
     "A band wider than needed": (("band, rad", "level of c₁", "cone at 10 Hz", "cone at 2 Hz"), wider_bands),
@@ -199,6 +227,10 @@ TABLES = {
     "Noise": (("", "window-7-7", "coning-combined 3+3", "coning-compressed 1+1"), noise),
     "Jitter": (("motion", "rms of an instant", "window-7-7", "coning-combined 3+3"), jitter),
     "Gyro": (("designed", "drift"), gyro),
+    "Start, in rad in place of": (
+        ("noise", "noise gain of c₁", "cone of 1° at 20 Hz", 'pulses of 5", turn of 300 °/s'),
+        start,
+    ),
 }
 
 

@@ -18,6 +18,7 @@ from pathlib import Path
 import pytest
 import typer.main
 
+import strapgen
 from strapgen.catalogue.methods import tableaux
 from strapgen.cli import app, main
 
@@ -249,6 +250,7 @@ LONG_COMMANDS = (
     "strapgen series euler ",
     "strapgen simulate ",
     "strapgen stability ",
+    "strapgen statements",
     "strapgen strapdown dcm ",
     "strapgen study ",
     "strapgen tables",
@@ -339,6 +341,15 @@ def test_the_tables_of_the_thesis_are_those_of_the_command(capsys):
         assert float(ours) == pytest.approx(value, rel=1e-3 if value > 1e-3 else 0.5)
 
 
+@pytest.mark.long
+def test_the_statements_of_the_thesis_are_those_of_the_command(capsys):
+    printed = run("strapgen statements --format markdown", capsys).strip().splitlines()
+    shown = [line for line in DOCS["thesis-statements"].splitlines() if line.startswith("|")]
+    # Round-off rules the smallest of the numbers, which the tests of the statements hold to their digits.
+    words = [[re.sub(r"[\d.]+(e-\d+)?", "#", line) for line in lines] for lines in (shown, printed)]
+    assert words[0] == words[1]
+
+
 @pytest.fixture
 def shown_files(workplace: Path) -> Path:
     """Return a folder with the tableau and the algorithm of the page on those of one's own."""
@@ -368,7 +379,7 @@ def test_the_algorithm_of_a_user_is_generated_as_the_page_says(shown_files, caps
 @pytest.mark.long
 def test_the_commands_on_own_algorithms(shown_files, capsys):
     commands = shown_commands(DOCS["own-algorithms"])
-    shown = {"tableau", "generate", "converge", "check", "compare"}
+    shown = {"tableau", "generate", "converge", "check", "compare", "simulate"}
     assert {shlex.split(command)[1] for command in commands} == shown
     for command in commands:
         run(command, capsys)
@@ -454,6 +465,9 @@ def test_example(path, capsys, monkeypatch):
     namespace = runpy.run_path(str(path))
     if "algorithm" in namespace:  # for strapgen to load, see `strapgen check`
         assert namespace["algorithm"]().companions is not None
+        return
+    if "attitude" in namespace:  # a motion, which is checked as it is read
+        assert strapgen.read_motion(path).functions.keys() == {"increments", "attitude", "rate"}
         return
     if path.stem.startswith("make_"):
         assert namespace["text"]() == namespace["LOG"].read_text()

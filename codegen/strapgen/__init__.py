@@ -19,7 +19,13 @@ if _typing.TYPE_CHECKING:
     from strapgen.backends import evaluator as evaluator
     from strapgen.backends import exact as exact
     from strapgen.backends import increments as _increments
+    from strapgen.backends.commit_late import CommitLate as CommitLate
+    from strapgen.backends.late_recording import recording_attitudes as recording_attitudes
+    from strapgen.backends.late_unit import GapError as GapError
+    from strapgen.backends.late_unit import SampleKind as SampleKind
     from strapgen.backends.registry import BACKENDS as BACKENDS
+    from strapgen.backends.systems import SystemRunner as SystemRunner
+    from strapgen.backends.systems import system_runner as system_runner
     from strapgen.backends.two_speed import TwoSpeed as TwoSpeed
     from strapgen.catalogue import Choice as Choice
     from strapgen.catalogue import choose as choose
@@ -30,10 +36,14 @@ if _typing.TYPE_CHECKING:
     from strapgen.catalogue.kinematics import Kinematics as Kinematics
     from strapgen.catalogue.methods import runge_kutta as runge_kutta
     from strapgen.catalogue.methods import tableaux as tableaux
+    from strapgen.catalogue.methods import windows as windows
     from strapgen.catalogue.methods.samples import Samples as Samples
     from strapgen.catalogue.methods.samples import increments_signal as increments_signal
     from strapgen.catalogue.methods.tableau import Tableau as Tableau
     from strapgen.catalogue.methods.tableaux import TABLEAUX as TABLEAUX
+    from strapgen.catalogue.methods.window import Window as Window
+    from strapgen.catalogue.methods.windows import WINDOWS as WINDOWS
+    from strapgen.design import family as _family
     from strapgen.experiments import word_length as _word_length
     from strapgen.experiments.comparison import Comparison as Comparison
     from strapgen.experiments.comparison import compare as compare
@@ -70,6 +80,7 @@ if _typing.TYPE_CHECKING:
     from strapgen.simulation.recording import read_rates as read_rates
     from strapgen.simulation.runs import Run as Run
     from strapgen.simulation.runs import simulate as simulate
+    from strapgen.simulation.users_motions import read_motion as read_motion
     from strapgen.support.exceptions import CompilerError as CompilerError
     from strapgen.support.exceptions import InputError as InputError
     from strapgen.support.exceptions import InputTypeError as InputTypeError
@@ -80,12 +91,14 @@ if _typing.TYPE_CHECKING:
     from strapgen.symbolic.kernel import KernelBuilder as KernelBuilder
     from strapgen.symbolic.kernel import Stage as Stage
     from strapgen.symbolic.kernel import resolution as resolution
+    from strapgen.systems.wiring import read_system as read_system
     from strapgen.targets.registry import TARGETS as TARGETS
     from strapgen.targets.registry import Target as Target
     from strapgen.toolchain.compiler import compile_together as compile_together
 
     gyro = _increments
     study = _word_length
+    window_design = _family
 
 #: Public names by the modules that define them.
 _NAMES = {
@@ -96,7 +109,17 @@ _NAMES = {
         "build",
         "evaluator",
     ),
+    "backends.commit_late": ("CommitLate",),
+    "backends.late_recording": ("recording_attitudes",),
+    "backends.late_unit": (
+        "GapError",
+        "SampleKind",
+    ),
     "backends.registry": ("BACKENDS",),
+    "backends.systems": (
+        "SystemRunner",
+        "system_runner",
+    ),
     "backends.two_speed": ("TwoSpeed",),
     "catalogue": (
         "Choice",
@@ -115,6 +138,8 @@ _NAMES = {
     ),
     "catalogue.methods.tableau": ("Tableau",),
     "catalogue.methods.tableaux": ("TABLEAUX",),
+    "catalogue.methods.window": ("Window",),
+    "catalogue.methods.windows": ("WINDOWS",),
     "experiments.comparison": (
         "Comparison",
         "compare",
@@ -167,6 +192,7 @@ _NAMES = {
         "Run",
         "simulate",
     ),
+    "simulation.users_motions": ("read_motion",),
     "support.exceptions": (
         "CompilerError",
         "InputError",
@@ -180,6 +206,7 @@ _NAMES = {
         "Stage",
         "resolution",
     ),
+    "systems.wiring": ("read_system",),
     "targets.registry": (
         "TARGETS",
         "Target",
@@ -196,6 +223,8 @@ _NAMESPACES = {
     "study": "experiments.word_length",
     "tableaux": "catalogue.methods.tableaux",
     "vibration": "vibration",
+    "window_design": "design.family",
+    "windows": "catalogue.methods.windows",
 }
 _EXPORTS = {name: module for module, names in _NAMES.items() for name in names}
 

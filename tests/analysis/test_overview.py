@@ -11,7 +11,7 @@ from strapgen.analysis.overview import choices, methods, overview
 from strapgen.catalogue import METHODS, choose
 from strapgen.catalogue.methods.shaped_coning import SHAPE_TITLES
 from strapgen.catalogue.methods.windows import WINDOW_TITLES
-from strapgen.reports.overview import overview_text
+from strapgen.reports.error_analysis.overview import overview_text
 
 
 @pytest.mark.long

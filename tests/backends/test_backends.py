@@ -271,9 +271,9 @@ def test_a_step_from_rates_on_every_back_end(backend_name, rng):
     np.testing.assert_allclose(backend.step(states[0], turns[0]), states[1], rtol=0, atol=roundoff(other, 1))
 
 
-def test_a_simulation_needs_increments(backend_name):
+def test_a_simulation_needs_increments_or_the_nodes_of_rates(backend_name):
     backend = strapgen.build(generated(lowered("dcm", "rk4", rates=True), backend_name))
-    with pytest.raises(InputError, match="dcm-rk4-rates takes turns"):
+    with pytest.raises(InputError, match="dcm-rk4-rates takes turns at nodes that its sources do not tell"):
         strapgen.simulate(backend, strapgen.motion("constant", x_deg_s=1), 1, 10)
 
 

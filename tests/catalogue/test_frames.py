@@ -14,9 +14,8 @@ WITHOUT = {
         ("torque_increment", "compensated_torque_increment", "indicated_torque_increment"),
         "each element is about another torquer axis",
     ),
+    "level_angles": "its axes, level with heading 0, are those of no other signal",
     **dict.fromkeys(("deviation", "next_deviation", "heating_gain"), "there is one number for each gyro"),
-    "ground_velocity": "its axes point to east, north and up",
-    "level_angles": "its axes point ahead, right and down",
 }
 #: Words of a meaning that name the frame.
 WORDS = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -36,15 +37,20 @@ def _claims_once() -> tuple[ratios.Claim, ...]:
 
 
 @cache
-def _table(number: int, backend_name: str, settings: Settings | None) -> tuple[thesis_tables.TableEntry, ...]:
+def _table(
+    number: int, backend_name: str, settings: Settings | None, interval: Fraction
+) -> tuple[thesis_tables.TableEntry, ...]:
     (table,) = (table for table in thesis_tables.TABLES if table.number == number)
-    return tuple(_entries(table, backend_name, settings))
+    return tuple(_entries(table, backend_name, settings, interval))
 
 
 def _entries_once(
-    table: thesis_tables.Table, backend_name: str, settings: Settings | None = None
+    table: thesis_tables.Table,
+    backend_name: str,
+    settings: Settings | None = None,
+    interval: Fraction = thesis_tables.INTERVAL,
 ) -> tuple[thesis_tables.TableEntry, ...]:
-    return _table(table.number, backend_name, settings)
+    return _table(table.number, backend_name, settings, interval)
 
 
 def _image(figure: Any, path: str | Path) -> bytes:

@@ -720,6 +720,43 @@ def test_simulate_text_is_the_default(strapgen_says):
     assert "error matrix E" in said and "mean drift, deg: " in said
 
 
+def test_simulate_prints_matrices_every_so_often_under_a_title(strapgen_says):
+    command = f"simulate dcm --method rk1 {CONING} --record 1 --orthonormalize 5"
+    lines = strapgen_says(f"{command} --print 2 --title 'A first try'").splitlines()
+    assert lines[0] == "A first try"
+    places = [k for k, line in enumerate(lines) if line.startswith("at ")]
+    assert [lines[k] for k in places] == ["at 0 s", "at 2 s", "at 4 s", "at 5 s"], "the end is among them"
+    data = json.loads(strapgen_says(f"{command} --format json --matrices --title 'A first try'"))
+    assert data["title"] == "A first try"
+    for k, record in zip(places, (0, 2, 4, 5), strict=True):
+        printed = np.array([[float(x) for x in line.split()] for line in lines[k + 2 : k + 5]])
+        wanted = np.hstack([data[name][record] for name in ("computed", "true", "difference", "error")])
+        np.testing.assert_allclose(printed, wanted, rtol=1e-4, atol=6e-10)
+
+
+def test_simulate_begins_at_an_attitude(strapgen_says):
+    command = f"simulate euler --method rk2 {CONING} --record 5 --format json --matrices"
+    turned, plain = (json.loads(strapgen_says(command + more)) for more in (" --initial-deg 10,-20,30", ""))
+    start = np.array(turned["true"][0])
+    np.testing.assert_allclose(turned["computed"][0], start, atol=1e-15)
+    np.testing.assert_allclose(start, np.array(turned["true"][1]) @ np.array(plain["true"][1]).T, atol=1e-14)
+    np.testing.assert_allclose(start[:, 0], [0.813797681, 0.469846310 * 1.0, 0.342020143], atol=1e-8)
+
+
+def test_simulate_on_rates_and_on_a_motion_of_ones_own(strapgen_says):
+    swing = (
+        "--motion "
+        + str(Path(__file__).parents[2] / "examples/own_motion.py")
+        + " --step 0.125 --duration 10"
+    )
+    command = f"simulate euler --method rk4 {swing} --record 10 --format json"
+    extracted, known = (json.loads(strapgen_says(command + more)) for more in ("", " --rates"))
+    assert known["rates_at"] == [0, 0.5, 1] and "increments" not in known
+    assert 0 < known["mean_drift_deg"] < extracted["mean_drift_deg"] / 5, "what the extraction of rates costs"
+    in_words = json.loads(strapgen_says(f"{command} --rates --backend c-fixed32 --carry full"))
+    assert in_words["mean_drift_deg"] == pytest.approx(known["mean_drift_deg"], abs=1e-5)
+
+
 def test_simulate_matrices(strapgen_says):
     plain = json.loads(strapgen_says(f"simulate dcm {CONING} --format json"))
     data = json.loads(strapgen_says(f"simulate dcm {CONING} --format json --matrices"))
@@ -946,7 +983,9 @@ def test_tables_json(backend, strapgen_says):
     )
     for entry in entries:
         assert list(entry)[: len(TABLE_KEYS)] == TABLE_KEYS
-        assert set(entry) - set(TABLE_KEYS) == {"thesis_printed", "note", "roundoff_dominates"}
+        assert set(entry) - set(TABLE_KEYS) == {
+            *("thesis_printed", "note", "roundoff_dominates", "scan", "repairs")
+        }
         assert entry.keys() == entries[0].keys()
         assert type(entry["agrees"]) is bool
     cases = [(e["table"], e["algorithm"], e["order"]) for e in entries]

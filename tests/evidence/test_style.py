@@ -17,9 +17,10 @@ from strapgen.experiments import project, two_speed_project
 from strapgen.experiments.vectors import vectors_of_choice
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sensor import Sensor
-from strapgen.library import generated_sources, two_speed_sources
+from strapgen.library import generated_sources
 from strapgen.support.files import write_files
 from strapgen.support.resources import folder as shipped
+from strapgen.systems import two_speed_sources
 from strapgen.targets.vectors_c.emit import table_files
 
 #: Words, error feedback, counts of a gyro with a state that saturates.

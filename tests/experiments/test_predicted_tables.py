@@ -6,7 +6,7 @@ import pytest
 
 from strapgen.experiments.predicted_tables import predicted
 from strapgen.experiments.thesis_tables import TABLES
-from strapgen.reports.predicted_tables import predicted_text
+from strapgen.reports.thesis.predicted import predicted_text
 
 
 @pytest.mark.long

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -84,6 +85,75 @@ def test_the_contradiction_of_table_2_is_told(backend_name):
         return
     assert noted[0].note.count("2.391") == 2, "the run without orthonormalization gives the printed figure"
     assert "0.856" in noted[0].note
+
+
+def test_every_repair_of_the_scan_is_disclosed():
+    repaired = {
+        (table.number, each.figure): each.scan for table in TABLES for each in table.repairs if each.algorithm
+    }
+    assert repaired == {
+        (1, ".75e-6"): ".75e-?",
+        (2, ".36e-4"): ".26e-4",
+        (2, ".225e-5"): ".225e-?",
+        (4, ".30e-8"): ".30e-3",
+        (5, ".23e-6"): ".23e-?",
+    }
+    for table in TABLES:
+        for each in table.repairs:
+            if each.algorithm:
+                assert table.printed[each.algorithm][ORDERS.index(each.order)] == each.figure
+    motions = {table.number: [each.scan for each in table.repairs if not each.algorithm] for table in TABLES}
+    assert motions == {1: [], 2: [], 3: [], 4: ["b = .1", "-a sin bt"], 5: ["-a sin bt"]}
+
+
+@pytest.mark.parametrize("table", [TABLES[1], TABLES[3]], ids=lambda table: f"table-{table.number}")
+def test_entries_have_the_text_of_the_scan(table):
+    rows = list(entries(table, "numpy"))
+    assert {row.thesis: row.scan for row in rows if row.scan} == {
+        each.figure: each.scan for each in table.repairs if each.algorithm
+    }
+    behind = sum(not each.algorithm for each in table.repairs)
+    assert all(len(row.repairs) == behind + bool(row.scan) for row in rows)
+    assert all(row.as_dict()["scan"] == row.scan for row in rows)
+
+
+@pytest.mark.parametrize(
+    ("repaired", "unrepaired"),
+    [
+        ({"a_deg_s": 1, "b_deg_s": 1, "g_deg_s": 1}, {"b_deg_s": 0.1}),
+        ({"a_deg_s": 1, "b_deg_s": 1, "g_deg_s": 1}, {"b_deg_s": -1}),
+    ],
+    ids=["rate", "sign"],
+)
+def test_the_scan_of_table_4_does_not_come_out(repaired, unrepaired):
+    backend = strapgen.backend("dcm", "rk1", 2)
+    base, other = (
+        math.degrees(strapgen.simulate(backend, strapgen.motion("coning", **s), "1/8", 180, 5, 5).mean_drift)
+        for s in (repaired, repaired | unrepaired)
+    )
+    assert base == pytest.approx(0.0625, abs=5e-5)
+    assert other == pytest.approx({0.1: 0.00942, -1: 0.140}[unrepaired["b_deg_s"]], rel=0.01)
+
+
+def test_ten_seconds_between_orthonormalizations_come_out_as_five_do():
+    rows = [row for table in TABLES for row in entries(table, "numpy", interval=Fraction(10))]
+    assert all(row.agrees for row in rows), "the tables cannot decide between 5 s and 10 s"
+    last = {(row.algorithm, row.order): row.normalised for row in rows if row.table == 5}
+    wanted = {("dcm", 2): 0.4355, ("dcm", 4): 1.869e-5, ("euler", 1): 0.6619, ("euler", 2): 0.1557}
+    for place, value in (wanted | {("euler", 4): 2.258e-7}).items():
+        assert last[place] == pytest.approx(value, rel=5e-4)
+
+
+@pytest.mark.parametrize(
+    ("table", "base"), [(TABLES[0], 0.288), (TABLES[4], 1.064)], ids=["one-axis", "coning"]
+)
+def test_records_between_orthonormalizations_do_not_come_out(table, base):
+    backend = strapgen.backend("dcm", "rk1", 2)
+    motion = strapgen.motion(table.motion, **table.settings)
+    between = strapgen.simulate(backend, motion, "1/8", 180, 5)
+    drift = thesis_tables.drift_deg(table, between)
+    assert drift == pytest.approx(base, abs=5e-4)
+    assert not -5e-4 <= drift - float(table.base) < 1e-3
 
 
 @pytest.mark.parametrize(

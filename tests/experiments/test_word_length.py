@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 
 import pytest
 
@@ -11,6 +12,7 @@ from strapgen.experiments import word_length
 from strapgen.experiments.word_length import cases, run, run_case
 from strapgen.reports import plots
 from strapgen.reports.word_length import word_length_report, word_length_text
+from strapgen.simulation import users_motions
 from strapgen.support.exceptions import InputError
 
 SMALL = {"duration": "5", "words": (12, 16, 24), "carries": ("none", "full")}
@@ -43,6 +45,39 @@ def test_parts_of_the_drift(outcomes):
         assert roundings == sorted(roundings, reverse=True)
     assert by_word[24, "full", "30"].dominates == "quantization", "pulses of 30 arcsec"
     assert by_word[12, "none", "0"].dominates == "rounding", "12 bits, nothing kept"
+
+
+def test_pulses_have_the_noise_of_the_closed_form_beside_them(outcomes):
+    pulse, step, duration = math.radians(30 / 3600), 0.125, 5.0
+    rate = math.radians(10)
+    # The coning rate is sqrt(a^2 + g^2) in size at all times; one end of the run adds on three axes, w across two.
+    wanted = pulse**2 / 12 * (3 + 2 * 5 / 9 * 2 * rate**2 * step * duration)
+    for outcome in outcomes:
+        if outcome.case.pulse_arcsec == "0":
+            assert outcome.expected_deg is None
+            continue
+        assert math.radians(outcome.expected_deg) ** 2 == pytest.approx(wanted, rel=1e-3)
+        # The largest error of one run with a real counter is of the size of the mean error at its end.
+        assert 0.3 < outcome.quantization_deg / outcome.expected_deg < 4
+    text = word_length_text(outcomes)
+    assert text.count("if their errors are independent") == 1
+    assert "5*h*q**2*t*w**2/108 + q**2/12" in text
+
+
+def test_the_file_of_a_motion_takes_the_place_of_its_parameters(tmp_path, monkeypatch):
+    monkeypatch.setattr(users_motions, "require_consistent", lambda *_: None)  # tested where it belongs
+    file = tmp_path / "turn.py"
+    text = "import numpy as np\ndef attitude(t): return np.eye(3) + np.zeros((*np.shape(t), 3, 3))\n"
+    text += "def increments(step, steps, samples, previous=0, ahead=0):\n"
+    text += "    return np.full((steps, samples, 3), RATE * step)\n"
+    drifts = []
+    for rate in (0.0, 0.01):
+        file.write_text(text.replace("RATE", str(rate)))
+        (case,) = cases(duration="5", words=24, carries="full", motion_name=str(file))
+        assert case.settings == ()
+        drifts.append(run_case(case).truncation_deg)
+        word_length_text([run_case(case)])
+    assert drifts[0] == 0 < drifts[1], "another content of the file is another case"
 
 
 def test_a_finished_case_is_not_run_again(outcomes, monkeypatch):

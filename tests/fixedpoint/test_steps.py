@@ -95,6 +95,21 @@ def test_an_exponential_for_increments_of_any_size(largest):
     assert fixed.error_bounds["next"] < (few_places if largest < 1 else root_near_zero)
 
 
+@pytest.mark.long
+def test_minutes_of_a_window_are_the_integers_of_the_model():
+    """Twenty thousand steps with all feedback; `benchmarks/window_fixed_point.py` runs an hour."""
+    samples = strapgen.motion("random", rate_deg_s=60).samples(Fraction(1, 100), -7, 20_007)
+    windows = np.lib.stride_tricks.sliding_window_view(samples, 15, axis=0).swapaxes(1, 2)
+    c, model = (
+        strapgen.backend("euler", "window-7-7", None, name, settings=Settings(carry="full")).propagate(
+            windows
+        )
+        for name in ("c-fixed32", "fixed-model")
+    )
+    assert len(c) == 20_001
+    np.testing.assert_array_equal(c, model)
+
+
 @pytest.mark.parametrize("carry", ["none", "full"])
 @pytest.mark.parametrize("method", ["magnus4", pytest.param("munthe-kaas4", marks=pytest.mark.long)])
 def test_c_gives_the_integers_of_the_model(method, carry, rng):

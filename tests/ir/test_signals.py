@@ -55,7 +55,7 @@ def test_plain_data_holds_all_of_a_signal(signal):
     [
         (
             {"frame": "q"},
-            "frame of rate 'q' is not known; allowed: b, n, e, i, any, or an attitude such as 'b to n'",
+            "frame of rate 'q' is not known; allowed: b, n, e, i, g, any, or an attitude such as 'b to n'",
         ),
         ({"frame": "b to q"}, "frame of rate 'b to q' is not known"),
         ({"frame": "b to n to e"}, "frame of rate 'b to n to e' is not known"),

@@ -10,11 +10,12 @@ from strapgen.catalogue.methods import lost_samples
 from strapgen.catalogue.methods.late_filters import LateFilters
 from strapgen.catalogue.methods.windows import WINDOWS
 from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.sensor import Sensor
 from strapgen.library.commit_late_fixed import functions, interface_of, rounded
 from strapgen.library.commit_late_sources import kernels
 from strapgen.support.exceptions import InputError
 
-FILTERS = LateFilters(WINDOWS["window-7-7"])
+FILTERS = LateFilters(WINDOWS["window-7-7"], calm_start=True)
 
 
 def fixed(**settings):
@@ -22,7 +23,7 @@ def fixed(**settings):
 
 
 def test_rounded_filters_hold_their_first_two_conditions_exactly():
-    (_, rotation, _), integers = fixed()
+    (_, rotation, _), integers, _ = fixed()
     formats = {argument.signal.name: argument.format.fraction for argument in interface_of(rotation).inputs}
     for group, rows in zip(integers.sets, FILTERS.sets, strict=True):
         for m, shift, taps in zip(integers.sums, integers.shifts, group, strict=True):
@@ -34,8 +35,24 @@ def test_rounded_filters_hold_their_first_two_conditions_exactly():
             assert max(abs(tap - exact / unit) for tap, exact in zip(taps, rows[m], strict=True)) < 4
 
 
+def test_filters_of_counts_have_their_scale():
+    scale = Sensor.of("0.0175dps", Fraction(1, 100))
+    (_, rotation, _), integers, filters = fixed(sensor=scale, largest_angle=Fraction(7, 100))
+    formats = {argument.signal.name: argument.format.fraction for argument in interface_of(rotation).inputs}
+    assert (filters.scale, integers.sums, integers.limit) == (scale.scale, range(5), 22919)
+    for group, rows in zip(integers.sets, FILTERS.sets, strict=True):
+        for m, shift, taps in zip(integers.sums, integers.shifts, group, strict=True):
+            unit = Fraction(2) ** (integers.fraction - shift - formats[f"legendre_{m}"])
+            assert all(
+                abs(n * unit - scale.scale * tap) < 4 * unit for n, tap in zip(taps, rows[m], strict=True)
+            )
+            # Of a constant rate c_0 has the scale to a unit, and all others have nothing.
+            assert abs(sum(taps) * unit - (m == 0) * scale.scale) < unit
+            assert m == 0 or sum(taps) == 0
+
+
 def test_restoring_filters_leave_a_constant_rate_as_it_is():
-    _, integers = fixed()
+    _, integers, _ = fixed()
     assert all(sum(taps) == 1 << integers.restoring_shift for taps in integers.restoring)
     lost, merged = integers.restoring
     assert lost[lost_samples.REACH] == 0
@@ -44,7 +61,7 @@ def test_restoring_filters_leave_a_constant_rate_as_it_is():
 
 @pytest.mark.parametrize("angle", [Fraction(1, 100), Fraction(1, 7), Fraction(1, 4)])
 def test_formats_fit_together_and_sums_have_room(angle):
-    (step, rotation, normalization), integers = fixed(largest_angle=angle, carry="full")
+    (step, rotation, normalization), integers, _ = fixed(largest_angle=angle, carry="full")
     state, samples = interface_of(step).inputs
     inputs = {argument.signal.name: argument for argument in interface_of(rotation).inputs}
     assert inputs["state"].format == interface_of(normalization).inputs[0].format == state.format
@@ -76,7 +93,11 @@ def test_moments_are_exact_and_taps_near(moments, count):
         ({"state": "q31"}, "saturates"),
         ({"ranges": {"legendre_1": Fraction(1)}}, "ranges or formats"),
         ({"formats": {"state": "Q2.29"}}, "ranges or formats"),
-        ({"input_bits": 24}, "increments in rad"),
+        ({"input_bits": 24}, "samples as words of 32"),
+        (
+            {"sensor": Sensor.of("0.02rad"), "largest_angle": Fraction(1, 50), "input_bits": 16},
+            "at most 1 in magnitude, too few units",
+        ),
         ({"largest_angle": Fraction(1, 2)}, "up to 0.5 rad; a smaller largest angle"),
     ],
 )

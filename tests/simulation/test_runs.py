@@ -82,3 +82,73 @@ def test_a_run_that_overflows_names_the_samples_that_the_rate_is_extracted_from(
     )
     with pytest.raises(InputError, match=said):
         strapgen.simulate(strapgen.backend("euler", "rk2", 8), cone, "0.08", 240, record=240)
+
+
+def rates(algorithm: str, method: str = "rk4") -> strapgen.Backend:
+    return strapgen.backend(strapgen.choose_step(algorithm, method, rates=True))
+
+
+@pytest.mark.parametrize("algorithm", ["euler", pytest.param("dcm", marks=pytest.mark.long)])
+def test_rates_are_as_good_as_increments_where_the_rate_is_constant(algorithm):
+    steady = strapgen.motion("constant", x_deg_s=10, y_deg_s=-70, z_deg_s=30)
+    runs = [
+        simulate(backend, steady, "1/8", 20) for backend in (rates(algorithm), strapgen.backend(algorithm))
+    ]
+    np.testing.assert_allclose(runs[0].computed, runs[1].computed, rtol=0, atol=1e-12)
+    assert rates(algorithm).nodes == (0, 0.5, 1)
+
+
+@pytest.mark.parametrize(
+    ("method", "increments"), [("rk4", 1), pytest.param("butcher6", 2, marks=pytest.mark.long)]
+)
+def test_the_orders_on_rates_and_on_increments_differ_as_the_series_predict(method, increments):
+    coning = strapgen.motion("coning", a_rad_s=1, b_rad_s=1.5, g_rad_s=0.6)
+    choices = [
+        strapgen.choose_step("euler", method, rates=True),
+        strapgen.choose_step("euler", method, increments),
+    ]
+    orders = []
+    for choice in choices:
+        drifts = [simulate(strapgen.backend(choice), coning, step, 2).mean_drift for step in ("1/16", "1/32")]
+        orders.append(math.log2(drifts[0] / drifts[1]))
+        assert orders[-1] == pytest.approx(strapgen.derive(choice).order.step, abs=0.1)
+    assert orders[0] > orders[1] + 1, "the extraction of the rate loses orders"
+
+
+@pytest.mark.parametrize("part", [None, 7])
+def test_an_initial_attitude_turns_the_error(make, algorithm, part, monkeypatch):
+    if part is not None:
+        monkeypatch.setattr(strapgen.backends.protocol, "PART", part)
+        monkeypatch.setattr(strapgen.backends.increments, "PART", part)
+    start = strapgen.evaluator("dcm-from-euler-angles")(np.radians([25.0, -40.0, 130.0]))
+    coning = strapgen.motion("coning", **CONING)
+    backend = make(algorithm, "rk2")
+    turned, plain = (simulate(backend, coning, "1/8", 4, initial=initial) for initial in (start, None))
+    rounding = 4 * certified(backend, 32, 0) + 1e-12 if backend.unit < 1e-12 else 100 * backend.unit * 32
+    np.testing.assert_allclose(turned.error, start @ plain.error @ start.T, rtol=0, atol=rounding)
+    np.testing.assert_allclose(
+        np.linalg.norm(turned.drift, axis=1), np.linalg.norm(plain.drift, axis=1), rtol=0, atol=rounding
+    )
+    differ = np.abs(turned.drift_by_axis - plain.drift_by_axis).max()
+    assert differ > 1e-5 or rounding > 1e-6, "the largest on each axis do not stay"
+
+
+def test_orthonormalization_keeps_the_turned_error_to_second_order():
+    start = strapgen.evaluator("dcm-from-euler-angles")(np.radians([25.0, -40.0, 130.0]))
+    backend, apart, sizes = strapgen.backend("dcm", "rk1", 2), [], []
+    for rate in (8, 4):
+        steady = strapgen.motion("constant", x_deg_s=rate, y_deg_s=-2 * rate, z_deg_s=rate / 2)
+        turned, plain = (
+            simulate(backend, steady, "1/8", 5, 5, 5, initial=initial) for initial in (start, None)
+        )
+        apart.append(np.abs(turned.error - start @ plain.error @ start.T).max())
+        sizes.append(np.abs(simulate(backend, steady, "1/8", 5, record=5).error).max())
+    assert apart[0] > 1e-6
+    assert math.log(apart[0] / apart[1]) / math.log(sizes[0] / sizes[1]) > 1.8
+
+
+def test_a_state_without_a_kernel_for_its_start_begins_at_zero_rotation(monkeypatch):
+    backend = strapgen.backend("euler")
+    monkeypatch.setattr(backend, "attitude", "dcm-from-thirds")
+    with pytest.raises(InputError, match="no kernel converts a matrix to the state of euler-rk4-2"):
+        simulate(backend, strapgen.motion("constant", y_deg_s=1), 1, 1, initial=np.eye(3))

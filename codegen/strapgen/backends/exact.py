@@ -289,5 +289,9 @@ class ExactBackend(Backend):
                 memory = []
         return states.reshape(-1, *self.state_shape), memory
 
+    def _memory(self, initial: Array) -> Any:
+        with mpmath.workdps(DIGITS):
+            return list(in_digits(initial.ravel()))
+
     def _kernels(self) -> list[tuple[str | None, str]]:
         return [*super()._kernels(), (self.attitude, self.sources.target)]

@@ -261,12 +261,15 @@ class FixedBackend(Backend):
     ) -> tuple[Array, Any]:
         state, samples = self.interface.inputs
         rows = increments.reshape(1, -1, samples.signal.size)
-        memory = memory or self._begun(self.evaluator.integers(state, self.identity.reshape(1, -1)))
         memory = replace(memory, first=first)
         words = self.evaluator.integers(samples, rows)
         history = self.propagate_integers(words, 1, orthonormalize_every, memory)
         states = self.evaluator.numbers(state, history[0, 1:]).reshape(-1, *self.state_shape)
         return states, replace(memory, state=history[:, -1])
+
+    def _memory(self, initial: Array) -> Memory:
+        state = self.interface.inputs[0]
+        return self._begun(self.evaluator.integers(state, initial.reshape(1, -1)))
 
     @abstractmethod
     def propagate_integers(

@@ -86,7 +86,7 @@ class LateUnit:
         self._short = [_table(rows) for rows in self.filters.short]
         self._restoring = _table(self.filters.restoration)
         self._next = _table([NEXT])[0]
-        self._ideal = self.filters.window.gyro is None
+        self._first_is_sample = self.filters.sums.start == 1
         size = self._step.function.inputs[0].size
         self.attitude: Array = np.eye(3) if size == 9 else np.array([0.0, 0, 0, 1])
         self.committed: list[Array] = []
@@ -204,7 +204,7 @@ class LateUnit:
 
     def _rotated(self, attitude: Array, rows: Array, samples: Array, place: int) -> Array:
         """Return an attitude after an interval, by filters on samples."""
-        rate = self._samples[place] if self._ideal else _weighted(rows[0], samples)
+        rate = self._samples[place] if self._first_is_sample else _weighted(rows[0], samples)
         coefficients = [rate, *(_weighted(taps, samples) for taps in rows[1:])]
         result: Array = self._rotation(attitude, *coefficients)
         return result

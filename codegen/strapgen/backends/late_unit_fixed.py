@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from strapgen.backends.evaluators import Array, Evaluator
+from strapgen.backends.fixed_numbers import in_units
 from strapgen.backends.late_unit import LateUnit, SampleKind
 from strapgen.backends.late_unit_in_c import LateUnitInC
 from strapgen.ir.fixed_interface import Argument
@@ -90,7 +91,7 @@ class LateUnitOnIntegers(LateUnit):
 
     def _rotated(self, attitude: Array, rows: Array, samples: Array, place: int) -> Array:
         sums = [_summed(taps, samples, shift) for taps, shift in zip(rows, self._fixed.shifts, strict=True)]
-        coefficients = [*([self._samples[place]] if self._ideal else []), *sums]
+        coefficients = [*([self._samples[place]] if self._first_is_sample else []), *sums]
         return _turned(self._rotation, attitude, coefficients)
 
 
@@ -153,7 +154,7 @@ def sample_integers(argument: Argument, values: Any, kind: int, rest: Array) -> 
         If it lies outside the range of a sample, or of the sum of two.
     """
     limit = argument.high * (2 if kind == SampleKind.MERGED else 1)
-    scaled = np.ldexp(np.asarray(values, np.float64), argument.format.fraction)
+    scaled = in_units(argument, np.asarray(values, np.float64))
     if (np.abs(np.rint(scaled)) > limit).any():
         raise InputError(
             f"sample holds {float(np.abs(values).max()):.9g}; formats were chosen for at most "

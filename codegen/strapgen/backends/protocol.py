@@ -99,6 +99,11 @@ class Backend(ABC):
         """Return the kernels that it may need beside the step, each with its target."""
         return [(self._orthonormalization, self.sources.target), (self.attitude, NUMPY)]
 
+    @property
+    def nodes(self) -> tuple[float, ...]:
+        """Nodes at which a step takes the rate, as fractions of its length; empty if it takes increments."""
+        return self._parts.nodes
+
     @abstractmethod
     def beside(self, kernel: str) -> Evaluator:
         """Return another kernel on the same target as the step: one that restores a state, or converts it.
@@ -322,8 +327,9 @@ class Backend(ABC):
         steps: int,
         record_every: int = 1,
         orthonormalize_every: int | None = None,
+        initial: Any = None,
     ) -> Array:
-        """Run the algorithm from zero rotation over increments that come part by part.
+        """Run the algorithm over increments that come part by part.
 
         The result has the bits of `propagate`, whose arrays hold the whole run.
 
@@ -333,8 +339,8 @@ class Backend(ABC):
             ``part(first, count)`` returns the increments of some steps, (count, samples, 3), one part after the other.
         steps : int
             Number of steps of the run.
-        record_every, orthonormalize_every : int, optional
-            As for `propagate`.
+        record_every, orthonormalize_every, initial : optional
+            As for `propagate`; one run has one initial state.
 
         Returns
         -------
@@ -346,14 +352,15 @@ class Backend(ABC):
             As `propagate` does.
         """
         if steps <= PART:
-            return self.propagate(part(0, steps), record_every, orthonormalize_every)
+            return self.propagate(part(0, steps), record_every, orthonormalize_every, initial)
         checks.count("record_every", record_every, largest=checks.MOST)
         if orthonormalize_every is not None:
             checks.count("orthonormalize_every", orthonormalize_every, largest=checks.MOST)
             self._need_orthonormalization()
         history = np.empty((1 + steps // record_every, *self.state_shape), self.dtype)
-        history[0] = self.identity
-        memory: Any = None
+        start = self.identity if initial is None else initial
+        history[0] = start = checks.real_array("initial", start, self.state_shape, self.dtype)
+        memory: Any = self._memory(start)
         for first, count, restore_every in run_parts(steps, orthonormalize_every or 0):
             increments = checks.real_array("increments", part(first, count), (self.samples, 3), self.dtype)
             states, memory = self._continue(increments, restore_every, memory, first)
@@ -368,13 +375,16 @@ class Backend(ABC):
     ) -> tuple[Array, Any]:
         """Return the states after each of some steps, (N, state shape), and the memory for the steps after them.
 
-        The memory of the first steps is None; the number of the first step serves messages.
+        The number of the first step serves messages.
         """
-        initial = self.identity if memory is None else memory
         states = self._propagate(
-            increments[None], 1, orthonormalize_every, np.ascontiguousarray(initial)[None]
+            increments[None], 1, orthonormalize_every, np.ascontiguousarray(memory)[None]
         )
         return states[0, 1:], states[0, -1]
+
+    def _memory(self, initial: Array) -> Any:
+        """Return the memory with which a run begins at a state."""
+        return initial
 
     @abstractmethod
     def _propagate(

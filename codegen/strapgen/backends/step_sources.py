@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
+from strapgen import catalogue
 from strapgen.backends.kernel_sources import sources_of_choice, sources_of_program
 from strapgen.catalogue import Choice
 from strapgen.ir.attitude_step import Companions
@@ -46,6 +47,24 @@ class StepSources:
         if self.step.companions is None:
             raise InputError(f"kernel {self.step.kernel} is no attitude step; back ends are built from steps")
         return self.step.companions
+
+    @property
+    def nodes(self) -> tuple[float, ...]:
+        """Nodes at which the step takes the rate, as fractions of its length; empty if it takes increments.
+
+        Raises
+        ------
+        InputError
+            If the step takes rates, and the choice that knows where is not here.
+        """
+        if self.step.function.inputs[1].name == "increments":
+            return ()
+        if self.choice is None or not (nodes := catalogue.nodes(self.choice)):
+            raise InputError(
+                f"kernel {self.step.kernel} takes turns at nodes that its sources do not tell; "
+                "strapgen.backend knows them from a choice"
+            )
+        return tuple(float(node) for node in nodes)
 
     def sources(self, kernel: str, target: str) -> Sources:
         """Return the sources of the step or of another kernel.

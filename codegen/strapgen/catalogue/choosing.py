@@ -18,6 +18,7 @@ from strapgen.catalogue.names import (
     ALGORITHMS,
     INTEGRATORS,
     KERNELS,
+    LEAST_WHOLE,
     METHODS,
     MOST_BESIDE,
     MOST_INCREMENTS,
@@ -156,7 +157,28 @@ def _choose_samples(
     increments = checks.count("increments", 2 if increments is None else increments, largest=MOST_INCREMENTS)
     if ahead and method in INTEGRATORS and not INTEGRATORS[str(method)].takes_ahead:
         raise InputError(f"method {method} takes no increments ahead; --previous goes with it")
+    if isinstance(method, str):
+        _require_whole_rate(method, increments + previous + ahead)
     return Choice(name, method, increments, previous, ahead)
+
+
+def _require_whole_rate(method: str, samples: int) -> None:
+    """Refuse a Taylor series that ends before the rate's polynomial through many samples does.
+
+    The powers of time that it leaves out are of first order in the increments: the step does not turn by their sum.
+    """
+    allowed = [
+        name
+        for name, integrator in INTEGRATORS.items()
+        if integrator.module == "taylor" and (samples < LEAST_WHOLE or integrator.order >= samples)
+    ]
+    if method not in INTEGRATORS or INTEGRATORS[method].module != "taylor" or method in allowed:
+        return
+    series = f"{allowed[0]} to {allowed[-1]} and fit-exact keep" if len(allowed) > 1 else "fit-exact keeps"
+    raise InputError(
+        f"method {method} leaves out part of the rate through {samples} samples, those beside the step included; "
+        f"{series} all of it"
+    )
 
 
 def _choose_window(

@@ -16,7 +16,7 @@ import sympy as sp
 from strapgen.ir.signals import Signal
 from strapgen.symbolic import rotations
 
-THESIS = "MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969)"
+THESIS = "MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229"
 SAVAGE = "P. G. Savage, Strapdown System Algorithms, AGARD Lecture Series 133 (1984), paper 3"
 
 

@@ -104,6 +104,9 @@ STANDARD_METHODS = ("rk1", "rk2", "rk3", "rk4")
 MOST_INCREMENTS = 8
 MOST_BESIDE = 32
 
+#: From so many samples on a Taylor series has to keep every power of time of the polynomial through them.
+LEAST_WHOLE = 4
+
 #: Motions with a closed-form attitude, and the unit of each of their parameters.
 MOTIONS = {
     "constant": dict.fromkeys("xyz", "rad/s"),

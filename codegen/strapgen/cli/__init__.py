@@ -25,8 +25,11 @@ from strapgen.cli.commands import (
     series,
     simulate,
     stability,
+    statements,
     strapdown,
     study,
+    study_system,
+    system,
     tableau,
     tables,
     two_speed,
@@ -50,6 +53,7 @@ COMMANDS: dict[str, dict[str, Any]] = {
     "Generate": {
         "generate": generate.generate,
         "two-speed": two_speed.two_speed,
+        "system": system.system,
         "vectors": vectors.vectors,
         "verify": verify.verify,
         "evidence": evidence.evidence,
@@ -64,7 +68,12 @@ COMMANDS: dict[str, dict[str, Any]] = {
         "cost": cost.cost,
         "frontier": frontier.frontier,
     },
-    "Reproduce": {"tables": tables.tables, "rate-table": rate_table.rate_table, "study": study.app},
+    "Reproduce": {
+        "tables": tables.tables,
+        "statements": statements.statements,
+        "rate-table": rate_table.rate_table,
+        "study": study.app,
+    },
 }
 
 #: Most characters of a word that a message repeats, what is left of a longer one, and most characters of a message.
@@ -78,6 +87,8 @@ class _Strapgen(PlainGroup):
         heading: tuple(commands) for heading, commands in COMMANDS.items()
     }
 
+
+study.app.command("system", cls=PlainCommand)(study_system.study_system)
 
 app = typer.Typer(
     name="strapgen",

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
+from strapgen.catalogue import MOTIONS, RUN_MOTIONS
 from strapgen.cli.options import option
 from strapgen.support.exceptions import InputError
 
@@ -22,6 +24,8 @@ _Text = str | None
 #: Names of motions with a closed-form attitude, and of all that a run can have, for the help.
 MOTION_NAMES = "constant, sinusoidal, coning or polynomial"
 RUN_MOTION_NAMES = "constant, sinusoidal, coning, polynomial, cone, random, slew, ramps or vibration"
+#: What --motion takes beside these names.
+MOTION_FILE = ", or a Python file of your own"
 MotionSettings = Annotated[
     list[str] | None,
     option(
@@ -60,7 +64,9 @@ class SampleSource:
 
     panel: ClassVar[str] = "Input"
 
-    motion: Annotated[_Text, option("--motion", metavar="NAME", help=f"Motion: {RUN_MOTION_NAMES}.")] = None
+    motion: Annotated[
+        _Text, option("--motion", metavar="NAME", help=f"Motion: {RUN_MOTION_NAMES}{MOTION_FILE}.")
+    ] = None
     settings: MotionSettings = None
     step: Annotated[_Text, option("--step", metavar="S", help="Step length in s.")] = None
     duration: Annotated[_Text, option("--duration", metavar="S", help="Duration of each run in s.")] = None
@@ -100,13 +106,31 @@ class SampleSource:
         ),
     ] = None
 
+    specific_force: Annotated[
+        _Text,
+        option(
+            "--specific-force",
+            metavar="X,Y,Z",
+            help="Specific force on a described system in m/s^2, constant in reference axes.  [default: 0,0,0]",
+        ),
+    ] = None
+
     @property
     def stated(self) -> bool:
         """Whether any of the options is stated."""
         return any(getattr(self, field.name) is not None for field in fields(self))
 
-    def check(self) -> None:
-        """Check that there is one source of increments, with the options that go with it and no others."""
+    def check(self, of_system: bool = False) -> None:
+        """Check that there is one source of increments, with the options that go with it and no others.
+
+        Parameters
+        ----------
+        of_system : bool, optional
+            Whether a described system runs, which states its rate itself.
+        """
+        if self.specific_force is not None and not (of_system and self.motion is not None):
+            raise InputError("--specific-force goes with a described system and --motion")
+        check_motion(self.motion, RUN_MOTIONS)
         sources = {
             "--motion": self.motion,
             "--increments-csv": self.increments_csv,
@@ -118,7 +142,9 @@ class SampleSource:
         times = {"--step": self.step, "--duration": self.duration}
         if self.motion is None:
             _refuse({"--set": self.settings, **times}, "--motion", chosen[0])
-        elif missing := [name for name, value in times.items() if value is None]:
+        elif missing := [
+            name for name, value in times.items() if value is None and not (of_system and name == "--step")
+        ]:
             raise InputError(f"--motion needs {missing[0]} in s")
         if self.rates_csv is None:
             rates = {"--rate-unit": self.rate_unit, "--resample-hz": self.resample_hz}
@@ -141,15 +167,21 @@ class SampleSource:
         return math.radians(float(checks.number("pulse_arcsec", self.pulse_arcsec, positive=True)) / 3600)
 
     def profile(self) -> Motion:
-        """Return the motion with its parameters."""
-        from strapgen.simulation.motions import motion
+        """Return the motion with its parameters; one of a file is checked over the duration of the run."""
+        from strapgen.simulation.users_motions import any_motion
 
-        return motion(self.motion or "", **pairs(self.settings or []))
+        return any_motion(self.motion or "", self.duration or "", pairs(self.settings or []))
+
+    def described(self, name: str, noun: str = "") -> str:
+        """Return the name of the motion with its parameters, for a title."""
+        words = ", ".join(self.settings or [])
+        return f"{name}{noun} ({words})" if words else f"{name}{noun}"
 
     @property
-    def words(self) -> str:
-        """The parameters of the motion, for a title."""
-        return ", ".join(self.settings or [])
+    def files(self) -> tuple[Path | None, ...]:
+        """The files that the options name."""
+        of_motion = Path(self.motion) if self.motion is not None and is_file(self.motion) else None
+        return self.increments_csv, self.rates_csv, of_motion
 
     def times(self) -> tuple[Fraction, Fraction]:
         """Return the step and the duration of a run on a motion in s."""
@@ -208,7 +240,10 @@ class SampleSource:
         increments, length = profile.increments(step, steps, samples, previous, ahead), float(step)
         truth = profile.attitude(np.arange(1 + steps) * length)
         return Inputs(
-            increments, truth, length, f"{self.motion} motion ({self.words}), {steps} steps of {self.step} s"
+            increments,
+            truth,
+            length,
+            f"{self.described(self.motion or '', ' motion')}, {steps} steps of {self.step} s",
         )
 
     def _recorded(self, samples: int, previous: int, ahead: int) -> Inputs:
@@ -230,6 +265,26 @@ def _refuse(options: dict[str, Any], owner: str, chosen: str) -> None:
     for name, value in options.items():
         if value is not None:
             raise InputError(f"{name} goes with {owner}, not with {chosen}")
+
+
+def is_file(motion: str) -> bool:
+    """Tell whether the name of a motion is that of a user's file."""
+    return motion.endswith(".py")
+
+
+def check_motion(name: str | None, further: Mapping[str, Any] | None = None) -> None:
+    """Check that a motion, if one is named, is of the catalogue or a file.
+
+    Parameters
+    ----------
+    name : str or None
+    further : mapping, optional
+        Motions that are allowed beside those with a closed form.
+    """
+    from strapgen.support import checks
+
+    if name is not None and not is_file(name):
+        checks.choice("motion", name, {**MOTIONS, **(further or {})})
 
 
 def pairs(settings: list[str]) -> dict[str, str]:

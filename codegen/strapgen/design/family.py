@@ -9,10 +9,11 @@ from typing import Any
 
 from strapgen.catalogue.methods.coefficient_files import slug
 from strapgen.catalogue.methods.window import GyroResponse, Taps, Window, sibling_name, sibling_title
-from strapgen.catalogue.methods.windows import one_sided_sizes, stored_sizes
+from strapgen.catalogue.methods.windows import one_sided_sizes, start_sizes, stored_sizes
 from strapgen.design import lawson, mean_square, minimax
 from strapgen.design.rounding import rounded
 from strapgen.design.unknowns import Shape, Unknowns
+from strapgen.support.exceptions import InputError
 
 #: Default of the noise for which one-sided filters are designed.
 ONE_SIDED_NOISE = Fraction(3, 10000)
@@ -20,7 +21,7 @@ ONE_SIDED_NOISE = Fraction(3, 10000)
 
 @dataclass(frozen=True)
 class FamilyBrief:
-    """What a family of filters is to do, for steps of one sample.
+    """What a family of filters is to do.
 
     Parameters
     ----------
@@ -34,9 +35,9 @@ class FamilyBrief:
         Highest Legendre coefficient of the rate that is estimated.
     gyro : GyroResponse, optional
         By default the increments are integrals of the rate.
-    noise, one_sided_noise : Fraction, optional
+    noise, one_sided_noise, start_noise : Fraction, optional
         Standard deviation of the noise of an increment, by that of the rate times the sampling interval, for the
-        committed filters and for the one-sided ones.
+        committed filters, for the one-sided ones and for those of the first intervals of a recording.
     spectrum : tuple of int, optional
         Density of the rate, see `spectra.weights`; by default it is flat over the band.
     rotation : str, optional
@@ -44,6 +45,13 @@ class FamilyBrief:
         As in `Window`.
     title : str, optional
         By default it says the samples and the band.
+    increments : int, optional
+        Samples of a step (N); several take the exact rotation.
+
+    Raises
+    ------
+    InputError
+        If the rotation of a step of several samples is not exact.
     """
 
     previous: int
@@ -58,6 +66,15 @@ class FamilyBrief:
     rotation: str = "fourth"
     terms: int = 16
     title: str = ""
+    start_noise: Fraction = Fraction(0)
+    increments: int = 1
+
+    def __post_init__(self) -> None:
+        """Refuse a rotation that is not good enough for steps of several samples."""
+        if self.increments > 1 and self.rotation != "exact":
+            raise InputError(
+                f"rotation is {self.rotation!r}; steps of {self.increments} samples take the exact one"
+            )
 
     @property
     def objective(self) -> str:
@@ -72,7 +89,7 @@ class FamilyBrief:
     @property
     def full_title(self) -> str:
         """The title, by default from the samples, the band, the gyro and the noise."""
-        parts = [f"Window 1+{self.previous}+{self.ahead} to {float(self.band):g} rad"]
+        parts = [f"Window {self.increments}+{self.previous}+{self.ahead} to {float(self.band):g} rad"]
         if self.gyro is not None:
             parts.append(f"gyro {float(self.gyro.bandwidth_hz):g} Hz")
         if self.noise:
@@ -112,12 +129,12 @@ def design(
     >>> [one.name for one in window.one_sided]
     ['window-1-2-2-to-1-rad-3-1', 'window-1-2-2-to-1-rad-4-0', 'window-1-2-2-to-1-rad-0-4', 'window-1-2-2-to-1-rad-1-3']
     """
-    designed = {size: _filters(brief, size) for size in track(brief.sizes)}
+    designed = {size: _filters(brief, size, brief.one_sided_noise) for size in track(brief.sizes)}
     committed = Window(
         slug(brief.full_title),
         brief.full_title,
         _source(brief),
-        1,
+        brief.increments,
         brief.previous,
         brief.ahead,
         brief.conditions,
@@ -135,7 +152,11 @@ def design(
             windows[size] = _sibling(committed, size, designed[size], brief.one_sided_noise)
         else:
             windows[size] = windows[size[::-1]].mirrored()
-    return replace(committed, one_sided=tuple(windows.values()))
+    start = tuple(
+        _sibling(committed, size, _filters(brief, size, brief.start_noise), brief.start_noise)
+        for size in start_sizes(brief.previous, brief.ahead)
+    )
+    return replace(committed, one_sided=tuple(windows.values()), start=start)
 
 
 def _source(brief: FamilyBrief) -> str:
@@ -163,15 +184,15 @@ def _sibling(committed: Window, size: tuple[int, int], filters: tuple[Taps, ...]
     )
 
 
-def _filters(brief: FamilyBrief, size: tuple[int, int]) -> tuple[Taps, ...]:
+def _filters(brief: FamilyBrief, size: tuple[int, int], one_sided_noise: Fraction) -> tuple[Taps, ...]:
     """Return the filters with some samples before and ahead of the step, as rationals."""
-    shape = Shape(*size, brief.conditions, brief.gyro)
+    shape = Shape(*size, brief.conditions, brief.gyro, brief.increments)
     degrees = range(0 if brief.gyro else 1, brief.degree + 1)
     unknowns = [Unknowns(shape, m) for m in degrees]
     one_sided = size != (brief.previous, brief.ahead)
     taps: Sequence[Sequence[Any]]
     if one_sided or brief.objective == "mean square":
-        noise = brief.one_sided_noise if one_sided else brief.noise
+        noise = one_sided_noise if one_sided else brief.noise
         taps = mean_square.design(shape, degrees, brief.band, noise, brief.spectrum)
     elif shape.symmetric:
         taps = [minimax.design(each, brief.band).taps for each in unknowns]
@@ -180,4 +201,5 @@ def _filters(brief: FamilyBrief, size: tuple[int, int]) -> tuple[Taps, ...]:
     rows = tuple(rounded(each, row) for each, row in zip(unknowns, taps, strict=True))
     if brief.gyro is not None:
         return rows
-    return (tuple(Fraction(place == shape.previous) for place in range(shape.samples)), *rows)
+    step = range(shape.previous, shape.previous + shape.increments)
+    return (tuple(Fraction(place in step) for place in range(shape.samples)), *rows)

@@ -41,9 +41,10 @@ def written(family: Window, command: str) -> str:
     if family.gyro is not None:
         lines += ["", "[gyro]"]
         lines += [f'{key} = "{number(value)}"' for key, value in family.gyro._asdict().items()]
-    for previous, ahead in stored_sizes(family.previous, family.ahead, family.gyro is None):
-        one = family.one_sided_with(ahead)
-        lines += ["", "[[one_sided]]", f"previous = {previous}", f"ahead = {ahead}"]
+    sizes = stored_sizes(family.previous, family.ahead, family.gyro is None)
+    tables = [("one_sided", family.one_sided_with(ahead)) for _, ahead in sizes]
+    for key, one in tables + [("start", one) for one in family.start]:
+        lines += ["", f"[[{key}]]", f"previous = {one.previous}", f"ahead = {one.ahead}"]
         lines += [f'objective = "{one.objective}"', f'noise = "{number(one.noise)}"']
         lines += [f'band = "{number(one.band)}"'] if one.band != family.band else []
         lines += _filters(one.filters)

@@ -11,17 +11,8 @@ from typing import Any
 from strapgen import catalogue
 from strapgen.analysis.prediction import Prediction, predict
 from strapgen.backends import backend
-from strapgen.experiments.thesis_tables import (
-    ALGORITHMS,
-    DURATION,
-    INTERVAL,
-    ORDERS,
-    STEP,
-    TABLES,
-    Table,
-    agrees,
-    drift_deg,
-)
+from strapgen.experiments.printed_tables import ALGORITHMS, ORDERS, TABLES, Table, agrees
+from strapgen.experiments.thesis_tables import DURATION, INTERVAL, STEP, drift_deg
 from strapgen.simulation.motions import motion
 from strapgen.simulation.runs import simulate
 
@@ -44,6 +35,8 @@ class PredictedEntry:
         The ratio as the thesis prints it.
     agrees : bool
         Whether `normalised` has the printed digits.
+    scan, repairs : str or None, tuple of str
+        As for `TableEntry`.
     """
 
     table: int
@@ -55,6 +48,8 @@ class PredictedEntry:
     simulated: float
     thesis: str
     agrees: bool
+    scan: str | None = None
+    repairs: tuple[str, ...] = ()
 
     @property
     def agrees_simulated(self) -> bool:
@@ -111,6 +106,8 @@ def predicted(tables: Sequence[Table] = TABLES) -> Iterator[PredictedEntry]:
                     runs[algorithm, order] / runs[base],
                     printed,
                     agrees(normalised, printed),
+                    None if (repair := table.repair(algorithm, order)) is None else repair.scan,
+                    tuple(each.sentence for each in table.repairs_behind(algorithm, order)),
                 )
 
 

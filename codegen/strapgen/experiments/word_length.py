@@ -6,9 +6,10 @@ import json
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, fields, replace
+from functools import lru_cache
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,11 +18,15 @@ from strapgen.backends import backend
 from strapgen.backends.increments import pulses
 from strapgen.experiments.comparison import certified_angle
 from strapgen.ir.fixed_settings import Settings
-from strapgen.simulation.motions import Motion, motion
+from strapgen.simulation.motions import Motion
 from strapgen.simulation.runs import attitude, drift_between
+from strapgen.simulation.users_motions import any_motion, is_file
 from strapgen.support import cache, checks
 from strapgen.support.exceptions import InputError
 from strapgen.support.resumable import side_by_side
+
+if TYPE_CHECKING:
+    from strapgen.analysis.quantization_noise import QuantizationNoise
 
 #: Most cases of one study.
 _MOST_CASES = 5000
@@ -65,7 +70,7 @@ class Case:
     @property
     def profile(self) -> Motion:
         """The motion with its parameters."""
-        return motion(self.motion, **dict(self.settings))
+        return any_motion(self.motion, self.duration, dict(self.settings))
 
 
 @dataclass(frozen=True)
@@ -86,6 +91,9 @@ class Outcome:
         Effect of the method: the drift of the run in double on exact increments.
     bound_deg : float or None
         Certified bound of `rounding_deg`; None where no useful bound is known.
+    expected_deg : float or None
+        Root mean square of the angle that pulses cause at the end of the run, if the errors of the counted angles are
+        independent; None without pulses. See `quantization_noise`.
     """
 
     case: Case
@@ -94,6 +102,7 @@ class Outcome:
     quantization_deg: float
     truncation_deg: float
     bound_deg: float | None
+    expected_deg: float | None = None
 
     @property
     def dominates(self) -> str:
@@ -129,7 +138,7 @@ class Study:
         In s.
     motion_name : str
     settings : dict of str to str, optional
-        Parameters of the motion; by default those of the thesis's table 5.
+        Parameters of the motion; by default those of the thesis's table 5, and none for the file of a motion.
     """
 
     algorithm: str = "euler"
@@ -146,7 +155,8 @@ class Study:
 
     def cases(self) -> list[Case]:
         """Return every combination, unchecked."""
-        parameters = tuple((self.settings or {"a_deg_s": "10", "b_deg_s": "10", "g_deg_s": "10"}).items())
+        default = {} if is_file(self.motion_name) else {"a_deg_s": "10", "b_deg_s": "10", "g_deg_s": "10"}
+        parameters = tuple((self.settings or default).items())
         swept = product(
             self.methods, self.steps, self.pulses_arcsec, self.roundings, self.carries, self.words
         )
@@ -242,7 +252,8 @@ def run_case(case: Case) -> Outcome:
             json.dumps({f.name: getattr(outcome, f.name) for f in fields(outcome) if f.name != "case"})
         )
 
-    key = cache.digest([cache.generator_digest(), json.dumps(asdict(case), sort_keys=True)])
+    source = Path(case.motion).read_bytes() if is_file(case.motion) else b""
+    key = cache.digest([cache.generator_digest(), json.dumps(asdict(case), sort_keys=True), source])
 
     def read() -> bytes:
         return cache.read(cache.entry("studies", key, fill), "outcome.json")
@@ -283,7 +294,37 @@ def _run(case: Case) -> Outcome:
         largest(same_attitude, plain_attitude),
         largest(plain_attitude, truth),
         None if bound is None else math.degrees(bound),
+        expected_noise(case, math.radians(pulse), exact) if pulse else None,
     )
+
+
+def expected_noise(case: Case, pulse: float, increments: Any) -> float:
+    """Return the root mean square of the angle that pulses cause in a run, if their errors are independent.
+
+    Parameters
+    ----------
+    case : Case
+    pulse : float
+        Angle of a pulse in rad.
+    increments : array, (N, K, 3)
+        Exact increments of the run in rad.
+
+    Returns
+    -------
+    float
+        In degrees, at the end of the run.
+    """
+    noise = noise_of(case.algorithm, case.method, case.increments)
+    turned = np.square(increments.sum(axis=1)).sum()
+    return math.degrees(math.sqrt(noise.mean_square(pulse, float(turned), len(increments))))
+
+
+@lru_cache(maxsize=64)
+def noise_of(algorithm: str, method: str, increments: int) -> QuantizationNoise:
+    """Return the noise that quantized increments cause in a step; see `quantization_noise`."""
+    from strapgen.analysis.quantization_noise import quantization_noise
+
+    return quantization_noise(catalogue.choose_step(algorithm, method, increments))
 
 
 def run(planned: Sequence[Case], jobs: int | None = None) -> Iterator[Outcome]:

@@ -8,7 +8,6 @@ from fractions import Fraction
 from typing import Any
 
 from strapgen.fixedpoint import derivation
-from strapgen.fixedpoint.alignment import aligning
 from strapgen.fixedpoint.comparisons import (
     lower_computed,
     lower_maximum,
@@ -33,6 +32,7 @@ from strapgen.fixedpoint.quotients_and_roots import lower_quotient, lower_root
 from strapgen.fixedpoint.runs.accumulation import accumulation, step_errors
 from strapgen.fixedpoint.runs.angle_accumulation import angle_accumulation
 from strapgen.fixedpoint.sums import lower_sum
+from strapgen.fixedpoint.words.alignment import aligning
 from strapgen.ir.fixed_interface import Argument, ErrorFeedback, Interface
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.formats import Format
@@ -100,8 +100,18 @@ def _with_guard_bits(
 ) -> tuple[Quantities, FormatPlan]:
     """Return the exact quantities and the formats of the inputs when sums of inputs have so many bits more."""
     box = {name: limit.range(guard_bits) for limit in stated for name in limit.signal.elements}
-    quantities = derivation.quantities(program, box, split=settings.carry == "state", word=settings.word)
+    quantities = derivation.quantities(program, box, split=_splits(program, settings), word=settings.word)
     return quantities, format_plan(program, settings, stated, quantities, guard_bits)
+
+
+def _splits(program: Program, settings: Settings) -> bool:
+    """Tell whether the increments are split off the transition: where the rounding of that has no feedback of its own.
+
+    A rotation vector that is a word of its own is rounded before the transition, out of reach of the feedback.
+    """
+    kernels = program.companions
+    through_vector = kernels is not None and kernels.truncation is not None
+    return settings.carry == "state" or (settings.carry == "full" and through_vector)
 
 
 def _walked(

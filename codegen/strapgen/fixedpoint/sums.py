@@ -19,6 +19,7 @@ from strapgen.fixedpoint.quantities import (
 )
 from strapgen.fixedpoint.quantization_context import Quantization, integer_value
 from strapgen.fixedpoint.terms import Aligned, Placed, aligned, largest_wide, nearest, up
+from strapgen.fixedpoint.words.filters import Factor, filter_words, nearest_word
 from strapgen.ir.fixed_interface import ErrorFeedback
 from strapgen.ir.formats import Format, finest
 from strapgen.ir.integer_program import Coefficient, IntegerSum, Term, Value
@@ -113,8 +114,9 @@ def _counts_alone(context: Quantization, terms: Sequence[Placed]) -> bool:
 
 def _integer_terms(context: Quantization, definition: Sum) -> list[Placed]:
     """Return the terms of a sum as integers, each with its fraction bits and its error."""
+    words = filter_words(context.quantities, context.program.inputs, definition, context.word)
     terms = [
-        _product_term(context, monomial, coefficient)
+        _product_term(context, monomial, coefficient, words.get(monomial))
         for monomial, coefficient in definition.terms
         if monomial
     ]
@@ -124,8 +126,10 @@ def _integer_terms(context: Quantization, definition: Sum) -> list[Placed]:
     return terms
 
 
-def _product_term(context: Quantization, monomial: Monomial, coefficient: Fraction) -> Placed:
-    """Return a multiple of one or two values as an integer term."""
+def _product_term(
+    context: Quantization, monomial: Monomial, coefficient: Fraction, rounded: Factor | None = None
+) -> Placed:
+    """Return a multiple of one or two values as an integer term, of the nearest coefficient or of a stated one."""
     shifts = is_power_of_two(coefficient)
     names = tuple(word_of(context, n) if len(monomial) == 2 or not shifts else n for n in monomial)
     values = [context.values[name] for name in names]
@@ -134,7 +138,7 @@ def _product_term(context: Quantization, monomial: Monomial, coefficient: Fracti
     if shifts:
         sign = 1 if coefficient > 0 else -1
         return Placed(Term(names, sign), places - exponent(coefficient), up(error))
-    factor, bits = _nearest_word(coefficient, context.word)
+    factor, bits = rounded or nearest_word(coefficient, context.word)
     wrong = abs(Fraction(factor, 1) / Fraction(2) ** bits - coefficient)
     stored = values[0].magnitude / Fraction(2) ** values[0].fraction
     term = Term(names, factor, coefficient=Coefficient(coefficient, bits))
@@ -148,15 +152,6 @@ def _product_error(context: Quantization, values: Sequence[Value], monomial: Mon
     a, b = values
     size_a, size_b = map(context.size, monomial)
     return size_a * b.error + size_b * a.error + a.error * b.error
-
-
-def _nearest_word(value: Fraction, word: int) -> tuple[int, int]:
-    """Return the nearest word to a number that is no power of two, and its fraction bits."""
-    bits = finest(abs(value) * (1 + Fraction(1, 1 << word)), word)
-    integer = nearest(value * Fraction(2) ** bits)
-    while integer and integer % 2 == 0:
-        integer, bits = integer // 2, bits - 1
-    return integer, bits
 
 
 def _constant_term(constant: Fraction, places: Sequence[int], word: int) -> Placed:

@@ -16,6 +16,7 @@ FRAMES = {
     "n": "navigation",
     "e": "earth-fixed",
     "i": "inertial",
+    "g": "geographic: north, east and down",
 }
 
 #: What stands for the unit or the frame of a signal that takes those of whatever is wired to it.

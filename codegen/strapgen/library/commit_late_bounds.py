@@ -93,7 +93,9 @@ def now_error(
 def _moved(filters: LateFilters, fixed: FixedFilters, interface: Interface) -> Mapping[str, Fraction]:
     """Return by how much rounding moves every element of a Legendre coefficient at most."""
     inputs: dict[str, Argument] = {argument.signal.name: argument for argument in interface.inputs}
-    sample = fixed.limit * Fraction(2) ** -fixed.fraction
+    sample = (
+        fixed.limit * Fraction(2) ** -fixed.fraction
+    )  # of a gyro's counts, less their scale, as in the taps
     moved: dict[str, Fraction] = {}
     for number, (m, shift) in enumerate(zip(fixed.sums, fixed.shifts, strict=True)):
         argument = inputs[f"legendre_{m}"]

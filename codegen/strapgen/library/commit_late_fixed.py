@@ -27,7 +27,7 @@ WORD, WIDE = 32, 64
 
 def functions(
     filters: LateFilters, choices: tuple[Choice, Choice, Choice], target: str, settings: Settings
-) -> tuple[tuple[Sources, Sources, Sources], FixedFilters]:
+) -> tuple[tuple[Sources, Sources, Sources], FixedFilters, LateFilters]:
     """Return the generated functions in formats that fit together, and the taps for them.
 
     Parameters
@@ -38,13 +38,17 @@ def functions(
     target : str
         A target in fixed point.
     settings : Settings
-        Of words of 32 bits, with increments in rad.
+        Of words of 32 bits, which the counts of a gyro have too.
+
+    Returns
+    -------
+    tuple
+        The functions, the taps and the filters whose taps they are.
 
     Raises
     ------
     InputError
-        If the rotation is exact, or the settings have other words, counts of a gyro, a state that saturates, or
-        ranges or formats.
+        If the rotation is exact, or the settings have other words, a state that saturates, or ranges or formats.
     """
     if filters.exact:
         raise InputError(
@@ -53,18 +57,24 @@ def functions(
         )
     if settings.word != WORD:
         raise InputError(f"word is {settings.word}; words of {WORD} bits commit late")
-    if settings.input_bits is not None or settings.state or settings.ranges or settings.formats:
+    if settings.input_bits not in (None, settings.default_input_bits, WORD):
         raise InputError(
-            "what commits late takes increments in rad, and neither a state that saturates nor ranges or formats"
+            f"input bits is {settings.input_bits}; what commits late takes samples as words of {WORD}"
         )
+    if settings.state or settings.ranges or settings.formats:
+        raise InputError("what commits late has neither a state that saturates nor ranges or formats")
+    filters = replace(filters, calm_start=True)
+    if settings.sensor is not None:
+        filters = replace(filters, scale=settings.sensor.scale)
+        settings = replace(settings, input_bits=WORD)
     step = generated_sources.sources(choices[0], target, settings)
     interface = interface_of(step)
     samples = interface.inputs[1]
-    sums = range(0 if filters.window.gyro else 1, filters.degree + 1)
+    sums = filters.sums
     fractions = {
         m: _fraction([row[m] for row in (*filters.sets, *filters.short)], samples.high) for m in sums
     }
-    rotation = generated_sources.sources(choices[1], target, _of_rotation(filters, interface, sums))
+    rotation = generated_sources.sources(choices[1], target, _of_rotation(filters, interface))
     normalization = generated_sources.sources(choices[2], target, interface.companion_settings)
     inputs = {argument.signal.name: argument for argument in interface_of(rotation).inputs}
     moments = 2 if filters.window.gyro is None else 1
@@ -92,23 +102,24 @@ def functions(
         interface_of(rotation),
         _truncation(choices[0]),
     )
-    return (step, rotation, normalization), replace(fixed, now_error=error)
+    return (step, rotation, normalization), replace(fixed, now_error=error), filters
 
 
-def _of_rotation(filters: LateFilters, interface: Interface, sums: range) -> Settings:
+def _of_rotation(filters: LateFilters, interface: Interface) -> Settings:
     """Return the settings of the step from Legendre coefficients: it takes any sums, and samples in their format."""
     state, samples = interface.inputs
-    size = samples.high * samples.unit
+    size = samples.high * samples.format.unit
     largest = {
         m: max(sum(map(abs, row[m]), Fraction(0)) for row in (*filters.sets, *filters.short)) * size * _SPARE
-        for m in sums
+        for m in filters.sums
     }
     formats = {"state": str(state.format), "next": str(state.format)}
-    if sums.start:
+    if filters.sums.start:
         formats["legendre_0"] = str(samples.format)
         largest[0] = size
     ranges = {f"legendre_{m}": largest[m] for m in sorted(largest)}
-    return replace(interface.settings, carry="none", ranges=ranges, formats=formats)
+    settings = replace(interface.settings, sensor=None, input_bits=None, stated="")
+    return replace(settings, carry="none", ranges=ranges, formats=formats)
 
 
 def _truncation(step: Choice) -> Truncation:
@@ -181,7 +192,11 @@ def _require_room(filters: FixedFilters, inputs: dict[str, Argument]) -> None:
         sizes = [sum(map(abs, group[number])) for group in (*filters.sets, *filters.short)]
         shift = filters.shifts[number]
         most = max(sizes) * filters.limit + (1 << (shift - 1)) if shift > 0 else 0
-        assert shift > 0, "sums have more bits than the coefficient"
+        if shift <= 0:
+            raise InputError(
+                f"samples are at most {filters.limit} in magnitude, too few units to commit late; a finer count, or a "
+                "larger rate, is needed"
+            )
         assert most < 1 << (WIDE - 1), "a sum leaves its word"
         assert most >> shift <= inputs[f"legendre_{m}"].high, "a coefficient leaves its range"
     assert max(sum(map(abs, row)) for row in filters.restoring) * filters.limit < 1 << (WIDE - 2)

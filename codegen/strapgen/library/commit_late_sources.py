@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from strapgen import targets
@@ -141,8 +141,10 @@ def parts(filters: LateFilters, algorithm: str, target: str, settings: Settings 
     choices = kernels(filters, algorithm)
     targets.require(target, settings)
     if targets.TARGETS[target].fixed:
-        functions, fixed = commit_late_fixed.functions(filters, choices, target, settings or Settings())
-        return LateSources(filters, *functions, fixed)
+        functions, fixed, rounded = commit_late_fixed.functions(
+            filters, choices, target, settings or Settings()
+        )
+        return LateSources(rounded, *functions, fixed)
     step, rotation, normalization = (generated_sources.sources(choice, target) for choice in choices)
     return LateSources(filters, step, rotation, normalization)
 
@@ -185,8 +187,8 @@ def sources(
     ['euler_late_3_3.h', 'euler_late_3_3.c', 'euler_window_3_3.h', 'euler_window_3_3.c']
     """
     checks.choice("target", target, TARGETS)
-    filters = family(window, sample_hz)
-    late = parts(filters, algorithm, target, settings)
+    late = parts(family(window, sample_hz), algorithm, target, settings)
+    filters = late.filters
     chosen = filters.window
     command = ["strapgen", "window", "generate", chosen.file or chosen.name]
     command += ["--algorithm", algorithm, "--target", target]
@@ -196,7 +198,9 @@ def sources(
     title = f"{_TITLES[algorithm]}, committed late and answered now: {chosen.title}"
     text = shlex.join(command)
     if late.step.fixed is not None:
-        text += f" {contract.options(late.step.fixed.settings, late.step.function.inputs)}"
+        usual = late.step.fixed.settings
+        usual = replace(usual, input_bits=usual.default_input_bits)
+        text += f" {contract.options(usual, late.step.function.inputs)}"
     functions = late.step, late.rotation, late.normalization
     return whole(_identifier(chosen, algorithm, target, name), title, text, filters, functions, late.fixed)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +14,9 @@ from strapgen.simulation.recording import History
 from strapgen.simulation.runs import Run
 
 if TYPE_CHECKING:
+    from strapgen.ir.signals import Signal
     from strapgen.simulation.courses import Course
+    from strapgen.simulation.system_runs import SystemCourse
 
 AXES = ("x", "y", "z")
 ANGLES = ("roll", "pitch", "heading")
@@ -58,7 +61,28 @@ def run_data(run: Run, settings: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def run_report(run: Run, settings: dict[str, Any], motion: str, matrices: bool = False) -> Report:
+@dataclass(frozen=True)
+class RunLayout:
+    """How a run is reported.
+
+    Parameters
+    ----------
+    motion : str
+        The motion with its parameters in words, for the text.
+    title : str, optional
+    matrices : bool, optional
+        Whether all matrices follow in JSON.
+    every : int, optional
+        Records from one print of the matrices to the next in the text; by default those at the end are printed.
+    """
+
+    motion: str
+    title: str | None = None
+    matrices: bool = False
+    every: int | None = None
+
+
+def run_report(run: Run, settings: dict[str, Any], layout: RunLayout) -> Report:
     """Return a run as a report.
 
     Parameters
@@ -66,17 +90,16 @@ def run_report(run: Run, settings: dict[str, Any], motion: str, matrices: bool =
     run : Run
     settings : dict
         Settings that the run was made with.
-    motion : str
-        The motion with its parameters in words, for the text.
-    matrices : bool, optional
-        Whether all matrices follow in JSON.
+    layout : RunLayout
     """
 
     def text() -> str:
-        return run_text(run, settings | {"motion": motion})
+        lines = [] if layout.title is None else [layout.title, ""]
+        return "\n".join([*lines, run_text(run, settings | {"motion": layout.motion}, layout.every)])
 
     def data() -> dict[str, Any]:
-        return run_data(run, settings) | (matrices_data(run) if matrices else {})
+        title = {} if layout.title is None else {"title": layout.title}
+        return title | run_data(run, settings) | (matrices_data(run) if layout.matrices else {})
 
     def markdown() -> TextTable:
         return TextTable(_ERROR_COLUMNS, _error_rows(run, range(len(run.time))))
@@ -106,8 +129,8 @@ def run_table(run: Run) -> TextTable:
     return _table(header, np.hstack(columns).tolist())
 
 
-def run_text(run: Run, settings: dict[str, Any]) -> str:
-    """Return a run as a report: the nine errors in time, the matrices at the end, the mean drift."""
+def run_text(run: Run, settings: dict[str, Any], every: int | None = None) -> str:
+    """Return a run as a report: the nine errors in time, the matrices at the end or every so often, the mean drift."""
     shown = _thinned(len(run.time))
     lines = [
         _settings_text(settings),
@@ -125,9 +148,7 @@ def run_text(run: Run, settings: dict[str, Any]) -> str:
         [
             *lines,
             "",
-            f"at {run.time[-1]:g} s",
-            *_matrix_lines(run),
-            "",
+            *(line for record in _printed(run, every) for line in _matrix_lines(run, record)),
             f"largest drift, deg: {largest}",
             f"mean drift, deg: {np.degrees(run.mean_drift):.6g}",
         ]
@@ -140,11 +161,18 @@ def _error_rows(run: Run, records: Iterable[int]) -> list[tuple[float, ...]]:
     return [(run.time[k], *parts[k]) for k in records]
 
 
-def _matrix_lines(run: Run) -> list[str]:
-    """Return the matrices at the end of a run side by side."""
-    computed, true = run.computed[-1], run.true[-1]
-    rows = np.hstack([computed, true, computed - true, run.error[-1]])
-    return TextTable(_MATRIX_TITLES, []).lines() + TextTable(_MATRIX_COLUMNS, rows.tolist()).lines()
+def _printed(run: Run, every: int | None) -> list[int]:
+    """Return the records whose matrices are printed, the last one among them."""
+    last = len(run.time) - 1
+    return [last] if every is None else sorted({*range(0, len(run.time), every), last})
+
+
+def _matrix_lines(run: Run, record: int) -> list[str]:
+    """Return the matrices at a record of a run side by side, and an empty line."""
+    computed, true = run.computed[record], run.true[record]
+    rows = np.hstack([computed, true, computed - true, run.error[record]])
+    table = TextTable(_MATRIX_TITLES, []).lines() + TextTable(_MATRIX_COLUMNS, rows.tolist()).lines()
+    return [f"at {run.time[record]:g} s", *table, ""]
 
 
 def _settings_text(settings: dict[str, Any]) -> str:
@@ -234,6 +262,53 @@ def course_data(course: Course, settings: dict[str, Any]) -> dict[str, Any]:
         },
         "velocity_changes_m_s": course.velocity_changes.tolist(),
     }
+
+
+def system_course_report(course: SystemCourse, settings: dict[str, Any]) -> Report:
+    """Return the outputs of a described system along a recording as a report."""
+    time, rows = course.rows()
+    units = {name: course.system.cell(name).signal for name in rows}
+    names = [
+        f"{name}_{element}" if signal.unit == "1" else f"{name}_{element}, {signal.unit}"
+        for name, signal in units.items()
+        for element in _places(signal)
+    ]
+    values = np.column_stack([time, *(part.reshape(len(time), -1) for part in rows.values())])
+
+    def table() -> TextTable:
+        return _table(["time_s", *names], values.tolist())
+
+    def text() -> str:
+        shown = _thinned(len(time))
+        lines = [_settings_text(settings)]
+        for name, part in rows.items():
+            signal, flat = units[name], part.reshape(len(time), -1)
+            columns = [_TIME_COLUMN, *(Column(p, spec=".9g", least=15, gap=1) for p in _places(signal))]
+            lines += ["", f"{name}, unit {signal.unit}{f', frame {signal.frame}' if signal.frame else ''}"]
+            lines += TextTable(columns, np.column_stack([time, flat])[shown].tolist()).lines()
+        if len(shown) < len(time):
+            lines.append(f"({len(shown)} of {len(time)} rows; --format csv prints all)")
+        if course.unused:
+            lines.append(f"{course.unused} samples at the end fill no cycle of all rates and were not used")
+        return "\n".join(lines)
+
+    def data() -> dict[str, Any]:
+        outputs = {name: part.tolist() for name, part in rows.items()}
+        return settings | {
+            "unused_samples": course.unused,
+            "time_s": time.tolist(),
+            "units": {name: signal.unit for name, signal in units.items()},
+            "outputs": outputs,
+        }
+
+    return Report(text, data, table, indented=False)
+
+
+def _places(signal: Signal) -> list[str]:
+    """Return short names of the elements of a signal."""
+    if signal.shape == (3, 3):
+        return list(_PLACES)
+    return [element.rpartition("_")[2] for element in signal.elements]
 
 
 def course_text(course: Course, settings: dict[str, Any]) -> str:

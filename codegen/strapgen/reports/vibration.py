@@ -24,6 +24,17 @@ _FAST_LOOP_NOTE = (
     "continuous and computed are the part of the fast loop within a slow cycle T_m; the slow loop adds the term in T_m "
     "to both, so that the error is that of both loops"
 )
+#: What of Savage's paper is repaired behind the rates of a unit.
+_REPAIRS = {
+    "rad/s": (
+        "drift has the sign of the angles as (65) of the source prints them; it prints (66) to (68) and (75) to (78) "
+        "with the other"
+    ),
+    "m/s^2": (
+        "the accelerations (69) to (72) of the source are reconstructed, their page is not in the scan; it prints the "
+        "errors (81) and (83) with the other sign"
+    ),
+}
 
 
 @dataclass(frozen=True)
@@ -125,6 +136,8 @@ def vibration_text(outcomes: Sequence[CaseRates], title: str) -> str:
             lines += ["", *_rate_table(group, unit).lines()]
     if any(outcome.case.is_fast_loop for outcome in outcomes):
         lines += ["", _FAST_LOOP_NOTE]
+    units = {outcome.case.assessment.unit for outcome in outcomes}
+    lines += ["", *(note for unit, note in _REPAIRS.items() if unit in units)]
     one_algorithm = len({outcome.case.label for outcome in outcomes}) == 1
     if one_algorithm and all(outcome.quadrature is None for outcome in outcomes):
         for outcome in outcomes:

@@ -24,7 +24,6 @@ def window_data(window: Window) -> dict[str, Any]:
     Parameters
     ----------
     window : Window
-        With steps of one sample.
     """
     gyro = window.gyro
     return {
@@ -39,6 +38,7 @@ def window_data(window: Window) -> dict[str, Any]:
         "terms": window.terms if window.rotation == "exact" else None,
         **_side(window),
         "one_sided": [{"name": one.name, **_side(one)} for one in window.one_sided],
+        "start": [{"name": one.name, **_side(one)} for one in window.start],
     }
 
 
@@ -97,6 +97,13 @@ def window_text(window: Window, data: Mapping[str, Any]) -> str:
             "level: largest error of a Legendre coefficient over the band, by the rate times the sampling interval",
             "noise gain: standard deviation of the coefficient by that of white noise of the increments",
             "gain of F_0: largest response to a rate, up to half the sampling rate",
+            *(
+                [
+                    "start: for the first intervals of a recording, in place of those with as many samples before"
+                ]
+                if window.start
+                else []
+            ),
             "",
             *_tap_table(window).lines(),
         ]
@@ -119,9 +126,11 @@ def _gyro(window: Window) -> str:
 
 def _side_table(data: Mapping[str, Any], first: int) -> TextTable:
     """Return a row for the filters of each number of samples ahead: levels and gains."""
-    sides = [data, *data["one_sided"]]
+    sides = [(data, ""), *((side, "") for side in data["one_sided"])]
+    sides += [(side, "start") for side in data["start"]]
     degrees = [row["coefficient"] for row in data["filters"][first:]]
     columns = [
+        *([Column("of", "<")] if data["start"] else []),
         Column("before"),
         Column("ahead"),
         *(Column(f"F_{m}", spec=".3e", group="level") for m in degrees),
@@ -130,12 +139,13 @@ def _side_table(data: Mapping[str, Any], first: int) -> TextTable:
     ]
     rows = [
         [
+            *([use] if data["start"] else []),
             side["previous"],
             side["ahead"],
             *(row[key] for key in ("level", "noise_gain") for row in side["filters"][first:]),
             side["largest_gain"],
         ]
-        for side in sides
+        for side, use in sides
     ]
     return TextTable(columns, rows)
 
@@ -156,14 +166,13 @@ def window_report(window: Window) -> Report:
     Parameters
     ----------
     window : Window
-        With steps of one sample.
     """
     data = window_data(window)
     return Report(lambda: window_text(window, data), lambda: data, lambda: flat_table(list(_rows(data))))
 
 
 def _rows(data: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-    for side in (data, *data["one_sided"]):
+    for side in (data, *data["one_sided"], *data["start"]):
         facts = {
             key: side[key] for key in ("name", "previous", "ahead", "objective", "noise", "largest_gain")
         }

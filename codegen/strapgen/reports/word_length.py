@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from strapgen.experiments.word_length import Outcome
+from strapgen.experiments.word_length import Outcome, noise_of
 from strapgen.reports.report import Report, flat_table
 from strapgen.reports.table import ANGLE, Column, TextTable
 
@@ -53,14 +53,28 @@ def word_length_text(outcomes: Sequence[Outcome]) -> str:
         case = first.case
         gyro = "increments rounded to their format" if float(pulse) == 0 else f"pulses of {pulse} arcsec"
         lines += [
-            f"{case.algorithm} {method}, step {step} s, {case.duration} s of {case.motion} motion "
-            f"({settings_text(first)}), {gyro}",
+            f"{case.algorithm} {method}, step {step} s, {case.duration} s of {case.motion} motion"
+            f"{f' ({settings_text(first)})' if case.settings else ''}, {gyro}",
             f"the method itself drifts by {first.truncation_deg:{ANGLE}} deg",
+            *_expected(first),
             "",
             *TextTable(_COLUMNS, [_cells(outcome) for outcome in group]).lines(),
             "",
         ]
     return "\n".join([*lines, *_NOTES])
+
+
+def _expected(outcome: Outcome) -> list[str]:
+    """Return what the pulses of a case are expected to do, in a line of text; none without pulses."""
+    if outcome.expected_deg is None:
+        return []
+    case = outcome.case
+    across = noise_of(case.algorithm, case.method, case.increments).across()
+    return [
+        f"pulses turn it by {outcome.expected_deg:{ANGLE}} deg rms at the end if their errors are independent; the "
+        "variance across",
+        f"a rate w is {across} for a pulse q, a step h and a time t",
+    ]
 
 
 def _cells(outcome: Outcome) -> list[Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from strapgen import catalogue
 from strapgen.backends import Backend, evaluator
 from strapgen.backends.increments import PART, StepWindows
 from strapgen.simulation.motions import Motion
@@ -148,8 +150,43 @@ def largest_increment(
         If a number is not allowed.
     """
     h = checks.number("step", step, positive=True)
+    return _largest(_increments(motion, h, samples, beside, pulse), h, duration)
+
+
+@np.errstate(all="ignore")
+def largest_turn(
+    motion: Motion,
+    step: float | str | Fraction,
+    duration: float | str | Fraction,
+    nodes: Sequence[float],
+) -> float:
+    """Return the largest magnitude of an element of the rates at nodes, times the step, of a simulation.
+
+    Parameters
+    ----------
+    motion : Motion
+    step, duration : number
+        As for `simulate`.
+    nodes : sequence of float
+        Nodes as fractions of the step.
+
+    Returns
+    -------
+    float
+        In rad.
+
+    Raises
+    ------
+    InputError
+        If a number is not allowed.
+    """
+    h = checks.number("step", step, positive=True)
+    return _largest(_turns(motion, h, nodes), h, duration)
+
+
+def _largest(part: Callable[[int, int], Array], h: Fraction, duration: float | str | Fraction) -> float:
+    """Return the largest magnitude of an element of the samples of a run."""
     steps = checks.multiple("duration", checks.number("duration", duration, positive=True), "step", h)
-    part = _increments(motion, h, samples, beside, pulse)
     counts = ((first, min(PART, steps - first)) for first in range(0, steps, PART))
     return max(float(np.abs(part(first, count)).max()) for first, count in counts)
 
@@ -169,6 +206,48 @@ def _increments(
     return StepWindows(read, samples, sum(beside), pulse)
 
 
+def _turns(motion: Motion, step: Fraction, nodes: Sequence[float]) -> Callable[[int, int], Array]:
+    """Return the rates at the nodes of the steps of a run, each times the step, part by part."""
+    length = float(step)
+
+    def read(first: int, count: int) -> Array:
+        rates = motion.rate((np.arange(first, first + count)[:, None] + np.array(nodes)) * length)
+        turns: Array = rates * length
+        return turns
+
+    return read
+
+
+def initial_state(backend: Backend, matrix: Any) -> Array:
+    """Return the state of a back end that has an attitude.
+
+    Parameters
+    ----------
+    backend : Backend
+    matrix : array_like, (3, 3)
+        Direction cosine matrix, body to reference.
+
+    Returns
+    -------
+    array, (state shape)
+
+    Raises
+    ------
+    InputError
+        If no kernel of the catalogue converts a matrix to such a state.
+    """
+    numbers = checks.real_array("initial", matrix, (3, 3), np.dtype(np.float64))
+    if backend.attitude is None:
+        return numbers
+    inverse = f"{backend.attitude.removeprefix('dcm-from-')}-from-dcm"
+    if inverse not in catalogue.KERNELS:
+        raise InputError(
+            f"no kernel converts a matrix to the state of {backend.kernel}; its runs begin at zero rotation"
+        )
+    state: Array = evaluator(inverse)(numbers)
+    return state
+
+
 @np.errstate(all="ignore")  # numbers that overflow are refused, in one line
 def simulate(
     backend: Backend,
@@ -178,8 +257,11 @@ def simulate(
     orthonormalize: float | str | Fraction | None = None,
     record: float | str | Fraction | None = None,
     pulse: float | str | Fraction | None = None,
+    initial: Any = None,
 ) -> Run:
     """Run an algorithm on a motion with a known attitude.
+
+    A step that takes rates at nodes gets those of the motion, in place of increments.
 
     Parameters
     ----------
@@ -195,6 +277,9 @@ def simulate(
         Interval of records in s, a multiple of the step; by default every step is recorded.
     pulse : number, optional
         Angle of a gyro pulse in rad, see `gyro.pulses`; by default increments are not quantized.
+    initial : array_like, (3, 3), optional
+        Direction cosine matrix at the start, body to reference; by default there is no rotation. The true attitude
+        is this matrix times that of the motion.
 
     Returns
     -------
@@ -203,8 +288,8 @@ def simulate(
     Raises
     ------
     InputError
-        If the algorithm takes no increments, a time is not finite, not positive, or no multiple of the step,
-        or the attitude leaves the range of the back end's numbers.
+        If a time is not finite, not positive, or no multiple of the step, a pulse goes with rates, or the attitude
+        leaves the range of the back end's numbers.
 
     Examples
     --------
@@ -215,7 +300,6 @@ def simulate(
     """
     stages.require("simulate", backend, Backend)
     stages.require("simulate", motion, Motion)
-    backend.need_increments()
     h = checks.number("step", step, positive=True)
     total = checks.number("duration", duration, positive=True)
     steps = checks.multiple("duration", total, "step", h)
@@ -228,12 +312,24 @@ def simulate(
     if record_every > steps:
         raise InputError(f"record {float(interval):g} s is longer than the duration {float(total):g} s")
     checks.multiple("duration", total, "record interval", interval)
-    increments = _increments(motion, h, backend.increments, (backend.previous, backend.ahead), pulse)
-    states = backend.propagate_parts(increments, steps, record_every, every)
+    start = None if initial is None else initial_state(backend, initial)
+    states = backend.propagate_parts(_samples(backend, motion, h, pulse), steps, record_every, every, start)
     time: Array = np.arange(len(states), dtype=np.float64) * float(interval)
     require_finite(backend, states, time)
-    true = motion.attitude(time)
+    true = motion.attitude(time) if initial is None else np.asarray(initial, float) @ motion.attitude(time)
     with np.errstate(over="ignore", invalid="ignore"):  # the squares of large states are refused instead
         computed = attitude(backend, states)
     require_finite(backend, computed, time)
     return Run(time, computed, true, *evaluator("error-matrix")(computed, true))
+
+
+def _samples(
+    backend: Backend, motion: Motion, step: Fraction, pulse: float | str | Fraction | None
+) -> Callable[[int, int], Array]:
+    """Return what the steps of a run take, part by part: increments, or rates at nodes."""
+    if not backend.nodes:
+        backend.need_increments()
+        return _increments(motion, step, backend.increments, (backend.previous, backend.ahead), pulse)
+    if pulse is not None:
+        raise InputError(f"kernel {backend.kernel} takes rates; a pulse goes with increments")
+    return _turns(motion, step, backend.nodes)

@@ -1,39 +1,47 @@
-"""Generates the C of a described system: its stages, and the unit that stores, calls and runs them."""
+"""Generates a described system: its stages, and the unit that stores, calls and runs them, in C or in Python."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
 from strapgen.support import checks
 from strapgen.systems.fitting import Fitted, fitted
 from strapgen.systems.wiring import Description
-from strapgen.targets import BUILT_IN
+from strapgen.targets import BUILT_IN, TARGETS
 from strapgen.targets.system_c import emit
+from strapgen.targets.system_python import emit as python
 
 
-def unit(fit: Fitted, command: str) -> Sources:
-    """Return the C of a system whose stages are generated.
+def unit(fit: Fitted, command: str, budget: Sequence[str] = ()) -> Sources:
+    """Return the C of a system whose stages are generated, or its twin in Python.
 
     Parameters
     ----------
     fit : Fitted
     command : str
         The command line that generates it.
+    budget : sequence of str, optional
+        Lines about operations and memory, for the head.
     """
     system = fit.description.system
-    return emit.whole(system, fit.name, (system.title, command), fit.sources, fit.arguments)
+    head = system.title, command
+    if TARGETS[fit.target].language == "Python":
+        return python.whole(system, head, fit.sources, fit.arguments, budget)
+    return emit.whole(system, fit.name, head, fit.sources, fit.arguments, budget)
 
 
 def sources(
     description: Description, target: str = "c", settings: Settings | None = None, command: str = ""
 ) -> Sources:
-    """Return the C of a described system.
+    """Return the C of a described system, or its twin in Python.
 
     Parameters
     ----------
     description : Description
     target : str, optional
-        A target of C.
+        A target of C, "numpy" or "fixed-model".
     settings : Settings, optional
         Settings of fixed point for what the stages do not state.
     command : str, optional
@@ -42,7 +50,7 @@ def sources(
     Raises
     ------
     InputError
-        If the target is not C, or a stage cannot be generated.
+        If the target is another, or a stage cannot be generated.
     """
-    checks.choice("target", target, [name for name, entry in BUILT_IN.items() if entry.compiled])
+    checks.choice("target", target, BUILT_IN)
     return unit(fitted(description, target, settings), command)

@@ -14,13 +14,12 @@ import strapgen
 from strapgen.backends.kernel_sources import sources_of_program
 from strapgen.catalogue import NAVIGATION, Choice
 from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.recursion import Recursion
 
 NAMES = [*NAVIGATION]
 #: A quotient with a root, a recursion with error feedback, and functions: compiled in the quick tests.
-SOME = ("transport-rate-ellipsoid", "position-step", "coarse-leveling")
+SOME = ("wander-rate-ellipsoid", "position-step", "coarse-leveling")
 SOME_FIRST = [pytest.param(name, marks=() if name in SOME else pytest.mark.long) for name in NAMES]
-#: Words in the description of a signal that say which axes it has, or that it has none.
-FRAMES = ("axes", "no frame", "of the earth", "length of the cycle", "of n", "z of e", "ellipsoid", "equator")
 
 
 def settings(word: int) -> Settings:
@@ -28,22 +27,27 @@ def settings(word: int) -> Settings:
 
 
 def proper_inputs(evaluator, count: int, rng) -> list[np.ndarray]:
-    """Return integers for every input: rotations and directions to the place, corners and numbers of all others."""
-    return [
-        array[count:] if argument.signal.constraint else array[:count]
-        for argument, array in zip(
-            evaluator.interface.inputs, corners_and_random(evaluator, 2 * count, rng), strict=True
-        )
-    ]
+    """Return integers for every input: rotations and directions to the place, corners and numbers of all others.
+
+    States stay an eighth below the end of their range, which they must not leave in the call.
+    """
+    states = [state for state, _ in (evaluator.sources.recursion or Recursion(())).states]
+    inputs = []
+    for argument, array in zip(
+        evaluator.interface.inputs, corners_and_random(evaluator, 2 * count, rng), strict=True
+    ):
+        signal = argument.signal
+        proper = array[count:] if signal.constraint else array[:count]
+        inputs.append(proper * 7 // 8 if signal.name in states and not signal.constraint else proper)
+    return inputs
 
 
-def test_every_source_says_where_it_comes_from_and_every_signal_its_axes():
+def test_every_source_says_where_it_comes_from_and_every_input_its_range():
     for name in NAMES:
         kernel = strapgen.derive(name)
         assert "derived" in kernel.source, name
         for signal in kernel.inputs:
             assert signal.bound is not None and signal.unit, (name, signal.name)
-            assert any(words in signal.meaning for words in FRAMES), (name, signal.name)
 
 
 @pytest.mark.parametrize("word", [pytest.param(16, marks=pytest.mark.long), 32])
@@ -64,8 +68,13 @@ def test_no_error_exceeds_its_bound(name, word, rng):
     assert share > 0.02, "the bound is of the size of the errors"
 
 
-@pytest.mark.parametrize("word", [pytest.param(16, marks=pytest.mark.long), 32])
-@pytest.mark.parametrize("name", SOME_FIRST)
+@pytest.mark.parametrize(
+    ("name", "word"),
+    [
+        *(pytest.param(name, 32, marks=() if name in SOME else pytest.mark.long) for name in NAMES),
+        *(pytest.param(name, 16, marks=pytest.mark.long) for name in SOME),
+    ],
+)
 def test_c_gives_the_integers_of_the_model(name, word, rng):
     in_c, model = (
         strapgen.evaluator(name, backend, settings(word)) for backend in (f"c-fixed{word}", "fixed-model")

@@ -19,7 +19,11 @@ def test_there_is_a_set_for_every_number_of_samples_before_the_interval():
     filters = LateFilters(WINDOW)
     assert len(filters.sets) == filters.samples == 15
     for previous, rows in enumerate(filters.sets):
-        assert rows == WINDOW.one_sided_with(14 - previous).filters
+        assert (rows == WINDOW.one_sided_with(14 - previous).filters) == (previous >= WINDOW.previous)
+    assert filters.sets[:7] == tuple(one.filters for one in WINDOW.start)
+    # Without filters of their own for the start, and in words, it has those of the family.
+    for calm in (LateFilters(replace(WINDOW, start=())), LateFilters(WINDOW, calm_start=True)):
+        assert calm.sets == tuple(WINDOW.one_sided_with(14 - previous).filters for previous in range(15))
     assert filters.sets[7] == WINDOW.filters
 
 

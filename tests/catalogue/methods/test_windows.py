@@ -51,7 +51,8 @@ def test_a_file_is_one_that_a_user_could_hand_over(name):
     verified, built_in = read(FOLDER / f"{name}.toml"), WINDOWS[name]
     assert verified.filters == built_in.filters and verified.title == built_in.title == WINDOW_TITLES[name]
     assert verified.name not in WINDOWS and verified.file.endswith(f"{name}.toml")
-    assert [one.filters for one in verified.one_sided] == [one.filters for one in built_in.one_sided]
+    for ours, theirs in ((verified.one_sided, built_in.one_sided), (verified.start, built_in.start)):
+        assert [one.filters for one in ours] == [one.filters for one in theirs]
 
 
 @FAMILIES
@@ -67,8 +68,11 @@ def test_filters_have_their_parity_and_their_sizes(name):
         assert window.one_sided_with(one.ahead) is one and WINDOWS[one.name] == one
         assert one.name == f"window-{one.previous}-{one.ahead}"
         assert one.mirrored().filters == window.one_sided_with(one.previous).filters and not one.parity
+    assert [(one.previous, one.ahead, one.noise) for one in window.start] == [
+        (k, 2 * half - k, 0) for k in range(half)
+    ]
     assert window.one_sided_with(half) is window
-    assert window.mirrored() == replace(window, one_sided=())
+    assert window.mirrored() == replace(window, one_sided=(), start=())
     with pytest.raises(InputError, match="has no filters with 99 of its samples ahead"):
         window.one_sided_with(99)
 

@@ -9,7 +9,7 @@ import sympy as sp
 
 from strapgen.catalogue.kinematics import DCM, SAVAGE
 from strapgen.ir.recursion import Recursion
-from strapgen.ir.signals import Signal
+from strapgen.ir.signals import ANY, Signal
 from strapgen.symbolic.evaluation import Direction, Wrapped
 from strapgen.symbolic.kernel import Kernel, KernelBuilder, resolution
 
@@ -20,7 +20,7 @@ ANGLES = Signal(
     unit="rad",
     meaning="Euler angles: roll, pitch, heading",
     bound=Fraction(355, 113),
-    frame="b to n",
+    frame=ANY,
 )
 #: Squared cosine of pitch below which heading is computed from its sum or difference with roll.
 _STEEP = sp.Rational(1, 4)
@@ -47,7 +47,7 @@ def dcm_from_euler_angles() -> Kernel:
         return matrix
 
     product = turned(heading, "heading", 2) * turned(pitch, "pitch", 1) * turned(roll, "roll", 0)
-    build.output(replace(DCM.state, name="attitude"), product)
+    build.output(replace(DCM.state, name="attitude", frame=ANY), product)
     return build.kernel(
         "dcm-from-euler-angles", "Direction cosine matrix from Euler angles", f"{SAVAGE}, equation (60)"
     )
@@ -108,7 +108,7 @@ def euler_angles_from_dcm() -> Kernel:
         rad, roll and heading from -pi to pi, pitch from -pi/2 to pi/2.
     """
     build = KernelBuilder()
-    C = build.input(DCM.state)
+    C = build.input(replace(DCM.state, frame=ANY))
     before = build.input(
         replace(
             ANGLES,

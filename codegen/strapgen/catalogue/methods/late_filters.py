@@ -34,6 +34,11 @@ class LateFilters:
     ----------
     window : Window
         A family with steps of one sample.
+    calm_start : bool, optional
+        Whether the first intervals of a recording have filters of small noise gain too, which words can hold, in place
+        of the family's own for its start.
+    scale : Fraction, optional
+        What the samples are multiplied by to be increments in rad: that of the counts of a gyro.
 
     Raises
     ------
@@ -50,6 +55,8 @@ class LateFilters:
     """
 
     window: Window
+    calm_start: bool = False
+    scale: Fraction = Fraction(1)
 
     def __post_init__(self) -> None:
         """Refuse windows for which there are no such filters."""
@@ -96,15 +103,27 @@ class LateFilters:
     @cached_property
     def sets(self) -> tuple[Rows, ...]:
         """The filters by the number of samples before the interval, from none to p + L."""
-        by_previous = {one.previous: one for one in (self.window, *self.window.one_sided)}
-        return tuple(by_previous[k].filters[: self.degree + 1] for k in range(self.samples))
+        start = () if self.calm_start else self.window.start
+        by_previous = {one.previous: one for one in (self.window, *self.window.one_sided, *start)}
+        return tuple(self._scaled(by_previous[k].filters[: self.degree + 1]) for k in range(self.samples))
 
     @cached_property
     def short(self) -> tuple[Rows, ...]:
         """The filters on fewer samples: for each of 1 to 4 samples, those of each interval; see `short_place`."""
         return tuple(
-            polynomial(count, place, self.degree) for count in range(1, SHORT + 1) for place in range(count)
+            self._scaled(polynomial(count, place, self.degree))
+            for count in range(1, SHORT + 1)
+            for place in range(count)
         )
+
+    @property
+    def sums(self) -> range:
+        """The Legendre coefficients that are sums of samples; of an ideal gyro in rad the first one is a sample."""
+        return range(1 if self.window.gyro is None and self.scale == 1 else 0, self.degree + 1)
+
+    def _scaled(self, rows: Rows) -> Rows:
+        """Return filters of samples with their scale."""
+        return rows if self.scale == 1 else tuple(tuple(tap * self.scale for tap in row) for row in rows)
 
     @cached_property
     def restoration(self) -> Restoration:

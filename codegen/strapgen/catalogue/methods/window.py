@@ -65,6 +65,9 @@ class Window:
     one_sided : tuple of Window
         Filters for the same samples with fewer samples ahead, from L - 1 down to none, and after them those with
         fewer samples before the step, from none up to p - 1.
+    start : tuple of Window
+        Filters of the first intervals of a recording, from none up to p - 1 samples before the step: designed for less
+        noise than those of `one_sided`, which take their place where there are none.
     file : str
         Path of the file; empty for a window of the catalogue.
     sibling : bool
@@ -95,6 +98,7 @@ class Window:
     rotation: str = "fourth"
     terms: int = 16
     one_sided: tuple[Window, ...] = ()
+    start: tuple[Window, ...] = ()
     file: str = field(default="", compare=False, repr=False)
     sibling: bool = False
 
@@ -142,6 +146,7 @@ class Window:
             ahead=self.previous,
             filters=tuple(_reversed(m, row) for m, row in enumerate(self.filters)),
             one_sided=(),
+            start=(),
         )
 
     def one_sided_with(self, ahead: int) -> Window:

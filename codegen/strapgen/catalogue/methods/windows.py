@@ -24,10 +24,10 @@ from strapgen.support.suggestions import counted
 #: Keys of a file, and those of them that are optional.
 KEYS = (
     *("name", "source", "previous", "ahead", "increments", "conditions", "band", "objective", "noise"),
-    *("gyro", "rotation", "terms", "filters", "one_sided"),
+    *("gyro", "rotation", "terms", "filters", "one_sided", "start"),
 )
-OPTIONAL = ("increments", "noise", "gyro", "rotation", "terms")
-#: Keys of one-sided filters, and those of them that are optional.
+OPTIONAL = ("increments", "noise", "gyro", "rotation", "terms", "start")
+#: Keys of one-sided filters and of those of the start, and those of them that are optional.
 ONE_SIDED_KEYS = ("previous", "ahead", "objective", "noise", "band", "filters")
 ONE_SIDED_OPTIONAL = ("noise", "band")
 
@@ -101,7 +101,18 @@ def one_sided_sizes(previous: int, ahead: int) -> list[tuple[int, int]]:
     """
     total = previous + ahead
     now = [(total - after, after) for after in range(ahead - 1, -1, -1)]
-    return now + [(before, total - before) for before in range(previous)]
+    return now + start_sizes(previous, ahead)
+
+
+def start_sizes(previous: int, ahead: int) -> list[tuple[int, int]]:
+    """Return the samples before and ahead of the filters of the start, in the order of `Window.start`.
+
+    Examples
+    --------
+    >>> start_sizes(2, 2)
+    [(0, 4), (1, 3)]
+    """
+    return [(before, previous + ahead - before) for before in range(previous)]
 
 
 def stored_sizes(previous: int, ahead: int, ideal: bool) -> list[tuple[int, int]]:
@@ -146,10 +157,12 @@ def named_window(method: str | Window) -> Window | None:
 
 def with_exact_rotation(window: Window) -> Window:
     """Return a window of the catalogue with the exact rotation of its polynomial."""
-    one_sided = tuple(with_exact_rotation(one) for one in window.one_sided)
+    one_sided, start = (tuple(map(with_exact_rotation, some)) for some in (window.one_sided, window.start))
     name, title = f"{window.name}{EXACT}", f"{window.title}; exact rotation"
     terms = max(window.terms, EXACT_TERMS)  # a family may state more
-    return replace(window, name=name, title=title, rotation="exact", terms=terms, one_sided=one_sided)
+    return replace(
+        window, name=name, title=title, rotation="exact", terms=terms, one_sided=one_sided, start=start
+    )
 
 
 def read(path: str | Path) -> Window:
@@ -181,7 +194,10 @@ def read(path: str | Path) -> Window:
         file = checks.text("the name of the file", str(path))
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    return replace(window, file=file, one_sided=tuple(replace(one, file=file) for one in window.one_sided))
+    one_sided, start = (
+        tuple(replace(one, file=file) for one in some) for some in (window.one_sided, window.start)
+    )
+    return replace(window, file=file, one_sided=one_sided, start=start)
 
 
 def verify(window: Window) -> None:
@@ -196,8 +212,9 @@ def verify(window: Window) -> None:
     InputError
         If one does not hold; the message names the first.
     """
-    for one in (window, *window.one_sided):
+    for one in (window, *window.one_sided, *window.start):
         place = "" if one is window else f"{one.previous} before and {one.ahead} ahead: "
+        place = f"start, {place}" if one in window.start else place
         if one.gyro is None and one.filters[0] != _sum_of_step(one):
             raise InputError(
                 f"{place}filters row 1, of c_0, is the sum of the step's samples for an ideal gyro: "
@@ -246,15 +263,48 @@ def _family(data: Mapping[str, Any], name: str) -> Window:
         checks.choice("rotation", data.get("rotation", "fourth"), ROTATIONS),
         _count("terms", data.get("terms", 16), 1, MOST_TERMS),
     )
-    return replace(window, one_sided=_all_one_sided(window, entries("one_sided", data["one_sided"])))
+    return replace(
+        window,
+        one_sided=_all_one_sided(window, entries("one_sided", data["one_sided"])),
+        start=_start(window, entries("start", data["start"])) if "start" in data else (),
+    )
 
 
 def _all_one_sided(window: Window, tables: list[Any]) -> tuple[Window, ...]:
     """Return the one-sided filters of a family, those with fewer samples before the step mirrored where it can be."""
     sizes = one_sided_sizes(window.previous, window.ahead)
+    stored = _stored("one_sided", window, tables, sizes)
+    for previous, ahead in sizes:
+        if (previous, ahead) not in stored and window.gyro is None and (ahead, previous) in stored:
+            stored[previous, ahead] = stored[ahead, previous].mirrored()
+    return _in_order("one_sided", stored, sizes)
+
+
+def _start(window: Window, tables: list[Any]) -> tuple[Window, ...]:
+    """Return the filters of the first intervals of a recording."""
+    sizes = start_sizes(window.previous, window.ahead)
+    return _in_order("start", _stored("start", window, tables, sizes), sizes)
+
+
+def _in_order(
+    key: str, stored: Mapping[tuple[int, int], Window], sizes: list[tuple[int, int]]
+) -> tuple[Window, ...]:
+    """Return filters in the order of their sizes, all of which are needed."""
+    for previous, ahead in sizes:
+        if (previous, ahead) not in stored:
+            raise InputError(
+                f"{key} lacks the filters with {counted(previous, 'sample')} before and {ahead} ahead"
+            )
+    return tuple(stored[size] for size in sizes)
+
+
+def _stored(
+    key: str, window: Window, tables: list[Any], sizes: list[tuple[int, int]]
+) -> dict[tuple[int, int], Window]:
+    """Return the filters of the tables under a key, by the samples before and ahead of their step."""
     stored: dict[tuple[int, int], Window] = {}
     for number, table in enumerate(tables, 1):
-        what = f"one_sided, table {number}"
+        what = f"{key}, table {number}"
         if not isinstance(table, dict):
             raise InputError(f"{what} is of type {type(table).__name__}; a table is needed")
         try:
@@ -267,15 +317,7 @@ def _all_one_sided(window: Window, tables: list[Any]) -> tuple[Window, ...]:
         except InputError as error:
             raise InputError(f"{what}: {error}") from None
         stored[size] = one
-    for previous, ahead in sizes:
-        if (previous, ahead) not in stored and window.gyro is None and (ahead, previous) in stored:
-            stored[previous, ahead] = stored[ahead, previous].mirrored()
-    for previous, ahead in sizes:
-        if (previous, ahead) not in stored:
-            raise InputError(
-                f"one_sided lacks the filters with {counted(previous, 'sample')} before and {ahead} ahead"
-            )
-    return tuple(stored[size] for size in sizes)
+    return stored
 
 
 def _one_sided(window: Window, table: Mapping[str, Any]) -> Window:

@@ -21,8 +21,8 @@ from strapgen.cli.options import (
 )
 from strapgen.cli.output import Output
 from strapgen.cli.progress import track
-from strapgen.cli.sample_source import MOTION_NAMES, MotionSettings, pairs
-from strapgen.support import checks
+from strapgen.cli.sample_source import MOTION_FILE, MOTION_NAMES, MotionSettings, check_motion, is_file, pairs
+from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
     from strapgen.experiments.convergence import Convergence
@@ -38,7 +38,8 @@ class Ladder:
     panel: ClassVar[str] = "Input"
 
     motion: Annotated[
-        _Text, option("--motion", metavar="NAME", help=f"Motion: {MOTION_NAMES}.  [default: coning]")
+        _Text,
+        option("--motion", metavar="NAME", help=f"Motion: {MOTION_NAMES}{MOTION_FILE}.  [default: coning]"),
     ] = None
     settings: MotionSettings = None
     steps: Annotated[
@@ -51,23 +52,24 @@ class Ladder:
     ] = "1/2,1/4,1/8,1/16,1/32,1/64,1/128"
     duration: Duration = "2"
 
-    def check(self) -> None:
-        """Check the name of the motion."""
-        from strapgen.catalogue import MOTIONS
+    def check(self, names: list[str]) -> None:
+        """Check the name of the motion, which back ends of many digits must know in closed form."""
+        from strapgen.backends import BACKENDS
 
-        if self.motion is not None:
-            checks.choice("motion", self.motion, MOTIONS)
+        check_motion(self.motion)
+        if is_file(self.motion or "") and any(BACKENDS[name].many_digits for name in names):
+            raise InputError(f"motion {self.motion} is known in double alone; --backend numpy runs on it")
 
     def profile(self) -> tuple[Motion, str]:
         """Return the motion, and a description of the runs in words."""
-        from strapgen.simulation import motions
+        from strapgen.simulation import motions, users_motions
 
         parameters = pairs(self.settings or [])
         if self.motion is None and not self.settings:
             parameters = motions.GENERAL
-        profile = motions.motion(self.motion or "coning", **parameters)
+        profile = users_motions.any_motion(self.motion or "coning", self.duration, parameters)
         words = ", ".join(f"{key}={value}" for key, value in parameters.items())
-        return profile, f"{self.duration} s of {profile.name} motion, {words}"
+        return profile, f"{self.duration} s of {profile.name} motion" + (f", {words}" if words else "")
 
 
 @grouped
@@ -99,7 +101,7 @@ def converge(
     output.check(algorithm, *methods.files)
     names = backends("--backend", backend, ())
     most = limit("--fail-beyond", fail_beyond)
-    ladder.check()
+    ladder.check(names)
     choices = methods.choices(algorithm)
     profile, words = ladder.profile()
     steps = listed("--step", ladder.steps)

@@ -72,7 +72,7 @@ def frontier(
 
     All algorithms get the same samples, of cones, cones on a spinning body, random rates, and slews with soft and with
     sharp onsets. You see the largest angle from the true attitude, divided by the duration, beside the multiplications
-    and additions for each sample. The plot shows which algorithms drift less than all that cost less.
+    and additions for each sample. The plot shows which algorithms halve the drift of all that cost less.
 
     A method:N+P+L takes N samples in a step, P from before it and L from after it. The method fit-exact integrates the
     polynomial through its samples exactly, as iterations on it do in the limit.
@@ -99,7 +99,7 @@ def frontier(
         float(checks.number("duration", run.duration)),
     )
     title = (
-        f"drift over {seconds:g} s at {hertz:g} Hz; a line joins what drifts less than all that costs less"
+        f"drift over {seconds:g} s at {hertz:g} Hz; a line joins what halves the drift of all that costs less"
     )
     output.report(
         frontier_report(standings, hertz, seconds),

@@ -230,7 +230,7 @@ def _overview(algorithm: _Text, method: MethodOptions, versus: Versus, output: O
         raise InputError("--all is a table; text, json, csv and markdown are allowed, not latex")
     from strapgen import catalogue
     from strapgen.analysis import overview
-    from strapgen.reports.overview import overview_report
+    from strapgen.reports.error_analysis.overview import overview_report
 
     algorithms = list(catalogue.ALGORITHMS)
     if algorithm is not None:

@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from strapgen.catalogue import MOTIONS, RUN_MOTIONS
 from strapgen.cli.fixed_options import RUN_OPTIONS, FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
-from strapgen.cli.options import STEP_OPTIONS, MethodOptions, OneBackend, StepAlgorithm, one, option
+from strapgen.cli.options import STEP_OPTIONS, MethodOptions, OneBackend, RunAlgorithm, one, option
 from strapgen.cli.output import Output, format_option, plot_option
 from strapgen.cli.sample_source import SampleSource
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
+from strapgen.systems.built_in import is_system
 
 if TYPE_CHECKING:
     from strapgen.backends import Backend
@@ -24,8 +24,8 @@ _Text = str | None
 
 
 @dataclass(frozen=True)
-class Intervals:
-    """Options of the times from one orthonormalization, or one record, to the next."""
+class RunOptions:
+    """Options of the attitude at the start, and of the times between orthonormalizations and between records."""
 
     panel: ClassVar[str] = "Run"
 
@@ -53,6 +53,29 @@ class Intervals:
             help="Time from one record to the next in s; it must divide the duration.  [default: every step]",
         ),
     ] = None
+    initial: Annotated[
+        _Text,
+        option(
+            "--initial-deg",
+            metavar="R,P,H",
+            help="Roll, pitch and heading at the start of a motion in deg.  [default: zero rotation]",
+        ),
+    ] = None
+
+    def start(self) -> Any:
+        """Return the matrix at the start of a run, (3, 3); None for zero rotation."""
+        if self.initial is None:
+            return None
+        import numpy as np
+
+        from strapgen.backends import evaluator
+
+        angles = [checks.number("initial-deg", part) for part in self.initial.split(",")]
+        if len(angles) != 3:
+            raise InputError(
+                f"--initial-deg is {self.initial!r}; three numbers with commas between are needed"
+            )
+        return evaluator("dcm-from-euler-angles")(np.radians([float(angle) for angle in angles]))
 
 
 @dataclass(frozen=True)
@@ -61,29 +84,52 @@ class RunOutput(Output):
 
     plot: Annotated[Path | None, plot_option("the plots")] = None
     format: Annotated[_Text, format_option(Output.formats, "  [default: text; csv for recorded data]")] = None
+    title: Annotated[
+        _Text, option("--title", metavar="TEXT", help="Title of the text, and of the plots.")
+    ] = None
+    print_every: Annotated[
+        _Text,
+        option(
+            "--print",
+            metavar="S",
+            help="Time in s from one print of the matrices to the next in the text.  [default: at the end alone]",
+        ),
+    ] = None
+    matrices: Annotated[
+        bool, option("--matrices", help="Add the computed and the true matrices to the JSON output.")
+    ] = False
+
+    def check_motion(self, motion: _Text) -> None:
+        """Check the options that go with a motion, and with one format."""
+        stated = {"--matrices": self.matrices, "--print": self.print_every is not None}
+        for name in (name for name, value in stated.items() if value and motion is None):
+            raise InputError(f"{name} goes with --motion")
+        if self.matrices and self.format != "json":
+            raise InputError("--matrices goes with --format json; --format csv has the matrices")
+        if self.print_every is not None and self.format not in (None, "text"):
+            raise InputError(f"--print goes with text, not with --format {self.format}")
+        if self.title is not None and not self.title.isprintable():
+            raise InputError(f"--title is {self.title!r}; one line of text is needed")
 
 
 @grouped
 def simulate(
-    algorithm: StepAlgorithm,
+    algorithm: RunAlgorithm,
     *,
-    method: Annotated[MethodOptions, Shown(only=STEP_OPTIONS)],
+    method: Annotated[MethodOptions, Shown(only=(*STEP_OPTIONS, "rates"))],
     backend: OneBackend = "numpy",
     source: SampleSource,
-    intervals: Intervals,
+    intervals: RunOptions,
     fixed: Annotated[FixedOptions, Shown(only=RUN_OPTIONS)],
     output: RunOutput,
-    matrices: Annotated[
-        bool,
-        option(
-            "--matrices", help="Add the computed and the true matrices to the JSON output.", panel="Output"
-        ),
-    ] = False,
 ) -> None:
     """Run an algorithm on a motion, or on recorded gyro data.
 
     The true attitude of a motion is known, so that you see the drift, scale and skew of the computed attitude; along a
     recording you see the attitude itself.
+
+    A file of a motion of your own has functions increments and attitude, which are checked against each other. With
+    --rates the step takes the rate itself, so that you see what its extraction from increments costs.
 
     Recorded times must be evenly spaced unless you give --resample-hz. The rate is then taken as linear from one sample
     to the next, across intervals of up to ten times the median.
@@ -93,22 +139,28 @@ def simulate(
     Example: strapgen simulate euler --method rk4 --increments 2 --backend c --motion coning --set a_deg_s=10 b_deg_s=10
     g_deg_s=10 --step 0.125 --duration 180 --orthonormalize 5 --record 5
 
+    A described system, a built-in one or a file, runs at the rate that it states, or at that of --step; the navigation
+    frame rests.
+
     Example: strapgen simulate dcm --backend c --rates-csv gyro.csv --rate-unit deg/s --resample-hz 100
     --out out/attitude.csv
     """
+    if is_system(algorithm):
+        from strapgen.cli.systems.running import simulated_system
+
+        return simulated_system(algorithm, method, backend, source, intervals, fixed, output)
     choice = method.choose(algorithm)
     from strapgen.backends import BACKENDS
 
     one("--backend", backend)
     checks.choice("backend", backend, BACKENDS)
-    if source.motion is not None:
-        checks.choice("motion", source.motion, {**MOTIONS, **RUN_MOTIONS})
-    output.check(algorithm, *method.files, source.increments_csv, source.rates_csv)
+    output.check(algorithm, *method.files, *source.files)
     source.check()
-    if matrices and source.motion is None:
-        raise InputError("--matrices goes with --motion")
-    if matrices and output.format != "json":
-        raise InputError("--matrices goes with --format json; --format csv has the matrices")
+    output.check_motion(source.motion)
+    if source.motion is None:
+        stated = {"--rates": method.rates, "--initial-deg": intervals.initial is not None}
+        for name in (name for name, value in stated.items() if value):
+            raise InputError(f"{name} goes with --motion")
     fixed.check_backend(backend)
     fixed.check_pulse(source.pulse_arcsec)
 
@@ -126,7 +178,7 @@ def simulate(
         if source.motion is None:
             _on_recording(build, choice, source, intervals, output)
         else:
-            _on_motion(build, choice, source, intervals, output, matrices)
+            _on_motion(build, choice, source, intervals, output)
 
 
 #: Most records that are written: the text of one takes some hundred bytes.
@@ -147,7 +199,8 @@ _Build = Callable[[float, Callable[[], float]], "Backend"]
 
 
 def _facts(backend: Backend, choice: Choice) -> dict[str, Any]:
-    facts = {"algorithm": choice.name, "method": choice.method_name, "increments": backend.increments}
+    facts: dict[str, Any] = {"algorithm": choice.name, "method": choice.method_name}
+    facts |= {"rates_at": list(backend.nodes)} if backend.nodes else {"increments": backend.increments}
     if backend.previous:
         facts["previous"] = backend.previous
     if backend.ahead:
@@ -159,45 +212,61 @@ def _on_motion(
     build: _Build,
     choice: Choice,
     source: SampleSource,
-    intervals: Intervals,
-    output: Output,
-    matrices: bool,
+    intervals: RunOptions,
+    output: RunOutput,
 ) -> None:
     """Simulate, and deliver the run."""
     from strapgen.cli.progress import waiting
     from strapgen.reports import plots
-    from strapgen.reports.runs import run_report
+    from strapgen.reports.runs import RunLayout, run_report
     from strapgen.simulation import runs
 
-    pulse = source.pulse
-    profile = source.profile()
-    step, duration = source.step or "", source.duration or ""
-    samples, beside = choice.increments_per_step, (choice.previous, choice.ahead)
+    pulse, step, duration = source.pulse, source.step or "", source.duration or ""
     length = float(checks.number("step", step, positive=True))
     _refuse_many(float(checks.number("duration", duration, positive=True)) / length, length, intervals.record)
-    backend = build(
-        length,
-        lambda: runs.largest_increment(profile, step, duration, samples, pulse, beside),
-    )
+    every = _prints(output.print_every, intervals.record or step)
+    profile, start = source.profile(), intervals.start()
+    samples, beside = choice.increments_per_step, (choice.previous, choice.ahead)
+
+    def largest() -> float:
+        if choice.increments is None:
+            from strapgen import catalogue
+
+            nodes = [float(node) for node in catalogue.nodes(choice)]
+            return runs.largest_turn(profile, step, duration, nodes)
+        return runs.largest_increment(profile, step, duration, samples, pulse, beside)
+
+    backend = build(length, largest)
     pulse = pulse or backend.count
     with waiting(f"running {backend.kernel}"):
         run = runs.simulate(
-            backend, profile, step, duration, intervals.orthonormalize, intervals.record, pulse
+            backend, profile, step, duration, intervals.orthonormalize, intervals.record, pulse, start
         )
     facts = _facts(backend, choice) | {
         "motion": profile.name,
         "step_s": float(checks.number("step", step)),
         "duration_s": float(checks.number("duration", duration)),
     }
-    title = f"{backend.kernel}, {backend.name}: {profile.name} motion ({source.words}), step {step} s"
+    facts |= {} if intervals.initial is None else {"initial_deg": intervals.initial}
+    title = f"{backend.kernel}, {backend.name}: {source.described(profile.name, ' motion')}, step {step} s"
+    shown = RunLayout(source.described(profile.name), output.title, output.matrices, every)
     output.report(
-        run_report(run, facts, f"{profile.name} ({source.words})", matrices),
-        lambda path: plots.run_image(run, title, path),
+        run_report(run, facts, shown), lambda path: plots.run_image(run, output.title or title, path)
+    )
+
+
+def _prints(every: _Text, record: str) -> int | None:
+    """Return how many records lie between two prints of the matrices."""
+    if every is None:
+        return None
+    interval = checks.number("print", every, positive=True)
+    return checks.multiple(
+        "print", interval, "record interval", checks.number("record", record, positive=True)
     )
 
 
 def _on_recording(
-    build: _Build, choice: Choice, source: SampleSource, intervals: Intervals, output: Output
+    build: _Build, choice: Choice, source: SampleSource, intervals: RunOptions, output: RunOutput
 ) -> None:
     """Propagate recorded data, and deliver the attitude."""
     from strapgen.cli.progress import waiting
@@ -220,6 +289,6 @@ def _on_recording(
     title = f"{backend.kernel}, {backend.name}: attitude along {source.file.name}"
     facts = _facts(backend, choice) | {"source": str(source.file)}
     replace(output, format=output.format or "csv").report(
-        history_report(history, backend.elements, facts),
-        lambda path: plots.history_image(history, backend.elements, title, path),
+        history_report(history, backend.elements, ({"title": output.title} if output.title else {}) | facts),
+        lambda path: plots.history_image(history, backend.elements, output.title or title, path),
     )

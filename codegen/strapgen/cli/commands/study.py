@@ -12,7 +12,7 @@ from strapgen.cli.option_groups import grouped
 from strapgen.cli.options import Duration, Increments, listed, option, whole
 from strapgen.cli.output import Output
 from strapgen.cli.progress import track
-from strapgen.cli.sample_source import RUN_MOTION_NAMES, pairs
+from strapgen.cli.sample_source import MOTION_FILE, RUN_MOTION_NAMES, check_motion, is_file, pairs
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 
@@ -100,7 +100,8 @@ def word_length(
     ] = "euler",
     sweep: Sweep,
     motion: Annotated[
-        str, option("--motion", metavar="NAME", help=f"Motion: {RUN_MOTION_NAMES}.", panel="Input")
+        str,
+        option("--motion", metavar="NAME", help=f"Motion: {RUN_MOTION_NAMES}{MOTION_FILE}.", panel="Input"),
     ] = "coning",
     settings: Annotated[
         list[str] | None,
@@ -137,11 +138,11 @@ def word_length(
     from strapgen import catalogue
 
     checks.choice("algorithm", algorithm, catalogue.ALGORITHMS)
-    checks.choice("motion", motion, {**catalogue.MOTIONS, **catalogue.RUN_MOTIONS})
+    check_motion(motion, catalogue.RUN_MOTIONS)
     count = whole("jobs", jobs)
     if count is not None:
         checks.count("jobs", count, largest=1024)
-    if settings is None and motion != "coning":
+    if settings is None and motion != "coning" and not is_file(motion):
         raise InputError(f"--motion {motion} needs --set; strapgen list motions shows the keys")
 
     import numpy as np

@@ -27,6 +27,15 @@ def tables(
             panel="Algorithm",
         ),
     ] = None,
+    orthonormalize: Annotated[
+        str,
+        option(
+            "--orthonormalize",
+            metavar="S",
+            help="Time from one orthonormalization, and record, to the next in s; the thesis has 5 s and 10 s.",
+            panel="Run",
+        ),
+    ] = "5",
     predict: Annotated[
         bool,
         option(
@@ -44,15 +53,25 @@ def tables(
     """
     output.check()
     if predict:
-        stated = [name for name, value in (("--backend", backend), ("--table", table)) if value is not None]
+        values = {"--backend": backend, "--table": table}
+        stated = [name for name, value in values.items() if value is not None]
+        stated += ["--orthonormalize"] if orthonormalize != "5" else []
         for name in [*stated, *fixed.stated]:
             raise InputError(f"--predict and {name} do not go together")
         _predict(output)
         return
     from strapgen.backends import BACKENDS
-    from strapgen.experiments.thesis_tables import ALGORITHMS, ORDERS, TABLES, build_all, run_tables
+    from strapgen.experiments.thesis_tables import (
+        ALGORITHMS,
+        DURATION,
+        ORDERS,
+        STEP,
+        TABLES,
+        build_all,
+        run_tables,
+    )
     from strapgen.reports import plots
-    from strapgen.reports.thesis_tables import thesis_tables_report
+    from strapgen.reports.thesis.tables import thesis_tables_report
     from strapgen.support import checks
 
     names = _runnable() if backend is None else tuple(backends("--backend", backend, ()))
@@ -61,10 +80,13 @@ def tables(
         raise InputError(f"--rounding and --carry are for fixed-point back ends, not for {', '.join(names)}")
     number = None if table is None else checks.count("table", whole("table", table), largest=len(TABLES))
     chosen = [each for each in TABLES if number in (None, each.number)]
+    interval = checks.number("orthonormalize", orthonormalize, positive=True)
+    checks.multiple("orthonormalize", interval, "step", STEP)
+    checks.multiple("duration", DURATION, "orthonormalize", interval)
     cases = len(names) * len(ALGORITHMS) * len(ORDERS)
     for _ in track(build_all(names, settings, chosen), "building", cases):
         pass
-    entries = list(track(run_tables(names, settings, chosen), "simulating", cases * len(chosen)))
+    entries = list(track(run_tables(names, settings, chosen, interval), "simulating", cases * len(chosen)))
     output.report(thesis_tables_report(entries), lambda path: plots.thesis_tables_image(entries, path))
 
 
@@ -74,7 +96,7 @@ def _predict(output: Output) -> None:
     from strapgen.experiments import predicted_tables
     from strapgen.experiments.thesis_tables import ALGORITHMS, ORDERS, TABLES
     from strapgen.reports import plots
-    from strapgen.reports.predicted_tables import predicted_report
+    from strapgen.reports.thesis.predicted import predicted_report
 
     cases = len(TABLES) * len(ALGORITHMS) * len(ORDERS)
     entries = list(track(predicted_tables.predicted(), "predicting", cases))

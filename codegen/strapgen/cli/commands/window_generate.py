@@ -38,13 +38,18 @@ def generate(
         option(
             "--sample-hz",
             metavar="HZ",
-            help="Samples of the gyro in a second: filters for a gyro need it, and --max-rate-deg-s does.",
+            help="Samples of the gyro in a second: filters for a gyro need it, --max-rate-deg-s and --lsb do.",
             panel="Algorithm",
         ),
     ] = None,
     fixed: Annotated[
         FixedOptions,
-        Shown(only=("word", "max_rate_deg_s", "max_angle_rad", "rounding", "carry", "drift_allowance")),
+        Shown(
+            only=(
+                *("word", "max_rate_deg_s", "max_angle_rad", "lsb", "lsb_rad"),
+                *("rounding", "carry", "drift_allowance"),
+            )
+        ),
     ],
     output: Annotated[SourceOptions, Shown(only=("out", "name", "check", "force"))],
     format: Format = "text",
@@ -59,7 +64,7 @@ def generate(
     check_format(format)
     from strapgen.library import commit_late_sources
 
-    rated = sample_hz if fixed.max_rate_deg_s is not None else None
+    rated = sample_hz if (fixed.max_rate_deg_s, fixed.lsb) != (None, None) else None
     settings = replace(fixed, sample_hz=rated).settings(1)
     with waiting("generating"):
         family = window_of(window)

@@ -153,7 +153,9 @@ def labels_at_the_right(axes: Any, labels: Iterable[tuple[float, str, Any]]) -> 
 _PLACES = [(x, y) for x in (-7, 7) for y in (-11, -2, -21, -31, -41, 5, 15, 25)]
 
 
-def labels_beside_points(axes: Any, points: Mapping[str, tuple[float, float]], colour: Any) -> None:
+def labels_beside_points(
+    axes: Any, points: Mapping[str, tuple[float, float]], colours: Mapping[str, Any]
+) -> None:
     """Write labels beside points, each where it covers no other label and leaves the axes as little as can be.
 
     Parameters
@@ -162,7 +164,8 @@ def labels_beside_points(axes: Any, points: Mapping[str, tuple[float, float]], c
         With their final place and limits.
     points : mapping of str to (float, float)
         Points in data by their labels.
-    colour : colour
+    colours : mapping of str to colour
+        Of the labels.
     """
     boxes: list[Any] = []
     frame = axes.get_window_extent()
@@ -176,7 +179,7 @@ def labels_beside_points(axes: Any, points: Mapping[str, tuple[float, float]], c
                 textcoords="offset points",
                 ha="left" if place[0] > 0 else "right",
                 fontsize=8,
-                color=colour,
+                color=colours[text],
             )
             box = label.get_window_extent()
             outside = max(0.0, box.x1 - frame.x1) + max(0.0, frame.x0 - box.x0)

@@ -16,14 +16,16 @@ _LEAST = 1e-9
 _COLUMNS = 2
 #: Space at the left of the points, for labels, and at their right, as factors.
 _LEFT, _RIGHT = 9.0, 1.5
-#: Gain from which an algorithm that costs more is on the frontier.
-_GAIN = 0.05
+#: Gain from which an algorithm that costs more is on the frontier: it has half the drift.
+_GAIN = 0.5
+#: Kinds of algorithms by how their names begin; all others are of the last kind.
+_KINDS = {"window": "windows", "coning": "coning coefficients", "": "fits of the rate, integrated"}
 
 
 def frontier_image(standings: Sequence[Standing], sample_hz: float, title: str, path: str | Path) -> bytes:
     """Return the drift over the multiplications a second: a panel a motion, a point an algorithm.
 
-    A line of steps joins the algorithms that drift less than all that cost less; only they have a label.
+    A line of steps joins the algorithms that halve the drift of all that cost less; only they have a label.
 
     Parameters
     ----------
@@ -58,7 +60,8 @@ def frontier_image(standings: Sequence[Standing], sample_hz: float, title: str, 
     grid[0, 0].set_xlim(min(rates) / _LEFT, max(rates) * _RIGHT)  # of all
     figure.draw_without_rendering()  # axes have their places
     for axes, names in labels:
-        figures.labels_beside_points(axes, names, figures.COLOURS[0])
+        figures.labels_beside_points(axes, names, {name: _colour(name) for name in names})
+    figures.common_legend(figure, [grid[0, 0]], loc="outside lower center", ncols=len(_KINDS))
     for axes in grid[:, 0]:
         axes.set_ylabel("drift, deg/h")
     figures.title(figure, title)
@@ -81,17 +84,25 @@ def _draw_panel(
     axes.margins(y=0.15)
     if not points:
         return {}
-    axes.plot(*zip(*points.values(), strict=True), "o", markersize=4, color="0.75", zorder=1)
     front = {name: points[name] for name in pareto(points, _GAIN)}
-    axes.plot(
-        *zip(*front.values(), strict=True),
-        "o-",
-        drawstyle="steps-post",
-        color=figures.COLOURS[0],
-        markersize=5,
-        linewidth=1,
-    )
+    axes.plot(*zip(*front.values(), strict=True), drawstyle="steps-post", color="0.55", linewidth=1, zorder=1)
+    for kind, colour in zip(_KINDS.values(), figures.COLOURS, strict=True):
+        axes.scatter([], [], s=30, color=colour, label=kind)
+        for name in (name for name in points if _kind(name) == kind):
+            best = name in front
+            look = {"s": 30 if best else 14, "alpha": 1.0 if best else 0.4}
+            axes.scatter(*points[name], color=colour, linewidths=0, zorder=2, **look)
     return front
+
+
+def _kind(name: str) -> str:
+    """Return the kind of an algorithm."""
+    return next(kind for start, kind in _KINDS.items() if name.startswith(start))
+
+
+def _colour(name: str) -> str:
+    """Return the colour of an algorithm."""
+    return figures.COLOURS[[*_KINDS.values()].index(_kind(name))]
 
 
 def _title(label: str) -> str:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from strapgen.experiments.thesis_tables import ALGORITHMS, ORDERS, TABLES, Table
 from strapgen.reports.plots import figures
-from strapgen.reports.thesis_tables import NAMES
+from strapgen.reports.thesis.tables import NAMES
 
 if TYPE_CHECKING:
     from strapgen.experiments.predicted_tables import PredictedEntry
@@ -96,7 +96,10 @@ def _image(entries: Sequence[_Figure], path: str | Path) -> bytes:
     for axes in list(grid.flat)[len(tables) :]:
         axes.set_visible(False)
     series = list(dict.fromkeys(entry.series for entry in entries))
-    figures.title(figure, "ratios of drifts, beside the thesis's figures")
+    figures.title(
+        figure,
+        "ratios of drifts, beside the thesis's figures; in brackets what its scan reads where they are repaired",
+    )
     figure.legend(
         *_legend(series), frameon=False, fontsize=9, loc="outside lower center", ncols=min(6, 1 + 2 * columns)
     )
@@ -125,12 +128,14 @@ def _draw_table(axes: Any, table: Table, entries: Sequence[_Figure]) -> None:
             axes.hlines(
                 float(Fraction(printed)), place - half, place + half, color="0.15", linewidth=1.6, zorder=1
             )
+            repair = table.repair(algorithm, order)
             axes.annotate(
-                printed,
+                printed if repair is None else f"{printed}\n[{repair.scan}]",
                 (place, float(Fraction(printed))),
-                xytext=(0, -12),
+                xytext=(0, -4),
                 textcoords="offset points",
                 ha="center",
+                va="top",
                 fontsize=8,
                 color="0.15",
                 bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.4, "alpha": 0.8},

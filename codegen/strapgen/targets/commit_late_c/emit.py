@@ -9,6 +9,7 @@ from typing import TypeVar
 
 from strapgen.catalogue.methods.late_filters import NEXT, SHORT, LateFilters
 from strapgen.catalogue.methods.lost_samples import REACH
+from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.sources import Function, Sources
 from strapgen.support.version import VERSION
 from strapgen.targets.c.emit import CPrinter, real_of
@@ -80,7 +81,7 @@ class LateCosts:
     def of(cls, filters: LateFilters, step: Sources, rotation: Sources, normalization: Sources) -> LateCosts:
         """Return the costs with filters and the generated functions."""
         window = filters.window
-        rows = len(_sums(filters))
+        rows = len(filters.sums)
         single = CallCost.of(step)
         other = rows * CallCost.of_sum(filters.samples) + CallCost.of(rotation)
         normal = CallCost.of(normalization)
@@ -127,7 +128,7 @@ def whole(
     """
     step, rotation, normalization = functions
     state, result = step.function.inputs[0], step.function.outputs[0]
-    rows = _sums(filters)
+    rows = filters.sums
     values = {
         "name": name,
         "title": title,
@@ -162,7 +163,7 @@ def whole(
 
 def _in_floating_point(filters: LateFilters, step: Sources) -> dict[str, object]:
     """Return what templates take of numbers in double or in float."""
-    real, rows = real_of(step.target), _sums(filters)
+    real, rows = real_of(step.target), filters.sums
     printer, size = CPrinter(real), step.function.inputs[0].size
     return {
         "fixed": None,
@@ -205,8 +206,8 @@ def _in_fixed_point(
         "bytes": state.format.word // 8 * (size + 3 * filters.capacity + len(feedback)) + 20,
         "counts": "five",
         "unit_text": f"format {state.format}, unit 2^-{state.format.fraction}",
-        "sample_text": f"format {samples.format}, unit 2^-{samples.format.fraction} rad; range -{fixed.limit} to "
-        f"{fixed.limit}, for a sum of two intervals twice that",
+        "sample_text": f"{_unit(samples)}; range -{fixed.limit} to {fixed.limit}, for a sum of two intervals twice "
+        "that",
         "identity": [str(one if number else 0) for number in _identity(size)],
         "sets": [[_text(row) for row in group] for group in fixed.sets],
         "shorts": [[_text(_padded(row, 0)) for row in group] for group in fixed.short],
@@ -215,12 +216,14 @@ def _in_fixed_point(
     }
 
 
+def _unit(samples: Argument) -> str:
+    """Return in words what the integers of samples are."""
+    if samples.sensor is not None:
+        return f"counts of the gyro, unit {samples.sensor.unit}"
+    return f"format {samples.format}, unit 2^-{samples.format.fraction} rad"
+
+
 _FILES = {"h": "header.h", "c": "source.c"}
-
-
-def _sums(filters: LateFilters) -> range:
-    """Return the Legendre coefficients that are sums of samples; of an ideal gyro the first one is a sample."""
-    return range(0 if filters.window.gyro else 1, filters.degree + 1)
 
 
 def _coefficients(rows: range) -> list[str]:

@@ -36,9 +36,9 @@ LEVEL = Signal(
     (2,),
     ("roll", "pitch"),
     unit="rad",
-    meaning="roll and pitch, body axes b",
+    meaning="roll and pitch of body axes b",
     bound=ANGLES.bound,
-    frame="b to n",
+    frame="b to g",
 )
 LEVEL_ANGLES = Signal(
     "level_angles",
@@ -102,6 +102,7 @@ def coarse_azimuth() -> Kernel:
             ANGLES,
             elements=elements,
             meaning="roll, pitch and heading of body axes b, from north, east, down",
+            frame="b to g",
         ),
         [*level, sp.atan2(-beta[1], beta[0])],
     )

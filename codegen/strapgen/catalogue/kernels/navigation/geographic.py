@@ -19,7 +19,7 @@ ATTITUDE = replace(
 )
 
 
-def geographic_from_position() -> Kernel:
+def geographic_angles() -> Kernel:
     """Return latitude, longitude and wander angle of a position.
 
     Columns z, x, y of C_n^e are a rotation whose heading is longitude, whose pitch is minus latitude and whose roll is
@@ -42,7 +42,7 @@ def geographic_from_position() -> Kernel:
     elements = tuple(f"next_{element}_angle" for element in GEOGRAPHIC.elements)
     build.output(replace(GEOGRAPHIC, name="next", elements=elements), [-dip, longitude, wander])
     return build.kernel(
-        "geographic-from-position",
+        "geographic-angles",
         "Latitude, longitude and wander angle of a position",
         DERIVED,
         recursion=Recursion((("previous", "next"),), kept=("previous",)),
@@ -67,7 +67,7 @@ def _wander(build: KernelBuilder) -> tuple[sp.Symbol, sp.Symbol]:
     return build.value("cos_wander", sp.cos(wander)), build.value("sin_wander", sp.sin(wander))
 
 
-def position_from_geographic() -> Kernel:
+def position_from_angles() -> Kernel:
     """Return the position of latitude, longitude and wander angle, with which a run begins.
 
     Returns
@@ -80,34 +80,40 @@ def position_from_geographic() -> Kernel:
     east, north = sp.Matrix([-so, co, 0]), sp.Matrix([-sl * co, -sl * so, cl])
     up = sp.Matrix([cl * co, cl * so, sl])
     build.output(POSITION, sp.Matrix.hstack(ca * east + sa * north, ca * north - sa * east, up))
-    return build.kernel(
-        "position-from-geographic", "Position of latitude, longitude and wander angle", DERIVED
-    )
+    return build.kernel("position-from-angles", "Position of latitude, longitude and wander angle", DERIVED)
 
 
-def north_east_down() -> Kernel:
+def north_east_down(inverse: bool = False) -> Kernel:
     """Return the attitude against north, east and down, of which `euler-angles-from-dcm` has roll, pitch and heading.
 
-    The matrix between n and these axes is its own inverse: the kernel also takes an attitude against north, east and
-    down to one against n.
+    Parameters
+    ----------
+    inverse : bool
+        Whether to return the attitude against axes n instead; the matrix between both is its own inverse.
 
     Returns
     -------
     Kernel
         Inputs ``state`` (3, 3), C_b^n, and ``geographic`` (3,) in rad; output ``attitude`` (3, 3), body to north, east
-        and down.
+        and down. For the inverse the input is ``attitude`` and the output ``state``.
     """
     build = KernelBuilder()
-    C = build.input(ATTITUDE)
+    words = "attitude, direction cosine matrix from body axes b to north, east and down"
+    other = replace(ATTITUDE, name="attitude", elements=_renamed("D"), meaning=words, frame="b to g")
+    before, result = (other, ATTITUDE) if inverse else (ATTITUDE, other)
+    C = build.input(before)
     cosine, sine = _wander(build)
     exchange = sp.Matrix([[sine, cosine, 0], [cosine, -sine, 0], [0, 0, -1]])
-    meaning = "attitude, direction cosine matrix from body axes b to north, east and down"
-    build.output(replace(ATTITUDE, name="attitude", elements=_renamed("D"), meaning=meaning), exchange * C)
-    return build.kernel("dcm-north-east-down", "Attitude against north, east and down", DERIVED)
+    build.output(result, exchange * C)
+    return build.kernel(
+        "dcm-navigation-axes" if inverse else "dcm-north-east-down",
+        f"Attitude against {'navigation axes' if inverse else 'north, east and down'}",
+        DERIVED,
+    )
 
 
 def ground_velocity() -> Kernel:
-    """Return the velocity to east, north and up.
+    """Return the velocity to north, east and down.
 
     Returns
     -------
@@ -120,12 +126,13 @@ def ground_velocity() -> Kernel:
     signal = Signal(
         "ground_velocity",
         (3,),
-        ("east_velocity", "north_velocity", "up_velocity"),
+        ("north_velocity", "east_velocity", "down_velocity"),
         unit="m/s",
-        meaning="velocity relative to the earth, axes to east, north and up",
+        meaning="velocity relative to the earth, axes to north, east and down",
+        frame="g",
     )
-    build.output(signal, [cosine * v[0] - sine * v[1], sine * v[0] + cosine * v[1], v[2]])
-    return build.kernel("ground-velocity", "Velocity to east, north and up", DERIVED)
+    build.output(signal, [sine * v[0] + cosine * v[1], cosine * v[0] - sine * v[1], -v[2]])
+    return build.kernel("ground-velocity", "Velocity to north, east and down", DERIVED)
 
 
 def _renamed(prefix: str) -> tuple[str, ...]:

@@ -115,7 +115,7 @@ def position_step() -> Kernel:
     build = KernelBuilder()
     position, before, rho = map(build.input, (POSITION, PREVIOUS_TRANSPORT_RATE, TRANSPORT_RATE))
     zeta = build.stage(
-        Signal.vector("zeta", "zeta", unit="rad", meaning="rotation of n over the earth, axes n"),
+        Signal.vector("zeta", "zeta", unit="rad", meaning="rotation of n over the earth, axes n", frame="n"),
         build.scalar(CYCLE) * midpoint(rho, before),
     )
     turned = build.stage(replace(DCM.transition, constraint="", frame="n to n"), DCM.exponential(zeta, 2))

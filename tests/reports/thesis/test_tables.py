@@ -7,7 +7,7 @@ import re
 import pytest
 
 from strapgen.experiments.thesis_tables import ALGORITHMS, ORDERS, TABLES, TableEntry
-from strapgen.reports.thesis_tables import thesis_table_text
+from strapgen.reports.thesis.tables import thesis_table_text
 
 TABLE = TABLES[0]
 
@@ -52,3 +52,14 @@ def test_a_note_stands_once_for_all_back_ends():
     text = thesis_table_text(TABLE, both)
     assert text.count("A repaired figure.") == len(ALGORITHMS) * len(ORDERS)
     assert "figure of d" not in text
+
+
+def test_a_repaired_figure_has_the_text_of_the_scan_below_it_and_the_reason():
+    lines = thesis_table_text(TABLE, entries("c")).splitlines()
+    (place,) = (k for k, line in enumerate(lines) if line.split()[:1] == ["scan"])
+    assert lines[place].split()[1:] == [".75e-?"]
+    assert lines[place - 1].split() == ["thesis", ".25", ".125", ".75e-6"]
+    assert lines[place].index(".75e-?") == lines[place - 1].index(".75e-6")
+    assert ".75e-6 is repaired, the scan reads .75e-?" in "\n".join(lines)
+    unrepaired = thesis_table_text(TABLES[2], [])
+    assert "scan" not in unrepaired

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 from strapgen.experiments.thesis_tables import ALGORITHMS, ORDERS, TABLES, Table, TableEntry
@@ -25,6 +26,8 @@ _WIDTH = 90
 def thesis_table_text(table: Table, entries: Sequence[TableEntry]) -> str:
     """Return one table as text: for each algorithm the thesis's line, then one for each back end.
 
+    Where the thesis's figures are repaired, a line below has what the scan reads.
+
     Parameters
     ----------
     table : Table
@@ -34,9 +37,11 @@ def thesis_table_text(table: Table, entries: Sequence[TableEntry]) -> str:
     backends = list(dict.fromkeys(entry.backend for entry in entries))
     label = Column(align="<", least=max([7, *map(len, backends)]))
     rows: list[list[Any]] = []
+    ends = [0]
     for algorithm in ALGORITHMS:
-        rows.append(_printed_row(table, algorithm))
+        rows += _printed_rows(table, algorithm)
         rows += [_row(entries, backend, algorithm) for backend in backends]
+        ends.append(len(rows))
     head, *lines = TextTable([label, *_FIGURES * len(ORDERS)], rows).lines("    ")
     # An order stands over the middle of its figures.
     orders = [Column(f"order {order}", least=18, gap=5 if k else 2) for k, order in enumerate(ORDERS)]
@@ -47,10 +52,9 @@ def thesis_table_text(table: Table, entries: Sequence[TableEntry]) -> str:
         *TextTable([label, *orders], []).lines("    "),
         head,
     ]
-    for k, algorithm in enumerate(ALGORITHMS):
-        first = k * (1 + len(backends))
-        text += [f"  {NAMES[algorithm]}", *lines[first : first + 1 + len(backends)]]
-    return "\n".join([*text, *_notes(entries)])
+    for algorithm, (first, stop) in zip(ALGORITHMS, pairwise(ends), strict=True):
+        text += [f"  {NAMES[algorithm]}", *lines[first:stop]]
+    return "\n".join([*text, *_notes(entries), *repair_notes(table)])
 
 
 def thesis_tables_report(entries: Sequence[TableEntry]) -> Report:
@@ -64,12 +68,20 @@ def thesis_tables_report(entries: Sequence[TableEntry]) -> Report:
     return Report(text, lambda: data, lambda: flat_table(data))
 
 
-def _printed_row(table: Table, algorithm: str) -> list[Any]:
-    """Return the figures that the thesis prints of an algorithm."""
-    row = ["thesis"]
+def repair_notes(table: Table) -> list[str]:
+    """Return what is repaired of a table of the thesis, as lines for a reader."""
+    sentences = (each.sentence for each in table.repairs)
+    return [f"  {line}" for sentence in sentences for line in textwrap.wrap(sentence, _WIDTH)]
+
+
+def _printed_rows(table: Table, algorithm: str) -> list[list[Any]]:
+    """Return the figures that the thesis prints of an algorithm, and what the scan reads where they are repaired."""
+    row, scan = ["thesis"], ["scan"]
     for order, figure in zip(ORDERS, table.printed[algorithm], strict=True):
         row += [table.base if (algorithm, order) == ("dcm", 1) else "", figure, ""]
-    return row
+        repair = table.repair(algorithm, order)
+        scan += ["", "" if repair is None else repair.scan, ""]
+    return [row, scan] if any(scan[1:]) else [row]
 
 
 def _row(entries: Sequence[TableEntry], backend: str, algorithm: str) -> list[Any]:

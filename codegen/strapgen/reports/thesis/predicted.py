@@ -10,6 +10,7 @@ from strapgen.experiments.thesis_tables import TABLES
 from strapgen.reports.error_analysis.ratios import claims_text
 from strapgen.reports.report import Report, flat_table
 from strapgen.reports.table import Column, TextTable
+from strapgen.reports.thesis.tables import repair_notes
 
 _COLUMNS = (
     Column("", "<", least=20),
@@ -20,6 +21,7 @@ _COLUMNS = (
     Column("off by", spec="+.2%", least=7),
     Column("thesis", least=8),
     Column("", "<", gap=1),
+    Column("scan", least=7, missing=""),
 )
 
 
@@ -35,6 +37,7 @@ def predicted_text(entries: Sequence[PredictedEntry]) -> str:
             f"Table {table.number}: {table.title}",
             f"  drift in deg, and its ratio to that of direction cosines {ratio}",
             *TextTable(_COLUMNS, rows).lines("  "),
+            *repair_notes(table),
             "",
         ]
     if not all(entry.agrees for entry in entries):
@@ -51,7 +54,7 @@ def predicted_report(entries: Sequence[PredictedEntry], claims: Sequence[Claim])
     )
 
 
-def _cells(entry: PredictedEntry) -> tuple[str | float, ...]:
+def _cells(entry: PredictedEntry) -> tuple[str | float | None, ...]:
     return (
         f"{entry.algorithm}, order {entry.order}",
         entry.drift_deg,
@@ -61,4 +64,5 @@ def _cells(entry: PredictedEntry) -> tuple[str | float, ...]:
         entry.deviation,
         entry.thesis,
         "" if entry.agrees else "*",
+        entry.scan,
     )

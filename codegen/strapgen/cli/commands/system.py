@@ -1,0 +1,190 @@
+"""The command ``strapgen system`` checks a described system, shows it, draws it and writes its code."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from strapgen.cli.fixed_options import FixedOptions
+from strapgen.cli.option_groups import Shown, grouped
+from strapgen.cli.options import option
+from strapgen.cli.output import Format, WithRuns, check_format, print_json
+from strapgen.cli.source_options import SourceOptions, refuse_out_of_step
+from strapgen.support import checks
+from strapgen.support.exceptions import InputError
+
+if TYPE_CHECKING:
+    from fractions import Fraction
+
+    from strapgen.ir.fixed_settings import Settings
+    from strapgen.systems.budget import Budget
+    from strapgen.systems.fitting import Fitted
+
+
+@grouped
+def system(
+    file: Annotated[
+        Path,
+        typer.Argument(metavar="FILE", help="TOML file with the stages and their wires.", show_default=False),
+    ],
+    *,
+    target: Annotated[
+        str,
+        option(
+            "--target",
+            metavar="NAME",
+            help="Kind of code: c, c-float, c-fixed, numpy or fixed-model.",
+            panel="System",
+        ),
+    ] = "c",
+    sample_hz: Annotated[
+        str | None,
+        option(
+            "--sample-hz",
+            metavar="HZ",
+            help="Cycles of the fastest rate in a second, in place of those in the file.",
+            panel="System",
+        ),
+    ] = None,
+    cpu: Annotated[
+        str | None,
+        option(
+            "--cpu",
+            metavar="NAME",
+            help="Count the instructions of every stage on this processor, as strapgen cost does; cortex-m3 is one.",
+            panel="System",
+        ),
+    ] = None,
+    fixed: Annotated[FixedOptions, Shown(only=("word", "rounding", "carry", "drift_allowance"))],
+    out: Annotated[
+        Path | None,
+        option("--out", metavar="FOLDER", help="Folder for the files.  [default: no files]", panel="Output"),
+    ] = None,
+    with_runs: WithRuns = False,
+    output: Annotated[SourceOptions, Shown(only=("check", "force"))],
+    draw: Annotated[
+        Path | None,
+        option("--draw", metavar="FILE", help="SVG file for a drawing of the wiring.", panel="Output"),
+    ] = None,
+    format: Format = "text",
+) -> None:
+    """Check a described system, show what it needs, and generate its code.
+
+    Without --out you get a summary: rates, values with their units, frames, formats and error bounds, and the budget.
+
+    Example: strapgen system examples/strapdown.toml --target c-fixed --word 16 --out firmware
+
+    Example: strapgen system examples/strapdown.toml --draw out/strapdown.svg
+    """
+    check_format(format)
+    _check_options(file, out, draw, with_runs, output)
+    fit, needs, command = _fitted(file, target, sample_hz, cpu, fixed)
+    if with_runs and not _compiled(target):
+        raise InputError(
+            f"--with-runs goes with targets in C, not with {target}; its module runs many cycles"
+        )
+    from strapgen.reports.systems.summary import bound_lines, system_data, system_report
+    from strapgen.support.files import write_files
+    from strapgen.systems import budget, generation
+    from strapgen.systems.bounds import bounds
+
+    errors = bounds(fit)
+    sources = generation.unit(fit, command, [*bound_lines(fit, errors), *budget.lines(needs)])
+    files = sources.files if with_runs else sources.step_files
+    place = SourceOptions(out=out, check=output.check, force=output.force)
+    if output.check:
+        _compare(place, files, format)
+        return
+    written = place.write(files) if out is not None else []
+    if draw is not None:
+        from strapgen.reports.systems.drawing import drawing
+
+        written += write_files(draw.parent, {draw.name: drawing(fit)})
+    if format == "json":
+        print_json({**system_data(fit, needs, errors), "files": [str(path) for path in written]})
+        return
+    typer.echo(f"{sources.kernel} for {target}" if written else system_report(fit, needs, errors).text())
+    for path in written:
+        typer.echo(f"  {path}")
+
+
+def _check_options(
+    file: Path, out: Path | None, draw: Path | None, with_runs: bool, output: SourceOptions
+) -> None:
+    """Refuse options that do not go together, and a drawing that is no SVG or the file itself."""
+    checks.text("FILE", str(file))
+    stated = {"--with-runs": with_runs, "--check": output.check, "--force": output.force}
+    for name, is_stated in stated.items():
+        if is_stated and out is None:
+            raise InputError(f"{name} goes with --out, the folder of the files")
+    if draw is None:
+        return
+    if draw.suffix.lower() != ".svg":
+        raise InputError(f"--draw {draw} is no SVG file; a name that ends with .svg is needed")
+    if output.check:
+        raise InputError("--check writes nothing; --draw does not go with it")
+
+
+def _compiled(target: str) -> bool:
+    from strapgen.targets import TARGETS
+
+    return TARGETS[target].compiled
+
+
+def _fitted(
+    file: Path, target: str, sample_hz: str | None, cpu: str | None, fixed: FixedOptions
+) -> tuple[Fitted, Budget, str]:
+    """Return the generated stages, what they need, and the command that makes the files again."""
+    from strapgen.experiments.cost import processors
+    from strapgen.experiments.systems import cost as system_cost
+    from strapgen.ir.fixed_settings import Settings
+    from strapgen.systems.budget import budget
+    from strapgen.systems.fitting import fitted
+    from strapgen.systems.wiring import read_system
+    from strapgen.targets import BUILT_IN, fixed_targets
+
+    checks.choice("target", target, BUILT_IN)
+    settings = fixed.settings(1)
+    if BUILT_IN[target].fixed:
+        settings = settings or Settings()
+    elif settings is not None:
+        raise InputError(
+            f"the options of fixed point go with --target {' or '.join(fixed_targets())}, not with {target}"
+        )
+    if cpu is not None:
+        if not BUILT_IN[target].compiled:
+            raise InputError(f"--cpu goes with targets in C, not with {target}")
+        processors(None, [cpu])  # known before the stages are generated
+    rate = None if sample_hz is None else checks.number("--sample-hz", sample_hz, positive=True)
+    fit = fitted(read_system(file, rate), target, settings)
+    needs = budget(fit) if cpu is None else system_cost.measured_budget(fit, cpu)
+    return fit, needs, _command(file, target, rate, cpu, settings)
+
+
+def _command(
+    file: Path, target: str, rate: Fraction | None, cpu: str | None, settings: Settings | None
+) -> str:
+    """Return the command line that makes the files again, without those of --with-runs."""
+    from strapgen.targets.contract import options
+
+    words = [f"strapgen system {shlex.quote(file.as_posix())} --target {target}"]
+    words += [] if rate is None else [f"--sample-hz {rate}"]
+    words += [] if cpu is None else [f"--cpu {cpu}"]
+    words += [] if settings is None else [options(settings)]
+    return " ".join(words)
+
+
+def _compare(place: SourceOptions, files: dict[str, str], format: str) -> None:
+    """Print how the files in the folder differ from the generated ones, and exit with 1 if they do."""
+    difference = place.compare(files)
+    if format == "json":
+        print_json({"in_step": not difference, "difference": difference})
+    elif difference:
+        typer.echo(difference, nl=False)
+    if difference:
+        refuse_out_of_step(place.out or Path(), "the same command without --check writes the files again")
+    if format == "text":
+        typer.echo(f"{place.out}: {len(files)} files, in step")

@@ -1,0 +1,1 @@
+"""What a described system consists of, as text, as JSON and as a drawing."""

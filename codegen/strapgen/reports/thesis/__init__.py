@@ -1,0 +1,1 @@
+"""Reports what is computed again of the thesis: its tables, and the statements of its text."""

@@ -1,0 +1,1 @@
+"""The target that prints the Python twin of the C of a described system."""
