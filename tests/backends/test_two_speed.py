@@ -18,8 +18,8 @@ from strapgen.backends.loops import LoopsFromPython, LoopSources
 from strapgen.backends.registry import evaluator_class
 from strapgen.backends.two_speed import TwoSpeed
 from strapgen.ir.fixed_settings import Settings
-from strapgen.library.two_speed_sources import ALGORITHMS, SCULLING, loops, sources
 from strapgen.support.exceptions import InputError, InputTypeError
+from strapgen.systems.two_speed_sources import ALGORITHMS, SCULLING, loops, sources
 from strapgen.toolchain import compiler
 
 FORMS = [(a, s) for a in ALGORITHMS for s in SCULLING]
@@ -171,7 +171,9 @@ def test_the_whole_is_its_loops_bit_for_bit(backend, carry, rng):
     angles, velocities, turns = noisy(48, rng)
     whole = runner.run(angles, velocities, fast_cycles=4, slow_cycles=3, turns=turns)
     single = pickle.loads(pickle.dumps(runner))
-    single._runner = LoopsFromPython(LoopSources(runner.loops), evaluator_class(runner.loops[0].target))
+    single._runner = LoopsFromPython(
+        LoopSources(runner.loops, runner._runner.sources.system), evaluator_class(runner.loops[0].target)
+    )
     parts = single.run(angles, velocities, fast_cycles=4, slow_cycles=3, turns=turns)
     for one, other in zip(whole, parts, strict=True):
         np.testing.assert_array_equal(one, other)

@@ -122,6 +122,14 @@ def test_a_spectrum_shapes_the_filters(run, tmp_path):
         ("--ahead 2 --band 1", "--previous is needed, a number of samples"),
         ("--previous 2 --band 1", "--ahead is needed, a number of samples"),
         (
+            "--samples 2 --previous 2 --ahead 2 --band 1",
+            "rotation is 'fourth'; steps of 2 samples take the exact one",
+        ),
+        (
+            "--samples 20 --previous 20 --ahead 2 --band 1",
+            "--previous 20 and --ahead 2 with --samples 20 make 42 samples; at most 41 are allowed",
+        ),
+        (
             "--previous 2 --ahead 2",
             "a band is needed, as --band in rad a sample, or as --band-hz with --sample-hz",
         ),

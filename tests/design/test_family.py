@@ -8,11 +8,13 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+import strapgen
 from strapgen.catalogue.methods import windows
 from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.design import family_file, spectra
 from strapgen.design.band_grid import BITS, ONE
 from strapgen.design.family import FamilyBrief, design
+from strapgen.simulation.drift import drift
 from strapgen.support.exceptions import InputError
 from strapgen.vibration.spectrum import Spectrum
 
@@ -28,6 +30,8 @@ BRIEFS = {
     "more ahead": replace(SMALL, previous=0, ahead=3),
     "none ahead": replace(SMALL, previous=3, ahead=0),
     "exact": replace(SMALL, rotation="exact", terms=20, title="Exact 7"),
+    "two samples": replace(SMALL, increments=2, rotation="exact"),
+    "three samples, more before": replace(SMALL, previous=3, ahead=1, increments=3, rotation="exact"),
     "gyro": pytest.param(
         replace(SMALL, gyro=GYRO, noise=Fraction(1, 10**6)),
     ),
@@ -93,6 +97,42 @@ def test_a_spectrum_without_rate_is_refused(spectrum, message):
 def test_numbers_of_a_file_are_exact():
     for value in (Fraction(1, 3), Fraction(13, 10), Fraction(-1, 2**13), Fraction(10**14), Fraction(0)):
         assert Fraction(family_file.number(value)) == value
+
+
+def test_a_single_sample_is_a_window_too():
+    window = design(FamilyBrief(0, 0, Fraction(1), conditions=1, degree=2))
+    assert window.filters[:2] == ((1,), (0,)) and not window.one_sided + window.start
+
+
+def test_several_samples_take_the_exact_rotation():
+    with pytest.raises(InputError, match=r"^rotation is 'fourth'; steps of 2 samples take the exact one$"):
+        replace(SMALL, increments=2)
+
+
+@pytest.mark.long
+def test_a_step_of_two_samples_integrates_what_is_in_its_band():
+    # 1+7+7 has 6.5e-6 deg/h there, and a polynomial through 3+3 samples 0.4.
+    brief = FamilyBrief(7, 7, Fraction(13, 10), increments=2, rotation="exact", terms=12)
+    window = replace(design(brief), file="designed here")
+    assert window.parity
+    cone = strapgen.motion("cone", half_angle_deg=1, frequency_hz=10)
+    run = strapgen.simulate(strapgen.backend("euler", window, backend="c"), cone, Fraction(1, 50), 60)
+    assert drift(run) < 1e-6
+
+
+def test_a_symmetric_window_of_two_samples_is_its_filters():
+    # A tap that is off by 1e-30 takes the symmetry away, and with it the sums and differences of samples.
+    brief = replace(SMALL, increments=2, rotation="exact", terms=4)
+    window = replace(design(brief), file="designed here")
+    first, *others = window.filters
+    uneven = replace(
+        window, filters=(first, (others[0][0] + Fraction(1, 10**30), *others[0][1:]), *others[1:])
+    )
+    assert window.parity and not uneven.parity
+    samples = strapgen.motion("random", rate_deg_s=200).samples(Fraction(1, 100), 0, window.samples)
+    steps = [strapgen.backend("euler", one) for one in (window, uneven)]
+    ends = [step.step(step.identity, samples) for step in steps]
+    np.testing.assert_allclose(*ends, rtol=0, atol=1e-15)
 
 
 def test_titles_say_what_the_filters_are_for():

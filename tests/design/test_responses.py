@@ -25,15 +25,26 @@ def error(window, m, b):
     if window.gyro is not None:
         x = 1j * b * float(window.gyro.sample_hz) / (2 * np.pi * float(window.gyro.bandwidth_hz))
         gyro = 1 / (1 + 2 * float(window.gyro.damping) * x + x**2)
+    N = window.increments
     A = (gyro * np.sinc(b / 2 / np.pi))[:, None] * np.exp(1j * b[:, None] * (j + 0.5))
-    C = (2 * m + 1) * 1j**m * spherical_jn(m, b / 2) * np.exp(0.5j * b)
+    C = N * (2 * m + 1) * 1j**m * spherical_jn(m, b * N / 2) * np.exp(0.5j * b * N)
     return np.abs(A @ np.array([float(tap) for tap in window.filters[m]]) - C)
 
 
+#: Filters are evaluated whatever they are good for: those of one sample in steps of several.
+WINDOWS_OF_SIX = [
+    WINDOWS["window-3-3"],
+    WINDOWS["window-5-1"],
+    WINDOWS["window-0-6"],
+    replace(WINDOWS["window-5-1"], previous=4, increments=2),
+    replace(WINDOWS["window-3-3"], previous=2, ahead=2, increments=3),
+]
+
+
 @pytest.mark.parametrize("gyro", [None, GYRO], ids=["ideal", "gyro"])
-@pytest.mark.parametrize("name", ["window-3-3", "window-5-1", "window-0-6"])
-def test_errors_and_levels_are_those_of_the_definitions(name, gyro):
-    window = replace(WINDOWS[name], gyro=gyro)
+@pytest.mark.parametrize("window", WINDOWS_OF_SIX, ids=lambda one: f"{one.name}-{one.increments}")
+def test_errors_and_levels_are_those_of_the_definitions(window, gyro):
+    window = replace(window, gyro=gyro)
     b = np.linspace(1e-3, np.pi, 50)
     fine = np.linspace(1e-4, 1.3, 40001)
     for m in range(5):
@@ -41,6 +52,15 @@ def test_errors_and_levels_are_those_of_the_definitions(name, gyro):
         np.testing.assert_allclose(responses.errors(window, m, b.tolist()), error(window, m, b), atol=1e-14)
         # A parabola through three of 1200 frequencies leaves 1e-8 of the largest error.
         assert responses.level(window, m) == pytest.approx(error(window, m, fine).max(), rel=1e-7, abs=1e-14)
+
+
+@pytest.mark.parametrize("increments", [1, 2, 5, 20])
+def test_what_is_to_be_reached_is_the_spherical_bessel_function(increments):
+    b = [0.01, 1.0, 2.0, 3.0]
+    grid = BandGrid([REAL.mpf(each) for each in b], 1, increments=increments)
+    for m in range(9):
+        expected = (-1) ** (m // 2) * increments * (2 * m + 1) * spherical_jn(m, np.array(b) * increments / 2)
+        np.testing.assert_allclose([v / ONE for v in grid.bessel(m)], expected, rtol=1e-9, atol=1e-14)
 
 
 def test_the_noise_gain_is_the_spread_of_a_coefficient():

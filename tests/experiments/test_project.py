@@ -14,8 +14,9 @@ from strapgen.catalogue import choose
 from strapgen.experiments import project, two_speed_project
 from strapgen.experiments.vectors import vectors_of_choice
 from strapgen.ir.fixed_settings import Settings
-from strapgen.library import generated_sources, two_speed_sources
+from strapgen.library import generated_sources
 from strapgen.support.exceptions import InputError
+from strapgen.systems import two_speed_sources
 from strapgen.targets.vectors_c.emit import file_names, table_files
 
 SETTINGS = Settings.of(word=32, max_rate_deg_s=400, step="0.01", increments=2, carry="full")

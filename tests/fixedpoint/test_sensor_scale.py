@@ -19,8 +19,8 @@ from strapgen.fixedpoint.sensor_scale import _note, in_counts
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.program import Assignment, Reference
 from strapgen.ir.sensor import Sensor
-from strapgen.library import two_speed_sources
 from strapgen.support.exceptions import InputError
+from strapgen.systems import two_speed_sources
 
 EULER, DCM, HEUN = Choice("euler", "rk4", 2), Choice("dcm", "rk4", 2), Choice("euler", "rk2", 1)
 #: A gyro of 16 bits at 100 Hz whose whole range is used, and the same up to 400 deg/s.

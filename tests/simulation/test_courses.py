@@ -13,13 +13,13 @@ import pytest
 
 from strapgen import evaluator
 from strapgen.ir.fixed_settings import Settings
-from strapgen.library.two_speed_sources import ALGORITHMS
 from strapgen.reports import runs
 from strapgen.simulation.courses import NavigationFrame, course
 from strapgen.simulation.motions import motion
 from strapgen.simulation.recording import InertialRecording, read_inertial
 from strapgen.simulation.runs import drift_between
 from strapgen.support.exceptions import InputError
+from strapgen.systems.two_speed_sources import ALGORITHMS
 
 LOG = Path(__file__).resolve().parents[2] / "examples" / "inertial_log.csv"
 GRAVITY = 9.80665

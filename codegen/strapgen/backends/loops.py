@@ -17,9 +17,10 @@ from strapgen.catalogue import Choice
 from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
-from strapgen.library import two_speed_sources
+from strapgen.ir.system import DescribedSystem
+from strapgen.systems import two_speed_sources
 from strapgen.targets import BUILT_IN
-from strapgen.targets.two_speed_c.emit import LOOPS, recursion, wiring
+from strapgen.targets.two_speed_c.emit import LOOPS, wiring
 
 #: From this word length on, a word resolves what a double does, and the gyro need not count pulses.
 _EXACT_BITS = 53
@@ -33,11 +34,14 @@ class LoopSources:
     ----------
     loops : tuple of Sources
         The fast, the slow and the navigation loop.
+    system : DescribedSystem
+        How they are wired, and what is reset.
     whole : Sources or None
         C of all loops in one function; None where the loops are called from Python.
     """
 
     loops: tuple[Sources, ...]
+    system: DescribedSystem
     whole: Sources | None = None
 
 
@@ -81,7 +85,7 @@ class Loops(ABC):
     def __init__(self, sources: LoopSources, evaluator: Callable[[Sources], Evaluator]) -> None:
         self.sources = sources
         self.evaluator = evaluator
-        self.wires = wiring(sources.loops)
+        self.wires = wiring(sources.system, sources.loops)
         self._arguments: dict[str, tuple[Argument, str]] = {}
         for loop in sources.loops:
             if loop.fixed is not None:
@@ -90,11 +94,12 @@ class Loops(ABC):
 
     @classmethod
     def generated(cls, algorithm: str, sculling: int, target: str, settings: Settings | None) -> LoopSources:
-        """Return the sources that the class runs; parameters are those of `library.two_speed_sources.loops`."""
+        """Return the sources that the class runs; parameters are those of `systems.two_speed_sources.loops`."""
+        system = two_speed_sources.description(algorithm, sculling).system
         if target in BUILT_IN and BUILT_IN[target].fixed:
-            return LoopSources(two_speed_sources.loops(algorithm, sculling, target, settings))
+            return LoopSources(two_speed_sources.loops(algorithm, sculling, target, settings), system)
         names = two_speed_sources.kernels(algorithm, sculling)
-        return LoopSources(tuple(sources_of_choice(Choice(name), target) for name in names))
+        return LoopSources(tuple(sources_of_choice(Choice(name), target) for name in names), system)
 
     def converted(self, name: str, values: Array, *, summed: bool = False) -> Array:
         """Return samples as the loops take them.
@@ -160,7 +165,6 @@ class LoopsFromPython(Loops):
         zero = self._zero(cycles)
         memory = zero | dict(cycles.start)
         feedback = [evaluator.fresh(1) for evaluator in self.evaluators]
-        next_inputs = [recursion(loop).inputs for loop in loops]
 
         def call(loop: int, place: int) -> dict[str, Array]:
             """Call a loop on the samples of one cycle; update the memory, and return the other outputs."""
@@ -171,7 +175,7 @@ class LoopsFromPython(Loops):
             ]
             outputs, feedback[loop] = evaluator.run(rows, feedback[loop])
             named = dict(zip((s.name for s in evaluator.function.outputs), outputs, strict=True))
-            inputs = next_inputs[loop]
+            inputs = self.wires.updates[loop]
             memory.update({inputs[name]: value for name, value in named.items() if name in inputs})
             return {name: value for name, value in named.items() if name not in inputs}
 
@@ -181,13 +185,13 @@ class LoopsFromPython(Loops):
             if sums is not None:
                 memory.update({name: values[cycle : cycle + 1] for name, values in sums.items()})
             else:
-                memory.update({name: zero[name] for name in recursion(loops[fast]).begun_anew})
+                memory.update({name: zero[name] for name in self.wires.cleared[slow]})
                 for k in range(cycles.fast):
                     call(fast, cycle * cycles.fast + k)
             call(slow, cycle)
             if (cycle + 1) % cycles.slow == 0:
                 changes.append(call(navigation, 0)["velocity_change"])
-                memory.update({name: zero[name] for name in recursion(loops[slow]).begun_anew})
+                memory.update({name: zero[name] for name in self.wires.cleared[navigation]})
             attitudes.append(memory["state"])
         return np.concatenate(attitudes), np.concatenate(changes)
 
@@ -201,12 +205,12 @@ class LoopsFromPython(Loops):
 
         In floating point the sums begin at zero in every slow cycle, so that all slow cycles run side by side.
         """
-        evaluator, loop = self.evaluators[0], recursion(self.sources.loops[0])
+        evaluator, updates, cleared = self.evaluators[0], self.wires.updates[0], self.wires.cleared[1]
         last = cycles.samples["increment"][cycles.fast - 1 :: cycles.fast]
         memory = {
             name: np.repeat(zero, len(last), axis=0)
             for name, zero in self._zero(cycles).items()
-            if name in loop.begun_anew
+            if name in cleared
         }
         memory["previous_increment"] = np.concatenate([cycles.start["previous_increment"], last[:-1]])
         for k in range(cycles.fast):
@@ -216,5 +220,5 @@ class LoopsFromPython(Loops):
             ]
             outputs, _ = evaluator.run(rows, evaluator.fresh(len(last)))
             named = zip((s.name for s in evaluator.function.outputs), outputs, strict=True)
-            memory = {loop.inputs[name]: value for name, value in named}
+            memory = {updates[name]: value for name, value in named}
         return memory

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,8 @@ from strapgen.backends.evaluators import Array, Evaluator
 from strapgen.backends.loops import Cycles, Loops, LoopsFromPython, LoopSources
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
-from strapgen.library import two_speed_sources
 from strapgen.support.exceptions import InputTypeError
+from strapgen.systems import two_speed_sources
 from strapgen.toolchain import compiler
 
 
@@ -38,8 +39,8 @@ class LoopsInC(Loops):
     @classmethod
     def generated(cls, algorithm: str, sculling: int, target: str, settings: Settings | None) -> LoopSources:
         """Return the loops and the C of the whole, see `Loops.generated`."""
-        loops = super().generated(algorithm, sculling, target, settings).loops
-        return LoopSources(loops, two_speed_sources.sources(algorithm, sculling, target, settings))
+        parts = super().generated(algorithm, sculling, target, settings)
+        return replace(parts, whole=two_speed_sources.sources(algorithm, sculling, target, settings))
 
     def run(self, cycles: Cycles) -> tuple[Array, Array]:
         """Run whole navigation cycles in C, see `Loops.run`."""

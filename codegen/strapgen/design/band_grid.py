@@ -1,9 +1,9 @@
 """Frequencies of a band, with what the samples of a window answer there, in integers of `BITS` binary digits.
 
 A filter F of the Legendre coefficient m has, at the angular frequency b in rad a sample and up to a factor of
-modulus 1, the error  h(b) sum_j F_j e^{ibj} - i^m (2m + 1) j_m(b/2),  h = G(b) sin(b/2)/(b/2),  for each unit of rate
-times the sampling interval; j_m is the spherical Bessel function, G the response of the gyro. The integers make a
-design the same on every machine.
+modulus 1, the error  h(b) sum_j F_j e^{ibj} - i^m N (2m + 1) j_m(b N/2),  h = G(b) sin(b/2)/(b/2),  for each unit of
+rate times the sampling interval; samples count from the middle of the step of N, j_m is the spherical Bessel function,
+G the response of the gyro. The integers make a design the same on every machine.
 """
 
 from __future__ import annotations
@@ -51,9 +51,11 @@ class BandGrid:
     points : sequence of mpf
         b in rad a sample.
     reach : int
-        Samples are j = -reach to reach, 0 that of the step.
+        Distances from the middle of the step go up to this number of samples, and half of one more for even N.
     gyro : GyroResponse, optional
         By default the response is 1.
+    increments : int, optional
+        N, samples of the step.
 
     Examples
     --------
@@ -62,24 +64,35 @@ class BandGrid:
     (-0.416147, 0.909297, 0.958851)
     """
 
-    def __init__(self, points: Sequence[Any], reach: int, gyro: GyroResponse | None = None) -> None:
-        self.points = points
-        #: cos(jb) and sin(jb) for j from 0 to the reach, by frequency.
+    def __init__(
+        self, points: Sequence[Any], reach: int, gyro: GyroResponse | None = None, increments: int = 1
+    ) -> None:
+        self.points, self._increments = points, increments
+        #: cos(jb) and sin(jb) for j from 0 to the reach, by frequency; from 1/2 on for even N.
         self.cosines: list[list[int]] = []
         self.sines: list[list[int]] = []
+        #: cos(jb) for whole j.
+        self.lags: list[list[int]] = []
         for b in points:
             cosine, sine = map(integer, REAL.cos_sin(b))
-            self.cosines.append(_recurrence(ONE, cosine, cosine, reach))
-            self.sines.append(_recurrence(0, sine, cosine, reach))
+            self.lags.append(_recurrence(ONE, cosine, cosine, reach))
+            if increments % 2:
+                self.cosines.append(self.lags[-1])
+                self.sines.append(_recurrence(0, sine, cosine, reach))
+            else:
+                first, second = (tuple(map(integer, REAL.cos_sin(b * k / 2))) for k in (1, 3))
+                self.cosines.append(_recurrence(first[0], second[0], cosine, reach))
+                self.sines.append(_recurrence(first[1], second[1], cosine, reach))
         #: h as real and imaginary part, by frequency.
         self.gains = [_gain(b, gyro) for b in points]
         self._bessel: dict[int, list[int]] = {}
 
     def bessel(self, m: int) -> list[int]:
-        """Return (2m + 1) j_m(b/2) with the sign of i^m, or of i^(m-1) for odd m, by frequency."""
+        """Return N (2m + 1) j_m(b N/2) with the sign of i^m, or of i^(m-1) for odd m, by frequency."""
         if m not in self._bessel:
-            sign = (-1) ** (m // 2) * (2 * m + 1)
-            self._bessel[m] = [sign * _bessel_integer(m, integer(b) // 2) for b in self.points]
+            number = self._increments
+            factor = (-1) ** (m // 2) * (2 * m + 1) * number
+            self._bessel[m] = [factor * _bessel_integer(m, integer(b) * number // 2) for b in self.points]
         return self._bessel[m]
 
     def squares(self) -> list[int]:
@@ -99,7 +112,7 @@ class BandGrid:
             Samples before the step.
         """
         result = []
-        even, odd = _folded(taps, previous)
+        even, odd = _folded(taps, 2 * previous + self._increments - 1)
         for cosines, sines, (x, y), right in zip(
             self.cosines, self.sines, self.gains, self.bessel(m), strict=True
         ):
@@ -110,15 +123,34 @@ class BandGrid:
         return result
 
 
-def _folded(taps: Sequence[int], previous: int) -> tuple[list[int], list[int]]:
-    """Return the weights of cos(jb) and of sin(jb), j from 0, in a sum over samples on both sides."""
-    reach = max(previous, len(taps) - 1 - previous)
+def _folded(taps: Sequence[int], twice_middle: int) -> tuple[list[int], list[int]]:
+    """Return the weights of cos(jb) and of sin(jb), j from 0 or 1/2, in a sum over samples on both sides."""
+    reach = max(twice_middle, 2 * len(taps) - 2 - twice_middle) // 2
     even, odd = [0] * (reach + 1), [0] * (reach + 1)
     for place, tap in enumerate(taps):
-        j = place - previous
-        even[abs(j)] += tap
-        odd[abs(j)] += tap if j > 0 else -tap
+        number, after = distance(place, twice_middle)
+        even[number] += tap
+        odd[number] += tap if after else -tap
     return even, odd
+
+
+def distance(place: int, twice_middle: int) -> tuple[int, bool]:
+    """Return the number of a sample by its distance from the middle of the step, and whether it is after that.
+
+    Parameters
+    ----------
+    place : int
+        Of the sample in a window.
+    twice_middle : int
+        Twice the place of the middle of the step.
+
+    Examples
+    --------
+    >>> [distance(place, 4)[0] for place in range(5)], [distance(place, 3)[0] for place in range(4)]
+    ([2, 1, 0, 1, 2], [1, 0, 0, 1])
+    """
+    twice = 2 * place - twice_middle
+    return abs(twice) // 2, twice > 0
 
 
 def _recurrence(first: int, second: int, cosine: int, reach: int) -> list[int]:
@@ -141,9 +173,13 @@ def _gain(b: Any, gyro: GyroResponse | None) -> tuple[int, int]:
     return integer(response.real), integer(response.imag)
 
 
+#: Largest argument of a Bessel function whose power series keeps its digits; a step of one sample has no larger one.
+_SMALL = 2 * ONE
+
+
 @lru_cache
 def _series(m: int) -> tuple[Any, ...]:
-    """Return the coefficients of (b/2)^(m + 2k) in j_m(b/2)."""
+    """Return the coefficients of x^(m + 2k) in j_m(x)."""
     coefficients = []
     k = 0
     while True:
@@ -163,6 +199,9 @@ def _series_integers(m: int) -> tuple[int, ...]:
 
 def _bessel_integer(m: int, x: int) -> int:
     """Return j_m(x), in integers."""
+    if x > _SMALL:
+        argument = real(x)
+        return integer(REAL.sqrt(REAL.pi / (2 * argument)) * REAL.besselj(REAL.mpf(2 * m + 1) / 2, argument))
     square, value = x * x >> BITS, 0
     for c in reversed(_series_integers(m)):
         value = (value * square >> BITS) + c
@@ -190,14 +229,14 @@ def search_points(band: Fraction, count: int = SEARCH_POINTS) -> list[Any]:
 
 
 @lru_cache(maxsize=8)
-def mean_grid(band: Fraction, reach: int, gyro: GyroResponse | None) -> BandGrid:
+def mean_grid(band: Fraction, reach: int, gyro: GyroResponse | None, increments: int = 1) -> BandGrid:
     """Return the grid of a mean over a band."""
-    return BandGrid(mean_points(band), reach, gyro)
+    return BandGrid(mean_points(band), reach, gyro, increments)
 
 
 @lru_cache(maxsize=8)
 def search_grid(
-    band: Fraction, reach: int, gyro: GyroResponse | None, count: int = SEARCH_POINTS
+    band: Fraction, reach: int, gyro: GyroResponse | None, count: int = SEARCH_POINTS, increments: int = 1
 ) -> BandGrid:
     """Return the grid of a search for a largest error over a band."""
-    return BandGrid(search_points(band, count), reach, gyro)
+    return BandGrid(search_points(band, count), reach, gyro, increments)

@@ -13,6 +13,7 @@ from strapgen.catalogue.methods.windows import one_sided_sizes, start_sizes, sto
 from strapgen.design import lawson, mean_square, minimax
 from strapgen.design.rounding import rounded
 from strapgen.design.unknowns import Shape, Unknowns
+from strapgen.support.exceptions import InputError
 
 #: Default of the noise for which one-sided filters are designed.
 ONE_SIDED_NOISE = Fraction(3, 10000)
@@ -20,7 +21,7 @@ ONE_SIDED_NOISE = Fraction(3, 10000)
 
 @dataclass(frozen=True)
 class FamilyBrief:
-    """What a family of filters is to do, for steps of one sample.
+    """What a family of filters is to do.
 
     Parameters
     ----------
@@ -44,6 +45,13 @@ class FamilyBrief:
         As in `Window`.
     title : str, optional
         By default it says the samples and the band.
+    increments : int, optional
+        Samples of a step (N); several take the exact rotation.
+
+    Raises
+    ------
+    InputError
+        If the rotation of a step of several samples is not exact.
     """
 
     previous: int
@@ -59,6 +67,14 @@ class FamilyBrief:
     terms: int = 16
     title: str = ""
     start_noise: Fraction = Fraction(0)
+    increments: int = 1
+
+    def __post_init__(self) -> None:
+        """Refuse a rotation that is not good enough for steps of several samples."""
+        if self.increments > 1 and self.rotation != "exact":
+            raise InputError(
+                f"rotation is {self.rotation!r}; steps of {self.increments} samples take the exact one"
+            )
 
     @property
     def objective(self) -> str:
@@ -73,7 +89,7 @@ class FamilyBrief:
     @property
     def full_title(self) -> str:
         """The title, by default from the samples, the band, the gyro and the noise."""
-        parts = [f"Window 1+{self.previous}+{self.ahead} to {float(self.band):g} rad"]
+        parts = [f"Window {self.increments}+{self.previous}+{self.ahead} to {float(self.band):g} rad"]
         if self.gyro is not None:
             parts.append(f"gyro {float(self.gyro.bandwidth_hz):g} Hz")
         if self.noise:
@@ -118,7 +134,7 @@ def design(
         slug(brief.full_title),
         brief.full_title,
         _source(brief),
-        1,
+        brief.increments,
         brief.previous,
         brief.ahead,
         brief.conditions,
@@ -170,7 +186,7 @@ def _sibling(committed: Window, size: tuple[int, int], filters: tuple[Taps, ...]
 
 def _filters(brief: FamilyBrief, size: tuple[int, int], one_sided_noise: Fraction) -> tuple[Taps, ...]:
     """Return the filters with some samples before and ahead of the step, as rationals."""
-    shape = Shape(*size, brief.conditions, brief.gyro)
+    shape = Shape(*size, brief.conditions, brief.gyro, brief.increments)
     degrees = range(0 if brief.gyro else 1, brief.degree + 1)
     unknowns = [Unknowns(shape, m) for m in degrees]
     one_sided = size != (brief.previous, brief.ahead)
@@ -185,4 +201,5 @@ def _filters(brief: FamilyBrief, size: tuple[int, int], one_sided_noise: Fractio
     rows = tuple(rounded(each, row) for each, row in zip(unknowns, taps, strict=True))
     if brief.gyro is not None:
         return rows
-    return (tuple(Fraction(place == shape.previous) for place in range(shape.samples)), *rows)
+    step = range(shape.previous, shape.previous + shape.increments)
+    return (tuple(Fraction(place in step) for place in range(shape.samples)), *rows)

@@ -49,7 +49,7 @@ def design(shape: Shape, degrees: Sequence[int], band: Fraction) -> list[list[An
 
 
 def _filter(shape: Shape, m: int, band: Fraction) -> list[Any]:
-    grid = mean_grid(band, shape.samples - 1, shape.gyro)
+    grid = mean_grid(band, shape.samples - 1, shape.gyro, shape.increments)
     weights = [ONE // len(grid.points)] * len(grid.points)
     best: tuple[int, list[Any]] | None = None
     for _ in range(ROUNDS):

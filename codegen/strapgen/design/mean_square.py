@@ -8,7 +8,7 @@ from operator import mul
 from typing import Any
 
 from strapgen.catalogue.methods import window_conditions
-from strapgen.design.band_grid import BITS, ONE, REAL, BandGrid, mean_grid, real
+from strapgen.design.band_grid import BITS, ONE, REAL, BandGrid, distance, mean_grid, real
 from strapgen.design.unknowns import Shape
 from strapgen.support.exceptions import InputError
 
@@ -49,7 +49,7 @@ def design(
     >>> [round(float(tap), 12) for tap in taps]
     [-0.25, 0.0, 0.25]
     """
-    grid = mean_grid(band, shape.samples - 1, shape.gyro)
+    grid = mean_grid(band, shape.samples - 1, shape.gyro, shape.increments)
     weights = [ONE] * len(grid.points) if spectrum is None else list(spectrum)
     weights = [weight // len(weights) for weight in weights]
     return least_squares(grid, shape, degrees, weights, noise)
@@ -76,7 +76,7 @@ def least_squares(
     """
     count, powers = shape.samples, shape.conditions
     scaled = [(w * square) >> BITS for w, square in zip(weights, grid.squares(), strict=True)]
-    lags = [real(sum(map(mul, scaled, column)) >> BITS) for column in zip(*grid.cosines, strict=True)]
+    lags = [real(sum(map(mul, scaled, column)) >> BITS) for column in zip(*grid.lags, strict=True)]
     lags[0] += REAL.mpf(noise.numerator) ** 2 / noise.denominator**2
     rows = [[REAL.mpf(value.numerator) / value.denominator for value in row] for row in shape.rows]
     matrix = [
@@ -97,9 +97,9 @@ def _products(grid: BandGrid, shape: Shape, m: int, weights: Sequence[int]) -> l
     im = [(y * value) >> BITS for (_, y), value in zip(grid.gains, right, strict=True)]
     result = []
     for place in range(shape.samples):
-        j = place - shape.previous
-        cosines = [row[abs(j)] for row in grid.cosines]
-        sines = [row[abs(j)] if j > 0 else -row[abs(j)] for row in grid.sines]
+        number, after = distance(place, shape.twice_middle)
+        cosines = [row[number] for row in grid.cosines]
+        sines = [row[number] if after else -row[number] for row in grid.sines]
         if m % 2:
             total = sum(map(mul, re, sines)) + sum(map(mul, im, cosines))
         else:

@@ -8,7 +8,7 @@ from operator import mul
 from typing import Any, NamedTuple
 
 from strapgen.design import exchange
-from strapgen.design.band_grid import BITS, REAL, SEARCH_POINTS, BandGrid, integer
+from strapgen.design.band_grid import BITS, REAL, SEARCH_POINTS, BandGrid, distance, integer
 from strapgen.design.exchange import Answers
 from strapgen.design.unknowns import Unknowns
 
@@ -83,18 +83,19 @@ class FilterProblem:
     def answers(self, points: Sequence[Any]) -> Answers:
         """Return the answers at frequencies in rad a sample."""
         unknowns = self._unknowns
-        grid = BandGrid(points, unknowns.shape.previous)
+        shape = unknowns.shape
+        grid = BandGrid(points, shape.twice_middle // 2, increments=shape.increments)
         tables = grid.sines if unknowns.m % 2 else grid.cosines
         single = []
         for group in unknowns.groups:
-            j = abs(group[0][0] - unknowns.shape.previous)
+            number, _ = distance(group[0][0], shape.twice_middle)
             single.append(
                 [
-                    len(group) * gain * row[j] >> BITS
+                    len(group) * gain * row[number] >> BITS
                     for (gain, _), row in zip(grid.gains, tables, strict=True)
                 ]
             )
-        rows = list(zip(*single, strict=True))
+        rows = list(zip(*single, strict=True)) or [()] * len(points)
         return Answers(
             [[sum(map(mul, direction, row)) >> BITS for row in rows] for direction in self._directions],
             [

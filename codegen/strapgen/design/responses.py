@@ -24,7 +24,6 @@ def level(window: Window, m: int) -> float:
     Parameters
     ----------
     window : Window
-        With steps of one sample.
     m : int
         Degree of the Legendre coefficient.
 
@@ -34,7 +33,7 @@ def level(window: Window, m: int) -> float:
     >>> f"{level(WINDOWS['window-3-3'], 1):.6e}"
     '2.160751e-03'
     """
-    grid = search_grid(window.band, window.samples - 1, window.gyro)
+    grid = search_grid(window.band, window.samples - 1, window.gyro, increments=window.increments)
     errors = [magnitude(*e) for e in grid.errors(m, _integers(window, m), window.previous)]
     place = max(range(len(errors)), key=lambda k: errors[k])
     largest = errors[place]
@@ -65,7 +64,7 @@ def noise_gain(window: Window, m: int) -> float:
 def largest_gain(window: Window) -> float:
     """Return the largest response of the filter of c_0 to a rate, up to half the sampling rate.
 
-    The response is |sum_j F_0j A_j(b)|, with the gyro: 1 is a rate that is passed on unchanged.
+    The response is |sum_j F_0j A_j(b)|/N, with the gyro: 1 is a rate that is passed on unchanged.
 
     Examples
     --------
@@ -80,7 +79,7 @@ def largest_gain(window: Window) -> float:
     if window.gyro is not None:
         x = b * float(window.gyro.sample_hz / window.gyro.bandwidth_hz) / (2 * np.pi)
         response = response / (1 - x * x + 2j * float(window.gyro.damping) * x)
-    return float(np.abs(response).max())
+    return float(np.abs(response).max()) / window.increments
 
 
 def errors(window: Window, m: int, points: Sequence[float]) -> NDArray[Any]:
@@ -89,7 +88,6 @@ def errors(window: Window, m: int, points: Sequence[float]) -> NDArray[Any]:
     Parameters
     ----------
     window : Window
-        With steps of one sample.
     m : int
     points : sequence of float, (n,)
         Angular frequencies in rad a sample, up to pi.
@@ -99,7 +97,7 @@ def errors(window: Window, m: int, points: Sequence[float]) -> NDArray[Any]:
     array, (n,)
         |sum_j F_j A_j - C_m|, for each unit of rate times the sampling interval.
     """
-    grid = BandGrid([REAL.mpf(b) for b in points], window.samples - 1, window.gyro)
+    grid = BandGrid([REAL.mpf(b) for b in points], window.samples - 1, window.gyro, window.increments)
     return np.array([magnitude(*e) / ONE for e in grid.errors(m, _integers(window, m), window.previous)])
 
 
@@ -112,7 +110,7 @@ def polynomial_fit(window: Window) -> tuple[tuple[Fraction, ...], ...]:
     >>> [str(tap) for tap in polynomial_fit(WINDOWS["window-3-3"])[1][4:]]
     ['7843/20160', '-211/2520', '191/20160']
     """
-    shape = Shape(window.previous, window.ahead, window.samples, window.gyro)
+    shape = Shape(window.previous, window.ahead, window.samples, window.gyro, window.increments)
     filters = []
     for m in range(len(window.filters)):
         unknowns = Unknowns(shape, m)

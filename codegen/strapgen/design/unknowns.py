@@ -14,21 +14,28 @@ from typing import Any
 
 from strapgen.catalogue.methods import window_conditions
 from strapgen.catalogue.methods.window import GyroResponse, Taps
+from strapgen.design.band_grid import distance
 
 
 @dataclass(frozen=True)
 class Shape:
-    """What determines the conditions of a filter: the samples around a step of one, the number of powers, the gyro."""
+    """What determines the conditions of a filter: the samples around and in a step, the number of powers, the gyro."""
 
     previous: int
     ahead: int
     conditions: int
     gyro: GyroResponse | None = None
+    increments: int = 1
 
     @property
     def samples(self) -> int:
         """Number of samples."""
-        return self.previous + 1 + self.ahead
+        return self.previous + self.increments + self.ahead
+
+    @property
+    def twice_middle(self) -> int:
+        """Twice the place of the middle of the step, which lies between two samples where it has an even number."""
+        return 2 * self.previous + self.increments - 1
 
     @property
     def symmetric(self) -> bool:
@@ -38,7 +45,8 @@ class Shape:
     @cached_property
     def rows(self) -> list[Taps]:
         """The increments of the powers of time, (conditions, samples)."""
-        return window_conditions.increments((1, self.previous, self.ahead), self.conditions, self.gyro)
+        samples = self.increments, self.previous, self.ahead
+        return window_conditions.increments(samples, self.conditions, self.gyro)
 
 
 @dataclass(frozen=True)
@@ -66,15 +74,14 @@ class Unknowns:
     @cached_property
     def groups(self) -> tuple[tuple[tuple[int, int], ...], ...]:
         """For each unknown the places of its taps, with a sign."""
-        middle = self.shape.previous
+        twice = self.shape.twice_middle
         if not self.shape.symmetric:
-            places = sorted(
-                range(self.shape.samples), key=lambda place: (abs(place - middle), place > middle)
-            )
+            places = sorted(range(self.shape.samples), key=lambda place: distance(place, twice))
             return tuple(((place, 1),) for place in places)
         sign = -1 if self.m % 2 else 1
-        pairs = [((middle + j, 1), (middle - j, sign)) for j in range(1, middle + 1)]
-        return tuple(pairs) if self.m % 2 else (((middle, 1),), *pairs)
+        after, before = twice // 2 + 1, (twice - 1) // 2
+        pairs = [((after + k, 1), (before - k, sign)) for k in range(before + 1)]
+        return tuple(pairs) if self.m % 2 or twice % 2 else (((twice // 2, 1),), *pairs)
 
     @cached_property
     def powers(self) -> list[int]:
@@ -127,7 +134,7 @@ class Unknowns:
 
     def taps(self, values: Sequence[Any]) -> tuple[Any, ...]:
         """Return the taps of a window, the oldest first, from the values of the unknowns."""
-        row = [values[0] * 0] * self.shape.samples
+        row = [values[0] * 0 if values else Fraction(0)] * self.shape.samples
         for group, value in zip(self.groups, values, strict=True):
             for place, sign in group:
                 row[place] = sign * value

@@ -33,7 +33,6 @@ def in_words(window: Window, bits: int) -> Window:
     Parameters
     ----------
     window : Window
-        With steps of one sample.
     bits : int
         Binary digits behind the point, 2 or more.
 
@@ -51,7 +50,7 @@ def in_words(window: Window, bits: int) -> Window:
     """
     digits = checks.count("bits", bits, smallest=2, largest=128)
     exact = min(window.conditions, 1 if window.gyro else 2)
-    shape = Shape(window.previous, window.ahead, window.conditions, window.gyro)
+    shape = Shape(window.previous, window.ahead, window.conditions, window.gyro, window.increments)
     if shape.symmetric and not window.parity:
         raise InputError(f"{window.name} has no symmetry; its taps are not rounded to words")
     rows = [
@@ -68,7 +67,7 @@ class _Search:
         self._window = window
         self._unit = Fraction(1, 1 << bits)
         self._exact = sum(power < exact for power in unknowns.powers)
-        self._grid = search_grid(window.band, window.samples - 1, window.gyro, _POINTS)
+        self._grid = search_grid(window.band, window.samples - 1, window.gyro, _POINTS, window.increments)
 
     def best(self, taps: Taps) -> Taps:
         """Return the taps of the least largest error."""

@@ -19,10 +19,10 @@ from strapgen.backends.increments import pulses, windows
 from strapgen.catalogue import Choice
 from strapgen.catalogue.methods.windows import named_window
 from strapgen.ir.fixed_settings import Settings
-from strapgen.library import two_speed_sources
 from strapgen.simulation.runs import attitude, drift_between
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
+from strapgen.systems import two_speed_sources
 
 Array = NDArray[np.float64]
 

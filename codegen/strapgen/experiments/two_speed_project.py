@@ -20,8 +20,9 @@ from strapgen.experiments.vectors import MODEL, SEED, vectors_of_choice
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Sources
-from strapgen.library import generated_sources, two_speed_sources
+from strapgen.library import generated_sources
 from strapgen.support.exceptions import InputError
+from strapgen.systems import two_speed_sources
 from strapgen.targets.contract import options
 from strapgen.targets.project_c.emit import MotionRun, two_speed_main
 from strapgen.targets.two_speed_c.emit import wiring
@@ -44,7 +45,7 @@ def project_files(
     Parameters
     ----------
     algorithm, sculling, target, settings
-        As for `library.two_speed_sources.sources`.
+        As for `systems.two_speed_sources.sources`.
 
     Returns
     -------
@@ -54,11 +55,12 @@ def project_files(
     """
     whole = two_speed_sources.sources(algorithm, sculling, target, settings)
     loops = two_speed_sources.loops(algorithm, sculling, target, settings)
+    system = two_speed_sources.description(algorithm, sculling).system
     command = f"strapgen two-speed {algorithm} --sculling {sculling} --target {target}"
     if settings is not None:
         command += f" {options(settings)}"
     command += " --project"
-    tests = cycle_files(_cycle_table(whole, loops, command, settings))
+    tests = cycle_files(_cycle_table(whole, LoopSources(loops, system), command))
     for loop in loops:
         stated = None if loop.fixed is None else loop.fixed.settings
         tests |= table_files(vectors_of_choice(Choice(loop.kernel), target, stated))
@@ -79,16 +81,16 @@ def project_files(
         FAST,
         SLOW,
     )
-    return project.assembled(whole, command, two_speed_main(whole, loops, command, run), motion, tests)
+    return project.assembled(
+        whole, command, two_speed_main(whole, loops, wiring(system, loops), command, run), motion, tests
+    )
 
 
-def _cycle_table(
-    whole: Sources, loops: tuple[Sources, ...], command: str, settings: Settings | None
-) -> CycleTable:
+def _cycle_table(whole: Sources, parts: LoopSources, command: str) -> CycleTable:
     """Return a run of all loops on random samples, from the models of the loops."""
-    runner = _runner(whole, loops)
+    loops, runner = parts.loops, _runner(whole, parts)
     for part in _PARTS:
-        samples = _samples(loops, part, random.Random(SEED))
+        samples = _samples(runner, part, random.Random(SEED))
         start = _start(loops)
         cycles = Cycles(_arrays(samples, runner.dtype), _arrays(start, runner.dtype), FAST, SLOW)
         try:
@@ -104,6 +106,7 @@ def _cycle_table(
     return CycleTable(
         whole,
         loops,
+        runner.wires,
         command,
         FAST,
         SLOW,
@@ -116,19 +119,22 @@ def _cycle_table(
     )
 
 
-def _runner(whole: Sources, loops: tuple[Sources, ...]) -> LoopsFromPython:
+def _runner(whole: Sources, parts: LoopSources) -> LoopsFromPython:
     """Return what runs the loops without their C: the integer models, or the programs in one floating-point type."""
+    loops = parts.loops
     if loops[0].fixed is not None:
         models = tuple(
             generated_sources.sources(Choice(loop.kernel), MODEL, loop.fixed.settings)
             for loop in loops
             if loop.fixed is not None
         )
-        return LoopsFromPython(LoopSources(models), ModelEvaluator)
+        return LoopsFromPython(LoopSources(models, parts.system), ModelEvaluator)
     programs = tuple(
         sources_of_program(generated_sources.program(Choice(loop.kernel)), "exact") for loop in loops
     )
-    return LoopsFromPython(LoopSources(programs), lambda sources: ProgramEvaluator(sources, whole.target))
+    return LoopsFromPython(
+        LoopSources(programs, parts.system), lambda sources: ProgramEvaluator(sources, whole.target)
+    )
 
 
 def _arrays(values: Mapping[str, Any], dtype: Any) -> dict[str, Array]:
@@ -139,11 +145,9 @@ def _arrays(values: Mapping[str, Any], dtype: Any) -> dict[str, Array]:
     }
 
 
-def _samples(
-    loops: tuple[Sources, ...], part: int, stream: random.Random
-) -> dict[str, list[tuple[Any, ...]]]:
+def _samples(runner: LoopsFromPython, part: int, stream: random.Random) -> dict[str, list[tuple[Any, ...]]]:
     """Return random samples of every cycle, of at most a part of their ranges."""
-    wires = wiring(loops)
+    wires, loops = runner.wires, runner.sources.loops
     counts = (FAST * SLOW * NAVIGATION, SLOW * NAVIGATION)
     return {
         signal.name: [

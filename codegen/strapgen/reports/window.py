@@ -24,7 +24,6 @@ def window_data(window: Window) -> dict[str, Any]:
     Parameters
     ----------
     window : Window
-        With steps of one sample.
     """
     gyro = window.gyro
     return {
@@ -167,7 +166,6 @@ def window_report(window: Window) -> Report:
     Parameters
     ----------
     window : Window
-        With steps of one sample.
     """
     data = window_data(window)
     return Report(lambda: window_text(window, data), lambda: data, lambda: flat_table(list(_rows(data))))

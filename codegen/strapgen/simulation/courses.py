@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from strapgen import backends
 from strapgen.backends import BACKENDS, two_speed
 from strapgen.ir.fixed_settings import Settings
-from strapgen.library import two_speed_sources
 from strapgen.simulation.recording import InertialRecording
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
+from strapgen.systems import two_speed_sources
 
 Array = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ from strapgen.ir.signals import ANY, Signal
 from strapgen.ir.system import Cell, DescribedSystem, Push, Rate, SystemStage, Wire
 from strapgen.support.exceptions import InputError
 from strapgen.support.suggestions import unknown
-from strapgen.systems import system_file, wire_checks
+from strapgen.systems import built_in, system_file, wire_checks
 from strapgen.systems.ports import Ports, ports
 from strapgen.systems.system_file import SystemText
 from strapgen.systems.wire_checks import Source
@@ -61,7 +61,7 @@ def read_system(path: str | Path, sample_hz: Fraction | None = None) -> Descript
     InputError
         If anything in the file is wrong; the message names the stage and the wire.
     """
-    text = system_file.read(path, sample_hz)
+    text = system_file.read(built_in.file_of(path), sample_hz)
     try:
         return wired(text)
     except InputError as error:

@@ -18,7 +18,7 @@ from strapgen.ir.recursion import Recursion
 
 NAMES = [*NAVIGATION]
 #: A quotient with a root, a recursion with error feedback, and functions: compiled in the quick tests.
-SOME = ("transport-rate-ellipsoid", "position-step", "coarse-leveling")
+SOME = ("wander-rate-ellipsoid", "position-step", "coarse-leveling")
 SOME_FIRST = [pytest.param(name, marks=() if name in SOME else pytest.mark.long) for name in NAMES]
 
 
@@ -68,8 +68,13 @@ def test_no_error_exceeds_its_bound(name, word, rng):
     assert share > 0.02, "the bound is of the size of the errors"
 
 
-@pytest.mark.parametrize("word", [pytest.param(16, marks=pytest.mark.long), 32])
-@pytest.mark.parametrize("name", SOME_FIRST)
+@pytest.mark.parametrize(
+    ("name", "word"),
+    [
+        *(pytest.param(name, 32, marks=() if name in SOME else pytest.mark.long) for name in NAMES),
+        *(pytest.param(name, 16, marks=pytest.mark.long) for name in SOME),
+    ],
+)
 def test_c_gives_the_integers_of_the_model(name, word, rng):
     in_c, model = (
         strapgen.evaluator(name, backend, settings(word)) for backend in (f"c-fixed{word}", "fixed-model")

@@ -136,12 +136,13 @@ class _Filtered:
         """Add a stage for the sum of the samples, each times its tap."""
         if not self._window.parity:
             return self._samples.combination(name, [exact(tap) for tap in taps], meaning)
-        sign, middle, ahead = (-1) ** m, self._window.previous, self._window.ahead
+        sign, first, ahead = (-1) ** m, self._window.previous, self._window.ahead
+        after = first + self._window.increments
         total = sp.zeros(3, 1)
         for j in range(1, ahead + 1):
-            if taps[middle + j]:
-                total += exact(taps[middle + j]) * self._pair(j, sign)
-        for k in range(middle, middle + self._window.increments):
+            if taps[after + j - 1]:
+                total += exact(taps[after + j - 1]) * self._pair(j, sign)
+        for k in range(first, after):
             if taps[k]:
                 total += exact(taps[k]) * self._sample(k)
         return self._build.stage(Signal.vector(name, name, unit="rad", meaning=meaning), total)

@@ -21,7 +21,8 @@ from strapgen.cli.options import (
 )
 from strapgen.cli.output import Output
 from strapgen.cli.progress import track
-from strapgen.cli.sample_source import MOTION_FILE, MOTION_NAMES, MotionSettings, check_motion, pairs
+from strapgen.cli.sample_source import MOTION_FILE, MOTION_NAMES, MotionSettings, check_motion, is_file, pairs
+from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
     from strapgen.experiments.convergence import Convergence
@@ -51,9 +52,13 @@ class Ladder:
     ] = "1/2,1/4,1/8,1/16,1/32,1/64,1/128"
     duration: Duration = "2"
 
-    def check(self) -> None:
-        """Check the name of the motion."""
+    def check(self, names: list[str]) -> None:
+        """Check the name of the motion, which back ends of many digits must know in closed form."""
+        from strapgen.backends import BACKENDS
+
         check_motion(self.motion)
+        if is_file(self.motion or "") and any(BACKENDS[name].many_digits for name in names):
+            raise InputError(f"motion {self.motion} is known in double alone; --backend numpy runs on it")
 
     def profile(self) -> tuple[Motion, str]:
         """Return the motion, and a description of the runs in words."""
@@ -96,7 +101,7 @@ def converge(
     output.check(algorithm, *methods.files)
     names = backends("--backend", backend, ())
     most = limit("--fail-beyond", fail_beyond)
-    ladder.check()
+    ladder.check(names)
     choices = methods.choices(algorithm)
     profile, words = ladder.profile()
     steps = listed("--step", ladder.steps)

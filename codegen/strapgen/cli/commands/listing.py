@@ -11,7 +11,7 @@ from strapgen.cli.output import TEXT_OUTPUT, Output
 from strapgen.support import checks
 
 #: The kinds of names, in the order in which they are listed.
-KINDS = ("algorithms", "methods", "vectors", "kernels", "motions", "targets", "backends")
+KINDS = ("algorithms", "methods", "vectors", "kernels", "systems", "motions", "targets", "backends")
 
 
 @grouped
@@ -51,6 +51,7 @@ def _parts() -> dict[str, dict[str, str]]:
     from strapgen.backends import BACKENDS
     from strapgen.catalogue.user import loading
     from strapgen.simulation.motions import keys
+    from strapgen.systems import built_in
     from strapgen.targets import titles
 
     installed = {
@@ -66,6 +67,7 @@ def _parts() -> dict[str, dict[str, str]]:
             for name, vector in catalogue.VECTORS.items()
         },
         "kernels": {name: recipe.title for name, recipe in catalogue.KERNELS.items()},
+        "systems": built_in.names(),
         "motions": {
             name: ", ".join(" or ".join(choices) for choices in keys(name).values())
             for name in (*catalogue.MOTIONS, *catalogue.RUN_MOTIONS)

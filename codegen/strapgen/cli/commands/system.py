@@ -138,8 +138,8 @@ def _fitted(
     file: Path, target: str, sample_hz: str | None, cpu: str | None, fixed: FixedOptions
 ) -> tuple[Fitted, Budget, str]:
     """Return the generated stages, what they need, and the command that makes the files again."""
-    from strapgen.experiments import system_cost
     from strapgen.experiments.cost import processors
+    from strapgen.experiments.systems import cost as system_cost
     from strapgen.ir.fixed_settings import Settings
     from strapgen.systems.budget import budget
     from strapgen.systems.fitting import fitted

@@ -39,7 +39,7 @@ def two_speed(
     """
     check_format(format)
     from strapgen.ir.fixed_settings import Settings
-    from strapgen.library import two_speed_sources
+    from strapgen.systems import two_speed_sources
     from strapgen.targets import fixed_targets
 
     form = whole("sculling", sculling) or 0

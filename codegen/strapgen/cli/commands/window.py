@@ -38,6 +38,10 @@ class WindowSize:
 
     panel: ClassVar[str] = "Window"
 
+    samples: Annotated[
+        str,
+        option("--samples", metavar="N", help="Number of samples in a step; several take --rotation exact."),
+    ] = "1"
     previous: Annotated[
         _Text,
         option(*("--previous", "--kept"), metavar="N", help="Number of samples from before the step."),
@@ -171,10 +175,12 @@ def _brief(size: WindowSize, band: Band, name: str | None) -> FamilyBrief:
         checks.count(stated, whole(stated, value), smallest=0, largest=windows.MOST_SAMPLES - 1)
         for stated, value in counts.items()
     )
-    samples = previous + 1 + ahead
+    increments = checks.count("--samples", whole("--samples", size.samples), largest=windows.MOST_SAMPLES)
+    samples = previous + increments + ahead
     if samples > windows.MOST_SAMPLES:
+        step = "" if increments == 1 else f" with --samples {increments}"
         raise InputError(
-            f"--previous {previous} and --ahead {ahead} make {samples} samples; "
+            f"--previous {previous} and --ahead {ahead}{step} make {samples} samples; "
             f"at most {windows.MOST_SAMPLES} are allowed"
         )
     rotation = checks.choice("rotation", size.rotation, windows.ROTATIONS)
@@ -202,6 +208,7 @@ def _brief(size: WindowSize, band: Band, name: str | None) -> FamilyBrief:
         ),
         _title(name),
         not_negative("--start-noise", band.start_noise),
+        increments,
     )
 
 
@@ -241,10 +248,6 @@ def show(
     from strapgen.reports.window import window_report
 
     family = window_of(window)
-    if family.increments != 1:
-        raise InputError(
-            f"{window} has steps of {family.increments} samples; only filters for steps of one are shown"
-        )
     with waiting("evaluating the filters"):
         report = window_report(family)
     output.report(report, lambda path: plots.window_image(family, path))

@@ -21,7 +21,6 @@ def window_image(window: Window, path: str | Path) -> bytes:
     Parameters
     ----------
     window : Window
-        With steps of one sample.
     path : path
         File for the image; its ending says which kind.
 

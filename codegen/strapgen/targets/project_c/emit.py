@@ -11,7 +11,7 @@ from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.sources import Sources
 from strapgen.targets.registry import BUILT_IN
 from strapgen.targets.rendering import render
-from strapgen.targets.two_speed_c.emit import wiring
+from strapgen.targets.two_speed_c.emit import Wiring
 from strapgen.targets.vectors_c.cycles import loop_calls
 from strapgen.targets.vectors_c.emit import VectorTable, numbers_of, types_of
 
@@ -128,10 +128,11 @@ def _values(sources: Sources, command: str, run: MotionRun, identity: Sequence[F
     }
 
 
-def two_speed_main(whole: Sources, loops: Sequence[Sources], command: str, run: MotionRun) -> str:
+def two_speed_main(
+    whole: Sources, loops: Sequence[Sources], wires: Wiring, command: str, run: MotionRun
+) -> str:
     """Return a main program that runs an algorithm in two speeds on coning and prints the attitude and its error."""
     fast, slow, _ = loops
-    wires = wiring(loops)
     state = slow.function.inputs[0]
     identity = [Fraction(place % 4 == 0 if state.size == 9 else place == 3) for place in range(state.size)]
     increment, *others = sum(wires.samples, ())

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 from strapgen.ir.fixed_interface import Argument
-from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Function, Sources
+from strapgen.ir.system import DescribedSystem
 from strapgen.support.version import VERSION
 from strapgen.targets.c.emit import real_of
 from strapgen.targets.c_fixed.words import WORDS
@@ -33,37 +33,59 @@ class Wiring:
         The other inputs of each loop.
     results : tuple of tuple of Signal
         The other outputs of each loop.
+    updates : tuple of mapping of str to str
+        The value of the memory that an output replaces, by the name of the output, for each loop.
+    cleared : tuple of tuple of str
+        Values of the memory that are zero again after a cycle of each loop.
     """
 
     memory: tuple[Signal, ...]
     samples: tuple[tuple[Signal, ...], ...]
     results: tuple[tuple[Signal, ...], ...]
+    updates: tuple[Mapping[str, str], ...]
+    cleared: tuple[tuple[str, ...], ...]
 
     def memory_named(self, name: str) -> Signal:
         """Return a signal of the memory by its name."""
         return next(signal for signal in self.memory if signal.name == name)
 
 
-def recursion(sources: Sources) -> Recursion:
-    """Return the recursion of a loop."""
-    assert sources.recursion is not None, "every loop has one"
-    return sources.recursion
+def wiring(system: DescribedSystem, loops: Sequence[Sources]) -> Wiring:
+    """Return how the arguments of loops are connected.
 
-
-def wiring(loops: Sequence[Sources]) -> Wiring:
-    """Return how the arguments of loops are connected: arguments of the same name are the same quantity."""
-    held = {name for loop in loops for name, _ in recursion(loop).states}
-    memory = {signal.name: signal for loop in loops for signal in loop.function.inputs if signal.name in held}
+    Parameters
+    ----------
+    system : DescribedSystem
+        One stage for each loop, at a rate of its own. What a stage takes from another has one name in both.
+    loops : sequence of Sources
+        The fast, slow and navigation loop.
+    """
+    memory: dict[str, Signal] = {}
+    samples = []
+    for stage, loop in zip(system.stages, loops, strict=True):
+        wired = [*zip(stage.wires, loop.function.inputs, strict=True)]
+        memory |= {wire.source: signal for wire, signal in wired if not wire.external}
+        samples.append(tuple(signal for wire, signal in wired if wire.external))
+    updates = tuple(
+        {output: memory[cell].name for output, cell in stage.results if cell in memory}
+        for stage in system.stages
+    )
     return Wiring(
         tuple(memory.values()),
-        tuple(tuple(s for s in loop.function.inputs if s.name not in held) for loop in loops),
+        tuple(samples),
         tuple(
-            tuple(s for s in loop.function.outputs if s.name not in recursion(loop).inputs) for loop in loops
+            tuple(signal for signal in loop.function.outputs if signal.name not in replaced)
+            for loop, replaced in zip(loops, updates, strict=True)
+        ),
+        updates,
+        tuple(
+            tuple(signal.name for cell, signal in memory.items() if cell in rate.cleared)
+            for rate in system.rates
         ),
     )
 
 
-def whole(name: str, title: str, command: str, loops: Sequence[Sources]) -> Sources:
+def whole(name: str, title: str, command: str, system: DescribedSystem, loops: Sequence[Sources]) -> Sources:
     """Generate the C of all loops: one function for a cycle of each, and one that runs whole navigation cycles.
 
     Parameters
@@ -74,6 +96,8 @@ def whole(name: str, title: str, command: str, loops: Sequence[Sources]) -> Sour
         A line for the head of the files.
     command : str
         The command line that generates the files.
+    system : DescribedSystem
+        How the loops are wired.
     loops : sequence of Sources
         The C of the fast, slow and navigation loop; in fixed point in formats that fit together.
 
@@ -83,7 +107,7 @@ def whole(name: str, title: str, command: str, loops: Sequence[Sources]) -> Sour
         The files of the whole, and those of the loops.
     """
     fast, slow, _ = loops
-    numbers, wires = _numbers(fast), wiring(loops)
+    numbers, wires = _numbers(fast), wiring(system, loops)
     state = wires.memory_named(slow.function.inputs[0].name)
     identifier = name.replace("-", "_") + numbers.suffix
     outputs = (state, *wires.results[2])
@@ -158,8 +182,7 @@ def _cycles(loops: Sequence[Sources], wires: Wiring, type_: str, identifier: str
             which: f"{loop.function.name}({_call(loop, which, wires)})"
             for which, loop in zip(LOOPS, loops, strict=True)
         },
-        # A sum of a loop is reset to zero when the next slower loop has used it.
-        "clears": dict(zip(LOOPS, [(), *(recursion(loop).begun_anew for loop in loops[:-1])], strict=True)),
+        "clears": dict(zip(LOOPS, wires.cleared, strict=True)),
     }
 
 
@@ -180,7 +203,6 @@ def _call(loop: Sources, which: str, wires: Wiring) -> str:
     inputs = [place(signal.name) for signal in loop.function.inputs]
     if loop.fixed is not None and loop.fixed.residuals:
         inputs.append(f"memory->residuals_{which}")
-    outputs = [
-        place(recursion(loop).inputs.get(signal.name, signal.name)) for signal in loop.function.outputs
-    ]
+    updates = wires.updates[LOOPS.index(which)]
+    outputs = [place(updates.get(signal.name, signal.name)) for signal in loop.function.outputs]
     return ", ".join([*inputs, *outputs])

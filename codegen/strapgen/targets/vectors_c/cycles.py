@@ -9,7 +9,7 @@ from typing import Any
 from strapgen.ir.sources import Sources
 from strapgen.targets.lines import fill_arguments
 from strapgen.targets.rendering import render
-from strapgen.targets.two_speed_c.emit import LOOPS, Wiring, wiring
+from strapgen.targets.two_speed_c.emit import LOOPS, Wiring
 from strapgen.targets.vectors_c.emit import NumberText, file_names, numbers_of
 
 Rows = Sequence[Sequence[Any]]
@@ -25,6 +25,7 @@ class CycleTable:
         All loops in C.
     loops : tuple of Sources
         The fast, slow and navigation loop in C.
+    wires : Wiring
     command : str
         The command that generates the run.
     fast, slow, navigation : int
@@ -43,6 +44,7 @@ class CycleTable:
 
     whole: Sources
     loops: tuple[Sources, ...]
+    wires: Wiring
     command: str
     fast: int
     slow: int
@@ -66,7 +68,7 @@ def cycle_files(table: CycleTable) -> dict[str, str]:
     dict of str to str
         Text by file name: the header, and the test.
     """
-    name, numbers, wires = table.whole.function.name, numbers_of(table.loops[0]), wiring(table.loops)
+    name, numbers, wires = table.whole.function.name, numbers_of(table.loops[0]), table.wires
     state = wires.memory_named(table.loops[1].function.inputs[0].name)
     (change,) = wires.results[2]
     expected = {state.name: table.attitudes, change.name: table.changes}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import sympy as sp
@@ -20,6 +20,8 @@ from strapgen.catalogue.kernels.navigation.signals import (
     VELOCITY,
 )
 from strapgen.catalogue.kernels.updates import TURN
+from strapgen.ir.recursion import Recursion
+from strapgen.ir.signals import Signal, after
 from strapgen.symbolic.kernel import Kernel, KernelBuilder
 
 #: Cosine of latitude below which the north-slaved frame no longer follows north: its rate would grow without limit.
@@ -30,6 +32,18 @@ AZIMUTHS = {
     "free": "free azimuth: the frame does not turn about the vertical against inertial axes i",
     "north": "north-slaved: y of n stays north",
 }
+
+PREVIOUS_RATE = Signal.vector(
+    "previous_rate",
+    "before",
+    unit="rad/s",
+    meaning="rate of the navigation frame one cycle before, navigation axes n",
+    bound=Fraction(1, 2700),
+    frame="n",
+)
+LEAD = Signal.scalar(
+    "lead", unit="1", meaning="navigation cycles by which to extrapolate, 1/2 + 1/(2m)", bound=Fraction(1)
+)
 
 
 def earth_rate() -> Kernel:
@@ -137,7 +151,7 @@ def transport_rate(shape: str, azimuth: str = "wander") -> Kernel:
     if azimuth == "north":
         notes.append(f"Where the cosine of latitude is below {STEEPEST}, y of n does not stay north.")
     return build.kernel(
-        f"transport-rate-{shape}" + ("" if azimuth == "wander" else f"-{azimuth}"),
+        f"{azimuth}-rate-{shape}",
         f"Transport rate over {'a sphere' if shape == 'sphere' else 'an ellipsoid'}, "
         + ("north-slaved" if azimuth == "north" else f"{azimuth} azimuth"),
         DERIVED,
@@ -145,18 +159,40 @@ def transport_rate(shape: str, azimuth: str = "wander") -> Kernel:
     )
 
 
-def navigation_turn() -> Kernel:
+def navigation_turn(ahead: bool = False) -> Kernel:
     """Return the rate of the navigation frame times a cycle, (Wn + rho) T, which the trapezoidal rule (27) takes.
+
+    A slow loop that holds this value over m of its cycles needs it ahead: extrapolated by `lead` navigation cycles,
+    1/2 + 1/(2m), a rate that is linear in time is integrated exactly by the rule, which itself lags by half a slow
+    cycle.
+
+    Parameters
+    ----------
+    ahead : bool
+        Whether to extrapolate.
 
     Returns
     -------
     Kernel
-        Inputs ``earth_rate`` and ``transport_rate`` (3,) in rad/s, axes n, and ``cycle`` in s; output ``turn`` (3,) in
-        rad, axes n.
+        Inputs ``earth_rate`` and ``transport_rate`` (3,) in rad/s, axes n, ``cycle`` in s, that of the loop which takes
+        the result, and to extrapolate ``previous_rate`` (3,), a state, in rad/s, and ``lead``; outputs ``turn`` (3,) in
+        rad, axes n, and ``next_previous_rate``.
     """
     build = KernelBuilder()
+    before = build.input(PREVIOUS_RATE) if ahead else None
     W, rho = build.input(EARTH_RATE), build.input(TRANSPORT_RATE)
-    build.output(TURN, build.scalar(CYCLE) * (W + rho))
+    cycle = build.scalar(CYCLE)
+    title = "Rate of the navigation frame against inertial axes, times the cycle"
+    if before is None:
+        build.output(TURN, cycle * (W + rho))
+        return build.kernel("navigation-turn", title, DERIVED)
+    lead = build.scalar(LEAD)
+    rate = build.stage(replace(PREVIOUS_RATE, name="rate", elements=("w_x", "w_y", "w_z")), W + rho)
+    build.output(TURN, cycle * (rate + lead * (rate - before)))
+    build.output(after(PREVIOUS_RATE), rate)
     return build.kernel(
-        "navigation-turn", "Rate of the navigation frame against inertial axes, times the cycle", DERIVED
+        "navigation-turn-ahead",
+        f"{title}, extrapolated",
+        DERIVED,
+        recursion=Recursion(((PREVIOUS_RATE.name, after(PREVIOUS_RATE).name),), kept=(PREVIOUS_RATE.name,)),
     )

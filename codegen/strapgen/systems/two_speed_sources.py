@@ -1,10 +1,15 @@
-"""Generates the sources of an algorithm in two speeds: its three loops, with formats that match, and their C."""
+"""Generates the sources of an algorithm in two speeds: its three loops, with formats that match, and their C.
+
+The loops, what passes between them and what is reset are those of the built-in system of the same name. How many cycles
+of one loop make one of the next is an argument of the generated functions, so that the rates of the file do not matter.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
 from fractions import Fraction
+from functools import cache
 
 from strapgen import targets
 from strapgen.catalogue import Choice
@@ -13,6 +18,9 @@ from strapgen.ir.sources import Sources
 from strapgen.library import generated_sources
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
+from strapgen.systems import built_in, system_file
+from strapgen.systems.sums import copies, summed
+from strapgen.systems.wiring import Description, wired
 from strapgen.targets import BUILT_IN, TARGETS
 from strapgen.targets.contract import options
 from strapgen.targets.two_speed_c.emit import whole
@@ -26,13 +34,6 @@ SCULLING = {1: "with the rotation compensation in it", 2: "with the rotation com
 _SPARE = Fraction(33, 32)
 #: Smallest increments that formats are chosen for, in rad and m/s.
 _LEAST = Fraction(1, 2**16)
-#: Inputs that have the range of another input, if no range of theirs is stated.
-_AS = {"previous_increment": "increment", "previous_turn": "turn"}
-#: Sums over a cycle, with the increments that they add up: exact where both have the same format.
-_SUMMED = {
-    "angle_sum": ("increment", "previous_increment"),
-    "velocity_sum": ("velocity_increment",),
-}
 
 
 def kernels(algorithm: str, sculling: int = 2) -> tuple[str, str, str]:
@@ -55,13 +56,31 @@ def kernels(algorithm: str, sculling: int = 2) -> tuple[str, str, str]:
     >>> kernels("dcm")
     ('two-speed-fast-2', 'dcm-two-speed-slow-2', 'dcm-two-speed-navigation')
     """
+    fast, slow, navigation = (stage.kernel for stage in _text(algorithm, sculling).stages)
+    return fast, slow, navigation
+
+
+def description(algorithm: str, sculling: int = 2) -> Description:
+    """Return the built-in system with the loops of an algorithm; parameters and errors are those of `kernels`.
+
+    Examples
+    --------
+    >>> [rate.every for rate in description("dcm").system.rates]
+    [1, 64, 320]
+    """
+    return wired(_text(algorithm, sculling))
+
+
+def _text(algorithm: str, sculling: int) -> system_file.SystemText:
+    """Return the file of the built-in system with the loops of an algorithm."""
     checks.choice("algorithm", algorithm, ALGORITHMS)
     checks.count("sculling", sculling, largest=len(SCULLING))
-    return (
-        f"two-speed-fast-{sculling}",
-        f"{algorithm}-two-speed-slow-{sculling}",
-        f"{algorithm}-two-speed-navigation",
-    )
+    return _read(f"two-speed-{algorithm}" if sculling == 2 else f"two-speed-{algorithm}-{sculling}")
+
+
+@cache
+def _read(name: str) -> system_file.SystemText:
+    return system_file.read(built_in.file_of(name))
 
 
 def ranges(
@@ -133,9 +152,11 @@ def loops(
         fast, slow, navigation = (generated_sources.sources(Choice(name), target) for name in names)
         return fast, slow, navigation
     settings = _without_largest_angle(settings or Settings())
-    inputs = {name: _inputs(name) for name in names}
+    programs = {name: generated_sources.program(Choice(name)) for name in names}
+    inputs = {name: {signal.name for signal in program.inputs} for name, program in programs.items()}
     _require_inputs(settings, set().union(*inputs.values()))
-    ranges = {name: settings.ranges[other] for name, other in _AS.items() if other in settings.ranges}
+    earlier = {state: name for program in programs.values() for state, name in copies(program).items()}
+    ranges = {name: settings.ranges[other] for name, other in earlier.items() if other in settings.ranges}
     settings = replace(settings, ranges=ranges | dict(settings.ranges))
 
     def loop(name: str, formats: Mapping[str, str]) -> Sources:
@@ -143,19 +164,15 @@ def loops(
 
     formats = dict(settings.formats)
     natural = _formats(loop(names[0], formats))
-    for total, increments in _SUMMED.items():
-        formats |= {name: natural[total] for name in increments if name not in formats}
+    for total, increment in summed(programs[names[0]]).items():
+        alike = [increment, *(state for state, name in earlier.items() if name == increment)]
+        formats |= {name: natural[total] for name in alike if name not in formats}
     result = []
     for name in names:
         result.append(loop(name, formats))
         formats |= {other: text for other, text in _formats(result[-1]).items() if other not in formats}
     fast, slow, navigation = result
     return fast, slow, navigation
-
-
-def _inputs(kernel: str) -> set[str]:
-    """Return the names of a loop's inputs."""
-    return {signal.name for signal in generated_sources.program(Choice(kernel)).inputs}
 
 
 def _require_inputs(settings: Settings, known: set[str]) -> None:
@@ -221,7 +238,8 @@ def sources(
     if settings is not None:
         command += f" {options(settings)}"
     title = f"Two speeds: {ALGORITHMS[algorithm]}, sculling {SCULLING[sculling]}"
-    return whole(f"{algorithm}-two-speed-{sculling}", title, command, parts)
+    system = description(algorithm, sculling).system
+    return whole(f"{algorithm}-two-speed-{sculling}", title, command, system, parts)
 
 
 def _without_largest_angle(settings: Settings) -> Settings:
