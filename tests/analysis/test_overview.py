@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+import pytest
 import sympy as sp
 
 from strapgen.analysis.overview import choices, methods, overview
@@ -13,6 +14,7 @@ from strapgen.catalogue.methods.windows import WINDOW_TITLES
 from strapgen.reports.error_analysis.overview import overview_text
 
 
+@pytest.mark.long
 def test_rows():
     rows = list(overview([choose("dcm", "rk1", 1), choose("euler", "rk4", 2), choose("euler", "magnus2", 1)]))
     first, fourth, magnus = rows

@@ -97,7 +97,7 @@ def test_pulses_that_cannot_be_counted_are_refused_in_a_later_part():
         part(5, 50)
 
 
-@pytest.mark.parametrize(("previous", "ahead"), [(0, 0), (2, 1)])
+@pytest.mark.parametrize(("previous", "ahead"), [(0, 0), pytest.param(2, 1, marks=pytest.mark.long)])
 @pytest.mark.parametrize("pulse", [None, "1e-4"])
 def test_simulations_and_recordings_run_in_parts(previous, ahead, pulse, request):
     backend = strapgen.backend("euler", "rk4", 1, previous=previous, ahead=ahead)

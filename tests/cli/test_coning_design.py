@@ -132,6 +132,7 @@ def test_wrong_options_get_one_line(run, command, words):
     assert words in error and error.count("\n") == 1
 
 
+@pytest.mark.long
 def test_a_band_too_narrow_for_so_many_samples_is_refused(run):
     status, out, error = run("coning --samples 1 --previous 8 --objective band --band 0.001")
     assert (status, out) == (2, "")

@@ -163,6 +163,7 @@ def test_no_coefficients_nearby_are_better_for_a_spectrum(objective, powers):
             assert cost([c + size * d for c, d in zip(best, direction, strict=True)]) > least
 
 
+@pytest.mark.long
 def test_random_phases_and_noise_are_weighed_by_their_mean_squares():
     """A sum of lines and noise, both drawn many times: the mean square of the drift is what the design minimizes."""
     noise = Fraction(1, 10**5)
@@ -297,6 +298,7 @@ def test_a_spectrum_that_does_not_cone_is_refused():
         of_spectrum(apart, Fraction(100))
 
 
+@pytest.mark.long
 def test_products_of_powers_of_time_are_integrated_exactly():
     """The degree is that of the page on coefficients, which counts what a step of them integrates exactly."""
     plain, exact = (design(ConingBrief(1, 5, "band", BAND, products=n)) for n in (0, 2))

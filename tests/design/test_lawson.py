@@ -19,6 +19,7 @@ def level(shape: Shape, m: int, band: Fraction, taps) -> float:
     return max(magnitude(*e) for e in grid.errors(m, list(map(integer, taps)), shape.previous)) / ONE
 
 
+@pytest.mark.long
 def test_the_noise_gain_of_a_filter_without_samples_ahead_is_the_one_that_is_known():
     (taps,) = lawson.design(Shape(14, 0, 4), [1], BAND)
     assert round(float(sum(tap * tap for tap in taps)) ** 0.5) == 98

@@ -37,7 +37,11 @@ def judged(script: Script, folder) -> tuple[str, str]:
 
 @pytest.mark.parametrize(
     "choice",
-    [EULER, PRODUCT, NORMALIZE, pytest.param(choose("error-matrix"), marks=pytest.mark.long)],
+    [
+        *(pytest.param(choice, marks=pytest.mark.long) for choice in (EULER, choose("error-matrix"))),
+        PRODUCT,
+        NORMALIZE,
+    ],
     ids=lambda choice: choice.name,
 )
 def test_the_error_bound_of_the_header_is_proved_and_is_as_small_as_gappas(choice, tmp_path):

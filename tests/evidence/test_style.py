@@ -82,9 +82,10 @@ def test_nothing_is_in_files_of_any_kind(kind, tmp_path):
 
 
 def every_setting() -> Iterator[tuple[str, dict[str, str]]]:
-    for kernel in KERNELS:
-        for name, settings in SETTINGS.items():
-            if settings.sensor is None or kernel in ("euler", "dcm"):
+    """Yield every setting with two kernels, and with them every kernel."""
+    for row, kernel in enumerate(KERNELS):
+        for column, (name, settings) in enumerate(SETTINGS.items()):
+            if kernel in ("euler", "dcm") if settings.sensor else (row + column) % 3 == 0:
                 yield f"{kernel}/{name}", with_vectors(choose(kernel), "c-fixed", settings)
 
 

@@ -206,6 +206,7 @@ def standing(name: str, multiply: int, drift: float | None) -> Standing:
     return Standing(name, name, "source", 1, multiply, 0, 0, dict.fromkeys(MOTIONS, drift))
 
 
+@pytest.mark.long
 def test_the_frontier_has_a_panel_a_motion_and_labels_for_the_best(figures):
     standings = [
         standing("cheap", 10, 5.0),

@@ -91,16 +91,39 @@ def test_a_matrix_of_zeros_has_no_other_eigenvalues():
 
 def test_coefficients_are_rounded_down_and_their_slack_counts():
     """Halving rounds every mean down: the limit must exceed what the true coefficients may be."""
-    form = bernstein._BernsteinForm(np.array([[3, 4, 4]]), ((Fraction(0), ONE),), 0)
-    lower, upper = form.halves()
-    assert lower.coefficients.tolist() == [[3, 3, 3]]  # 3, 7/2, 15/4
-    assert upper.coefficients.tolist() == [[3, 4, 4]]
-    assert [part.cube for part in (lower, upper)] == [((0, ONE / 2),), ((ONE / 2, ONE),)]
-    assert lower.slack >= 1
+    forms = bernstein._BernsteinForms(np.array([[[3, 4, 4]]]), [((Fraction(0), ONE),)], 0)
+    halves = forms.halves()
+    assert halves.coefficients.tolist() == [[[3, 3, 3]], [[3, 4, 4]]]  # 3, 7/2, 15/4 and 15/4, 4, 4
+    assert halves.cubes == [((0, ONE / 2),), ((ONE / 2, ONE),)]
+    assert halves.slack >= 1
+
+
+def test_of_several_variables_the_longest_is_cut_and_parts_stay_apart():
+    numbers = np.arange(12).reshape(2, 1, 2, 3)
+    cubes = [((Fraction(0), ONE / 2), (low, low + ONE / 2)) for low in (Fraction(0), ONE / 2)]
+    halves = bernstein._BernsteinForms(numbers, cubes, 0).halves()
+    assert [cube[1] for cube in halves.cubes] == [(k * ONE / 4, (k + 1) * ONE / 4) for k in (0, 2, 1, 3)]
+    assert {cube[0] for cube in halves.cubes} == {(0, ONE / 2)}
+    assert halves.coefficients[:2, 0, :, 0].tolist() == numbers[:, 0, :, 0].tolist()
+    assert halves.coefficients[2:, 0, :, 2].tolist() == numbers[:, 0, :, 2].tolist()
 
 
 def test_a_limit_exceeds_coefficients_by_their_slack_and_by_what_rounding_needs():
     """Rounding in double needs 2^-45 of what a coefficient of 2^50 lacks: 32 units, and one."""
-    form = bernstein._BernsteinForm(np.array([[1000, -1000]]), ((Fraction(0), ONE),), 100)
-    assert not form.is_below(1000 + 100 + 33)
-    assert form.is_below(1000 + 100 + 34)
+    whole = [((Fraction(0), ONE),)]
+    forms = bernstein._BernsteinForms(np.array([[[1000, -1000]], [[999, 999]]]), 2 * whole, 100)
+    assert forms.are_below(1000 + 100 + 33).tolist() == [False, True]
+    assert forms.are_below(1000 + 100 + 34).tolist() == [True, True]
+
+
+def test_a_limit_exceeds_all_eigenvalues_of_a_matrix(rng):
+    """A coefficient counts as below if and only if its largest eigenvalue is, away from what rounding needs."""
+    matrices = rng.integers(-(1 << 49), 1 << 49, (40, 4, 4))
+    matrices = np.triu(matrices) + np.swapaxes(np.triu(matrices, 1), 1, 2)
+    rows, columns = np.triu_indices(4)
+    forms = bernstein._BernsteinForms(matrices[:, rows, columns][..., None], 40 * [((Fraction(0), ONE),)], 0)
+    for limit in (1 << 49, 1 << 50):
+        assert (
+            forms.are_below(limit).tolist()
+            == (np.linalg.eigvalsh(matrices.astype(float)).max(axis=1) < limit).tolist()
+        )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -25,15 +26,18 @@ class Ranges:
 
     Parameters
     ----------
-    items : mapping of str to Quantity
+    items : dict of str to Quantity
         The quantities so far; the caller adds each after its range is proved.
     box : mapping of str to Interval
         Range of every element of an input.
     """
 
-    def __init__(self, items: Mapping[str, Quantity], box: Mapping[str, Interval]) -> None:
+    def __init__(self, items: dict[str, Quantity], box: Mapping[str, Interval]) -> None:
         self.items, self.box = items, dict(box)
         self.expanded: dict[str, Terms | None] = {name: {(name,): Fraction(1)} for name in box}
+        # What is known of the items so far: the inputs of each, and whether all are inputs or sums.
+        self._inputs: dict[str, frozenset[str]] = {name: frozenset((name,)) for name in box}
+        self._looked_at, self._sums_alone = 0, True
 
     def of_sum(self, name: str, terms: Terms, seen: float) -> Interval:
         """Return the range of a sum and note its expansion by name; `seen` is its largest magnitude on samples."""
@@ -102,13 +106,14 @@ class Ranges:
         `seen` is the largest magnitude on samples: it tells whether a bit may be gained, and proves nothing.
         """
         bits, lost = math.frexp(seen * (1 + 1e-9))[1], math.frexp(float(enclosure.magnitude))[1]
-        if lost <= bits or any(not isinstance(q.definition, InputElement | Sum) for q in self.items.values()):
+        if lost <= bits or not self._are_sums_alone():
             return enclosure
         goal = Interval.of(Fraction(2) ** bits).low
-        needed = self._needed(definition)
-        names = [n for n in self.box if n in needed]
+        inputs = self._inputs_of(definition)
+        names = [n for n in self.box if n in inputs]
         if not names or 2 ** len(names) > _MOST_BOXES:  # not even a cut of every side in two
             return enclosure
+        needed = self._needed(definition)
         parts = _Parts(self.box, [q for name, q in self.items.items() if name in needed], definition)
         pending, proved, spent = [parts.whole()], Interval(0, 0), 0
         while pending:
@@ -122,6 +127,21 @@ class Ranges:
                 return enclosure
             pending += parts.halves(part, parts.widest(part, names))
         return enclosure.meet(proved)
+
+    def _are_sums_alone(self) -> bool:
+        """Return whether all quantities are inputs or sums, and note the inputs of those that are new."""
+        new = list(itertools.islice(reversed(self.items.values()), len(self.items) - self._looked_at))
+        for quantity in reversed(new):
+            self._sums_alone &= isinstance(quantity.definition, InputElement | Sum)
+            if isinstance(quantity.definition, Sum):
+                self._inputs[quantity.name] = self._inputs_of(quantity.definition)
+        self._looked_at = len(self.items)
+        return self._sums_alone
+
+    def _inputs_of(self, definition: Sum) -> frozenset[str]:
+        """Return the inputs that a sum is made from, directly or not."""
+        names = {name for monomial, _ in definition.terms for name in monomial}
+        return frozenset().union(*(self._inputs.get(name, ()) for name in names))
 
     def _needed(self, definition: Sum) -> set[str]:
         """Return the names that a sum is made from, directly or not."""

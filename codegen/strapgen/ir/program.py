@@ -41,7 +41,7 @@ class Operation:
     kind: str
     arguments: tuple[Node, ...]
 
-    # Trees are deep, share their branches and are looked up often: hash, size and text are worked out once.
+    # Trees are deep, share their branches and are looked up often: hash, size, names and text are worked out once.
     def __hash__(self) -> int:
         return self._hash
 
@@ -53,6 +53,11 @@ class Operation:
     def size(self) -> int:
         """Number of operations in the tree."""
         return 1 + sum(node.size for node in self.arguments if isinstance(node, Operation))
+
+    @cached_property
+    def names(self) -> frozenset[str]:
+        """The names that the tree uses."""
+        return frozenset().union(*map(names_in, self.arguments))
 
     def __repr__(self) -> str:
         return self._text
@@ -102,21 +107,10 @@ OPERATIONS: dict[str, Callable[..., Any]] = {
 
 #: The key of `Program.operations` under which an operation is counted.
 COUNTED_AS = {
-    "add": "add",
-    "subtract": "add",
-    "multiply": "multiply",
-    "divide": "divide",
-    "sqrt": "sqrt",
-    "negate": "negate",
-    "maximum": "select",
-    "select": "select",
+    **{kind: kind for kind in ("add", "multiply", "divide", "sqrt", "negate", "select")},
+    **{"subtract": "add", "maximum": "select"},
     "at_least": None,  # counted with its select
-    "sin": "function",
-    "cos": "function",
-    "sinc": "function",
-    "atan2": "function",
-    "direction": "function",
-    "wrap": "function",
+    **dict.fromkeys(("sin", "cos", "sinc", "atan2", "direction", "wrap"), "function"),
 }
 
 
@@ -206,12 +200,12 @@ class Program:
         for assignment in self.body:
             if assignment.name in known:
                 raise ValueError(f"{self.name}: {assignment.name!r} is assigned twice")
-            unknown = set(references(assignment.value)) - known
-            if unknown:
-                raise ValueError(f"{self.name}: {assignment.name!r} uses {sorted(unknown)} before assignment")
+            if not names_in(assignment.value) <= known:
+                unknown = sorted(names_in(assignment.value) - known)
+                raise ValueError(f"{self.name}: {assignment.name!r} uses {unknown} before assignment")
             known.add(assignment.name)
         for result in self.results:
-            missing = {name for node in result.nodes for name in references(node)} - known
+            missing = set().union(*map(names_in, result.nodes)) - known
             if len(result.nodes) != result.signal.size or missing:
                 raise ValueError(f"{self.name}: {result.signal.name!r} is not computed: {sorted(missing)}")
 
@@ -311,15 +305,11 @@ class Program:
 
     def used(self, results: Iterable[Result] | None = None) -> set[str]:
         """Return the names that some results need, by default all results."""
-        needed = {
-            name
-            for result in (self.results if results is None else results)
-            for node in result.nodes
-            for name in references(node)
-        }
+        results = self.results if results is None else results
+        needed = {name for result in results for node in result.nodes for name in names_in(node)}
         for assignment in reversed(self.body):
             if assignment.name in needed:
-                needed.update(references(assignment.value))
+                needed |= names_in(assignment.value)
         return needed
 
     def transition_program(self) -> Program:
@@ -361,13 +351,13 @@ class Program:
         ahead: list[Assignment] = []
         behind: list[Assignment] = []
         for assignment in self.body:
-            if waiting.isdisjoint(references(assignment.value)):
+            if waiting.isdisjoint(names_in(assignment.value)):
                 ahead.append(assignment)
             else:
                 waiting.add(assignment.name)
                 behind.append(assignment)
-        results = {name for result in self.outputs for node in result.nodes for name in references(node)}
-        needed = results.union(*(references(assignment.value) for assignment in behind)) - waiting
+        results = {name for result in self.outputs for node in result.nodes for name in names_in(node)}
+        needed = results.union(*(names_in(assignment.value) for assignment in behind)) - waiting
         order = [name for signal in self.inputs for name in signal.elements] + [a.name for a in ahead]
         names = tuple(name for name in order if name in needed)
         prepared = Signal("prepared", (len(names),), names, meaning="what depends on the other inputs alone")
@@ -395,6 +385,13 @@ def walk(node: Node) -> Iterator[Node]:
             pending.extend(reversed(node.arguments))
 
 
+def names_in(node: Node) -> frozenset[str]:
+    """Return the names that a node uses."""
+    if isinstance(node, Operation):
+        return node.names
+    return frozenset((node.name,) if isinstance(node, Reference) else ())
+
+
 def references(node: Node) -> Iterator[str]:
-    """Yield the names that a node uses."""
+    """Yield the names that a node uses, each as often as it occurs."""
     return (n.name for n in walk(node) if isinstance(n, Reference))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from strapgen.experiments.comparison import Comparison
-from strapgen.experiments.system_comparison import OutputComparison
+from strapgen.experiments.systems.comparison import OutputComparison
 from strapgen.reports.report import Report
 from strapgen.reports.table import ANGLE, Column, TextTable
 

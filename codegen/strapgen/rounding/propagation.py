@@ -19,6 +19,8 @@ def moved(
 ) -> dict[str, tuple[Fraction, ...]]:
     """Bound how far every output moves when inputs move by at most some errors.
 
+    The bounds hold under the conditions that `rounding_bounds` states for the program, such as a norm near 1.
+
     Parameters
     ----------
     program : Program

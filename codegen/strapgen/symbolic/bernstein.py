@@ -7,10 +7,12 @@ cube brings the coefficients closer to values of the matrix. They are integers, 
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -34,58 +36,71 @@ Cube = tuple[tuple[Fraction, Fraction], ...]
 
 
 @dataclass(frozen=True)
-class _BernsteinForm:
-    """Coefficients on a part of the unit cube: upper triangle, then a side for each variable."""
+class _BernsteinForms:
+    """Coefficients on equal parts of the unit cube: a part, the upper triangle, then a side for each variable."""
 
     coefficients: NDArray[np.int64]
-    cube: Cube
+    cubes: list[Cube]
     #: Units by which a true coefficient may be larger.
     slack: int
 
     @classmethod
-    def of(cls, form: NDArray[Any], unit: Fraction) -> _BernsteinForm:
+    def of(cls, form: NDArray[Any], unit: Fraction) -> _BernsteinForms:
         """Return integers as multiples of a unit, rounded down, on the whole cube."""
         whole = ((Fraction(0), Fraction(1)),) * (form.ndim - 1)
-        return cls((form * unit.denominator // unit.numerator).astype(np.int64), whole, 1)
+        return cls((form * unit.denominator // unit.numerator).astype(np.int64)[None], [whole], 1)
 
-    def is_below(self, limit: int) -> bool:
-        """Tell whether the eigenvalues of all coefficients are below a limit: what they lack of it has none below 0.
+    def are_below(self, limit: int) -> NDArray[np.bool_]:
+        """Tell of each part whether the eigenvalues of its coefficients are below a limit: their lack has none below 0.
 
         A matrix of n rows has none if the Cholesky decomposition in double succeeds after (n + 2) 2^-53 of its trace
         were subtracted from the diagonal (S. M. Rump, BIT 46 (2006) 433-452); here it is 2^-45 of it.
         """
-        size = _size(len(self.coefficients))
-        rows, columns = np.triu_indices(size)
-        flat = self.coefficients.reshape(len(rows), -1)
+        parts, elements = self.coefficients.shape[:2]
+        size = _size(elements)
+        flat = self.coefficients.reshape(parts, elements, -1)
         trace = size * (limit + (1 << _BITS))
         on_diagonal = limit - size * self.slack - (trace >> 45) - 1
-        lack = np.zeros((flat.shape[1], size, size))
-        lack[:, columns, rows] = (np.where(rows == columns, on_diagonal, 0)[:, None] - flat).T
-        try:
-            np.linalg.cholesky(lack)  # of the lower triangle
-        except np.linalg.LinAlgError:
-            return False
-        return True
+        upper = {place: flat[:, number] for number, place in enumerate(_upper_triangle(size))}
+        root: dict[tuple[int, int], NDArray[np.float64]] = {}
+        succeeds = np.ones(flat[:, 0].shape, bool)
+        for j in range(size):
+            for i in range(j, size):
+                left = ((on_diagonal if i == j else 0) - upper[j, i]).astype(np.float64)
+                for k in range(j):
+                    left -= root[i, k] * root[j, k]
+                if i == j:
+                    succeeds &= left > 0
+                    root[j, j] = np.sqrt(np.where(succeeds, left, 1))
+                else:
+                    root[i, j] = left / root[j, j]
+        return np.asarray(succeeds.all(axis=1))
 
-    def halves(self) -> list[_BernsteinForm]:
-        """Return both halves of the cube, cut across its longest side, of equal ones the last."""
-        lengths = [high - low for low, high in self.cube]
+    def halves(self) -> _BernsteinForms:
+        """Return both halves of every part, cut across its longest side, of equal ones the last."""
+        lengths = [high - low for low, high in self.cubes[0]]
         side = max(range(len(lengths)), key=lambda k: (lengths[k], k))
-        means = np.moveaxis(self.coefficients, side + 1, 0)
+        means = np.moveaxis(self.coefficients, side + 2, 0)
         lower, upper = np.empty_like(means), np.empty_like(means)
         for k in range(len(means)):
             lower[k], upper[-1 - k] = means[0], means[-1]
             means = (means[:-1] + means[1:]) >> 1
-        low, high = self.cube[side]
-        ends = ((low, (low + high) / 2), ((low + high) / 2, high))
-        return [
-            _BernsteinForm(
-                np.moveaxis(half, 0, side + 1),
-                (*self.cube[:side], end, *self.cube[side + 1 :]),
-                self.slack + len(half),
-            )
-            for half, end in zip((lower, upper), ends, strict=True)
-        ]
+        ends = ((low, (low + high) / 2, high) for low, high in (cube[side] for cube in self.cubes))
+        cuts = [((low, middle), (middle, high)) for low, middle, high in ends]
+        return _BernsteinForms(
+            np.concatenate([np.moveaxis(half, 0, side + 2) for half in (lower, upper)]),
+            [
+                (*cube[:side], cut[which], *cube[side + 1 :])
+                for which in (0, 1)
+                for cube, cut in zip(self.cubes, cuts, strict=True)
+            ],
+            self.slack + len(lower),
+        )
+
+    def chosen(self, which: NDArray[np.bool_]) -> _BernsteinForms:
+        """Return some of the parts."""
+        cubes = [cube for cube, one in zip(self.cubes, which, strict=True) if one]
+        return _BernsteinForms(self.coefficients[which], cubes, self.slack)
 
 
 def eigenvalue_bounds(
@@ -129,7 +144,7 @@ def eigenvalue_bounds(
     reached = np.array([_reached(form, unit * common, samples) for form, common in forms])
     low, high = (
         _bound(
-            [_BernsteinForm.of(form * sign, unit * common) for form, common in forms],
+            [_BernsteinForms.of(form * sign, unit * common) for form, common in forms],
             int(max(0, (sign * reached).max())),
             known / unit,
             is_outside,
@@ -140,14 +155,14 @@ def eigenvalue_bounds(
 
 
 def _bound(
-    parts: Sequence[_BernsteinForm], reached: int, known: Fraction, is_outside: Callable[[Cube], bool]
+    wholes: Sequence[_BernsteinForms], reached: int, known: Fraction, is_outside: Callable[[Cube], bool]
 ) -> Fraction:
     """Return a number that is not below any eigenvalue, near the largest of the samples if that is proved."""
     for of_reached, of_largest in _ROOMS:
         limit = _short(math.ceil(reached * (1 + of_reached) + (1 << _BITS) * of_largest))
         if limit >= known:
             break
-        if _is_below(parts, limit, is_outside):
+        if _is_below(wholes, limit, is_outside):
             return Fraction(limit)
     return known
 
@@ -192,6 +207,12 @@ def _reached(form: NDArray[Any], unit: Fraction, samples: NDArray[np.float64]) -
     return float(eigenvalues.min()), float(eigenvalues.max())
 
 
+@cache
+def _upper_triangle(size: int) -> list[tuple[int, int]]:
+    """Return the rows and columns of the elements of an upper triangle."""
+    return list(itertools.combinations_with_replacement(range(size), 2))
+
+
 def _size(elements: int) -> int:
     """Return the number of rows of a matrix whose upper triangle has so many elements."""
     return (math.isqrt(8 * elements + 1) - 1) // 2
@@ -203,17 +224,19 @@ def _short(value: int) -> int:
     return -(-value >> dropped) << dropped
 
 
-def _is_below(parts: Sequence[_BernsteinForm], limit: int, is_outside: Callable[[Cube], bool]) -> bool:
+def _is_below(wholes: Sequence[_BernsteinForms], limit: int, is_outside: Callable[[Cube], bool]) -> bool:
     """Tell whether all eigenvalues are proved to be below a limit; False after too many cubes."""
-    pending = list(parts)
-    left = min(_MOST_CUBES, _MOST_COEFFICIENTS // max(part.coefficients.size for part in parts))
-    while pending:
-        part = pending.pop()
-        if is_outside(part.cube):
-            continue
-        if not left:
-            return False
-        left -= 1
-        if not part.is_below(limit):
-            pending += part.halves()
+    left = min(_MOST_CUBES, _MOST_COEFFICIENTS // max(whole.coefficients.size for whole in wholes))
+    for parts in wholes:
+        while True:
+            parts = parts.chosen(np.array([not is_outside(cube) for cube in parts.cubes], bool))
+            if not parts.cubes:
+                break
+            left -= len(parts.cubes)
+            if left < 0:
+                return False
+            pending = ~parts.are_below(limit)
+            if not pending.any():
+                break
+            parts = parts.chosen(pending).halves()
     return True

@@ -10,6 +10,7 @@ first vector and whose xy plane contains the second.
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
@@ -20,7 +21,7 @@ import sympy as sp
 from sympy.polys.matrices import DomainMatrix
 
 from strapgen.symbolic.evaluation import exact
-from strapgen.symbolic.polynomials import Monomial, Polynomial, add, substitute
+from strapgen.symbolic.polynomials import ONE, Monomial, Polynomial, add, substitute
 from strapgen.symbolic.rotations import cross_elements, dot
 
 #: The covariant that a coefficient multiplies: () is a scalar or the unit matrix; (i,) is vector i; (i, j) is the cross
@@ -284,12 +285,12 @@ def transform(decomposition: Decomposition, matrix: list[list[Fraction]]) -> Dec
         """Return a product of old vectors as a sum of products of new ones."""
         total: Polynomial = {}
         for choice in itertools.product(*(expansions[i,].items() for i in covariant)):
-            coefficient = Fraction(1)
-            for _, factor in choice:
-                coefficient *= factor
-            product, sign = canonical(tuple(j for (j,), _ in choice))
+            product, sign = canonical(tuple([j for (j,), _ in choice]))
             if sign:
-                total = add(total, {(product,): coefficient * sign})
+                coefficient = math.prod(
+                    [factor for _, factor in choice[1:]], start=choice[0][1] if choice else ONE[()]
+                )
+                total = add(total, {(product,): coefficient if sign > 0 else -coefficient})
         return total
 
     products: dict[Covariant, Polynomial] = {}

@@ -26,12 +26,18 @@ def add(p: Polynomial, q: Polynomial, factor: Fraction | int = 1) -> Polynomial:
     """Return p + factor q."""
     total = dict(p)
     for monomial, coefficient in q.items():
-        value = total.get(monomial, 0) + factor * coefficient
-        if value:
-            total[monomial] = value
-        else:
-            del total[monomial]
+        _gather(total, monomial, coefficient if factor == 1 else factor * coefficient)
     return total
+
+
+def _gather(total: Polynomial, monomial: Monomial, coefficient: Fraction) -> None:
+    """Add a term to a polynomial in place."""
+    if monomial in total:
+        coefficient = total[monomial] + coefficient
+    if coefficient:
+        total[monomial] = coefficient
+    else:
+        total.pop(monomial, None)
 
 
 def scale(p: Polynomial, factor: Fraction | int) -> Polynomial:
@@ -45,11 +51,7 @@ def multiply(p: Polynomial, q: Polynomial) -> Polynomial:
     for first, a in p.items():
         for second, b in q.items():
             monomial = tuple(sorted(first + second)) if first and second else first or second
-            value = total.get(monomial, 0) + a * b
-            if value:
-                total[monomial] = value
-            else:
-                del total[monomial]
+            _gather(total, monomial, a * b)
     return total
 
 

@@ -9,7 +9,8 @@ from fractions import Fraction
 from strapgen import targets
 from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.fixed_settings import DEFAULT_ANGLE, TURNING, Settings
-from strapgen.ir.signals import Signal
+from strapgen.ir.formats import Format
+from strapgen.ir.signals import CYCLE, Signal
 from strapgen.ir.sources import Sources
 from strapgen.ir.system import Push, SystemStage
 from strapgen.library import generated_sources
@@ -123,7 +124,21 @@ class _Fit:
             except InputError as error:
                 raise InputError(f"stage {stage.name}: {error}") from None
             self._note(stage, self.sources[stage.name])
+        self._check_initial()
         return Fitted(self.description, self.target, self.settings, self.sources, self.arguments)
+
+    def _check_initial(self) -> None:
+        """Check that the values before the first cycle lie inside the ranges of their cells."""
+        for cell in self.description.system.cells:
+            argument = self.arguments.get(cell.name)
+            if argument is None:
+                continue
+            for value in cell.initial:
+                if not argument.low <= argument.format.nearest(value) <= argument.high:
+                    largest = float(argument.high * argument.unit)
+                    raise InputError(
+                        f"{cell.name} begins with {float(value):g}, beyond its range of {largest:g}"
+                    )
 
     def _stage(self, stage: SystemStage) -> Sources:
         """Return the sources of a stage, in the formats of what is wired to it as far as they fit."""
@@ -219,6 +234,9 @@ class _Fit:
         word = stage.word or self.settings.word
         wired: dict[str, str] = {}
         for wire, signal in zip(stage.wires, self._signals(stage), strict=True):
+            if wire.external and self.inputs[wire.source].unit == "1" and signal.over == CYCLE:
+                wired[wire.input] = str(Format(word, 0))  # counts are whole numbers
+                continue
             argument = self.arguments.get(wire.source)
             if argument is None or argument.format.word != word or wire.source in self.pushed:
                 continue

@@ -37,6 +37,7 @@ def evaluators(name, word):
     )
 
 
+@pytest.mark.long
 @each("name", NAMES)
 def test_every_source_states_its_equations_and_where_they_come_from(name):
     kernel = strapgen.derive(name)
@@ -47,7 +48,7 @@ def test_every_source_states_its_equations_and_where_they_come_from(name):
         assert "axes" in signal.meaning or "axis" in signal.meaning or signal.name in NO_FRAME, signal.name
 
 
-@pytest.mark.parametrize("word", [16, 32])
+@pytest.mark.parametrize("word", [pytest.param(16, marks=pytest.mark.long), 32])
 @each("name", NAMES)
 def test_no_error_exceeds_its_bound(name, word, rng):
     fixed = quantized(Choice(name), settings(name, word))

@@ -148,6 +148,7 @@ def as_scanned(W, A, unbalance, error):
     return gyro_torques(W, A, unbalance, error) - sp.Matrix([2 * elastic_y, 0])
 
 
+@pytest.mark.long
 def test_with_the_sign_of_the_scans_figure_20_does_not_follow(monkeypatch):
     monkeypatch.setattr(gyro_model, "gyro_torques", as_scanned)
     structure = error_structure(diagonal_layout(), 1)

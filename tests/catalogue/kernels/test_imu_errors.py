@@ -199,6 +199,7 @@ def test_a_unit_without_errors_needs_no_compensation():
         assert np.abs(missed(0, 1, seed)).max() < 1e-13
 
 
+@pytest.mark.long
 def test_the_errors_of_a_unit_integrated_in_numpy_are_compensated_to_second_order():
     for seed in SEEDS:
         full, half = missed(1, 1, seed), missed(0.5, 1, seed)

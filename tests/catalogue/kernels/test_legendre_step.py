@@ -41,6 +41,7 @@ def test_without_the_highest_coefficients_it_is_that_of_a_lower_degree(degree):
     )
 
 
+@pytest.mark.long
 def test_the_exact_rotation_is_that_of_the_window():
     family = WINDOWS["window-9-9"]
     backend = strapgen.backend("euler", family.name)

@@ -139,13 +139,17 @@ def test_the_gain_of_gx_falls_with_the_difference_of_the_unbalances():
     assert sp.simplify(gain**2 - 2 / (second - third) ** 2) == 0
 
 
-@pytest.mark.parametrize("angles", [(sp.pi / 6, -sp.pi / 3, sp.pi / 4), (sp.pi / 2, 0, sp.pi / 3)])
+@pytest.mark.parametrize(
+    "angles",
+    [pytest.param((sp.pi / 6, -sp.pi / 3, sp.pi / 4), marks=pytest.mark.long), (sp.pi / 2, 0, sp.pi / 3)],
+)
 def test_turning_the_torquers_about_the_spin_changes_neither_determinant_nor_gains(angles):
     gyros = [gyro.turned(angle) for gyro, angle in zip(canonical_layout(), angles, strict=True)]
     assert sp.simplify(sp.Abs(measurement_matrix(gyros, 1).det())) == 2 * B**3
     assert noise_gains(gyros, 1) == noise_gains(canonical_layout(), 1)
 
 
+@pytest.mark.long
 def test_the_determinant_stays_for_any_angle():
     angles = sp.symbols("alpha beta gamma", real=True)
     gyros = [gyro.turned(angle) for gyro, angle in zip(canonical_layout(), angles, strict=True)]
@@ -178,6 +182,7 @@ def test_the_numbers_the_other_way():
     np.testing.assert_allclose(made, np.sqrt(2) / 2 * np.array([-5, 1, 3.5, -2.5, 1, -1]), rtol=1e-15)
 
 
+@pytest.mark.long
 def test_a_layout_of_numbers_against_a_numeric_solution(rng):
     # Any description: each gyro turned, one of them with axes of its own, unbalances as exact numbers.
     gyros = (

@@ -67,7 +67,7 @@ def test_the_term_of_second_order_is_that_of_the_polynomial_through_the_samples(
         ("magnus4", 0, (2, 3), 1.3),
         pytest.param("magnus4", 0, (3, 4), 20 / 13, marks=pytest.mark.long),
         # Samples before the step help as well.
-        ("magnus6", 2, (2, 3), 2),
+        pytest.param("magnus6", 2, (2, 3), 2, marks=pytest.mark.long),
         pytest.param("magnus6", 2, (3, 4), 1, marks=pytest.mark.long),
     ],
 )

@@ -60,10 +60,10 @@ def test_the_rotation_is_that_of_the_polynomial(parts):
 
 
 def test_all_parameters_are_of_the_same_rotation():
-    euler, cayley_klein = transition(EULER, 16), transition(CAYLEY_KLEIN, 16)
+    euler, cayley_klein = transition(EULER, 8), transition(CAYLEY_KLEIN, 8)
     np.testing.assert_allclose(cayley_klein, [euler[3], *euler[:3]], atol=1e-15)
     matrix = rotations.quaternion_matrix(sp.Matrix(euler))
-    np.testing.assert_allclose(np.array(matrix, float), transition(DCM, 16).reshape(3, 3), atol=1e-15)
+    np.testing.assert_allclose(np.array(matrix, float), transition(DCM, 8).reshape(3, 3), atol=1e-15)
 
 
 def test_what_is_cut_off_falls_with_the_order_and_with_the_parts():
@@ -85,6 +85,7 @@ def test_a_constant_rate_about_an_axis_is_an_exponential():
     assert half == pytest.approx([0, 0, math.sin(0.25), math.cos(0.25)], abs=1e-16)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("increments", "previous"), [(1, 1), (3, 0)])
 def test_the_exact_rotation_of_a_fit_is_the_limit_of_the_methods_that_use_it(increments, previous):
     """A Taylor series of high order on few increments is the same polynomial."""
@@ -102,7 +103,9 @@ def test_the_exact_rotation_of_a_fit_takes_increments():
         strapgen.choose("euler", "fit-exact", rates=True)
 
 
-@pytest.mark.parametrize(("increments", "previous", "order"), [(1, 0, 2), (1, 1, 3), (2, 0, 4)])
+@pytest.mark.parametrize(
+    ("increments", "previous", "order"), [(1, 0, 2), (1, 1, 3), pytest.param(2, 0, 4, marks=pytest.mark.long)]
+)
 def test_the_order_of_an_exact_rotation_is_that_of_the_fit(increments, previous, order):
     motion = strapgen.motion("coning", a_rad_s=1, b_rad_s=1.5, g_rad_s=0.6)
     choice = strapgen.choose("euler", "fit-exact", increments, previous=previous)

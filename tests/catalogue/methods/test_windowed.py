@@ -103,6 +103,7 @@ def test_operations_of_a_window_are_few():
     assert (multiply, add) <= (205, 200)
 
 
+@pytest.mark.long
 def test_operations_of_combined_coning_coefficients_counted_alike():
     step = lower(derive("euler", "coning-combined", 3, previous=3)).operations
     normalize = lower(derive("euler-normalize-first-order")).operations

@@ -163,6 +163,7 @@ def test_legendre_coefficients_of_powers_are_those_of_sympy():
         power = product(power, [Fraction(-1, 2), Fraction(1)])
 
 
+@pytest.mark.long
 def test_a_gyro_shows_the_polynomial_that_its_equation_has_for_solution():
     # y + 2 zeta y'/w + y''/w^2 = t^k has one polynomial solution; its increments are the row.
     t = sp.Symbol("t")

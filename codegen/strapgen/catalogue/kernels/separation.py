@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cache
 from typing import Any
 
 import sympy as sp
@@ -175,6 +176,12 @@ def separation_matrix(gyros: Sequence[TwoAxisGyro], sign: int) -> sp.Matrix:
     >>> separation_matrix(canonical_layout(), -1)[0, :]
     Matrix([[0, 0, 1/2, 0, 0, -1/2]])
     """
+    return _separation_matrix(tuple(gyros), sign).as_mutable()
+
+
+@cache
+def _separation_matrix(gyros: tuple[TwoAxisGyro, ...], sign: int) -> sp.ImmutableMatrix:
+    """Return the inverse, which takes seconds, once for each layout."""
     matrix = measurement_matrix(gyros, sign)
     if sp.simplify(matrix.det(method="berkowitz")) == 0:
         motion = [sp.simplify(element) for element in matrix.nullspace(simplify=True)[0]]
@@ -182,7 +189,7 @@ def separation_matrix(gyros: Sequence[TwoAxisGyro], sign: int) -> sp.Matrix:
             f"the layout is singular: no torquer measures the rate {tuple(motion[:3])} together with the acceleration "
             f"{tuple(motion[3:])}; unbalances are {', '.join(str(gyro.unbalance) for gyro in gyros)}"
         )
-    return matrix.inv().applyfunc(sp.simplify)
+    return matrix.inv().applyfunc(sp.simplify).as_immutable()
 
 
 def noise_gains(gyros: Sequence[TwoAxisGyro], sign: int) -> tuple[sp.Expr, ...]:

@@ -53,14 +53,25 @@ def study_system(
             panel="Input",
         ),
     ] = None,
+    cpu: Annotated[
+        str | None,
+        option(
+            "--cpu",
+            metavar="NAME",
+            help="Count the instructions of the C in fixed point on this processor, as strapgen cost does, for "
+            "instance cortex-m3.",
+            panel="Run",
+        ),
+    ] = None,
     fixed: Annotated[FixedOptions, Shown(only=("rounding", "carry", "drift_allowance"))],
     output: Output,
 ) -> None:
     """Run a described system on several back ends, and compare attitude, velocity and position.
 
     A vehicle stands on one spot, turns to and fro, rolls, pitches and vibrates; its sensors send counts. You see how
-    far the other back ends go from C in double, and this from the truth. Differences add up in a closed run, and no
-    bound is known for them; strapgen compare holds each single pass to its bound.
+    far the other back ends go from C in double, and this from the truth, and what memory and load they need, beside
+    those of 1984. Differences add up in a closed run, and no bound is known for them; strapgen compare holds each
+    single pass to its bound.
 
     Example: strapgen study system examples/strapdown.toml --sample-hz 100 --duration 60
     """
@@ -68,9 +79,9 @@ def study_system(
     import math
 
     from strapgen.backends import BACKENDS
-    from strapgen.experiments.system_study import study
-    from strapgen.experiments.turning_vehicle import TurningVehicle
-    from strapgen.reports.system_study import system_study_report
+    from strapgen.experiments.systems.study import study
+    from strapgen.experiments.systems.turning_vehicle import TurningVehicle
+    from strapgen.reports.systems.study import system_study_report
     from strapgen.systems.wiring import described
     from strapgen.vibration.spectrum import read_spectrum
 
@@ -80,5 +91,5 @@ def study_system(
     latitude = math.radians(checks.number("latitude-deg", latitude_deg))
     seconds = checks.number("duration", duration, positive=True)
     vehicle = TurningVehicle(latitude, turning, None if spectrum is None else read_spectrum(spectrum))
-    result = study(described(file, rate), vehicle, seconds, names, fixed.settings(1))
+    result = study(described(file, rate), vehicle, seconds, names, fixed.settings(1), cpu or "")
     output.report(system_study_report(result))

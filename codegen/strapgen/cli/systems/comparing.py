@@ -41,7 +41,7 @@ def compared_system(
     output.check(name, *source.files)
     source.check(of_system=True)
     from strapgen.cli.progress import waiting
-    from strapgen.experiments.system_comparison import compare_system
+    from strapgen.experiments.systems.comparison import compare_system
     from strapgen.reports.comparison import system_comparison_report
 
     description, inputs, title = _inputs(name, source)

@@ -11,7 +11,7 @@ from strapgen.lowering.canonical.plan import Cross, Opened, Plan, Planner, Sides
 from strapgen.lowering.canonical.vectors import (
     Form,
     Pool,
-    components,
+    all_components,
     independent,
     mirrored,
     normalized,
@@ -53,7 +53,7 @@ def plans(core: Core, decomposition: Decomposition) -> list[Plan]:
     bases: list[tuple[int, tuple[Form, ...], Decomposition]] = []
     choices = (c for c in itertools.combinations(forms, count) if len(independent(c)) == count)
     for basis in itertools.islice(choices, 1 + _EXPANSIONS // expansions):
-        moved = transform(decomposition, [components(form, basis) for form in base])
+        moved = transform(decomposition, all_components(base, basis))
         bases.append((_outlook(moved) + 3 * sum(map(_terms, basis)), basis, moved))
     bases.sort(key=lambda entry: entry[0])
     ranked = [

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from operator import add, sub
 
 #: Coefficients of the input vectors.
 Form = tuple[Fraction, ...]
@@ -40,9 +41,9 @@ class Vector:
 
 def proportion(a: Form, b: Form) -> Fraction | None:
     """Return the number c with a = c b, None if there is none."""
-    k = next((k for k, x in enumerate(b) if x), None)
-    if k is None or not a[k]:
+    if not any(b) or any(bool(x) is not bool(y) for x, y in zip(a, b, strict=True)):
         return None
+    k = next(k for k, x in enumerate(b) if x)
     c = a[k] / b[k]
     return c if all(x == c * y for x, y in zip(a, b, strict=True)) else None
 
@@ -79,36 +80,44 @@ def independent(forms: Sequence[Form]) -> list[int]:
 
 
 def components(form: Form, basis: Sequence[Form]) -> list[Fraction]:
-    """Return the components of a form along a basis.
+    """Return the components of a form along a basis, see `all_components`."""
+    return all_components([form], basis)[0]
+
+
+def all_components(forms: Sequence[Form], basis: Sequence[Form]) -> list[list[Fraction]]:
+    """Return the components of each of some forms along a basis.
 
     Parameters
     ----------
-    form : Form
+    forms : sequence of Form
     basis : sequence of Form
         Independent forms.
 
     Returns
     -------
-    list of Fraction
+    list of list of Fraction
 
     Raises
     ------
     ValueError
-        If the basis does not span the form.
+        If the basis does not span a form.
     """
-    rows = [[*column, x] for *column, x in zip(*basis, form, strict=True)]
+    rows = [list(row) for row in zip(*basis, *forms, strict=True)]
     count = len(basis)
     for pivot in range(count):
         k = next(k for k in range(pivot, len(rows)) if rows[k][pivot])
         rows[pivot], rows[k] = rows[k], rows[pivot]
-        rows[pivot] = [x / rows[pivot][pivot] for x in rows[pivot]]
+        if (unit := rows[pivot][pivot]) != 1:
+            rows[pivot] = [x / unit for x in rows[pivot]]
         for other in range(len(rows)):
             if other != pivot and rows[other][pivot]:
                 factor = rows[other][pivot]
-                rows[other] = [x - factor * y for x, y in zip(rows[other], rows[pivot], strict=True)]
-    if any(row[-1] for row in rows[count:]):
-        raise ValueError("the form lies outside the span of the basis")
-    return [rows[k][-1] for k in range(count)]
+                rows[other] = [
+                    x - factor * y if y else x for x, y in zip(rows[other], rows[pivot], strict=True)
+                ]
+    if any(any(row[count:]) for row in rows[count:]):
+        raise ValueError("a form lies outside the span of the basis")
+    return [[row[count + k] for row in rows[:count]] for k in range(len(forms))]
 
 
 class Pool:
@@ -195,8 +204,8 @@ class Pool:
         for k, first in enumerate(names):
             for second in names[k + 1 :]:
                 a, b = self.vectors[first].form, self.vectors[second].form
-                for sign in (1, -1):
-                    factor = proportion(form, tuple(x + sign * y for x, y in zip(a, b, strict=True)))
+                for sign, combined in ((1, map(add, a, b)), (-1, map(sub, a, b))):
+                    factor = proportion(form, tuple(combined))
                     if factor is not None and abs(factor) == 1:
                         return (factor, first), (factor * sign, second)
         return None

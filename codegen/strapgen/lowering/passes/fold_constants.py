@@ -10,10 +10,11 @@ from __future__ import annotations
 from collections import defaultdict
 from dataclasses import replace
 from fractions import Fraction
+from functools import lru_cache
 
-from strapgen.ir.program import OPERATIONS, Constant, Node, Operation, Program, Reference, references, walk
+from strapgen.ir.program import OPERATIONS, Constant, Node, Operation, Program, Reference, names_in, walk
 from strapgen.lowering.names import is_temporary
-from strapgen.lowering.passes.rewriting import rewritten, uses, with_values
+from strapgen.lowering.passes.rewriting import REMEMBERED, rewritten, uses, with_values
 
 _EXACT = ("add", "subtract", "multiply", "divide", "negate")
 
@@ -34,6 +35,7 @@ def fold_constants(program: Program) -> Program:
     return with_values(_scalings_moved(with_values(program, _folded)), _folded)
 
 
+@lru_cache(REMEMBERED)
 def _folded(node: Node) -> Node:
     return rewritten(node, _rule)
 
@@ -122,7 +124,6 @@ def _scalings_moved(program: Program) -> Program:
 
     body = tuple(replace(a, value=moved[a.name][1] if a.name in moved else a.value) for a in program.body)
     body = tuple(
-        replace(a, value=rewritten(a.value, rule)) if moved.keys() & set(references(a.value)) else a
-        for a in body
+        replace(a, value=rewritten(a.value, rule)) if moved.keys() & names_in(a.value) else a for a in body
     )
     return replace(program, body=body)

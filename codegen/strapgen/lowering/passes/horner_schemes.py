@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from functools import lru_cache
 
 from strapgen.ir.program import Constant, Node, Operation, Program
 from strapgen.lowering.arithmetic import horner, operation_count, plain
-from strapgen.lowering.passes.rewriting import with_values
+from strapgen.lowering.passes.rewriting import REMEMBERED, with_values
 from strapgen.symbolic.polynomials import ONE, Polynomial, add, atom, multiply, scale
 
 #: Most terms of a polynomial that is rewritten: expanding a longer one takes long and saves no operations.
@@ -33,6 +34,7 @@ def horner_schemes(program: Program) -> Program:
     return with_values(program, _written)
 
 
+@lru_cache(REMEMBERED)
 def _written(node: Node) -> Node:
     if not isinstance(node, Operation):
         return node

@@ -5,15 +5,20 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
+from operator import is_not
 
 from strapgen.ir.program import Node, Operation, Program, references
+
+#: Outcomes of a pass for single values that are remembered: the candidates of a kernel have most values in common, and
+#: passes run again until nothing changes.
+REMEMBERED = 10_000
 
 
 def rewritten(node: Node, rule: Callable[[Node], Node]) -> Node:
     """Return a node after a rule has been applied to all nodes in it, to arguments before their operation."""
     if isinstance(node, Operation):
-        arguments = tuple(rewritten(argument, rule) for argument in node.arguments)
-        if any(new is not old for new, old in zip(arguments, node.arguments, strict=True)):
+        arguments = tuple([rewritten(argument, rule) for argument in node.arguments])
+        if any(map(is_not, arguments, node.arguments)):
             node = Operation(node.kind, arguments)
     return rule(node)
 
@@ -23,8 +28,8 @@ def with_values(program: Program, change: Callable[[Node], Node]) -> Program:
     body = []
     for assignment in program.body:
         value = change(assignment.value)
-        body.append(assignment if value is assignment.value else replace(assignment, value=value))
-    if all(new is old for new, old in zip(body, program.body, strict=True)):
+        body.append(assignment if value == assignment.value else replace(assignment, value=value))
+    if not any(map(is_not, body, program.body)):
         return program
     return replace(program, body=tuple(body))
 

@@ -9,12 +9,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from itertools import combinations
 
-from strapgen.ir.program import Assignment, Node, Operation, Program, Reference, references
+from strapgen.ir.program import Assignment, Node, Operation, Program, Reference, names_in
 from strapgen.lowering.arithmetic import Term, chain, plain, signed_sum
 from strapgen.lowering.names import is_temporary, shared_names
-from strapgen.lowering.passes.rewriting import rewritten, uses
+from strapgen.lowering.passes.rewriting import REMEMBERED, rewritten, uses
 
 #: The kind of the sum or product, two members, and whether their signs are equal; those of factors always are.
 _Pair = tuple[str, Node, Node, bool]
@@ -37,7 +38,31 @@ class _Entry:
     pairs: Counter[_Pair] = field(init=False)
 
     def __post_init__(self) -> None:
-        self.pairs = _count(self.tree)
+        self.pairs = _pairs_of(self.assignment.value)
+
+
+class _Counts:
+    """In how many sums and products each pair occurs; of thousands of pairs the few that occur twice stand apart."""
+
+    def __init__(self) -> None:
+        self._all: dict[_Pair, int] = {}
+        self._repeated: dict[_Pair, int] = {}
+
+    def add(self, pairs: Counter[_Pair], sign: int = 1) -> None:
+        """Add the pairs of an entry, or take them away."""
+        for pair, number in pairs.items():
+            total = self._all[pair] = self._all.get(pair, 0) + sign * number
+            if total > 1:
+                self._repeated[pair] = total
+            else:
+                self._repeated.pop(pair, None)
+
+    def most_frequent(self) -> _Pair | None:
+        """Return the pair that occurs in most sums or products, the first of several; None if none occurs twice."""
+        most = max(self._repeated.values(), default=0)
+        return min(
+            (pair for pair, number in self._repeated.items() if number == most), key=repr, default=None
+        )
 
 
 def share_pairs(program: Program) -> Program:
@@ -58,21 +83,21 @@ def share_pairs(program: Program) -> Program:
     inlined = _inlined(program)
     names = shared_names(inlined)
     entries = [_Entry(assignment, _flat(assignment.value)) for assignment in inlined.body]
-    counts: Counter[_Pair] = Counter()
+    counts = _Counts()
     for entry in entries:
-        counts.update(entry.pairs)
-    while pair := _most_frequent(counts):
+        counts.add(entry.pairs)
+    while pair := counts.most_frequent():
         name = next(names)
         kind, a, b, equal = pair
         holders = [place for place, entry in enumerate(entries) if pair in entry.pairs]
         for entry in (entries[place] for place in holders):
-            counts.subtract(entry.pairs)
+            counts.add(entry.pairs, -1)
             _replace(entry.tree, pair, Reference(name))
             entry.pairs = _count(entry.tree)
-            counts.update(entry.pairs)
+            counts.add(entry.pairs)
         value = Operation(kind if equal else "subtract", (a, b))
         shared = _Entry(Assignment(name, value), _flat(value))
-        counts.update(shared.pairs)
+        counts.add(shared.pairs)
         entries.insert(holders[0], shared)
     if len(entries) == len(inlined.body):
         return program
@@ -83,7 +108,7 @@ def share_pairs(program: Program) -> Program:
 def _inlined(program: Program) -> Program:
     """Put temporaries that are used once back into the tree that uses them."""
     counts = uses(program)
-    held = {name for result in program.results for node in result.nodes for name in references(node)}
+    held = {name for result in program.results for node in result.nodes for name in names_in(node)}
     values: dict[str, Node] = {}
     body = []
 
@@ -151,18 +176,18 @@ def _pairs(many: _Many) -> Iterator[_Pair]:
             yield many.kind, a, b, one == other
 
 
+@lru_cache(REMEMBERED)
+def _pairs_of(value: Node) -> Counter[_Pair]:
+    """Return in how many sums and products of a value each pair occurs; nobody changes it."""
+    return _count(_flat(value))
+
+
 def _count(tree: Node | _Many) -> Counter[_Pair]:
     """Return in how many sums and products of a tree each pair occurs."""
     counts: Counter[_Pair] = Counter()
     for many in _inside(tree):
         counts.update(set(_pairs(many)))
     return counts
-
-
-def _most_frequent(counts: Counter[_Pair]) -> _Pair | None:
-    """Return the pair that occurs in most sums or products, the first of several; None if none occurs twice."""
-    most = max(counts.values(), default=0)
-    return min((pair for pair, number in counts.items() if number == most), key=repr) if most > 1 else None
 
 
 def _replace(tree: Node | _Many, pair: _Pair, name: Reference) -> None:

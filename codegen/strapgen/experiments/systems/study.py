@@ -11,11 +11,14 @@ from numpy.typing import NDArray
 
 from strapgen import backends
 from strapgen.backends.systems import SystemMemory, SystemRunner, system_runner
-from strapgen.experiments.turning_vehicle import TurningVehicle
+from strapgen.backends.systems.compiled import CompiledSystem
+from strapgen.experiments.systems.cost import measured_budget
+from strapgen.experiments.systems.turning_vehicle import TurningVehicle
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.system import Cell
 from strapgen.simulation import system_inputs
 from strapgen.simulation.system_runs import matrices
+from strapgen.systems.budget import Budget, budget
 from strapgen.systems.wiring import Description
 
 Array = NDArray[np.float64]
@@ -55,12 +58,15 @@ class SystemStudy:
         Angle between the attitude of the reference and the true one in rad; empty without an attitude.
     errors : tuple of NavigationErrors
         Of every other back end against the reference.
+    needs : mapping of str to Budget
+        Memory and operations of the code of each back end in C.
     """
 
     description: Description
     seconds: float
     against_truth: Array
     errors: tuple[NavigationErrors, ...]
+    needs: Mapping[str, Budget]
 
 
 def study(
@@ -69,6 +75,7 @@ def study(
     seconds: Fraction,
     names: Iterable[str],
     settings: Settings | None = None,
+    cpu: str = "",
 ) -> SystemStudy:
     """Run a system on back ends.
 
@@ -82,18 +89,26 @@ def study(
         Back ends; the reference, C in double, is always run.
     settings : Settings, optional
         Settings of fixed point.
+    cpu : str, optional
+        Processor on which the instructions of the C in fixed point are counted; by default they are not.
 
     Raises
     ------
     InputError
         If the system has other inputs, or a back end refuses a sample.
+    CompilerError
+        If the code cannot be measured on the processor.
     """
     inputs = samples(description, vehicle, seconds)
     outputs = Outputs.of(description)
 
+    needs: dict[str, Budget] = {}
+
     def run(name: str) -> tuple[SystemRunner, Mapping[str, Array]]:
         fixed = backends.BACKENDS[name].fixed
         runner = system_runner(description, name, settings if fixed else None)
+        if isinstance(runner, CompiledSystem):
+            needs[name] = measured_budget(runner.fit, cpu) if cpu and fixed else budget(runner.fit)
         return runner, runner.run(inputs, started(runner, outputs, vehicle)).values
 
     runner, values = run(REFERENCE)
@@ -106,7 +121,7 @@ def study(
         attitudes = matrices(outputs.attitude.signal, values[outputs.attitude.name])
         times = np.arange(1.0, len(attitudes) + 1) * float(every / runner.system.sample_hz)
         truth = angles(attitudes, vehicle.attitude(times))
-    return SystemStudy(description, float(seconds), truth, errors)
+    return SystemStudy(description, float(seconds), truth, errors, needs)
 
 
 def samples(description: Description, vehicle: TurningVehicle, seconds: Fraction) -> dict[str, Array]:

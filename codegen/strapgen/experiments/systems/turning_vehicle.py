@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 
 #: Axes east, north, up of those of north, east, down.
 _EAST_NORTH_UP = np.array([[0.0, 1, 0], [1, 0, 0], [0, 0, -1]])
+#: Everything repeats after so many seconds, so that the increments of hours are those of this time.
+_PERIOD = 120
 #: Cycles whose increments are computed together.
 _BLOCK = 1 << 14
 #: Lines that stand for a spectrum, spread evenly in the logarithm of frequency.
@@ -71,7 +73,7 @@ class TurningVehicle:
             * (1 + constants["gravity_increase"] * sine)
             / math.sqrt(1 - constants["eccentricity_squared"] * sine)
         )
-        swing, roll, pitch = 0.5, 0.4, 0.3
+        swing, roll, pitch = (math.tau * turns / _PERIOD for turns in (10, 8, 6))
         self._turn = _Waves(np.array([turn_rate / swing]), np.array([swing]), np.zeros(1))
         self._roll = _Waves(np.array([0.3]), np.array([roll]), np.zeros(1))
         self._pitch = _Waves(np.array([0.15]), np.array([pitch]), np.zeros(1))
@@ -126,9 +128,13 @@ class TurningVehicle:
 
         Gauss's rule integrates each cycle, with enough nodes for the highest frequency of the vibration.
         """
+        once = round(_PERIOD / step)
+        if count > once and math.isclose(once * step, _PERIOD, rel_tol=1e-12):
+            angle, velocity = (np.tile(part, (-(-count // once), 1)) for part in self.increments(step, once))
+            return angle[:count], velocity[:count]
         nodes, weights = np.polynomial.legendre.leggauss(6 + math.ceil(5 * self.highest_hz * step))
-        parts = list(self._blocks(step, count, (1 + nodes) / 2, weights * step / 2))
-        return np.concatenate([a for a, _ in parts]), np.concatenate([v for _, v in parts])
+        blocks = list(self._blocks(step, count, (1 + nodes) / 2, weights * step / 2))
+        return np.concatenate([a for a, _ in blocks]), np.concatenate([v for _, v in blocks])
 
     def _blocks(self, step: float, count: int, nodes: Array, weights: Array) -> Iterator[tuple[Array, Array]]:
         for first in range(0, count, _BLOCK):
@@ -140,7 +146,7 @@ class TurningVehicle:
 def _lines(spectrum: Spectrum, seed: int) -> Iterator[tuple[str, _Waves]]:
     """Return sines with the power of a spectrum, by channel; those of one frequency keep their phases to each other."""
     edges = np.geomspace(spectrum.edges[0], spectrum.edges[-1], _LINES + 1)
-    middle = np.sqrt(edges[:-1] * edges[1:])
+    middle = np.rint(np.sqrt(edges[:-1] * edges[1:]) * _PERIOD) / _PERIOD
     size = np.sqrt(2 * spectrum.densities(middle) * np.diff(edges))
     random = np.random.default_rng(seed).uniform(0, math.tau, _LINES)
     for name, transfer in spectrum.amplitudes(middle).items():

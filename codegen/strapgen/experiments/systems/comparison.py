@@ -11,7 +11,7 @@ import numpy as np
 from strapgen.backends import BACKENDS
 from strapgen.backends.systems import system_runner
 from strapgen.backends.systems.compiled import CompiledSystem
-from strapgen.experiments.system_agreement import PassAgreement, agreement
+from strapgen.experiments.systems.agreement import PassAgreement, agreement
 from strapgen.ir.fixed_settings import Settings
 from strapgen.systems.wiring import Description
 

@@ -6,12 +6,19 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from strapgen.experiments.system_study import NavigationErrors, SystemStudy
+from strapgen.experiments.systems.study import NavigationErrors, SystemStudy
 from strapgen.reports.report import Report
 from strapgen.reports.table import Column, TextTable
+from strapgen.systems.budget import Budget
+from strapgen.targets.lines import fill
 
 _ARCSEC = math.degrees(1) * 3600
 _SPEC = ".3g"
+#: What the papers print, AGARD LS-133.
+_PRINTED = (
+    "printed in 1984: LTR-81 had a Z-8002 with 40,960 bytes of program and 6,144 of scratch for its whole task, and "
+    "the M6800 of the gyro module of LCIGS, with 1,433 bytes of program and 143 of memory, was busy 85 % of the time"
+)
 _HEADERS = (
     ("attitude_arcsec", "largest", "attitude, arcsec"),
     ("attitude_end_arcsec", "at the end", "attitude, arcsec"),
@@ -49,7 +56,22 @@ def _data(study: SystemStudy) -> dict[str, Any]:
         "double_from_truth_arcsec": {"largest": float(truth.max()), "end": float(truth[-1])}
         if truth.size
         else None,
+        "needs": [{"backend": name, **_need(budget)} for name, budget in study.needs.items()],
         "from_double": [{"backend": errors.backend, **_row(errors)} for errors in study.errors],
+    }
+
+
+def _need(needs: Budget) -> dict[str, float | str | None]:
+    """Return memory, code and load of a back end in C."""
+    sizes = [stage.code_bytes for rate in needs.rates for stage in rate.stages]
+    executed = needs.executed_per_second
+    return {
+        "memory_bytes": needs.memory_bytes,
+        "constant_bytes": needs.constant_bytes,
+        "operations_per_s": float(needs.per_second),
+        "cpu": needs.cpu or None,
+        "code_bytes": None if None in sizes else sum(filter(None, sizes)),
+        "instructions_per_s": None if executed is None else float(executed),
     }
 
 
@@ -71,3 +93,18 @@ def _lines(study: SystemStudy) -> Iterator[str]:
         )
     if study.errors:
         yield from ["", "differences from double, in one closed run", "", *_table(study).lines()]
+    yield from ["", *_load(study).lines(), "", *fill(_PRINTED, "", 100).splitlines()]
+
+
+def _load(study: SystemStudy) -> TextTable:
+    """Return memory, code and load of each back end in C."""
+    cpu = next((needs.cpu for needs in study.needs.values() if needs.cpu), "")
+    columns = [Column("back end", "<"), Column("state, bytes"), Column("constants, bytes")]
+    columns += [Column("operations/s", spec=",.0f")]
+    columns += [Column(f"code on {cpu}, bytes"), Column("instructions/s", spec=",.0f")] if cpu else []
+    rows = []
+    for name, needs in study.needs.items():
+        row = _need(needs)
+        measured = [row["code_bytes"], row["instructions_per_s"]] if cpu else []
+        rows.append([name, row["memory_bytes"], row["constant_bytes"], row["operations_per_s"], *measured])
+    return TextTable(columns, rows)
