@@ -61,7 +61,8 @@ def check_order(stages: Sequence[Ports]) -> None:
             )
     if stages[0].text.every != 1 and stages[0].program.companions is None:
         raise InputError(
-            f"stage {stages[0].name}: every is {stages[0].text.every}; the fastest stage has 1, unless it collects samples"
+            f"stage {stages[0].name}: every is {stages[0].text.every}; the fastest stage has 1, unless it "
+            "collects samples"
         )
 
 
