@@ -22,7 +22,10 @@ if TYPE_CHECKING:
 @grouped
 def verify(
     file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="Source or header in C that strapgen generated, or a folder of a system.")
+        Path,
+        typer.Argument(
+            metavar="FILE", help="Source or header in C that strapgen generated, or a folder of a system."
+        ),
     ],
     *,
     source: SampleSource,
@@ -48,7 +51,7 @@ def verify(
     if header is not None:
         from strapgen.cli.systems.verifying import verified_system
 
-        return verified_system(header, source, output)
+        return verified_system(header, source, output, request_of)
     request = request_of(file)
     increments = None
     if source.stated:

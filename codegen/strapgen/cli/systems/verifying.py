@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import shlex
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,14 +18,27 @@ from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
     from strapgen.cli.output import Output
+    from strapgen.library.generation import Request
 
 
-def verified_system(header: Path, source: SampleSource, output: Output) -> None:
-    """Verify the C of a described system, and exit with 1 if it is not what its header says."""
+def verified_system(
+    header: Path, source: SampleSource, output: Output, request_of: Callable[[Path], Request]
+) -> None:
+    """Verify the C of a described system, and exit with 1 if it is not what its header says.
+
+    Parameters
+    ----------
+    header : Path
+        Header of the whole.
+    source : SampleSource
+        Must be empty: a system has no run of its own.
+    output : Output
+    request_of : callable
+        Returns what the command in the header of a stage asks for.
+    """
     if source.stated:
         raise InputError("a motion or a recording does not go with the files of a described system")
     output.check(header)
-    from strapgen.cli.commands.verify import request_of
     from strapgen.cli.progress import waiting
     from strapgen.experiments.system_verification import verify_system
     from strapgen.library.generated_files import command_of, text_of
