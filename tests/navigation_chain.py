@@ -26,7 +26,7 @@ class Navigator:
     """
 
     def __init__(self, earth: Earth, cycle: float, azimuth: str = "wander", level: bool = False) -> None:
-        self.transport = f"transport-rate-{earth.shape}" + ("" if azimuth == "wander" else f"-{azimuth}")
+        self.transport = f"{azimuth}-rate-{earth.shape}"
         self.gravity = f"gravity-{earth.shape}"
         self.level = level
         self.values = {
@@ -48,7 +48,7 @@ class Navigator:
             for name, value in (("state", attitude), ("geographic", geographic), ("velocity", velocity))
         }
         self.values["height"] = np.asarray(height, float)
-        self.values["position"] = self.call("position-from-geographic")
+        self.values["position"] = self.call("position-from-angles")
         self.values["previous"] = self.values["geographic"]
         self.find_rates()
         for rate in ("acceleration", "transport_rate"):
@@ -91,7 +91,7 @@ class Navigator:
 
     def shown(self) -> dict[str, np.ndarray]:
         """Return latitude, longitude, wander angle and heading in degrees, and the velocity to north, east and down."""
-        self.values["previous"] = self.values["geographic"] = self.call("geographic-from-position")
+        self.values["previous"] = self.values["geographic"] = self.call("geographic-angles")
         attitude = self.call("dcm-north-east-down")
         angles = kernel("euler-angles-from-dcm")[0](attitude, np.zeros(3))
         return {

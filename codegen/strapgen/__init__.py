@@ -24,6 +24,8 @@ if _typing.TYPE_CHECKING:
     from strapgen.backends.late_unit import GapError as GapError
     from strapgen.backends.late_unit import SampleKind as SampleKind
     from strapgen.backends.registry import BACKENDS as BACKENDS
+    from strapgen.backends.systems import SystemRunner as SystemRunner
+    from strapgen.backends.systems import system_runner as system_runner
     from strapgen.backends.two_speed import TwoSpeed as TwoSpeed
     from strapgen.catalogue import Choice as Choice
     from strapgen.catalogue import choose as choose
@@ -89,6 +91,7 @@ if _typing.TYPE_CHECKING:
     from strapgen.symbolic.kernel import KernelBuilder as KernelBuilder
     from strapgen.symbolic.kernel import Stage as Stage
     from strapgen.symbolic.kernel import resolution as resolution
+    from strapgen.systems.wiring import read_system as read_system
     from strapgen.targets.registry import TARGETS as TARGETS
     from strapgen.targets.registry import Target as Target
     from strapgen.toolchain.compiler import compile_together as compile_together
@@ -113,6 +116,10 @@ _NAMES = {
         "SampleKind",
     ),
     "backends.registry": ("BACKENDS",),
+    "backends.systems": (
+        "SystemRunner",
+        "system_runner",
+    ),
     "backends.two_speed": ("TwoSpeed",),
     "catalogue": (
         "Choice",
@@ -199,6 +206,7 @@ _NAMES = {
         "Stage",
         "resolution",
     ),
+    "systems.wiring": ("read_system",),
     "targets.registry": (
         "TARGETS",
         "Target",

@@ -99,6 +99,11 @@ def test_numbers_of_a_file_are_exact():
         assert Fraction(family_file.number(value)) == value
 
 
+def test_a_single_sample_is_a_window_too():
+    window = design(FamilyBrief(0, 0, Fraction(1), conditions=1, degree=2))
+    assert window.filters[:2] == ((1,), (0,)) and not window.one_sided + window.start
+
+
 def test_several_samples_take_the_exact_rotation():
     with pytest.raises(InputError, match=r"^rotation is 'fourth'; steps of 2 samples take the exact one$"):
         replace(SMALL, increments=2)

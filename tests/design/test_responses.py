@@ -54,6 +54,15 @@ def test_errors_and_levels_are_those_of_the_definitions(window, gyro):
         assert responses.level(window, m) == pytest.approx(error(window, m, fine).max(), rel=1e-7, abs=1e-14)
 
 
+@pytest.mark.parametrize("increments", [1, 2, 5, 20])
+def test_what_is_to_be_reached_is_the_spherical_bessel_function(increments):
+    b = [0.01, 1.0, 2.0, 3.0]
+    grid = BandGrid([REAL.mpf(each) for each in b], 1, increments=increments)
+    for m in range(9):
+        expected = (-1) ** (m // 2) * increments * (2 * m + 1) * spherical_jn(m, np.array(b) * increments / 2)
+        np.testing.assert_allclose([v / ONE for v in grid.bessel(m)], expected, rtol=1e-9, atol=1e-14)
+
+
 def test_the_noise_gain_is_the_spread_of_a_coefficient():
     window = WINDOWS["window-7-7"]
     assert responses.noise_gain(window, 0) == 1.0

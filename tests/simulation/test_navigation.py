@@ -97,7 +97,7 @@ def test_both_modes_pass_the_pole(azimuth):
 @pytest.mark.parametrize("azimuth", ["wander", "free"])
 def test_the_equations_hold_to_the_last_digit(azimuth, inclination):
     # The classical Runge-Kutta method at 2 s on the kernels' rates, so that only the equations are left to be wrong.
-    names = "earth-rate", "transport-rate-sphere" + ("-free" if azimuth == "free" else ""), "gravity-sphere"
+    names = "earth-rate", f"{azimuth}-rate-sphere", "gravity-sphere"
     earth_rate, transport, gravity = (kernel(name)[0] for name in names)
     constants, coriolis = EARTH.constants, kernel("coriolis-gravity")[0]
     spin = np.array([[0, 0, CIRCLE_RATE], [0, 0, 0], [-CIRCLE_RATE, 0, 0]])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from strapgen.backends.systems import system_runner
-from strapgen.experiments.system_agreement import agreement
+from strapgen.experiments.systems.agreement import agreement
 from strapgen.ir.fixed_settings import Settings
 from strapgen.support.exceptions import InputError
 from strapgen.systems.bounds import bounds

@@ -19,7 +19,7 @@ def _recipe(title: str, module: str, function: str, *arguments: Any) -> Recipe:
 NAVIGATION = {
     "earth-rate": _recipe("earth rate in navigation axes", "rates", "earth_rate"),
     **{
-        f"transport-rate-{shape}" + ("" if azimuth == "wander" else f"-{azimuth}"): _recipe(
+        f"{azimuth}-rate-{shape}": _recipe(
             f"transport rate over {body}, {words}", "rates", "transport_rate", shape, azimuth
         )
         for shape, body in _SHAPES.items()
@@ -36,16 +36,12 @@ NAVIGATION = {
     "velocity-step-level": _recipe("velocity after a cycle, vertical held", "steps", "velocity_step", True),
     "position-step": _recipe("position after a cycle", "steps", "position_step"),
     "height-step": _recipe("height after a cycle", "steps", "height_step"),
-    "geographic-from-position": _recipe(
-        "latitude, longitude and wander angle", "geographic", "geographic_from_position"
-    ),
-    "position-from-geographic": _recipe(
-        "position of latitude, longitude, wander angle", "geographic", "position_from_geographic"
+    "geographic-angles": _recipe("latitude, longitude and wander angle", "geographic", "geographic_angles"),
+    "position-from-angles": _recipe(
+        "position of latitude, longitude, wander angle", "geographic", "position_from_angles"
     ),
     "dcm-north-east-down": _recipe("attitude against north, east, down", "geographic", "north_east_down"),
-    "dcm-from-north-east-down": _recipe(
-        "attitude against navigation axes", "geographic", "north_east_down", True
-    ),
+    "dcm-navigation-axes": _recipe("attitude against navigation axes", "geographic", "north_east_down", True),
     "ground-velocity": _recipe("velocity to north, east and down", "geographic", "ground_velocity"),
     "coarse-leveling": _recipe("coarse alignment: roll and pitch", "alignment", "coarse_leveling"),
     "coarse-azimuth": _recipe("coarse alignment: analytic gyrocompass", "alignment", "coarse_azimuth"),

@@ -46,6 +46,9 @@ OptionalAlgorithm = Annotated[
     ),
 ]
 StepAlgorithm = Annotated[str, _argument("dcm, euler or cayley-klein, or a Python file of your own.")]
+RunAlgorithm = Annotated[
+    str, _argument("dcm, euler or cayley-klein, a Python file of your own, or a described system.")
+]
 CheckedAlgorithm = Annotated[
     str, _argument("dcm, euler or cayley-klein, or a Python file of your own, or one in C or C++.")
 ]
@@ -53,6 +56,7 @@ OptionalStepAlgorithm = Annotated[
     _Text, _argument("dcm, euler or cayley-klein, or a Python file of your own.")
 ]
 TwoSpeedAlgorithm = Annotated[str, _argument("dcm or euler.")]
+StrapdownAlgorithm = Annotated[str, _argument("dcm or euler in two speeds, or a described system.")]
 
 _SHOWN_BACKENDS = "strapgen list backends shows all."
 #: One back end.

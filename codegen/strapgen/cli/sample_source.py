@@ -106,13 +106,30 @@ class SampleSource:
         ),
     ] = None
 
+    specific_force: Annotated[
+        _Text,
+        option(
+            "--specific-force",
+            metavar="X,Y,Z",
+            help="Specific force on a described system in m/s^2, constant in reference axes.  [default: 0,0,0]",
+        ),
+    ] = None
+
     @property
     def stated(self) -> bool:
         """Whether any of the options is stated."""
         return any(getattr(self, field.name) is not None for field in fields(self))
 
-    def check(self) -> None:
-        """Check that there is one source of increments, with the options that go with it and no others."""
+    def check(self, of_system: bool = False) -> None:
+        """Check that there is one source of increments, with the options that go with it and no others.
+
+        Parameters
+        ----------
+        of_system : bool, optional
+            Whether a described system runs, which states its rate itself.
+        """
+        if self.specific_force is not None and not (of_system and self.motion is not None):
+            raise InputError("--specific-force goes with a described system and --motion")
         check_motion(self.motion, RUN_MOTIONS)
         sources = {
             "--motion": self.motion,
@@ -125,7 +142,9 @@ class SampleSource:
         times = {"--step": self.step, "--duration": self.duration}
         if self.motion is None:
             _refuse({"--set": self.settings, **times}, "--motion", chosen[0])
-        elif missing := [name for name, value in times.items() if value is None]:
+        elif missing := [
+            name for name, value in times.items() if value is None and not (of_system and name == "--step")
+        ]:
             raise InputError(f"--motion needs {missing[0]} in s")
         if self.rates_csv is None:
             rates = {"--rate-unit": self.rate_unit, "--resample-hz": self.resample_hz}

@@ -173,13 +173,13 @@ def _gain(b: Any, gyro: GyroResponse | None) -> tuple[int, int]:
     return integer(response.real), integer(response.imag)
 
 
-#: Largest arguments of a Bessel function for steps of one sample, and of the most samples, as powers of two.
-_SMALL, _LARGE = 1, 7
+#: Largest argument of a Bessel function whose power series keeps its digits; a step of one sample has no larger one.
+_SMALL = 2 * ONE
 
 
 @lru_cache
-def _series(m: int, size: int) -> tuple[Any, ...]:
-    """Return the coefficients of x^(m + 2k) in j_m(x) for x up to 2^size."""
+def _series(m: int) -> tuple[Any, ...]:
+    """Return the coefficients of x^(m + 2k) in j_m(x)."""
     coefficients = []
     k = 0
     while True:
@@ -187,20 +187,23 @@ def _series(m: int, size: int) -> tuple[Any, ...]:
         n = m + k
         double_factorial = factorial(2 * n + 1) // (2**n * factorial(n))
         coefficients.append(REAL.mpf((-1) ** k) / (2**k * factorial(k) * double_factorial))
-        if k > 8 and abs(coefficients[-1]) * 2 ** (2 * k * size) < REAL.ldexp(1, -BITS - 24):
+        if k > 8 and abs(coefficients[-1]) * 2 ** (2 * k) < REAL.ldexp(1, -BITS - 24):
             return tuple(coefficients)
         k += 1
 
 
 @lru_cache
-def _series_integers(m: int, size: int) -> tuple[int, ...]:
-    return tuple(map(integer, _series(m, size)))
+def _series_integers(m: int) -> tuple[int, ...]:
+    return tuple(map(integer, _series(m)))
 
 
 def _bessel_integer(m: int, x: int) -> int:
     """Return j_m(x), in integers."""
+    if x > _SMALL:
+        argument = real(x)
+        return integer(REAL.sqrt(REAL.pi / (2 * argument)) * REAL.besselj(REAL.mpf(2 * m + 1) / 2, argument))
     square, value = x * x >> BITS, 0
-    for c in reversed(_series_integers(m, _SMALL if x <= 2 * ONE else _LARGE)):
+    for c in reversed(_series_integers(m)):
         value = (value * square >> BITS) + c
     for _ in range(m):
         value = value * x >> BITS

@@ -95,7 +95,7 @@ class FilterProblem:
                     for (gain, _), row in zip(grid.gains, tables, strict=True)
                 ]
             )
-        rows = list(zip(*single, strict=True))
+        rows = list(zip(*single, strict=True)) or [()] * len(points)
         return Answers(
             [[sum(map(mul, direction, row)) >> BITS for row in rows] for direction in self._directions],
             [

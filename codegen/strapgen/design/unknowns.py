@@ -134,7 +134,7 @@ class Unknowns:
 
     def taps(self, values: Sequence[Any]) -> tuple[Any, ...]:
         """Return the taps of a window, the oldest first, from the values of the unknowns."""
-        row = [values[0] * 0] * self.shape.samples
+        row = [values[0] * 0 if values else Fraction(0)] * self.shape.samples
         for group, value in zip(self.groups, values, strict=True):
             for place, sign in group:
                 row[place] = sign * value

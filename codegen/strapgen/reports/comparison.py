@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from strapgen.experiments.comparison import Comparison
+from strapgen.experiments.systems.comparison import OutputComparison
 from strapgen.reports.report import Report
 from strapgen.reports.table import ANGLE, Column, TextTable
 
@@ -20,6 +21,16 @@ _COLUMNS = (
     Column("ns/step", spec=".1f"),
     Column("bytes"),
     Column("operations", "<"),
+)
+
+
+_SYSTEM_COLUMNS = (
+    Column("", "<"),
+    Column("output", "<"),
+    Column("unit", "<"),
+    Column("run", spec=".3g"),
+    Column("one pass", spec=".3g"),
+    Column("certified", spec=".3g"),
 )
 
 
@@ -105,3 +116,45 @@ def _cells(row: Comparison) -> list[Any]:
         row.bytes,
         ", ".join(f"{number} {kind}" for kind, number in row.operations.items() if number),
     ]
+
+
+def system_comparison_report(rows: Sequence[OutputComparison], title: str, reference: str) -> Report:
+    """Return the outputs of a described system on several back ends as a report.
+
+    Parameters
+    ----------
+    rows : sequence of OutputComparison
+    title : str
+        The system and its run in words.
+    reference : str
+        Back end that the differences are taken from.
+    """
+
+    def table() -> TextTable:
+        names = [field.name for field in fields(OutputComparison)]
+        return TextTable(
+            [Column(name) for name in names], [[getattr(row, name) for name in names] for row in rows]
+        )
+
+    def shown() -> TextTable:
+        return TextTable(
+            _SYSTEM_COLUMNS,
+            [[row.backend, row.output, row.unit, row.run, row.one_pass, row.bound] for row in rows],
+        )
+
+    def text() -> str:
+        lines = [
+            title,
+            f"largest difference of an element from {reference}: over the run, where differences add up, and after",
+            "one pass from equal memories, beside the certified bound of a pass",
+            "",
+            *shown().lines(),
+        ]
+        reasons = dict.fromkeys(
+            f"no bound of {row.output}: {row.reason}"
+            for row in rows
+            if row.one_pass is not None and row.reason
+        )
+        return "\n".join([*lines, *reasons])
+
+    return Report(text, lambda: [row.as_dict() for row in rows], table, shown)

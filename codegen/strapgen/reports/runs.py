@@ -14,7 +14,9 @@ from strapgen.simulation.recording import History
 from strapgen.simulation.runs import Run
 
 if TYPE_CHECKING:
+    from strapgen.ir.signals import Signal
     from strapgen.simulation.courses import Course
+    from strapgen.simulation.system_runs import SystemCourse
 
 AXES = ("x", "y", "z")
 ANGLES = ("roll", "pitch", "heading")
@@ -260,6 +262,53 @@ def course_data(course: Course, settings: dict[str, Any]) -> dict[str, Any]:
         },
         "velocity_changes_m_s": course.velocity_changes.tolist(),
     }
+
+
+def system_course_report(course: SystemCourse, settings: dict[str, Any]) -> Report:
+    """Return the outputs of a described system along a recording as a report."""
+    time, rows = course.rows()
+    units = {name: course.system.cell(name).signal for name in rows}
+    names = [
+        f"{name}_{element}" if signal.unit == "1" else f"{name}_{element}, {signal.unit}"
+        for name, signal in units.items()
+        for element in _places(signal)
+    ]
+    values = np.column_stack([time, *(part.reshape(len(time), -1) for part in rows.values())])
+
+    def table() -> TextTable:
+        return _table(["time_s", *names], values.tolist())
+
+    def text() -> str:
+        shown = _thinned(len(time))
+        lines = [_settings_text(settings)]
+        for name, part in rows.items():
+            signal, flat = units[name], part.reshape(len(time), -1)
+            columns = [_TIME_COLUMN, *(Column(p, spec=".9g", least=15, gap=1) for p in _places(signal))]
+            lines += ["", f"{name}, unit {signal.unit}{f', frame {signal.frame}' if signal.frame else ''}"]
+            lines += TextTable(columns, np.column_stack([time, flat])[shown].tolist()).lines()
+        if len(shown) < len(time):
+            lines.append(f"({len(shown)} of {len(time)} rows; --format csv prints all)")
+        if course.unused:
+            lines.append(f"{course.unused} samples at the end fill no cycle of all rates and were not used")
+        return "\n".join(lines)
+
+    def data() -> dict[str, Any]:
+        outputs = {name: part.tolist() for name, part in rows.items()}
+        return settings | {
+            "unused_samples": course.unused,
+            "time_s": time.tolist(),
+            "units": {name: signal.unit for name, signal in units.items()},
+            "outputs": outputs,
+        }
+
+    return Report(text, data, table, indented=False)
+
+
+def _places(signal: Signal) -> list[str]:
+    """Return short names of the elements of a signal."""
+    if signal.shape == (3, 3):
+        return list(_PLACES)
+    return [element.rpartition("_")[2] for element in signal.elements]
 
 
 def course_text(course: Course, settings: dict[str, Any]) -> str:

@@ -124,7 +124,21 @@ class _Fit:
             except InputError as error:
                 raise InputError(f"stage {stage.name}: {error}") from None
             self._note(stage, self.sources[stage.name])
+        self._check_initial()
         return Fitted(self.description, self.target, self.settings, self.sources, self.arguments)
+
+    def _check_initial(self) -> None:
+        """Check that the values before the first cycle lie inside the ranges of their cells."""
+        for cell in self.description.system.cells:
+            argument = self.arguments.get(cell.name)
+            if argument is None:
+                continue
+            for value in cell.initial:
+                if not argument.low <= argument.format.nearest(value) <= argument.high:
+                    largest = float(argument.high * argument.unit)
+                    raise InputError(
+                        f"{cell.name} begins with {float(value):g}, beyond its range of {largest:g}"
+                    )
 
     def _stage(self, stage: SystemStage) -> Sources:
         """Return the sources of a stage, in the formats of what is wired to it as far as they fit."""

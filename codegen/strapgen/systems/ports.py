@@ -124,6 +124,9 @@ def _check_names(stage: Ports) -> None:
         ("initial", text.initial, {**{s: inputs[s] for s in stage.states}, **outputs}, "state or output"),
         ("formats", text.formats, {**inputs, **outputs}, "input or output"),
     )
+    for name in text.wires:
+        if name in text.constants:
+            raise InputError(f"stage {text.name}: {name} is wired and stated as a constant; one is needed")
     for table, entries, signals, what in tables:
         for name in entries:
             try:

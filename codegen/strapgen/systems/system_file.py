@@ -12,8 +12,11 @@ from typing import Any
 
 from strapgen.ir.fixed_settings import CARRIES
 from strapgen.ir.formats import check_word
+from strapgen.ir.signals import ANY, FRAMES
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
+from strapgen.support.suggestions import alternatives, shown, suggestions, unknown
+from strapgen.systems.reserved import check_names
 
 #: A longer file is refused.
 _MOST_BYTES = 1 << 20
@@ -140,9 +143,12 @@ def read(path: str | Path, sample_hz: Fraction | None = None) -> SystemText:
         raise InputError(f"{path}: {error}") from None
 
 
-def _decimal(text: str) -> Fraction:
-    """Return a number of the file exactly as its decimal digits say."""
-    return checks.number("number", text)
+def _decimal(text: str) -> Fraction | str:
+    """Return a number of the file exactly as its decimal digits say; the text of one that is not finite."""
+    try:
+        return checks.number("number", text)
+    except InputError:
+        return text  # refused where it stands, by name
 
 
 def parsed(tables: Mapping[str, Any], name: str = "system", sample_hz: Fraction | None = None) -> SystemText:
@@ -166,7 +172,7 @@ def parsed(tables: Mapping[str, Any], name: str = "system", sample_hz: Fraction 
     outputs = tables.get("outputs", [])
     if not isinstance(outputs, list) or not all(isinstance(entry, str) for entry in outputs):
         raise InputError('outputs is no list of texts; ["stage.output"] is needed')
-    rate = _positive("sample_hz", tables["sample_hz"])
+    rate = _positive("'sample_hz'", tables["sample_hz"])
     rate = rate if sample_hz is None else sample_hz
     described = SystemText(
         _name("name", tables.get("name", name)),
@@ -186,6 +192,11 @@ def _check_unique(described: SystemText) -> None:
     for name in names:
         if names.count(name) > 1:
             raise InputError(f"the name {name!r} stands twice; every input and stage needs its own name")
+    check_names(
+        described.name,
+        [entry.name for entry in described.inputs],
+        [stage.name for stage in described.stages],
+    )
 
 
 def _input(name: str, value: Any, cycle: Fraction) -> InputText:
@@ -198,11 +209,29 @@ def _input(name: str, value: Any, cycle: Fraction) -> InputText:
     _check_keys(where, table, _INPUT_KEYS, ("unit", "range"))
     return InputText(
         name,
-        checks.text(f"{where}: unit", table["unit"]),
-        checks.text(f"{where}: frame", table.get("frame", "")),
+        _unit(where, table["unit"]),
+        _frame(where, table.get("frame", "")),
         _positive(f"{where}: range", table["range"], cycle),
         checks.text(f"{where}: meaning", table.get("meaning", name.replace("_", " "))),
     )
+
+
+def _unit(where: str, value: Any) -> str:
+    """Return the unit of an input, which is a real one."""
+    unit = checks.text(f"{where}: unit", value)
+    if not unit.strip() or unit == ANY:
+        raise InputError(f"{where}: unit is {unit!r}; a unit is needed, '1' for a pure number")
+    return unit
+
+
+def _frame(where: str, value: Any) -> str:
+    """Return the frame of an input; "" for one that has none."""
+    frame = checks.text(f"{where}: frame", value)
+    if frame and not set(frame.split(" to ", maxsplit=1)) <= set(FRAMES):
+        raise InputError(
+            f"{where}: {unknown('frame', frame, FRAMES, 'an attitude such as b to n, or no frame')}"
+        )
+    return frame
 
 
 def _stage(number: int, value: Any, sample_hz: Fraction) -> StageText:
@@ -245,10 +274,17 @@ def _check_keys(
 ) -> None:
     for key in table:
         if key not in keys:
-            raise InputError(f"{where}: key {key!r} is not known; allowed: {', '.join(keys)}")
+            meant = suggestions("key", key, keys)
+            question = f" (did you mean {alternatives(list(map(repr, meant)))}?)" if meant else ""
+            raise InputError(f"{where}: key {key!r} is not known{question}; allowed: {_quoted(keys)}")
     for key in required:
         if key not in table:
-            raise InputError(f"{where}: {key} is missing; needed: {', '.join(required)}")
+            raise InputError(f"{where}: {key!r} is missing; needed: {_quoted(required)}")
+
+
+def _quoted(keys: tuple[str, ...]) -> str:
+    """Return keys as they stand in a message, which are no options of the command line."""
+    return ", ".join(map(repr, keys))
 
 
 def _name(what: str, value: Any) -> str:
@@ -280,9 +316,16 @@ def _delays(what: str, value: Any) -> dict[str, int]:
 def _every(value: Any, sample_hz: Fraction) -> int:
     """Return the cycles of the fastest rate from one call to the next, of a number or a text as "50 Hz"."""
     match = re.fullmatch(r"([0-9.]+) ?Hz", value) if isinstance(value, str) else None
+    if match is None and not isinstance(value, int):
+        number = float(value) if isinstance(value, Fraction) else value
+        raise InputError(
+            f"every is {shown(number)}; a whole number of cycles is needed, or a text as '50 Hz'"
+        )
     if match is None:
         return checks.count("every", value, largest=MOST_CYCLES)
-    rate = checks.number("every", match[1], positive=True)
+    rate = checks.number("every", match[1])
+    if rate <= 0:
+        raise InputError(f"every is {value!r}; a rate above 0 Hz is needed")
     cycles = sample_hz / rate
     if cycles.denominator != 1:
         raise InputError(
@@ -312,7 +355,7 @@ def _flat(what: str, value: Any, cycle: Fraction) -> list[Fraction]:
 def _quantity(what: str, value: Any, cycle: Fraction) -> Fraction:
     """Return a number, or a product or quotient of numbers and T, the cycle of the stage in s."""
     if isinstance(value, bool) or not isinstance(value, (int, str, Fraction)):
-        raise InputError(f'{what} is {value!r}; a number is needed, or a text as "1/3" or "90*T"')
+        raise InputError(f'{what} is {shown(value)}; a number is needed, or a text as "1/3" or "90*T"')
     if not isinstance(value, str):
         return Fraction(value)
     result, inverse = Fraction(1), False

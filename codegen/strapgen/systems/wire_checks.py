@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 
 from strapgen.ir.signals import CYCLE, Signal
 from strapgen.support.exceptions import InputError
@@ -40,6 +41,8 @@ class Source:
 def check_order(stages: Sequence[Ports]) -> None:
     """Check that stages stand from the fastest to the slowest, and that each rate divides the next.
 
+    The fastest runs in every cycle, unless it is an attitude step that collects the samples of several.
+
     Raises
     ------
     InputError
@@ -56,8 +59,10 @@ def check_order(stages: Sequence[Ports]) -> None:
                 f"stage {stage.name}: every {stage.text.every} is no multiple of the {before.text.every} "
                 f"of {before.name}; rates divide"
             )
-    if stages[0].text.every != 1:
-        raise InputError(f"stage {stages[0].name}: every is {stages[0].text.every}; the fastest stage has 1")
+    if stages[0].text.every != 1 and stages[0].program.companions is None:
+        raise InputError(
+            f"stage {stages[0].name}: every is {stages[0].text.every}; the fastest stage has 1, unless it collects samples"
+        )
 
 
 def check_shape(where: str, needed: Signal, there: Signal) -> None:
@@ -70,15 +75,40 @@ def check_direction(stage: Ports, name: str, source: Source) -> None:
     """Check that a wire to an earlier stage, or to the stage itself, is delayed, and no other is."""
     assert source.stage is not None
     back = source.stage.place >= stage.place
+    if source.stage is stage and name not in stage.text.delay:
+        raise InputError(
+            f"stage {stage.name}: {name} = {source.name!r} comes from the stage itself; state its delay, "
+            f"delay = {{ {name} = 1 }}"
+        )
     if back and name not in stage.text.delay:
         raise InputError(
-            f"stage {stage.name}: {name} = {source.name!r} goes back to an earlier stage; state its delay, "
-            f"delay = {{ {name} = 1 }}"
+            f"stage {stage.name}: {name} = {source.name!r} goes back from a later stage to an earlier one; "
+            f"state its delay, delay = {{ {name} = 1 }}"
         )
     if not back and name in stage.text.delay:
         raise InputError(
             f"stage {stage.name}: delay of {name}, which comes from the earlier stage {source.stage.name}; "
             "only wires that go back are delayed"
+        )
+
+
+def check_undelayed(stage: Ports, name: str, what: str) -> None:
+    """Check that no delay is stated for an input that cannot have one."""
+    if name in stage.text.delay:
+        raise InputError(
+            f"stage {stage.name}: delay of {name}, which is {what}; only wires that go back are delayed"
+        )
+
+
+def check_initial(stage: Ports, name: str, signal: Signal, initial: Sequence[Fraction]) -> None:
+    """Check that the value of a cell before the first cycle lies inside its range."""
+    largest = stage.text.ranges.get(name, signal.bound)
+    if largest is None and signal.constraint:
+        largest = Fraction(1)
+    beyond = next((value for value in initial if largest is not None and abs(value) > largest), None)
+    if largest is not None and beyond is not None:
+        raise InputError(
+            f"stage {stage.name}: initial {name} holds {float(beyond):g}, beyond its range of {float(largest):g}"
         )
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from strapgen.catalogue import Choice
 from strapgen.ir.fixed_settings import TURNING
 from strapgen.ir.program import Program
-from strapgen.ir.signals import ANY, FRAMES, Signal
+from strapgen.ir.signals import ANY, Signal
 from strapgen.ir.system import Cell, DescribedSystem, Push, Rate, SystemStage, Wire
 from strapgen.support.exceptions import InputError
 from strapgen.support.suggestions import unknown
@@ -43,7 +43,7 @@ class Description:
     formats: Mapping[str, Mapping[str, str]]
 
 
-def described(path: str | Path, sample_hz: Fraction | None = None) -> Description:
+def read_system(path: str | Path, sample_hz: Fraction | None = None) -> Description:
     """Read the file of a system and wire it.
 
     Parameters
@@ -68,8 +68,12 @@ def described(path: str | Path, sample_hz: Fraction | None = None) -> Descriptio
         raise InputError(f"{path}: {error}") from None
 
 
+#: The name by which modules of the package call it.
+described = read_system
+
+
 def wired(text: SystemText) -> Description:
-    """Return a described system with its stages wired; parameters and errors are those of `described`."""
+    """Return a described system with its stages wired; parameters and errors are those of `read_system`."""
     stages = [ports(stage, place) for place, stage in enumerate(text.stages)]
     wiring = _Wiring(text, stages)
     wiring.run()
@@ -173,6 +177,7 @@ class _Wiring:
         """Note the states that are those of another stage, and the outputs that replace them."""
         for state in stage.states:
             if state in stage.text.wires:
+                wire_checks.check_undelayed(stage, state, "the same memory as a state of another stage")
                 self.shared[stage.name, state] = self._shared_state(stage, "wires", state)
         for output, reference in stage.text.writes.items():
             if stage.state_of(output) is not None:
@@ -206,12 +211,19 @@ class _Wiring:
         for name, reference in stage.text.wires.items():
             where = f"stage {stage.name}: {name} = {reference!r}"
             signal, source = stage.inputs[name], self._source(where, reference)
-            for what in ("unit", "frame"):
-                needed, there = getattr(signal, what), getattr(source.signal, what)
-                if needed == ANY:
-                    needed = stage.known.setdefault(what, there)
-                if there != needed:
-                    raise InputError(f"{where}: {what} {there or 'none'} meets {what} {needed or 'none'}")
+            self._check_same(where, stage, signal, source)
+        for name, reference in stage.text.writes.items():
+            where = f"stage {stage.name}: writes: {name} = {reference!r}"
+            self._check_same(where, stage, stage.outputs[name], self._source(where, reference))
+
+    def _check_same(self, where: str, stage: Ports, signal: Signal, source: Source) -> None:
+        """Check that unit and frame are the same at both ends of a wire."""
+        for what in ("unit", "frame"):
+            needed, there = getattr(signal, what), getattr(source.signal, what)
+            if needed == ANY:
+                needed = stage.known.setdefault(what, there)
+            if there != needed:
+                raise InputError(f"{where}: {what} {there or 'none'} meets {what} {needed or 'none'}")
 
     def _source(self, where: str, reference: str) -> Source:
         """Return what a reference names: "input", "stage.output" or "stage.state"."""
@@ -220,10 +232,6 @@ class _Wiring:
             if name not in self.described:
                 raise InputError(f"{where}: {unknown('input', name, self.described, 'stage.output')}")
             entry = self.described[name]
-            if entry.frame not in FRAMES:
-                raise InputError(
-                    f"input {name}: frame {entry.frame!r} is not known; allowed: {', '.join(filter(None, FRAMES))}"
-                )
             return Source(
                 name, Signal.scalar(name, unit=entry.unit, frame=entry.frame, meaning=entry.meaning)
             )
@@ -261,6 +269,8 @@ class _Wiring:
     def _add(self, stage: Ports, cell: str, name: str, signal: Signal) -> None:
         output = stage.states.get(name, name)
         initial = stage.text.initial.get(name, stage.text.initial.get(output))
+        if initial is not None:
+            wire_checks.check_initial(stage, name, signal, initial)
         if cell in self.cells or cell in self.described:
             raise InputError(f"stage {stage.name}: {name} would be called {cell} in code, which is taken")
         self.cells[cell] = Cell(
@@ -279,6 +289,7 @@ class _Wiring:
         source = self._source(where, reference)
         many = self._samples(stage, signal, source)
         if source.stage is None:
+            wire_checks.check_undelayed(stage, name, "an input of the system")
             self._add_input(where, reference, signal, many)
         else:
             if not many:

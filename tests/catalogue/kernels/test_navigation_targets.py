@@ -18,7 +18,7 @@ from strapgen.ir.recursion import Recursion
 
 NAMES = [*NAVIGATION]
 #: A quotient with a root, a recursion with error feedback, and functions: compiled in the quick tests.
-SOME = ("transport-rate-ellipsoid", "position-step", "coarse-leveling")
+SOME = ("wander-rate-ellipsoid", "position-step", "coarse-leveling")
 SOME_FIRST = [pytest.param(name, marks=() if name in SOME else pytest.mark.long) for name in NAMES]
 
 

@@ -13,8 +13,8 @@ from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import (
     STEP_OPTIONS,
     FastBackends,
+    RunAlgorithm,
     SeveralMethods,
-    StepAlgorithm,
     backends,
     limit,
     one,
@@ -23,6 +23,7 @@ from strapgen.cli.options import (
 from strapgen.cli.output import Output
 from strapgen.cli.sample_source import SampleSource
 from strapgen.support.exceptions import InputError
+from strapgen.systems.built_in import is_system
 
 if TYPE_CHECKING:
     from strapgen.backends import Backend
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
 
 @grouped
 def compare(
-    algorithm: StepAlgorithm,
+    algorithm: RunAlgorithm,
     *,
     methods: Annotated[SeveralMethods, Shown(only=STEP_OPTIONS)],
     backend: FastBackends = None,
@@ -74,10 +75,20 @@ def compare(
     object code and its operations. Fixed-point formats are chosen for the increments of the run, or for
     --max-rate-deg-s if you give it. --plot draws the angle over time, and the certified bound after as many steps.
 
+    Of a described system you see how far each output departs over the run, and after a single pass from equal memories,
+    beside the certified bound of a pass; the exit status is 1 if one is outside its bound.
+
     Example: strapgen compare euler --method rk4 --increments 2 --backend numpy,c,c-fixed32,c-fixed16 --carry full
     --reference exact --motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 --step 0.125 --duration 180
     """
     output.check(algorithm, *methods.files, *source.files)
+    if is_system(algorithm):
+        from strapgen.cli.systems.comparing import compared_system
+
+        stated = {"--source": files, "--fail-above": fail_above, "--plot": output.plot}
+        others = [name for name, value in stated.items() if value]
+        names = _backends(backend, reference, None)
+        return compared_system(algorithm, methods, names, reference, others, source, fixed, output)
     choices = methods.choices(algorithm)
     names = _backends(backend, reference, files)
     most = limit("--fail-above", fail_above)

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from strapgen.cli.fixed_options import RUN_OPTIONS, FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
-from strapgen.cli.options import STEP_OPTIONS, MethodOptions, OneBackend, StepAlgorithm, one, option
+from strapgen.cli.options import STEP_OPTIONS, MethodOptions, OneBackend, RunAlgorithm, one, option
 from strapgen.cli.output import Output, format_option, plot_option
 from strapgen.cli.sample_source import SampleSource
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
+from strapgen.systems.built_in import is_system
 
 if TYPE_CHECKING:
     from strapgen.backends import Backend
@@ -113,7 +114,7 @@ class RunOutput(Output):
 
 @grouped
 def simulate(
-    algorithm: StepAlgorithm,
+    algorithm: RunAlgorithm,
     *,
     method: Annotated[MethodOptions, Shown(only=(*STEP_OPTIONS, "rates"))],
     backend: OneBackend = "numpy",
@@ -138,9 +139,16 @@ def simulate(
     Example: strapgen simulate euler --method rk4 --increments 2 --backend c --motion coning --set a_deg_s=10 b_deg_s=10
     g_deg_s=10 --step 0.125 --duration 180 --orthonormalize 5 --record 5
 
+    A described system, a built-in one or a file, runs at the rate that it states, or at that of --step; the navigation
+    frame rests.
+
     Example: strapgen simulate dcm --backend c --rates-csv gyro.csv --rate-unit deg/s --resample-hz 100
     --out out/attitude.csv
     """
+    if is_system(algorithm):
+        from strapgen.cli.systems.running import simulated_system
+
+        return simulated_system(algorithm, method, backend, source, intervals, fixed, output)
     choice = method.choose(algorithm)
     from strapgen.backends import BACKENDS
 

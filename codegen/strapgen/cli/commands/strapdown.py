@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
-from strapgen.cli.options import OneBackend, Sculling, TwoSpeedAlgorithm, option, whole
+from strapgen.cli.options import OneBackend, StrapdownAlgorithm, option, whole
 from strapgen.cli.output import Output, format_option, plot_option
 from strapgen.support.exceptions import InputError
+from strapgen.systems.built_in import is_system
 
 if TYPE_CHECKING:
     from strapgen.simulation.courses import NavigationFrame
@@ -42,6 +43,14 @@ class Start:
         ),
     ] = "0,0,0"
 
+    def matrix(self) -> Any:
+        """Return the attitude at the start as a matrix, (3, 3)."""
+        import numpy as np
+
+        from strapgen.backends import evaluator
+
+        return evaluator("dcm-from-euler-angles")(np.radians(_three("--initial-deg", self.initial)))
+
     def frame(self) -> NavigationFrame:
         """Return the navigation frame with the attitude at its start."""
         import numpy as np
@@ -52,26 +61,53 @@ class Start:
         return NavigationFrame(begin, np.radians(_three("--frame-rate-deg-h", self.frame_rate)) / 3600)
 
 
+@dataclass(frozen=True)
+class CycleCounts:
+    """Options of an algorithm in two speeds: the cycles of its loops, and its sculling integral."""
+
+    panel: ClassVar[str] = "Algorithm"
+
+    fast: Annotated[
+        str | None,
+        option("--fast-cycles", metavar="N", help="Number of fast cycles in a slow cycle."),
+    ] = None
+    slow: Annotated[
+        str | None,
+        option(
+            "--slow-cycles", metavar="N", help="Number of slow cycles in a navigation cycle.  [default: 1]"
+        ),
+    ] = None
+    sculling: Annotated[
+        str | None,
+        option(
+            "--sculling",
+            metavar="N",
+            help="Form of the sculling integral: 1 with the rotation compensation, 2 without.  [default: 2]",
+        ),
+    ] = None
+
+    @property
+    def stated(self) -> list[str]:
+        """The options that the command line has."""
+        values = {"--fast-cycles": self.fast, "--slow-cycles": self.slow, "--sculling": self.sculling}
+        return [name for name, value in values.items() if value is not None]
+
+    def counts(self) -> dict[str, int]:
+        """Return the cycles and the form of the sculling integral."""
+        if self.fast is None:
+            raise InputError("--fast-cycles is missing; an algorithm in two speeds needs it")
+        return {
+            "fast_cycles": whole("fast_cycles", self.fast) or 0,
+            "slow_cycles": whole("slow_cycles", self.slow or "1") or 0,
+            "sculling": whole("sculling", self.sculling or "2") or 0,
+        }
+
+
 @grouped
 def strapdown(
-    algorithm: TwoSpeedAlgorithm,
+    algorithm: StrapdownAlgorithm,
     *,
-    fast_cycles: Annotated[
-        str,
-        option(
-            "--fast-cycles", metavar="N", help="Number of fast cycles in a slow cycle.", panel="Algorithm"
-        ),
-    ],
-    slow_cycles: Annotated[
-        str,
-        option(
-            "--slow-cycles",
-            metavar="N",
-            help="Number of slow cycles in a navigation cycle.",
-            panel="Algorithm",
-        ),
-    ] = "1",
-    sculling: Sculling = "2",
+    cycles: CycleCounts,
     backend: OneBackend = "numpy",
     increments: Annotated[
         Path,
@@ -92,10 +128,18 @@ def strapdown(
     navigation cycle you see the attitude as roll, pitch and heading, and the integral of the specific force over the
     cycle in navigation axes. Fixed-point formats are chosen for the recording.
 
+    A described system, a built-in one or a file, takes the rate of the recording, and you see its outputs at the rate
+    of the slowest of them.
+
     Example: strapgen strapdown dcm --increments-csv examples/inertial_log.csv --fast-cycles 4 --slow-cycles 25
     --backend c
     """
     output.check(increments)
+    if is_system(algorithm):
+        from strapgen.cli.systems.along import system_along
+
+        return system_along(algorithm, cycles.stated, backend, increments, start, fixed, output)
+    counts = cycles.counts()
     import numpy as np
 
     from strapgen.reports import plots, runs
@@ -110,9 +154,7 @@ def strapdown(
         covered = course(
             algorithm,
             data,
-            fast_cycles=whole("fast_cycles", fast_cycles) or 0,
-            slow_cycles=whole("slow_cycles", slow_cycles) or 0,
-            sculling=whole("sculling", sculling) or 0,
+            **counts,
             backend=backend,
             settings=settings,
             frame=frame,

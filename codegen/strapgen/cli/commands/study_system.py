@@ -79,8 +79,8 @@ def study_system(
     import math
 
     from strapgen.backends import BACKENDS
-    from strapgen.experiments.system_study import study
-    from strapgen.experiments.turning_vehicle import TurningVehicle
+    from strapgen.experiments.systems.study import study
+    from strapgen.experiments.systems.turning_vehicle import TurningVehicle
     from strapgen.reports.systems.study import system_study_report
     from strapgen.systems.wiring import described
     from strapgen.vibration.spectrum import read_spectrum

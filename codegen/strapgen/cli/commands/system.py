@@ -138,12 +138,12 @@ def _fitted(
     file: Path, target: str, sample_hz: str | None, cpu: str | None, fixed: FixedOptions
 ) -> tuple[Fitted, Budget, str]:
     """Return the generated stages, what they need, and the command that makes the files again."""
-    from strapgen.experiments import system_cost
     from strapgen.experiments.cost import processors
+    from strapgen.experiments.systems import cost as system_cost
     from strapgen.ir.fixed_settings import Settings
     from strapgen.systems.budget import budget
     from strapgen.systems.fitting import fitted
-    from strapgen.systems.wiring import described
+    from strapgen.systems.wiring import read_system
     from strapgen.targets import BUILT_IN, fixed_targets
 
     checks.choice("target", target, BUILT_IN)
@@ -159,7 +159,7 @@ def _fitted(
             raise InputError(f"--cpu goes with targets in C, not with {target}")
         processors(None, [cpu])  # known before the stages are generated
     rate = None if sample_hz is None else checks.number("--sample-hz", sample_hz, positive=True)
-    fit = fitted(described(file, rate), target, settings)
+    fit = fitted(read_system(file, rate), target, settings)
     needs = budget(fit) if cpu is None else system_cost.measured_budget(fit, cpu)
     return fit, needs, _command(file, target, rate, cpu, settings)
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from strapgen.experiments.system_study import NavigationErrors, SystemStudy
+from strapgen.experiments.systems.study import NavigationErrors, SystemStudy
 from strapgen.reports.report import Report
 from strapgen.reports.table import Column, TextTable
 from strapgen.systems.budget import Budget

@@ -19,7 +19,7 @@ ATTITUDE = replace(
 )
 
 
-def geographic_from_position() -> Kernel:
+def geographic_angles() -> Kernel:
     """Return latitude, longitude and wander angle of a position.
 
     Columns z, x, y of C_n^e are a rotation whose heading is longitude, whose pitch is minus latitude and whose roll is
@@ -42,7 +42,7 @@ def geographic_from_position() -> Kernel:
     elements = tuple(f"next_{element}_angle" for element in GEOGRAPHIC.elements)
     build.output(replace(GEOGRAPHIC, name="next", elements=elements), [-dip, longitude, wander])
     return build.kernel(
-        "geographic-from-position",
+        "geographic-angles",
         "Latitude, longitude and wander angle of a position",
         DERIVED,
         recursion=Recursion((("previous", "next"),), kept=("previous",)),
@@ -67,7 +67,7 @@ def _wander(build: KernelBuilder) -> tuple[sp.Symbol, sp.Symbol]:
     return build.value("cos_wander", sp.cos(wander)), build.value("sin_wander", sp.sin(wander))
 
 
-def position_from_geographic() -> Kernel:
+def position_from_angles() -> Kernel:
     """Return the position of latitude, longitude and wander angle, with which a run begins.
 
     Returns
@@ -80,9 +80,7 @@ def position_from_geographic() -> Kernel:
     east, north = sp.Matrix([-so, co, 0]), sp.Matrix([-sl * co, -sl * so, cl])
     up = sp.Matrix([cl * co, cl * so, sl])
     build.output(POSITION, sp.Matrix.hstack(ca * east + sa * north, ca * north - sa * east, up))
-    return build.kernel(
-        "position-from-geographic", "Position of latitude, longitude and wander angle", DERIVED
-    )
+    return build.kernel("position-from-angles", "Position of latitude, longitude and wander angle", DERIVED)
 
 
 def north_east_down(inverse: bool = False) -> Kernel:
@@ -108,7 +106,7 @@ def north_east_down(inverse: bool = False) -> Kernel:
     exchange = sp.Matrix([[sine, cosine, 0], [cosine, -sine, 0], [0, 0, -1]])
     build.output(result, exchange * C)
     return build.kernel(
-        "dcm-from-north-east-down" if inverse else "dcm-north-east-down",
+        "dcm-navigation-axes" if inverse else "dcm-north-east-down",
         f"Attitude against {'navigation axes' if inverse else 'north, east and down'}",
         DERIVED,
     )

@@ -151,7 +151,7 @@ def transport_rate(shape: str, azimuth: str = "wander") -> Kernel:
     if azimuth == "north":
         notes.append(f"Where the cosine of latitude is below {STEEPEST}, y of n does not stay north.")
     return build.kernel(
-        f"transport-rate-{shape}" + ("" if azimuth == "wander" else f"-{azimuth}"),
+        f"{azimuth}-rate-{shape}",
         f"Transport rate over {'a sphere' if shape == 'sphere' else 'an ellipsoid'}, "
         + ("north-slaved" if azimuth == "north" else f"{azimuth} azimuth"),
         DERIVED,

@@ -9,15 +9,15 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen import backends, catalogue
+from strapgen import backends
 from strapgen.backends.systems import SystemMemory, SystemRunner, system_runner
 from strapgen.backends.systems.compiled import CompiledSystem
-from strapgen.experiments.system_cost import measured_budget
-from strapgen.experiments.turning_vehicle import TurningVehicle, counts
+from strapgen.experiments.systems.cost import measured_budget
+from strapgen.experiments.systems.turning_vehicle import TurningVehicle
 from strapgen.ir.fixed_settings import Settings
-from strapgen.ir.signals import CYCLE, Signal
 from strapgen.ir.system import Cell
-from strapgen.support.exceptions import InputError
+from strapgen.simulation import system_inputs
+from strapgen.simulation.system_runs import matrices
 from strapgen.systems.budget import Budget, budget
 from strapgen.systems.wiring import Description
 
@@ -137,49 +137,9 @@ def samples(description: Description, vehicle: TurningVehicle, seconds: Fraction
         If an input is neither, or the time holds no whole cycle of all rates.
     """
     system = description.system
-    cycles = seconds * system.sample_hz
-    if cycles.denominator != 1 or cycles % system.cycle:
-        raise InputError(
-            f"{float(seconds):g} s are no whole number of cycles of the slowest rate, "
-            f"{float(system.cycle / system.sample_hz):g} s"
-        )
-    angle, velocity = _sensed(description, *vehicle.increments(float(1 / system.sample_hz), int(cycles)))
-    result = {}
-    for signal in system.inputs:
-        if signal.frame != "b" or signal.over != CYCLE or signal.shape != (3,):
-            raise InputError(
-                f"input {signal.name} is no increment of a gyro or an accelerometer in body axes"
-            )
-        unit, scale = _measured(description, signal)
-        exact = {"rad": angle, "m/s": velocity}[unit]
-        result[signal.name] = exact if scale is None else counts(exact, scale)
-    return result
-
-
-def _sensed(description: Description, angle: Array, velocity: Array) -> tuple[Array, Array]:
-    """Return increments with the errors that the system compensates."""
-    for stage in description.system.stages:
-        if stage.kernel.startswith("imu-compensate"):
-            constants = dict(description.choices[stage.name].constants)
-            errors = backends.evaluator(catalogue.choose("imu-errors", constants=constants))
-            measured: tuple[Array, Array] = errors(angle, velocity)
-            return measured
-    return angle, velocity
-
-
-def _measured(description: Description, signal: Signal) -> tuple[str, float | None]:
-    """Return the unit of what an input measures, and how much of it a count is."""
-    if signal.unit in ("rad", "m/s"):
-        return signal.unit, None
-    for stage in description.system.stages:
-        takes = any(wire.external and wire.source == signal.name for wire in stage.wires)
-        scale = dict(description.choices[stage.name].constants).get("scale")
-        if takes and scale is not None:
-            unit = description.programs[stage.name].outputs[0].signal.unit
-            return unit, float(scale[0])
-    raise InputError(
-        f"input {signal.name} has unit {signal.unit}; rad, m/s or counts with a constant scale are needed"
-    )
+    cycles = system_inputs.cycles_of(system, seconds)
+    angle, velocity = vehicle.increments(float(1 / system.sample_hz), cycles)
+    return system_inputs.samples(description, angle, velocity)
 
 
 @dataclass(frozen=True)
@@ -230,18 +190,6 @@ def started(runner: SystemRunner, outputs: Outputs, vehicle: TurningVehicle) -> 
             attitude = backends.evaluator("euler-from-dcm")(attitude)
         runner.set(memory, outputs.attitude.name, attitude)
     return memory
-
-
-def matrices(signal: Signal, values: Array) -> Array:
-    """Return attitudes as direction cosine matrices, (N, 3, 3)."""
-    if signal.size == 9:
-        return values.reshape(-1, 3, 3)
-    if signal.size == 4:
-        converted: Array = backends.evaluator("dcm-from-euler")(values)
-        return converted
-    raise InputError(
-        f"{signal.name} has {signal.size} elements; Euler parameters or direction cosines are needed"
-    )
 
 
 def angles(one: Array, other: Array) -> Array:

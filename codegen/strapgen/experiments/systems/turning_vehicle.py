@@ -143,12 +143,6 @@ class TurningVehicle:
             yield np.einsum("cnk,n->ck", rate, weights), np.einsum("cnk,n->ck", force, weights)
 
 
-def counts(increments: Array, unit: float) -> Array:
-    """Return the whole counts that a sensor sends for exact increments, with what is left over carried on."""
-    total = np.rint(np.cumsum(increments, axis=0) / unit)
-    return np.diff(total, axis=0, prepend=np.zeros((1, 3)))
-
-
 def _lines(spectrum: Spectrum, seed: int) -> Iterator[tuple[str, _Waves]]:
     """Return sines with the power of a spectrum, by channel; those of one frequency keep their phases to each other."""
     edges = np.geomspace(spectrum.edges[0], spectrum.edges[-1], _LINES + 1)

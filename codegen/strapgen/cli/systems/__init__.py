@@ -1,0 +1,1 @@
+"""What commands do with a described system in place of an algorithm."""

@@ -1,0 +1,48 @@
+"""`strapdown` with a described system: its outputs along an inertial recording."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from strapgen.cli.systems.running import described_along, facts_of, refuse_options, runner_of
+from strapgen.support.exceptions import InputError
+
+if TYPE_CHECKING:
+    from strapgen.cli.commands.strapdown import CourseOutput, Start
+    from strapgen.cli.fixed_options import FixedOptions
+
+
+def system_along(
+    name: str,
+    others: list[str],
+    backend: str,
+    increments: Path,
+    start: Start,
+    fixed: FixedOptions,
+    output: CourseOutput,
+) -> None:
+    """Run a described system along a recording, and deliver its outputs."""
+    refuse_options(None, fixed, [*others, *([] if output.plot is None else ["--plot"])])
+    if start.frame_rate != "0,0,0":
+        raise InputError(
+            "--frame-rate-deg-h does not go with a described system, whose navigation frame rests"
+        )
+    fixed.check_backend(backend)
+    output.check(name, increments)
+    from strapgen.cli.progress import waiting
+    from strapgen.reports.runs import system_course_report
+    from strapgen.simulation import recording
+    from strapgen.simulation.system_runs import begun, system_course
+
+    data = recording.read_inertial(increments)
+    runner = runner_of(described_along(name, data), backend, fixed)
+    memory = None
+    if start.initial != "0,0,0":
+        memory, _ = begun(runner, start.matrix())
+    with waiting(f"running {name}"):
+        course = system_course(runner, data, memory)
+    facts = facts_of(runner, name) | {"source": str(increments)}
+    format = output.format or ("text" if output.file is None else "csv")
+    replace(output, format=format).report(system_course_report(course, facts))

@@ -1,0 +1,75 @@
+"""`compare` with a described system: its outputs on several back ends, beside the bounds of one pass."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from strapgen.cli.systems.running import (
+    described_along,
+    described_at,
+    force_of,
+    recorded,
+    refuse_options,
+)
+from strapgen.support import checks
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from strapgen.cli.fixed_options import FixedOptions
+    from strapgen.cli.options import SeveralMethods
+    from strapgen.cli.output import Output
+    from strapgen.cli.sample_source import SampleSource
+    from strapgen.systems.wiring import Description
+
+
+def compared_system(
+    name: str,
+    methods: SeveralMethods,
+    names: list[str],
+    reference: str,
+    others: list[str],
+    source: SampleSource,
+    fixed: FixedOptions,
+    output: Output,
+) -> None:
+    """Compare a described system on back ends, and exit with 1 if a pass is outside its bound."""
+    refuse_options(methods, fixed, others)
+    output.check(name, *source.files)
+    source.check(of_system=True)
+    from strapgen.cli.progress import waiting
+    from strapgen.experiments.systems.comparison import compare_system
+    from strapgen.reports.comparison import system_comparison_report
+
+    description, inputs, title = _inputs(name, source)
+    with waiting(f"running {name}"):
+        rows = compare_system(description, names, reference, inputs, fixed.settings(1))
+    output.report(system_comparison_report(rows, f"{name}: {title}", reference))
+    broken = [f"{row.output} on {row.backend}" for row in rows if row.share is not None and row.share > 1]
+    if broken:
+        typer.echo(f"strapgen: outside the certified bound: {', '.join(broken)}", err=True)
+        raise typer.Exit(1)
+
+
+def _inputs(name: str, source: SampleSource) -> tuple[Description, dict[str, NDArray[Any]], str]:
+    """Return the system, the samples of its inputs, and where they come from in words."""
+    import numpy as np
+
+    from strapgen.simulation.system_inputs import cycles_of, samples, velocity_increments
+
+    if source.motion is None:
+        data = recorded(source)
+        description = described_along(name, data)
+        angle = np.asarray(data.increments)
+        return description, samples(description, angle, np.zeros_like(angle)), Path(source.file).name
+    description, profile = described_at(name, source), source.profile()
+    seconds = checks.number("duration", source.duration or "", positive=True)
+    system = description.system
+    count, interval = cycles_of(system, seconds), 1 / system.sample_hz
+    angle = profile.samples(interval, 0, count)
+    velocity = velocity_increments(profile.attitude, force_of(source.specific_force), interval, count)
+    title = f"{source.described(profile.name, ' motion')}, {count} cycles of {float(interval):.6g} s"
+    return description, samples(description, angle, velocity), title

@@ -1,0 +1,114 @@
+"""Compares a described system on several back ends: along a run, and pass by pass with the certified bounds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from strapgen.backends import BACKENDS
+from strapgen.backends.systems import system_runner
+from strapgen.backends.systems.compiled import CompiledSystem
+from strapgen.experiments.systems.agreement import PassAgreement, agreement
+from strapgen.ir.fixed_settings import Settings
+from strapgen.systems.wiring import Description
+
+
+@dataclass(frozen=True)
+class OutputComparison:
+    """An output of a system on a back end beside a reference.
+
+    Parameters
+    ----------
+    backend, output, unit : str
+    run : float
+        Largest difference of an element over the run, in the unit.
+    one_pass : float or None
+        Largest difference of an element after one pass from equal memories; None for a back end that runs no C.
+    bound : float or None
+        Certified bound of that difference; None where there is none.
+    share : float or None
+        Largest difference of one pass as a part of its bound.
+    reason : str
+        Why there is no bound.
+    """
+
+    backend: str
+    output: str
+    unit: str
+    run: float
+    one_pass: float | None
+    bound: float | None
+    share: float | None
+    reason: str
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the comparison as plain JSON data."""
+        return asdict(self)
+
+
+def compare_system(
+    description: Description,
+    names: Iterable[str],
+    reference: str,
+    inputs: Mapping[str, Any],
+    settings: Settings | None = None,
+) -> list[OutputComparison]:
+    """Run a system on back ends over the same samples and compare its outputs with those of a reference.
+
+    Parameters
+    ----------
+    description : Description
+    names : iterable of str
+        Keys of `strapgen.backends.BACKENDS`.
+    reference : str
+        Such a key; "exact" shows all rounding.
+    inputs : mapping of str to array, (cycles, shape)
+        Samples in SI units.
+    settings : Settings, optional
+        Word, rounding and error feedback in fixed point where a stage states none.
+
+    Returns
+    -------
+    list of OutputComparison
+        By back end and output. Differences add up over a run, and no bound is known for them; every single pass keeps
+        the bound of `strapgen.systems.bounds`.
+
+    Raises
+    ------
+    InputError
+        If a name is not known, or a stage refuses a sample.
+    """
+    other = system_runner(description, reference, settings if BACKENDS[reference].fixed else None)
+    expected = other.run(inputs).values
+    rows = []
+    for name in names:
+        runner = system_runner(description, name, settings if BACKENDS[name].fixed else None)
+        values = runner.run(inputs).values
+        passes: PassAgreement | None = None
+        if isinstance(runner, CompiledSystem):
+            passes = agreement(runner, other, inputs)
+        for output in runner.system.outputs:
+            difference = float(np.abs(values[output] - expected[output]).max(initial=0))
+            unit = runner.system.cell(output).signal.unit
+            rows.append(_row(name, output, unit, difference, passes))
+    return rows
+
+
+def _row(
+    backend: str, output: str, unit: str, difference: float, passes: PassAgreement | None
+) -> OutputComparison:
+    if passes is None:
+        return OutputComparison(backend, output, unit, difference, None, None, None, "it runs no C")
+    return OutputComparison(
+        backend,
+        output,
+        unit,
+        difference,
+        passes.largest[output],
+        passes.certified.get(output),
+        passes.share.get(output),
+        passes.reasons.get(output, ""),
+    )
