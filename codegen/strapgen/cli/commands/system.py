@@ -71,7 +71,7 @@ def system(
     ] = None,
     format: Format = "text",
 ) -> None:
-    """Check a described system, show what it needs, and generate its code.
+    """Check a described system and generate its code.
 
     Without --out you get a summary: rates, values with their units, frames, formats and error bounds, and the budget.
 
