@@ -212,7 +212,7 @@ BAD_STEPS = [
     (
         "increments = 2\nevery = 2",
         "increments = 2\nevery = 4",
-        "a step takes 2 increments of every 1; every 2 is needed",
+        "a step takes 2 samples of every 1, so that its every is 2, not 4",
     ),
     (
         "delay = { state = 1 }\n",
