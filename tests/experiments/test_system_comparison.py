@@ -8,10 +8,10 @@ from fractions import Fraction
 
 import pytest
 from small_systems import COUNTING
+from strapgen.experiments.system_comparison import compare_system
 
 from strapgen.cli import main
 from strapgen.experiments import system_comparison
-from strapgen.experiments.system_comparison import compare_system
 from strapgen.simulation.motions import motion
 from strapgen.simulation.system_inputs import samples, velocity_increments
 from strapgen.systems.wiring import described
