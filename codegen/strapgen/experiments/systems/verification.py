@@ -57,7 +57,9 @@ def system_header(place: Path) -> Path | None:
     headers = sorted(path for path in place.glob("*.h") if _is_system(path))
     if len(headers) != 1:
         names = ", ".join(path.name for path in headers) or "none"
-        raise InputError(f"{place} holds {names} of the headers of strapgen system; a folder with one is needed")
+        raise InputError(
+            f"{place} holds {names} of the headers of strapgen system; a folder with one is needed"
+        )
     return headers[0]
 
 
