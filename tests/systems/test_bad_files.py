@@ -306,6 +306,7 @@ def test_a_file_that_is_no_description_is_refused_in_one_line(content, message, 
     "words, message",
     [
         ("nowhere.toml", "nowhere.toml cannot be read (No such file or directory)"),
+        ("two-speed-dmc", "system 'two-speed-dmc' is not known (did you mean two-speed-dcm"),
         (".", ". cannot be read (Is a directory)"),
         ("a*/b.toml", "FILE holds */"),
         (

@@ -28,7 +28,11 @@ if TYPE_CHECKING:
 def system(
     file: Annotated[
         Path,
-        typer.Argument(metavar="FILE", help="TOML file with the stages and their wires.", show_default=False),
+        typer.Argument(
+            metavar="FILE",
+            help="TOML file with the stages and their wires, or the name of a built-in system.",
+            show_default=False,
+        ),
     ],
     *,
     target: Annotated[
