@@ -158,7 +158,7 @@ def test_list(strapgen_says):
     assert list(data["algorithms"]) == ["dcm", "euler", "cayley-klein"]
     assert list(data["methods"].items()) == list(catalogue.METHODS.items())
     assert data["vectors"].keys() == catalogue.VECTORS.keys()
-    assert data["kernels"].keys() == catalogue.KERNELS.keys()
+    assert data["kernels"].keys() == {**catalogue.KERNELS, **catalogue.LAYOUT_KERNELS}.keys()
     assert list(data["motions"]) == [
         *("constant", "sinusoidal", "coning", "polynomial"),
         *("cone", "random", "slew", "ramps", "vibration"),
