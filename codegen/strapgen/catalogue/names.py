@@ -9,6 +9,7 @@ from strapgen.catalogue.methods.tableaux import TITLES
 from strapgen.catalogue.methods.windows import EXACT_TERMS, WINDOW_TITLES
 from strapgen.catalogue.navigation_names import NAVIGATION
 from strapgen.catalogue.recipe import Recipe
+from strapgen.catalogue.redundancy_names import REDUNDANCY
 
 #: Attitude algorithms, by the state they integrate.
 ALGORITHMS = {
@@ -347,6 +348,7 @@ KERNELS = {
     **TWO_SPEED,
     **COMPENSATION,
     **NAVIGATION,
+    **REDUNDANCY,
 }
 
 
