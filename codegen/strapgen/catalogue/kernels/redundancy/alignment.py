@@ -85,8 +85,8 @@ def boresight() -> Kernel:
     Returns
     -------
     Kernel
-        Inputs ``attitude_a`` and ``attitude_b`` (3, 3), C_A^n and C_B^n, ``mean`` (3, 3), a state, and ``share``, 1/k in
-        alignment k; output ``next_mean``. `dcm-orthonormalize-optimal` makes a rotation of the mean.
+        Inputs ``attitude_a`` and ``attitude_b`` (3, 3), C_A^n and C_B^n, ``mean`` (3, 3), a state, and ``share``, 1/k
+        in alignment k; output ``next_mean``. `dcm-orthonormalize-optimal` makes a rotation of the mean.
     """
     build = KernelBuilder()
     attitudes = [

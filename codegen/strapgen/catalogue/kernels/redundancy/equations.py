@@ -10,6 +10,7 @@ import sympy as sp
 from strapgen.catalogue.kernels.redundancy.geometry import HEXAD, SensorGeometry, Triad
 from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import CYCLE, Signal, after
+from strapgen.support import checks
 from strapgen.symbolic.kernel import Kernel, KernelBuilder
 
 SEBRING = (
@@ -31,12 +32,18 @@ class SensorSet:
         A key of `KINDS`.
     range : Fraction
         Largest increment of a cycle that a sensor measures, in rad or m/s.
+    command : str
+        The command that generates its kernels, if that is not ``strapgen generate``.
     """
 
     name: str
     geometry: SensorGeometry
     sensor: str = "gyro"
     range: Fraction = Fraction(1, 8)
+    command: str = ""
+
+    def __post_init__(self) -> None:
+        checks.choice("sensor", self.sensor, KINDS)
 
     @property
     def unit(self) -> str:
@@ -120,7 +127,12 @@ def parity(sensors: SensorSet = HEXAD_SET) -> Kernel:
     build = KernelBuilder()
     m = build.input(sensors.measurement(sensors.all_sensors))
     build.output(sensors.parity, sp.Matrix(sensors.geometry.equations) * m)
-    return build.kernel(f"parity-{sensors.name}", "Parity equations", _source("null vectors", sensors))
+    return build.kernel(
+        f"parity-{sensors.name}",
+        "Parity equations",
+        _source("null vectors", sensors),
+        arguments=sensors.command,
+    )
 
 
 def parity_rest(sensors: SensorSet = HEXAD_SET) -> Kernel:
@@ -159,6 +171,7 @@ def parity_rest(sensors: SensorSet = HEXAD_SET) -> Kernel:
         f"parity-rest-{sensors.name}",
         "Parity without its mean at rest",
         _source("mean", sensors),
+        arguments=sensors.command,
         recursion=Recursion(((bias.name, after(bias).name),), kept=(bias.name,)),
     )
 
@@ -185,6 +198,7 @@ def triad(number: int, sensors: SensorSet = HEXAD_SET) -> Kernel:
         triad_name(one, sensors),
         f"Vector of the sensors {', '.join(map(str, one.sensors))}",
         _source("inverse", sensors),
+        arguments=sensors.command,
         notes=(f"Noise of 1 on all sensors is {gain_text(one)} in x, y and z.",),
     )
 
@@ -211,7 +225,10 @@ def all_sensors(sensors: SensorSet = HEXAD_SET) -> Kernel:
     m = build.input(sensors.measurement(sensors.all_sensors))
     build.output(sensors.increment, _matrix(sensors.geometry.least_squares) * m)
     return build.kernel(
-        f"all-{sensors.name}", "Vector of all sensors, least squares", _source("least squares", sensors)
+        f"all-{sensors.name}",
+        "Vector of all sensors, least squares",
+        _source("least squares", sensors),
+        arguments=sensors.command,
     )
 
 

@@ -1,4 +1,4 @@
-"""Axes of redundant sensors in exact numbers: parity equations, triads with their noise, and failures that they tell."""
+"""Axes of redundant sensors in exact numbers: parity equations, triads with noise, and failures that they tell."""
 
 from __future__ import annotations
 

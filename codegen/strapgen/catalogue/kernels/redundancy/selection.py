@@ -57,15 +57,15 @@ def select(sensors: SensorSet = HEXAD_SET) -> Kernel:
     out = build.stage(
         _flags("out", "out", labels, "sensors that do not count"), [_flag(x - _HALF) for x in excluded]
     )
-    fails = []
-    for number, equation in enumerate(geometry.equations):
-        invalid = sum(out[k] for k in sensors.all_sensors if equation[k]) - _HALF
-        tripped = sp.Abs(p[number]) - trip[number] >= 0
-        fails.append(sp.Piecewise((0, invalid >= 0), (1, tripped), (0, True)))
     names = list(map(equation_label, geometry.equations))
-    fail = build.stage(_flags("fail", "f", names, "equations that fail"), fails)
+    fail = build.stage(
+        _flags("fail", "f", names, "equations that fail"),
+        [_fails(e, p[k], trip[k], out) for k, e in enumerate(geometry.equations)],
+    )
     counts = [sum(fail[k] for k, e in enumerate(geometry.equations) if e[s]) for s in sensors.all_sensors]
-    count = build.stage(Signal.labelled("count", "n", labels, meaning="failing equations of a sensor"), counts)
+    count = build.stage(
+        Signal.labelled("count", "n", labels, meaning="failing equations of a sensor"), counts
+    )
     total = build.value("total", sum(fail), "failing equations")
     candidates = [
         sp.Piecewise((0, _HALF - total >= 0), (1, n - total + _HALF >= 0), (0, True)) for n in count
@@ -81,9 +81,7 @@ def select(sensors: SensorSet = HEXAD_SET) -> Kernel:
         Signal.labelled("cost", "cost", labels, meaning="what speaks against a sensor"),
         [n + penalty * (o + f) for n, o, f in zip(count, out, isolated, strict=True)],
     )
-    best = _number_of_least(
-        build, [sum(cost[k] for k in triad.sensors) for triad in geometry.triads]
-    )
+    best = _number_of_least(build, [sum(cost[k] for k in triad.sensors) for triad in geometry.triads])
     build.output(
         Signal.scalar("detected", meaning="whether an equation fails: 1 or 0"), [_flag(total - _HALF)]
     )
@@ -95,11 +93,18 @@ def select(sensors: SensorSet = HEXAD_SET) -> Kernel:
         f"select-{sensors.name}",
         "Failed sensor and selected triad",
         f"{SEBRING}, tables by failure directions described, rule derived",
+        arguments=sensors.command,
         notes=(
             "Triads are numbered from 0 by their noise, then by the numbers of their sensors.",
             "Without a single suspect no sensor is isolated; detected is 1 all the same.",
         ),
     )
+
+
+def _fails(equation: tuple[int, ...], parity: sp.Symbol, trip: sp.Symbol, out: sp.Matrix) -> sp.Expr:
+    """Return 1 where an equation fails that needs no sensor that is out, else 0."""
+    invalid = sum(out[sensor] for sensor, value in enumerate(equation) if value) - _HALF
+    return sp.Piecewise((0, invalid >= 0), (1, sp.Abs(parity) - trip >= 0), (0, True))
 
 
 def _number_of_least(build: KernelBuilder, costs: list[sp.Expr]) -> sp.Expr:
