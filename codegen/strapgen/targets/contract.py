@@ -48,7 +48,7 @@ def _counts_text(argument: Argument, sensor: Sensor) -> str:
 
 
 def generating(program: Program) -> str:
-    """Return the command that generates a program, up to the target: ``strapgen generate``, or a whole one of its own."""
+    """Return the command that generates a program, up to the target: ``strapgen generate`` or its own."""
     stated = program.arguments
     return stated if stated.startswith("strapgen ") else f"strapgen generate {stated}"
 
