@@ -47,7 +47,7 @@ def redundancy(
     output: Annotated[SourceOptions, Shown(only=("force",))],
     format: Format = "text",
 ) -> None:
-    """Derive parity equations, triads and failure tables of redundant sensors.
+    """Derive what redundant sensors tell of their failures.
 
     Components of an axis are exact: whole numbers, decimals, or texts such as "2/3". You see the parity equations in
     integers, the noise of every triad, and how many failures are isolated. With --out you get the code of all: parity,

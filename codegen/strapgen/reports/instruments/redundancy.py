@@ -54,7 +54,7 @@ def redundancy_image(sensors: SensorSet, rows: Sequence[Outcomes], path: str | P
     figure, grid = figures.grid_of_axes(1, len(groups), (2.0 + 3.6 * len(groups), 4.2), sharey=True)
     for axes, (removed, group) in zip(grid[0], groups.items(), strict=True):
         _draw(axes, group)
-        axes.set_title(f"{removed} sensors removed", loc="left", fontsize=10)
+        axes.set_title(f"sensors removed before: {removed}", loc="left", fontsize=10)
         axes.set_xlabel("failure, trip levels")
     grid[0][0].set_ylabel("share of the trials")
     figures.common_legend(figure, list(grid[0]), loc="outside right center")
