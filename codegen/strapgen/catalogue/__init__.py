@@ -30,6 +30,7 @@ from strapgen.catalogue.names import (
 )
 from strapgen.catalogue.navigation_names import NAVIGATION
 from strapgen.catalogue.recipe import Recipe
+from strapgen.catalogue.redundancy_names import REDUNDANCY
 
 __all__ = [
     "ALGORITHMS",
@@ -42,6 +43,7 @@ __all__ = [
     "MOST_INCREMENTS",
     "MOTIONS",
     "NAVIGATION",
+    "REDUNDANCY",
     "RESERVED",
     "RUN_MOTIONS",
     "STANDARD_METHODS",
