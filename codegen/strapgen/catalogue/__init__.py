@@ -28,6 +28,7 @@ from strapgen.catalogue.names import (
     StepVector,
 )
 from strapgen.catalogue.navigation_names import NAVIGATION
+from strapgen.catalogue.output_names import OUTPUTS, TWO_ROWS
 from strapgen.catalogue.recipe import Recipe
 
 __all__ = [
@@ -40,9 +41,11 @@ __all__ = [
     "MOST_INCREMENTS",
     "MOTIONS",
     "NAVIGATION",
+    "OUTPUTS",
     "RESERVED",
     "RUN_MOTIONS",
     "STANDARD_METHODS",
+    "TWO_ROWS",
     "TWO_SPEED",
     "UPDATE_ORDERS",
     "VECTORS",

@@ -8,6 +8,7 @@ from strapgen.catalogue.methods.shaped_coning import SHAPE_TITLES
 from strapgen.catalogue.methods.tableaux import TITLES
 from strapgen.catalogue.methods.windows import EXACT_TERMS, WINDOW_TITLES
 from strapgen.catalogue.navigation_names import NAVIGATION
+from strapgen.catalogue.output_names import OUTPUTS, TWO_ROWS
 from strapgen.catalogue.recipe import Recipe
 
 #: Attitude algorithms, by the state they integrate.
@@ -347,6 +348,8 @@ KERNELS = {
     **TWO_SPEED,
     **COMPENSATION,
     **NAVIGATION,
+    **OUTPUTS,
+    **TWO_ROWS,
 }
 
 
