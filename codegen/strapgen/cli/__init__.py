@@ -28,6 +28,8 @@ from strapgen.cli.commands import (
     statements,
     strapdown,
     study,
+    study_attitude_form,
+    study_output_filter,
     study_system,
     system,
     tableau,
@@ -89,6 +91,8 @@ class _Strapgen(PlainGroup):
 
 
 study.app.command("system", cls=PlainCommand)(study_system.study_system)
+study.app.command("attitude-form", cls=PlainCommand)(study_attitude_form.study_attitude_form)
+study.app.command("output-filter", cls=PlainCommand)(study_output_filter.study_output_filter)
 
 app = typer.Typer(
     name="strapgen",

@@ -86,8 +86,11 @@ def butterworth() -> Kernel:
     build = KernelBuilder()
     s1, s2, x = map(build.input, (FIRST, SECOND, SAMPLE))
     loss, coupling, square = map(build.scalar, (LOSS, COUPLING, SQUARE))
-    build.output(after(FIRST), s1 + 2 * (coupling * x - coupling * s2 - loss * s1))
-    later = build.output(after(SECOND), s2 + 2 * (coupling * s1 + square * x - square * s2))
+    # Named, so that a constant passes unchanged: sample and state have one and the same coefficient in every word.
+    meaning = "sample less the second state"
+    apart = build.stage(replace(SAMPLE, name="apart", elements=_named("apart"), meaning=meaning), x - s2)
+    build.output(after(FIRST), s1 + 2 * (coupling * apart - loss * s1))
+    later = build.output(after(SECOND), s2 + 2 * (coupling * s1 + square * apart))
     filtered = replace(
         SAMPLE, name="filtered", elements=_named("y"), meaning="the sample, filtered, any axes"
     )
