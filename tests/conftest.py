@@ -19,6 +19,7 @@ from gathering import SEED
 import strapgen
 from strapgen.backends import BACKENDS, Backend
 from strapgen.catalogue import ALGORITHMS
+from strapgen.evidence.subjects import Subject
 from strapgen.ir.fixed_settings import Settings
 from strapgen.reports.plots import figures
 from strapgen.toolchain import compiler
@@ -54,6 +55,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def _is_of_cayley_klein(value: object) -> bool:
+    if isinstance(value, Subject):  # whose name is derived
+        value = value.choice
     return str(getattr(value, "name", value)).startswith("cayley-klein")
 
 

@@ -253,6 +253,7 @@ LONG_COMMANDS = (
     "strapgen statements",
     "strapgen strapdown dcm ",
     "strapgen study ",
+    "strapgen system ",
     "strapgen tables",
     "strapgen two-speed dcm --target c-fixed",
     "strapgen two-speed euler ",
@@ -313,8 +314,9 @@ def test_no_command_writes_into_the_checkout_what_git_does_not_ignore():
     for command in (command for page in pages for command in shown_commands(page.read_text())):
         words = shlex.split(command)
         for option, value in pairwise(words):
-            if option in ("--out", "--plot") and value != "-":
-                written[f"{value}/file.c" if words[1] in writers else value] = command
+            if option in ("--out", "--plot", "--draw") and value != "-":
+                is_folder = option == "--out" and words[1] in (*writers, "system")
+                written[f"{value}/file.c" if is_folder else value] = command
         assert words[1] not in writers or {"--out", "--all"} & {*words}, command
     assert len(written) >= 9
     assert [written[path] for path in not_ignored(written)] == []

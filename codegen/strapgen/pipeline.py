@@ -23,7 +23,10 @@ from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.support.timing import timed
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from strapgen.catalogue.choice import AnyMethod
+    from strapgen.catalogue.layout import Layout
     from strapgen.symbolic.kernel import Kernel
 
 
@@ -55,6 +58,7 @@ def derive(
     previous: int | None = None,
     ahead: int | None = None,
     constants: Mapping[str, Any] | None = None,
+    layout: str | Path | Layout | None = None,
 ) -> Kernel:
     """Derive an algorithm exactly.
 
@@ -74,6 +78,8 @@ def derive(
     constants : mapping of str to number, or to an array or nested sequence of numbers, optional
         Values of inputs of a kernel that is no attitude algorithm, in their units and row by row, by name. These are
         then no inputs; what is multiplied by zero vanishes.
+    layout : path or Layout, optional
+        Of the kernels "separate" and "torques": the TOML file that describes the three gyros.
 
     Raises
     ------
@@ -91,8 +97,8 @@ def derive(
     """
     if not isinstance(algorithm, Choice):
         stages.require("derive", algorithm, str, os.PathLike, Choice)
-        algorithm = catalogue.choose(algorithm, method, increments, rates, previous, ahead, constants)
-    elif (method, increments, rates, previous, ahead, constants) != (None, None, False, None, None, None):
+        algorithm = catalogue.choose(algorithm, method, increments, rates, previous, ahead, constants, layout)
+    elif rates or any(x is not None for x in (method, increments, previous, ahead, constants, layout)):
         raise InputError(f"the choice of {algorithm.kernel} is complete; derive takes it alone")
     with timed("derive", algorithm.kernel):
         return catalogue.derive(algorithm)

@@ -5,9 +5,9 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: 949e088ab57f2f09.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
- *     2, inverted; largest element first as in S. W. Shepperd, J. Guidance and Control 1
- *     (1978) 223-224.
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 2,
+ *     inverted; largest element first as in S. W. Shepperd, J. Guidance and Control 1 (1978)
+ *     223-224.
  * The scalar part of the result is not negative.
  * Operations of one call: 13 add, 8 multiply, 1 divide, 1 sqrt, 16 select; 18 temporaries.
  * Rounding: no bound is known, because rounding may turn a comparison in column_s.

@@ -5,8 +5,8 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: c402fe625de7279b.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
- *     2: a1 = e4, a2 = e1, a3 = e2, a4 = e3.
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 2: a1 =
+ *     e4, a2 = e1, a3 = e2, a4 = e3.
  * Operations of one call: none; 0 temporaries.
  * Rounding: none, every output is exact.
  *

@@ -5,8 +5,8 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: 16820e440d72949f.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
- *     3 C: x / sqrt(x . x).
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 3 C: x
+ *     / sqrt(x . x).
  * The state must not be zero.
  * Operations of one call: 3 add, 8 multiply, 1 divide, 1 sqrt; 1 temporaries.
  * Rounding: against exact arithmetic on the same inputs, next is off by at most 1.20353e-15,

@@ -5,8 +5,8 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: 2996307c838f07a4.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
- *     2: dU/dt = (i/2) (w . s) U, s the Pauli matrices.
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 2:
+ *     dU/dt = (i/2) (w . s) U, s the Pauli matrices.
  * Operations of one call: 12 add, 16 multiply; 0 temporaries.
  * Rounding: against exact arithmetic on the same inputs, next is off by at most 1.33227e-15, 6
  *     units in the last place of 1. This holds for state, transition up to 1.0625; IEEE 754,

@@ -5,8 +5,8 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: 41a8b7d5f6e8b5fa.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
- *     2: dU/dt = (i/2) (w . s) U, s the Pauli matrices; rate extraction chapter 3 A; Euler's
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 2:
+ *     dU/dt = (i/2) (w . s) U, s the Pauli matrices; rate extraction chapter 3 A; Euler's
  *     method: thesis, chapter 3 B.
  * Operations of one call: 15 add, 18 multiply; 3 temporaries.
  * Rounding: against exact arithmetic on the same inputs, next is off by at most 5.04805e-16,

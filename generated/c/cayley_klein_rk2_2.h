@@ -5,8 +5,8 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: 20c10c94f24ebd25.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
- *     2: dU/dt = (i/2) (w . s) U, s the Pauli matrices; rate extraction chapter 3 A; Heun's
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 2:
+ *     dU/dt = (i/2) (w . s) U, s the Pauli matrices; rate extraction chapter 3 A; Heun's
  *     method: thesis, chapter 3 B.
  * Operations of one call: 27 add, 33 multiply; 12 temporaries.
  * Rounding: against exact arithmetic on the same inputs, next is off by at most 7.55283e-16,

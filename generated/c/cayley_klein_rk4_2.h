@@ -6,8 +6,8 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: 3ced9f68a3cfefa7.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
- *     2: dU/dt = (i/2) (w . s) U, s the Pauli matrices; rate extraction chapter 3 A; classical
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 2:
+ *     dU/dt = (i/2) (w . s) U, s the Pauli matrices; rate extraction chapter 3 A; classical
  *     fourth-order Runge-Kutta method: thesis, chapter 3 B.
  * Operations of one call: 30 add, 38 multiply; 14 temporaries.
  * Rounding: against exact arithmetic on the same inputs, next is off by at most 6.88787e-16,

@@ -5,8 +5,8 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: 79f3f6bba2497f38.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
- *     4 B and appendix A.
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 4 B and
+ *     appendix A.
  * Operations of one call: 11 add, 28 multiply, 1 sqrt, 2 negate, 4 function; 22 temporaries.
  * Rounding: no bound is known, because the range of time is not known.
  *

@@ -5,8 +5,7 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: 40e18d9b78203a7f.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
- *     4 B.
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 4 B.
  * Operations of one call: 3 multiply; 0 temporaries.
  * Rounding: no bound is known, because the range of middle is not known.
  *

@@ -5,8 +5,8 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: ce17d6c6afc617d1.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), appendix
- *     B, equation (B.4) in terms of the computed matrix.
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, appendix B,
+ *     equation (B.4) in terms of the computed matrix.
  * Made for a matrix near a rotation: all products of its transpose and itself near the identity.
  * Operations of one call: 36 add, 51 multiply; 12 temporaries.
  * Rounding: against exact arithmetic on the same inputs, orthonormalized is off by at most

@@ -5,8 +5,8 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: 5660e375a974ebf2.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
- *     2, equation (2.1): dC/dt = C skew(w).
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 2,
+ *     equation (2.1): dC/dt = C skew(w).
  * Operations of one call: 18 add, 27 multiply; 0 temporaries.
  * Rounding: against exact arithmetic on the same inputs, next is off by at most 7.77157e-16, 3.5
  *     units in the last place of 1. This holds for state, transition up to 1.0625; IEEE 754,

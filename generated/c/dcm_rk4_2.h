@@ -6,9 +6,9 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: cd779f7a780da099.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
- *     2, equation (2.1): dC/dt = C skew(w); rate extraction chapter 3 A; classical
- *     fourth-order Runge-Kutta method: thesis, chapter 3 B.
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 2,
+ *     equation (2.1): dC/dt = C skew(w); rate extraction chapter 3 A; classical fourth-order
+ *     Runge-Kutta method: thesis, chapter 3 B.
  * Operations of one call: 63 add, 74 multiply; 36 temporaries.
  * Rounding: against exact arithmetic on the same inputs, next is off by at most 1.02622e-15,
  *     4.62168 units in the last place of 1; the row of the error after N steps is at most

@@ -5,9 +5,9 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: 6d4a6161af6d24e2.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
- *     2: de/dt = 1/2 e (w, 0), quaternion product; rate extraction chapter 3 A; Euler's
- *     method: thesis, chapter 3 B.
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 2:
+ *     de/dt = 1/2 e (w, 0), quaternion product; rate extraction chapter 3 A; Euler's method:
+ *     thesis, chapter 3 B.
  * Operations of one call: 15 add, 18 multiply; 3 temporaries.
  * Rounding: against exact arithmetic on the same inputs, next is off by at most 5.04805e-16,
  *     2.27344 units in the last place of 1; the error after N steps is at most 9.34825e-16 N

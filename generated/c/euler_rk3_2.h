@@ -5,8 +5,8 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: 25045322dd22ef11.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
- *     2: de/dt = 1/2 e (w, 0), quaternion product; rate extraction chapter 3 A; Kutta's
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 2:
+ *     de/dt = 1/2 e (w, 0), quaternion product; rate extraction chapter 3 A; Kutta's
  *     third-order method: W. Kutta, Z. Math. Phys. 46 (1901) 435-453.
  * Operations of one call: 37 add, 45 multiply; 18 temporaries.
  * Rounding: against exact arithmetic on the same inputs, next is off by at most 8.32292e-16,

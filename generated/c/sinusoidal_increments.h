@@ -5,8 +5,7 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: ca3d3dd36329d86b.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
- *     4 B.
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 4 B.
  * Operations of one call: 6 multiply, 2 function; 0 temporaries.
  * Rounding: no bound is known, because the range of middle is not known.
  *

@@ -6,8 +6,8 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: 5d9a9ca146866665.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
- *     3 C: x / sqrt(x . x).
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 3 C: x
+ *     / sqrt(x . x).
  * The state must not be zero.
  * Integer operations of one call: 7 add, 8 multiply, 4 shift, 1 divide, 1 sqrt; 3 temporaries.
  *

@@ -6,8 +6,8 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: 4c8d08e877da733f.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
- *     2: dU/dt = (i/2) (w . s) U, s the Pauli matrices.
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 2:
+ *     dU/dt = (i/2) (w . s) U, s the Pauli matrices.
  * Integer operations of one call: 16 add, 16 multiply, 4 shift; 0 temporaries.
  *
  * A number in format Qm.n is an integer times 2^-n. Rounding: nearest. No sum or product on the

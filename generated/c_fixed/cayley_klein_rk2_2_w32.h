@@ -6,8 +6,8 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: 6fb75d6dbd473e03.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
- *     2: dU/dt = (i/2) (w . s) U, s the Pauli matrices; rate extraction chapter 3 A; Heun's
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 2:
+ *     dU/dt = (i/2) (w . s) U, s the Pauli matrices; rate extraction chapter 3 A; Heun's
  *     method: thesis, chapter 3 B.
  * Integer operations of one call: 39 add, 29 multiply, 10 shift; 12 temporaries.
  *

@@ -7,8 +7,8 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: 9353801be53654e3.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
- *     2: dU/dt = (i/2) (w . s) U, s the Pauli matrices; rate extraction chapter 3 A; classical
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 2:
+ *     dU/dt = (i/2) (w . s) U, s the Pauli matrices; rate extraction chapter 3 A; classical
  *     fourth-order Runge-Kutta method: thesis, chapter 3 B.
  * Integer operations of one call: 51 add, 37 multiply, 25 shift; 15 temporaries.
  *

@@ -6,8 +6,7 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: 9ab332dc4f435e73.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
- *     2.
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 2.
  * The result is |state|^2 times a rotation: a rotation for a state of length 1.
  * Integer operations of one call: 22 add, 10 multiply, 9 shift; 14 temporaries.
  *

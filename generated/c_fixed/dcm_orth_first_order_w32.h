@@ -6,8 +6,8 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: dd9ee7b9abf71ac4.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), appendix
- *     B, equation (B.4) in terms of the computed matrix.
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, appendix B,
+ *     equation (B.4) in terms of the computed matrix.
  * Made for a matrix near a rotation: all products of its transpose and itself near the identity.
  * Integer operations of one call: 51 add, 45 multiply, 21 shift; 12 temporaries.
  *

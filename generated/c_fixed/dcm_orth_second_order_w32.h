@@ -6,8 +6,8 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: 9c3f3a5fbb2337d6.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), appendix
- *     B, equation (B.14) in terms of the computed matrix.
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, appendix B,
+ *     equation (B.14) in terms of the computed matrix.
  * Made for a matrix near a rotation: all products of its transpose and itself near the identity.
  * Integer operations of one call: 84 add, 63 multiply, 45 shift; 24 temporaries.
  *

@@ -6,8 +6,8 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: 12957cce8c942f53.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
- *     3 C, subroutine ORTHO.
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 3 C,
+ *     subroutine ORTHO.
  * Made for a matrix near a rotation: all products of its transpose and itself near the identity.
  * Integer operations of one call: 42 add, 36 multiply, 36 shift, 3 divide, 3 sqrt; 18
  *     temporaries.

@@ -7,8 +7,8 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: b679bcd3dbd213f3.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
- *     2, equation (2.1): dC/dt = C skew(w); rate extraction chapter 3 A; Kutta's third-order
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 2,
+ *     equation (2.1): dC/dt = C skew(w); rate extraction chapter 3 A; Kutta's third-order
  *     method: W. Kutta, Z. Math. Phys. 46 (1901) 435-453.
  * Integer operations of one call: 105 add, 72 multiply, 57 shift; 42 temporaries.
  *

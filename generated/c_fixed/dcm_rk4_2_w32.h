@@ -7,9 +7,9 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: 708d031defcfbb70.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
- *     2, equation (2.1): dC/dt = C skew(w); rate extraction chapter 3 A; classical
- *     fourth-order Runge-Kutta method: thesis, chapter 3 B.
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 2,
+ *     equation (2.1): dC/dt = C skew(w); rate extraction chapter 3 A; classical fourth-order
+ *     Runge-Kutta method: thesis, chapter 3 B.
  * Integer operations of one call: 105 add, 72 multiply, 64 shift; 37 temporaries.
  *
  * A number in format Qm.n is an integer times 2^-n. Rounding: nearest. No sum or product on the

@@ -6,8 +6,7 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: 69920ea545e2965a.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
- *     4 A.
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 4 A.
  * The true matrix is a rotation.
  * Integer operations of one call: 36 add, 27 multiply, 12 shift; 6 temporaries.
  *

@@ -6,8 +6,8 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: 663e853a164a3b3f.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
- *     2: a1 = e4, a2 = e1, a3 = e2, a4 = e3.
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 2: a1 =
+ *     e4, a2 = e1, a3 = e2, a4 = e3.
  * Integer operations of one call: none; 0 temporaries.
  *
  * A number in format Qm.n is an integer times 2^-n. Rounding: nearest. No sum or product on the

@@ -6,9 +6,9 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: a1b43c2323bb1adb.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
- *     2, inverted; largest element first as in S. W. Shepperd, J. Guidance and Control 1
- *     (1978) 223-224.
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 2,
+ *     inverted; largest element first as in S. W. Shepperd, J. Guidance and Control 1 (1978)
+ *     223-224.
  * The scalar part of the result is not negative.
  * Integer operations of one call: 21 add, 4 multiply, 13 shift, 1 divide, 1 sqrt, 16 compare; 25
  *     temporaries.

@@ -6,8 +6,8 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: d9e1e1bd7f543188.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
- *     2: de/dt = 1/2 e (w, 0), quaternion product.
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 2:
+ *     de/dt = 1/2 e (w, 0), quaternion product.
  * Integer operations of one call: 16 add, 16 multiply, 4 shift; 0 temporaries.
  *
  * A number in format Qm.n is an integer times 2^-n. Rounding: nearest. No sum or product on the

@@ -6,9 +6,9 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: 8b8059606bc8398b.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
- *     2: de/dt = 1/2 e (w, 0), quaternion product; rate extraction chapter 3 A; Euler's
- *     method: thesis, chapter 3 B.
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 2:
+ *     de/dt = 1/2 e (w, 0), quaternion product; rate extraction chapter 3 A; Euler's method:
+ *     thesis, chapter 3 B.
  * Integer operations of one call: 22 add, 15 multiply, 7 shift; 3 temporaries.
  *
  * A number in format Qm.n is an integer times 2^-n. Rounding: nearest. No sum or product on the

@@ -6,8 +6,8 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: a83c059af94f0e90.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
- *     2: de/dt = 1/2 e (w, 0), quaternion product; rate extraction chapter 3 A; Heun's method:
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 2:
+ *     de/dt = 1/2 e (w, 0), quaternion product; rate extraction chapter 3 A; Heun's method:
  *     thesis, chapter 3 B.
  * Integer operations of one call: 39 add, 29 multiply, 10 shift; 12 temporaries.
  *

@@ -7,8 +7,8 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: 230d11fe6ec58f74.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
- *     2: de/dt = 1/2 e (w, 0), quaternion product; rate extraction chapter 3 A; Kutta's
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 2:
+ *     de/dt = 1/2 e (w, 0), quaternion product; rate extraction chapter 3 A; Kutta's
  *     third-order method: W. Kutta, Z. Math. Phys. 46 (1901) 435-453.
  * Integer operations of one call: 58 add, 44 multiply, 25 shift; 18 temporaries.
  *

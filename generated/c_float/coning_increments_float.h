@@ -5,8 +5,7 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: ddf37b828ac1efec.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
- *     4 B.
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 4 B.
  * Operations of one call: 8 multiply, 3 function; 2 temporaries.
  * Rounding: no bound is known, because the range of middle is not known.
  *

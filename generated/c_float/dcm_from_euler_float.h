@@ -5,8 +5,7 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: 4180fd2b84e0eed7.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
- *     2.
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 2.
  * The result is |state|^2 times a rotation: a rotation for a state of length 1.
  * Operations of one call: 13 add, 13 multiply; 14 temporaries.
  * Rounding: against exact arithmetic on the same inputs, attitude is off by at most 5.36442e-07,

@@ -5,8 +5,8 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: 62fd7b03cbe9f28e.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), appendix
- *     B, equation (B.1).
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, appendix B,
+ *     equation (B.1).
  * The determinant of the matrix must be above 0. Round-off grows with the fourth power of its
  * condition.
  * Irrational constants are rounded to 80 digits, and once more to the format of the target.

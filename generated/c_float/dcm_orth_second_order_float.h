@@ -5,8 +5,8 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: 556a409c13faf3b1.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), appendix
- *     B, equation (B.14) in terms of the computed matrix.
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, appendix B,
+ *     equation (B.14) in terms of the computed matrix.
  * Made for a matrix near a rotation: all products of its transpose and itself near the identity.
  * Operations of one call: 54 add, 69 multiply; 21 temporaries.
  * Rounding: against exact arithmetic on the same inputs, orthonormalized is off by at most

@@ -5,8 +5,8 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: 6dffe5a59017f0f9.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
- *     3 C, subroutine ORTHO.
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 3 C,
+ *     subroutine ORTHO.
  * Made for a matrix near a rotation: all products of its transpose and itself near the identity.
  * Operations of one call: 24 add, 36 multiply, 3 divide, 3 sqrt; 12 temporaries.
  * Rounding: against exact arithmetic on the same inputs, orthonormalized is off by at most

@@ -5,9 +5,9 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: b6f9c3dc08c2fcb5.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
- *     2, equation (2.1): dC/dt = C skew(w); rate extraction chapter 3 A; Euler's method:
- *     thesis, chapter 3 B.
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 2,
+ *     equation (2.1): dC/dt = C skew(w); rate extraction chapter 3 A; Euler's method: thesis,
+ *     chapter 3 B.
  * Operations of one call: 21 add, 21 multiply, 3 negate; 6 temporaries.
  * Rounding: against exact arithmetic on the same inputs, next is off by at most 3.01749e-07,
  *     2.53125 units in the last place of 1; the row of the error after N steps is at most

@@ -5,8 +5,8 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: 9fdff6ec2a6ca18a.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
- *     2, equation (2.1): dC/dt = C skew(w); rate extraction chapter 3 A; Kutta's third-order
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 2,
+ *     equation (2.1): dC/dt = C skew(w); rate extraction chapter 3 A; Kutta's third-order
  *     method: W. Kutta, Z. Math. Phys. 46 (1901) 435-453.
  * Operations of one call: 66 add, 76 multiply; 42 temporaries.
  * Rounding: against exact arithmetic on the same inputs, next is off by at most 6.11685e-07,

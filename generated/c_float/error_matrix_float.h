@@ -5,8 +5,7 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: d174ca262843b8fd.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
- *     4 A.
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 4 A.
  * The true matrix is a rotation.
  * Operations of one call: 27 add, 33 multiply; 6 temporaries.
  * Rounding: against exact arithmetic on the same inputs, error is off by at most 6.55652e-07,

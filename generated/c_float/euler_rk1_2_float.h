@@ -5,9 +5,9 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: e566d253c0a62b75.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
- *     2: de/dt = 1/2 e (w, 0), quaternion product; rate extraction chapter 3 A; Euler's
- *     method: thesis, chapter 3 B.
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 2:
+ *     de/dt = 1/2 e (w, 0), quaternion product; rate extraction chapter 3 A; Euler's method:
+ *     thesis, chapter 3 B.
  * Operations of one call: 15 add, 18 multiply; 3 temporaries.
  * Rounding: against exact arithmetic on the same inputs, next is off by at most 2.71015e-07,
  *     2.27344 units in the last place of 1; the error after N steps is at most 5.01881e-07 N

@@ -5,8 +5,8 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: d33a0ec78dabb56c.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
- *     2: de/dt = 1/2 e (w, 0), quaternion product; rate extraction chapter 3 A; classical
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 2:
+ *     de/dt = 1/2 e (w, 0), quaternion product; rate extraction chapter 3 A; classical
  *     fourth-order Runge-Kutta method: thesis, chapter 3 B.
  * Operations of one call: 30 add, 38 multiply; 14 temporaries.
  * Rounding: against exact arithmetic on the same inputs, next is off by at most 3.6979e-07,

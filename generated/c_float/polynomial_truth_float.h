@@ -5,8 +5,8 @@
  *     differs. strapgen 0.1.0; digest of the algorithm and its options: efcb4fec77cc4b0f.
  * SPDX-License-Identifier: 0BSD
  *
- * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229 (1969), chapter
- *     4 B and appendix A.
+ * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 4 B and
+ *     appendix A.
  * Operations of one call: 8 add, 14 multiply, 1 negate, 2 function; 4 temporaries.
  * Rounding: no bound is known, because the range of time is not known.
  *

@@ -69,7 +69,8 @@ BAD = {
     "stress --carry some": "carry 'some' is not known",
     "stress --format latex": "format 'latex' is not known; allowed: text, json, csv, markdown",
     # Along a recording in two speeds
-    "strapdown dcm": "Missing option '--fast-cycles'",
+    "strapdown dcm": "Missing option '--increments-csv'",
+    f"strapdown dcm {LOG}": "fast-cycles is missing; an algorithm in two speeds needs it",
     "strapdown dcm --increments-csv nowhere.csv --fast-cycles 4": "nowhere.csv cannot be read",
     f"strapdown dcm --increments-csv {DATA}/rates_even.csv --fast-cycles 4": "no column",
     f"strapdown dcm {LOG} --fast-cycles four": "fast-cycles is 'four'; a whole number is needed",
@@ -109,7 +110,7 @@ BAD = {
     # Commands and options
     "check": "Missing argument 'ALGORITHM': dcm, euler or cayley-klein, or a Python file of your own",
     "simulat": "No such command 'simulat' (did you mean simulate?). Allowed: list, derive, ",
-    "study wordlength": "No such command 'wordlength' (did you mean word-length?). Allowed: word-length.",
+    "study wordlength": "No such command 'wordlength' (did you mean word-length?). Allowed: word-length, system",
     "simulate euler --methods rk4": "No such option: --methods (did you mean --method?); --help shows all",
     "simulate euler --method": "--method needs a value, NAME: integration method; strapgen list methods shows all",
     "simulate euler --method --increments 2": "--method needs a value, NAME: integration method",

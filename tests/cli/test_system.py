@@ -8,6 +8,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from c_programs import needed
 from cli.test_generated_by import generated_by
 from gathering import each
 from systems.described_files import ATTITUDE, TWO_SPEEDS
@@ -62,6 +63,7 @@ def test_json_has_the_keys_that_the_page_promises(two, capsys):
     assert [key for key in nested if f"`{key}`" not in page] == []
 
 
+@pytest.mark.long
 @each("target", ["c", "c-fixed", "numpy", "fixed-model"])
 def test_every_file_says_which_command_makes_it(target, two, capsys):
     word = " --word 16 --carry state --drift-allowance 0.05" if "fixed" in target else ""
@@ -98,6 +100,27 @@ def test_files_are_compared_and_not_written_over(two, capsys):
     assert "Three speeds" in header.read_text()
     run("two.toml --out o --sample-hz 1600 --force", capsys)
     assert "1600" in header.read_text()
+
+
+@pytest.mark.long
+def test_instructions_are_counted_on_a_processor_and_stand_in_the_header(two, capsys):
+    needed("arm-none-eabi-gcc", "qemu-system-arm")
+    data = json.loads(run("att.toml --target c-fixed --cpu cortex-m3 --format json", capsys))
+    counts = {stage["name"]: stage["executed"] for stage in data["stages"]}
+    assert all(count > 20 for count in counts.values())
+    assert data["budget"]["instructions_per_second"] == sum(
+        stage["hz"] * stage["executed"] for stage in data["stages"]
+    )
+    run("att.toml --target c-fixed --cpu cortex-m3 --out o", capsys)
+    header = " ".join(Path("o/att_w32.h").read_text().replace("\n *", " ").split())
+    assert "--cpu cortex-m3" in header
+    assert "On cortex-m3: " in header
+
+
+def test_the_picture_of_the_page_is_that_of_the_example(tmp_path, capsys):
+    root = Path(__file__).parents[2]
+    run(f"{root}/examples/attitude.toml --target numpy --draw {tmp_path}/system.svg", capsys)
+    assert (tmp_path / "system.svg").read_text() == (root / "docs" / "system.svg").read_text()
 
 
 @each("name", ["two", "att"])

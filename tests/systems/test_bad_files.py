@@ -212,7 +212,7 @@ BAD_STEPS = [
     (
         "increments = 2\nevery = 2",
         "increments = 2\nevery = 4",
-        "a step takes 2 increments of every 1; every 2 is needed",
+        "a step takes 2 samples of every 1, so that its every is 2, not 4",
     ),
     (
         "delay = { state = 1 }\n",
@@ -306,6 +306,7 @@ def test_a_file_that_is_no_description_is_refused_in_one_line(content, message, 
     "words, message",
     [
         ("nowhere.toml", "nowhere.toml cannot be read (No such file or directory)"),
+        ("two-speed-dmc", "system 'two-speed-dmc' is not known (did you mean two-speed-dcm"),
         (".", ". cannot be read (Is a directory)"),
         ("a*/b.toml", "FILE holds */"),
         (
@@ -325,6 +326,7 @@ def test_a_file_that_is_no_description_is_refused_in_one_line(content, message, 
         ("case.toml --check", "--check goes with --out"),
         ("case.toml --force", "--force goes with --out"),
         ("case.toml --draw case.png", "--draw case.png is no SVG file"),
+        ("case.svg --draw ./case.svg", "--draw case.svg is the file that the command reads"),
         ("case.toml --out o --check --draw o.svg", "--check writes nothing; --draw does not go with it"),
         ("case.toml --sample-hz 0", "--sample-hz is 0; a number above 0 is needed"),
         ("case.toml --sample-hz fast", "--sample-hz is 'fast'; a finite number is needed"),

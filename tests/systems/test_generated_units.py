@@ -13,6 +13,7 @@ import pytest
 from c_programs import STRICT, complaints, needed, written
 from systems.described_files import ATTITUDE, TWO_SPEEDS, description, samples
 
+import strapgen
 from strapgen.backends.systems import system_runner
 from strapgen.backends.systems.compiled import CompiledSystem
 from strapgen.backends.systems.memory import rescaled
@@ -221,3 +222,53 @@ def _nothing() -> dict[str, object]:
         "samples": "",
         "system": system,
     }
+
+
+STEP = """
+name = "one"
+sample_hz = 100
+
+[inputs.gyro]
+unit = "rad"
+frame = "b"
+range = 0.1
+
+[[stage]]
+name = "step"
+kernel = "euler"
+wires = { increments = "gyro" }
+"""
+
+
+PREVIOUS = {"method": "rk4", "increments": 1, "previous": 2}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("stated", "options", "samples_per_step", "beside"),
+    [
+        ('method = "rk4"\nincrements = 2\nevery = 2\n', {"method": "rk4", "increments": 2}, 2, 0),
+        ('method = "window-3-3"\nevery = 1\n', {"method": "window-3-3"}, 1, 6),
+        (
+            'method = "rk4"\nincrements = 1\nprevious = 2\nevery = 1\n',
+            {"method": "rk4", "increments": 1, "previous": 2},
+            1,
+            2,
+        ),
+    ],
+)
+def test_a_step_in_a_system_is_the_step_alone_on_the_samples_that_it_collects(
+    stated, options, samples_per_step, beside, tmp_path, rng
+):
+    """Samples from before the first cycle count as zero."""
+    system = description(tmp_path, STEP + stated)
+    increments = rng.uniform(-0.05, 0.05, (24, 3))
+    states = system_runner(system, "numpy").run({"gyro": increments}).values["step_state"]
+    function = strapgen.evaluator(strapgen.choose_step("euler", **options))
+    collected = np.concatenate([np.zeros((beside, 3)), increments])
+    state = np.array([0.0, 0.0, 0.0, 1.0])
+    for number, expected in enumerate(states):
+        first = number * samples_per_step
+        state = function(state, collected[first : first + samples_per_step + beside])
+        assert np.array_equal(state, expected)
+    assert len(states) == 24 // samples_per_step

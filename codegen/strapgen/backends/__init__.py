@@ -102,7 +102,7 @@ def evaluator(kernel: str | Choice, backend: str = "numpy", settings: Settings |
     stages.require("evaluator", kernel, str, Choice)
     checks.choice("backend", backend, BACKENDS)
     if not isinstance(kernel, Choice):
-        checks.choice("kernel", kernel, catalogue.KERNELS)
+        checks.choice("kernel", kernel, {**catalogue.KERNELS, **catalogue.LAYOUT_KERNELS})
         kernel = catalogue.choose(kernel)
     return of_sources(sources_of_choice(kernel, BACKENDS[backend].target, fitted(backend, settings)))
 

@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, TypeAlias
 
 from strapgen.catalogue.constants import Constants, options
+from strapgen.catalogue.layout import Layout
 from strapgen.catalogue.methods.shaped_coning import ShapedConing, named_shape
 from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.catalogue.methods.window import Window
@@ -41,6 +42,8 @@ class Choice:
     constants : tuple of (str, tuple of Fraction), optional
         Inputs that are constants, sorted by name, each with its numbers in row-major order; of kernels that are no
         attitude steps.
+    layout : Layout, optional
+        Gyros whose rate and acceleration the kernel separates, or whose torques it returns.
     """
 
     name: str
@@ -51,6 +54,7 @@ class Choice:
     # Equality compares the kernels; the hash leaves them out, because most choices differ in name or numbers.
     user_kernel: Kernel | None = field(default=None, hash=False, repr=False)
     constants: Constants = ()
+    layout: Layout | None = None
 
     @classmethod
     def of_user(cls, kernel: Kernel) -> Choice:
@@ -79,6 +83,8 @@ class Choice:
     @property
     def kernel(self) -> str:
         """Name of the kernel."""
+        if self.layout is not None:
+            return f"{self.name}-{self.layout.name}"
         if self.method is None:
             return self.name
         if self.window is not None:  # its name says how many samples it takes
@@ -91,14 +97,17 @@ class Choice:
     def identity(self) -> str:
         """Text that differs between choices with different kernels or generated files: the key of the library's cache.
 
-        It is the name of the kernel with its constants and, where that is a user's to choose, the tableau with its file
-        or the kernel.
+        It is the name of the kernel with its constants and, where that is a user's to choose, the tableau or layout
+        with its file, or the kernel.
         """
         if self.user_kernel is not None:
             return f"{self.kernel} {_text(self.user_kernel)}"
         if self.method is not None and not isinstance(self.method, str):
             return f"{self.kernel} {self.method!r} {self.method.file}"
-        return f"{self.kernel} {options(self.constants)}" if self.constants else self.kernel
+        words = [self.kernel, options(self.constants)]
+        if self.layout is not None:
+            words += [repr(self.layout), self.layout.file]
+        return " ".join(filter(None, words))
 
     @property
     def increments_per_step(self) -> int:

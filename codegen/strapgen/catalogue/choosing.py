@@ -5,10 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from strapgen.catalogue import constants as constant_values
+from strapgen.catalogue import layout as layout_files
 from strapgen.catalogue.choice import AnyMethod, Choice
+from strapgen.catalogue.layout import Layout
 from strapgen.catalogue.methods.shaped_coning import ShapedConing, named_shape
 from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.catalogue.methods.tableaux import TABLEAUX
@@ -18,6 +21,7 @@ from strapgen.catalogue.names import (
     ALGORITHMS,
     INTEGRATORS,
     KERNELS,
+    LAYOUT_KERNELS,
     LEAST_WHOLE,
     METHODS,
     MOST_BESIDE,
@@ -43,6 +47,7 @@ def choose(
     previous: int | None = None,
     ahead: int | None = None,
     constants: Mapping[str, Any] | None = None,
+    layout: str | Path | Layout | None = None,
 ) -> Choice:
     """Check a choice of kernel and fill in the defaults: fourth order, two increments.
 
@@ -61,6 +66,8 @@ def choose(
     constants : mapping of str to number, or to an array or nested sequence of numbers, optional
         Values of inputs of a kernel that is no attitude step, in their units and row by row; they are then constants
         of its code. A float stands for its shortest decimal form. `derive` refuses what the kernel has no input for.
+    layout : path or Layout, optional
+        Of the kernels "separate" and "torques": the file that describes the gyros, see `layout.read`.
 
     Raises
     ------
@@ -75,6 +82,8 @@ def choose(
     (('slope_above', (Fraction(0, 1),)),)
     """
     choice = _choose(name, method, increments, rates, previous, ahead)
+    if layout is not None or name in LAYOUT_KERNELS:
+        choice = _with_layout(choice, layout)
     return choice if constants is None else with_constants(choice, constants)
 
 
@@ -87,6 +96,21 @@ def with_constants(choice: Choice, constants: Mapping[str, Any]) -> Choice:
             "imu-compensate"
         )
     return replace(choice, constants=values)
+
+
+def _with_layout(choice: Choice, layout: str | Path | Layout | None) -> Choice:
+    """Return the choice of a kernel of a layout, which its file describes."""
+    if choice.name not in LAYOUT_KERNELS:
+        raise InputError(f"{choice.name} takes no layout; {' and '.join(LAYOUT_KERNELS)} do")
+    if layout is None:
+        others = ", ".join(name for name in KERNELS if name.startswith(f"{choice.name}-"))
+        raise InputError(f"{choice.name} needs the file of a layout; kernels of built-in ones are {others}")
+    if not isinstance(layout, Layout):
+        layout = layout_files.read(layout)
+    kernel = f"{choice.name}-{layout.name}"
+    if kernel in KERNELS:
+        raise InputError(f"a layout called {layout.name} would make the kernel {kernel}, which exists")
+    return replace(choice, layout=layout)
 
 
 def _choose(
@@ -106,9 +130,9 @@ def _choose(
         return _choose_users(name, method, increments, rates, previous, ahead)
     if name not in RESERVED:
         shown = [kernel for kernel, recipe in KERNELS.items() if recipe.standard]
-        names = [*_algorithms(), *VECTORS, *shown, *KERNELS]
+        names = [*_algorithms(), *VECTORS, *shown, *KERNELS, *LAYOUT_KERNELS]
         checks.choice("algorithm", name, dict.fromkeys(names), _FILE, "kernels")
-    if name in KERNELS:
+    if name in KERNELS or name in LAYOUT_KERNELS:
         options = {
             "method": method if isinstance(method, str) or method is None else method.name,
             "increments": increments,
@@ -285,7 +309,7 @@ def choose_step(
     ahead: int | None = None,
 ) -> Choice:
     """Check a choice of attitude step; parameters and errors are those of `choose`."""
-    if name in KERNELS or name in VECTORS:
+    if name in KERNELS or name in VECTORS or name in LAYOUT_KERNELS:
         raise InputError(
             f"algorithm {name!r} is no attitude step; allowed: {some(_algorithms())}, or {_FILE}"
         )

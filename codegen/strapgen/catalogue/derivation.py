@@ -12,7 +12,7 @@ from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.catalogue.methods.window import Window
 from strapgen.catalogue.methods.windows import named_window
-from strapgen.catalogue.names import INTEGRATORS, KERNELS, MOST_INCREMENTS, VECTORS
+from strapgen.catalogue.names import INTEGRATORS, KERNELS, LAYOUT_KERNELS, MOST_INCREMENTS, VECTORS
 
 if TYPE_CHECKING:
     from strapgen.catalogue.methods.coefficients import Number
@@ -82,9 +82,10 @@ def _derived(choice: Choice) -> Kernel:
     if choice.user_kernel is not None:
         return choice.user_kernel
     if choice.method is None:
-        recipe = KERNELS[choice.name]
+        described = choice.layout is not None
+        recipe = LAYOUT_KERNELS[choice.name] if described else KERNELS[choice.name]
         function = getattr(import_module(f"{_PACKAGE}.kernels.{recipe.module}"), recipe.function)
-        kernel: Kernel = function(*recipe.arguments)
+        kernel: Kernel = function(*((choice.layout,) if described else recipe.arguments))
         return kernel
     if choice.name in VECTORS:
         vector = VECTORS[choice.name]

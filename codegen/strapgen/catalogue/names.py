@@ -389,5 +389,15 @@ VECTORS = {
 }
 
 
+#: Kernels of a layout that a file describes.
+LAYOUT_KERNELS = {
+    "separate": Recipe(
+        "rate and acceleration from torques, of a layout file", "layouts", "separate", standard=False
+    ),
+    "torques": Recipe(
+        "torques of mass-unbalanced gyros, of a layout file", "layouts", "measure", standard=False
+    ),
+}
+
 #: Names that a user's algorithm cannot have.
-RESERVED = (*ALGORITHMS, *VECTORS, *KERNELS)
+RESERVED = (*ALGORITHMS, *VECTORS, *KERNELS, *LAYOUT_KERNELS)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
@@ -192,17 +193,32 @@ class MethodOptions:
         for path, read in readers.values():
             if path is not None:
                 method = read(path)
-        choose = catalogue.choose_step if step else catalogue.choose
+        choose = catalogue.choose_step if step else self._chooser()
         one("--method", self.method)
         count = whole("increments", self.increments)
         before, after = whole("previous", self.previous), whole("ahead", self.ahead)
         with waiting(f"deriving {algorithm}"):  # a user's code may take its time
             return choose(algorithm, method, count, self.rates, before, after)
 
+    def _chooser(self) -> Callable[..., Choice]:
+        """Return the function that chooses a kernel, which need be no attitude step."""
+        from strapgen import catalogue
+
+        return catalogue.choose
+
 
 @dataclass(frozen=True)
 class KernelOptions(MethodOptions):
-    """Options that choose a kernel: those of an attitude step, and the constants of any other."""
+    """Options that choose a kernel: those of an attitude step, and the constants and the layout of any other."""
+
+    layout: Annotated[
+        Path | None,
+        option(
+            "--layout",
+            metavar="FILE",
+            help="TOML file with the gyros whose rate and acceleration separate separates.",
+        ),
+    ] = None
 
     constant: Annotated[
         list[str] | None,
@@ -212,6 +228,17 @@ class KernelOptions(MethodOptions):
             help="Value of the input NAME in its unit, row by row, which the code then has as a constant.",
         ),
     ] = None
+
+    @property
+    def files(self) -> tuple[Path | None, ...]:
+        """The files that the options name."""
+        return *super().files, self.layout
+
+    def _chooser(self) -> Callable[..., Choice]:
+        """Return the function that chooses a kernel, with its layout."""
+        from strapgen import catalogue
+
+        return partial(catalogue.choose, layout=self.layout)
 
     @property
     def stated(self) -> list[str]:

@@ -77,7 +77,9 @@ def _cases(subject: Subject) -> dict[str, _Files]:
         }
 
     def tests() -> dict[str, str]:
-        table = vectors_of_choice(subject.choice, "c-fixed", subject.settings, _VECTORS)
+        table = vectors_of_choice(
+            subject.choice, "c-fixed", subject.settings, _VECTORS, naming=subject.naming
+        )
         files = {**fuzz_files(subject), **table_files(table)}
         assert subject.sources.fixed is not None
         if subject.sources.fixed.settings.word <= LONGEST_WORD:

@@ -14,6 +14,9 @@ from strapgen.ir.integer_program import FixedProgram
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
 from strapgen.library import generated_sources
+from strapgen.systems.fitting import fitted
+from strapgen.systems.wiring import Description
+from strapgen.targets.names import UNNAMED, Naming
 
 
 @dataclass(frozen=True)
@@ -25,10 +28,13 @@ class Subject:
     choice : Choice
     settings : Settings, optional
         Word, ranges and rounding; by default 32 bits and 1/8 rad.
+    naming : Naming, optional
+        Name of the function, where it is a stage of a system.
     """
 
     choice: Choice
     settings: Settings | None = None
+    naming: Naming = UNNAMED
 
     @cached_property
     def program(self) -> Program:
@@ -43,7 +49,7 @@ class Subject:
     @cached_property
     def sources(self) -> Sources:
         """The C."""
-        return generated_sources.sources(self.choice, "c-fixed", self.settings)
+        return generated_sources.sources(self.choice, "c-fixed", self.settings, self.naming)
 
     @property
     def name(self) -> str:
@@ -64,3 +70,25 @@ def standard() -> Iterator[Subject]:
     for choice in catalogue.standard():
         if fixedpoint.can_lower(generated_sources.program(choice)):
             yield Subject(choice)
+
+
+def of_system(description: Description, settings: Settings | None = None) -> Iterator[Subject]:
+    """Yield the stages of a described system, each with the word, ranges and formats that it has there.
+
+    Parameters
+    ----------
+    description : Description
+    settings : Settings, optional
+        Word, rounding and error feedback where a stage states none.
+
+    Raises
+    ------
+    InputError
+        If a stage cannot be generated in fixed point; the message names it.
+    """
+    fit = fitted(description, "c-fixed", settings)
+    for stage in description.system.stages:
+        sources = fit.sources[stage.name]
+        assert sources.fixed is not None, "the target is fixed point"
+        naming = Naming(name=sources.function.name)
+        yield Subject(description.choices[stage.name], sources.fixed.settings, naming)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from strapgen.experiments.systems.verification import SystemVerification
 from strapgen.experiments.verification import Verification
 from strapgen.reports.report import Report
 
@@ -26,12 +27,41 @@ def _data(result: Verification) -> dict[str, Any]:
     }
 
 
+def system_verification_report(result: SystemVerification) -> Report:
+    """Return the verification of a described system as a report."""
+
+    def data() -> dict[str, Any]:
+        return {
+            "header": str(result.header),
+            "files": result.files,
+            "differences": list(result.differences),
+            "holds": result.holds,
+            "stages": [_data(stage) for stage in result.stages],
+        }
+
+    def text() -> str:
+        state = "out of step" if result.differences else "in step"
+        lines = [*result.differences, f"{result.header}: {result.files} files, {state} with the command"]
+        for stage in result.stages:
+            if stage.max_ulp is None:
+                lines.append(stage.differences[-1])
+            else:
+                lines.append(f"{stage.file.stem}: {_calls(stage)}")
+        return "\n".join(lines)
+
+    return Report(text, data)
+
+
 def _text(result: Verification) -> str:
     lines = [*result.differences]
     lines.append(f"{result.file}: {'in step' if result.in_step else 'out of step'} with its command")
     if result.max_ulp is None:
         return "\n".join(lines)
+    return "\n".join([*lines, _calls(result)])
+
+
+def _calls(result: Verification) -> str:
+    """Return what the calls of a function returned."""
     right = f"{result.calls - result.wrong} of {result.calls} calls return what they must"
     bound = "" if result.bound_ulp is None else f", certified {result.bound_ulp:.4f}"
-    lines.append(f"{right}; error {result.max_ulp:.4f} of the last place{bound}")
-    return "\n".join(lines)
+    return f"{right}; error {result.max_ulp:.4f} of the last place{bound}"

@@ -23,6 +23,7 @@ import shutil
 import stat
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
@@ -43,6 +44,8 @@ _DRAFT, _REMOVED = ".filling-", ".removed-"
 _TEMPORARY = "strapgen-cache-"
 #: How often work is begun again whose entries others remove.
 _TRIALS = 5
+#: As many entries of a kind are filled before the folder is not looked through after every one.
+_FEW = 16
 #: The number of folders that are the user's alone: the cache folder, that of a kind, that of an entry.
 _PRIVATE = 3
 
@@ -257,6 +260,8 @@ def _folder(create: bool) -> Path:
 _replaced: dict[Path, Path] = {}
 #: Cache folders that were the user's alone when they were looked at first.
 _private: set[Path] = set()
+#: How many entries this process has filled in the folder of a kind.
+_filled_here: Counter[Path] = Counter()
 #: Folders of a kind in which this process has looked for what others have left.
 _tidied: set[Path] = set()
 
@@ -356,7 +361,13 @@ def _warn(reason: str) -> None:
 
 
 def _prune(folder: Path) -> None:
-    """Remove entries that have not been used for long, and what processes that are gone have left."""
+    """Remove entries that have not been used for long, and what processes that are gone have left.
+
+    A process that fills many entries looks through them now and then.
+    """
+    _filled_here[folder] += 1
+    if _filled_here[folder] > _FEW and _filled_here[folder] % _FEW:
+        return
     _tidy(folder)
     oldest = time.time() - _UNUSED_DAYS * 86400
     with os.scandir(folder) as places:

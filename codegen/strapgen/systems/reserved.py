@@ -8,10 +8,12 @@ from collections.abc import Iterable
 from strapgen.support.exceptions import InputError
 from strapgen.targets.names import PYTHON, C
 
+_HEADERS_TEXT = """
+assert complex ctype errno fenv float inttypes iso646 limits locale math setjmp signal stdalign stdarg stdatomic
+stdbool stdckdint stddef stdint stdio stdlib stdnoreturn string tgmath threads time uchar wchar wctype numpy
+"""
 #: Headers and modules that generated files include or import, or that a file of the same name would hide.
-_HEADERS = frozenset(
-    ["assert", "complex", "ctype", "errno", "fenv", "float", "inttypes", "iso646", "limits", "locale", "math", "setjmp", "signal", "stdalign", "stdarg", "stdatomic", "stdbool", "stdckdint", "stddef", "stdint", "stdio", "stdlib", "stdnoreturn", "string", "tgmath", "threads", "time", "uchar", "wchar", "wctype", "numpy"]
-)
+_HEADERS = frozenset(_HEADERS_TEXT.split())
 #: What the functions of a system are called behind its name, and members of its memory.
 _FUNCTIONS = re.compile(r"begin|cycle|memory|residuals|runs?|every_\d+")
 #: Parameters, functions and modules that generated functions use.

@@ -9,6 +9,7 @@ from fractions import Fraction
 
 from strapgen.ir.signals import CYCLE, Signal
 from strapgen.support.exceptions import InputError
+from strapgen.support.suggestions import counted
 from strapgen.systems.ports import Ports
 
 
@@ -61,7 +62,8 @@ def check_order(stages: Sequence[Ports]) -> None:
             )
     if stages[0].text.every != 1 and stages[0].program.companions is None:
         raise InputError(
-            f"stage {stages[0].name}: every is {stages[0].text.every}; the fastest stage has 1, unless it collects samples"
+            f"stage {stages[0].name}: every is {stages[0].text.every}; the fastest stage has 1, unless it "
+            "collects samples"
         )
 
 
@@ -132,8 +134,8 @@ def check_rates(where: str, stage: Ports, signal: Signal, source: Source, sample
         due = there * (samples - step.beside)
         if here != due:
             raise InputError(
-                f"{where}: a step takes {samples - step.beside} increments of every {there}; every {due} is "
-                f"needed, not {here}"
+                f"{where}: a step takes {counted(samples - step.beside, 'sample')} of every {there}, so that its every "
+                f"is {due}, not {here}"
             )
     elif source.sum:
         if here < there:

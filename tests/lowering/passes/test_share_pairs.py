@@ -103,3 +103,11 @@ def test_names_that_are_taken_are_not_given_again(parse, show):
     assert show(share_pairs(before)) == (
         "shared_1 = sin(x); w = shared_1 * shared_1; shared_2 = a + b; y = shared_2 + c; z = shared_2 - shared_1"
     )
+
+
+def test_a_sum_and_a_difference_in_one_value_stay_apart(parse):
+    before = parse("y = (a + b + c) * (a - b + d); z = a + b + e")
+    after = share_pairs(before)
+    assert after.operations["add"] == before.operations["add"] - 1
+    point = {"a": 3, "b": 5, "c": 7, "d": 11, "e": 13}
+    assert after.run(point) == before.run(point)

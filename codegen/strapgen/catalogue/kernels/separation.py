@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache
 from typing import Any
@@ -183,13 +183,46 @@ def separation_matrix(gyros: Sequence[TwoAxisGyro], sign: int) -> sp.Matrix:
 def _separation_matrix(gyros: tuple[TwoAxisGyro, ...], sign: int) -> sp.ImmutableMatrix:
     """Return the inverse, which takes seconds, once for each layout."""
     matrix = measurement_matrix(gyros, sign)
-    if sp.simplify(matrix.det(method="berkowitz")) == 0:
-        motion = [sp.simplify(element) for element in matrix.nullspace(simplify=True)[0]]
+    return (_covariance(gyros, sign) * matrix.T).applyfunc(sp.simplify).as_immutable()
+
+
+@cache
+def _covariance(gyros: tuple[TwoAxisGyro, ...], sign: int) -> sp.ImmutableMatrix:
+    """Return the covariance of rates and accelerations for equal, independent noise of 1 on all torques.
+
+    It is the inverse of M^T M, to which a gyro adds its unbalance and the projection across its spin axis alone: the
+    angle of the torquers about it cancels.
+    """
+    gram = _gram(gyros, sign)
+    if sp.simplify(gram.det(method="berkowitz")) == 0:
+        motion = [sp.simplify(element) for element in gram.nullspace(simplify=True)[0]]
         raise InputError(
             f"the layout is singular: no torquer measures the rate {tuple(motion[:3])} together with the acceleration "
             f"{tuple(motion[3:])}; unbalances are {', '.join(str(gyro.unbalance) for gyro in gyros)}"
         )
-    return matrix.inv().applyfunc(sp.simplify).as_immutable()
+    return gram.inv().applyfunc(sp.simplify).as_immutable()
+
+
+def _gram(gyros: Sequence[TwoAxisGyro], sign: int) -> sp.Matrix:
+    """Return M^T M, 6 x 6, of the matrix M from rate and acceleration to torques."""
+    measurement_matrix(gyros, sign)  # refuses what is no layout
+    total = sp.zeros(6, 6)
+    for gyro in gyros:
+        across = sp.eye(3) - gyro.spin * gyro.spin.T
+        factors = sp.Matrix([1, sign * gyro.unbalance])
+        total += sp.kronecker_product(factors * factors.T, across)
+    return total.applyfunc(sp.expand)
+
+
+def determinant(gyros: Sequence[TwoAxisGyro], sign: int) -> sp.Expr:
+    """Return the magnitude of the determinant of `measurement_matrix`, which the angles of the torquers leave alone.
+
+    Examples
+    --------
+    >>> determinant(diagonal_layout(), 1)
+    2*B**3
+    """
+    return sp.sqrt(sp.factor(sp.simplify(_gram(gyros, sign).det(method="berkowitz"))))
 
 
 def noise_gains(gyros: Sequence[TwoAxisGyro], sign: int) -> tuple[sp.Expr, ...]:
@@ -205,9 +238,8 @@ def noise_gains(gyros: Sequence[TwoAxisGyro], sign: int) -> tuple[sp.Expr, ...]:
     >>> noise_gains(canonical_layout(), -1)
     (sqrt(2)/2, 1, 1, sqrt(2)/(2*B), sqrt(2)/B, sqrt(2)/B)
     """
-    inverse = separation_matrix(gyros, sign)
-    rows = (sum(element**2 for element in inverse[row, :]) for row in range(6))
-    return tuple(sp.simplify(sp.sqrt(sp.simplify(square))) for square in rows)
+    squares = _covariance(tuple(gyros), sign).diagonal()
+    return tuple(sp.simplify(sp.sqrt(sp.factor(square))) for square in squares)
 
 
 def separating_kernel(name: str, title: str, source: str, gyros: Sequence[TwoAxisGyro], sign: int) -> Kernel:
@@ -218,7 +250,7 @@ def separating_kernel(name: str, title: str, source: str, gyros: Sequence[TwoAxi
     name, title, source : str
         Fields of the kernel.
     gyros : sequence of TwoAxisGyro
-        Three gyros; their unbalances are exact numbers or multiples of `UNBALANCE`.
+        Three gyros; their unbalances are exact numbers or multiples of symbols, such as `UNBALANCE`.
     sign : int
         As in `measurement_matrix`.
 
@@ -226,7 +258,8 @@ def separating_kernel(name: str, title: str, source: str, gyros: Sequence[TwoAxi
     -------
     Kernel
         Input ``torque_increment`` (6,) in rad and, where the unbalances are multiples of B, ``unbalance_reciprocal``
-        1/B in m/s per rad; outputs ``increment`` (3,) in rad and ``velocity_increment`` (3,) in m/s, body axes.
+        1/B in m/s per rad; where they have other symbols or numbers beside B, each symbol itself, as `measuring_kernel`
+        takes it. Outputs ``increment`` (3,) in rad and ``velocity_increment`` (3,) in m/s, body axes.
 
     Raises
     ------
@@ -236,13 +269,27 @@ def separating_kernel(name: str, title: str, source: str, gyros: Sequence[TwoAxi
     inverse = separation_matrix(gyros, sign)
     build = KernelBuilder()
     torques = build.input(TORQUES)
-    if inverse.has(UNBALANCE):
+    if all(gyro.unbalance.coeff(UNBALANCE) * UNBALANCE == gyro.unbalance for gyro in gyros):
         reciprocal = build.scalar(RECIPROCAL)
         inverse = inverse.applyfunc(sp.expand).subs(UNBALANCE, 1 / reciprocal)
+    else:
+        inverse = _with_inputs(build, inverse)
     motion = inverse * torques
     build.output(INCREMENT, motion[:3])
     build.output(VELOCITY_INCREMENT, [sp.factor_terms(element) for element in motion[3:]])
     return build.kernel(name, title, source)
+
+
+def _with_inputs(build: KernelBuilder, matrix: sp.Matrix) -> sp.Matrix:
+    """Return a matrix with an input in the place of every symbol of an unbalance."""
+    values = {}
+    for symbol in sorted(matrix.free_symbols, key=str):
+        name = f"{UNBALANCE_INPUT.name}_{symbol.name.removeprefix('B')}".rstrip("_")
+        signal = replace(UNBALANCE_INPUT, name=name, elements=(name,))
+        if symbol != UNBALANCE:
+            signal = replace(signal, meaning=f"{symbol}, a mass unbalance of the gyros")
+        values[symbol] = build.scalar(signal)
+    return matrix.subs(values)
 
 
 def measuring_kernel(name: str, title: str, source: str, gyros: Sequence[TwoAxisGyro], sign: int) -> Kernel:
@@ -251,14 +298,13 @@ def measuring_kernel(name: str, title: str, source: str, gyros: Sequence[TwoAxis
     Returns
     -------
     Kernel
-        Inputs ``increment`` (3,) in rad, ``velocity_increment`` (3,) in m/s, body axes, and, where the unbalances are
-        multiples of B, ``unbalance`` in rad per m/s; output ``torque_increment`` (6,) in rad.
+        Inputs ``increment`` (3,) in rad, ``velocity_increment`` (3,) in m/s, body axes, and every symbol of the
+        unbalances in rad per m/s: ``unbalance`` for B, ``unbalance_2`` for B2; output ``torque_increment`` (6,) in rad.
     """
     matrix = measurement_matrix(gyros, sign)
     build = KernelBuilder()
     motion = sp.Matrix.vstack(build.input(INCREMENT), build.input(VELOCITY_INCREMENT))
-    if matrix.has(UNBALANCE):
-        matrix = matrix.subs(UNBALANCE, build.scalar(UNBALANCE_INPUT))
+    matrix = _with_inputs(build, matrix)
     build.output(TORQUES, [sp.expand(element) for element in matrix * motion])
     return build.kernel(name, title, source)
 

@@ -22,6 +22,7 @@ from strapgen.cli.options import (
 )
 from strapgen.cli.output import Output
 from strapgen.cli.sample_source import SampleSource
+from strapgen.cli.systems.comparing import compared_system
 from strapgen.support.exceptions import InputError
 from strapgen.systems.built_in import is_system
 
@@ -83,11 +84,8 @@ def compare(
     """
     output.check(algorithm, *methods.files, *source.files)
     if is_system(algorithm):
-        from strapgen.cli.systems.comparing import compared_system
-
         stated = {"--source": files, "--fail-above": fail_above, "--plot": output.plot}
-        others = [name for name, value in stated.items() if value]
-        names = _backends(backend, reference, None)
+        others, names = [name for name in stated if stated[name]], _backends(backend, reference, None)
         return compared_system(algorithm, methods, names, reference, others, source, fixed, output)
     choices = methods.choices(algorithm)
     names = _backends(backend, reference, files)

@@ -15,6 +15,7 @@ from strapgen.cli.options import KernelOptions, option
 from strapgen.cli.output import format_option
 from strapgen.cli.progress import track
 from strapgen.support.exceptions import InputError
+from strapgen.systems.built_in import is_system
 
 if TYPE_CHECKING:
     from strapgen.evidence.subjects import Subject
@@ -29,7 +30,8 @@ def evidence(
         list[str] | None,
         typer.Argument(
             metavar="NAME...",
-            help="dcm, euler, cayley-klein, any other kernel that strapgen list kernels shows, or a Python file.",
+            help="dcm, euler, cayley-klein, any other kernel that strapgen list kernels shows, or a Python file, "
+            "or a described system, of which every stage is examined.",
             show_default=False,
         ),
     ] = None,
@@ -113,8 +115,21 @@ def _subjects(
     if all_:
         yield from subjects.standard()
     for kernel in kernels:
+        if is_system(kernel):
+            yield from _stages(kernel, method, fixed)
+            continue
         choice = method.choose(kernel, step=False)
         yield subjects.Subject(choice, fixed.settings(choice.increments_per_step))
+
+
+def _stages(name: str, method: KernelOptions, fixed: FixedOptions) -> Iterator[Subject]:
+    """Yield the stages of a described system."""
+    from strapgen.cli.systems.running import refuse_options
+    from strapgen.evidence import subjects
+    from strapgen.systems.wiring import described
+
+    refuse_options(method, fixed, ["--constant"] if method.constant else [])
+    yield from subjects.of_system(described(name), fixed.settings(1))
 
 
 @contextlib.contextmanager

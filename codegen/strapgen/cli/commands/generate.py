@@ -148,6 +148,7 @@ def _check_alone(
         ("--ahead", method.ahead),
         ("--rates", method.rates or None),
         ("--constant", method.constant or None),
+        ("--layout", method.layout),
         ("--target", target),
         ("a fixed-point option", fixed.stated or None),
         (output.for_c, output.for_c),

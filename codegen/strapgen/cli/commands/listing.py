@@ -57,7 +57,7 @@ def _parts() -> dict[str, dict[str, str]]:
     installed = {
         name: f"from {point.value}"
         for name, point in loading.installed().items()
-        if name not in catalogue.ALGORITHMS and name not in catalogue.KERNELS
+        if name not in (*catalogue.ALGORITHMS, *catalogue.KERNELS, *catalogue.LAYOUT_KERNELS)
     }
     return {
         "algorithms": {**catalogue.ALGORITHMS, **installed},
@@ -66,7 +66,9 @@ def _parts() -> dict[str, dict[str, str]]:
             name: f"{vector.title}; methods {', '.join(vector.methods)}"
             for name, vector in catalogue.VECTORS.items()
         },
-        "kernels": {name: recipe.title for name, recipe in catalogue.KERNELS.items()},
+        "kernels": {
+            name: recipe.title for name, recipe in {**catalogue.KERNELS, **catalogue.LAYOUT_KERNELS}.items()
+        },
         "systems": built_in.names(),
         "motions": {
             name: ", ".join(" or ".join(choices) for choices in keys(name).values())

@@ -28,7 +28,11 @@ if TYPE_CHECKING:
 def system(
     file: Annotated[
         Path,
-        typer.Argument(metavar="FILE", help="TOML file with the stages and their wires.", show_default=False),
+        typer.Argument(
+            metavar="FILE",
+            help="TOML file with the stages and their wires, or the name of a built-in system.",
+            show_default=False,
+        ),
     ],
     *,
     target: Annotated[
@@ -71,7 +75,7 @@ def system(
     ] = None,
     format: Format = "text",
 ) -> None:
-    """Check a described system, show what it needs, and generate its code.
+    """Check a described system and generate its code.
 
     Without --out you get a summary: rates, values with their units, frames, formats and error bounds, and the budget.
 
@@ -86,6 +90,7 @@ def system(
         raise InputError(
             f"--with-runs goes with targets in C, not with {target}; its module runs many cycles"
         )
+    from strapgen.reports.systems.drawing import drawing
     from strapgen.reports.systems.summary import bound_lines, system_data, system_report
     from strapgen.support.files import write_files
     from strapgen.systems import budget, generation
@@ -98,11 +103,9 @@ def system(
     if output.check:
         _compare(place, files, format)
         return
+    picture = {} if draw is None else {draw.name: drawing(fit)}
     written = place.write(files) if out is not None else []
-    if draw is not None:
-        from strapgen.reports.systems.drawing import drawing
-
-        written += write_files(draw.parent, {draw.name: drawing(fit)})
+    written += [] if draw is None else write_files(draw.parent, picture)
     if format == "json":
         print_json({**system_data(fit, needs, errors), "files": [str(path) for path in written]})
         return
@@ -124,6 +127,8 @@ def _check_options(
         return
     if draw.suffix.lower() != ".svg":
         raise InputError(f"--draw {draw} is no SVG file; a name that ends with .svg is needed")
+    if draw.resolve() == file.resolve():
+        raise InputError(f"--draw {draw} is the file that the command reads; another one is needed")
     if output.check:
         raise InputError("--check writes nothing; --draw does not go with it")
 

@@ -22,7 +22,10 @@ if TYPE_CHECKING:
 @grouped
 def verify(
     file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="Source or header in C that strapgen generated.")
+        Path,
+        typer.Argument(
+            metavar="FILE", help="Source or header in C that strapgen generated, or a folder of a system."
+        ),
     ],
     *,
     source: SampleSource,
@@ -35,12 +38,20 @@ def verify(
     return the integers of the model, and stay within the certified bound of arithmetic with 40 digits. The run is a
     cone, or what --motion or a recording says.
 
+    Of a described system, a folder or the header of the whole, all files are compared, and every stage is called.
+
     Example: strapgen verify generated/c_fixed/euler_rk4_2_w32.c
     """
     output.check(file, source.increments_csv, source.rates_csv)
     from strapgen.experiments import verification
+    from strapgen.experiments.systems.verification import system_header
     from strapgen.reports.verification import verification_report
 
+    header = system_header(file)
+    if header is not None:
+        from strapgen.cli.systems.verifying import verified_system
+
+        return verified_system(header, source, output, request_of)
     request = request_of(file)
     increments = None
     if source.stated:

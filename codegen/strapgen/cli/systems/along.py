@@ -10,7 +10,7 @@ from strapgen.cli.systems.running import described_along, facts_of, refuse_optio
 from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
-    from strapgen.cli.commands.strapdown import CourseOutput, Start
+    from strapgen.cli.course_options import CourseOutput, Start
     from strapgen.cli.fixed_options import FixedOptions
 
 

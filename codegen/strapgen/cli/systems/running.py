@@ -11,9 +11,9 @@ from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
     from strapgen.backends.systems import SystemRunner
-    from strapgen.cli.commands.simulate import RunOptions, RunOutput
     from strapgen.cli.fixed_options import FixedOptions
     from strapgen.cli.options import MethodOptions
+    from strapgen.cli.run_options import RunOptions, RunOutput
     from strapgen.cli.sample_source import SampleSource
     from strapgen.simulation.recording import Recording
     from strapgen.systems.wiring import Description

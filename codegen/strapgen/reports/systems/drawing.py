@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from strapgen.reports.systems.layout import CHARACTER, HEAD, LANE_HEAD, LINE, MARGIN, plan
+from strapgen.reports.systems.layout import plan
+from strapgen.reports.systems.parts import CHARACTER, HEAD, LANE_HEAD, LINE, MARGIN
 from strapgen.systems.fitting import Fitted
 from strapgen.targets.rendering import render
 

@@ -7,149 +7,24 @@ from dataclasses import dataclass, field
 
 from strapgen.ir.signals import Signal
 from strapgen.ir.system import Cell, DescribedSystem, Push, SystemStage
-
-#: Sizes in pixels: a line of a box, the head of a box, a character, and gaps.
-LINE, HEAD, CHARACTER = 19, 46, 6.7
-MARGIN, LANE_HEAD, BETWEEN, LANE_EDGE, TRACK = 28, 44, 26, 26, 9
-#: Least width of a box, and of the gap between two columns.
-LEAST_BOX, LEAST_GAP = 132, 64
-
-
-@dataclass
-class Port:
-    """A line of a box where a wire begins or ends.
-
-    Parameters
-    ----------
-    name : str
-    unit, frame : str
-    mark : str
-        "sum" if a slower stage clears it, "out" if a run records it, "" for neither.
-    x, y : float
-        Where the wire meets the box.
-    """
-
-    name: str
-    unit: str
-    frame: str
-    mark: str = ""
-    x: float = 0
-    y: float = 0
-
-    @property
-    def about(self) -> str:
-        """Unit and frame in a few characters."""
-        unit = "" if self.unit == "1" else self.unit
-        return " ".join(part for part in (unit, self.frame.replace(" to ", "→")) if part)
-
-    @property
-    def width(self) -> float:
-        """Width of its text."""
-        return (len(self.name) + len(self.about) + 3) * CHARACTER
+from strapgen.reports.systems.parts import (
+    BETWEEN,
+    CHARACTER,
+    LANE_EDGE,
+    LANE_HEAD,
+    LEAST_BOX,
+    LEAST_GAP,
+    MARGIN,
+    TRACK,
+    Box,
+    Lane,
+    Link,
+    Placement,
+    Port,
+)
 
 
-@dataclass
-class Box:
-    """An input or a stage.
-
-    Parameters
-    ----------
-    name, kind : str
-        A line above the ports, and one below it: the kernel, or nothing.
-    every : int
-        Cycles of the fastest rate from one call to the next; 0 for an input.
-    inputs, outputs : list of Port
-    column : int
-    x, y, width : float
-        Upper left corner, and width.
-    """
-
-    name: str
-    kind: str
-    every: int
-    inputs: list[Port] = field(default_factory=list)
-    outputs: list[Port] = field(default_factory=list)
-    column: int = 0
-    x: float = 0
-    y: float = 0
-    width: float = 0
-
-    @property
-    def height(self) -> float:
-        """Height with all ports."""
-        return (HEAD if self.kind else 12) + LINE * max(len(self.inputs), len(self.outputs)) + 8
-
-    def place(self) -> None:
-        """Place the ports at the edges of the box."""
-        top = self.y + (HEAD if self.kind else 12)
-        for ports, x in ((self.inputs, self.x), (self.outputs, self.x + self.width)):
-            for number, port in enumerate(ports):
-                port.x, port.y = x, top + LINE * (number + 0.5)
-
-
-@dataclass(frozen=True)
-class Link:
-    """A wire between two ports.
-
-    Parameters
-    ----------
-    source, destination : tuple of (Box, Port)
-    kind : str
-        "forward", "delayed" or "shared".
-    """
-
-    source: tuple[Box, Port]
-    destination: tuple[Box, Port]
-    kind: str
-
-    @property
-    def title(self) -> str:
-        """What the wire connects, in words."""
-        (here, start), (there, end) = self.source, self.destination
-        text = f"{here.name}.{start.name}" if here.kind else here.name
-        words = {"forward": "", "delayed": ", one cycle late", "shared": ", the same memory"}
-        return f"{text} → {there.name}.{end.name}{words[self.kind]}"
-
-
-@dataclass(frozen=True)
-class Lane:
-    """The columns of one rate.
-
-    Parameters
-    ----------
-    label, about : str
-    x, width : float
-    """
-
-    label: str
-    about: str
-    x: float
-    width: float
-
-
-@dataclass
-class Plan:
-    """Boxes and wires of a system, placed.
-
-    Parameters
-    ----------
-    boxes : list of Box
-    links : list of Link
-    lanes : list of Lane
-    paths : list of (Link, str)
-        Each wire with its way as the commands of an SVG path.
-    width, height : float
-    """
-
-    boxes: list[Box]
-    links: list[Link]
-    lanes: list[Lane] = field(default_factory=list)
-    paths: list[tuple[Link, str]] = field(default_factory=list)
-    width: float = 0
-    height: float = 0
-
-
-def plan(system: DescribedSystem) -> Plan:
+def plan(system: DescribedSystem) -> Placement:
     """Return a drawing of a system as places of its parts.
 
     Parameters
@@ -157,7 +32,7 @@ def plan(system: DescribedSystem) -> Plan:
     system : DescribedSystem
     """
     boxes, links = _Graph(system).run()
-    result = Plan(boxes, links)
+    result = Placement(boxes, links)
     _choose_columns(result)
     _place(result, system)
     return result
@@ -230,7 +105,7 @@ class _Graph:
         self.links.append(Link((self.boxes[owner], start), (box, box.inputs[-1]), kind))
 
 
-def _choose_columns(result: Plan) -> None:
+def _choose_columns(result: Placement) -> None:
     """Give every box a column: inputs in the first, then the stages of each rate, behind those that they read."""
     before: dict[str, list[Box]] = {box.name: [] for box in result.boxes}
     for link in result.links:
@@ -245,7 +120,7 @@ def _choose_columns(result: Plan) -> None:
         first = max(box.column for box in stages) + 1
 
 
-def _place(result: Plan, system: DescribedSystem) -> None:
+def _place(result: Placement, system: DescribedSystem) -> None:
     """Place boxes, lanes and wires."""
     columns = [
         [box for box in result.boxes if box.column == number]
@@ -304,7 +179,7 @@ def _net(link: Link) -> tuple[str, str]:
     return link.source[0].name, link.source[1].name
 
 
-def _tracks(result: Plan) -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:
+def _tracks(result: Placement) -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:
     """Return the wires that pass above the boxes, and those that pass below, a track for each port."""
     far = [link for link in result.links if not _is_direct(link)]
     above = {_net(link): _span(link) for link in far if link.destination[0].column > link.source[0].column}
@@ -316,7 +191,7 @@ def _span(link: Link) -> int:
     return abs(link.destination[0].column - link.source[0].column)
 
 
-def _gaps(result: Plan, count: int) -> list[float]:
+def _gaps(result: Placement, count: int) -> list[float]:
     """Return the width before each column and behind the last, by the number of wires that turn up or down there."""
     turns = [0] * (count + 1)
     for starts, nets in ((True, _ends(result.links, True)), (False, _ends(result.links, False))):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from strapgen.ir.fixed_interface import Argument
-from strapgen.ir.signals import Signal
+from strapgen.ir.signals import FRAMES, Signal
 from strapgen.ir.sources import Function, Sources
 from strapgen.ir.system import Cell, DescribedSystem, Push, Rate, SystemStage
 from strapgen.support.version import VERSION
@@ -117,6 +117,7 @@ class _Printer:
             "version": VERSION,
             "guard": f"{self.name}_h".upper(),
             "system": system,
+            "frames": ", ".join(f"{letter} {name}" for letter, name in FRAMES.items()),
             "fixed": fixed,
             "headers": [f"{sources.function.name}.h" for sources in self.stages.values()],
             "cells": [(cell, self._stored(cell.name).type, self._told(cell)) for cell in system.cells],

@@ -45,7 +45,7 @@ def whole(
         The module of the whole, and one for each stage.
     """
     first = stages[system.stages[0].name]
-    printer = _Printer(system, stages, arguments)
+    printer = _TwinPrinter(system, stages, arguments)
     files = {f"{system.name}.py": printer.module(*title_and_command, budget)}
     for stage, sources in stages.items():
         (text,) = sources.files.values()
@@ -60,7 +60,7 @@ def whole(
 
 
 @dataclass(frozen=True)
-class _Printer:
+class _TwinPrinter:
     """Prints the parts of a module that the template puts together."""
 
     system: DescribedSystem
@@ -84,7 +84,7 @@ class _Printer:
             cells=[(cell, self._told(cell.signal, cell), self._initial(cell)) for cell in system.cells],
             inputs=[(signal, self._told(signal)) for signal in system.inputs],
             feedback=[
-                (stage.name, [residual.fresh for residual in interface.residuals])
+                (stage.name, [word.fresh for word in interface.residuals])
                 for stage in system.stages
                 if (interface := self.stages[stage.name].fixed) is not None and interface.residuals
             ],
