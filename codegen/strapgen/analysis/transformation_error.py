@@ -93,7 +93,7 @@ def slowest_rate(largest_rate: float, error: float) -> float:
     Examples
     --------
     >>> round(slowest_rate(1.0, 1e-4), 4)
-    40.8267
+    40.8246
     """
     if not 0 < error < 1:
         raise InputError(

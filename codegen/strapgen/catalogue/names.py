@@ -10,6 +10,7 @@ from strapgen.catalogue.methods.windows import EXACT_TERMS, WINDOW_TITLES
 from strapgen.catalogue.navigation_names import NAVIGATION
 from strapgen.catalogue.output_names import OUTPUTS, TWO_ROWS
 from strapgen.catalogue.recipe import Recipe
+from strapgen.catalogue.sampling_names import SAMPLING
 
 #: Attitude algorithms, by the state they integrate.
 ALGORITHMS = {
@@ -276,16 +277,6 @@ COMPENSATION = {
         ("torques-canonical", "torques of mass-unbalanced gyros", "separation", "measure", "canonical"),
         ("torques-45", "torques, torquers at 45 degrees", "separation", "measure", "45"),
     )
-}
-
-#: Kernels between stages of different rates, and from counts; they take no method.
-SAMPLING = {
-    "sum-3": Recipe("sum of increments for a slower cycle", "sampling", "increment_sum", (), False),
-    "hold-3": Recipe("increments shared out to faster cycles", "sampling", "held_increment", (), False),
-    "angle-counts": Recipe("angle increments from counts", "sampling", "scaled_counts", ("angle",), False),
-    "velocity-counts": Recipe(
-        "velocity increments from counts", "sampling", "scaled_counts", ("velocity",), False
-    ),
 }
 
 #: Kernels that take no method.

@@ -39,7 +39,7 @@ class OutputFilter:
     --------
     >>> edge = OutputFilter(3.2, 50)
     >>> [round(b, 10) for b in edge.numerator], [round(a, 10) for a in edge.denominator]
-    ([0.0312389237, 0.0624778475, 0.0312389237], [1.0, -1.4415303099, 0.5664860047])
+    ([0.0312389237, 0.0624778474, 0.0312389237], [1.0, -1.4415303099, 0.5664860047])
     """
 
     cutoff_hz: float

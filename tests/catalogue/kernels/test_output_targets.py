@@ -17,6 +17,8 @@ from strapgen.backends.kernel_sources import sources_of_program
 from strapgen.catalogue import OUTPUTS, TWO_ROWS, Choice
 from strapgen.catalogue.output_names import MOUNTINGS
 from strapgen.ir.fixed_settings import Settings
+from strapgen.simulation.variation_table import VariationTable
+from strapgen.support.exceptions import InputError
 
 NAMES = [*OUTPUTS, *TWO_ROWS]
 AXES = [f"axes-{mounting}" for mounting in MOUNTINGS]
@@ -163,6 +165,35 @@ def test_variation_is_exact_at_corners_and_linear_on_edges():
     assert value(sp.Rational(1, 4), sp.Rational(3, 5)).subs(numbers) == sp.Rational(51, 4)
     heading = strapgen.evaluator("magnetic-heading")
     assert math.isclose(heading(3.0, 0.5), 3.5 - 2 * math.pi, rel_tol=1e-15)
+
+
+def test_a_table_of_variations_is_continuous_over_its_lines_and_over_half_turns():
+    latitudes, longitudes = [-60, 0, 73], [-180, -60, 60, 180]
+    numbers = [[20, 150, -120, 20], [0, 90, -150, 0], [10, 100, -140, 10]]
+    table = VariationTable(latitudes, longitudes, numbers)
+    evaluate = strapgen.evaluator("variation")
+
+    def value(latitude, longitude):
+        corners, fractions = table.around(latitude, longitude)
+        return np.degrees(float(evaluate(*corners, *fractions)))
+
+    def apart(one, other):
+        return abs(math.remainder(one - other, 360))
+
+    for row, latitude in enumerate(latitudes):
+        for column, longitude in enumerate(longitudes):
+            assert apart(value(latitude, longitude), numbers[row][column]) < 1e-12
+    for longitude in (-60, 60, 180):
+        # The largest slope is 150 deg in 120; both sides of a line differ by no more.
+        assert apart(value(-30, longitude - 1e-9), value(-30, longitude + 1e-9)) < 1e-7
+    assert apart(value(-60, 0), -165) < 1e-12  # between 150 and -120 over the half turn, not through 0
+    for position, reason in (((74, 0), "latitude 74 deg is outside of the grid, -60 to 73 deg"),):
+        with pytest.raises(InputError, match=reason):
+            table.around(*position)
+    with pytest.raises(InputError, match="have to increase"):
+        VariationTable([0, 0], [0, 1], np.zeros((2, 2)))
+    with pytest.raises(InputError, match=r"the grid has \(2, 2\)"):
+        VariationTable([0, 1], [0, 1], np.zeros((2, 3)))
 
 
 def test_track_angle_and_its_error():

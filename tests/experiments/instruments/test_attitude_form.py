@@ -3,6 +3,7 @@
 import json
 import math
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -56,6 +57,19 @@ def test_numbers_of_the_error_and_a_quadrature():
         assert math.isclose(
             math.hypot(*transformation_error.errors(math.radians(70) / hz)), error, rel_tol=1e-9
         )
+
+
+def test_the_page_shows_the_operations_of_the_kernels():
+    page = (Path(__file__).parents[3] / "docs" / "attitude-form.md").read_text()
+    rows = [line.strip("| ").split(" | ") for line in page.splitlines() if line.startswith("| ")][1:]
+    assert len(rows) == len(attitude_form.PARTS)
+    for part, (_, *shown) in zip(attitude_form.PARTS, rows, strict=True):
+        kernels = [kernels[part] for _, kernels in attitude_form.FORMS.values()]
+        counts = [
+            sum(generated_sources.program(Choice(kernel)).operations.values()) if kernel else 0
+            for kernel in kernels
+        ]
+        assert list(map(int, shown)) == counts, part
 
 
 def study(*words: str, capsys):

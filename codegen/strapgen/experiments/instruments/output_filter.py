@@ -173,7 +173,7 @@ def _measured(
     cycles = cycles_needed(output_filter, min(frequencies))
     samples = _samples(output_filter, _PART * largest, frequencies, cycles)
     outputs = run_filter(evaluator, samples)
-    angles = 2 * math.pi * np.arange(start, cycles) / output_filter.sample_hz
+    angles = np.asarray(2 * math.pi * np.arange(start, cycles) / output_filter.sample_hz, np.float64)
     responses = tuple(
         complex(np.mean(_phasors(outputs[start:, k], angles * f) / _phasors(samples[start:, k], angles * f)))
         for k, f in enumerate(frequencies)

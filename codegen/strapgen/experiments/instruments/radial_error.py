@@ -35,7 +35,7 @@ def radial_error_rate(errors: Sequence[float], times: Sequence[float], factor: f
     Examples
     --------
     >>> round(radial_error_rate([1.0, 2.0, 3.0], [1.0, 2.0, 1.0]), 6)
-    3.317333
+    3.317316
     """
     distances, durations = checks.numbers("errors", errors), checks.numbers("times", times)
     if distances.shape != durations.shape or distances.ndim != 1 or not distances.size:
