@@ -35,7 +35,7 @@ def study_attitude_form(
         ),
     ] = "1",
     max_rate_deg_s: Annotated[
-        str, option("--max-rate-deg-s", metavar="RATE", help="Largest body rate in deg/s.", panel="Rates")
+        str, option("--max-rate-deg-s", metavar="DEG_S", help="Largest body rate in deg/s.", panel="Rates")
     ] = "70",
     velocity_error: Annotated[
         str,
@@ -87,7 +87,7 @@ def study_attitude_form(
     for name, value in values.items():
         if value < 0:
             raise InputError(f"{name} is {value:g}; a number of at least 0 is needed")
-    rates = forms.Rates(float(checks.number("update-hz", update_hz, positive=True)), *values.values())
+    rates = forms.PartRates(float(checks.number("update-hz", update_hz, positive=True)), *values.values())
     turning = math.radians(checks.number("max-rate-deg-s", max_rate_deg_s, positive=True))
     allowed = float(checks.number("velocity-error", velocity_error))
     which = forms.pairs([] if without is None else listed("--without", without))

@@ -68,7 +68,7 @@ FORMS: dict[str, tuple[str, dict[str, str]]] = {
 
 
 @dataclass(frozen=True)
-class Rates:
+class PartRates:
     """How often a navigator runs each part, in Hz.
 
     Parameters
@@ -120,7 +120,7 @@ class PartCost:
 
 
 @dataclass(frozen=True)
-class Truncation:
+class VelocityLoss:
     """What the first-order attitude in a slow cycle costs in velocity.
 
     Parameters
@@ -149,16 +149,16 @@ class FormStudy:
 
     Parameters
     ----------
-    rates : Rates
+    rates : PartRates
     parts : tuple of PartCost
-    truncation : Truncation
+    truncation : VelocityLoss
     cpu : str
         Processor on which instructions were counted; "" if none were.
     """
 
-    rates: Rates
+    rates: PartRates
     parts: tuple[PartCost, ...]
-    truncation: Truncation
+    truncation: VelocityLoss
     cpu: str = ""
 
     def of(self, form: str) -> list[PartCost]:
@@ -198,7 +198,7 @@ def pairs(without: Iterable[str] = ()) -> list[tuple[str, str]]:
 
 
 def part_costs(
-    which: Iterable[tuple[str, str]], rates: Rates, cpu: str = "", settings: Settings | None = None
+    which: Iterable[tuple[str, str]], rates: PartRates, cpu: str = "", settings: Settings | None = None
 ) -> Iterator[PartCost]:
     """Count the operations of parts, and where a processor is named their instructions in fixed point.
 
@@ -206,7 +206,7 @@ def part_costs(
     ----------
     which : iterable of (str, str)
         Forms and parts.
-    rates : Rates
+    rates : PartRates
     cpu : str, optional
     settings : Settings, optional
         Settings of fixed point.
@@ -231,12 +231,12 @@ def part_costs(
         yield PartCost(form, part, kernel, rates.of(part), counts, executed)
 
 
-def truncation(rates: Rates, largest_rate: float, error: float) -> Truncation:
+def truncation(rates: PartRates, largest_rate: float, error: float) -> VelocityLoss:
     """Return what (47) costs at the slow rate, and the slow rate for a stated error.
 
     Parameters
     ----------
-    rates : Rates
+    rates : PartRates
     largest_rate : float
         In rad/s.
     error : float
@@ -244,4 +244,4 @@ def truncation(rates: Rates, largest_rate: float, error: float) -> Truncation:
     """
     slowest = transformation_error.slowest_rate(largest_rate, error)
     angle = largest_rate / rates.update
-    return Truncation(largest_rate, angle, *transformation_error.errors(angle), error, slowest)
+    return VelocityLoss(largest_rate, angle, *transformation_error.errors(angle), error, slowest)

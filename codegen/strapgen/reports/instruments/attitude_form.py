@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from strapgen.analysis import transformation_error
-from strapgen.experiments.instruments.attitude_form import FORMS, PARTS, FormStudy, PartCost, Truncation
+from strapgen.experiments.instruments.attitude_form import FORMS, PARTS, FormStudy, PartCost, VelocityLoss
 from strapgen.reports.plots import figures
 from strapgen.reports.report import Report
 from strapgen.reports.table import Column, TextTable
@@ -136,7 +136,7 @@ def _lines(study: FormStudy) -> Iterator[str]:
     yield from _truncation_lines(study.truncation, study.rates.update)
 
 
-def _truncation_lines(loss: Truncation, hz: float) -> Iterator[str]:
+def _truncation_lines(loss: VelocityLoss, hz: float) -> Iterator[str]:
     """Tell what (47) costs."""
     yield "the first-order attitude (47) in a slow cycle makes a velocity increment too large, phi = w T, by"
     yield f"  along the acceleration  {_series(transformation_error.along_series(3))}"
