@@ -80,6 +80,7 @@ def study(*words: str, capsys):
     return json.loads(said.out)
 
 
+@pytest.mark.long
 def test_totals_are_those_of_the_kernels_and_close_together(tmp_path, capsys):
     image = tmp_path / "forms.png"
     answer = study(
