@@ -8,6 +8,7 @@ from strapgen.catalogue.methods.shaped_coning import SHAPE_TITLES
 from strapgen.catalogue.methods.tableaux import TITLES
 from strapgen.catalogue.methods.windows import EXACT_TERMS, WINDOW_TITLES
 from strapgen.catalogue.navigation_names import NAVIGATION
+from strapgen.catalogue.output_names import OUTPUTS, TWO_ROWS
 from strapgen.catalogue.recipe import Recipe
 from strapgen.catalogue.redundancy_names import REDUNDANCY
 from strapgen.catalogue.sampling_names import SAMPLING
@@ -340,6 +341,8 @@ KERNELS = {
     **COMPENSATION,
     **NAVIGATION,
     **REDUNDANCY,
+    **OUTPUTS,
+    **TWO_ROWS,
 }
 
 

@@ -29,6 +29,8 @@ from strapgen.cli.commands import (
     statements,
     strapdown,
     study,
+    study_attitude_form,
+    study_output_filter,
     study_redundancy,
     study_system,
     system,
@@ -92,6 +94,8 @@ class _Strapgen(PlainGroup):
 
 
 study.app.command("system", cls=PlainCommand)(study_system.study_system)
+study.app.command("attitude-form", cls=PlainCommand)(study_attitude_form.study_attitude_form)
+study.app.command("output-filter", cls=PlainCommand)(study_output_filter.study_output_filter)
 
 study.app.command("redundancy", cls=PlainCommand)(study_redundancy.study_redundancy)
 

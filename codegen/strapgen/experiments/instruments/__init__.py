@@ -1,1 +1,1 @@
-"""Experiments on the instruments and systems of 1984."""
+"""Experiments on the instruments and systems of 1984 that stand around an attitude algorithm."""
