@@ -215,7 +215,7 @@ def test_the_glossary_is_sorted_and_other_pages_refer_to_it():
 # The pages
 
 #: Pages that take seconds: many kernels, or the integer model.
-LONG_PAGES = ("canonical-form", "coning", "fixed-point", "series", "two-speed", "vibration")
+LONG_PAGES = ("canonical-form", "compensation", "coning", "fixed-point", "series", "two-speed", "vibration")
 
 
 @pytest.mark.parametrize(

@@ -153,11 +153,12 @@ def test_version_names_all_that_shapes_the_output(strapgen_says):
 
 def test_list(strapgen_says):
     data = json.loads(strapgen_says("list --format json"))
-    assert list(data) == ["algorithms", "methods", "vectors", "kernels", "motions", "targets", "backends"]
+    kinds = ["algorithms", "methods", "vectors", "kernels", "systems", "motions", "targets", "backends"]
+    assert list(data) == kinds
     assert list(data["algorithms"]) == ["dcm", "euler", "cayley-klein"]
     assert list(data["methods"].items()) == list(catalogue.METHODS.items())
     assert data["vectors"].keys() == catalogue.VECTORS.keys()
-    assert data["kernels"].keys() == catalogue.KERNELS.keys()
+    assert data["kernels"].keys() == {**catalogue.KERNELS, **catalogue.LAYOUT_KERNELS}.keys()
     assert list(data["motions"]) == [
         *("constant", "sinusoidal", "coning", "polynomial"),
         *("cone", "random", "slew", "ramps", "vibration"),

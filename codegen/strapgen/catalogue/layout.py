@@ -121,9 +121,8 @@ def _gyro(what: str, table: Any) -> GyroDescription:
     except InputError as error:
         raise InputError(f"{what}: {error}") from None
     if ("y" in table) == ("spin" in table):
-        raise InputError(
-            f"{what} has {'both' if 'y' in table else 'neither'} y and spin; one of them is needed"
-        )
+        present = "both y and spin" if "y" in table else "neither y nor spin"
+        raise InputError(f"{what} has {present}; one of them is needed")
     second = "y" if "y" in table else "spin"
     x, other = (_axis(f"{what}: axis {key}", table[key]) for key in ("x", second))
     if _total(zip(x, other, strict=True)) != 0:

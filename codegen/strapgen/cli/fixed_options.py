@@ -101,7 +101,8 @@ class FixedOptions:
             "--carry",
             metavar="NAME",
             help="Error feedback, which adds the rounding errors of a step to the next one: none; state for those of "
-            "the state; full for those of the transition too.  [default: none]",
+            "the state; full for those of the transition too; all for those of sums and outgoing increments too.  "
+            "[default: none]",
         ),
     ] = None
     state: Annotated[

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from strapgen.experiments.system_verification import SystemVerification
+from strapgen.experiments.systems.verification import SystemVerification
 from strapgen.experiments.verification import Verification
 from strapgen.reports.report import Report
 

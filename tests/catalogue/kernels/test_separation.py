@@ -85,6 +85,10 @@ def test_the_determinant_is_twice_the_cube_of_the_unbalance(name):
     assert sp.simplify(sp.Abs(measurement_matrix(*LAYOUTS[name]).det())) == 2 * B**3
 
 
+def test_the_spins_at_45_degrees_are_those_of_the_source():
+    assert [gyro.spin for gyro in diagonal_layout()] == [-X, -Z, Y]
+
+
 def test_the_determinant_for_free_unbalances():
     second, third = sp.symbols("B2 B3")
     matrix = measurement_matrix(canonical_layout(second, third), -1)

@@ -43,6 +43,10 @@ def test_the_steady_deviation_and_its_share_after_a_time_constant():
     assert abs(deviation_after(360, 540) / deviation_after(360, 0) - 0.0273) <= 0.00005
 
 
+def test_a_cycle_at_93_hz_decays_by_the_stated_share():
+    assert abs(-np.expm1(-1 / 93 / TAU) - 7.2e-5) <= 0.05e-5
+
+
 def test_the_recursion_is_the_differential_equation_for_a_rate_held_over_a_cycle():
     u, w, k, tau, T = sp.symbols("u w k tau T", positive=True)
     time = sp.Symbol("t", positive=True)

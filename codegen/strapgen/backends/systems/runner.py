@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
@@ -123,7 +124,7 @@ class SystemRunner(ABC):
             values = values.reshape(-1, signal.size)
             argument = self.fit.arguments.get(signal.name)
             if argument is not None and signal.over == CYCLE and argument.format.word < _EXACT_BITS:
-                values = pulses(values[:, None], argument.unit)[:, 0]
+                values = _carried(values, argument.unit)
             result[signal.name] = self.stored(signal.name, values)
             counts.add(len(values))
         if len(counts) > 1:
@@ -237,3 +238,11 @@ class InterpretedSystem(SystemRunner):
         return {
             name: np.concatenate(rows) if rows else empty[name] for name, rows in recorded.items()
         }, memory
+
+
+def _carried(values: Array, unit: Fraction) -> Array:
+    """Return increments of any number of elements, (cycles, elements), as differences of rounded sums."""
+    count, size = values.shape
+    padded = np.pad(values, ((0, 0), (0, -size % 3)))
+    triples = padded.reshape(count, -1, 1, 3).swapaxes(0, 1)
+    return pulses(triples, unit).swapaxes(0, 1).reshape(count, -1)[:, :size]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
@@ -105,7 +106,7 @@ def _gyro(one: GyroDescription) -> TwoAxisGyro:
 
 def _text(value: sp.Expr) -> str:
     """Return an exact number or formula as text; a long number with six digits."""
-    text = str(value).replace("**", "^")
+    text = re.sub(r"Abs\(([^()]*)\)", r"|\1|", str(value).replace("**", "^"))
     return f"{float(value):.6g}" if len(text) > _MOST_CHARACTERS and not value.free_symbols else text
 
 

@@ -44,7 +44,7 @@ def verify(
     """
     output.check(file, source.increments_csv, source.rates_csv)
     from strapgen.experiments import verification
-    from strapgen.experiments.system_verification import system_header
+    from strapgen.experiments.systems.verification import system_header
     from strapgen.reports.verification import verification_report
 
     header = system_header(file)

@@ -40,7 +40,7 @@ def verified_system(
         raise InputError("a motion or a recording does not go with the files of a described system")
     output.check(header)
     from strapgen.cli.progress import waiting
-    from strapgen.experiments.system_verification import verify_system
+    from strapgen.experiments.systems.verification import verify_system
     from strapgen.library.generated_files import command_of, text_of
     from strapgen.reports.verification import system_verification_report
     from strapgen.support.drafts import temporary_folder

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -12,6 +13,7 @@ import numpy as np
 from strapgen.backends.evaluators import Array
 from strapgen.backends.systems import SystemMemory, SystemRunner
 from strapgen.backends.systems.compiled import CompiledSystem
+from strapgen.ir.signals import Signal
 from strapgen.support.exceptions import InputError
 from strapgen.systems.bounds import bounds
 
@@ -134,9 +136,27 @@ def _differences(
     with np.errstate(all="ignore"):
         reference.call(before, measured, runner.system.rates[:due])
     return {
-        name: np.abs(runner.in_si(name, trace[name][rows + 1]) - reference.in_si(name, values))
+        name: distance(
+            runner.system.cell(name).signal,
+            runner.in_si(name, trace[name][rows + 1]),
+            reference.in_si(name, values),
+        )
         for name, values in before.cells.items()
     }
+
+
+def distance(signal: Signal, one: Array, other: Array) -> Array:
+    """Return how far values are from each other, element by element; angles without whole turns.
+
+    Parameters
+    ----------
+    signal : Signal
+    one, other : array, (..., elements)
+    """
+    apart = one - other
+    if signal.unit == "rad":
+        apart = apart - math.tau * np.rint(apart / math.tau)
+    return np.asarray(np.abs(apart))
 
 
 def _share(differences: Array, errors: tuple[Fraction, ...]) -> float:

@@ -6,12 +6,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-import numpy as np
-
 from strapgen.backends import BACKENDS
 from strapgen.backends.systems import system_runner
 from strapgen.backends.systems.compiled import CompiledSystem
-from strapgen.experiments.systems.agreement import PassAgreement, agreement
+from strapgen.experiments.systems.agreement import PassAgreement, agreement, distance
 from strapgen.ir.fixed_settings import Settings
 from strapgen.systems.wiring import Description
 
@@ -91,9 +89,9 @@ def compare_system(
         if isinstance(runner, CompiledSystem):
             passes = agreement(runner, other, inputs)
         for output in runner.system.outputs:
-            difference = float(np.abs(values[output] - expected[output]).max(initial=0))
-            unit = runner.system.cell(output).signal.unit
-            rows.append(_row(name, output, unit, difference, passes))
+            signal = runner.system.cell(output).signal
+            difference = float(distance(signal, values[output], expected[output]).max(initial=0))
+            rows.append(_row(name, output, signal.unit, difference, passes))
     return rows
 
 

@@ -8,10 +8,10 @@ from fractions import Fraction
 
 import pytest
 from small_systems import COUNTING
-from strapgen.experiments.system_comparison import compare_system
 
 from strapgen.cli import main
-from strapgen.experiments import system_comparison
+from strapgen.experiments.systems import comparison
+from strapgen.experiments.systems.comparison import compare_system
 from strapgen.simulation.motions import motion
 from strapgen.simulation.system_inputs import samples, velocity_increments
 from strapgen.systems.wiring import described
@@ -71,13 +71,13 @@ def test_a_pass_outside_its_bound_fails_the_command(file, capsys, monkeypatch):
     status, out, err = says(command.split(), capsys)
     rows = json.loads(out)
     assert status == 0 and not err and rows[0]["output"] == "attitude_state" and rows[0]["share"] > 0
-    real = system_comparison.agreement
+    real = comparison.agreement
 
     def broken(*arguments):
         passes = real(*arguments)
         return replace(passes, share={name: 1 + share for name, share in passes.share.items()})
 
-    monkeypatch.setattr(system_comparison, "agreement", broken)
+    monkeypatch.setattr(comparison, "agreement", broken)
     status, _, err = says(command.split(), capsys)
     assert status == 1 and err == "strapgen: outside the certified bound: attitude_state on c-fixed16\n"
 
