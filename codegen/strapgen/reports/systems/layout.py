@@ -47,7 +47,7 @@ def _planned(system: DescribedSystem, abreast: int) -> Placement:
     """Return a drawing with at most so many boxes side by side."""
     boxes, links = Graph(system).run()
     rows = list(_rows(boxes, abreast))
-    _choose_columns(rows, links)
+    _choose_columns(rows, links, abreast)
     routing = Routing(rows, links)
     result = Placement(boxes, links)
     routing.choose_channels()
@@ -71,9 +71,8 @@ def _rows(boxes: list[Box], abreast: int) -> Iterator[list[Box]]:
         yield from (group[a:b] for a, b in pairwise(edges))
 
 
-def _choose_columns(rows: list[list[Box]], links: list[Link]) -> None:
+def _choose_columns(rows: list[list[Box]], links: list[Link], abreast: int) -> None:
     """Give every box a column, so that wires go to the right and not far."""
-    columns = range(max(len(row) for row in rows))
     touching: dict[str, list[Link]] = {box.name: [] for row in rows for box in row}
     for number, row in enumerate(rows):
         for column, box in enumerate(row):
@@ -85,10 +84,13 @@ def _choose_columns(rows: list[list[Box]], links: list[Link]) -> None:
         for row in rows:
             near = {id(link): link for box in row for link in touching[box.name]}.values()
             choices = []
-            for places in permutations(columns, len(row)):
+            for places in permutations(range(abreast), len(row)):
                 _put(row, places)
                 choices.append((sum(map(_detour, near)), places))
             _put(row, min(choices)[1])
+    used = sorted({box.column for row in rows for box in row})
+    for row in rows:
+        _put(row, [used.index(box.column) for box in row])
 
 
 def _put(row: list[Box], places: Iterable[int]) -> None:

@@ -11,7 +11,7 @@ MARGIN, BETWEEN = 24, 8
 #: From a wire to the next one beside it, from a box to the first wire, and the least width of a gutter.
 TRACK, EDGE, GUTTER = 8, 20, 46
 #: Least and greatest width of a box; what does not fit is shortened.
-LEAST_BOX, GREATEST_BOX = 168, 276
+LEAST_BOX, GREATEST_BOX = 168, 288
 #: Most boxes side by side, and the greatest width of a drawing.
 ABREAST, WIDEST = 4, 1500
 #: What the colours of wires mean, in the order in which they are drawn.

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Hashable
 
 from strapgen.reports.systems.parts import KINDS, TRACK, Box, Link, Way
-from strapgen.reports.systems.tracks import Run, tracks
+from strapgen.reports.systems.tracks import Straight, tracks
 
 _Net = tuple[str, str, str]
 
@@ -42,11 +42,11 @@ class Routing:
     def choose_channels(self) -> None:
         """Choose a channel for each net, where few others are, and a track in it."""
         self._choose_least_crowded()
-        runs: dict[int, dict[Hashable, Run]] = {}
+        runs: dict[int, dict[Hashable, Straight]] = {}
         for net in sorted(self._channel, key=self._nesting):
             channel = self._channel[net]
             source = self.nets[net][0].source[0]
-            run = runs.setdefault(channel, {}).setdefault(net, Run())
+            run = runs.setdefault(channel, {}).setdefault(net, Straight())
             if source.kind:
                 run.reach(source.column + 1, source.row >= channel)
             else:
@@ -77,19 +77,19 @@ class Routing:
 
     def choose_gutters(self) -> None:
         """Choose a track for each wire in each gutter; rows and channels have their places now."""
-        runs: dict[int, dict[Hashable, Run]] = {}
+        runs: dict[int, dict[Hashable, Straight]] = {}
         for net, links in self.nets.items():
             source, port = links[0].source
             leave = source.column + 1
             for link in links:
                 destination, end = link.destination
-                run = runs.setdefault(destination.column, {}).setdefault(net, Run())
+                run = runs.setdefault(destination.column, {}).setdefault(net, Straight())
                 run.reach(end.y, True)
                 if net in self._channel and (destination.column != leave or not source.kind):
                     place = source.column + 0.5 if not source.kind else leave
                     run.reach(self._height(net), place > destination.column)
             if source.kind:
-                run = runs.setdefault(leave, {}).setdefault(net, Run())
+                run = runs.setdefault(leave, {}).setdefault(net, Straight())
                 run.reach(port.start(net[2]), False)
                 for link in links:
                     if link.destination[0].column != leave:

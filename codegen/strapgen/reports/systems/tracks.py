@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 
 @dataclass
-class Run:
+class Straight:
     """A straight part of wires along a gutter.
 
     Parameters
@@ -35,25 +35,25 @@ class Run:
         self.low, self.high = min(self.low, place), max(self.high, place)
         (self.after if is_after else self.before).add(place)
 
-    def crossings(self, other: Run) -> int:
-        """Return how often wires cross if another run has a higher track.
+    def crossings(self, other: Straight) -> int:
+        """Return how often wires cross if another stretch has a higher track.
 
         Parameters
         ----------
-        other : Run
+        other : Straight
         """
         here = sum(other.low <= place <= other.high for place in self.after)
         return here + sum(self.low <= place <= self.high for place in other.before)
 
 
-def tracks(runs: Mapping[Hashable, Run], apart: float) -> dict[Hashable, int]:
-    """Return a track for each run: 0 for the first, and so on; the order stays where no other is better.
+def tracks(runs: Mapping[Hashable, Straight], apart: float) -> dict[Hashable, int]:
+    """Return a track for each stretch: 0 for the first, and so on; the order stays where no other is better.
 
     Parameters
     ----------
-    runs : dict of Run
+    runs : dict of Straight
     apart : float
-        Least distance of two runs on one track.
+        Least distance of two stretches on one track.
     """
     order = _ordered(list(runs), runs)
     numbers: dict[Hashable, int] = {}
@@ -68,8 +68,8 @@ def tracks(runs: Mapping[Hashable, Run], apart: float) -> dict[Hashable, int]:
     return numbers
 
 
-def _ordered(order: list[Hashable], runs: Mapping[Hashable, Run]) -> list[Hashable]:
-    """Return runs in an order with few crossings: each moves to its best place until nothing gets better."""
+def _ordered(order: list[Hashable], runs: Mapping[Hashable, Straight]) -> list[Hashable]:
+    """Return stretches in an order with few crossings: each moves to its best place until nothing gets better."""
     excess = {  # crossings of a before b less those of b before a
         (a, b): runs[a].crossings(runs[b]) - runs[b].crossings(runs[a]) for a in order for b in order
     }
