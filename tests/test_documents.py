@@ -247,6 +247,7 @@ LONG_COMMANDS = (
     "strapgen generate dcm ",
     "strapgen generate euler --method rk4 --",
     "strapgen rate-table ",
+    "strapgen redundancy ",
     "strapgen series euler ",
     "strapgen simulate ",
     "strapgen stability ",

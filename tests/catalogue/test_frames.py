@@ -14,6 +14,12 @@ WITHOUT = {
         ("torque_increment", "compensated_torque_increment", "indicated_torque_increment"),
         "each element is about another torquer axis",
     ),
+    **dict.fromkeys(("measurement", "excluded", "failed"), "there is one number for each redundant sensor"),
+    **dict.fromkeys(
+        ("parity", "parity_bias", "next_parity_bias", "corrected", "trip"),
+        "there is one number for each parity equation",
+    ),
+    **dict.fromkeys(("mean", "next_mean"), "from the axes of one unit to those of another"),
     "level_angles": "its axes, level with heading 0, are those of no other signal",
     **dict.fromkeys(("deviation", "next_deviation", "heating_gain"), "there is one number for each gyro"),
 }

@@ -117,10 +117,11 @@ def test_instructions_are_counted_on_a_processor_and_stand_in_the_header(two, ca
     assert "On cortex-m3: " in header
 
 
-def test_the_picture_of_the_page_is_that_of_the_example(tmp_path, capsys):
+@each("example, picture", [("attitude", "system"), ("strapdown", "strapdown")])
+def test_a_picture_of_the_page_is_that_of_its_example(example, picture, tmp_path, capsys):
     root = Path(__file__).parents[2]
-    run(f"{root}/examples/attitude.toml --target numpy --draw {tmp_path}/system.svg", capsys)
-    assert (tmp_path / "system.svg").read_text() == (root / "docs" / "system.svg").read_text()
+    run(f"{root}/examples/{example}.toml --target numpy --draw {tmp_path}/{picture}.svg", capsys)
+    assert (tmp_path / f"{picture}.svg").read_text() == (root / "docs" / f"{picture}.svg").read_text()
 
 
 @each("name", ["two", "att"])

@@ -29,7 +29,9 @@ from strapgen.catalogue.names import (
     StepVector,
 )
 from strapgen.catalogue.navigation_names import NAVIGATION
+from strapgen.catalogue.output_names import OUTPUTS, TWO_ROWS
 from strapgen.catalogue.recipe import Recipe
+from strapgen.catalogue.redundancy_names import REDUNDANCY
 
 __all__ = [
     "ALGORITHMS",
@@ -42,9 +44,12 @@ __all__ = [
     "MOST_INCREMENTS",
     "MOTIONS",
     "NAVIGATION",
+    "OUTPUTS",
+    "REDUNDANCY",
     "RESERVED",
     "RUN_MOTIONS",
     "STANDARD_METHODS",
+    "TWO_ROWS",
     "TWO_SPEED",
     "UPDATE_ORDERS",
     "VECTORS",

@@ -8,7 +8,10 @@ from strapgen.catalogue.methods.shaped_coning import SHAPE_TITLES
 from strapgen.catalogue.methods.tableaux import TITLES
 from strapgen.catalogue.methods.windows import EXACT_TERMS, WINDOW_TITLES
 from strapgen.catalogue.navigation_names import NAVIGATION
+from strapgen.catalogue.output_names import OUTPUTS, TWO_ROWS
 from strapgen.catalogue.recipe import Recipe
+from strapgen.catalogue.redundancy_names import REDUNDANCY
+from strapgen.catalogue.sampling_names import SAMPLING
 
 #: Attitude algorithms, by the state they integrate.
 ALGORITHMS = {
@@ -277,16 +280,6 @@ COMPENSATION = {
     )
 }
 
-#: Kernels between stages of different rates, and from counts; they take no method.
-SAMPLING = {
-    "sum-3": Recipe("sum of increments for a slower cycle", "sampling", "increment_sum", (), False),
-    "hold-3": Recipe("increments shared out to faster cycles", "sampling", "held_increment", (), False),
-    "angle-counts": Recipe("angle increments from counts", "sampling", "scaled_counts", ("angle",), False),
-    "velocity-counts": Recipe(
-        "velocity increments from counts", "sampling", "scaled_counts", ("velocity",), False
-    ),
-}
-
 #: Kernels that take no method.
 KERNELS = {
     **{
@@ -347,6 +340,9 @@ KERNELS = {
     **TWO_SPEED,
     **COMPENSATION,
     **NAVIGATION,
+    **REDUNDANCY,
+    **OUTPUTS,
+    **TWO_ROWS,
 }
 
 

@@ -22,12 +22,16 @@ from strapgen.cli.commands import (
     generate,
     listing,
     rate_table,
+    redundancy,
     series,
     simulate,
     stability,
     statements,
     strapdown,
     study,
+    study_attitude_form,
+    study_output_filter,
+    study_redundancy,
     study_system,
     system,
     tableau,
@@ -54,6 +58,7 @@ COMMANDS: dict[str, dict[str, Any]] = {
         "generate": generate.generate,
         "two-speed": two_speed.two_speed,
         "system": system.system,
+        "redundancy": redundancy.redundancy,
         "vectors": vectors.vectors,
         "verify": verify.verify,
         "evidence": evidence.evidence,
@@ -89,6 +94,10 @@ class _Strapgen(PlainGroup):
 
 
 study.app.command("system", cls=PlainCommand)(study_system.study_system)
+study.app.command("attitude-form", cls=PlainCommand)(study_attitude_form.study_attitude_form)
+study.app.command("output-filter", cls=PlainCommand)(study_output_filter.study_output_filter)
+
+study.app.command("redundancy", cls=PlainCommand)(study_redundancy.study_redundancy)
 
 app = typer.Typer(
     name="strapgen",

@@ -112,7 +112,8 @@ class Kernel:
     own : tuple of Kernel
         Kernels that `companions` names and the catalogue does not have.
     arguments : str
-        Name and options on the command line; by default the name alone.
+        Name and options on the command line; by default the name alone. A whole command, such as
+        ``strapgen redundancy FILE``, where another than ``strapgen generate`` generates it.
     notes : tuple of str
         Remarks for the reader of generated code: domain, conventions.
     """

@@ -47,10 +47,16 @@ def _counts_text(argument: Argument, sensor: Sensor) -> str:
     )
 
 
+def generating(program: Program) -> str:
+    """Return the command that generates a program, up to the target: ``strapgen generate`` or its own."""
+    stated = program.arguments
+    return stated if stated.startswith("strapgen ") else f"strapgen generate {stated}"
+
+
 def command(fixed: FixedProgram, target: str) -> str:
     """Return the command that generates a fixed-point program, with all options."""
     stated = options(fixed.interface.settings, fixed.program.inputs)
-    return f"strapgen generate {fixed.program.arguments} --target {target} {stated}"
+    return f"{generating(fixed.program)} --target {target} {stated}"
 
 
 def options(settings: Settings, inputs: Iterable[Signal] = ()) -> str:

@@ -10,7 +10,7 @@ from derived import kernel, program
 
 import strapgen
 from strapgen.catalogue import choose
-from strapgen.catalogue.names import SAMPLING
+from strapgen.catalogue.sampling_names import SAMPLING
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.signals import ANY
 

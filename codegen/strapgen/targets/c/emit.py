@@ -141,7 +141,7 @@ def _files(program: Program, name: str, target: str, rounding: RoundingBounds) -
     """Return the header and the source of a program with its printed names."""
     real = real_of(target)
     printer = CPrinter(real, name)
-    command = f"strapgen generate {program.arguments} --target {target}"
+    command = f"{contract.generating(program)} --target {target}"
     nodes = [node for a in program.body for node in walk(a.value) if isinstance(node, Operation)]
     values = {
         "program": program,

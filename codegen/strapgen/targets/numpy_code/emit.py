@@ -6,6 +6,7 @@ from fractions import Fraction
 
 from strapgen.ir.program import Operation, Program, Reference, walk
 from strapgen.ir.sources import Function, Sources
+from strapgen.targets.contract import generating
 from strapgen.targets.lines import fill_expression
 from strapgen.targets.names import PYTHON, printed
 from strapgen.targets.printer import Printer
@@ -79,7 +80,7 @@ def _files(program: Program, target: str) -> dict[str, str]:
     text = render(
         "numpy_code/module.py.j2",
         program=program,
-        command=f"strapgen generate {program.arguments} --target {target}",
+        command=f"{generating(program)} --target {target}",
         functions=[_function(part, part is not program) for part in functions],
         uses_sinc="sinc" in kinds,
         uses_wrap="wrap" in kinds,

@@ -1,0 +1,87 @@
+"""Reads the geometry of redundant sensors from a TOML file, and returns all its kernels."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import tomllib
+from collections.abc import Iterator
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from strapgen.catalogue.kernels.redundancy import equations, selection
+from strapgen.catalogue.kernels.redundancy.equations import KINDS, SensorSet
+from strapgen.catalogue.kernels.redundancy.geometry import geometry
+from strapgen.support import checks
+from strapgen.support.exceptions import InputError
+from strapgen.symbolic.kernel import Kernel
+
+#: A longer file is refused.
+_MOST_BYTES = 1 << 16
+_KEYS = ("name", "sensor", "range", "axes")
+_NAME = re.compile(r"[a-z][a-z0-9]{0,7}")
+
+
+def read(path: str | Path) -> SensorSet:
+    """Read a geometry.
+
+    Parameters
+    ----------
+    path : path
+        A TOML file with ``axes``, rows of three exact numbers each, and if need be ``name``, ``sensor``, "gyro" or
+        "accelerometer", and ``range``, the largest increment of a cycle in rad or m/s.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, a key, a name or a number is not allowed, or the geometry is none; one line names it.
+    """
+    place = checks.path("path", path)
+    try:
+        with place.open("rb") as file:
+            data = file.read(_MOST_BYTES + 1)
+    except OSError as error:
+        raise InputError(f"{path} cannot be read ({error.strerror})") from None
+    if len(data) > _MOST_BYTES:
+        raise InputError(f"{path} is over {_MOST_BYTES} bytes long; a geometry is shorter")
+    try:
+        tables = tomllib.loads(data.decode("utf-8-sig").replace("\r\n", "\n"), parse_float=str)
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path} is not UTF-8 (byte {error.start})") from None
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{path} is not TOML ({error})") from None
+    try:
+        sensors = _parsed(tables, re.sub(r"[^a-z0-9]", "", place.stem.lower())[:8])
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    return replace(sensors, command=f"strapgen redundancy {shlex.quote(place.as_posix())}")
+
+
+def _parsed(tables: dict[str, Any], name: str) -> SensorSet:
+    for key in tables:
+        checks.choice("key", key, _KEYS)
+    if "axes" not in tables:
+        raise InputError("the geometry has no axes; rows of three numbers are needed")
+    name = str(tables.get("name", name))
+    if not _NAME.fullmatch(name):
+        raise InputError(
+            f"the name is {name!r}; at most eight small letters and digits are needed, a letter first"
+        )
+    sensor = checks.choice("sensor", str(tables.get("sensor", "gyro")), KINDS)
+    default = Fraction(1, 8) if sensor == "gyro" else Fraction(4)
+    if isinstance(tables.get("range"), bool):
+        raise InputError("range is true or false; a number is needed")
+    largest = checks.number("range", tables.get("range", default), positive=True)
+    return SensorSet(name, geometry(tables["axes"]), sensor, largest)
+
+
+def kernels(sensors: SensorSet) -> Iterator[Kernel]:
+    """Yield the kernels of a set of sensors: parity, its bias, the selection, all sensors, and each triad."""
+    yield equations.parity(sensors)
+    yield equations.parity_rest(sensors)
+    yield selection.select(sensors)
+    yield equations.all_sensors(sensors)
+    for number in range(len(sensors.geometry.triads)):
+        yield equations.triad(number, sensors)

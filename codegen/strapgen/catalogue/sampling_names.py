@@ -1,0 +1,15 @@
+"""The names of the kernels between stages of different rates, as plain data."""
+
+from __future__ import annotations
+
+from strapgen.catalogue.recipe import Recipe
+
+#: Kernels between stages of different rates, and from counts; they take no method.
+SAMPLING = {
+    "sum-3": Recipe("sum of increments for a slower cycle", "sampling", "increment_sum", (), False),
+    "hold-3": Recipe("increments shared out to faster cycles", "sampling", "held_increment", (), False),
+    "angle-counts": Recipe("angle increments from counts", "sampling", "scaled_counts", ("angle",), False),
+    "velocity-counts": Recipe(
+        "velocity increments from counts", "sampling", "scaled_counts", ("velocity",), False
+    ),
+}

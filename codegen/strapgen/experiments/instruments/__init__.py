@@ -1,0 +1,1 @@
+"""Experiments on the instruments and systems of 1984."""

@@ -1,0 +1,1 @@
+"""Reports on the instruments and systems of 1984."""
