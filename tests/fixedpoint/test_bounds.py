@@ -58,7 +58,7 @@ def with_words():
             yield pytest.param(choice, word, rounding, id=name, marks=() if quick else pytest.mark.long)
 
 
-@pytest.mark.parametrize(("choice", "word", "rounding"), with_words())
+@pytest.mark.parametrize(("choice", "word", "rounding"), list(with_words()))
 def test_every_value_keeps_its_range_and_its_error_bound(choice, word, rounding, rng):
     loose = choice.name == "dcm-orthonormalize-optimal"
     if word == 8 and (loose or (choice.name, rounding) == ("euler-angles-from-dcm", "truncation")):

@@ -58,7 +58,7 @@ class TurningVehicle:
     --------
     >>> vehicle = TurningVehicle(0.8, 1.2)
     >>> vehicle.attitude(np.zeros(1)).round(6)[0, 2]
-    array([ 0.      , -0.      , -1.      ])
+    array([ 0.,  0., -1.])
     """
 
     def __init__(
