@@ -24,7 +24,7 @@ TABLES = {
     "list backends": ("name", 7),
     "tableau rk4": ("row", 5),
     "coning --samples 3": ("older", 2),
-    "window show window-3-3": ("name", 35),
+    "window show window-3-3": ("name", 50),
     "derive dcm --method rk1 --show operations": ("operation", None),
     "derive dcm --method rk1 --show program": ("name", None),
     f"simulate euler {RUN}": ("time_s", 3),
