@@ -9,7 +9,6 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from strapgen.catalogue import MOTIONS, RUN_MOTIONS
 from strapgen.cli.options import option
 from strapgen.support.exceptions import InputError
 
@@ -130,6 +129,8 @@ class SampleSource:
         """
         if self.specific_force is not None and not (of_system and self.motion is not None):
             raise InputError("--specific-force goes with a described system and --motion")
+        from strapgen.catalogue import RUN_MOTIONS
+
         check_motion(self.motion, RUN_MOTIONS)
         sources = {
             "--motion": self.motion,
@@ -284,6 +285,8 @@ def check_motion(name: str | None, further: Mapping[str, Any] | None = None) -> 
     from strapgen.support import checks
 
     if name is not None and not is_file(name):
+        from strapgen.catalogue import MOTIONS
+
         checks.choice("motion", name, {**MOTIONS, **(further or {})})
 
 

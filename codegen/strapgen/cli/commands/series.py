@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
-from strapgen.catalogue import MOTIONS
 from strapgen.cli.option_groups import grouped
 from strapgen.cli.options import (
     Duration,
@@ -89,6 +88,7 @@ class DriftPlot:
     def draw(self, choice: Choice, motion: str, count: int | None, path: Path) -> bytes:
         """Return the image of the drift on a motion of the catalogue."""
         from strapgen.analysis import agreement
+        from strapgen.catalogue import MOTIONS
         from strapgen.reports import plots
         from strapgen.simulation import motions
 
