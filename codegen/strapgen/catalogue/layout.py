@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from strapgen.catalogue.methods import coefficient_files, coefficients
-from strapgen.support import checks
+from strapgen.support import checks, toml_files
 from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ def read(path: str | Path) -> Layout:
         If the file cannot be read, a key or number is wrong, or axes are not of length 1 and perpendicular; the
         message names the gyro.
     """
-    data = coefficient_files.content(path, "a layout", MOST_BYTES)
+    data = toml_files.content(path, "a layout", MOST_BYTES)
     try:
         coefficient_files.check_keys(data, KEYS, ())
         tables = coefficient_files.entries("gyros", data["gyros"])

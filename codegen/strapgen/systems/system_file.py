@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -13,7 +12,7 @@ from typing import Any
 from strapgen.ir.fixed_settings import CARRIES
 from strapgen.ir.formats import check_word
 from strapgen.ir.signals import ANY, FRAMES
-from strapgen.support import checks
+from strapgen.support import checks, toml_files
 from strapgen.support.exceptions import InputError
 from strapgen.support.suggestions import alternatives, shown, suggestions, unknown
 from strapgen.systems.reserved import check_names
@@ -124,19 +123,7 @@ def read(path: str | Path, sample_hz: Fraction | None = None) -> SystemText:
         If it cannot be read or a key, a name or a number is not allowed; the message names it.
     """
     place = checks.path("path", path)
-    try:
-        with place.open("rb") as file:
-            data = file.read(_MOST_BYTES + 1)
-    except OSError as error:
-        raise InputError(f"{path} cannot be read ({error.strerror})") from None
-    if len(data) > _MOST_BYTES:
-        raise InputError(f"{path} is over {_MOST_BYTES} bytes long; a system is shorter")
-    try:
-        tables = tomllib.loads(data.decode("utf-8-sig").replace("\r\n", "\n"), parse_float=_decimal)
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path} is not UTF-8 (byte {error.start})") from None
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{path} is not TOML ({error})") from None
+    tables = toml_files.content(path, "a system", _MOST_BYTES, _decimal)
     try:
         return parsed(tables, re.sub(r"[^a-z0-9]+", "_", place.stem.lower()).strip("_"), sample_hz)
     except InputError as error:

@@ -1,12 +1,10 @@
-"""Reads files of exact coefficients, which are TOML: bytes, keys, rationals, and the name that a title gives."""
+"""Reads what files of exact coefficients hold: keys, rationals, and the name that a title gives."""
 
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Collection, Mapping
 from fractions import Fraction
-from pathlib import Path
 from typing import Any
 
 from strapgen.catalogue.methods import coefficients
@@ -17,38 +15,6 @@ from strapgen.support.exceptions import InputError
 _FRACTION = re.compile(r"-?[0-9]+(/[1-9][0-9]*)?")
 #: Most characters of a fraction; those of filters for a gyro are long.
 MOST_CHARACTERS = 4000
-
-
-def content(path: str | Path, what: str, most_bytes: int) -> dict[str, Any]:
-    """Return the content of a TOML file.
-
-    Parameters
-    ----------
-    path : path
-    what : str
-        What the file holds, for an error message: "a tableau".
-    most_bytes : int
-        A longer file is refused.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, is too long, not UTF-8 or not TOML.
-    """
-    place = checks.path("path", path)
-    try:
-        with place.open("rb") as file:
-            data = file.read(most_bytes + 1)
-    except OSError as error:
-        raise InputError(f"{path} cannot be read ({error.strerror})") from None
-    if len(data) > most_bytes:
-        raise InputError(f"{path} is over {most_bytes} bytes long; {what} is shorter")
-    try:
-        return tomllib.loads(data.decode("utf-8-sig").replace("\r\n", "\n"))
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path} is not UTF-8 (byte {error.start})") from None
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{path} is not TOML ({error})") from None
 
 
 def check_keys(data: Mapping[str, Any], keys: Collection[str], optional: Collection[str]) -> None:

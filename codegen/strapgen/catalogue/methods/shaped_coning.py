@@ -20,7 +20,7 @@ from strapgen.catalogue.methods import coefficient_files
 from strapgen.catalogue.methods.coefficient_files import band, entries, gyro, rational
 from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.catalogue.methods.windows import WINDOWS
-from strapgen.support import checks
+from strapgen.support import checks, toml_files
 from strapgen.support.exceptions import InputError
 from strapgen.support.suggestions import counted
 
@@ -172,7 +172,7 @@ def read(path: str | Path) -> ShapedConing:
         If the file cannot be read, a key or number is wrong, a power of the frequency is not annulled, or the level is
         another one.
     """
-    data = coefficient_files.content(path, "a file of coning coefficients", MOST_BYTES)
+    data = toml_files.content(path, "a file of coning coefficients", MOST_BYTES)
     try:
         coefficient_files.check_keys(data, KEYS, OPTIONAL)
         name = coefficient_files.slug(data["name"])

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from strapgen.catalogue.methods import coefficient_files, coefficients, order_conditions
 from strapgen.catalogue.methods.coefficient_files import entries
 from strapgen.catalogue.methods.tableau import Tableau
-from strapgen.support import checks
+from strapgen.support import checks, toml_files
 from strapgen.support.exceptions import InputError
 from strapgen.support.suggestions import counted, needed
 
@@ -100,7 +100,7 @@ def read(path: str | Path) -> Tableau:
     InputError
         If the file cannot be read, a key or number is wrong, or a condition does not hold; the message names it.
     """
-    data = coefficient_files.content(path, "a tableau", MOST_BYTES)
+    data = toml_files.content(path, "a tableau", MOST_BYTES)
     try:
         _check_keys(data)
         name = coefficient_files.slug(data["name"])

@@ -17,7 +17,7 @@ from typing import Any
 from strapgen.catalogue.methods import coefficient_files, coefficients, window_conditions
 from strapgen.catalogue.methods.coefficient_files import band, entries, gyro, not_negative, rational
 from strapgen.catalogue.methods.window import Taps, Window, sibling_name, sibling_title
-from strapgen.support import checks
+from strapgen.support import checks, toml_files
 from strapgen.support.exceptions import InputError
 from strapgen.support.suggestions import counted
 
@@ -183,7 +183,7 @@ def read(path: str | Path) -> Window:
     InputError
         If the file cannot be read, a key or number is wrong, or a condition does not hold; the message names it.
     """
-    data = coefficient_files.content(path, "a family of filters", MOST_BYTES)
+    data = toml_files.content(path, "a family of filters", MOST_BYTES)
     try:
         coefficient_files.check_keys(data, KEYS, OPTIONAL)
         name = coefficient_files.slug(data["name"])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import shlex
-import tomllib
 from collections.abc import Iterator
 from dataclasses import replace
 from fractions import Fraction
@@ -14,7 +13,7 @@ from typing import Any
 from strapgen.catalogue.kernels.redundancy import equations, selection
 from strapgen.catalogue.kernels.redundancy.equations import KINDS, SensorSet
 from strapgen.catalogue.kernels.redundancy.geometry import geometry
-from strapgen.support import checks
+from strapgen.support import checks, toml_files
 from strapgen.support.exceptions import InputError
 from strapgen.symbolic.kernel import Kernel
 
@@ -39,19 +38,7 @@ def read(path: str | Path) -> SensorSet:
         If it cannot be read, a key, a name or a number is not allowed, or the geometry is none; one line names it.
     """
     place = checks.path("path", path)
-    try:
-        with place.open("rb") as file:
-            data = file.read(_MOST_BYTES + 1)
-    except OSError as error:
-        raise InputError(f"{path} cannot be read ({error.strerror})") from None
-    if len(data) > _MOST_BYTES:
-        raise InputError(f"{path} is over {_MOST_BYTES} bytes long; a geometry is shorter")
-    try:
-        tables = tomllib.loads(data.decode("utf-8-sig").replace("\r\n", "\n"), parse_float=str)
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path} is not UTF-8 (byte {error.start})") from None
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{path} is not TOML ({error})") from None
+    tables = toml_files.content(path, "a geometry", _MOST_BYTES, str)
     try:
         sensors = _parsed(tables, re.sub(r"[^a-z0-9]", "", place.stem.lower())[:8])
     except InputError as error:
