@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
+from functools import partial
 
 import numpy as np
 import pytest
-from derived import program, quantized
-from fixed_inputs import corners_and_random, exactly
+from derived import program
+from fixed_inputs import corners_and_random
 from gathering import each
+from kernel_checks import require_integers_of_the_model, require_what_numpy_computes, share_of_bound
 
 import strapgen
 from strapgen.backends.kernel_sources import sources_of_program
@@ -53,19 +54,8 @@ def test_every_source_says_where_it_comes_from_and_every_input_its_range():
 @pytest.mark.parametrize("word", [pytest.param(16, marks=pytest.mark.long), 32])
 @each("name", NAMES)
 def test_no_error_exceeds_its_bound(name, word, rng):
-    fixed = quantized(Choice(name), settings(word))
-    model = strapgen.evaluator(name, "fixed-model", settings(word))
-    inputs = proper_inputs(model, 20, rng)
-    results, _ = model.run(inputs, model.fresh(20))
-    share = 0.0
-    for k, sample in enumerate(zip(*(array.tolist() for array in inputs), strict=True)):
-        known = exactly(fixed, sample)
-        for argument, result in zip(fixed.interface.outputs, results, strict=True):
-            for element, integer, bound in zip(argument.values, result[k], argument.errors, strict=True):
-                apart = abs(int(integer) * argument.unit - known[element])
-                assert apart <= bound, element
-                share = max(share, float(Fraction(apart) / bound) if bound else 0.0)
-    assert share > 0.02, "the bound is of the size of the errors"
+    share = share_of_bound(name, settings(word), partial(proper_inputs, rng=rng))
+    assert share is not None and share > 0.02, "the bound is of the size of the errors"
 
 
 @pytest.mark.parametrize(
@@ -76,41 +66,13 @@ def test_no_error_exceeds_its_bound(name, word, rng):
     ],
 )
 def test_c_gives_the_integers_of_the_model(name, word, rng):
-    in_c, model = (
-        strapgen.evaluator(name, backend, settings(word)) for backend in (f"c-fixed{word}", "fixed-model")
-    )
-    integers = proper_inputs(model, 100, rng)
-    computed, left = in_c.run(integers, in_c.fresh(100))
-    expected, remaining = model.run(integers, model.fresh(100))
-    for one, other in zip(computed, expected, strict=True):
-        np.testing.assert_array_equal(one, other)
-    np.testing.assert_array_equal(left, remaining)
+    require_integers_of_the_model(name, settings(word), partial(proper_inputs, rng=rng))
 
 
 @pytest.mark.parametrize("backend", ["c", pytest.param("c-float", marks=pytest.mark.long)])
 @pytest.mark.parametrize("name", SOME_FIRST)
 def test_c_computes_what_numpy_computes(name, backend, rng):
-    in_c, double = strapgen.evaluator(name, backend), strapgen.evaluator(name)
-    model = strapgen.evaluator(name, "fixed-model", settings(32))
-    inputs = [
-        (array * float(argument.format.unit)).astype(in_c.dtype).reshape(50, *argument.signal.shape)
-        for argument, array in zip(model.interface.inputs, proper_inputs(model, 50, rng), strict=True)
-    ]
-    results = [
-        evaluator(*(array.astype(evaluator.dtype) for array in inputs)) for evaluator in (in_c, double)
-    ]
-    computed, expected = (result if isinstance(result, tuple) else (result,) for result in results)
-    bounds = in_c.sources.rounding
-    for signal, one, other in zip(program(Choice(name)).outputs, computed, expected, strict=True):
-        apart = np.abs(one.astype(float) - other).reshape(50, -1)
-        if bounds.errors:
-            # Double itself rounds 2**-29 as much as float; the bounds of both are of twice what either may lose.
-            allowed = np.array([*map(float, bounds.errors[signal.signal.name])])
-            assert np.all(apart <= allowed * (2 if backend == "c" else 1.001)), signal.signal.name
-        else:
-            # Functions of the library; the angles of a matrix may differ by what its rounding turns it by.
-            turned = np.minimum(apart, np.abs(apart - 2 * np.pi))
-            assert turned.max() <= 64 * np.finfo(in_c.dtype).eps * np.abs(other).max(), signal.signal.name
+    require_what_numpy_computes(name, backend, settings(32), partial(proper_inputs, rng=rng))
 
 
 def test_the_sources_build_for_numpy_too():
