@@ -146,11 +146,13 @@ class Quantities:
     items: dict[str, Quantity] = field(default_factory=dict)
     results: dict[str, tuple[Operand, ...]] = field(default_factory=dict)
 
-    def distance(self, name: str) -> Fraction:
-        """Return a bound of how far a quantity can be from its offset."""
+    def distance(self, name: str, number: Fraction) -> Fraction:
+        """Return a bound of how far a quantity can be from a number."""
         quantity = self.items[name]
+        shift = quantity.offset - number
+        ends = (quantity.range.lowest + shift, quantity.range.highest + shift)
         beside = (abs(c) * self.items[m[0]].range.magnitude for m, c in quantity.beside)
-        return quantity.range.magnitude + sum(beside, Fraction(0))
+        return max(map(abs, ends)) + sum(beside, Fraction(0))
 
     def factors(self) -> set[str]:
         """Return the quantities that must be words: factors of products, exact parts beside others, and arguments."""

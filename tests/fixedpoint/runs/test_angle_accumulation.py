@@ -141,6 +141,24 @@ def test_any_run_keeps_the_bound_along_it(algorithm, orthonormalization, word, r
             assert np.all(angles_apart(*runs)[1:] <= np.array(bounds) + 1e-12)
 
 
+def test_error_feedback_bounds_a_step_with_a_cosine_as_it_does_others(rng):
+    settings = {carry: Settings.of(**RATES, carry=carry) for carry in ("none", "full")}
+    fixed = {
+        carry: strapgen.backend("euler", "coning-compressed", 2, "fixed-model", settings=one)
+        for carry, one in settings.items()
+    }
+    per_step = {carry: one.interface.angle_accumulation.per_step for carry, one in fixed.items()}
+    # What is rounded off a transition near 1 comes back times its distance from 1.
+    assert per_step["full"] < per_step["none"] / 5
+    turn = rng.uniform(-1, 1, (1, 2, 3)) * 0.03
+    increments = fixed["full"].representable(np.repeat(turn, 500, axis=0))  # steady: rounding adds up
+    double = strapgen.backend("euler", "coning-compressed", 2).propagate(increments)
+    bounds = [fixed["full"].angle_bound(n, shortest=0.9375) for n in range(1, 501)]
+    apart = {carry: angles_apart(one.propagate(increments), double)[1:] for carry, one in fixed.items()}
+    assert np.all(apart["full"] <= np.array(bounds) + 1e-13)
+    assert apart["none"][-1] > bounds[-1]
+
+
 @pytest.mark.parametrize("algorithm", ["euler", "dcm"])
 def test_a_state_stays_proper_for_as_many_steps_as_are_proved(algorithm):
     settings = Settings.of(**RATES)

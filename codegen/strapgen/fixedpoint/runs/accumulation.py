@@ -158,7 +158,7 @@ def _away(context: Quantization, transition: Result) -> tuple[Fraction, ...]:
     for place, element in enumerate(quantities.results[transition.signal.name]):
         one = identity[place] if place < len(identity) else Fraction(0)
         if isinstance(element, str):
-            distances.append(quantities.distance(element) + abs(quantities.items[element].offset - one))
+            distances.append(quantities.distance(element, one))
         else:
             distances.append(abs(element - one))
     return tuple(distances)

@@ -12,6 +12,8 @@ from strapgen.ir.integer_program import IntegerSum, Term, Value, used_by
 _BELOW = 8
 #: A coarser format may add this part of the rounding error of a value that it is multiplied into.
 _PART = Fraction(1, 16)
+#: Bits by which that is less where the sum's own rounding comes with the next call: other errors add up alone.
+_FED_BACK = 4
 
 
 def aligning(body: Iterable[Value], values: Mapping[str, Value], fixed: Container[str]) -> dict[str, int]:
@@ -78,5 +80,11 @@ def _room(term: Term, place: int, value: Value, factor: Value, others: list[Valu
     size = abs(term.factor) / Fraction(2) ** (place - factor.fraction)
     for other in others:
         size = Fraction(other.magnitude) / Fraction(2) ** other.fraction
-    units = _PART / Fraction(2) ** value.fraction / size * Fraction(2) ** factor.fraction
+    fraction = value.fraction + (_FED_BACK if _is_fed_back(value) else 0)
+    units = _PART / Fraction(2) ** fraction / size * Fraction(2) ** factor.fraction
     return max(0, math.floor(units).bit_length() - 1)
+
+
+def _is_fed_back(value: Value) -> bool:
+    """Return whether what is rounded off a sum comes with the next call, so that only other errors add up."""
+    return isinstance(value.definition, IntegerSum) and value.definition.residual is not None
