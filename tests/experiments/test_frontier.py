@@ -9,7 +9,7 @@ import pytest
 from strapgen.experiments import frontier
 from strapgen.experiments.frontier import CANDIDATES, MOTIONS, Candidate, candidates, in_order, pareto
 from strapgen.reports import plots
-from strapgen.reports.frontier import frontier_report
+from strapgen.reports.selection.frontier import frontier_report
 from strapgen.support.exceptions import InputError
 
 FEW = ("coning-compressed:1+1", "rk4:2", "coning-compressed:4")

@@ -17,6 +17,7 @@ from strapgen.cli.commands import (
     converge,
     cost,
     derive,
+    design,
     evidence,
     frontier,
     generate,
@@ -72,6 +73,7 @@ COMMANDS: dict[str, dict[str, Any]] = {
         "check": check.check,
         "cost": cost.cost,
         "frontier": frontier.frontier,
+        "design": design.design,
     },
     "Reproduce": {
         "tables": tables.tables,

@@ -92,7 +92,7 @@ def frontier(
     runs = study.frontier(several, run.sample_hz, run.duration, run.results, jobs)
     standings = study.in_order(track(runs, "running", len(several)), several)
     from strapgen.reports import plots
-    from strapgen.reports.frontier import frontier_report
+    from strapgen.reports.selection.frontier import frontier_report
 
     hertz, seconds = (
         float(checks.number("sample_hz", run.sample_hz)),

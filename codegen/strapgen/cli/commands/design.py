@@ -1,0 +1,138 @@
+"""The command ``strapgen design`` selects an algorithm for an environment, a gyro, a budget and a processor."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from strapgen.cli.option_groups import grouped
+from strapgen.cli.options import listed, option, whole
+from strapgen.cli.output import Output
+from strapgen.cli.progress import track
+from strapgen.support import checks
+from strapgen.support.exceptions import InputError
+
+if TYPE_CHECKING:
+    from strapgen.experiments.selection.brief import DesignBrief
+    from strapgen.experiments.selection.judgement import Judgement
+    from strapgen.experiments.selection.simulated import Simulated
+
+
+@grouped
+def design(
+    file: Annotated[
+        Path, typer.Argument(metavar="BRIEF", help="TOML file with the brief.", show_default=False)
+    ],
+    *,
+    methods: Annotated[
+        str | None,
+        option(
+            *("--method", "--methods"),
+            metavar="NAME,...",
+            help="Look at these methods alone, with all their samples or some, as in magnus4 or coning-combined:3+3.  "
+            "[default: all of the catalogue, and coefficients designed for the vibration]",
+            panel="Algorithm",
+        ),
+    ] = None,
+    simulate: Annotated[
+        str | None,
+        option(
+            "--simulate",
+            metavar="N",
+            help="Run the cheapest N algorithms in time, and show their drift beside the predicted one.",
+            panel="Run",
+        ),
+    ] = None,
+    generate: Annotated[
+        Path | None,
+        option(
+            "--generate",
+            metavar="FOLDER",
+            help="Write the fixed-point C of the cheapest algorithm, its project and test, and a report.",
+            panel="Run",
+        ),
+    ] = None,
+    results: Annotated[
+        Path | None,
+        option(
+            "--results",
+            metavar="FILE",
+            help="File that keeps each result when it is there; a run that was stopped goes on from it.",
+            panel="Run",
+        ),
+    ] = None,
+    jobs: Annotated[
+        str | None,
+        option(
+            "--jobs",
+            metavar="N",
+            help="Number of processes that run side by side.  [default: one for each processor]",
+            panel="Run",
+        ),
+    ] = None,
+    output: Output,
+) -> None:
+    """Select the cheapest algorithm that meets a brief.
+
+    The brief states the largest rate, the vibration, the gyro, the budget and the processor. You see every algorithm
+    of the catalogue, and coefficients designed for the vibration, with the drift that each cause predicts, what it
+    costs, and what binds those that do not meet the brief. The bound of rounding is certified.
+
+    Example: strapgen design examples/briefs/ahrs.toml --plot out/ahrs.png
+
+    Example: strapgen design examples/briefs/ahrs.toml --simulate 5 --generate out/ahrs
+    """
+    output.check(file, results)
+    for name, path in (("--out", output.file), ("--plot", output.plot)):
+        if path is not None and results is not None and path.resolve() == results.resolve():
+            raise InputError(f"{name} and --results are both {path}; two files are needed")
+    shown = whole("simulate", simulate)
+    if shown is not None:
+        checks.count("simulate", shown)
+    count = whole("jobs", jobs)
+    if count is not None:
+        checks.count("jobs", count, largest=1024)
+    from strapgen.experiments.selection.answer import in_order, judgements
+    from strapgen.experiments.selection.brief import read_brief
+    from strapgen.experiments.selection.candidates import contenders
+    from strapgen.reports.selection.picture import selection_image
+    from strapgen.reports.selection.report import selection_report
+
+    brief = read_brief(file)
+    several = contenders(brief, None if methods is None else listed("--method", methods))
+    rows = track(judgements(file, several, results, count), "judging", len(several))
+    ordered = in_order(one for row in rows for one in row)
+    runs = None if shown is None else _simulated(brief, file, ordered[:shown])
+    report = selection_report(brief, ordered, runs)
+    if generate is not None:
+        _write(brief, file, ordered, generate, report.written("text"))
+    title = f"{file.stem}: what the software adds to the drift, and what it costs; hollow: rounding is not looked at"
+    output.report(report, lambda path: selection_image(brief, ordered, title, path))
+
+
+def _simulated(brief: DesignBrief, file: Path, ordered: list[Judgement]) -> dict[str, Simulated]:
+    """Return time simulations of the algorithms that meet the brief."""
+    from strapgen.experiments.selection.simulated import choice_of, run
+
+    accepted = [one for one in ordered if one.meets]
+    steps = ((one.name, run(brief, one, choice_of(one, file))) for one in accepted)
+    return dict(track(steps, "running", len(accepted)))
+
+
+def _write(brief: DesignBrief, file: Path, ordered: list[Judgement], folder: Path, report: str) -> None:
+    """Write the firmware of the cheapest algorithm that meets the brief."""
+    from strapgen.cli.source_options import SourceOptions
+    from strapgen.experiments.selection.firmware import firmware_files
+    from strapgen.experiments.selection.simulated import choice_of
+
+    if not ordered or not ordered[0].meets:
+        raise InputError(f"{file}: no algorithm meets the brief, so --generate has nothing to write")
+    best = ordered[0]
+    files = firmware_files(
+        brief, best, choice_of(best, file), report, f"strapgen design {shlex.quote(str(file))}"
+    )
+    for path in SourceOptions(out=folder).write(files):
+        typer.echo(f"wrote {path}", err=True)

@@ -1,0 +1,1 @@
+"""Selects an algorithm for an environment, a gyro, a budget and a processor."""

@@ -1,0 +1,178 @@
+"""Runs algorithms that meet a brief in time, to set the drift of a simulation beside the predicted one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from strapgen.backends import backend
+from strapgen.catalogue import Choice
+from strapgen.experiments.selection import causes
+from strapgen.experiments.selection.brief import DesignBrief
+from strapgen.experiments.selection.candidates import Contender
+from strapgen.experiments.selection.environment import Line
+from strapgen.experiments.selection.judgement import Judgement
+from strapgen.simulation.motions import Motion, motion
+from strapgen.simulation.rate_profiles import CosineSum
+from strapgen.simulation.reference_attitudes import KNOT, ReferenceAttitude
+from strapgen.simulation.runs import Run, drift_between, simulate
+
+#: Fewest steps of a run, and its longest time in s.
+_FEWEST, _LONGEST = 200, 10
+#: Fewest records of a run whose slope is told from what swings.
+_FEWEST_RECORDS = 100
+#: Substeps of the reference attitude in a period of the highest frequency.
+_SUBSTEPS = 24
+_AXES = 3
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """Drifts in time simulations.
+
+    Parameters
+    ----------
+    truncation : float
+        Drift in deg/h of a steady turn at the largest rate.
+    coning : float or None
+        Drift in deg/h under the vibration, less the true one; None without vibration.
+    rounding : float
+        Drift in deg/h between fixed point and double in the steady turn.
+    """
+
+    truncation: float
+    coning: float | None
+    rounding: float
+
+
+@dataclass(frozen=True)
+class Vibration(Motion):
+    """A vibration of lines about x and y, as a gyro measures it.
+
+    Parameters
+    ----------
+    name, parameters
+        As for `Motion`.
+    rates, measured : CosineSum
+        The body rate, and what the gyro passes on of it.
+    """
+
+    name: str = "vibration of a brief"
+    parameters: dict[str, float] = field(default_factory=dict)
+    rates: Any = None
+    measured: Any = None
+
+    def samples(self, interval: Fraction, first: int, stop: int) -> Any:
+        """Return the increments that the gyro measures, see `Motion.samples`."""
+        edges = np.arange(first, stop + 1) * float(interval)
+        return np.diff(self.measured.angle(edges), axis=0)
+
+    def attitude(self, time: Any) -> Any:
+        """Return the true attitude, see `Motion.attitude`."""
+        return self._truth(time)[1]
+
+    def rate(self, time: Any) -> Any:
+        """Return the body rate, see `Motion.rate`."""
+        return self.rates.rate(time)
+
+    def _truth(self, time: Any) -> Any:
+        highest = float(self.rates.frequencies.max()) / (2 * math.pi)
+        substeps = max(16, math.ceil(_SUBSTEPS * highest * KNOT))
+        return self.rates.rate(time), ReferenceAttitude(self.rates.rate, substeps)(time)
+
+
+def vibration(lines: Sequence[Line], brief: DesignBrief) -> Vibration:
+    """Return the motion of lines, seen by the gyro of a brief.
+
+    Parameters
+    ----------
+    lines : sequence of Line
+    brief : DesignBrief
+    """
+    omega = 2 * np.pi * np.array([line.frequency_hz for line in lines])
+    still = np.zeros_like(omega)
+    sizes = np.array([[line.theta_x, line.theta_y] for line in lines]).T
+    # Lines begin at phases that have nothing to do with each other, so that they never all add up.
+    begin = 2 * np.pi * (math.sqrt(2) * np.arange(1, len(lines) + 1) % 1)
+    phases = begin + np.array([still, [line.phase for line in lines], still])
+    # The angle X sin(wt) has the rate X w cos(wt).
+    rates = CosineSum(np.array([*sizes, still]) * omega, np.tile(omega, (_AXES, 1)), phases)
+    measured = rates
+    if brief.gyro.bandwidth_hz is not None and brief.gyro.damping is not None:
+        ratio = omega / (2 * np.pi * float(brief.gyro.bandwidth_hz))
+        gain = 1 / (1 - ratio**2 + 2j * float(brief.gyro.damping) * ratio)
+        measured = replace(rates, amplitudes=rates.amplitudes * np.abs(gain), phases=phases + np.angle(gain))
+    return Vibration(rates=rates, measured=measured)
+
+
+def choice_of(judgement: Judgement, path: str | Path) -> Choice:
+    """Return the step of a judgement.
+
+    Parameters
+    ----------
+    judgement : Judgement
+    path : path
+        The file of the brief, for which coefficients are designed again.
+    """
+    contender = Contender(judgement.method, judgement.increments, judgement.previous, judgement.ahead)
+    return contender.choice(judgement.state, str(path))
+
+
+def run(brief: DesignBrief, judgement: Judgement, choice: Choice) -> Simulated:
+    """Run an algorithm that meets a brief in time.
+
+    Parameters
+    ----------
+    brief : DesignBrief
+    judgement : Judgement
+    choice : Choice
+        The step of the judgement.
+    """
+    step = causes.step_length(choice, brief.gyro)
+    steps = max(_FEWEST, math.floor(min(Fraction(_LONGEST), brief.budget.over_s) / step))
+    turn = motion("constant", z_deg_s=brief.max_rate_deg_s)
+    double = backend(choice)
+    truth = simulate(double, turn, step, steps * step)
+    settings = causes.settings(choice, brief, judgement.carry)
+    fixed = backend(choice, backend="fixed-model", settings=settings)
+    row = fixed.representable(
+        turn.increments(step, steps, choice.increments or 1, choice.previous, choice.ahead)
+    )
+    coning = None
+    if brief.environment is not None:
+        shaken = vibration(brief.environment.lines(), brief)
+        coning = _slope(simulate(double, shaken, step, steps * step, record=_record(step, steps)))
+    return Simulated(
+        _slope(truth),
+        coning,
+        _apart(fixed.propagate(row), double.propagate(row), double, float(steps * step)),
+    )
+
+
+def _record(step: Fraction, steps: int) -> Fraction:
+    """Return the interval of records: where the reference attitude is stored, if that leaves enough of them."""
+    knot = Fraction(str(KNOT))
+    common = Fraction(math.lcm(step.numerator * knot.denominator, knot.numerator * step.denominator))
+    common /= step.denominator * knot.denominator
+    return common if steps * step >= _FEWEST_RECORDS * common else step
+
+
+def _apart(one: Any, other: Any, double: Any, seconds: float) -> float:
+    """Return the angle in deg/h between the ends of two runs."""
+    ends = [double.matrices(states[-1:]) for states in (one, other)]
+    return float(np.linalg.norm(drift_between(*ends)[-1])) / seconds * causes.DEG_H
+
+
+def _slope(run: Run) -> float:
+    """Return the slope of the error in deg/h; records in the middle weigh most, so that what swings cancels."""
+    time = run.time - run.time.mean()
+    weights = np.hanning(len(time) + 2)[1:-1]
+    time = time - np.average(time, weights=weights)
+    slope = (weights * time) @ run.drift / (weights @ time**2)
+    return float(np.linalg.norm(slope)) * causes.DEG_H

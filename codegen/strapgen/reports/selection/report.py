@@ -1,0 +1,132 @@
+"""Reports which algorithms meet a brief: every cause of drift, what each costs, and what binds the others."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from strapgen.experiments.selection.answer import verdicts
+from strapgen.experiments.selection.brief import DesignBrief
+from strapgen.experiments.selection.judgement import CAUSES, Judgement
+from strapgen.experiments.selection.simulated import Simulated
+from strapgen.reports.report import Report
+from strapgen.reports.table import Column, TextTable
+
+#: Format of a drift, and of a cost.
+_DRIFT, _COUNT = ".2g", ".0f"
+#: Most rows of those that meet the brief, and of the others, in a text for a reader.
+_MOST_ACCEPTED, _MOST_REFUSED = 20, 12
+
+
+def selection_report(
+    brief: DesignBrief, ordered: Sequence[Judgement], simulated: Mapping[str, Simulated] | None = None
+) -> Report:
+    """Return the judgements of algorithms as a report.
+
+    Parameters
+    ----------
+    brief : DesignBrief
+    ordered : sequence of Judgement
+        Those that meet the brief first.
+    simulated : mapping of str to Simulated, optional
+        What time simulations made of those that meet it, by name.
+    """
+    return Report(
+        lambda: _text(brief, ordered, simulated or {}),
+        lambda: [_as_dict(one) for one in ordered],
+        lambda: _flat(ordered),
+        lambda: _table(brief, ordered, refused=True),
+    )
+
+
+def _as_dict(one: Judgement) -> dict[str, Any]:
+    """Return a judgement as JSON data, the promised keys first."""
+    first = {
+        "name": one.name,
+        "meets": one.meets,
+        "binding": one.binding,
+        "drift_deg_h": {cause: one.drift_deg_h[cause] for cause in CAUSES},
+        "operations_per_s": one.operations_per_s,
+    }
+    return first | {name: value for name, value in vars(one).items() if name not in first}
+
+
+def _flat(ordered: Sequence[Judgement]) -> TextTable:
+    """Return all figures, a row for each algorithm."""
+    names = ["name", "meets", "binding", "operations_per_s", "carry"]
+    more = ["velocity_m_s", "position_m", "instructions_per_s", "bytes"]
+    columns = [*names, *(f"{cause}_deg_h" for cause in CAUSES), *more, "reason"]
+    rows = []
+    for one in ordered:
+        row = vars(one) | {f"{cause}_deg_h": one.drift_deg_h[cause] for cause in CAUSES}
+        row |= {"meets": "yes" if one.meets else "no"}
+        rows.append([row[name] for name in columns])
+    texts = ("name", "meets", "binding", "carry", "reason")
+    return TextTable([Column(name, "<" if name in texts else ">", missing="") for name in columns], rows)
+
+
+def _table(brief: DesignBrief, ordered: Sequence[Judgement], refused: bool) -> TextTable:
+    """Return what a reader compares: drifts by cause, and costs."""
+    measured = brief.processor.is_measured
+    columns = [
+        Column("algorithm", "<"),
+        *(Column(cause, spec=_DRIFT, group="drift in deg/h") for cause in CAUSES),
+        Column("operations/s", spec=_COUNT),
+    ]
+    if measured:
+        columns += [Column("instructions/s", spec=_COUNT), Column("bytes", spec=_COUNT)]
+    columns.append(Column("exceeds" if refused else "error feedback", "<"))
+    rows = []
+    for one in ordered:
+        row: list[Any] = [one.name, *(one.drift_deg_h[cause] for cause in CAUSES), one.operations_per_s]
+        if measured:
+            row += [one.instructions_per_s, one.bytes]
+        rows.append([*row, (one.binding or "") if refused else one.carry])
+    return TextTable(columns, rows)
+
+
+def _text(brief: DesignBrief, ordered: Sequence[Judgement], simulated: Mapping[str, Simulated]) -> str:
+    """Return the answer for a reader."""
+    accepted = [one for one in ordered if one.meets]
+    others = [one for one in ordered if not one.meets]
+    lines = [
+        f"{sentence}." for sentence in (one[:1].upper() + one[1:] for one in verdicts(brief, [*ordered]))
+    ]
+    if accepted:
+        first = accepted[:_MOST_ACCEPTED]
+        lines += ["", f"meets the brief, the cheapest {len(first)} of {len(accepted)}", ""]
+        lines += _table(brief, first, refused=False).lines()
+    if simulated:
+        lines += [
+            "",
+            "drift in deg/h, predicted and in a time simulation",
+            "",
+            *_simulated(accepted, simulated),
+        ]
+    if others:
+        nearest = sorted(others, key=lambda one: (one.binding == "operations_per_s", one.operations_per_s))
+        shown = nearest[:_MOST_REFUSED]
+        lines += [
+            "",
+            f"does not meet it, the cheapest {len(shown)} of {len(others)}; - was not looked at",
+            "",
+        ]
+        lines += _table(brief, shown, refused=True).lines()
+    return "\n".join(lines)
+
+
+def _simulated(accepted: Sequence[Judgement], simulated: Mapping[str, Simulated]) -> list[str]:
+    """Return predicted drifts beside those of time simulations."""
+    columns = [Column("algorithm", "<")]
+    for cause in ("truncation", "coning", "rounding"):
+        columns += [Column("predicted", spec=_DRIFT, group=cause), Column("run", spec=_DRIFT, group=cause)]
+    rows = []
+    for one in accepted:
+        if one.name in simulated:
+            run = simulated[one.name]
+            pairs = [
+                (one.drift_deg_h[cause], getattr(run, cause))
+                for cause in ("truncation", "coning", "rounding")
+            ]
+            rows.append([one.name, *(value for pair in pairs for value in pair)])
+    return TextTable(columns, rows).lines()
