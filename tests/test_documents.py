@@ -153,6 +153,7 @@ def missing(excerpt: str, text: str) -> list[str]:
     return lost
 
 
+@pytest.mark.long
 def test_the_formulas_and_the_c_of_the_readme_are_what_its_python_prints(new_clone):
     _, done = new_clone
     first_screen = "\n".join(README.splitlines()[:FIRST_SCREEN])

@@ -18,6 +18,7 @@ W = sp.symbols("w_x w_y w_z")
 RANK = {"rk1": 1, "rk2": 2, "rk3": 3, "rk4": 4}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("method", RANK)
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
 @pytest.mark.parametrize("motion", MOTIONS)

@@ -95,6 +95,7 @@ def test_every_value_keeps_its_range_and_its_error_bound(choice, word, rounding,
     assert compared > (5 * named if not loose else 0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("word", [16, 32])
 @pytest.mark.parametrize("algorithm", ["euler", "dcm"])
 def test_the_bound_of_a_step_is_near_the_worst_of_many(algorithm, word, rng):
@@ -117,6 +118,7 @@ def test_the_bound_of_a_step_is_near_the_worst_of_many(algorithm, word, rng):
         assert float(bound) <= 1.6 * worst
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("carry", ["none", "state", "full"])
 @pytest.mark.parametrize("rounding", ["nearest", pytest.param("truncation", marks=pytest.mark.long)])
 @pytest.mark.parametrize("word", [12, 32, pytest.param(16, marks=pytest.mark.long)])
@@ -157,6 +159,7 @@ def test_small_increments_keep_the_bound_in_c(angle, rounding, rng):
         np.testing.assert_array_equal(model.propagate(given), made.propagate(given))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("choice", STEPS, ids=lambda choice: choice.kernel)
 def test_no_transition_stretches_more_than_the_bound_says(choice, rng):
     angle = 1 / 40
@@ -297,6 +300,7 @@ def test_the_reference_in_many_places_is_that_of_mpmath():
     np.testing.assert_allclose(in_many_places(given), wanted, rtol=0, atol=3e-16)
 
 
+@pytest.mark.long
 def test_a_transition_kept_beside_the_increments_needs_no_residual():
     # With the state's residuals alone, the transition is split: its rounding is that of its terms of higher order.
     fixed = quantized(Choice("euler", "rk4", 2), Settings(16, Fraction(1, 76), carry="state"))

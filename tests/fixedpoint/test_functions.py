@@ -240,6 +240,7 @@ def test_c_computes_what_the_model_does(rounding, cases):
     agree()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("case", CASES)
 @settings(max_examples=25, deadline=None)
 @given(data=st.data())
@@ -254,6 +255,7 @@ def test_any_argument_stays_below_the_bound(case, data):
     assert worst_error(lowered, inputs, integers, kind) <= lowered.interface.outputs[0].errors[0]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("kind", "bounds"),
     [
@@ -446,6 +448,7 @@ def near_rotations(evaluator: FixedEvaluator, count: int, size: float) -> np.nda
     return evaluator.integers(evaluator.interface.inputs[0], wrong.reshape(count, 9))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("size", [0.0, 1e-6, 1e-3, 1e-2])
 def test_nearest_rotation(size):
     made = programs()["dcm-orthonormalize-optimal"]
@@ -470,6 +473,7 @@ def test_nearest_rotation(size):
         assert error < 1e-6
 
 
+@pytest.mark.long
 def test_nearest_rotation_refuses_the_same_input_in_c_and_model():
     lowered = quantize(programs()["dcm-orthonormalize-optimal"], Settings(word=32))
     both = ModelEvaluator(emit(lowered, "fixed-model")), CFixedEvaluator(emit(lowered, "c-fixed"))

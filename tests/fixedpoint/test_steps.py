@@ -34,6 +34,7 @@ def exact_step(
     return [known[name] for name in kernel.outputs[0].signal.elements]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("method", "previous"), [*((m, 0) for m in EXPONENTIALS), ("magnus4", 1), ("rk4", 2)]
 )
@@ -60,6 +61,7 @@ def test_a_call_is_inside_its_bound(algorithm, method, previous, rng):
     assert worst > 0.3, "something is rounded"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("method", EXPONENTIALS)
 @pytest.mark.parametrize("algorithm", ["dcm", "euler"])
 def test_the_bound_of_an_exponential_is_a_few_places(algorithm, method):
@@ -71,6 +73,7 @@ def test_the_bound_of_an_exponential_is_a_few_places(algorithm, method):
     assert fixed.interface.accumulation.growth == 1
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "carry", ["none", *(pytest.param(c, marks=pytest.mark.long) for c in ("state", "full"))]
 )
@@ -110,6 +113,7 @@ def test_minutes_of_a_window_are_the_integers_of_the_model():
     np.testing.assert_array_equal(c, model)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("carry", ["none", "full"])
 @pytest.mark.parametrize("method", ["magnus4", pytest.param("munthe-kaas4", marks=pytest.mark.long)])
 def test_c_gives_the_integers_of_the_model(method, carry, rng):

@@ -40,6 +40,7 @@ def constant(*value):
     return Constant(Fraction(*value))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "expression",
     [

@@ -27,6 +27,7 @@ def motion(name: str) -> strapgen.Motion:
     return strapgen.motion(kind, **settings)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("first", [-3, 299, 420])
 @pytest.mark.parametrize("name", MOTIONS)
 def test_increments_integrate_the_rate(name, first):

@@ -115,6 +115,7 @@ def objects(folder: Path) -> Path:
     return session_library.folder("test-objects", [*command, version], fill)
 
 
+@pytest.mark.long
 def test_objects_have_no_state_of_their_own(objects):
     needed("nm")
     files = sorted(objects.glob("*.o"))
@@ -204,6 +205,7 @@ def pairs(kernel: str) -> list[tuple[str, str]]:
     ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("target", TARGETS)
 def test_output_may_be_an_input(target, library, rng):
     checked = 0
@@ -467,6 +469,7 @@ def function_body(source: str) -> str:
     return body
 
 
+@pytest.mark.long
 @each("target", TARGETS)
 @each("kernel", KERNELS)
 def test_operation_counts(kernel, target):

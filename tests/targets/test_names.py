@@ -7,6 +7,7 @@ import re
 import subprocess
 from dataclasses import replace
 from fractions import Fraction
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import NamedTuple
@@ -143,7 +144,9 @@ def printed_names() -> list[str]:
 @cache
 def pool() -> list[str]:
     """Return the names that are tried."""
-    return sorted({*KEYWORDS, *MACROS, *FUNCTIONS, *ODD, *DERIVED, *LETTERS, *printed_names()} - {"resolution"})
+    return sorted(
+        {*KEYWORDS, *MACROS, *FUNCTIONS, *ODD, *DERIVED, *LETTERS, *printed_names()} - {"resolution"}
+    )
 
 
 @cache
@@ -400,6 +403,7 @@ def test_names_that_would_become_the_same_are_kept_apart():
     )
 
 
+@pytest.mark.long
 def test_the_interface_keeps_the_names_of_the_kernel():
     called = HARMLESS._replace(elements=(*"kqjp", "i", "count", "out", "batch", "x", "status", *"abcdef"))
     for target in targets.TARGETS:

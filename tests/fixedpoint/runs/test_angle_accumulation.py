@@ -57,6 +57,7 @@ def assert_holds(errors: np.ndarray, bounds: np.ndarray, carry: str) -> None:
     assert bounds[-1] <= LARGEST_RATIO[carry] * errors[-1]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("algorithm", "carry", "steps", "every"),
     [
@@ -98,6 +99,7 @@ def test_the_errors_of_the_adversary_are_those_of_forty_digits(adversarial_run, 
     assert angle == pytest.approx(result.errors[-1], rel=1e-4)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("carry", ["none", "state", "full"])
 @pytest.mark.parametrize(
     ("word", "rounding"),
@@ -141,6 +143,7 @@ def test_any_run_keeps_the_bound_along_it(algorithm, orthonormalization, word, r
             assert np.all(angles_apart(*runs)[1:] <= np.array(bounds) + 1e-12)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("algorithm", ["euler", "dcm"])
 def test_a_state_stays_proper_for_as_many_steps_as_are_proved(algorithm):
     settings = Settings.of(**RATES)
