@@ -16,6 +16,9 @@ if not (find_spec("z3") and find_spec("pycparser")):
 def pytest_collect_file(file_path: Path) -> Iterator[None]:
     """Look for examples in the docstrings of those modules alone that have any: others are not even imported."""
     collectors = yield
-    if not any(isinstance(collector, DoctestModule) for collector in collectors) or ">>>" in file_path.read_text():
+    if (
+        not any(isinstance(collector, DoctestModule) for collector in collectors)
+        or ">>>" in file_path.read_text()
+    ):
         return collectors
     return [collector for collector in collectors if not isinstance(collector, DoctestModule)]

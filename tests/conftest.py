@@ -54,6 +54,14 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     )
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_pycollect_makeitem(collector: pytest.Collector, obj: object) -> list[pytest.Item] | None:
+    """Make no cases of a long test that is not to run."""
+    marks = getattr(obj, "pytestmark", ())
+    is_quick = collector.config.getoption("markexpr") == "not long"
+    return [] if is_quick and any(mark.name == "long" for mark in marks) else None
+
+
 def _is_of_cayley_klein(value: object) -> bool:
     if isinstance(value, Subject):  # whose name is derived
         value = value.choice

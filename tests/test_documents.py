@@ -216,7 +216,19 @@ def test_the_glossary_is_sorted_and_other_pages_refer_to_it():
 # The pages
 
 #: Pages that take seconds: many kernels, or the integer model.
-LONG_PAGES = ("canonical-form", "compensation", "coning", "fixed-point", "series", "two-speed", "vibration")
+LONG_PAGES = (
+    *(
+        "canonical-form",
+        "compensation",
+        "coning",
+        "fixed-point",
+        "navigation",
+        "redundancy",
+        "series",
+        "systems",
+    ),
+    *("two-speed", "vibration"),
+)
 
 
 @pytest.mark.parametrize(
@@ -238,7 +250,11 @@ def test_the_python_of_a_page(page, monkeypatch):
 LONG_COMMANDS = (
     "strapgen check ",
     "strapgen compare ",
+    "strapgen coning --samples 1 --previous ",
+    "strapgen coning --samples 3 --previous ",
     "strapgen cost ",
+    "strapgen derive separate ",
+    "strapgen derive torques ",
     "strapgen frontier ",
     "strapgen generate euler --method window",
     "strapgen window ",
@@ -246,6 +262,7 @@ LONG_COMMANDS = (
     "strapgen derive dcm --method butcher6",
     "strapgen evidence ",
     "strapgen generate dcm ",
+    "strapgen generate separate ",
     "strapgen generate euler --method rk4 --",
     "strapgen rate-table ",
     "strapgen redundancy ",
@@ -258,6 +275,7 @@ LONG_COMMANDS = (
     "strapgen system ",
     "strapgen tables",
     "strapgen two-speed dcm --target c-fixed",
+    "strapgen verify ",
     "strapgen two-speed euler ",
     "strapgen vibration ",
 )
