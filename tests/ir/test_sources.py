@@ -70,11 +70,8 @@ def test_command_names_what_is_not_the_default():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(
-    "pairs", [FEW, pytest.param([*product(KERNELS, TARGETS)], marks=pytest.mark.long)], ids=["few", "all"]
-)
-def test_interface_survives_json(pairs):
-    for kernel, target in pairs:
+def test_interface_survives_json():
+    for kernel, target in product(KERNELS, TARGETS):
         sources = emitted(kernel, target)
         interface = json.loads(json.dumps(sources.interface()))
         assert Sources.restore(interface, sources.files) == sources, (kernel, target)
