@@ -14,9 +14,6 @@ from strapgen.backends import BACKENDS
 from strapgen.experiments import thesis_tables
 from strapgen.experiments.thesis_tables import TABLES, agrees, build_all, entries, table_settings
 
-#: Every combination has its own number in the source.
-pytestmark = pytest.mark.every_combination
-
 # What an independent program computed from the thesis's equations, in double precision: orders 1, 2, 4.
 REPRODUCED = {
     1: {"dcm": (1, 0.5, 1.190e-5), "euler": (0.25, 0.125, 7.439e-7)},
