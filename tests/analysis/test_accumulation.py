@@ -95,7 +95,6 @@ def test_drift_ratio_on_a_sinusoid(method, share):
     assert sp.expand(share * ours[power][1] - theirs[power][1]) == 0
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(
     "method", ["rk2", *(pytest.param(m, marks=pytest.mark.long) for m in ("rk3", "magnus4"))]
 )

@@ -97,7 +97,6 @@ def test_every_value_keeps_its_range_and_its_error_bound(choice, word, rounding,
     assert compared > (5 * named if not loose else 0)
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("word", [16, 32])
 @pytest.mark.parametrize("algorithm", ["euler", "dcm"])
 def test_the_bound_of_a_step_is_near_the_worst_of_many(algorithm, word, rng):
@@ -302,7 +301,6 @@ def test_the_reference_in_many_places_is_that_of_mpmath():
     np.testing.assert_allclose(in_many_places(given), wanted, rtol=0, atol=3e-16)
 
 
-@pytest.mark.long
 def test_a_transition_kept_beside_the_increments_needs_no_residual():
     # With the state's residuals alone, the transition is split: its rounding is that of its terms of higher order.
     fixed = quantized(Choice("euler", "rk4", 2), Settings(16, Fraction(1, 76), carry="state"))

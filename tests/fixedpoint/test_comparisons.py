@@ -52,7 +52,6 @@ def chosen(c, first, second):
     return first if c >= 0 else second
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("names", [("a", "b"), ("b", "a")])
 def test_a_selection_by_exact_numbers_is_off_by_the_error_of_the_worse_case(names):
     known = {"c": EXACT, "a": FINE, "b": COARSE}
@@ -74,7 +73,6 @@ def test_a_selection_by_an_inexact_number_is_off_by_all_of_its_range_too(case):
     assert measured.error == 2 * most + Fraction(1, 9) <= value.error <= measured.error + GRID
 
 
-@pytest.mark.long
 def test_outcomes_without_room_at_one_fraction_lose_a_unit_of_it():
     known = {"c": EXACT, "a": Known(18, -20, 20), "b": Known(0, 90, 100)}
     value, walk = lowered(lower_selection, known, Selection((("c", ZERO, "a"),), "b"), -100, 100)

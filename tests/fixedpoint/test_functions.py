@@ -255,7 +255,6 @@ def test_any_argument_stays_below_the_bound(case, data):
     assert worst_error(lowered, inputs, integers, kind) <= lowered.interface.outputs[0].errors[0]
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(
     ("kind", "bounds"),
     [

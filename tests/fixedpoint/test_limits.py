@@ -56,7 +56,6 @@ def test_an_attitude_may_exceed_its_bound_by_the_allowance():
     assert largest_magnitude(CODE, CODE.inputs[1], settings) == 3
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("word", [8, 16])
 def test_the_next_call_takes_whatever_a_step_returns(word):
     """An attitude whose range is not proved is checked: against the largest number that the next call accepts."""

@@ -169,7 +169,6 @@ def test_what_a_root_goes_into_is_no_polynomial_of_the_inputs():
     }
 
 
-@pytest.mark.long
 def test_sums_of_increments_are_exact():
     for count in (2, 3, 4):
         fixed = quantize(program(Choice("euler", "rk2", count)), Settings(16))
@@ -233,7 +232,6 @@ def test_products_meet_at_one_place_where_that_costs_nothing():
     assert fixed.error_bounds["next"] < Fraction(52, 100) * Fraction(1, 2**30)
 
 
-@pytest.mark.long
 def test_longer_words_have_smaller_bounds():
     bounds = [quantize(program(EULER), Settings(word)).error_bounds["next"] for word in range(8, 65, 4)]
     assert all(a > b for a, b in pairwise(bounds))

@@ -58,7 +58,6 @@ def test_a_part_and_its_halves_have_the_range_that_intervals_give(sums, box, sid
 
 
 # A cut takes long: no shorter example is sought.
-@pytest.mark.long
 @settings(max_examples=20, phases=(Phase.explicit, Phase.generate))
 @given(chains(), st.fixed_dictionaries(dict.fromkeys(INPUTS, intervals)))
 def test_no_value_at_a_corner_or_inside_leaves_its_range(sums, box):

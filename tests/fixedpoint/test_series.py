@@ -26,7 +26,6 @@ def at(series: Series, values: list[Fraction]) -> Fraction:
     return total
 
 
-@pytest.mark.long
 @settings(derandomize=True, database=None, deadline=None, max_examples=25)
 @given(
     data=st.lists(

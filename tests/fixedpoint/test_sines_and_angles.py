@@ -275,7 +275,6 @@ def test_the_smaller_and_the_larger_argument_have_their_ranges():
     assert [one for one in larger.definition.arguments if isinstance(one, Fraction)] == [Fraction(1, 1 << 16)]
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(
     ("kind", "ranges"),
     [

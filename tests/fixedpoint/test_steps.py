@@ -61,7 +61,6 @@ def test_a_call_is_inside_its_bound(algorithm, method, previous, rng):
     assert worst > 0.3, "something is rounded"
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("method", EXPONENTIALS)
 @pytest.mark.parametrize("algorithm", ["dcm", "euler"])
 def test_the_bound_of_an_exponential_is_a_few_places(algorithm, method):
@@ -73,7 +72,6 @@ def test_the_bound_of_an_exponential_is_a_few_places(algorithm, method):
     assert fixed.interface.accumulation.growth == 1
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(
     "carry", ["none", *(pytest.param(c, marks=pytest.mark.long) for c in ("state", "full"))]
 )

@@ -127,7 +127,6 @@ def lowered(known: dict[str, Known], item, **options):
     return walk.values[item.name], walk
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("rounding", ["nearest", "truncation"])
 @pytest.mark.parametrize(("places", "fraction"), [(8, 5), (15, 2), (12, 4)])
 def test_what_error_feedback_loses_is_attained(places, fraction, rounding):

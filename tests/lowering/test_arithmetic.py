@@ -96,7 +96,6 @@ def test_the_number_comes_last():
     assert with_constant([], Fraction(-3)) == (False, constant(3))
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("write", [expanded, horner])
 @SETTINGS
 @given(p=polynomials, point=points)

@@ -40,7 +40,6 @@ def constant(*value):
     return Constant(Fraction(*value))
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(
     "expression",
     [

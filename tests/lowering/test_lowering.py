@@ -185,7 +185,6 @@ def test_passes_leave_the_values(choice):
                     assert abs(a - b) <= mpmath.mpf("1e-40") * max(1, abs(b))
 
 
-@pytest.mark.long
 @EVERY
 def test_the_cheapest_candidate_is_taken(choice):
     assert cost(program(choice)) == min(map(cost, map(optimize, every_candidate(choice))))

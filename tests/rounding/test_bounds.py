@@ -83,7 +83,6 @@ def test_no_kernel_rounds_by_more_than_its_bound(number, rng):
     assert not above
 
 
-@pytest.mark.long
 def test_every_kernel_has_a_bound_or_a_reason():
     for name, code in programs().items():
         bounds = rounding_bounds(code)
@@ -154,7 +153,6 @@ def halves(code) -> tuple[Program, Program]:
     return transition, replace(code, body=product, inputs=inputs, transition=None)
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("name", STEPS)
 @pytest.mark.parametrize("number", TYPES)
 def test_a_step_rounds_its_transition_and_its_product_by_nearly_their_bounds(name, number, rng):
@@ -242,7 +240,6 @@ def adversarial_run(code, number: str, steps: int, rng: np.random.Generator) -> 
     return lengths
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("name", STEPS)
 @pytest.mark.parametrize("number", TYPES)
 def test_no_run_is_farther_off_than_the_bound_of_its_steps(name, number, rng):
@@ -265,7 +262,6 @@ def test_the_compiled_function_computes_what_the_bounds_are_of(number, rng):
     assert np.array_equal(compiled.step(state, increments.reshape(-1, 2, 3)), np.stack(expected, axis=-1))
 
 
-@pytest.mark.long
 def test_smaller_increments_have_a_smaller_bound():
     code = programs()["dcm-rk4-2"]
     slow = Settings.of(max_rate_deg_s=400, step="0.01", increments=2)

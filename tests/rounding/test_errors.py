@@ -50,7 +50,6 @@ def bound(code: Program, number: str = "float") -> Fraction:
     return error
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("kind", LARGEST)
 def test_without_the_rounding_of_one_operation_the_bound_would_be_exceeded(kind, monkeypatch):
     code, share = LARGEST[kind]

@@ -293,7 +293,6 @@ def test_the_relation_between_symmetrized_triple_products(u):
     assert matrix(cyclic, u) == matrix(triple, u)
 
 
-@pytest.mark.long
 @SETTINGS
 @given(decomposition=decompositions(3), u=vectors)
 def test_exchanging_a_triple_product_leaves_the_value(decomposition, u):

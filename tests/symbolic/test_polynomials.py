@@ -81,7 +81,6 @@ def test_multiples(p, factor, point):
     assert is_tidy(scale(p, factor))
 
 
-@pytest.mark.long
 @SETTINGS
 @given(p=polynomials, parts=st.fixed_dictionaries(dict.fromkeys(NAMES, polynomials)), point=points)
 def test_substitution(p, parts, point):

@@ -50,7 +50,6 @@ def test_conjugate_gives_the_squared_length():
     assert zero(product - sp.Matrix([0, 0, 0, squared]))
 
 
-@pytest.mark.long
 def test_products_of_quaternions_are_products_of_matrices():
     # A wrong order or a transposed matrix would turn the right side round.
     left = rotations.quaternion_matrix(rotations.quaternion_product(P, Q))

@@ -205,7 +205,6 @@ def pairs(kernel: str) -> list[tuple[str, str]]:
     ]
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("target", TARGETS)
 def test_output_may_be_an_input(target, library, rng):
     checked = 0
@@ -469,7 +468,6 @@ def function_body(source: str) -> str:
     return body
 
 
-@pytest.mark.long
 @each("target", TARGETS)
 @each("kernel", KERNELS)
 def test_operation_counts(kernel, target):

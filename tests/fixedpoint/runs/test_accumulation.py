@@ -271,7 +271,6 @@ def behind_transition(code: Program, values: dict[str, Fraction]) -> list[Fracti
     return [value(node) for node in code.outputs[0].nodes]
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("rounding", ["nearest", "truncation"])
 @pytest.mark.parametrize("algorithm", ["euler", "dcm"])
 def test_what_a_step_loses_beside_its_feedback_is_told(algorithm, rounding, rng):

@@ -57,7 +57,6 @@ def assert_holds(errors: np.ndarray, bounds: np.ndarray, carry: str) -> None:
     assert bounds[-1] <= LARGEST_RATIO[carry] * errors[-1]
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(
     ("algorithm", "carry", "steps", "every"),
     [
@@ -143,7 +142,6 @@ def test_any_run_keeps_the_bound_along_it(algorithm, orthonormalization, word, r
             assert np.all(angles_apart(*runs)[1:] <= np.array(bounds) + 1e-12)
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("algorithm", ["euler", "dcm"])
 def test_a_state_stays_proper_for_as_many_steps_as_are_proved(algorithm):
     settings = Settings.of(**RATES)

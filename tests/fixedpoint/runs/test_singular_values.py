@@ -41,7 +41,6 @@ def reached(step: Program, vectors: np.ndarray) -> np.ndarray:
     return np.square(np.linalg.svd(matrices, compute_uv=False)) - 1
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("method", ["rk2", "rk3", "rk4"])
 @pytest.mark.parametrize("algorithm", ["euler", "dcm"])
 def test_bounds_of_two_increments_hold_and_are_nearly_reached_in_the_ball_about_the_box(

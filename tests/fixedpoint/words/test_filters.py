@@ -68,7 +68,6 @@ def taps(window: str, word: int) -> FixedProgram:
     return quantize(program(choose("euler", window)), Settings(word, Fraction(1, 16)))
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(
     ("window", "word"),
     [("window-3-3", 16), ("window-3-3", 32), pytest.param("window-7-7", 32, marks=pytest.mark.long)],
@@ -86,7 +85,6 @@ def test_filters_in_words_hold_their_conditions(window, word):
     assert abs(total + Fraction(1, 6)) < Fraction(1, 1 << (word + 3))
 
 
-@pytest.mark.long
 def test_at_a_constant_rate_nothing_of_the_taps_adds_up(monkeypatch):
     def stages(rate: int, slope: int) -> list[int]:
         known = filtered(taps("window-3-3", 32), [rate + slope * k for k in range(-3, 4)])
@@ -102,7 +100,6 @@ def test_at_a_constant_rate_nothing_of_the_taps_adds_up(monkeypatch):
     assert moments(taps("window-3-3", 32), 3, "lever_3")[0] != 0
 
 
-@pytest.mark.long
 @settings(derandomize=True, database=None, deadline=None, max_examples=40)
 @given(st.lists(st.integers(-(1 << 40), 1 << 40).filter(lambda n: abs(n) % 3), min_size=3, max_size=7))
 def test_rounding_together_is_never_worse_than_one_by_one(integers):

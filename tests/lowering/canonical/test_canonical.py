@@ -36,7 +36,6 @@ def is_the_kernel(made: Program, choice: Choice) -> bool:
     return elements == kernel(choice).polynomials()
 
 
-@pytest.mark.long
 @EVERY
 def test_the_transition_is_that_of_the_stages(choice):
     core, made = canonical.extract_core(kernel(choice)), program(choice)
@@ -49,7 +48,6 @@ def test_the_transition_is_that_of_the_stages(choice):
     assert choice.name == "dcm" or not temporaries
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(
     "choice",
     [
@@ -69,7 +67,6 @@ def test_every_candidate_is_exact_not_only_the_one_that_is_taken(choice):
         assert is_the_kernel(candidate, choice)
 
 
-@pytest.mark.long
 def test_plans_that_are_not_written_are_exact_too_and_nearly_as_long_as_estimated(monkeypatch):
     """In a step on three increments some vectors are multiples of those that have a name."""
     choice = Choice("euler", "rk2", 3)
@@ -84,7 +81,6 @@ def test_plans_that_are_not_written_are_exact_too_and_nearly_as_long_as_estimate
         assert abs(search._estimate(plan) - count) <= 2
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(
     ("choice", "multiplications", "additions"),
     [

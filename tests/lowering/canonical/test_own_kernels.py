@@ -92,7 +92,6 @@ def test_a_second_order_step_from_one_increment_gets_a_canonical_form():
     assert sum(program.operations.values()) == sum(transition.values()) + 16 + 12
 
 
-@pytest.mark.long
 def test_the_program_does_not_depend_on_how_the_step_was_written():
     def plain(build: KernelBuilder, d: list[sp.Matrix]) -> list:
         return [*(d[0] / 2), 1 - dot(d[0], d[0]) / 8]

@@ -4,7 +4,6 @@ import itertools
 import math
 from fractions import Fraction
 
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -55,7 +54,6 @@ def cost(polynomials: list[Polynomial]) -> int:
     return sum(len(m) for p in distinct for m in p) + 3 * len(atoms(polynomials))
 
 
-@pytest.mark.long
 @SETTINGS
 @given(data=st.data(), points=vectors)
 def test_a_choice_keeps_every_value(data, points):
@@ -72,7 +70,6 @@ def test_a_choice_keeps_every_value(data, points):
     assert [value(p, named) for p in chosen] == [value(p, basis) for p in polynomials]
 
 
-@pytest.mark.long
 @SETTINGS
 @given(data=st.data())
 def test_a_choice_never_costs_more(data):

@@ -114,7 +114,6 @@ def test_a_pass_keeps_every_value_and_the_stages_that_are_used(run, program, poi
     assert [(a.name, a.meaning) for a in named(changed)] == stated
 
 
-@pytest.mark.long
 @SETTINGS
 @given(program=programs(), point=points)
 def test_all_passes_together_keep_every_value_and_never_add_operations(program, point):
@@ -123,7 +122,6 @@ def test_all_passes_together_keep_every_value_and_never_add_operations(program, 
     assert cost(optimized) <= cost(program)
 
 
-@pytest.mark.long
 @SETTINGS
 @given(program=programs())
 def test_all_passes_together_leave_nothing_to_tidy_up(program):
