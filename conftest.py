@@ -1,7 +1,24 @@
-"""Leaves modules out of the collection of examples that need tools of `make evidence-tools` where these are missing."""
+"""Leaves out of the collection what has no tests: modules without an example, and examples whose tools are missing."""
 
+from collections.abc import Iterator
 from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+from _pytest.doctest import DoctestModule
 
 collect_ignore_glob = []
 if not (find_spec("z3") and find_spec("pycparser")):
     collect_ignore_glob.append("codegen/strapgen/evidence/overflow/*.py")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collect_file(file_path: Path) -> Iterator[None]:
+    """Look for examples in the docstrings of those modules alone that have any: others are not even imported."""
+    collectors = yield
+    if (
+        not any(isinstance(collector, DoctestModule) for collector in collectors)
+        or ">>>" in file_path.read_text()
+    ):
+        return collectors
+    return [collector for collector in collectors if not isinstance(collector, DoctestModule)]

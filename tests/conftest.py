@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import session_library
 import typer.main
-from covering import mark_combinations
+from covering import beyond_two_rounds, mark_combinations
 from gathering import SEED
 
 import strapgen
@@ -39,6 +39,9 @@ CAYLEY_KLEIN = ("numpy", "c")
 
 def pytest_configure(config: pytest.Config) -> None:
     """Let properties that say no number of examples of their own take a quarter of them, except in the long tests."""
+    config.addinivalue_line(
+        "markers", "every_combination: the long tests run every combination of its parameters"
+    )
     if config.getoption("markexpr") == "not long":
         hypothesis.settings.register_profile("quick", max_examples=25, deadline=None)
         hypothesis.settings.load_profile("quick")
@@ -52,6 +55,19 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         type=Path,
         help="append a line to FILE for every kernel that tests compile, and compile each when it is needed",
     )
+    parser.addoption(
+        "--all-combinations",
+        action="store_true",
+        help="with -m long: run every combination of the parameters of a test",
+    )
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_pycollect_makeitem(collector: pytest.Collector, obj: object) -> list[pytest.Item] | None:
+    """Make no cases of a long test that is not to run."""
+    marks = getattr(obj, "pytestmark", ())
+    is_quick = collector.config.getoption("markexpr") == "not long"
+    return [] if is_quick and any(mark.name == "long" for mark in marks) else None
 
 
 def _is_of_cayley_klein(value: object) -> bool:
@@ -64,7 +80,7 @@ def _is_of_cayley_klein(value: object) -> bool:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Let combinations and Cayley-Klein parameters run with the long tests.
 
-    Every value of every parameter is in a quick test; all combinations of several are in the long ones. Cayley-Klein
+    Every value of every parameter is in a quick test, and in two combinations that are long. Cayley-Klein
     parameters do not run on back ends that show nothing new of them: their kernels and programs are those of Euler
     parameters but for names, which tests/catalogue, tests/lowering and tests/test_claims.py prove.
     """
@@ -75,10 +91,17 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             item.add_marker(pytest.mark.long)
         if values.get("algorithm") == "cayley-klein" and values.get("backend_name", "c") not in CAYLEY_KLEIN:
             left.append(item)
+    _leave_out(config, items, left)
+    mark_combinations(items)
+    if config.getoption("markexpr") == "long" and not config.getoption("all_combinations"):
+        _leave_out(config, items, list(beyond_two_rounds(items)))
+
+
+def _leave_out(config: pytest.Config, items: list[pytest.Item], left: list[pytest.Item]) -> None:
     if left:
         config.hook.pytest_deselected(items=left)
-        items[:] = [item for item in items if item not in set(left)]
-    mark_combinations(items)
+        without = set(left)
+        items[:] = [item for item in items if item not in without]
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:

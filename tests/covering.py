@@ -1,4 +1,4 @@
-"""Tests on every combination of several parameters: few that have every value of each run at once, all others long."""
+"""Tests on combinations of several parameters: few that have every value of each run at once, some more are long."""
 
 from __future__ import annotations
 
@@ -41,20 +41,46 @@ def mark_combinations(items: Iterable[pytest.Item]) -> None:
 
     Parameters of one list belong together: each of its rows counts as one value.
     """
-    tests: dict[Any, list[pytest.Function]] = {}
-    for item in items:
-        is_combination = isinstance(item, pytest.Function) and len(_axes(item)) > 1
-        if is_combination and item.get_closest_marker("long") is None:
-            tests.setdefault(item.function, []).append(item)
-    for several in tests.values():
-        axes = _axes(several[0])
-        cases = [
-            [repr([item.callspec.params.get(name) for name in names]) for names in axes] for item in several
-        ]
+    quick = [item for item in items if item.get_closest_marker("long") is None]
+    for several, cases in _combinations(quick):
         chosen = {*covering(cases)}
         for number, item in enumerate(several):
             if number not in chosen:
                 item.add_marker(pytest.mark.long)
+
+
+def beyond_two_rounds(items: Iterable[pytest.Item]) -> Iterator[pytest.Item]:
+    """Yield the long combinations that remain after every value of every parameter was in two of them.
+
+    A value meets another partner in each round, and the quick tests are a third one. Where every combination has an
+    expected value of its own, the mark `every_combination` leaves all of them.
+    """
+    long = [item for item in items if item.get_closest_marker("long") is not None]
+    for several, cases in _combinations(long):
+        if several[0].get_closest_marker("every_combination") is not None:
+            continue
+        left = list(range(len(several)))
+        for _ in range(2):
+            chosen = {left[number] for number in covering([cases[k] for k in left])} if left else set()
+            left = [k for k in left if k not in chosen]
+        yield from (several[k] for k in left)
+
+
+def _combinations(items: Iterable[pytest.Item]) -> Iterator[tuple[list[pytest.Function], list[list[str]]]]:
+    """Yield the cases of every test that has several parameters, with the value of each."""
+    tests: dict[Any, list[pytest.Function]] = {}
+    for item in items:
+        if isinstance(item, pytest.Function) and len(_axes(item)) > 1:
+            tests.setdefault(item.function, []).append(item)
+    for several in tests.values():
+        axes = _axes(several[0])
+        yield (
+            several,
+            [
+                [repr([item.callspec.params.get(name) for name in names]) for names in axes]
+                for item in several
+            ],
+        )
 
 
 def _axes(item: pytest.Function) -> list[tuple[str, ...]]:

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import json
-import pickle
 from collections.abc import Callable, Mapping
 from functools import cache
-from pathlib import Path
 
 import mpmath
-import session_library
 import sympy as sp
 
-from strapgen import catalogue, fixedpoint
+from strapgen import catalogue
 from strapgen.backends import BACKENDS, fitted
 from strapgen.backends.kernel_sources import sources_of_program
 from strapgen.catalogue import Choice
@@ -47,19 +43,9 @@ def program(choice: Choice) -> Program:
     return generated_sources.program(choice)
 
 
-@cache
-def _quantized(identity: str, choice: Choice, settings: str) -> FixedProgram:
-    def fill(draft: Path) -> None:
-        made = fixedpoint.quantize(program(choice), Settings.from_dict(json.loads(settings)))
-        (draft / "fixed.pickle").write_bytes(pickle.dumps(made))
-
-    folder = session_library.folder("test-quantized", [identity, settings], fill)
-    return pickle.loads((folder / "fixed.pickle").read_bytes())
-
-
 def quantized(choice: Choice, settings: Settings) -> FixedProgram:
     """Return a kernel of the catalogue in fixed point."""
-    return _quantized(choice.identity, choice, json.dumps(settings.as_dict(), sort_keys=True))
+    return generated_sources.fixed_program(choice, settings)
 
 
 @cache

@@ -19,6 +19,9 @@ import strapgen
 from strapgen.simulation.runs import simulate
 from strapgen.support.exceptions import InputError
 
+#: Every combination has its own number in the source.
+pytestmark = pytest.mark.every_combination
+
 ORDERS = (1, 2, 3, 4)
 
 

@@ -217,6 +217,7 @@ def truncated_exponential(algorithm: str, order: int) -> list:
 RATIONAL = [name for name in TABLEAUX if TABLEAUX[name].rational and TABLEAUX[name].order < 7]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "method",
     [
@@ -234,6 +235,7 @@ def test_no_number_of_increments_changes_a_step_at_a_constant_rate(algorithm, me
         assert turn_at_a_constant_rate(algorithm, method, increments, previous) == one
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("method", [*STANDARD_METHODS, "taylor2", "taylor5", "taylor8"])
 @pytest.mark.parametrize("algorithm", STEP_NAMES)
 def test_at_a_constant_rate_a_step_is_the_exponential_cut_off(algorithm, method):

@@ -153,6 +153,7 @@ def missing(excerpt: str, text: str) -> list[str]:
     return lost
 
 
+@pytest.mark.long
 def test_the_formulas_and_the_c_of_the_readme_are_what_its_python_prints(new_clone):
     _, done = new_clone
     first_screen = "\n".join(README.splitlines()[:FIRST_SCREEN])
@@ -215,7 +216,19 @@ def test_the_glossary_is_sorted_and_other_pages_refer_to_it():
 # The pages
 
 #: Pages that take seconds: many kernels, or the integer model.
-LONG_PAGES = ("canonical-form", "compensation", "coning", "fixed-point", "series", "two-speed", "vibration")
+LONG_PAGES = (
+    *(
+        "canonical-form",
+        "compensation",
+        "coning",
+        "fixed-point",
+        "navigation",
+        "redundancy",
+        "series",
+        "systems",
+    ),
+    *("two-speed", "vibration"),
+)
 
 
 @pytest.mark.parametrize(
@@ -237,7 +250,11 @@ def test_the_python_of_a_page(page, monkeypatch):
 LONG_COMMANDS = (
     "strapgen check ",
     "strapgen compare ",
+    "strapgen coning --samples 1 --previous ",
+    "strapgen coning --samples 3 --previous ",
     "strapgen cost ",
+    "strapgen derive separate ",
+    "strapgen derive torques ",
     "strapgen frontier ",
     "strapgen generate euler --method window",
     "strapgen window ",
@@ -245,6 +262,7 @@ LONG_COMMANDS = (
     "strapgen derive dcm --method butcher6",
     "strapgen evidence ",
     "strapgen generate dcm ",
+    "strapgen generate separate ",
     "strapgen generate euler --method rk4 --",
     "strapgen rate-table ",
     "strapgen redundancy ",
@@ -257,6 +275,7 @@ LONG_COMMANDS = (
     "strapgen system ",
     "strapgen tables",
     "strapgen two-speed dcm --target c-fixed",
+    "strapgen verify ",
     "strapgen two-speed euler ",
     "strapgen vibration ",
 )

@@ -82,6 +82,7 @@ def test_a_choice_passes_through_few_modules(algorithm, empty_cache):
     assert len(TRIP) <= 8
 
 
+@pytest.mark.long
 def test_compiling_is_the_stages_in_order():
     choice = choose("euler", "rk2", 1)
     program = strapgen.lower(strapgen.derive("euler", "rk2", 1))
@@ -170,6 +171,7 @@ def test_verbose_shows_stages_on_stderr_and_what_the_cache_holds(empty_cache, ca
     assert first.out == second.out == third.out
 
 
+@pytest.mark.long
 def test_verbose_tells_of_users_kernels(empty_cache, capsys):
     words = ("--verbose", "generate", str(EXAMPLE), "--out", str(empty_cache))
     run(*words)

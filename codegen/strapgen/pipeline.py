@@ -40,13 +40,13 @@ def compile(
     target: str,
     settings: Settings | None = None,
     lowered: Callable[[Choice], Program] = lowered,
+    quantized: Callable[[Choice, Settings | None], FixedProgram] | None = None,
 ) -> Sources:
-    """Compile a choice for a target; `lowered` returns its program, for instance from a cache."""
+    """Compile a choice for a target; `lowered` and `quantized` return its programs, for instance from a cache."""
     _require_target(target, settings)
-    program = lowered(choice)
-    if targets.TARGETS[target].fixed:
-        return generate(quantize(program, settings), target)
-    return generate(program, target)
+    if not targets.TARGETS[target].fixed:
+        return generate(lowered(choice), target)
+    return generate(quantized(choice, settings) if quantized else quantize(lowered(choice), settings), target)
 
 
 def derive(

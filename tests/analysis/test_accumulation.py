@@ -42,6 +42,7 @@ def test_prediction_leaves_the_next_order_for_other_methods(name, method):
         assert found.slopes[-1] > found.order + found.terms - 0.15
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "order", [1, pytest.param(2, marks=pytest.mark.long), pytest.param(3, marks=pytest.mark.long), 4]
 )
@@ -60,6 +61,7 @@ def test_constant_rate_adds_up_along_the_rate(order):
     assert not run.bounded
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("order", "power"),
     [(1, 1), pytest.param(2, 2, marks=pytest.mark.long), (3, 4), pytest.param(4, 4, marks=pytest.mark.long)],
@@ -77,6 +79,7 @@ def test_drift_on_a_sinusoid_is_bounded(algorithm, order, power):
     assert b not in scaled.free_symbols
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("method", "share"),
     [
@@ -124,6 +127,7 @@ def test_drift_over_hours_is_the_secular_rate(algorithm, method, simulated):
     assert np.abs(made.drift - wanted).max() < 0.01 * np.abs(wanted).max()
 
 
+@pytest.mark.long
 def test_first_order_on_coning_needs_products_of_errors():
     """Its secular drift comes with h^2 while errors are of order h: the eigenvalue has them, to all orders.
 
@@ -137,6 +141,7 @@ def test_first_order_on_coning_needs_products_of_errors():
     assert list(run.bounded) == [1]
 
 
+@pytest.mark.long
 def test_growth_of_scale_is_that_of_the_closed_form():
     run = accumulate(choose("dcm", "rk4", 2), "constant", 1)
     square = sum(x**2 for x in sp.symbols("w_x w_y w_z"))

@@ -32,6 +32,7 @@ def closed_form(algorithm: str, method: str) -> ConstantRate:
     return constant_rate(choose(algorithm, method, 2))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
 @pytest.mark.parametrize("order", range(1, 9))
 def test_the_state_turns_as_the_cut_exponential(algorithm, order):
@@ -43,6 +44,7 @@ def test_the_state_turns_as_the_cut_exponential(algorithm, order):
     assert found.parameters == (algorithm != "dcm")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("order", range(1, 5))
 def test_a_runge_kutta_step_is_the_taylor_step_there(order):
     """Where the order is the number of stages; Cayley-Klein parameters have the programs of Euler parameters."""
@@ -59,6 +61,7 @@ def test_what_the_first_order_loses():
     assert constant_rate(choose("euler", "rk1")).stretch == 1 + x**2 / 4
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("method", ["rk1", "rk2", "rk3", "rk4", "taylor7", "fehlberg5"])
 def test_the_series_is_that_of_the_closed_form(method):
     found = closed_form("euler", method)

@@ -22,6 +22,7 @@ from strapgen.support.exceptions import InputError
 SQUARE = sum(w**2 for w in sp.symbols("w_x w_y w_z"))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("algorithm", "part", "wanted"),
     [

@@ -98,6 +98,7 @@ def one_step(choice: Choice, vectors: list[list[sp.Rational]], h: Fraction) -> l
     return list(computed * true.T - mpmath.eye(3))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("algorithm", ["dcm", "euler"])
 @pytest.mark.parametrize(("method", "increments", "previous"), CASES)
 def test_two_terms_leave_an_error_of_the_square_of_the_step(algorithm, method, increments, previous):

@@ -43,6 +43,7 @@ def test_to_second_order():
     assert is_zero(second - nearest_to_second_order())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("scheme", SERIES)
 def test_what_each_scheme_leaves_to_second_order(scheme):
     """Drift changes by half of KY + YK, whatever the scheme; they differ in what is left of scale and skew.
@@ -70,6 +71,7 @@ def test_scale_alone_lets_the_drift_of_a_large_error_fall():
     assert sp.expand((second - second.T)[0, 1] / 2 + y * k) == 0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("scheme", orthonormalizations("dcm"))
 def test_any_true_matrix(scheme):
     """The kernels, that of the nearest rotation too, on (I + sP) C: what they leave is as predicted, to order s^3."""

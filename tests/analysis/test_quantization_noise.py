@@ -52,6 +52,7 @@ def test_the_closed_form_for_any_coefficient_of_the_cross_product():
     assert sp.solve(sp.diff(noise.turning, c), c) == [sp.Rational(1, 2)], "the least"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("algorithm", "method", "increments", "previous", "turning"),
     [

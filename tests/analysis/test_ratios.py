@@ -30,6 +30,7 @@ def test_the_claims_of_section_8():
     assert "1/4 + 9/80 x^2" in claims_text(claims())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
 def test_parameters_lose_twice_what_the_matrix_loses_at_half_the_angle(order):
     """Claim 2 in closed form: the ratio is 2 delta(x/2)/delta(x), exactly."""
@@ -37,6 +38,7 @@ def test_parameters_lose_twice_what_the_matrix_loses_at_half_the_angle(order):
     assert sp.simplify(euler.angle_lost - 2 * dcm.angle_lost.subs(ANGLE, ANGLE / 2)) == 0
 
 
+@pytest.mark.long
 def test_three_axes_at_the_thesis_rate():
     """3.00069 at 10 deg/s and 1/8 s."""
     ratio = claims()[-1].ratio
@@ -72,6 +74,7 @@ def test_an_exact_step_has_no_ratio():
     assert "euler-magnus4-2 loses nothing" in ratio_text(found)
 
 
+@pytest.mark.long
 def test_quotient_is_the_series_of_the_quotient():
     first = {2: (R(1, 3),), 3: (R(1, 5),), 4: (R(-1, 7),)}
     second = {1: (R(2, 3),), 2: (R(-1, 2),), 3: (R(4),)}

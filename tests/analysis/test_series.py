@@ -18,6 +18,7 @@ W = sp.symbols("w_x w_y w_z")
 RANK = {"rk1": 1, "rk2": 2, "rk3": 3, "rk4": 4}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("method", RANK)
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
 @pytest.mark.parametrize("motion", MOTIONS)
@@ -77,7 +78,7 @@ def test_a_step_that_takes_rates(method):
         if not n.startswith(
             ("taylor", "fit", "ralston", "butcher", "nystrom", "fehlberg7", "fehlberg8", "cooper-verner8")
         )
-    ],
+    ][::2],
 )
 def test_every_method_has_its_order_on_a_general_motion(method):
     """The order that theory gives the step; methods of irrational and of rounded coefficients too."""

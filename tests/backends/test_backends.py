@@ -31,6 +31,7 @@ def random_increments(rng, *shape: int, size: float = 0.01) -> np.ndarray:
     return rng.normal(scale=size, size=(*shape, 3))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "method", [*(pytest.param(f"rk{order}", marks=pytest.mark.long) for order in (1, 2, 3)), "rk4"]
 )
@@ -79,6 +80,7 @@ def test_orthonormalization_comes_after_every_so_many_steps(make, algorithm, rng
     assert np.abs(backend.propagate(increments) - history).max() > 1e-4, "orthonormalization must be seen"
 
 
+@pytest.mark.long
 @settings(max_examples=10, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     steps=st.integers(0, 120),
@@ -102,6 +104,7 @@ def test_records_are_samples_of_the_full_history(
         assert np.abs(alone - some[run]).max() <= roundoff(backend, max(steps, 1))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("orthonormalize_every", [None, 1, 3, 64, 100, 1000])
 @pytest.mark.parametrize("span", [32, 100, 257])
 def test_spans_of_the_numpy_scan_join_without_a_seam(monkeypatch, rng, span, orthonormalize_every):
@@ -252,6 +255,7 @@ def lowered(*chosen: object, **more: object) -> Program:
     return strapgen.lower(strapgen.derive(*chosen, **more))
 
 
+@pytest.mark.long
 def test_the_pipeline_by_hand_gives_the_same_back_end(backend_name, rng):
     built = strapgen.build(generated(lowered("euler", "rk2", 2), backend_name))
     increments = random_increments(rng, 20, 2)
@@ -259,6 +263,7 @@ def test_the_pipeline_by_hand_gives_the_same_back_end(backend_name, rng):
     np.testing.assert_array_equal(built.propagate(increments), cached.propagate(increments))
 
 
+@pytest.mark.long
 def test_a_step_from_rates_on_every_back_end(backend_name, rng):
     backend = strapgen.build(generated(lowered("dcm", "rk4", rates=True), backend_name))
     other = strapgen.backend("dcm", "rk4", 2, backend_name)
@@ -277,6 +282,7 @@ def test_a_simulation_needs_increments_or_the_nodes_of_rates(backend_name):
         strapgen.simulate(backend, strapgen.motion("constant", x_deg_s=1), 1, 10)
 
 
+@pytest.mark.long
 def test_every_orthonormalization_restores_the_constraint(make, rng):
     # What each leaves of the excess S = C'C - I (thesis, appendix B); adding the duals cancels S to first order.
     left = {
@@ -321,6 +327,7 @@ def test_conversions_close_on_every_back_end(backend_name, rng):
 METHODS = ("taylor4", "magnus4", "munthe-kaas4")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("algorithm", "count", "previous", "ahead"),
     [

@@ -92,6 +92,7 @@ def test_every_interval_has_the_filters_of_the_catalogue_for_its_place_in_the_re
     np.testing.assert_allclose(now, committed[-1], rtol=0, atol=ROUNDING)
 
 
+@pytest.mark.long
 def test_nothing_is_committed_before_a_whole_window_and_then_all_that_it_allows():
     unit = CommitLate(WINDOW)
     counts = [unit.push(sample) for sample in samples(12)]
@@ -110,6 +111,7 @@ def test_now_is_an_answer_and_changes_nothing():
     np.testing.assert_array_equal(asked.now(), silent.now())
 
 
+@pytest.mark.long
 def test_now_is_what_is_committed_l_samples_later_but_for_its_filters():
     unit, now, committed = CommitLate("window-5-5"), [], []
     for sample in samples(60, "cone"):
@@ -138,6 +140,7 @@ def test_polynomials_give_the_rate_until_a_window_is_full():
     assert unit.flush() == W - 1
 
 
+@pytest.mark.long
 def test_a_recording_that_runs_backwards_gives_the_way_back():
     # With the filters of now at both ends, which are each other's mirror images.
     increments, ways = samples(20), []
@@ -189,6 +192,7 @@ def run(name: str, window: str, kinds: dict[int, int], count: int = 44, backend:
     return unit
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["random", "cone", "slew"])
 @pytest.mark.parametrize(
     "kinds",
@@ -213,6 +217,7 @@ def test_intervals_wait_for_eight_samples_after_a_gap():
     assert max(counts) == counts[22] == LateFilters(WINDOWS["window-7-7"]).most_commits == 16
 
 
+@pytest.mark.long
 def test_now_goes_on_with_an_estimate_while_a_gap_is_open():
     whole, gap = CommitLate("window-7-7"), CommitLate("window-7-7")
     for number, sample in enumerate(samples(40, "slew")):
@@ -268,6 +273,7 @@ def test_the_direction_cosine_matrix_is_that_of_the_euler_parameters():
         np.testing.assert_allclose(convert(one), other, rtol=0, atol=ROUNDING)
 
 
+@pytest.mark.long
 def test_filters_for_a_gyro_go_with_its_sampling_rate_alone():
     family = replace(WINDOWS[WINDOW], gyro=GyroResponse(Fraction(40), Fraction(7, 10), Fraction(100)))
     with pytest.raises(InputError, match=r"no sampling rate is stated.*at 100 Hz"):
@@ -502,6 +508,7 @@ def test_c_on_integers_refuses_what_its_header_says():
     assert lib.euler_late_3_3_w32_flush(memory) == 17
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("algorithm", "window", "counts"),
     [
@@ -560,6 +567,7 @@ def test_samples_are_counted_so_that_no_angle_is_lost():
     assert apart(unit.attitude, np.array([0.0, 0.0, 150045 * 2.0**-32, 1.0])) < 4 * 2.0**-30
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("carry", ["none", "full"])
 def test_the_committed_attitude_stays_within_the_bounds_of_its_steps(carry):
     settings = Settings(carry=carry)

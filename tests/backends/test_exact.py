@@ -29,6 +29,7 @@ def test_exact_runs_are_those_of_rationals(algorithm, method, rng):
     np.testing.assert_array_equal(exact.propagate(made, increments)[-1].ravel(), wanted)
 
 
+@pytest.mark.long
 def test_double_is_near_the_exact_run(algorithm, rng):
     increments = rng.normal(scale=0.01, size=(200, 2, 3))
     wanted = exact.propagate(program(Choice(algorithm, "rk4", 2)), increments)
@@ -76,6 +77,7 @@ def test_a_run_that_divides_by_zero_goes_on_as_no_number():
     assert np.isnan(states[2:]).all()
 
 
+@pytest.mark.long
 def test_no_computer_algebra_where_the_program_is_cached(tmp_path):
     backend = strapgen.backend("euler", "rk2", backend="exact")
     backend.matrices(backend.orthonormalize(backend.identity))

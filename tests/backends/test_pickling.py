@@ -76,6 +76,7 @@ def test_a_copy_of_an_algorithm_in_two_speeds_runs_bit_for_bit_the_same(name, rn
         np.testing.assert_array_equal(one, other)
 
 
+@pytest.mark.long
 def test_a_back_end_that_was_built_by_hand_can_be_copied(increments):
     backend = strapgen.build(strapgen.generate(strapgen.lower(strapgen.derive(FILE)), "numpy"))
     np.testing.assert_array_equal(
@@ -100,6 +101,7 @@ def test_a_pool_of_processes_runs_a_back_end(algorithm, rng):
         np.testing.assert_array_equal(history, backend.propagate(run))
 
 
+@pytest.mark.long
 def test_what_arrives_needs_no_computer_algebra(tmp_path, increments):
     backend = strapgen.backend(FILE, backend="numpy")
     (tmp_path / "backend.pickle").write_bytes(pickle.dumps(backend))

@@ -66,6 +66,7 @@ def test_coning_is_that_of_the_source_in_every_slow_cycle(algorithm, backend_nam
     assert np.abs(drift + 2.720926166e-3).max() <= allowed
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
 @pytest.mark.parametrize("sculling", SCULLING)
 def test_sculling_is_that_of_the_source_in_every_slow_cycle(algorithm, sculling):
@@ -115,6 +116,7 @@ def off(algorithm: str, sculling: int, slow: int, cycles: int) -> tuple[float, f
     return (turned.inv() * attitude).magnitude(), float(np.abs(total - change).max())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("algorithm", "sculling"), FORMS)
 def test_a_turn_with_a_steady_force_comes_out(algorithm, sculling):
     # A steady turn has no coning, so that the attitude is exact; (51) and (52) miss the third power of a slow
@@ -190,6 +192,7 @@ def test_c_and_model_agree_bit_for_bit(carry, rng):
         np.testing.assert_array_equal(one, other)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("algorithm", ["euler", pytest.param("dcm", marks=pytest.mark.long)])
 def test_error_feedback_in_the_memory_of_the_c_is_that_of_the_model(algorithm):
     """Words of 16 bits, rounded down, on a vibration: bit for bit, and not what runs without feedback."""
@@ -208,6 +211,7 @@ def test_error_feedback_in_the_memory_of_the_c_is_that_of_the_model(algorithm):
     assert (attitudes["full"] != attitudes["none"]).any()
 
 
+@pytest.mark.long
 def test_generated_files_are_the_command_s_whatever_largest_angle_is_stated():
     # No loop has the increments of a step: what bounds them goes into neither the code nor its header.
     plain = sources("euler", 2, "c-fixed", Settings(carry="full")).files
@@ -297,6 +301,7 @@ def test_names_that_are_not_there_are_told(call, said):
         call()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("target", ["c", "c-float", "c-fixed"])
 def test_the_whole_compiles_without_a_warning(target, tmp_path):
     if shutil.which("gcc") is None:
@@ -380,6 +385,7 @@ def test_null_pointers_are_refused():
     assert lib.dcm_two_speed_2_navigation(memory, ffi.NULL) == 4
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "partner"), [("increment", "previous_increment"), ("turn", "previous_turn")]
 )
@@ -417,6 +423,7 @@ def test_words_that_are_not_the_back_end_s():
         loops("dcm", 2, "c-fixed", Settings(formats={"angle_sum": "Q40.-9"}))
 
 
+@pytest.mark.long
 def test_a_long_word_needs_no_pulses():
     run = TwoSpeed("euler", 2, "fixed-model", Settings(word=64)).run(
         np.full((4, 3), 0.01), np.zeros((4, 3)), fast_cycles=2

@@ -68,6 +68,7 @@ def test_the_standard_catalogue_holds_everything_once():
     assert len(identifiers) == len(names)
 
 
+@pytest.mark.long
 @EVERY
 def test_a_kernel_is_what_was_chosen(choice):
     kernel = derived(choice)
@@ -122,6 +123,7 @@ def test_companions_are_in_the_catalogue_and_fit(choice):
         assert attitude.outputs[0].signal.shape == (3, 3)
 
 
+@pytest.mark.long
 @EVERY
 def test_deriving_twice_gives_the_same(choice):
     assert catalogue.derive(choice) == derived(choice)

@@ -91,6 +91,7 @@ def test_choices_differ_in_the_kernels_that_a_step_brings(chosen):
     assert len(kernel.own) > 1
 
 
+@pytest.mark.long
 def test_each_runs_as_its_own_method(chosen, rng):
     d = rng.normal(scale=0.05, size=(30, 2, 3))
     for name in ("numpy", "c"):
@@ -99,6 +100,7 @@ def test_each_runs_as_its_own_method(chosen, rng):
             np.testing.assert_array_equal(backend(choice, backend=name).propagate(d), wanted)
 
 
+@pytest.mark.long
 def test_each_has_the_companions_that_it_brings(chosen, rng):
     state = np.array([0.1, 0.2, 0.3, 1.0])
     d = rng.normal(scale=0.02, size=(30, 2, 3))
@@ -124,6 +126,7 @@ def test_an_evaluator_takes_a_choice_of_a_user_s_kernel(chosen, rng):
         strapgen.evaluator("mend")
 
 
+@pytest.mark.long
 def test_the_stages_by_hand_find_what_a_kernel_brings():
     for target in ("numpy", "c"):
         sources = strapgen.generate(strapgen.lower(strapgen.derive(FILE, "rk2")), target)

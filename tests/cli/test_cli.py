@@ -185,6 +185,7 @@ def test_list(strapgen_says):
 # tableau
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "name",
     [
@@ -260,6 +261,7 @@ HEADS = [*((part, "rad/s") for part in ("continuous", "computed", "error")), ("e
 TRUE = -math.pi * 10 * 0.01 * 0.02 * math.sin(1.1)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "algorithm",
     [
@@ -474,6 +476,7 @@ def test_derive_json(show, strapgen_says):
     assert [signal["name"] for signal in data["inputs"]] == ["state", "increments"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kernel", [n for n, recipe in catalogue.KERNELS.items() if recipe.standard])
 def test_every_kernel_can_be_shown(kernel, strapgen_says):
     assert strapgen_says(f"derive {kernel}")
@@ -584,6 +587,7 @@ def test_previous_increments_on_the_command_line(strapgen_says):
     assert rows[2]["max_abs_rad"] <= rows[2]["bound_rad"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "method", ["magnus4", *(pytest.param(m, marks=pytest.mark.long) for m in ("taylor4", "munthe-kaas4"))]
 )
@@ -782,6 +786,7 @@ def test_output_into_a_file(strapgen_says, tmp_path):
     assert (tmp_path / "deep" / "er" / "run.csv").read_text() == wanted
 
 
+@pytest.mark.long
 def test_plot(strapgen_says, tmp_path):
     pytest.importorskip("matplotlib")
     assert strapgen_says(f"simulate dcm {CONING} --plot run.png") == strapgen_says(f"simulate dcm {CONING}")
@@ -853,6 +858,7 @@ COMPARE_KEYS = [
 ]
 
 
+@pytest.mark.long
 def test_compare_json(strapgen_says):
     said = strapgen_says(
         f"compare euler --backends numpy,c,c-float,c-fixed32,c-fixed16 {CONING} --format json"
@@ -864,6 +870,7 @@ def test_compare_json(strapgen_says):
     assert all(row["max_abs_rad"] <= row["bound_rad"] for row in rows[3:])
 
 
+@pytest.mark.long
 def test_compare_recorded_data_as_csv_into_a_file(strapgen_says, tmp_path):
     options = (
         f"--rates-csv {DATA}/rates_uneven.csv --rate-unit deg/s --resample-hz 100 --format csv --out rows.csv"
@@ -1008,6 +1015,7 @@ def test_tables_in_fixed_point_mark_what_round_off_dominates(strapgen_says):
     assert len(rows) == 10 and sum(row.endswith("r") for row in rows) >= 5
 
 
+@pytest.mark.long
 def test_round_off_of_table_5(strapgen_says):
     def drift(backend, options=""):
         entries = json.loads(strapgen_says(f"tables --table 5 --backend {backend} {options} --format json"))
@@ -1034,6 +1042,7 @@ def test_tables_text(strapgen_says):
     assert "2.391" in said and "0.856" in said
 
 
+@pytest.mark.long
 def test_a_footnote_is_printed_once_for_all_back_ends(strapgen_says):
     said = strapgen_says("tables --table 2 --backend numpy,c")
     assert len(re.findall(r"^    c ", said, flags=re.MULTILINE)) == 2

@@ -35,6 +35,7 @@ def check(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
     return run
 
 
+@pytest.mark.long
 def test_the_right_example_passes(check):
     status, printed, said = check(f"{PLACE}/correct.c {COMMAND}")
     assert (status, said) == (0, "")

@@ -29,6 +29,7 @@ def help_of(name: str) -> list[str]:
         return command.get_help(context).splitlines()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("width", [60, 80, 100])
 def test_no_line_is_wider_than_the_terminal(width, monkeypatch):
     monkeypatch.setenv("COLUMNS", str(width))

@@ -59,6 +59,7 @@ def test_what_is_written_is_read_again(brief, tmp_path):
     assert again.objective == ("mean square" if brief.noise else "minimax")
 
 
+@pytest.mark.long
 def test_noise_makes_the_filters_smaller():
     quiet, noisy = (design(replace(SMALL, noise=noise)) for noise in (Fraction(0), Fraction(1, 10)))
     for m in (1, 2):
@@ -99,6 +100,7 @@ def test_numbers_of_a_file_are_exact():
         assert Fraction(family_file.number(value)) == value
 
 
+@pytest.mark.long
 def test_a_single_sample_is_a_window_too():
     window = design(FamilyBrief(0, 0, Fraction(1), conditions=1, degree=2))
     assert window.filters[:2] == ((1,), (0,)) and not window.one_sided + window.start

@@ -16,6 +16,7 @@ def integers(values) -> list[int]:
     return [round(float(value) * 2**60) << (BITS - 60) for value in values]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("count", [1, 3, 8])
 def test_the_sum_is_that_of_a_linear_programme(count, seed):

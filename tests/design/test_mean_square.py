@@ -32,6 +32,7 @@ def columns(shape: Shape, m: int, band: float) -> tuple[np.ndarray, np.ndarray, 
     return A, C, b
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("gyro", [None, GYRO], ids=["ideal", "gyro"])
 @pytest.mark.parametrize("sides", [(6, 0), (4, 2), (0, 3)], ids=str)
 def test_filters_are_those_of_equations_in_double_precision(sides, gyro):

@@ -51,6 +51,7 @@ def designs():
     return design
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("side", "taps"), [(3, TAPS_3), (7, TAPS_7)])
 def test_taps_are_those_that_are_known(side, taps, designs):
     for m, values in taps.items():
@@ -59,6 +60,7 @@ def test_taps_are_those_that_are_known(side, taps, designs):
         assert [float(tap) for tap in computed] == pytest.approx(values, rel=2e-14, abs=0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "size",
     [
@@ -76,6 +78,7 @@ def test_levels_are_those_that_are_known(size, designs):
         assert abs(float(designs(*size, m).level) - float(text)) < 10.0**unit
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("size", "gain"),
     [((3, 4), 0.595), ((5, 4), 0.684), ((7, 4), 0.731), pytest.param((9, 7), 0.761, marks=pytest.mark.long)],
@@ -85,6 +88,7 @@ def test_noise_gains_are_those_that_are_known(size, gain, designs):
     assert round(float(sum(tap * tap for tap in taps)) ** 0.5, 3) == gain
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("side", "powers", "m"), [(3, 4, 1), (7, 4, 2), pytest.param(9, 7, 5, marks=pytest.mark.long)]
 )
@@ -134,6 +138,7 @@ def test_without_scipy_the_extra_is_named(monkeypatch):
         minimax.design(Unknowns(Shape(3, 3, 4), 1), BAND)
 
 
+@pytest.mark.long
 def test_the_programme_only_starts_the_exchange(designs, monkeypatch):
     # Another solver, or another machine, leaves other last digits of the programme.
     rng = np.random.default_rng(1)

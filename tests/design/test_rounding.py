@@ -53,6 +53,7 @@ def test_words_hold_the_sum_and_the_first_moment_exactly(name, bits):
         assert max(abs(a - b) for a, b in zip(row, exact, strict=True)) < 100 * unit, m
 
 
+@pytest.mark.long
 def test_no_other_word_of_a_free_tap_has_a_smaller_error():
     # F_1 with sum j F_j = 1/4 exactly, and the second tap nearest to sum j^3 F_j = 3/80 - 1/16, both by hand.
     window, bits = WINDOWS["window-5-5"], 20

@@ -141,6 +141,7 @@ def test_a_fuzzer_that_is_stopped_is_no_proof():
     assert fuzzing.reported("killed\n") == "the fuzzer ends early"
 
 
+@pytest.mark.long
 def test_the_driver_runs_without_a_fuzzer(tmp_path):
     if shutil.which("gcc") is None:
         pytest.skip("gcc is not on this machine")

@@ -46,6 +46,7 @@ def test_the_error_bound_of_the_header_is_proved_and_is_as_small_as_gappas(choic
     assert judged(smaller, tmp_path)[0] == "fails"
 
 
+@pytest.mark.long
 def test_a_bound_of_double_does_not_hold_in_float(tmp_path):
     code = program(choose("euler-product"))
     text = replace(script(code, "float"), goals=script(code, "double").goals)

@@ -50,6 +50,7 @@ def test_the_balls_hold_the_exact_states(algorithm):
             assert ball.rad() < 1e-100
 
 
+@pytest.mark.long
 def test_a_short_run_ends_near_the_balls(short, tmp_path):
     (verdict,) = long_run.million_steps(Subject(choose("euler")), tmp_path)
     assert (verdict.kernel, verdict.claim) == ("euler_rk4_2_w32", "error of a million steps: host")

@@ -110,6 +110,7 @@ def test_words_of_64_bits_have_no_claim(tmp_path):
     assert same_bits.same_bits(Subject(choose("euler-product"), Settings(word=64)), tmp_path) == []
 
 
+@pytest.mark.long
 def test_a_program_can_be_run_again_by_hand(monkeypatch, tmp_path):
     on(monkeypatch, HOST)
     subject = Subject(choose("euler-product"))

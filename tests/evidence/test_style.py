@@ -148,6 +148,7 @@ def test_a_finding_fails_the_claim(monkeypatch, tmp_path):
     assert results["style: floating point", "clang-tidy"] == ("agrees", "")
 
 
+@pytest.mark.long
 def test_no_check_is_left_out_without_need(monkeypatch, tmp_path):
     write_files(tmp_path, with_vectors(choose("euler"), "c-fixed", Settings(16)))
     monkeypatch.setattr(style, "CHECKS", "-*,bugprone-easily-swappable-parameters")

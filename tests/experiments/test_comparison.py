@@ -27,6 +27,7 @@ def increments(rng):
     return rng.uniform(-1, 1, (1, 1, 3)) / 100 + rng.normal(scale=2e-3, size=(60, 2, 3))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "reference", ["exact", *(pytest.param(r, marks=pytest.mark.long) for r in ("numpy", "c-float"))]
 )
@@ -60,6 +61,7 @@ def test_every_back_end_against_every_kind_of_reference(algorithm, reference, in
         assert 0 < by_name["exact"].max_abs_rad < 1e-13
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("carry", ["none", "state", "full"])
 def test_the_bound_counts_the_rounding_of_increments_only_where_there_is_one(increments, carry):
     settings = Settings(largest_angle=strapgen.ir.fixed_settings.Fraction(1, 60), carry=carry)
@@ -150,6 +152,7 @@ def test_a_back_end_is_shown_under_the_name_that_was_asked_for(increments):
     assert [row.backend for row in rows] == ["c-q31", "c-fixed32"]
 
 
+@pytest.mark.long
 def test_slow_back_ends_are_compared_where_they_are_named():
     rows = comparison.compare("euler", "rk1", 1, increments=np.full((2, 1, 3), 0.01))
     assert [row.backend for row in rows] == [name for name, entry in BACKENDS.items() if not entry.slow]

@@ -67,6 +67,7 @@ def test_every_method_has_its_order_with_enough_increments(algorithm, method, co
     assert found.observed == pytest.approx(found.predicted, abs=WITHIN)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("method", "increments", "previous", "order"),
     [

@@ -39,6 +39,7 @@ def one_by_one(samples: int, factor: float, distance: int = 1) -> Products:
     return Products(samples, table, table)
 
 
+@pytest.mark.long
 @each("chosen", DESIGNS)
 def test_a_published_correction_has_no_fault(chosen):
     assert causes.cause(tables(*chosen)) is None

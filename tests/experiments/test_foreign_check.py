@@ -162,6 +162,7 @@ def failed(outcome) -> list[str]:
     return [finding.name for finding in outcome.findings if finding.holds is False]
 
 
+@pytest.mark.long
 def test_the_right_example_holds():
     outcome = check_foreign(example("correct.c"))
     assert (outcome.holds, outcome.cause, failed(outcome)) == (True, None, [])
@@ -199,6 +200,7 @@ def test_there_is_an_example_of_every_fault():
     assert {path.name for path in EXAMPLES.glob("*.c")} == {"correct.c", *FAULTS}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("coefficient", "cause"),
     [

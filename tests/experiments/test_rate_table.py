@@ -24,6 +24,7 @@ def test_both_motions_pass_the_vertical():
         assert max(row.pitch_deg for row in rows if row.motion == motion) > 85
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("backend", ["numpy", "c", pytest.param("c-fixed32", marks=pytest.mark.long)])
 def test_orders_are_in_order(backend):
     """Each order of the thesis is better than the one before, and exponentials have rounding alone."""

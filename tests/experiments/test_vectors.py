@@ -148,6 +148,7 @@ def faults(text: str) -> dict[str, str]:
     return {name: changed for name, changed in result.items() if changed != text}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("fault", ["sign", "limit", "code", "output", "feedback"])
 def test_a_fault_in_the_c_is_seen(fault, tmp_path):
     table = table_of("euler", "c-fixed", SETTINGS)
@@ -175,6 +176,7 @@ def test_strict_compilers_are_silent(compiler, tmp_path):
     assert complaints(compiler, tmp_path, sources) == ""
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("compiler", ["arm-none-eabi-gcc", "riscv64-unknown-elf-gcc"])
 def test_an_emulated_processor_returns_the_very_integers(compiler, tmp_path):
     needed(compiler)
@@ -183,6 +185,7 @@ def test_an_emulated_processor_returns_the_very_integers(compiler, tmp_path):
     assert said(folder, test_of(table), compiler) == (0, "200 passed, 0 failed\n")
 
 
+@pytest.mark.long
 def test_a_processor_with_16_bits_returns_the_very_integers(tmp_path):
     table = table_of("euler", "c-fixed", SETTINGS)
     assert line_of_avr(written(tmp_path, files_of(table)), test_of(table)) == "200 passed, 0 failed"

@@ -25,6 +25,7 @@ def outcomes():
     return [found[case] for case in planned]
 
 
+@pytest.mark.long
 def test_every_combination_is_run(outcomes):
     cases = [outcome.case for outcome in outcomes]
     assert len(set(cases)) == 2 * 3 * 2

@@ -49,9 +49,11 @@ def spied(fixed):
 
 
 def with_words():
-    """Yield every kernel with every word, its rounding in turn: so has its neighbour the other one."""
+    """Yield every kernel with words of 16 and 32 bits and a third one in turn, and the roundings in turn."""
     for row, choice in enumerate(STEPS + OTHERS):
         for column, word in enumerate((8, 16, 24, 32, 64)):
+            if word not in (16, 32, (8, 24, 64)[(row + 2) % 3]):
+                continue
             rounding = ("nearest", "truncation")[(row + column + 1) % 2]
             quick = (word, rounding) in ((32, "nearest"), (16, "truncation"))
             name = f"{choice.kernel}-{word}-{rounding}"
@@ -117,6 +119,7 @@ def test_the_bound_of_a_step_is_near_the_worst_of_many(algorithm, word, rng):
         assert float(bound) <= 1.6 * worst
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("carry", ["none", "state", "full"])
 @pytest.mark.parametrize("rounding", ["nearest", pytest.param("truncation", marks=pytest.mark.long)])
 @pytest.mark.parametrize("word", [12, 32, pytest.param(16, marks=pytest.mark.long)])
@@ -157,6 +160,7 @@ def test_small_increments_keep_the_bound_in_c(angle, rounding, rng):
         np.testing.assert_array_equal(model.propagate(given), made.propagate(given))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("choice", STEPS, ids=lambda choice: choice.kernel)
 def test_no_transition_stretches_more_than_the_bound_says(choice, rng):
     angle = 1 / 40

@@ -240,6 +240,7 @@ def test_c_computes_what_the_model_does(rounding, cases):
     agree()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("case", CASES)
 @settings(max_examples=25, deadline=None)
 @given(data=st.data())
@@ -446,6 +447,7 @@ def near_rotations(evaluator: FixedEvaluator, count: int, size: float) -> np.nda
     return evaluator.integers(evaluator.interface.inputs[0], wrong.reshape(count, 9))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("size", [0.0, 1e-6, 1e-3, 1e-2])
 def test_nearest_rotation(size):
     made = programs()["dcm-orthonormalize-optimal"]
@@ -470,6 +472,7 @@ def test_nearest_rotation(size):
         assert error < 1e-6
 
 
+@pytest.mark.long
 def test_nearest_rotation_refuses_the_same_input_in_c_and_model():
     lowered = quantize(programs()["dcm-orthonormalize-optimal"], Settings(word=32))
     both = ModelEvaluator(emit(lowered, "fixed-model")), CFixedEvaluator(emit(lowered, "c-fixed"))

@@ -47,6 +47,7 @@ def by_intervals(sums: list[Sum], box: dict[str, Interval]) -> Interval:
     return known[f"v_{len(sums) - 1}"]
 
 
+@pytest.mark.long
 @given(chains(), st.fixed_dictionaries(dict.fromkeys(INPUTS, intervals)), st.sampled_from(INPUTS))
 def test_a_part_and_its_halves_have_the_range_that_intervals_give(sums, box, side):
     parts = _Parts(box, [*quantities(sums, box).values()], sums[-1])

@@ -88,6 +88,7 @@ def test_another_scale_breaks_the_bound(rng):
     assert abs(int(computed[0, 0]) * result.unit - other["next"][0]) > result.errors[0]
 
 
+@pytest.mark.long
 @each(
     ("choice", "more"),
     [(EULER, 2), (DCM, 3), (HEUN, 3), (Choice("euler", "rk4", 4), 0), (Choice("dcm", "rk2", 1), 3)],

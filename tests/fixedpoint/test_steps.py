@@ -34,6 +34,7 @@ def exact_step(
     return [known[name] for name in kernel.outputs[0].signal.elements]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("method", "previous"), [*((m, 0) for m in EXPONENTIALS), ("magnus4", 1), ("rk4", 2)]
 )
@@ -110,6 +111,7 @@ def test_minutes_of_a_window_are_the_integers_of_the_model():
     np.testing.assert_array_equal(c, model)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("carry", ["none", "full"])
 @pytest.mark.parametrize("method", ["magnus4", pytest.param("munthe-kaas4", marks=pytest.mark.long)])
 def test_c_gives_the_integers_of_the_model(method, carry, rng):

@@ -257,6 +257,7 @@ def in_accepted_calls(walk, name: str, known: dict[str, Known], exact) -> tuple[
     return error, largest
 
 
+@pytest.mark.long
 def test_what_passes_the_check_of_a_sum_of_squares_has_the_error_of_smaller_factors():
     """An element of 15/4 is possible, but with squares of 4 together none above 2 is accepted."""
     known = {name: Known(2, -15, 15, Fraction(1, 50)) for name in "ab"} | {

@@ -22,6 +22,7 @@ def fixed(**settings):
     return functions(FILTERS, kernels(FILTERS, "euler"), "c-fixed", Settings(**settings))
 
 
+@pytest.mark.long
 def test_rounded_filters_hold_their_first_two_conditions_exactly():
     (_, rotation, _), integers, _ = fixed()
     formats = {argument.signal.name: argument.format.fraction for argument in interface_of(rotation).inputs}
@@ -59,6 +60,7 @@ def test_restoring_filters_leave_a_constant_rate_as_it_is():
     assert merged[lost_samples.REACH] != 0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("angle", [Fraction(1, 100), Fraction(1, 7), Fraction(1, 4)])
 def test_formats_fit_together_and_sums_have_room(angle):
     (step, rotation, normalization), integers, _ = fixed(largest_angle=angle, carry="full")

@@ -23,6 +23,7 @@ GYRO = replace(WINDOW, gyro=GyroResponse(Fraction(40), Fraction(7, 10), Fraction
 UNITS = [(a, t) for a in NORMALIZATIONS for t in TARGETS]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("algorithm", "target"), UNITS)
 def test_files_are_narrow_plain_text_that_says_its_command(algorithm, target):
     unit = sources(WINDOW, algorithm, target)
@@ -46,6 +47,7 @@ def test_files_are_narrow_plain_text_that_says_its_command(algorithm, target):
     assert sources(WINDOW, algorithm, target).files == unit.files
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("algorithm", "target"), UNITS)
 @pytest.mark.parametrize(
     "compiler",

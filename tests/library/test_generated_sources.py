@@ -7,6 +7,7 @@ import sys
 
 import strapgen
 from strapgen import catalogue, pipeline
+from strapgen.ir.fixed_settings import Settings
 from strapgen.library import generated_sources
 from strapgen.support import cache
 
@@ -63,3 +64,21 @@ def test_another_target_and_other_settings_derive_nothing_again(monkeypatch, tmp
         wanted, "c-fixed", settings
     )
     assert generated_sources.program(choice) == wanted
+
+
+def test_the_integer_model_takes_the_integers_of_the_c(monkeypatch, tmp_path):
+    monkeypatch.setenv("STRAPGEN_CACHE_DIR", str(tmp_path))
+    choice = catalogue.choose("euler-normalize")
+    compiled = generated_sources.sources(choice, "c-fixed", Settings())
+
+    def never(*_):
+        raise AssertionError("quantized again")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(pipeline, "quantize", never)
+        model = generated_sources.sources(choice, "fixed-model", Settings())
+    assert model.fixed == compiled.fixed
+    others = Settings(word=16)
+    assert generated_sources.fixed_program(choice, others) == pipeline.quantize(
+        generated_sources.program(choice), others
+    )

@@ -67,6 +67,7 @@ def test_checked_in_tree_is_in_step():
     assert standard_tree.difference(resources.folder("generated"), files()) == ""
 
 
+@pytest.mark.long
 def test_tree_holds_every_kernel_for_every_target():
     names = [program.name for program in programs().values()]
     assert [program.kernel for program in programs().values()] == [
@@ -108,6 +109,7 @@ def test_readme_lists_the_operations():
 # Holding it against a folder
 
 
+@pytest.mark.long
 def test_check_of_a_tree_in_step(folder, capsys):
     status, out, err = command(capsys, *CHECK, str(folder))
     assert (status, err) == (0, "")
@@ -209,6 +211,7 @@ def test_writing_rebuilds_what_is_out_of_step(folder, capsys):
     assert contents(folder) == few()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["stray.txt", "c_old/euler_rk4_2.c", "c/stray.c"])
 def test_check_tells_a_file_that_should_not_be_there(folder, capsys, name):
     (folder / name).parent.mkdir(exist_ok=True)
@@ -307,6 +310,7 @@ def test_drafts_of_earlier_versions_are_removed(folder, name, is_whole):
     assert contents(folder) == few()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "name", ["c/.euler_rk4_2.c-0a1b2c3", "c/.mine.c-0a1b2c3d", ".notes-0a1b2c3d", "c/.x"]
 )

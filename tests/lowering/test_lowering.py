@@ -122,6 +122,7 @@ def expand_precisely(made: Kernel, values: dict[str, Fraction]) -> list:
     return [known[name] for stage in made.outputs for name in stage.signal.elements]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("choice", OTHER, ids=lambda choice: choice.kernel)
 def test_a_program_agrees_with_its_kernel_to_forty_digits(choice):
     random = Random(1969)
@@ -161,6 +162,7 @@ def every_candidate(choice: Choice) -> list[Program]:
     return list(candidates(rational, canonical.extract_core(rational)))
 
 
+@pytest.mark.long
 @EVERY
 def test_passes_leave_the_values(choice):
     # On random exact rationals: equal where a kernel has no roots or functions, else to forty digits.

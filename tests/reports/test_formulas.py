@@ -29,6 +29,7 @@ def stages(kernel):
     return (*kernel.stages, *kernel.outputs)
 
 
+@pytest.mark.long
 def test_text_has_every_formula(kernel):
     lines = formulas.as_text(kernel).splitlines()
     assert lines[0] == kernel.title
@@ -64,6 +65,7 @@ def test_latex_names():
     )
 
 
+@pytest.mark.long
 def test_data_reads_back(kernel):
     program = derived.programs()[kernel.name]
     data = json.loads(json.dumps(formulas.as_data(kernel, program), allow_nan=False))

@@ -306,6 +306,7 @@ def test_rate_table_has_a_panel_a_motion_and_tells_what_is_out_of_range(figures)
     assert "70 deg/s" in figure.get_suptitle()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "head"),
     [
@@ -320,6 +321,7 @@ def test_image_is_of_the_kind_that_the_ending_says(name, head):
     assert drawing.image(figure, name).startswith(head)
 
 
+@pytest.mark.long
 def test_a_run_is_drawn_into_a_file_in_a_new_folder(run, tmp_path):
     path = plots.plot_run(run, "A title", tmp_path / "new" / "run.png")
     assert path == tmp_path / "new" / "run.png"

@@ -223,6 +223,7 @@ def bodies(draw):
     return body, names[-1]
 
 
+@pytest.mark.long
 @settings(max_examples=60)
 @given(made=bodies(), number=st.sampled_from(["double", "float"]), scale=st.integers(-6, 2))
 def test_no_program_rounds_by_more_than_its_bound(made, number, scale):
@@ -234,6 +235,7 @@ def test_no_program_rounds_by_more_than_its_bound(made, number, scale):
     assert measured(code, values, number) <= bound(code, number)
 
 
+@pytest.mark.long
 @settings(max_examples=60)
 @given(made=bodies(), parts=st.lists(st.tuples(*2 * [st.integers(-64, 64)]), min_size=10, max_size=10))
 def test_no_program_rounds_by_more_than_its_bound_in_four_bits(made, parts):

@@ -36,6 +36,7 @@ def still(count: int, velocity=(0.0, 0.0, 0.0)) -> InertialRecording:
     return InertialRecording(0.0, 0.01, np.zeros((count, 3)), np.tile(velocity, (count, 1)))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("sculling", [1, 2])
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
 def test_a_wobble_on_one_spot(algorithm, sculling, backend_name, wobble):

@@ -35,6 +35,7 @@ DRIFTS = {
 FLOOR = 1e-8
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "settings"), DRIFTS, ids=[f"{n} {s}" for n, s in DRIFTS])
 @pytest.mark.parametrize("method", ALGORITHMS)
 def test_known_algorithms_drift_as_tabulated(method, name, settings):

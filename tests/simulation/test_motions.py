@@ -21,6 +21,7 @@ MOTIONS = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", MOTIONS)
 def test_increments_integrate_the_rate(name):
     motion = strapgen.motion(name, **MOTIONS[name])
@@ -33,6 +34,7 @@ def test_increments_integrate_the_rate(name):
             assert increment[axis] == pytest.approx(integral, abs=error + 1e-15)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("count", "previous"), [(1, 1), (1, 3), (2, 2), (3, 1)])
 @pytest.mark.parametrize("name", MOTIONS)
 def test_increments_before_the_start_are_those_of_the_motion_before_it(name, count, previous):
@@ -62,6 +64,7 @@ def test_previous_increments_raise_the_order_of_a_slow_gyro():
     assert orders == pytest.approx([2, 3, 4], abs=0.2)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", MOTIONS)
 def test_a_fine_run_meets_the_truth(name, backend_name):
     motion = strapgen.motion(name, **MOTIONS[name])

@@ -64,6 +64,7 @@ def test_the_great_circle_begins_as_the_table_says():
     np.testing.assert_allclose(velocity, [-55.31128980, 490.2684436, 0], rtol=0, atol=5e-8)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("azimuth", ["wander", "free"])
 def test_the_error_on_a_great_circle_falls_with_the_square_of_the_cycle(azimuth):
     # Two cycles as long as these show the order; without its term of second order the result is the closed form.
@@ -133,6 +134,7 @@ def test_the_equations_hold_to_the_last_digit(azimuth, inclination):
     assert abs(np.mod(end["heading"], 360) - heading) < 1e-9
 
 
+@pytest.mark.long
 def test_a_turn_of_constant_radius_comes_round(rng):
     # A small circle of 20 km about an axis fixed to the earth, in 300 s: 419 m/s and 0.9 g. In earth-fixed axes the
     # body turns about that axis alone; inertial axes turn against them by the earth rate.

@@ -7,7 +7,6 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from scipy import signal
 from scipy.integrate import quad
 
 import strapgen
@@ -28,6 +27,7 @@ def motion(name: str) -> strapgen.Motion:
     return strapgen.motion(kind, **settings)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("first", [-3, 299, 420])
 @pytest.mark.parametrize("name", MOTIONS)
 def test_increments_integrate_the_rate(name, first):
@@ -108,6 +108,8 @@ def test_a_vibration_has_its_angle_and_y_comes_a_quarter_period_after_x():
 
 def test_a_gyro_passes_on_what_a_butterworth_filter_does():
     profile = rate_profiles.vibration_rate(0.003, math.inf)
+    from scipy import signal  # which takes longer to load than all that is collected here
+
     b, a = signal.butter(2, 2 * math.pi * 40, analog=True)
     _, response = signal.freqs(b, a, profile.frequencies[0])
     filtered = profile.filtered(2 * math.pi * 40)

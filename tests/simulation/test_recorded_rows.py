@@ -117,6 +117,7 @@ def test_memory_does_not_grow_with_the_file(read, on_disk, tmp_path):
     assert peaks[1] - peaks[0] < 20_000, peaks
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("read", READERS.values(), ids=READERS)
 def test_a_recording_on_the_disk_has_the_bits_of_one_in_memory(read, tmp_path, request):
     path = long_file(tmp_path / "gyro.csv", 5_000)

@@ -83,6 +83,7 @@ def loaded(name: str) -> Recording:
     return read_rates(DATA / name, "deg/s", 100 if name == "rates_uneven.csv" else None)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["increments.csv", "rates_even.csv", "rates_uneven.csv"])
 def test_recordings_lead_to_the_true_attitude(name, make):
     backend = make("euler", largest=0.01, carry="full")
@@ -303,6 +304,7 @@ def samples(draw: st.DrawFn) -> tuple[np.ndarray, np.ndarray]:
     return time, np.array(values)
 
 
+@pytest.mark.long
 @given(samples(), st.floats(20, 1500))
 @settings(max_examples=25, deadline=None)
 def test_resampling_integrates_a_piecewise_linear_rate_exactly(tmp_path_factory, sampled, hertz):
@@ -387,6 +389,7 @@ def test_records_and_orthonormalization_are_counted_in_steps(make, even):
     np.testing.assert_array_equal(history.time, 10 + 0.75 * np.arange(5))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("increments", "unused"),
     [(1, 0), (5, 4), pytest.param(7, 3, marks=pytest.mark.long)],
@@ -398,6 +401,7 @@ def test_increments_that_make_no_whole_step_are_told(increments, unused, even):
     assert len(history.time) == 1 + 24 // increments
 
 
+@pytest.mark.long
 def test_recording_shorter_than_a_step(even):
     short = Recording(even.start, even.interval, even.increments[:3])
     with pytest.raises(InputError, match=r"^the recording holds 3 increments; a step needs 4$"):
@@ -447,6 +451,7 @@ def test_units_have_their_factors():
 # Steps that keep increments
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("count", "previous"),
     [(1, 1), (1, 3), (2, 2), pytest.param(5, 3, marks=pytest.mark.long)],

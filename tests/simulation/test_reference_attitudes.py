@@ -25,6 +25,7 @@ def test_a_cone_meets_its_closed_form_at_any_time():
     np.testing.assert_array_equal(reference(times.reshape(2, 4))[1, 2], reference(7.0))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "profile",
     [

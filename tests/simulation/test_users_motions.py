@@ -90,6 +90,7 @@ def written(folder: Path, text: str, name: str = "mine.py") -> str:
     return str(file)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", THESIS)
 def test_the_motions_of_the_thesis_as_a_user_writes_them(name, tmp_path):
     text, settings = THESIS[name]

@@ -52,6 +52,7 @@ def test_what_is_beyond_bounds_is_refused_in_one_line(text, said, block, tmp_pat
     assert str(refusal.value) == said.format(path=path)
 
 
+@pytest.mark.long
 def test_a_line_without_an_end_is_not_read_to_its_end():
     """The device never ends a line, nor itself."""
     with pytest.raises(InputError, match="line 1: over 20000 characters"):

@@ -130,6 +130,7 @@ def test_passes_in_exact_arithmetic_and_in_the_model_say_the_same(description, i
         assert (values == model[name]).all()
 
 
+@pytest.mark.long
 def test_a_bound_counts_every_stage_that_comes_before(description):
     fit = fitted(description, "c-fixed", Settings())
     errors = bounds(fit).errors

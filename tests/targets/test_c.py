@@ -115,6 +115,7 @@ def objects(folder: Path) -> Path:
     return session_library.folder("test-objects", [*command, version], fill)
 
 
+@pytest.mark.long
 def test_objects_have_no_state_of_their_own(objects):
     needed("nm")
     files = sorted(objects.glob("*.o"))

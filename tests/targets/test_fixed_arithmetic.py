@@ -79,6 +79,7 @@ def signed(word: int, least: int | None = None) -> st.SearchStrategy[int]:
     return near | st.integers(-top if least is None else least, top - 1)
 
 
+@pytest.mark.long
 @given(data=st.data())
 def test_a_product_is_exact(arithmetic, data):
     a, b = (data.draw(signed(arithmetic.word)) for _ in range(2))

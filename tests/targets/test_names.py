@@ -7,6 +7,7 @@ import re
 import subprocess
 from dataclasses import replace
 from fractions import Fraction
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import NamedTuple
@@ -140,12 +141,20 @@ def printed_names() -> list[str]:
     return sorted(name for name in found if name.isidentifier())
 
 
-POOL = sorted({*KEYWORDS, *MACROS, *FUNCTIONS, *ODD, *DERIVED, *LETTERS, *printed_names()} - {"resolution"})
-KERNELS = sorted(
-    name
-    for word in {*POOL, *sorted(c_library.LIBRARY)[::7]}
-    if re.fullmatch(admission._NAME, name := word.replace("_", "-"))
-)
+@cache
+def pool() -> list[str]:
+    """Return the names that are tried."""
+    return sorted(
+        {*KEYWORDS, *MACROS, *FUNCTIONS, *ODD, *DERIVED, *LETTERS, *printed_names()} - {"resolution"}
+    )
+
+
+@cache
+def kernel_names() -> list[str]:
+    """Return the names of kernels that are tried."""
+    words = {*pool(), *sorted(c_library.LIBRARY)[::7]}
+    return sorted(name for word in words if re.fullmatch(admission._NAME, name := word.replace("_", "-")))
+
 
 START = np.array([0.3, -0.2, 0.25])
 INCREMENTS = np.random.default_rng(7).uniform(-0.1, 0.1, (STEPS, 3))
@@ -289,11 +298,11 @@ def check_c(folder: Path, steps: list[Lowered], models: list[np.ndarray]) -> Non
 @st.composite
 def calls(draw: st.DrawFn) -> list[Names]:
     """Draw names for several kernels, which are called differently."""
-    kernels = draw(st.lists(st.sampled_from(KERNELS), min_size=5, max_size=5, unique=True))
+    kernels = draw(st.lists(st.sampled_from(kernel_names()), min_size=5, max_size=5, unique=True))
     result = []
     for kernel in kernels:
-        elements = draw(st.lists(st.sampled_from(POOL), min_size=16, max_size=16, unique=True))
-        stage, output = (draw(st.sampled_from(POOL)) for _ in range(2))
+        elements = draw(st.lists(st.sampled_from(pool()), min_size=16, max_size=16, unique=True))
+        stage, output = (draw(st.sampled_from(pool())) for _ in range(2))
         result.append(
             Names(kernel, stage, "after" if output in ("state", "increments") else output, tuple(elements))
         )

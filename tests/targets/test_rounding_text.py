@@ -32,6 +32,7 @@ def test_every_header_has_a_line_on_rounding_beside_the_operations(target):
         assert f"Rounding: {expected}." in head, name
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("number", ["double", "float"])
 def test_the_text_says_no_less_than_what_is_proved(number):
     for name in programs():

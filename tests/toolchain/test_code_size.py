@@ -16,6 +16,7 @@ def empty_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("STRAPGEN_CACHE_DIR", str(tmp_path / "cache"))
 
 
+@pytest.mark.long
 def test_the_cache_keeps_the_size_of_each_code(monkeypatch):
     small, large = (
         pipeline.generate(pipeline.lower(pipeline.derive(kernel)), "c")

@@ -133,6 +133,7 @@ def test_generation_works_without_a_compiler(without_compiler, tmp_path, capsys)
     assert (tmp_path / "out" / "euler_rk4_2.c").is_file()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("backend", ["c", "c-float"])
 def test_command_line_without_a_compiler(backend, without_compiler, capsys):
     with pytest.raises(SystemExit) as stop:

@@ -99,6 +99,7 @@ def test_both_loops_have_equations_75_and_79_and_the_term_in_the_slow_cycle():
 # Other derivations of the same
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("form", coning_coefficients.FORMS)
 @pytest.mark.parametrize(("samples", "previous"), [(1, 0), (1, 2), (2, 0), (3, 1), (5, 0)])
 def test_coning_coefficients_leave_their_residual(form, samples, previous):
@@ -111,6 +112,7 @@ def test_coning_coefficients_leave_their_residual(form, samples, previous):
     assert sp.expand(found.expression("error").subs(cone, simultaneous=True) - residual) == 0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "options",
     [("coning-compressed", 3), pytest.param(("coning-combined", 3, False, 1), marks=pytest.mark.long)],
@@ -232,6 +234,7 @@ def test_steps_drift_as_the_closed_form_says(options, periods, phase):
     assert off[1][0] < off[0][0] / 3.5 + off[1][1]
 
 
+@pytest.mark.long
 @settings(max_examples=10, deadline=None)
 @given(
     st.sampled_from(
@@ -351,6 +354,7 @@ def test_all_loops_together_have_the_errors_of_the_recursions():
         assert rates.error == pytest.approx(in_part.error, rel=1e-12)
 
 
+@pytest.mark.long
 def test_steps_gain_velocity_as_the_closed_form_says():
     """The sculling term of a step with its rotation compensation, turned by the attitude at its beginning."""
     options = ("coning-uncompressed", 3)
@@ -451,6 +455,7 @@ def test_frequencies_of_which_every_step_sees_the_same():
     assert rates.computed == 0 and rates.error == -rates.continuous
 
 
+@pytest.mark.long
 def test_rates_and_factors_agree():
     """The factors, in double or where terms cancel in more digits, are those of the closed form."""
     for options in (("euler", "rk4", 2), ("dcm", "coning-combined", 5)):

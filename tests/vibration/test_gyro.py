@@ -94,6 +94,7 @@ def test_the_rates_are_those_of_the_drift_on_coning():
         assert rates.error == pytest.approx(float(error) * 100, rel=1e-12)
 
 
+@pytest.mark.long
 def test_a_wide_gyro_changes_nothing_and_sculling_turns_with_the_lag():
     choice = choose("euler", "rk4", 2)
     wave = {"theta_x": 0.01, "theta_y": 0.02, "phase": 1.1, "acceleration_y": 3}

@@ -75,6 +75,7 @@ def recursion_26(omega):
     return (1 + (1 - np.cos(omega * FAST)) / 3) * fast(omega)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "quantity", "moved", "algorithm"),
     [
@@ -97,6 +98,7 @@ def test_equations_68_74_77_78_82_and_83(name, quantity, moved, algorithm):
     assert max(found.quadrature) < 1e-9 * abs(found.rates.continuous)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("quantity", ["drift", "sculling"])
 def test_a_narrow_band_is_one_frequency(quantity):
     """A band of width w and density c^2/2w around f is an oscillation of amplitude c."""
@@ -251,6 +253,7 @@ def sculling_of_one(f, moved, phases):
     return ways[0] - ways[1]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "quantity", "one", "step", "cycles", "made", "less"),
     [

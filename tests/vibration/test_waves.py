@@ -28,6 +28,7 @@ def value(wave, angles=(0.37, 1.234)):
     return total / (z - 1) ** wave.poles
 
 
+@pytest.mark.long
 @given(waves, waves, coefficients)
 def test_waves_are_complex_numbers(left, right, factor):
     left, right = left.summed(), right.summed().summed()
@@ -40,6 +41,7 @@ def test_waves_are_complex_numbers(left, right, factor):
     assert value(left.summed()) == near(value(left) / (z - 1), abs=1e-9)
 
 
+@pytest.mark.long
 @given(waves)
 def test_what_is_a_difference_is_summed_without_poles(wave):
     difference = wave.shifted(CYCLE) + wave.scaled(-1)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
-from strapgen import catalogue, fixedpoint, pipeline
+from strapgen import catalogue, fixedpoint
 from strapgen.catalogue import Choice
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.integer_program import FixedProgram
@@ -44,7 +44,7 @@ class Subject:
     @cached_property
     def fixed(self) -> FixedProgram:
         """The program in integers, from which the C is printed."""
-        return pipeline.quantize(self.program, self.settings)
+        return generated_sources.fixed_program(self.choice, self.settings)
 
     @cached_property
     def sources(self) -> Sources:

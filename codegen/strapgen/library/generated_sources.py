@@ -1,8 +1,8 @@
-"""Returns the program and the generated sources of a choice, from the cache or, if they are new, from `pipeline`.
+"""Returns the programs and the generated sources of a choice, from the cache or, if they are new, from `pipeline`.
 
 The key of an entry is the choice with the generator itself, its code and templates: after a change of either, entries
 are generated again, and what runs agrees with the derivation. A second use loads neither SymPy nor Jinja; another
-target or other settings of the same kernel derive nothing again.
+target or other settings of the same kernel derive nothing again, and the integer model has the integers of the C.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from pathlib import Path
 from strapgen import pipeline, targets
 from strapgen.catalogue import Choice
 from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.integer_program import FixedProgram
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
 from strapgen.support import cache
@@ -56,6 +57,49 @@ def program(choice: Choice) -> Program:
     return _programs[key]
 
 
+def fixed_program(choice: Choice, settings: Settings | None = None) -> FixedProgram:
+    """Return a kernel in fixed point, quantized once for all targets.
+
+    Parameters
+    ----------
+    choice : Choice
+        What `strapgen.catalogue.choose` returned.
+    settings : Settings, optional
+        Word, ranges and rounding; by default 32 bits and 1/8 rad.
+
+    Returns
+    -------
+    FixedProgram
+
+    Raises
+    ------
+    InputError
+        If the kernel has no fixed point with these settings, see `strapgen.quantize`.
+
+    Examples
+    --------
+    >>> from strapgen.catalogue import choose
+    >>> str(fixed_program(choose("euler")).formats["state"])
+    'Q1.30'
+    """
+    settings = settings or Settings()
+
+    def fill(draft: Path) -> None:
+        (draft / "fixed.pickle").write_bytes(pickle.dumps(pipeline.quantize(program(choice), settings)))
+
+    def read() -> bytes:
+        place = cache.entry("fixed-programs", key, fill, f"integers of {choice.kernel}")
+        return cache.read(place, "fixed.pickle")
+
+    key = cache.digest([cache.generator_digest(), choice.identity, _text(settings)])
+    fixed: FixedProgram = pickle.loads(cache.persistently(read))
+    return fixed
+
+
+def _text(settings: Settings) -> str:
+    return json.dumps(settings.as_dict(), sort_keys=True)
+
+
 def sources(
     choice: Choice, target: str, settings: Settings | None = None, naming: Naming = UNNAMED
 ) -> Sources:
@@ -83,12 +127,18 @@ def sources(
     """
 
     def fill(draft: Path) -> None:
-        compiled = pipeline.compile(choice, target, settings, lambda chosen: naming.of(program(chosen)))
+        compiled = pipeline.compile(
+            choice,
+            target,
+            settings,
+            lambda chosen: naming.of(program(chosen)),
+            None if naming.option else fixed_program,
+        )
         for name, text in compiled.files.items():
             (draft / name).write_text(text)
         (draft / "interface.json").write_text(json.dumps(compiled.interface()))
 
-    stated = json.dumps(settings.as_dict(), sort_keys=True) if settings else ""
+    stated = _text(settings) if settings else ""
     targets.require(target, settings)
     if naming.option and not targets.TARGETS[target].compiled:
         raise InputError(f"{naming.option} goes with targets in C, not with {target}")

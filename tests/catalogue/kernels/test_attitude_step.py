@@ -126,6 +126,7 @@ def test_an_order_in_words(order, text, limited):
     assert (str(order), order.limited) == (text, limited)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("method", "count", "previous", "expected"),
     [
@@ -156,6 +157,7 @@ def test_a_sixth_order_method_on_three_increments_is_told_to_be_of_fourth():
     )
 
 
+@pytest.mark.long
 @ALGORITHM
 def test_a_note_says_where_samples_limit_the_order_and_only_there(algorithm):
     limited = derive(algorithm, "butcher6", 3)
@@ -234,6 +236,7 @@ def values_of(kernel: Kernel, state: list, samples: list) -> dict[str, object]:
     )
 
 
+@pytest.mark.long
 @each(
     ("method", "count", "previous"),
     [("rk4", 1, 1), ("rk2", 1, 3), ("nystrom5", 2, 1), ("rk4", 3, 2), ("rk2", 8, 3)],
@@ -281,6 +284,7 @@ def test_with_previous_increments_a_step_is_that_of_the_rates_they_fit(algorithm
     assert found == from_rates.expand(values_of(from_rates, state, turns))["next"]
 
 
+@pytest.mark.long
 @ALGORITHM
 def test_previous_increments_are_of_use_only_where_the_rate_changes(algorithm):
     # On a rate of degree K - 1 the step without them is the same step.

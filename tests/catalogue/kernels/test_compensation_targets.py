@@ -68,6 +68,7 @@ def test_no_error_exceeds_its_bound(name, word, rng):
     assert worst > 0.02, "the bound is of the size of the errors"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("word", [16, 32])
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=() if name in SOME else pytest.mark.long) for name in NAMES]
@@ -82,6 +83,7 @@ def test_c_gives_the_integers_of_the_model(name, word, rng):
     np.testing.assert_array_equal(left, remaining)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("backend", ["c", pytest.param("c-float", marks=pytest.mark.long)])
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=() if name in SOME else pytest.mark.long) for name in NAMES]

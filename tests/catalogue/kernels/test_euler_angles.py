@@ -170,6 +170,7 @@ def test_nothing_jumps_on_the_way_to_vertical_pitch(roll, heading, sign, backend
         before, last, last_pitch = angles, bound, pitch
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("sign", [1, -1])
 def test_the_attitude_is_continuous_through_vertical_pitch(sign, backend_name):
     # A loop: pitch passes 90 degrees, roll and heading turn over by half a turn there, the attitude does not.
@@ -205,6 +206,7 @@ def test_elements_beyond_one_do_no_harm():
     assert angles[1] == np.pi / 2
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("roll", "pitch", "heading"), [(2, 1, -2), (-1, -1, 3), (3, 0, 2), (0, 2, 3), (4, -2, -5), (6, 1, 6)]
 )

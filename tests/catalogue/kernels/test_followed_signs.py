@@ -107,6 +107,7 @@ def test_zero_counts_as_plus():
         assert made[3] > 0 or made[2] > 0
 
 
+@pytest.mark.long
 def test_a_slow_turn_keeps_its_sign_over_two_turns(backend_name):
     angles = np.linspace(0, 4 * np.pi, 200)
     axis = np.array([2, -1, 2]) / 3

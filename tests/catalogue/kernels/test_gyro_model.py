@@ -98,6 +98,7 @@ def test_products_are_related_through_the_unbalance():
         assert sp.simplify(forms[symbol(one)] - sign * forms[symbol(other)] / B) == 0
 
 
+@pytest.mark.long
 def test_the_torques_are_turned_with_a_gyro_that_is_turned_about_its_spin():
     # With the sign of (4.2) as the scans print it this fails: the anisoelastic torques must turn with the gyro.
     angle = symbol("angle")
@@ -125,6 +126,7 @@ def test_the_products_have_the_order_of_the_source():
     assert list(TERMS["rate products"]) == [y * z, z * x, x * y]
 
 
+@pytest.mark.long
 def test_another_layout_has_another_structure():
     # Without errors of gyro 2 to 45 degrees: the torquers of all gyros turned by it.
     turned = [gyro.turned(sp.pi / 4) for gyro in diagonal_layout()]

@@ -81,6 +81,7 @@ def test_two_passes_give_the_numbers_of_the_example():
             assert abs(value - sp.Rational(text)) <= sp.Rational(1, 2) * sp.Rational(10) ** -14
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", RESULTS)
 def test_every_back_end_gives_the_numbers_of_the_example(name, backend_name):
     evaluator = strapgen.evaluator(name, backend_name)
@@ -117,6 +118,7 @@ def residuals(scale, passes):
     ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("passes", "order"), [(1, 2), (2, 3)])
 def test_what_is_left_is_of_second_order_in_the_coefficients_and_of_third_after_two_passes(passes, order):
     full, half = residuals(Fraction(1), passes), residuals(Fraction(1, 2), passes)
@@ -194,6 +196,7 @@ def missed(scale, passes, seed, ramp=0.0):
 SEEDS = range(3)
 
 
+@pytest.mark.long
 def test_a_unit_without_errors_needs_no_compensation():
     for seed in SEEDS:
         assert np.abs(missed(0, 1, seed)).max() < 1e-13
@@ -208,6 +211,7 @@ def test_the_errors_of_a_unit_integrated_in_numpy_are_compensated_to_second_orde
         assert np.all(np.linalg.norm(again, axis=1) < 0.5 * np.linalg.norm(full, axis=1))
 
 
+@pytest.mark.long
 def test_a_ramp_within_the_cycle_leaves_what_products_of_means_miss():
     # The mean of a product of two ramps exceeds the product of means by a twelfth of the product of their changes:
     # for changes of the rate of 2 rad/s and of the acceleration of 30 m/s^2 at most, times J and D, E, thrice each.
@@ -222,6 +226,7 @@ def test_a_ramp_within_the_cycle_leaves_what_products_of_means_miss():
 # Constants in place of inputs
 
 
+@pytest.mark.long
 def test_constants_take_the_place_of_inputs():
     names = {s.name: value for s in source_structure().forms for value in [Fraction(1, 10**5)]}
     kernel = imu_compensate(constants={**names, "cycle": Fraction(1, 50)})

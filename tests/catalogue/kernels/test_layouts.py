@@ -52,6 +52,7 @@ def rows(name: str) -> np.ndarray:
     return np.array(lines)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=() if name == "turned" else pytest.mark.long) for name in NAMES]
 )
@@ -82,6 +83,7 @@ def test_the_diagonal_file_gives_the_kernels_that_are_built_in():
         assert described.expand() == built_in.expand()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["turned", pytest.param("skewed", marks=pytest.mark.long)])
 def test_the_torques_of_a_motion_are_separated_again(name):
     first, second = (kernel(choose(what, layout=layout(name))) for what in ("torques", "separate"))
@@ -93,6 +95,7 @@ def test_the_torques_of_a_motion_are_separated_again(name):
         assert sp.simplify(output - sp.Symbol(symbol, real=True)) == 0
 
 
+@pytest.mark.long
 def test_the_notes_state_determinant_and_gains_with_the_rule_of_the_source():
     # Maximise |B2 - B3|: the gain of the acceleration along x is sqrt(2)/|B2 - B3|.
     notes = " ".join(kernel(choose("separate", layout=layout("turned"))).notes)

@@ -10,6 +10,7 @@ from strapgen.catalogue.methods.late_filters import LateFilters
 from strapgen.catalogue.methods.windows import WINDOWS
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["dcm", "euler"])
 @pytest.mark.parametrize("previous", [0, 3, 5, 6])
 def test_filters_before_it_give_the_step_of_each_window_of_a_family(name, previous):
@@ -26,6 +27,7 @@ def test_filters_before_it_give_the_step_of_each_window_of_a_family(name, previo
     np.testing.assert_allclose(ours, theirs, rtol=0, atol=3e-15)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("degree", [1, 2, 3])
 def test_without_the_highest_coefficients_it_is_that_of_a_lower_degree(degree):
     rows = np.random.default_rng(degree).uniform(-0.1, 0.1, (degree + 1, 3))

@@ -98,6 +98,7 @@ def reduced_truth(name: str) -> tuple[sp.Matrix, sp.Matrix]:
     return rate, with_norm(open_sinc(attitude), SQUARED_NORM[name], S)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", SQUARED_NORM)
 def test_the_attitude_turns_with_the_rate_about_three_axes(name):
     # dC/dt = C skew(w), for parameters of either sign.
@@ -143,6 +144,7 @@ def test_the_constant_truth_is_the_printed_form():
     assert vanishes(difference, relations | {S: SQUARED_NORM["constant"]})
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("sign", [1, -1])
 def test_the_coning_truth_is_the_printed_form(sign):
     # With -a sin bt in the rate: W = skew((0, g - b, a)) and R(t) with bt negated.
@@ -184,6 +186,7 @@ def expanded(expression: sp.Expr) -> sp.Expr:
     return expression.replace(lambda e: e.func in (sp.sin, sp.cos), lambda e: e.func(sp.expand(e.args[0])))
 
 
+@pytest.mark.long
 @MOTION
 def test_increments_grow_by_the_rate_at_their_end(name):
     start, end = sp.symbols("t0 t1", real=True)
@@ -197,6 +200,7 @@ def test_increments_of_no_time_are_zero(name):
     assert increment(name, T, T, *PARAMETERS[name]) == sp.zeros(3, 1)
 
 
+@pytest.mark.long
 def test_the_coning_increments_are_the_printed_ones():
     start, end = sp.symbols("t0 t1", real=True)
     printed = sp.Matrix(

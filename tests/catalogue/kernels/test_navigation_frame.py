@@ -69,6 +69,7 @@ def test_gravity_of_the_sphere_is_gravitation_and_centrifugal_acceleration_once(
     )
 
 
+@pytest.mark.long
 def test_the_equations_are_newtons_in_inertial_axes():
     # In axes n: V = v + W x r, and the inertial acceleration is dV/dt + (W + rho) x V, with dW/dt = -rho x W and
     # dr/dt = v - rho x r = (0, 0, v_z) over the sphere. It is specific force and gravitation.

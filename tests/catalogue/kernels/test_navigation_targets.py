@@ -58,6 +58,7 @@ def test_no_error_exceeds_its_bound(name, word, rng):
     assert share is not None and share > 0.02, "the bound is of the size of the errors"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "word"),
     [

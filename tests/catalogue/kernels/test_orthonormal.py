@@ -82,6 +82,7 @@ def test_the_scheme_of_the_thesis():
     assert difference.applyfunc(sp.radsimp) == sp.zeros(3, 3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", [SCHEME, OPTIMAL, *EXPANSIONS.values()])
 def test_a_rotation_is_left_alone(name):
     if name == OPTIMAL:  # atan2(0, 0) at equal singular values has a value in floating point only
@@ -161,6 +162,7 @@ def test_the_identity_behind_the_nearest_rotation():
     assert np.all(U @ (G + identity * i2) == G * i1 + identity * i3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "stretch",
     [

@@ -118,6 +118,7 @@ def test_all_targets_compute_the_same(name, rng):
     assert sources_of_program(program(Choice(name)), "numpy", None).function.name == name.replace("-", "_")
 
 
+@pytest.mark.long
 def test_the_filter_is_the_bilinear_transform_and_no_cycle_lengthens_its_state():
     K, k, z, x, s1, s2 = sp.symbols("K k z x s1 s2", positive=True)
     n = 1 + k * K + K**2  # k = sqrt(2) in what follows; the identities hold for any

@@ -34,6 +34,7 @@ def test_the_numbers(acceleration, raw, dk1, out, miss):
     assert abs(exact - acceleration * T) <= 1e-15
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("positive", [True, False])
 def test_what_the_compensation_leaves_is_the_stated_property(positive):
     count, cycle, bias, offset, scale, plus, minus = SYMBOLS
@@ -80,6 +81,7 @@ def test_the_slope_follows_the_sign_of_the_difference(difference, slope, backend
     assert abs(result - (0.1 + slope * difference)) <= tolerance
 
 
+@pytest.mark.long
 def test_counts_of_a_sensor_integrated_in_numpy_are_compensated_over_many_cycles():
     # Whole counts of 1 cm/s; the count is the change of a register, so that what is left of a quantum stays in it.
     quantum, cycles = 0.01, 2000

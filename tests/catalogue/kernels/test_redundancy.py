@@ -205,6 +205,7 @@ def test_the_kernels_of_a_file_are_those_of_its_sensors(tmp_path):
     assert (parity.inputs[0].unit, parity.arguments) == ("m/s", f"strapgen redundancy {file}")
 
 
+@pytest.mark.long
 def test_the_acceleration_at_the_end_of_a_moment_arm():
     rate, change, arm = np.array([0.5, -0.2, 0.3]), np.array([1.0, 2, -3]), [-2.8, 0, 0.1]
     cycle = 0.02
@@ -271,6 +272,7 @@ def test_parity_at_rest_becomes_a_bias_that_no_equation_sees(rng):
     np.testing.assert_allclose(corrected, 0, atol=1e-15)
 
 
+@pytest.mark.long
 def test_every_kernel_says_what_is_printed_derived_or_lost():
     for name in REDUNDANCY:
         source = strapgen.derive(name).source

@@ -44,6 +44,7 @@ def proper_inputs(evaluator, count: int, rng) -> list[np.ndarray]:
     return inputs
 
 
+@pytest.mark.long
 def test_the_bound_of_the_selection_is_zero():
     for word in (16, 32):
         assert not any(quantized(Choice("select-hexad"), settings(word)).error_bounds.values())

@@ -69,6 +69,7 @@ def test_the_torques_of_the_canonical_layout_are_the_printed_ones():
     assert list(torques) == [wz, -wy, wx - B * gx, -wz + B * gz, wy + B * gy, -wx - B * gx]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", LAYOUTS)
 def test_the_torques_of_a_motion_are_separated_again(name):
     first, second = derive(f"torques-{name}"), derive(f"separate-{name}")
@@ -136,6 +137,7 @@ def test_the_noise_gains(name):
     assert noise_gains(*LAYOUTS[name]) == (ROOT / 2, 1, 1, ROOT / 2 / B, ROOT / B, ROOT / B)
 
 
+@pytest.mark.long
 def test_the_gain_of_gx_falls_with_the_difference_of_the_unbalances():
     # The rule of the source: maximise |B2 - B3|.
     second, third = sp.symbols("B2 B3", positive=True)

@@ -30,12 +30,14 @@ def deviation_after(moving, resting, step=1.0):
     return float(u[0])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("moving", "resting", "printed"), PROTOCOL)
 def test_the_deviation_is_that_of_the_protocol(moving, resting, printed):
     half_a_digit = 0.5 * 10.0 ** (np.floor(np.log10(-printed)) - 5)
     assert abs(deviation_after(moving, resting) - printed) <= half_a_digit
 
 
+@pytest.mark.long
 def test_the_steady_deviation_and_its_share_after_a_time_constant():
     steady = GAIN * np.radians(100) ** 2
     assert abs(steady - -7.92005e-4) <= 0.5e-9
@@ -47,6 +49,7 @@ def test_a_cycle_at_93_hz_decays_by_the_stated_share():
     assert abs(-np.expm1(-1 / 93 / TAU) - 7.2e-5) <= 0.05e-5
 
 
+@pytest.mark.long
 def test_the_recursion_is_the_differential_equation_for_a_rate_held_over_a_cycle():
     u, w, k, tau, T = sp.symbols("u w k tau T", positive=True)
     time = sp.Symbol("t", positive=True)
@@ -113,6 +116,7 @@ def allowed(evaluator, carry):
     return float(factor.error + 2 * interface.outputs[0].unit)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "carry"), [("c-fixed32", "none"), ("c-fixed32", "state"), ("c-fixed16", "state")]
 )

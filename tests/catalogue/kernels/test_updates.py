@@ -70,6 +70,7 @@ def test_the_navigation_frame_is_the_sources(order):
     assert (sp.Matrix(made.expand()["next"]) - wanted).expand() == sp.zeros(4, 1)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("order", ["", "-1", "-2"])
 def test_a_turn_of_both_frames_leaves_the_attitude(algorithm, order, rng):
     # A body at the reference attitude that turns with the navigation frame stays there, but for what is cut off:
@@ -195,6 +196,7 @@ def test_orders_are_told():
 # What the source says of the size of the rotation, and of orthonormalization
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("order", range(1, 6))
 @pytest.mark.parametrize("name", ["dcm", "euler"])
 def test_what_is_cut_off_at_a_tenth_of_a_radian(name, order):
@@ -249,6 +251,7 @@ def stepped(update, state: np.ndarray, phi: np.ndarray) -> np.ndarray:
     return before if interface is None else update.numbers(interface.outputs[0], before)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("backend", ["c", "c-fixed32"])
 @pytest.mark.parametrize("name", ["dcm", "euler"])
 def test_exact_updates_need_no_orthonormalization(name, backend, rng):

@@ -83,6 +83,7 @@ def test_compressed_coefficients_leave_what_the_literature_says(samples):
     assert found == (2 * samples + 1, -size)
 
 
+@pytest.mark.long
 @MANY
 def test_compressed_and_combined_annul_coning_as_far_as_there_are_distances(many):
     for samples, previous in many:
@@ -264,6 +265,7 @@ def test_a_kernel_is_its_design(form, count, previous):
     assert max(x.degree() for x in phi) == (4 if form == "combined" else 2)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("method", "count", "previous"),
     [("combined", 2, 0), ("combined", 4, 0), ("combined", 2, 2), ("polynomial", 3, 0), ("polynomial", 1, 2)]
@@ -360,6 +362,7 @@ KERNELS = [
 ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "method", "count", "previous"), KERNELS)
 def test_vectors_of_a_step_on_every_back_end(backend_name, name, method, count, previous, rng):
     choice = choose(name, method, count, previous=previous)
@@ -407,6 +410,7 @@ def stated(form: str, samples: int, previous: int, alpha, omega, T):
     return residual.subs({"alpha": alpha, "omega": omega, "T": T})
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("form", "samples", "previous"),
     [
@@ -425,6 +429,7 @@ def test_measured_drift_in_double_is_the_residual(form, samples, previous):
     assert found == pytest.approx(wanted, rel=0.01)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("samples", "previous"),
     [pytest.param(n, p, marks=pytest.mark.long if n + p > 4 else ()) for n, p in ALL],

@@ -35,6 +35,7 @@ def test_a_constant_rate_is_integrated_exactly():
     np.testing.assert_allclose(state, expected, atol=1e-15)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("algorithm", ["euler", pytest.param("dcm", marks=pytest.mark.long)])
 def test_the_observed_order_is_the_predicted_one(algorithm):
     motion = strapgen.motion("coning", a_rad_s=1, b_rad_s=1.5, g_rad_s=0.6)

@@ -62,6 +62,7 @@ def transition():
     return rotations
 
 
+@pytest.mark.long
 def test_a_polynomial_through_the_samples_is_turned_by_exactly(transition):
     """A rate about one axis, or along one direction, has no cross products: the step turns by the sum."""
     samples = np.outer(np.array([0.3, -0.2, 0.15, 0.4, -0.1]), [0.6, 0.0, 0.8])[None]

@@ -43,6 +43,7 @@ def test_the_sample_itself_is_not_used_and_the_filter_is_symmetric():
     assert merged[REACH] == merged[REACH + 1]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("which", ["lost", "merged"])
 @pytest.mark.parametrize("gyro", [None, GyroResponse(Fraction(10), Fraction(7, 10), Fraction(100))])
 def test_no_filter_near_it_has_a_smaller_sum_of_squares(which, gyro):
@@ -70,6 +71,7 @@ def test_no_filter_near_it_has_a_smaller_sum_of_squares(which, gyro):
             assert squares(taps + size * change) > squares(taps)
 
 
+@pytest.mark.long
 def test_the_gyro_counts():
     slow = replace(WINDOW, gyro=GyroResponse(Fraction(5), Fraction(7, 10), Fraction(100)))
     assert restoration(slow) != restoration(WINDOW)

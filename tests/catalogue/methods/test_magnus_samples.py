@@ -59,6 +59,7 @@ def test_the_term_of_second_order_is_that_of_the_polynomial_through_the_samples(
     assert second_order(kernel) == second_order(exact)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("method", "previous", "counts", "factor"),
     [

@@ -53,12 +53,14 @@ def reference() -> np.ndarray:
     return ReferenceAttitude(rate, 256)(KNOT)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("parts", [1, 3])
 def test_the_rotation_is_that_of_the_polynomial(parts):
     computed = transition(DCM, 24, parts).reshape(3, 3)
     np.testing.assert_allclose(computed, reference(), atol=1e-13)
 
 
+@pytest.mark.long
 def test_all_parameters_are_of_the_same_rotation():
     euler, cayley_klein = transition(EULER, 8), transition(CAYLEY_KLEIN, 8)
     np.testing.assert_allclose(cayley_klein, [euler[3], *euler[:3]], atol=1e-15)
@@ -66,6 +68,7 @@ def test_all_parameters_are_of_the_same_rotation():
     np.testing.assert_allclose(np.array(matrix, float), transition(DCM, 8).reshape(3, 3), atol=1e-15)
 
 
+@pytest.mark.long
 def test_what_is_cut_off_falls_with_the_order_and_with_the_parts():
     """A part of half the length has terms of order n that are 2^n times smaller."""
     exact = transition(EULER, 30)

@@ -52,6 +52,7 @@ def test_one_increment_gives_a_constant_rate(node):
     assert from_increments(1).at(node) == [1]
 
 
+@pytest.mark.long
 @settings(derandomize=True, database=None, deadline=None)
 @given(
     coefficients=st.integers(1, MOST_INCREMENTS).flatmap(
@@ -129,6 +130,7 @@ POLYNOMIALS = COUNTS.flatmap(
 )
 
 
+@pytest.mark.long
 @settings(derandomize=True, database=None, deadline=None, max_examples=25)
 @given(case=POLYNOMIALS, node=RATIONALS, power=st.integers(0, 4))
 def test_k_and_m_increments_are_exact_on_rates_of_degree_k_plus_m_minus_1(case, node, power):
@@ -141,6 +143,7 @@ def test_k_and_m_increments_are_exact_on_rates_of_degree_k_plus_m_minus_1(case, 
     assert weighed(fit.moment(power), given_) == expected
 
 
+@pytest.mark.long
 @each("previous", range(FEW_PREVIOUS + 1))
 @each("count", range(1, MOST_INCREMENTS + 1))
 def test_a_fit_tells_the_same_as_weights_taylor_and_moments(count, previous):
@@ -183,6 +186,7 @@ def test_previous_increments_give_the_formulas_of_backward_differences():
 # Rates at nodes
 
 
+@pytest.mark.long
 @settings(derandomize=True, database=None, deadline=None, max_examples=25)
 @given(
     data=st.lists(st.tuples(RATIONALS, RATIONALS), min_size=1, max_size=6, unique_by=lambda pair: pair[0]),
@@ -196,6 +200,7 @@ def test_rates_at_nodes_are_exact_on_polynomials_of_their_degree(data, node):
         assert fit.at(own) == [int(k == place) for k in range(len(nodes))]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_rates_at_the_nodes_of_gauss_give_moments_to_twice_their_number(count):
     # Gauss's quadrature: with n nodes exact to degree 2 n - 1, here of the rate times (t - 1/2)^power, t in steps.
@@ -232,6 +237,7 @@ def fitted_rate(rate_: list, count: int, previous: int, top: int) -> list[list[S
     return fitted
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("previous", range(FEW_PREVIOUS + 1))
 @pytest.mark.parametrize("count", range(1, 6))
 def test_the_step_order_is_that_of_the_exact_rotation_of_the_fitted_rate(count, previous):

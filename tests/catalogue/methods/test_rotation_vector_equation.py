@@ -106,6 +106,7 @@ def powers_of_bracket() -> sp.Expr:
     return sp.series(BRACKET, A, 0, 5).removeO()
 
 
+@pytest.mark.long
 def test_the_series_of_the_bracket_is_that_of_the_kernels():
     # 1/12 + alpha^2/720 + alpha^4/30240: what `bortz` has, whose coefficients are Bernoulli's numbers.
     wanted = powers_of_bracket()

@@ -155,6 +155,7 @@ def test_transitions_may_be_multiplied_in_any_grouping(algorithm):
     assert times(x, y) != times(y, x)
 
 
+@pytest.mark.long
 @METHOD
 def test_cayley_klein_equals_euler_after_renaming(method):
     # a1 = e4, a2 = e1, a3 = e2, a4 = e3
@@ -171,6 +172,7 @@ def test_cayley_klein_equals_euler_after_renaming(method):
 RATE = generic_rate(3)
 
 
+@pytest.mark.long
 @each("increments", [2, 3, 5, MOST_INCREMENTS])
 @ALGORITHM
 @METHOD
@@ -223,6 +225,7 @@ def test_a_step_from_rates_is_the_step_from_increments_after_rate_extraction(alg
     assert [ring(x) for x in given["next"]] == expected["next"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("increments", [None, 3])
 def test_irrational_coefficients_stay_exact_and_their_nodes_have_names(increments):
     tableau = TABLEAUX["cooper-verner8"]
@@ -236,6 +239,7 @@ def test_irrational_coefficients_stay_exact_and_their_nodes_have_names(increment
     assert any(e.has(sp.sqrt(21)) for stage in kernel.stages for e in stage.expressions)
 
 
+@pytest.mark.long
 def test_a_step_with_irrational_coefficients_has_its_order():
     # A constant rate about one axis: cos + i sin of half the angle, up to the eighth power.
     x = sp.Symbol("x")

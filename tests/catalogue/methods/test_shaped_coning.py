@@ -23,6 +23,7 @@ def text() -> str:
     return content.replace('name = "', 'name = "My ')
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", SHAPES)
 def test_built_in_coefficients_are_what_they_are_said_to_be(name):
     shaped_coning.verify(SHAPES[name])

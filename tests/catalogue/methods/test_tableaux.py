@@ -59,6 +59,7 @@ def test_the_catalogue_lists_every_file_in_the_order_of_the_methods():
     assert len(set(METHODS.values())) == len(METHODS)
 
 
+@pytest.mark.long
 def test_the_catalogue_is_read_only_and_lazy():
     with pytest.raises(KeyError):
         TABLEAUX["rk9"]

@@ -37,6 +37,7 @@ def transition(kernel: Kernel, samples: list[mpmath.mpf]) -> mpmath.matrix:
     return mpmath.matrix([flat[k : k + 3] for k in (0, 3, 6)] if signal.shape == (3, 3) else flat)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("algorithm", "order", "count", "previous"),
     [
@@ -82,6 +83,7 @@ def test_the_series_from_the_middle_converges_where_that_from_the_beginning_does
     assert np.degrees(run.mean_drift) < most_deg
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
 @pytest.mark.parametrize(
     ("order", "count", "previous"),
@@ -98,6 +100,7 @@ def test_a_transition_is_a_rotation_whatever_the_increments_are(algorithm, order
             assert mpmath.mnorm(product - mpmath.eye(product.rows)) < mpmath.mpf(10) ** -50
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("algorithm", "order", "count"), [("dcm", 4, 3), ("dcm", 5, 4)])
 def test_time_reversed_takes_the_step_back(algorithm, order, count):
     # Hence the order is even.

@@ -91,6 +91,7 @@ def test_a_motion_that_runs_backwards_turns_backwards(name, mirrored):
 # Operations
 
 
+@pytest.mark.long
 def test_operations_of_a_window_are_few():
     normalize = lower(derive("euler-normalize-first-order")).operations
     for name in ("window-3-3", "window-7-7"):
@@ -131,6 +132,7 @@ def test_the_series_leaves_out_no_more_than_is_stated(algorithm, scale):
     )
 
 
+@pytest.mark.long
 def test_bounds_have_what_the_series_leaves_out():
     program = lower(derive("euler", "window-3-3"))
     near, far = (

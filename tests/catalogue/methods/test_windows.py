@@ -77,6 +77,7 @@ def test_filters_have_their_parity_and_their_sizes(name):
         window.one_sided_with(99)
 
 
+@pytest.mark.long
 @FAMILIES
 def test_a_wrong_digit_is_seen(name):
     window, off = WINDOWS[name], Fraction(1, 10**30)

@@ -38,6 +38,7 @@ def test_dataclasses_and_what_else_asks_for_the_module_work(tmp_path):
     assert title(path) == "of a dataclass"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
 def test_each_file_gets_the_helper_beside_it(folders, order):
     assert [title(folders[place]) for place in (*order, *order)] == [
@@ -45,6 +46,7 @@ def test_each_file_gets_the_helper_beside_it(folders, order):
     ]
 
 
+@pytest.mark.long
 def test_what_is_imported_late_is_found_too(tmp_path):
     for word in ("first", "second"):
         path = written(tmp_path / word / "own.py", inside="from parts.late import WORD")

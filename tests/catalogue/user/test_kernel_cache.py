@@ -50,6 +50,7 @@ def test_a_file_is_derived_once(derives, file):
     assert derives(file) == (False, "one")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["own", "helper", "base"])
 def test_a_change_of_any_module_derives_again(derives, file, name):
     derives(file)

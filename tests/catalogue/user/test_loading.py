@@ -66,6 +66,7 @@ def test_a_file_is_an_algorithm(folder):
     assert kernel.arguments == "mrp.py"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("chosen", "name", "arguments"),
     [
@@ -132,6 +133,7 @@ def test_names_of_the_catalogue_are_not_hidden_by_entry_points(monkeypatch):
     assert strapgen.derive("euler").name == "euler-rk4-2"
 
 
+@pytest.mark.long
 def test_what_a_file_says_now_counts(folder):
     assert strapgen.backend("picard.py").propagate(np.full((1, 2, 3), 0.1))[-1][3] < 1
     text = (folder / "picard.py").read_text()
@@ -378,6 +380,7 @@ def test_a_step_with_the_companions_of_the_catalogue_has_its_order(here):
     assert local_error(strapgen.derive("picard.py"), generic_rate(3), 5) == 4
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("method", ["rk2", "rk4"])
 def test_a_step_with_a_state_of_its_own_has_the_order_of_its_tableau(here, method):
     kernel = strapgen.derive("mrp.py", method, 3)
@@ -393,6 +396,7 @@ def test_a_step_with_a_state_of_its_own_has_the_order_of_its_tableau(here, metho
     assert min(e.lowest for e in errors if e.lowest is not None) == top
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("backend", ["numpy", "c"])
 @pytest.mark.parametrize(("file", "most"), [("mrp.py", 1e-7), ("picard.py", 1e-4)])
 def test_users_algorithms_run_on_the_back_ends(here, strapgen_says, file, most, backend):

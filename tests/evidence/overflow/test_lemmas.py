@@ -27,6 +27,7 @@ def function(part, fault=("", ""), defined=(), settings=None):
     return ParsedSource(files, f"{subject.name}.c", defined).functions[f"{subject.name}_{part}"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
 @pytest.mark.parametrize("defined", [(), ("__FRAMAC__",)], ids=["shipped", "as Eva reads it"])
 def test_shifts(model, defined):
@@ -35,6 +36,7 @@ def test_shifts(model, defined):
     assert shifts_down(function("shr"), model, PLACES)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "fault",
     [

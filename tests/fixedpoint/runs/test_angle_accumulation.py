@@ -98,6 +98,7 @@ def test_the_errors_of_the_adversary_are_those_of_forty_digits(adversarial_run, 
     assert angle == pytest.approx(result.errors[-1], rel=1e-4)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("carry", ["none", "state", "full"])
 @pytest.mark.parametrize(
     ("word", "rounding"),

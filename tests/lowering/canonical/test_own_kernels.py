@@ -104,6 +104,7 @@ def test_the_program_does_not_depend_on_how_the_step_was_written():
     assert len(costs) == 1
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "kernel",
     [

@@ -159,7 +159,6 @@ def _check_alone(
 
 
 def _data(choice: Choice, sources: Sources, target: str, written: list[Path]) -> dict[str, Any]:
-    from strapgen import pipeline
     from strapgen.library import generated_sources
 
     operations = sources.operations
@@ -174,8 +173,7 @@ def _data(choice: Choice, sources: Sources, target: str, written: list[Path]) ->
         data["error_bounds"] = sources.rounding.as_data()
     if sources.fixed is None:
         return data
-    program = generated_sources.program(choice)
-    return data | pipeline.quantize(program, sources.fixed.settings).as_data()
+    return data | generated_sources.fixed_program(choice, sources.fixed.settings).as_data()
 
 
 def _text(sources: Sources, target: str, written: list[Path]) -> str:
