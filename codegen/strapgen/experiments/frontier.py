@@ -7,7 +7,7 @@ its program, for each sample.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from functools import cache
 from pathlib import Path
@@ -24,6 +24,7 @@ from strapgen.simulation.motions import Motion, motion
 from strapgen.simulation.runs import simulate
 from strapgen.support import cache as disk_cache
 from strapgen.support import checks
+from strapgen.support.clusters import Bundle, Cluster, moved
 from strapgen.support.exceptions import InputError
 from strapgen.support.resumable import resume, side_by_side
 from strapgen.support.version import VERSION
@@ -161,6 +162,13 @@ class Trial:
     sample_hz: str
     duration: str
 
+    def moved(self, begin: Path, end: Path) -> Trial:
+        """Return the trial with the file of a user's algorithm in another folder, see `clusters.Movable`."""
+        one = self.candidate
+        if not one.method.endswith(".py"):
+            return self
+        return replace(self, candidate=replace(one, method=moved(one.method, begin, end)))
+
 
 def candidates(names: Iterable[str] | None = None) -> list[Candidate]:
     """Return the algorithms that are asked for, checked.
@@ -234,6 +242,7 @@ def frontier(
     duration: str = "60",
     results: str | Path | None = None,
     jobs: int | None = None,
+    cluster: Cluster | None = None,
 ) -> Iterator[Standing]:
     """Run algorithms on all motions, and yield what each costs and how it drifts when its runs end.
 
@@ -246,6 +255,8 @@ def frontier(
         File that keeps what is done: the study goes on from there.
     jobs : int, optional
         Number of processes; by default one for each processor.
+    cluster : Cluster, optional
+        Where they run, in place of processes of this one.
 
     Yields
     ------
@@ -266,10 +277,12 @@ def frontier(
             )
     checks.multiple("duration", length, "sampling interval", 1 / rate)
     cases = {one.name: Trial(one, str(rate), str(length)) for one in several}
+    users = [one.method for one in several if one.method.endswith(".py")]
+    files = None if cluster is None else Bundle.of(users)
     if results is None:
-        finished = side_by_side(run_trial, cases, jobs)
+        finished = side_by_side(run_trial, cases, jobs, cluster, files)
     else:
-        finished = resume(run_trial, cases, results, identity(str(rate), str(length)), jobs)
+        finished = resume(run_trial, cases, results, identity(str(rate), str(length)), jobs, cluster, files)
     for _, data in finished:
         yield Standing(**data)
 

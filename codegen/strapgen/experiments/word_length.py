@@ -22,6 +22,7 @@ from strapgen.simulation.motions import Motion
 from strapgen.simulation.runs import attitude, drift_between
 from strapgen.simulation.users_motions import any_motion, is_file
 from strapgen.support import cache, checks
+from strapgen.support.clusters import Bundle, Cluster, moved
 from strapgen.support.exceptions import InputError
 from strapgen.support.resumable import side_by_side
 
@@ -66,6 +67,10 @@ class Case:
     pulse_arcsec: str
     motion: str
     settings: tuple[tuple[str, str], ...]
+
+    def moved(self, begin: Path, end: Path) -> Case:
+        """Return the case with the file of a user's motion in another folder, see `clusters.Movable`."""
+        return replace(self, motion=moved(self.motion, begin, end)) if is_file(self.motion) else self
 
     @property
     def profile(self) -> Motion:
@@ -327,7 +332,9 @@ def noise_of(algorithm: str, method: str, increments: int) -> QuantizationNoise:
     return quantization_noise(catalogue.choose_step(algorithm, method, increments))
 
 
-def run(planned: Sequence[Case], jobs: int | None = None) -> Iterator[Outcome]:
+def run(
+    planned: Sequence[Case], jobs: int | None = None, cluster: Cluster | None = None
+) -> Iterator[Outcome]:
     """Run cases side by side, and yield each outcome when its case ends.
 
     Parameters
@@ -335,10 +342,15 @@ def run(planned: Sequence[Case], jobs: int | None = None) -> Iterator[Outcome]:
     planned : sequence of Case
     jobs : int, optional
         Processes; by default one for every processor.
+    cluster : Cluster, optional
+        Where they run, in place of processes of this one.
 
     Yields
     ------
     Outcome
     """
-    for _, outcome in side_by_side(run_case, {str(k): case for k, case in enumerate(planned)}, jobs):
-        yield outcome
+    cases = {str(k): case for k, case in enumerate(planned)}
+    users = {case.motion for case in planned if is_file(case.motion)}
+    files = None if cluster is None else Bundle.of(sorted(users))
+    for name, outcome in side_by_side(run_case, cases, jobs, cluster, files):
+        yield replace(outcome, case=cases[name])  # whose files are here

@@ -17,6 +17,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
+from strapgen.support.clusters import Bundle, Cluster, on_cluster
 from strapgen.support.exceptions import InputError, StrapgenError
 from strapgen.support.processes import begin_worker
 
@@ -30,9 +31,13 @@ _MOST_BYTES = 1 << 28
 
 
 def side_by_side(
-    work: Callable[[Any], Any], cases: Mapping[str, Any], jobs: int | None = None
+    work: Callable[[Any], Any],
+    cases: Mapping[str, Any],
+    jobs: int | None = None,
+    cluster: Cluster | None = None,
+    files: Bundle | None = None,
 ) -> Iterator[tuple[str, Any]]:
-    """Run cases in several processes, and yield each result when its case ends.
+    """Run cases in several processes, here or on a cluster, and yield each result when its case ends.
 
     Parameters
     ----------
@@ -42,6 +47,10 @@ def side_by_side(
         What each case needs, by its name.
     jobs : int, optional
         Number of processes; by default one for each processor.
+    cluster : Cluster, optional
+        Where the cases run, in place of processes of this one.
+    files : Bundle, optional
+        Files that the cases name, for workers on other machines.
 
     Yields
     ------
@@ -53,6 +62,9 @@ def side_by_side(
     StrapgenError
         If a process is killed. What `work` raises is raised here.
     """
+    if cluster is not None:
+        yield from on_cluster(work, cases, cluster, files)
+        return
     workers = min(len(cases), jobs or os.cpu_count() or 1)
     if workers <= 1:
         yield from ((name, work(case)) for name, case in cases.items())
@@ -82,6 +94,8 @@ def resume(
     results: str | Path,
     identity: Mapping[str, Any],
     jobs: int | None = None,
+    cluster: Cluster | None = None,
+    files: Bundle | None = None,
 ) -> Iterator[tuple[str, Any]]:
     """Run the cases whose results a file does not hold yet, and add each result to the file when its case ends.
 
@@ -95,7 +109,8 @@ def resume(
         The results file, which is created if it does not exist.
     identity : mapping of str to JSON data
         What the study is: the version of what computes, and all parameters that its cases share.
-    jobs : int, optional
+    jobs, cluster, files
+        As for `side_by_side`.
 
     Yields
     ------
@@ -115,7 +130,7 @@ def resume(
         known = _known(file, path, dict(identity))
         yield from ((name, known[name]) for name in cases if name in known)
         missing = {name: case for name, case in cases.items() if name not in known}
-        for name, result in side_by_side(work, missing, jobs):
+        for name, result in side_by_side(work, missing, jobs, cluster, files):
             line = _line({"case": name, "result": result})
             _append(file, path, line)
             yield name, json.loads(line)["result"]

@@ -12,6 +12,7 @@ from strapgen.cli.option_groups import grouped
 from strapgen.cli.options import listed, option, whole
 from strapgen.cli.output import Output
 from strapgen.cli.progress import track
+from strapgen.cli.worker_options import WorkerOptions
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 
@@ -64,15 +65,7 @@ def design(
             panel="Run",
         ),
     ] = None,
-    jobs: Annotated[
-        str | None,
-        option(
-            "--jobs",
-            metavar="N",
-            help="Number of processes that run side by side.  [default: one for each processor]",
-            panel="Run",
-        ),
-    ] = None,
+    workers: WorkerOptions,
     output: Output,
 ) -> None:
     """Select the cheapest algorithm that meets a brief.
@@ -92,9 +85,7 @@ def design(
     shown = whole("simulate", simulate)
     if shown is not None:
         checks.count("simulate", shown)
-    count = whole("jobs", jobs)
-    if count is not None:
-        checks.count("jobs", count, largest=1024)
+    count, cluster = workers.count(), workers.workers()
     from strapgen.experiments.selection.answer import in_order, judgements
     from strapgen.experiments.selection.brief import read_brief
     from strapgen.experiments.selection.candidates import contenders
@@ -103,7 +94,7 @@ def design(
 
     brief = read_brief(file)
     several = contenders(brief, None if methods is None else listed("--method", methods))
-    rows = track(judgements(file, several, results, count), "judging", len(several))
+    rows = track(judgements(file, several, results, count, cluster), "judging", len(several))
     ordered = in_order(one for row in rows for one in row)
     runs = None if shown is None else _simulated(brief, file, ordered[:shown])
     report = selection_report(brief, ordered, runs)

@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Annotated, ClassVar
 
 from strapgen.cli.option_groups import grouped
-from strapgen.cli.options import listed, option, whole
+from strapgen.cli.options import listed, option
 from strapgen.cli.output import Output
+from strapgen.cli.worker_options import WorkerOptions
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 
@@ -31,25 +32,12 @@ class StudyRun:
             help="File that keeps each result when it is there; a study that was stopped goes on from it.",
         ),
     ] = None
-    jobs: Annotated[
-        str | None,
-        option(
-            "--jobs",
-            metavar="N",
-            help="Number of processes that run side by side.  [default: one for each processor]",
-        ),
-    ] = None
 
     def check(self, output: Output) -> None:
         """Check that the output is not written over the results."""
         for name, path in (("--out", output.file), ("--plot", output.plot)):
             if path is not None and self.results is not None and path.resolve() == self.results.resolve():
                 raise InputError(f"{name} and --results are both {path}; two files are needed")
-
-    def count(self) -> int | None:
-        """Return the number of processes, checked."""
-        count = whole("jobs", self.jobs)
-        return None if count is None else checks.count("jobs", count, largest=1024)
 
 
 @grouped
@@ -66,6 +54,7 @@ def frontier(
         ),
     ] = None,
     run: StudyRun,
+    workers: WorkerOptions,
     output: Output,
 ) -> None:
     """Compare the drift of algorithms on many motions with their cost.
@@ -84,12 +73,12 @@ def frontier(
     """
     output.check(run.results)
     run.check(output)
-    jobs = run.count()
+    jobs, cluster = workers.count(), workers.workers()
     from strapgen.cli.progress import track
     from strapgen.experiments import frontier as study
 
     several = study.candidates(None if methods is None else listed("--method", methods))
-    runs = study.frontier(several, run.sample_hz, run.duration, run.results, jobs)
+    runs = study.frontier(several, run.sample_hz, run.duration, run.results, jobs, cluster)
     standings = study.in_order(track(runs, "running", len(several)), several)
     from strapgen.reports import plots
     from strapgen.reports.selection.frontier import frontier_report

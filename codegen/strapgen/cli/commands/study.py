@@ -13,6 +13,7 @@ from strapgen.cli.options import Duration, Increments, listed, option, whole
 from strapgen.cli.output import Output
 from strapgen.cli.progress import track
 from strapgen.cli.sample_source import MOTION_FILE, RUN_MOTION_NAMES, check_motion, is_file, pairs
+from strapgen.cli.worker_options import WorkerOptions
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 
@@ -114,15 +115,7 @@ def word_length(
         ),
     ] = None,
     duration: Duration = "180",
-    jobs: Annotated[
-        str | None,
-        option(
-            "--jobs",
-            metavar="N",
-            help="Number of processes that run side by side.  [default: one for each processor]",
-            panel="Run",
-        ),
-    ] = None,
+    workers: WorkerOptions,
     output: Output,
 ) -> None:
     """Show the drift against the word length of fixed point.
@@ -139,9 +132,7 @@ def word_length(
 
     checks.choice("algorithm", algorithm, catalogue.ALGORITHMS)
     check_motion(motion, catalogue.RUN_MOTIONS)
-    count = whole("jobs", jobs)
-    if count is not None:
-        checks.count("jobs", count, largest=1024)
+    count, cluster = workers.count(), workers.workers()
     if settings is None and motion != "coning" and not is_file(motion):
         raise InputError(f"--motion {motion} needs --set; strapgen list motions shows the keys")
 
@@ -158,7 +149,7 @@ def word_length(
     )
     _ = planned[0].profile  # a motion that lacks a parameter is told before anything runs
     with np.errstate(all="ignore"):
-        outcomes = {done.case: done for done in track(run(planned, count), "running", len(planned))}
+        outcomes = {done.case: done for done in track(run(planned, count, cluster), "running", len(planned))}
     from strapgen.reports import plots
     from strapgen.reports.word_length import word_length_report
 

@@ -9,10 +9,11 @@ from typing import Any
 
 from strapgen import catalogue
 from strapgen.experiments.selection import causes
-from strapgen.experiments.selection.brief import DesignBrief
+from strapgen.experiments.selection.brief import DesignBrief, files_of
 from strapgen.experiments.selection.candidates import Contender
 from strapgen.experiments.selection.judgement import Judgement, Question, judged
 from strapgen.support import cache as disk_cache
+from strapgen.support.clusters import Bundle, Cluster
 from strapgen.support.resumable import resume, side_by_side
 from strapgen.support.version import VERSION
 
@@ -22,6 +23,7 @@ def judgements(
     several: Iterable[Contender],
     results: str | Path | None = None,
     jobs: int | None = None,
+    cluster: Cluster | None = None,
 ) -> Iterator[list[Judgement]]:
     """Judge algorithms by a brief, and yield the judgements of each with all states when they are there.
 
@@ -34,6 +36,8 @@ def judgements(
         File that keeps what is done: the study goes on from there.
     jobs : int, optional
         Number of processes; by default one for each processor.
+    cluster : Cluster, optional
+        Where they run, in place of processes of this one.
 
     Yields
     ------
@@ -45,10 +49,11 @@ def judgements(
         If the brief is not allowed, or the file holds another study.
     """
     cases = {one.name: Question(str(path), one) for one in several}
+    files = None if cluster is None else Bundle.of(files_of(path))
     if results is None:
-        finished = side_by_side(judged, cases, jobs)
+        finished = side_by_side(judged, cases, jobs, cluster, files)
     else:
-        finished = resume(judged, cases, results, _identity(path), jobs)
+        finished = resume(judged, cases, results, _identity(path), jobs, cluster, files)
     for _, rows in finished:
         yield [Judgement(**row) for row in rows]
 

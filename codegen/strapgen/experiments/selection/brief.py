@@ -165,6 +165,13 @@ def read_brief(path: str | Path) -> DesignBrief:
         raise InputError(f"{path}: {error}") from None
 
 
+def files_of(path: str | Path) -> list[Path]:
+    """Return the files that a brief is read from: its own, and that of its vibration."""
+    vibration = toml_files.content(path, "a brief", _MOST_BYTES, parse_float=str).get("vibration", {})
+    named = [vibration[key] for key in ("psd", "recording") if key in vibration]
+    return [Path(path), *(Path(path).parent / name for name in named)]
+
+
 def _brief(data: Mapping[str, Any], folder: Path) -> DesignBrief:
     _check_keys("", data, _TOP)
     tables = {}

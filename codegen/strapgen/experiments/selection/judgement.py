@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 import shutil
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 from strapgen.catalogue import Choice
@@ -16,6 +17,7 @@ from strapgen.experiments.selection.brief import DesignBrief, read_brief
 from strapgen.experiments.selection.candidates import STATES, Contender
 from strapgen.experiments.selection.causes import Rounding
 from strapgen.library import generated_sources
+from strapgen.support.clusters import moved
 from strapgen.support.exceptions import InputError
 from strapgen.toolchain.processors import PROCESSORS
 
@@ -91,6 +93,10 @@ class Question:
 
     path: str
     contender: Contender
+
+    def moved(self, begin: Path, end: Path) -> Question:
+        """Return the question with its brief in another folder, see `clusters.Movable`."""
+        return replace(self, path=moved(self.path, begin, end))
 
 
 @dataclass

@@ -1,0 +1,171 @@
+"""Clusters: the same results as here, whatever is killed on the way."""
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+
+from strapgen.support import cache, clusters
+from strapgen.support.clusters import Bundle, Cluster
+from strapgen.support.exceptions import InputError, StrapgenError
+from strapgen.support.resumable import side_by_side
+
+BRIEFS = Path(__file__).resolve().parents[2] / "examples" / "briefs"
+STUDY = ["frontier", "--method", "rk1,rk2:1,rk4:2,magnus4:2,coning-compressed:1+1", "--duration", "1"]
+
+
+@pytest.mark.parametrize(
+    ("scheduler", "cluster", "said"),
+    [
+        ("tcp://a:1", "local:2", "--scheduler and --cluster are both given; one is needed"),
+        ("10.0.0.7:8786", None, "an address such as tcp://10.0.0.7:8786 is needed"),
+        ("tcp://10.0.0.7", None, "an address such as tcp://10.0.0.7:8786 is needed"),
+        (None, "local:0", "local:N with N from 1 to 256 is needed"),
+        (None, "here", "local:N with N from 1 to 256 is needed"),
+    ],
+)
+def test_a_cluster_that_cannot_be_is_refused(scheduler, cluster, said):
+    with pytest.raises(InputError, match=said):
+        Cluster.of(scheduler, cluster)
+    assert Cluster.of(None, None) is None
+
+
+def test_files_move_with_their_folders(tmp_path):
+    for name in ("a/brief.toml", "log.csv"):
+        path = tmp_path / "here" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(name)
+    files = [tmp_path / "here" / name for name in ("a/brief.toml", "a/../log.csv")]
+    bundle = Bundle.of(files)
+    assert bundle == Bundle(tmp_path / "here", {"a/brief.toml": b"a/brief.toml", "log.csv": b"log.csv"})
+    placed = clusters._placed(bundle.contents)
+    assert clusters._placed(bundle.contents) == placed
+    again = Path(clusters.moved(str(files[1]), bundle.folder, placed))
+    assert again.read_text() == "log.csv" and again.parent == placed
+    assert Bundle.of([]) is None
+    with pytest.raises(InputError, match="cannot be read"):
+        Bundle.of([tmp_path / "none.toml"])
+
+
+def test_a_worker_with_another_version_refuses(monkeypatch):
+    assert clusters._remote(Fraction, "1/3", cache.generator_digest(), None) == Fraction(1, 3)
+    with pytest.raises(StrapgenError, match="another version of strapgen"):
+        clusters._remote(Fraction, "1/3", "0" * 24, None)
+
+
+def test_a_scheduler_that_is_not_there_is_told(monkeypatch):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(clusters, "_PATIENCE_S", 1)
+    with pytest.raises(StrapgenError, match=r"no scheduler answers at tcp://127\.0\.0\.1:9"):
+        list(side_by_side(Fraction, {"a": "1"}, cluster=Cluster("tcp://127.0.0.1:9")))
+
+
+class Machines:
+    """A scheduler and two workers, each a process with a cache of its own."""
+
+    def __init__(self, folder):
+        self.folder, self.port, self.processes = (
+            folder,
+            random.Random(os.getpid()).randrange(20000, 60000),
+            {},
+        )
+        for name in ("scheduler", "worker-1", "worker-2"):
+            self.begin(name)
+
+    @property
+    def address(self):
+        return f"tcp://127.0.0.1:{self.port}"
+
+    def begin(self, name):
+        words = ["scheduler", "--host", "127.0.0.1", "--port", str(self.port), "--no-dashboard"]
+        if name != "scheduler":
+            words = ["worker", self.address, "--nthreads", "1", "--no-dashboard", "--no-nanny"]
+            words += ["--local-directory", str(self.folder / name), "--death-timeout", "60"]
+        self.processes[name] = subprocess.Popen(
+            [sys.executable, "-m", "dask", *words],
+            env=os.environ | {"STRAPGEN_CACHE_DIR": str(self.folder / f"cache-{name}")},
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+
+    def kill(self, name):
+        self.processes[name].send_signal(signal.SIGKILL)
+        self.processes[name].wait()
+        for ended in [name] if name != "scheduler" else list(self.processes):  # without it, workers end
+            self.processes[ended].kill()
+            self.processes[ended].wait()
+            self.begin(ended)
+
+    def end(self):
+        for process in self.processes.values():
+            process.kill()
+            process.wait()
+
+
+@pytest.fixture
+def machines(tmp_path):
+    pytest.importorskip("distributed")
+    several = Machines(tmp_path)
+    yield several
+    several.end()
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("killed", ["worker-1", "scheduler", "client"])
+def test_a_study_is_completed_whatever_is_killed(tmp_path, machines, killed):
+    def client(*more):
+        words = [*STUDY, "--format", "json", *more]
+        return subprocess.Popen(
+            [sys.executable, "-m", "strapgen", *words],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+
+    here, _ = client("--jobs", "1").communicate()
+    where = ["--scheduler", machines.address, "--results", str(tmp_path / "results.jsonl")]
+    first = client(*where)
+    results = tmp_path / "results.jsonl"
+    deadline = time.monotonic() + 90
+    while time.monotonic() < deadline and (not results.exists() or results.read_bytes().count(b"\n") < 2):
+        time.sleep(0.1)
+    assert results.read_bytes().count(b"\n") >= 2  # it is on its way
+    if killed == "client":
+        first.kill()
+    else:
+        machines.kill(killed)
+    first.communicate()
+    for _ in range(5):
+        again = client(*where)
+        there, said = again.communicate()
+        if again.returncode == 0:
+            break
+        assert said.startswith("strapgen: ") and "Traceback" not in said
+    assert json.loads(there) == json.loads(here)
+
+
+@pytest.mark.long
+def test_a_brief_is_answered_by_workers_that_do_not_have_its_files(tmp_path):
+    pytest.importorskip("distributed")
+    words = [
+        "design",
+        str(BRIEFS / "ins-1.toml"),
+        "--method",
+        "rk4:2,coning-compressed:4",
+        "--format",
+        "json",
+    ]
+    tables = [
+        subprocess.run(
+            [sys.executable, "-m", "strapgen", *words, *more], capture_output=True, text=True, check=True
+        )
+        for more in (["--cluster", "local:2"], ["--jobs", "1"])
+    ]
+    assert tables[0].stdout == tables[1].stdout
