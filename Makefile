@@ -13,7 +13,7 @@ BENCH := .venv-bench/.ready
 help:
 	@echo "make demo      set up, then a short tour: formulas, their C, a table on every back end"
 	@echo "make test      set up, with what tests need; run the test suite"
-	@echo "make test-long the tests that take long: every word, rounding and residual on every kernel"
+	@echo "make test-long the tests that take long: more words, roundings, methods and motions, long runs"
 	@echo "make test-modules  list anew which kernels the tests compile"
 	@echo "make mutants   put 369 written faults and 240 drawn ones into copies of the code; up to an hour, goes on where it stopped"
 	@echo "make check     generated code in step, ruff, mypy"

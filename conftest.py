@@ -1,11 +1,15 @@
 """Leaves out of the collection what has no tests: modules without an example, and examples whose tools are missing."""
 
+import os
 from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 from _pytest.doctest import DoctestModule
+
+#: SymPy remembers a thousand results of each function; more spare a session of many kernels a tenth of its derivations.
+os.environ.setdefault("SYMPY_CACHE_SIZE", "20000")
 
 collect_ignore_glob = []
 if not (find_spec("z3") and find_spec("pycparser")):

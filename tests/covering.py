@@ -36,6 +36,21 @@ def covering(cases: Sequence[Sequence[Any]]) -> Iterator[int]:
         number += 1
 
 
+def in_rounds(cases: Sequence[Sequence[Any]], count: int) -> set[int]:
+    """Return the places of cases that have every value of every parameter so many times, where so many cases have it.
+
+    Examples
+    --------
+    >>> sorted(in_rounds([(method, word) for method in ("rk1", "rk2", "rk4") for word in (16, 32, 64)], 2))
+    [0, 1, 4, 5, 6, 8]
+    """
+    left = list(range(len(cases)))
+    for _ in range(count):
+        chosen = {left[number] for number in covering([cases[k] for k in left])} if left else set()
+        left = [k for k in left if k not in chosen]
+    return set(range(len(cases))) - set(left)
+
+
 def mark_combinations(items: Iterable[pytest.Item]) -> None:
     """Mark as long the combinations whose every value is in another test that is not.
 
@@ -59,11 +74,8 @@ def beyond_two_rounds(items: Iterable[pytest.Item]) -> Iterator[pytest.Item]:
     for several, cases in _combinations(long):
         if several[0].get_closest_marker("every_combination") is not None:
             continue
-        left = list(range(len(several)))
-        for _ in range(2):
-            chosen = {left[number] for number in covering([cases[k] for k in left])} if left else set()
-            left = [k for k in left if k not in chosen]
-        yield from (several[k] for k in left)
+        chosen = in_rounds(cases, 2)
+        yield from (item for number, item in enumerate(several) if number not in chosen)
 
 
 def _combinations(items: Iterable[pytest.Item]) -> Iterator[tuple[list[pytest.Function], list[list[str]]]]:

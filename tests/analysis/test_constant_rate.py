@@ -73,6 +73,7 @@ def test_the_series_is_that_of_the_closed_form(method):
             assert abs(value - mpmath.mpf(term.p) / term.q) < 1e-12
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rate", RATES)
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
 def test_nine_errors_in_symbols(algorithm, rate):

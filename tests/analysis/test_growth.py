@@ -45,6 +45,7 @@ def test_the_determinant_is_the_sixth_power_of_the_length():
     assert found.as_dict()["invariant"]["length"]["4"] == "1/32 |w1|^2 + 1/128 |w0|^4"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["coning", "sinusoidal", "polynomial"])
 def test_growth_on_a_motion_is_that_of_the_general_rate(name):
     """The invariants, with the derivatives of the motion's rate put in."""
@@ -59,6 +60,7 @@ def test_growth_on_a_motion_is_that_of_the_general_rate(name):
     assert sp.simplify(general.determinant[power].subs(values) - special.determinant[power]) == 0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
 def test_contraction(algorithm):
     """The imaginary axis in the stability regions of the textbooks: 3^(1/2) and 8^(1/2), twice that for parameters."""
@@ -76,6 +78,7 @@ def test_contraction(algorithm):
     assert high > low
 
 
+@pytest.mark.long
 @settings(max_examples=10, deadline=None)
 @given(st.floats(0.05, 6.0))
 def test_runs_grow_as_the_stretch_says(angle):

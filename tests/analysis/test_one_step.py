@@ -49,6 +49,7 @@ def test_fourth_order_at_a_constant_rate(algorithm, share):
         assert drift.parts == {5: w[axis] * square**2 * sp.Rational(1, 120 * share)}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
 @pytest.mark.parametrize("method", ["magnus4", "magnus6", "munthe-kaas4"])
 def test_exponentials_are_exact_at_a_constant_rate(algorithm, method):

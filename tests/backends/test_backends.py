@@ -357,6 +357,7 @@ def test_a_step_takes_increments_beside_its_own_on_every_back_end(
         assert np.abs(state - expected).max() <= roundoff(backend, 60)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("count", "previous", "ahead"), [(1, 1, 0), (1, 0, 1), (2, 2, 1)])
 def test_an_exact_fit_needs_no_more_samples(make, count, previous, ahead):
     # A rate that rises linearly: whatever fits it gives the step of two increments.

@@ -62,6 +62,7 @@ def test_a_copy_of_an_evaluator_gives_the_same(name):
     np.testing.assert_array_equal(copied(evaluator)(state), evaluator(state))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", BACKENDS)
 def test_a_copy_of_an_algorithm_in_two_speeds_runs_bit_for_bit_the_same(name, rng):
     runner = TwoSpeed("euler", 2, name)
@@ -84,6 +85,7 @@ def test_a_back_end_that_was_built_by_hand_can_be_copied(increments):
     )
 
 
+@pytest.mark.long
 def test_a_copy_refuses_what_the_back_end_refuses(increments):
     backend = strapgen.backend(catalogue.choose(str(ALGORITHMS / "mrp.py")))
     with pytest.raises(InputError, match="has nothing to orthonormalize its state with"):

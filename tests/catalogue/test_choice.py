@@ -172,6 +172,7 @@ def test_each_is_compared_and_checked_for_itself(chosen, rng):
     assert findings["order"].measured == pytest.approx(2, abs=0.15)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("command", "columns"),
     [

@@ -79,6 +79,7 @@ def drawn(choice, rng, unit=1024):
     }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "constants"),
     [
@@ -117,6 +118,7 @@ def test_zero_coefficients_cost_nothing():
     assert count("coning-increments", {"a": 0, "b": 0, "g": 1}) == 0
 
 
+@pytest.mark.long
 def test_the_formulas_are_those_that_the_error_model_builds_with_its_constants():
     names = {symbol.name: Fraction(0) for symbol in source_structure().forms}
     built = imu_compensate(constants=names | {"K_xx": Fraction(1, 2000), "cycle": Fraction(1, 50)})

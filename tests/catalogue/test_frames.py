@@ -74,6 +74,7 @@ def faults(choice: Choice) -> list[str]:
     return wrong
 
 
+@pytest.mark.long
 def test_every_vector_states_its_frame_and_a_state_keeps_it():
     assert [fault for choice in SHORT for fault in faults(choice)] == []
 

@@ -485,6 +485,7 @@ def test_every_kernel_can_be_shown(kernel, strapgen_says):
 # generate
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("target", TARGETS)
 def test_generate_json(target, strapgen_says, tmp_path):
     command = f"generate cayley-klein --method rk3 --increments 2 --target {target} --out out --format json"
@@ -574,6 +575,7 @@ def test_a_tableau_of_a_file_becomes_c_that_compiles(strapgen_says, tmp_path):
     assert (done.returncode, done.stderr) == (0, "")
 
 
+@pytest.mark.long
 def test_previous_increments_on_the_command_line(strapgen_says):
     run = f"{CONING} --format json"
     data = json.loads(strapgen_says(f"simulate euler --increments 1 --previous 2 {run}"))
@@ -834,6 +836,7 @@ def test_unit_of_rates_matters(strapgen_says):
     assert not np.allclose(*last)
 
 
+@pytest.mark.long
 def test_increments_left_over_are_told(strapgen_says):
     options = f"--increments 3 --increments-csv {DATA}/increments.csv"
     assert json.loads(strapgen_says(f"simulate euler {options} --format json"))["unused_increments"] == 1
@@ -841,6 +844,7 @@ def test_increments_left_over_are_told(strapgen_says):
     assert said.endswith("1 increments at the end make no whole step and were not used\n")
 
 
+@pytest.mark.long
 def test_recording_into_files(strapgen_says, tmp_path):
     pytest.importorskip("matplotlib")
     options = f"--rates-csv {DATA}/rates_even.csv --rate-unit deg/s"
@@ -1008,6 +1012,7 @@ def test_tables_run_on_every_back_end_by_default(strapgen_says):
     assert {entry["backend"] for entry in entries} == set(BACKENDS) - {"fixed-model", "exact"}
 
 
+@pytest.mark.long
 def test_tables_in_fixed_point_mark_what_round_off_dominates(strapgen_says):
     said = strapgen_says("tables --backend c-fixed32")
     assert "r round-off dominates" in said
@@ -1027,6 +1032,7 @@ def test_round_off_of_table_5(strapgen_says):
     assert abs(drift("c-fixed32", "--carry full") - double) < 1e-7
 
 
+@pytest.mark.long
 def test_one_table_by_its_number(strapgen_says, tmp_path):
     pytest.importorskip("matplotlib")
     said = strapgen_says("tables --table 5 --backend numpy --plot table.svg")
@@ -1175,6 +1181,7 @@ def test_converge_prints_what_python_finds(strapgen_says):
         assert [rung["step_s"] for rung in data["rungs"]] == [0.125, 0.0625, 0.03125]
 
 
+@pytest.mark.long
 def test_converge_takes_as_many_increments_as_the_method_needs(strapgen_says):
     said = strapgen_says(
         "converge euler --method rk2,butcher6 --increments enough --steps 1/8,1/16 --duration 1 --format csv"
@@ -1261,6 +1268,7 @@ def test_tables_predicted(strapgen_says):
         assert f"Table {table.number}" in said
 
 
+@pytest.mark.long
 def test_strapdown_is_the_course_of_python(strapgen_says, tmp_path):
     log = DATA.parents[1] / "examples" / "inertial_log.csv"
     command = (

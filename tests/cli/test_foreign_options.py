@@ -76,6 +76,7 @@ def test_json_has_what_was_agreed(check, tmp_path):
     assert [each["name"] for each in checks if each["holds"] is False] == ["runs"]
 
 
+@pytest.mark.long
 def test_the_page_of_the_examples_names_every_fault_as_the_command_does(check):
     page = (ROOT / PLACE / "README.md").read_text()
     rows = dict(re.findall(r"^\| `(\w+\.c)` \| .*? \| (.*?) \| [\d.]+ \|$", page, flags=re.MULTILINE))

@@ -32,6 +32,7 @@ CONSTANTS = (
 )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "command",
     [

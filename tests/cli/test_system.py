@@ -124,6 +124,7 @@ def test_a_picture_of_the_page_is_that_of_its_example(example, picture, tmp_path
     assert (tmp_path / f"{picture}.svg").read_text() == (root / "docs" / f"{picture}.svg").read_text()
 
 
+@pytest.mark.long
 @each("name", ["two", "att"])
 def test_a_drawing_shows_every_stage_input_and_wire(name, two, capsys):
     run(f"{name}.toml --draw {name}.svg", capsys)

@@ -100,6 +100,7 @@ def test_a_window_that_amplifies_is_told(run):
     assert "; a higher --now-noise lowers it\n" in warned and "F_0" not in warned
 
 
+@pytest.mark.long
 def test_a_spectrum_shapes_the_filters(run, tmp_path):
     (tmp_path / "psd.csv").write_text("frequency_hz,density,angle_x_rad\n1,1e-3,1\n5,1e-3,1\n")
     command = "window design --previous 2 --ahead 2 --powers 2 --band 1.3 --coefficients 1"

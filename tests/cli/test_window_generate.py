@@ -59,6 +59,7 @@ def test_options_choose_numbers_attitude_and_name(run):
     assert data["operations"] == sources("window-3-3", "dcm", "c-float").operations
 
 
+@pytest.mark.long
 def test_filters_for_a_gyro_are_refused_at_another_rate(run, tmp_path):
     family = replace(
         WINDOWS["window-3-3"],
@@ -103,6 +104,7 @@ def test_wrong_options_are_refused_in_one_line(options, message, run, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.long
 def test_fixed_point_has_its_options_in_the_command(run, tmp_path):
     options = "--target c-fixed --max-rate-deg-s 400 --sample-hz 100 --carry full"
     status, said, _ = run(f"window generate window-3-3 {options} --out out")

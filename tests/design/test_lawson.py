@@ -25,6 +25,7 @@ def test_the_noise_gain_of_a_filter_without_samples_ahead_is_the_one_that_is_kno
     assert round(float(sum(tap * tap for tap in taps)) ** 0.5) == 98
 
 
+@pytest.mark.long
 def test_the_level_is_near_that_of_the_exchange():
     (taps,) = lawson.design(Shape(3, 3, 4), [1], BAND)
     # The iteration approaches 2.160751e-3 from above; sixty rounds leave less than 1 %.

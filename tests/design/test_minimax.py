@@ -125,6 +125,7 @@ def test_without_free_unknowns_the_conditions_give_the_filter():
     assert float(filter.level) == pytest.approx(expected, rel=1e-12)
 
 
+@pytest.mark.long
 def test_a_band_that_is_too_narrow_is_refused():
     with pytest.raises(InputError, match=r"a wider band|too narrow"):
         minimax.design(Unknowns(Shape(12, 12, 4), 1), Fraction(1, 10**7))

@@ -40,6 +40,7 @@ def test_conditions_hold_exactly_whatever_is_rounded(shape, rng):
         assert all((tap * 2**12).denominator == 1 for tap in unknowns.values(taps)[unknowns.inner :])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "bits"), [("window-3-3", 15), ("window-5-5", 24), ("window-4-2", 24)])
 def test_words_hold_the_sum_and_the_first_moment_exactly(name, bits):
     window = WINDOWS[name]

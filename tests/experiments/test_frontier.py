@@ -64,6 +64,7 @@ def test_candidates_that_cannot_be_chosen(name, words):
         candidates([name])
 
 
+@pytest.mark.long
 def test_costs_are_those_of_the_program_for_each_sample(study):
     _, _, standings = study
     by_name = {standing.name: standing for standing in standings}

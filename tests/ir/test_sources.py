@@ -63,6 +63,7 @@ def test_named_command_makes_the_same_text(kernel, target, tmp_path, capsys):
     assert written == sources.files
 
 
+@pytest.mark.long
 def test_command_names_what_is_not_the_default():
     program = pipeline.lower(pipeline.derive("cayley-klein", "rk3", 4))
     (text,) = pipeline.generate(program, "numpy").files.values()

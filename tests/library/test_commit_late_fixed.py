@@ -36,6 +36,7 @@ def test_rounded_filters_hold_their_first_two_conditions_exactly():
             assert max(abs(tap - exact / unit) for tap, exact in zip(taps, rows[m], strict=True)) < 4
 
 
+@pytest.mark.long
 def test_filters_of_counts_have_their_scale():
     scale = Sensor.of("0.0175dps", Fraction(1, 100))
     (_, rotation, _), integers, filters = fixed(sensor=scale, largest_angle=Fraction(7, 100))

@@ -181,6 +181,7 @@ def test_a_turn_of_constant_radius_comes_round(rng):
     assert abs(navigator["velocity"][2]) < 1e-9  # held
 
 
+@pytest.mark.long
 def test_schuler_pumping_is_the_sum_of_two_sines():
     radius, g, bias = 6373388.0, 9.81, 100 * 9.81e-6
     ws = schuler_rate(g, radius)

@@ -133,6 +133,7 @@ def test_a_recording_on_the_disk_has_the_bits_of_one_in_memory(read, tmp_path, r
     np.testing.assert_array_equal(data.increments, in_memory.increments)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("hz", [3, 999, 1000, 7777])
 def test_resampling_in_parts_has_the_bits_of_all_at_once(hz, tmp_path, request):
     path = long_file(tmp_path / "gyro.csv", 2_500)

@@ -472,6 +472,7 @@ def test_the_first_increments_of_a_recording_are_those_before_the_first_step(cou
     np.testing.assert_allclose(history.states, states, rtol=0, atol=16 * steps * 2.0**-53)
 
 
+@pytest.mark.long
 def test_a_recording_that_is_as_long_as_a_first_step(even):
     backend = strapgen.backend("euler", "rk4", 2, "numpy", previous=3)
     history = propagate(backend, Recording(even.start, even.interval, even.increments[:5]))
@@ -513,6 +514,7 @@ def outcome(call) -> object:
             return str(error)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", EXTREME)
 def test_extreme_recordings_are_run_or_refused_and_nothing_warns(name, write):
     path = write([[repr(time), *[value] * 6] for time, value in EXTREME[name]])

@@ -115,6 +115,7 @@ def test_the_orders_on_rates_and_on_increments_differ_as_the_series_predict(meth
     assert orders[0] > orders[1] + 1, "the extraction of the rate loses orders"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("part", [None, 7])
 def test_an_initial_attitude_turns_the_error(make, algorithm, part, monkeypatch):
     if part is not None:

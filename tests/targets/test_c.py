@@ -205,6 +205,7 @@ def pairs(kernel: str) -> list[tuple[str, str]]:
     ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("target", TARGETS)
 def test_output_may_be_an_input(target, library, rng):
     checked = 0

@@ -147,6 +147,7 @@ def test_whole_runs_agree_bit_for_bit(choice, word, carry, rng):
     np.testing.assert_array_equal(in_c.propagate(increments, 3, 10), model.propagate(increments, 3, 10))
 
 
+@pytest.mark.long
 def test_a_long_run_agrees_bit_for_bit(rng):
     fixed = quantized(EULER, Settings(32, Fraction(1, 60), carry="full"))
     in_c, model = (build(generate(fixed, target)) for target in ("c-fixed", "fixed-model"))

@@ -63,6 +63,7 @@ def test_every_generated_header_is_read_back():
         assert f'_DIGEST "{contract.digest}"' in path.read_text()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("choice", "settings"),
     [

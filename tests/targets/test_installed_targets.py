@@ -61,6 +61,7 @@ def lists(values: np.ndarray) -> list[float] | float:
     return values.reshape(-1).tolist() if values.ndim else float(values)
 
 
+@pytest.mark.long
 def test_the_example_computes_what_numpy_does(toy, rng):
     """Bit for bit, but where the sines of two libraries are rounded differently."""
     with_sines = 0

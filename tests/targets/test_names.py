@@ -403,6 +403,7 @@ def test_names_that_would_become_the_same_are_kept_apart():
     )
 
 
+@pytest.mark.long
 def test_the_interface_keeps_the_names_of_the_kernel():
     called = HARMLESS._replace(elements=(*"kqjp", "i", "count", "out", "batch", "x", "status", *"abcdef"))
     for target in targets.TARGETS:

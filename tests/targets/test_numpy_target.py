@@ -57,6 +57,7 @@ def as_tuple(result) -> tuple[np.ndarray, ...]:
     return result if isinstance(result, tuple) else (result,)
 
 
+@pytest.mark.long
 @each("kernel", KERNELS)
 def test_leading_axes_are_samples(kernel, rng):
     program = programs()[kernel]

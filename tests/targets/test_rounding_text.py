@@ -53,6 +53,7 @@ def test_the_text_of_a_step_is_a_bound_of_runs():
     assert 1 + Fraction(growth) >= bounds.accumulation.growth
 
 
+@pytest.mark.long
 def test_all_conditions_are_told():
     assert "from 0.75 to 1.34375" in said("euler-normalize")[1]
     assert "sin of the C library within a unit in the last place" in said("dcm-update")[1]

@@ -20,6 +20,7 @@ def paragraphs(algorithm: str, settings: Settings, method: str = "rk4") -> list[
     return run_paragraphs(quantized(choice, settings).interface, program(choice))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("carry", ["none", "full"])
 @pytest.mark.parametrize("algorithm", ["euler", "cayley-klein", "dcm"])
 def test_examples_are_the_formula_rounded_up(algorithm, carry):

@@ -42,6 +42,7 @@ def file(tmp_path: Path) -> Path:
     return tmp_path / "calls.c"
 
 
+@pytest.mark.long
 def test_a_function_gets_every_argument_and_a_run_begins_where_it_says(file):
     arguments = read_arguments("state[4], previous[1][3], increments[2][3], dt, step -> next[4]")
     module = compile_foreign(ForeignSource(file, "look", arguments, "begin"))

@@ -60,6 +60,7 @@ def test_equations_73_79_and_81_follow_from_the_recursion_56(name):
     assert same(found.expression("error"), SCULLING * (fast - 1))
 
 
+@pytest.mark.long
 def test_equation_80_follows_from_the_recursion_55():
     """S1 has half the mean of beta x u at the end of a slow cycle beside S2, in the algorithm as in truth."""
     first, second = (vibration.of(choose(f"sculling-fast-{form}"), "sculling") for form in (1, 2))
@@ -200,6 +201,7 @@ def named(options):
     return choose(*options)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("options", "periods", "phase"),
     [

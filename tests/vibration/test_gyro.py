@@ -51,6 +51,7 @@ class SeenCone(IntegratedMotion):
         return self._reference(time)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("hertz", [7.5, 18.5])
 @pytest.mark.parametrize(
     ("method", "increments", "previous"),

@@ -127,6 +127,7 @@ def test_any_angles_of_the_torquers_leave_determinant_and_gains():
     assert sp.simplify(matrix.det() ** 2 - (b2 * b3 * (b2 - b3)) ** 2) == 0
 
 
+@pytest.mark.long
 def test_unbalances_that_are_inputs_have_no_fixed_point_until_they_are_constants():
     free = choose("separate", layout=layout("turned"))
     assert [signal.name for signal in kernel(free).inputs] == [

@@ -27,6 +27,7 @@ def test_the_coefficients_meet_the_condition_of_the_order_of_the_exponentials():
     assert total == Fraction(1, 6)
 
 
+@pytest.mark.long
 def test_a_constant_rate_is_integrated_exactly():
     turn = np.tile([0.3, -0.4, 0.5], (1, 2, 1)) / 2
     state = strapgen.backend("euler", "crouch-grossman3", 2).propagate(turn)[-1]

@@ -85,6 +85,7 @@ def test_small_samples_are_crossed_with_the_combined_coefficients(transition):
     assert (turned[0, 2] - turned[1, 2]) / 2 == pytest.approx(expected, rel=1e-6)
 
 
+@pytest.mark.long
 def test_the_rest_consists_of_products_of_high_degree():
     """Both forms are exact for products of powers to the same total degree, three samples and two before them to 4."""
     kernel = derive(choose("euler", "coning-exact-rest", 3, previous=2))

@@ -49,6 +49,7 @@ def test_the_mean_square_is_below_that_of_coefficients_for_low_frequencies(incre
     assert sizes[0] < 0.7 * sizes[1]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("increments", "previous", "frequency", "degrees"),
     [(1, 1, 10, 0.05), (4, 0, 20, 0.001), (1, 4, 20, 0.05)],

@@ -431,6 +431,7 @@ def test_attitudes_of_a_state_of_its_own_are_those_of_euler_parameters(here):
     assert np.abs(run.error).max() < 1e-7
 
 
+@pytest.mark.long
 def test_users_algorithms_are_derived_and_compared(here, strapgen_says):
     assert "Modified Rodrigues parameters: step by" in strapgen_says(
         "derive mrp.py --method rk2 --previous 1"

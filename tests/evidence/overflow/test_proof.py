@@ -41,6 +41,7 @@ def faulty(subject, fault):
     return {**files, f"{subject.name}.c": files[f"{subject.name}.c"].replace(right, wrong)}
 
 
+@pytest.mark.long
 @needs_z3
 @pytest.mark.parametrize("fault", QUICK_FAULTS)
 def test_the_solver_notices(fault):

@@ -66,8 +66,10 @@ def singular_value_bounds(
     if not _turns_with_vectors(elements):
         return coarse
     lengths = [_length(sizes[k : k + _SPACE]) for k in range(0, len(sizes), _SPACE)]
-    orders = itertools.permutations(range(vectors))
-    in_plane = [_excess(_in_plane(elements, order, lengths), width) for order in orders]
+    in_plane = [
+        _excess(_in_plane(elements, order, lengths), width)
+        for order in itertools.permutations(range(vectors))
+    ]
     excess = [_in_powers(matrix, side, vectors) for matrix in in_plane for side in (1, -1)[:vectors]]
     return Interval.of(*eigenvalue_bounds(excess, _samples(vectors), known, _is_outside))
 
