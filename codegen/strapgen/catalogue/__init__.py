@@ -9,6 +9,7 @@ from __future__ import annotations
 from strapgen.catalogue.choice import Choice, increments, orthonormalizations, previous
 from strapgen.catalogue.choosing import choose, choose_step, standard, with_constants
 from strapgen.catalogue.derivation import companion, derive, enough, nodes, rounding
+from strapgen.catalogue.loop_names import LOOPS
 from strapgen.catalogue.names import (
     ALGORITHMS,
     COMPENSATION,
@@ -39,6 +40,7 @@ __all__ = [
     "INTEGRATORS",
     "KERNELS",
     "LAYOUT_KERNELS",
+    "LOOPS",
     "METHODS",
     "MOST_BESIDE",
     "MOST_INCREMENTS",

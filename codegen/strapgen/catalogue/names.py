@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from strapgen.catalogue.loop_names import LOOPS
 from strapgen.catalogue.methods.shaped_coning import SHAPE_TITLES
 from strapgen.catalogue.methods.tableaux import TITLES
 from strapgen.catalogue.methods.windows import EXACT_TERMS, WINDOW_TITLES
@@ -343,6 +344,7 @@ KERNELS = {
     **REDUNDANCY,
     **OUTPUTS,
     **TWO_ROWS,
+    **LOOPS,
 }
 
 

@@ -234,7 +234,8 @@ class _Printer:
                 places = places_between(there.argument, here.argument)
                 before.append(f"{self._rescale(there, here)}({local}, {source}, {signal.size}, {places});")
                 source = local
-            inputs.append(source)
+            by_value = sources.fixed is None and not signal.shape  # integers are passed by address
+            inputs.append(f"*{source}" if by_value else source)
         if sources.fixed is not None and sources.fixed.residuals:
             inputs.append(f"memory->residuals_{stage.name}")
         results = dict(stage.results)

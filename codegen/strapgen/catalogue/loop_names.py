@@ -1,0 +1,18 @@
+"""The names of the kernels of an attitude and heading reference, as plain data."""
+
+from __future__ import annotations
+
+from strapgen.catalogue.recipe import Recipe
+
+#: Kernels of the loops of an attitude and heading reference; they take no method.
+LOOPS = {
+    name: Recipe(title, f"loops.{module}", function, (), False)
+    for name, title, module, function in (
+        ("level-loop", "levelling loop of third order", "level", "level_loop"),
+        ("erection", "erection loop of the attitude mode", "level", "erection"),
+        ("heading-loop", "heading loop of second order", "heading", "heading_loop"),
+        ("heading-from-dcm", "heading of an attitude", "heading", "heading_of_attitude"),
+        ("vertical-loop", "vertical loop of third order", "vertical", "vertical_loop"),
+        ("body-feedback", "feedback of the loops in body axes", "feedback", "body_feedback"),
+    )
+}
