@@ -31,6 +31,7 @@ from strapgen.cli.commands import (
     strapdown,
     study,
     study_attitude_form,
+    study_calibration,
     study_loops,
     study_output_filter,
     study_redundancy,
@@ -101,6 +102,7 @@ study.app.command("attitude-form", cls=PlainCommand)(study_attitude_form.study_a
 study.app.command("output-filter", cls=PlainCommand)(study_output_filter.study_output_filter)
 
 study.app.command("redundancy", cls=PlainCommand)(study_redundancy.study_redundancy)
+study.app.command("calibration", cls=PlainCommand)(study_calibration.study_calibration)
 study.app.command("loops", cls=PlainCommand)(study_loops.study_loops)
 
 app = typer.Typer(

@@ -40,7 +40,11 @@ class WorkerOptions:
     ] = None
     cluster: Annotated[
         str | None,
-        option("--cluster", metavar="local:N", help="Run the cases on a Dask cluster of N workers here."),
+        option(
+            "--cluster",
+            metavar="CLUSTER",
+            help="local:N runs the cases on a Dask cluster of N workers on this machine.",
+        ),
     ] = None
 
     def count(self) -> int | None:
