@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields
 from fractions import Fraction
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -271,11 +272,21 @@ def exponential(matrix: Array) -> Array:
     return np.asarray(total)
 
 
+def _unchecked(name: str, backend: str, inputs: Array) -> Callable[..., Any]:
+    """Return a kernel for as many runs as `inputs` has rows, without the checks of arrays, most of a call."""
+    kernel, batch = backends.evaluator(name, backend), (len(inputs),)
+
+    def call(*values: Any) -> tuple[Array, ...]:
+        return kernel.evaluate([np.asarray(value, float) for value in values], batch)
+
+    return call
+
+
 class _LevelPlant:
     """The channel of V_y and phi_x, with the kernel of levelling or of erection."""
 
     def __init__(self, schedule: LoopSchedule, inputs: Array, backend: str) -> None:
-        self._kernels = {name: backends.evaluator(name, backend) for name in ("level-loop", "erection")}
+        self._kernels = {name: _unchecked(name, backend, inputs) for name in ("level-loop", "erection")}
         self._cycle, self._gravity = float(schedule.cycle_s), float(schedule.gravity)
         self._curvature = 1 / float(schedule.radius)
         self._drift, self._force, reference = inputs.T
@@ -314,7 +325,7 @@ class _HeadingPlant:
     """The heading, which the commanded rate turns."""
 
     def __init__(self, schedule: LoopSchedule, inputs: Array, backend: str) -> None:
-        self._kernel = backends.evaluator("heading-loop", backend)
+        self._kernel = _unchecked("heading-loop", backend, inputs)
         self._cycle = float(schedule.cycle_s)
         self._drift, self._reference = inputs.T
 
@@ -337,7 +348,7 @@ class _VerticalPlant:
     """The vertical channel, whose states are all in the kernel."""
 
     def __init__(self, schedule: LoopSchedule, inputs: Array, backend: str) -> None:
-        self._kernel = backends.evaluator("vertical-loop", backend)
+        self._kernel = _unchecked("vertical-loop", backend, inputs)
         self._cycle, self._gravity = float(schedule.cycle_s), float(schedule.gravity)
         self._gradient = 2 * self._gravity / float(schedule.radius)
         force, self._reference = inputs.T
