@@ -138,6 +138,7 @@ def test_what_is_refused(tmp_path, capsys):
         ),
         (f"{tmp_path}/third.toml", "the heading loop has order 3; 2 is possible"),
         ("--set tilt=3", "tilt"),
+        ("--set heading_deg=180", "heading_deg is 180; a magnitude below 180 is needed"),
         ("--last 0.005", "mode normal: duration_s is no whole number of cycles of 0.01 s"),
         ("--last 1e6", "cycles; 1 to 1000000 are possible"),
         ("--backend c-fixed32", "backend"),

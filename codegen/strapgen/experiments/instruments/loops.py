@@ -31,6 +31,8 @@ UNITS = {
 #: Records of a mode for a picture, and most cycles of a run.
 _RECORDS, _LONGEST = 150, 1_000_000
 _TERMS = 24
+#: What an error has to be smaller than; a larger heading error would be taken for that on the other side.
+_LARGEST = {"heading_deg": 180.0}
 
 
 @dataclass(frozen=True)
@@ -60,8 +62,9 @@ class LoopErrors:
 
     def __post_init__(self) -> None:
         for field in fields(self):
-            if not math.isfinite(getattr(self, field.name)):
-                raise InputError(f"{field.name} is no finite number")
+            value, largest = getattr(self, field.name), _LARGEST.get(field.name, 1e6)
+            if not abs(value) < largest:
+                raise InputError(f"{field.name} is {value:g}; a magnitude below {largest:g} is needed")
 
     def cases(self, loop: str, gravity: float) -> dict[str, tuple[dict[str, float], dict[str, float]]]:
         """Return the cases of a loop: constant inputs and states at the start, in SI units, by the name of the case."""
@@ -213,7 +216,7 @@ def _course(
     start = np.array([[begin.get(name, 0.0) for name in full.states] for _, begin in cases.values()])
     cycle = float(schedule.cycle_s)
     plant = _PLANTS[loop](schedule, inputs, backend)
-    run, exact, times, ends = [start], [start], [0.0], []
+    run, exact, cycles, ends = [start], [start], [0], []
     for mode, count in zip(modes, cycles_of_modes(schedule, modes), strict=True):
         setting = mode.loop(loop)
         spacing = max(1, count // _RECORDS)
@@ -225,9 +228,10 @@ def _course(
             part = min(spacing, count - first)
             run.append(plant.run(setting.loop, gains, part))
             exact.append(_advance(matrices, exact[-1], inputs, part * cycle))
-            times.append(times[-1] + part * cycle)
-        ends.append(len(times) - 1)
-    return LoopCourse(loop, tuple(cases), np.array(times), np.array(run), np.array(exact), tuple(ends))
+            cycles.append(cycles[-1] + part)
+        ends.append(len(cycles) - 1)
+    times = np.array([float(count * schedule.cycle_s) for count in cycles])
+    return LoopCourse(loop, tuple(cases), times, np.array(run), np.array(exact), tuple(ends))
 
 
 def _matrices(schedule: LoopSchedule, setting: LoopSetting, loop: str) -> tuple[Array, Array]:
