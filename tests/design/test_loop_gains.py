@@ -6,6 +6,7 @@ from fractions import Fraction
 import pytest
 import sympy as sp
 
+from strapgen.catalogue.kernels.loops.level import level_loop
 from strapgen.design import loop_gains
 from strapgen.design.loop_gains import (
     ORDERS,
@@ -19,6 +20,7 @@ from strapgen.design.loop_gains import (
     s,
     symbolic_gains,
     tau,
+    z,
 )
 from strapgen.support.exceptions import InputError
 
@@ -104,6 +106,51 @@ def test_between_the_calls_the_tilt_splits_the_poles_of_levelling():
         moved = [abs((pole - 1) / ratio + 1) for pole in poles]
         assert 0.5 * ratio ** (1 / 3) < max(moved) < 1.5 * ratio ** (1 / 3)
         assert abs(poles[0]) < 1
+
+
+@pytest.mark.parametrize(
+    ("name", "order", "limit"),
+    [("level", 3, "2/3"), ("erection", 2, "1"), ("heading", 2, "2"), ("vertical", 3, "2")],
+)
+def test_the_longest_stable_cycle_is_a_part_of_the_time_constant(name, order, limit):
+    loop = closed_loop(name, order)
+    known = dict(zip(loop.gains, symbolic_gains(name, order), strict=True))
+    matrix = loop.cycle.subs(known).subs(T, sp.Rational(limit) * tau)
+    assert sp.simplify(matrix.charpoly(z).as_expr().subs(z, -1)) == 0
+    for part, stable in ((0.999, True), (1.001, False)):
+        values = gains(name, Fraction(10), order)
+        poles = poles_of_a_cycle(name, values, Fraction(part) * 10 * Fraction(limit))
+        assert (abs(poles[0]) < 1) == stable
+
+
+@pytest.mark.parametrize(("seconds", "cycle"), [(Fraction(10**6), "1e-5"), (Fraction(1, 1000), "1e3")])
+def test_poles_of_the_shortest_and_of_the_longest_cycle(seconds, cycle):
+    for name, order in LOOPS:
+        poles = poles_of_a_cycle(name, gains(name, seconds, order), Fraction(cycle))
+        assert len(poles) == order
+        assert (abs(poles[0]) < 1) == (seconds > 1), name
+
+
+def test_both_channels_of_levelling_have_the_same_poles_and_one_with_signs_of_the_other_is_unstable():
+    kernel = level_loop()
+    states = V, phi, B = sp.symbols("V phi B")
+    names = [name for signal in kernel.inputs for name in signal.elements]
+
+    def polynomial(velocity, turned):
+        zero = dict.fromkeys(names, sp.S.Zero) | {k: sp.Symbol(k) for k in ("k1", "k2", "k3")}
+        place, other = "xy".index(velocity), "yx"["xy".index(velocity)]
+        known = zero | {"curvature": 1 / R, f"V_{velocity}": V, f"B_{other}": B}
+        later = kernel.expand(known | {"cycle": T, f"change_{velocity}": turned * T * g * phi})
+        rate = kernel.expand(known)["level_rate"][1 - place]
+        changes = sp.Matrix(
+            [later["next_level_velocity"][place], phi - T * rate, later["next_level_bias"][1 - place]]
+        )
+        return sp.expand(changes.diff(T).subs(T, 0).jacobian(states).charpoly(s).as_expr())
+
+    # The specific force is g phi_x along y, and -g phi_y along x.
+    assert polynomial("y", 1) == polynomial("x", -1)
+    wrong = sp.Poly(polynomial("x", 1), s).all_coeffs()
+    assert any(sp.simplify(c.subs({sp.Symbol(k): 1 for k in ("k1", "k2", "k3")})).is_negative for c in wrong)
 
 
 def test_a_cycle_that_is_too_long_is_refused_in_one_line():

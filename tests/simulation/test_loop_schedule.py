@@ -68,6 +68,7 @@ CHANGES = {
     "twice": ('"fine"', '"fast"', "two modes of the schedule have the same name"),
     "order": ("tau_s = 5,", "tau_s = 5, order = 4,", "order of the level loop is 4"),
     "hysteresis": ('off_m_s = "463/9"', "off_m_s = 60", "air_data_off_m_s is 60; at most"),
+    "slow": ("tau_s = 5,", "tau_s = 1e7,", "tau_s of the level loop is 1e7; 0.001 to 1e+06 is possible"),
     "text": ("duration_s = 30", "duration_s = true", "mode fast: duration_s is no number"),
 }
 

@@ -272,3 +272,36 @@ def test_a_step_in_a_system_is_the_step_alone_on_the_samples_that_it_collects(
         state = function(state, collected[first : first + samples_per_step + beside])
         assert np.array_equal(state, expected)
     assert len(states) == 24 // samples_per_step
+
+
+SCALARS = """
+name = "course_only"
+sample_hz = 100
+outputs = ["heading.next_heading_bias", "heading.heading_rate"]
+
+[inputs.course]
+unit = "rad"
+range = 3
+
+[inputs.flux_valve]
+unit = "rad"
+range = 3
+
+[[stage]]
+name = "heading"
+kernel = "heading-loop"
+every = 1
+wires = { heading = "course", magnetic_heading = "flux_valve" }
+constants = { cycle = "T", k1 = 0.5, k2 = 0.0625 }
+"""
+
+
+def test_scalars_go_into_a_stage_on_every_back_end(tmp_path, rng):
+    system = description(tmp_path, SCALARS)
+    inputs = {name: rng.uniform(-0.5, 0.5, 50) for name in ("course", "flux_valve")}
+    double = system_runner(system, "numpy").run(inputs)
+    for backend, limit in (("c", 1e-14), ("c-fixed32", 1e-7)):  # 32 bits of headings up to 3 rad
+        run = system_runner(system, backend).run(inputs)
+        for name, values in double.values.items():
+            assert np.abs(values).max() > 1e-4
+            assert np.abs(run.values[name] - values).max() < limit, (backend, name)

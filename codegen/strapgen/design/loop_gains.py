@@ -22,7 +22,7 @@ tau, g, R, T = sp.symbols("tau g R T", positive=True)
 #: Gravity in m/s^2 and radius of the earth in m of the source.
 GRAVITY, RADIUS = Fraction(981, 100), Fraction(6_373_388)
 #: Digits to which poles of a cycle are computed, of which three that nearly coincide lose two thirds.
-_DIGITS = 60
+_DIGITS, _MOST_STEPS = 60, 2000
 
 
 @dataclass(frozen=True)
@@ -158,8 +158,8 @@ def closed_loop(name: str, order: int | None = None) -> ClosedLoop:
 
     Examples
     --------
-    >>> closed_loop("erection").continuous
-    Matrix([[-k1, g], [-k2, 0]])
+    >>> closed_loop("erection").continuous.tolist()
+    [[-k1, g], [-k2, 0]]
     """
     loop = _LOOPS[checks.choice("loop", name, _LOOPS)]()
     if order is None or order == len(loop.states):
@@ -256,8 +256,11 @@ def poles_of_a_cycle(
     loop = closed_loop(name, order if order in ORDERS[name] else None)
     known = dict(zip(loop.gains, values, strict=False)) | {T: cycle_s, g: gravity, R: radius}
     matrix = loop.cycle.subs({symbol: sp.Rational(value) for symbol, value in known.items()})
-    _, factors = sp.Poly(matrix.charpoly(z).as_expr(), z).sqf_list()  # roots that coincide converge badly
-    roots = [root for factor, power in factors for root in factor.nroots(n=_DIGITS) * power]
+    # Roots that coincide converge badly, and those that nearly do in a variable where they are not close to 1.
+    scale = sp.Rational(values[0] * cycle_s)
+    _, factors = sp.Poly(matrix.charpoly(z).as_expr().subs(z, 1 + scale * z), z).sqf_list()
+    options = {"n": _DIGITS, "maxsteps": _MOST_STEPS}
+    roots = [1 + scale * root for factor, power in factors for root in factor.nroots(**options) * power]
     return tuple(sorted(map(complex, roots), key=abs, reverse=True))
 
 

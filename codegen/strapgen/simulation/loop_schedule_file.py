@@ -14,6 +14,13 @@ from strapgen.support.exceptions import InputError
 BUILT_IN = Path(__file__).parent / "ltr81.toml"
 #: A longer file is refused.
 _MOST_BYTES, _MOST_MODES = 1 << 16, 50
+#: Least and largest numbers of what decides over gains.
+_LIMITS = {
+    "cycle_s": (Fraction(1, 100_000), Fraction(1000)),
+    "gravity": (Fraction(1, 1000), Fraction(1000)),
+    "radius_m": (Fraction(1000), Fraction(10**10)),
+    "tau_s": (Fraction(1, 1000), Fraction(10**6)),
+}
 _NUMBERS = ("cycle_s", "gravity", "radius_m", "heading_cutout_deg_s", "air_data_on_m_s", "air_data_off_m_s")
 _KEYS = ("title", *_NUMBERS, "mode")
 _MODE_KEYS = ("name", "duration_s", "when", "after_s", "level", "erection", "heading", "vertical")
@@ -96,7 +103,11 @@ def _loop(name: str, table: Any) -> LoopSetting:
 def _number(what: str, value: Any) -> Fraction:
     if isinstance(value, bool) or not isinstance(value, (int, str)):
         raise InputError(f"{what} is no number")
-    return checks.number(what, value, positive=True)
+    exact = checks.number(what, value, positive=True)
+    least, largest = _LIMITS.get(what.split()[0], (exact, exact))
+    if not least <= exact <= largest:
+        raise InputError(f"{what} is {value}; {float(least):g} to {float(largest):g} is possible")
+    return exact
 
 
 def _text(what: str, value: Any) -> str:

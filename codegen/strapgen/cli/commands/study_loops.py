@@ -30,7 +30,7 @@ def study_loops(
     last: Annotated[
         str,
         option("--last", metavar="S", help="Time of a last mode without an end, in s.", panel="Run"),
-    ] = "120",
+    ] = "600",
     backend: Annotated[
         str,
         option("--backend", metavar="NAME", help="Back end: numpy or c.", panel="Run"),

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields
 from fractions import Fraction
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,8 @@ UNITS = {
 #: Records of a mode for a picture, and most cycles of a run.
 _RECORDS, _LONGEST = 150, 1_000_000
 _TERMS = 24
+#: What an error has to be smaller than; a larger heading error would be taken for that on the other side.
+_LARGEST = {"heading_deg": 180.0}
 
 
 @dataclass(frozen=True)
@@ -59,8 +62,9 @@ class LoopErrors:
 
     def __post_init__(self) -> None:
         for field in fields(self):
-            if not math.isfinite(getattr(self, field.name)):
-                raise InputError(f"{field.name} is no finite number")
+            value, largest = getattr(self, field.name), _LARGEST.get(field.name, 1e6)
+            if not abs(value) < largest:
+                raise InputError(f"{field.name} is {value:g}; a magnitude below {largest:g} is needed")
 
     def cases(self, loop: str, gravity: float) -> dict[str, tuple[dict[str, float], dict[str, float]]]:
         """Return the cases of a loop: constant inputs and states at the start, in SI units, by the name of the case."""
@@ -212,7 +216,7 @@ def _course(
     start = np.array([[begin.get(name, 0.0) for name in full.states] for _, begin in cases.values()])
     cycle = float(schedule.cycle_s)
     plant = _PLANTS[loop](schedule, inputs, backend)
-    run, exact, times, ends = [start], [start], [0.0], []
+    run, exact, cycles, ends = [start], [start], [0], []
     for mode, count in zip(modes, cycles_of_modes(schedule, modes), strict=True):
         setting = mode.loop(loop)
         spacing = max(1, count // _RECORDS)
@@ -224,9 +228,10 @@ def _course(
             part = min(spacing, count - first)
             run.append(plant.run(setting.loop, gains, part))
             exact.append(_advance(matrices, exact[-1], inputs, part * cycle))
-            times.append(times[-1] + part * cycle)
-        ends.append(len(times) - 1)
-    return LoopCourse(loop, tuple(cases), np.array(times), np.array(run), np.array(exact), tuple(ends))
+            cycles.append(cycles[-1] + part)
+        ends.append(len(cycles) - 1)
+    times = np.array([float(count * schedule.cycle_s) for count in cycles])
+    return LoopCourse(loop, tuple(cases), times, np.array(run), np.array(exact), tuple(ends))
 
 
 def _matrices(schedule: LoopSchedule, setting: LoopSetting, loop: str) -> tuple[Array, Array]:
@@ -271,11 +276,21 @@ def exponential(matrix: Array) -> Array:
     return np.asarray(total)
 
 
+def _unchecked(name: str, backend: str, inputs: Array) -> Callable[..., Any]:
+    """Return a kernel for as many runs as `inputs` has rows, without the checks of arrays, most of a call."""
+    kernel, batch = backends.evaluator(name, backend), (len(inputs),)
+
+    def call(*values: Any) -> tuple[Array, ...]:
+        return kernel.evaluate([np.asarray(value, float) for value in values], batch)
+
+    return call
+
+
 class _LevelPlant:
     """The channel of V_y and phi_x, with the kernel of levelling or of erection."""
 
     def __init__(self, schedule: LoopSchedule, inputs: Array, backend: str) -> None:
-        self._kernels = {name: backends.evaluator(name, backend) for name in ("level-loop", "erection")}
+        self._kernels = {name: _unchecked(name, backend, inputs) for name in ("level-loop", "erection")}
         self._cycle, self._gravity = float(schedule.cycle_s), float(schedule.gravity)
         self._curvature = 1 / float(schedule.radius)
         self._drift, self._force, reference = inputs.T
@@ -314,7 +329,7 @@ class _HeadingPlant:
     """The heading, which the commanded rate turns."""
 
     def __init__(self, schedule: LoopSchedule, inputs: Array, backend: str) -> None:
-        self._kernel = backends.evaluator("heading-loop", backend)
+        self._kernel = _unchecked("heading-loop", backend, inputs)
         self._cycle = float(schedule.cycle_s)
         self._drift, self._reference = inputs.T
 
@@ -337,7 +352,7 @@ class _VerticalPlant:
     """The vertical channel, whose states are all in the kernel."""
 
     def __init__(self, schedule: LoopSchedule, inputs: Array, backend: str) -> None:
-        self._kernel = backends.evaluator("vertical-loop", backend)
+        self._kernel = _unchecked("vertical-loop", backend, inputs)
         self._cycle, self._gravity = float(schedule.cycle_s), float(schedule.gravity)
         self._gradient = 2 * self._gravity / float(schedule.radius)
         force, self._reference = inputs.T
