@@ -112,7 +112,7 @@ def _square_root(context: DerivationContext, name: str, node: Operation, meaning
 
 def _radicand(context: DerivationContext, node: Node, name: str) -> Operand:
     """Return what a root is drawn from; a sum of squares as squares of words, so that it is not below 0."""
-    factors = _squared_names(node)
+    factors = _squared_names(context, node)
     if not any(context.items[factor].beside or context.items[factor].offset for factor in factors):
         return operand_of(context, node, name)
     terms: Terms = {}
@@ -123,12 +123,17 @@ def _radicand(context: DerivationContext, node: Node, name: str) -> Operand:
     return store_temporary(context, name, terms)
 
 
-def _squared_names(node: Node) -> list[str]:
-    """Return the names whose squares a node is the sum of; none if it is no such sum."""
+def _squared_names(context: DerivationContext, node: Node) -> list[str]:
+    """Return the names whose squares a node is the sum of, squares with a name included; none if it is no such sum."""
+    if isinstance(node, Reference):
+        values = (assignment.value for assignment in context.program.body if assignment.name == node.name)
+        node = next(
+            (value for value in values if isinstance(value, Operation) and value.kind == "multiply"), node
+        )
     if not isinstance(node, Operation):
         return []
     if node.kind == "add":
-        parts = [_squared_names(argument) for argument in node.arguments]
+        parts = [_squared_names(context, argument) for argument in node.arguments]
         return [name for part in parts for name in part] if all(parts) else []
     left, right = node.arguments if node.kind == "multiply" else (None, None)
     return [left.name] if isinstance(left, Reference) and left == right else []

@@ -160,6 +160,17 @@ def test_error_feedback_bounds_a_step_with_a_cosine_as_it_does_others(rng):
     assert 5 * apart["full"][-1] < apart["none"][-1]
 
 
+def test_a_matrix_of_a_rotation_vector_takes_the_increments_apart(rng):
+    # The squares under the root have names, and their sum is not below 0 although increments are split off.
+    settings = Settings.of(**RATES, carry="state")
+    fixed = strapgen.backend("dcm", "coning-compressed", 2, "fixed-model", settings=settings)
+    increments = fixed.representable(rng.uniform(-0.034, 0.034, (200, 2, 3)))
+    double = strapgen.backend("dcm", "coning-compressed", 2).propagate(increments)
+    bounds = [fixed.angle_bound(n, shortest=0.9375) for n in range(1, 201)]
+    assert np.all(angles_apart(fixed.propagate(increments), double)[1:] <= np.array(bounds) + 1e-13)
+    assert bounds[-1] < 200 * 1e-9 / 2
+
+
 @pytest.mark.parametrize("algorithm", ["euler", "dcm"])
 def test_a_state_stays_proper_for_as_many_steps_as_are_proved(algorithm):
     settings = Settings.of(**RATES)
