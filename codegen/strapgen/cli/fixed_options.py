@@ -105,6 +105,24 @@ class FixedOptions:
             "[default: none]",
         ),
     ] = None
+    multiply: Annotated[
+        _Text,
+        option(
+            "--multiply",
+            metavar="NAME",
+            help="How products with a constant are computed: product, or shift-add for sums of shifted terms.  "
+            "[default: product]",
+        ),
+    ] = None
+    digits: Annotated[
+        _Text,
+        option(
+            "--digits",
+            metavar="N",
+            help="Signed digits of a constant with --multiply shift-add; fewer cost less and are less accurate.  "
+            "[default: all]",
+        ),
+    ] = None
     state: Annotated[
         _Text,
         option(
@@ -155,6 +173,8 @@ class FixedOptions:
             "--rounding": self.rounding,
             "--carry": self.carry,
             "--drift-allowance": self.drift_allowance,
+            "--multiply": self.multiply,
+            "--digits": self.digits,
             "--range": self.ranges,
             "--fix": self.formats,
         }
@@ -184,6 +204,8 @@ class FixedOptions:
             state=self.state or "",
             rounding="nearest" if self.rounding is None else self.rounding,
             carry="none" if self.carry is None else self.carry,
+            multiply="product" if self.multiply is None else self.multiply,
+            digits=whole("digits", self.digits) or 0,
             **allowance,
             ranges=_numbers(self.ranges or ()),
             formats=dict(pair("--fix", text) for text in self.formats or ()),

@@ -23,6 +23,7 @@ from strapgen.fixedpoint.words.filters import Factor, filter_words, nearest_word
 from strapgen.ir.fixed_interface import ErrorFeedback
 from strapgen.ir.formats import Format, finest
 from strapgen.ir.integer_program import Coefficient, IntegerSum, Term, Value
+from strapgen.ir.signed_digits import from_digits, signed_digits
 from strapgen.support.exceptions import InputError
 
 
@@ -139,6 +140,8 @@ def _product_term(
         sign = 1 if coefficient > 0 else -1
         return Placed(Term(names, sign), places - exponent(coefficient), up(error))
     factor, bits = rounded or nearest_word(coefficient, context.word)
+    if context.settings.digits and rounded is None:
+        factor = from_digits(signed_digits(factor, context.settings.digits))
     wrong = abs(Fraction(factor, 1) / Fraction(2) ** bits - coefficient)
     stored = values[0].magnitude / Fraction(2) ** values[0].fraction
     term = Term(names, factor, coefficient=Coefficient(coefficient, bits))

@@ -10,6 +10,7 @@ from typing import Any
 
 from strapgen.ir.formats import SHORTEST_WORD, Format, check_rounding, check_word
 from strapgen.ir.sensor import DEFAULT_BITS, Sensor
+from strapgen.ir.signed_digits import MULTIPLICATIONS
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 
@@ -67,6 +68,10 @@ class Settings:
         Bits of an increment in memory; None for those of a word, or of a usual gyro where `sensor` is stated.
     state : str
         "q31", "q15" or "q63" for a state whose elements lie in -1 to 1 less a unit and saturate; "" for room above 1.
+    multiply : str
+        How products with a constant are computed: "product" or "shift-add".
+    digits : int
+        Canonical signed digits of a constant that "shift-add" takes; 0 for all that a word has.
 
     Raises
     ------
@@ -90,6 +95,8 @@ class Settings:
     sensor: Sensor | None = None
     input_bits: int | None = None
     state: str = ""
+    multiply: str = "product"
+    digits: int = 0
 
     def __post_init__(self) -> None:
         check_word(self.word)
@@ -97,6 +104,10 @@ class Settings:
         self._check_state()
         check_rounding(self.rounding)
         checks.choice("carry", self.carry, CARRIES)
+        checks.choice("multiply", self.multiply, MULTIPLICATIONS)
+        checks.count("digits", self.digits, smallest=0, largest=self.word)
+        if self.digits and self.multiply != "shift-add":
+            raise InputError(f"digits is {self.digits}; it goes with multiply shift-add")
         if not SMALLEST_ANGLE <= self.largest_angle <= LARGEST_ANGLE:
             # In the names of Python; the command line turns them into options again.
             stated = self.stated.removeprefix("--").replace("max-rate-deg-s", "max_rate_deg_s")
@@ -253,6 +264,8 @@ class Settings:
             "sensor": self.sensor and self.sensor.as_dict(),
             "input_bits": self.input_bits,
             "state": self.state,
+            "multiply": self.multiply,
+            "digits": self.digits,
         }
 
     @classmethod

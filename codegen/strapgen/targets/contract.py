@@ -75,6 +75,9 @@ def options(settings: Settings, inputs: Iterable[Signal] = ()) -> str:
         f"--carry {settings.carry}",
         f"--drift-allowance {settings.allowance}",
     ]
+    if settings.multiply != "product":
+        words.append(f"--multiply {settings.multiply}")
+        words += [f"--digits {settings.digits}"] * bool(settings.digits)
     words += [f"--range {name}={value}" for name, value in settings.ranges.items()]
     words += [f"--fix {name}={value}" for name, value in settings.formats.items()]
     return " ".join(words)

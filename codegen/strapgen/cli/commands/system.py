@@ -62,7 +62,9 @@ def system(
             panel="System",
         ),
     ] = None,
-    fixed: Annotated[FixedOptions, Shown(only=("word", "rounding", "carry", "drift_allowance"))],
+    fixed: Annotated[
+        FixedOptions, Shown(only=("word", "rounding", "carry", "drift_allowance", "multiply", "digits"))
+    ],
     out: Annotated[
         Path | None,
         option("--out", metavar="FOLDER", help="Folder for the files.  [default: no files]", panel="Output"),

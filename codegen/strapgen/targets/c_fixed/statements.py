@@ -16,6 +16,7 @@ from strapgen.ir.integer_program import (
     Value,
     used_by,
 )
+from strapgen.ir.signed_digits import signed_digits
 from strapgen.targets import contract
 from strapgen.targets.c_fixed.words import Word
 from strapgen.targets.lines import fill_expression
@@ -31,9 +32,10 @@ class StatementPrinter:
         self.places = {feedback.name: k for k, feedback in enumerate(fixed.interface.residuals)}
         self.checks = any(value.guarded for value in fixed.body)
         self.nearest = fixed.interface.settings.rounding == "nearest"
+        self.adds_shifted = fixed.interface.settings.multiply == "shift-add"
         # A file that multiplies nothing else has no function for squares, whose text needs that for products.
         self.has_products = any(
-            len({*term.names}) == 2 or (term.names and abs(term.factor) != 1)
+            len({*term.names}) == 2 or (term.names and abs(term.factor) != 1 and not self.adds_shifted)
             for value in fixed.body
             if isinstance(value.definition, IntegerSum)
             for term in (*value.definition.fine, *value.definition.coarse)
@@ -234,7 +236,9 @@ class StatementPrinter:
             value = term.factor << term.shift if term.shift > 0 else term.factor
             return sign + self.constant(abs(value), wide=True) + _exactly(term)
         factors = list(term.names)
-        if abs(term.factor) != 1:
+        if abs(term.factor) != 1 and self.adds_shifted:
+            factors = [self._shifted_terms(term)]
+        elif abs(term.factor) != 1:
             factors.append(self.constant(abs(term.factor)) + _exactly(term))
         if len(factors) == 2:
             first, second = factors
@@ -242,10 +246,21 @@ class StatementPrinter:
             text = self._call("sqr", first) if square else self._call("mul", first, second)
         else:
             (text,) = factors
-            text = text if text in self.wide_names else f"({wide}){text}"
+            is_wide = text in self.wide_names or text.startswith("(")
+            text = text if is_wide else f"({wide}){text}"
         if term.shift < 0 and term.factor < 0:  # what is shifted down is the signed product
             return f"+{self._scaled_text(f'-{text}', term.shift)}"
         return sign + self._scaled_text(text, term.shift)
+
+    def _shifted_terms(self, term: Term) -> str:
+        """Return a value times the magnitude of a constant as a sum of shifted terms, in brackets."""
+        (name,) = term.names
+        terms = [
+            f"{'+' if digit > 0 else '-'}({self.word.wide}){name}"
+            + (f" * {self.constant(1 << power, wide=True)}" if power else "")
+            for digit, power in signed_digits(abs(term.factor))
+        ]
+        return f"({self._joined(terms)}){_exactly(term)}"
 
     def _scaled_text(self, text: str, shift: int) -> str:
         """Return an expression times a power of two."""
