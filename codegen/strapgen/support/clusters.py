@@ -10,6 +10,7 @@ import logging
 import os
 import re
 import threading
+import uuid
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -168,14 +169,16 @@ def on_cluster(
         worker. What `work` raises is raised here.
     """
     distributed = _distributed()
+    run = uuid.uuid4().hex  # results of an earlier run are not taken for those of this one
     lost = (OSError, TimeoutError, distributed.comm.CommClosedError, distributed.CancelledError)
-    digest, waiting = cache.generator_digest(), iter(cases)
+    # Workers that this process starts have its own code.
+    digest, waiting = cache.generator_digest() if cluster.scheduler else "", iter(cases)
     with _client(distributed, cluster) as client:
         finished = distributed.as_completed(loop=client.loop)
         names: dict[Any, tuple[str, int]] = {}
 
         def give(name: str, times: int) -> None:
-            key = f"{digest[:12]}-{name}-{times}"
+            key = f"{run}-{name}-{times}"
             future = client.submit(_remote, work, cases[name], digest, files, key=key, pure=False)
             names[future] = name, times
             finished.add(future)
@@ -248,7 +251,7 @@ def _client(distributed: Any, cluster: Cluster) -> Iterator[Any]:
 
 def _remote(work: Callable[[Any], Any], case: Any, digest: str, files: Bundle | None) -> Any:
     """Run a case in a worker."""
-    if cache.generator_digest() != digest:
+    if digest and cache.generator_digest() != digest:
         raise StrapgenError(
             "a worker has another version of strapgen; the same one is needed on all machines"
         )
