@@ -1,0 +1,1 @@
+"""Errors of gyros and accelerometers, from a file to measured increments."""
