@@ -39,12 +39,17 @@ SERIES = 12
 #: Highest power of the step in the products of third and fourth order of a window; c_m counts as the power m + 1.
 _POWER = 7
 
-_CHANGES = {
-    "velocity": ("velocity change over the step", "the integral of the specific force in these axes"),
-    "position": (
-        "position change over the step, divided by the step length",
-        "what the velocity change alone adds, without that of the velocity before",
-    ),
+_MEANINGS = {
+    "velocity": "velocity change over the step, body axes at its start: integral of the specific force there",
+    "position": "position change over the step, divided by the step length, without that by the velocity at its start, "
+    "body axes there",
+}
+#: The outputs, by what changes.
+CHANGES = {
+    part: Signal.vector(
+        f"{part}_change", f"{part}_change", unit="m/s", meaning=meaning, frame="b", over="cycle"
+    )
+    for part, meaning in _MEANINGS.items()
 }
 
 
@@ -70,17 +75,9 @@ def step(method: Method, increments: int, previous: int = 0, ahead: int = 0) -> 
     build = KernelBuilder()
     rate = _Rate(build, method, (increments, previous, ahead))
     turn = _Turn(build, rate)
-    for name, (meaning, more) in _CHANGES.items():
-        known = add_tangents(build, turn.stages, rate.changes[name](), name, "m/s")
-        signal = Signal.vector(
-            f"{name}_change",
-            f"{name}_change",
-            unit="m/s",
-            meaning=f"{meaning}, body axes at its start: {more}",
-            frame="b",
-            over="cycle",
-        )
-        build.output(signal, turn.velocity(known, name))
+    for part, signal in CHANGES.items():
+        known = add_tangents(build, turn.stages, rate.changes[part](), part, "m/s")
+        build.output(signal, turn.velocity(known, part))
     suffix, option, source = chosen(method, increments, previous, ahead)
     order = method.step_order(increments, previous, ahead)
     return build.kernel(
