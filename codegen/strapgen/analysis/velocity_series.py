@@ -93,9 +93,9 @@ def series(choice: Choice, terms: int = 1) -> VelocitySeries:
     Examples
     --------
     >>> from strapgen import choose
-    >>> one = series(choose("velocity-position", "rk1", 1))
-    >>> one.as_dict()["velocity"]
-    {'3': '1/12 f0 x w1 + ...'}
+    >>> one = series(choose("velocity-position", "magnus2", 1))
+    >>> one.order, one.as_dict()["velocity"]["3"]
+    (2, '-1/12 w0 x f1 + 1/12 w1 x f0')
     """
     checks.count("terms", terms, largest=MOST_TERMS)
     if not isinstance(choice, Choice) or choice.name != NAME:
