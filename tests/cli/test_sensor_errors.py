@@ -14,6 +14,9 @@ from strapgen.cli import main
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 MOTION = "--motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 --duration 2"
+VIBRATION = (
+    "vibration euler --step 0.01 --frequency-hz 20 --theta-x-rad 0.01 --theta-y-rad 0.01 --phase-rad 0"
+)
 LOG = f"--increments-csv {EXAMPLES}/inertial_log.csv"
 
 
@@ -134,6 +137,8 @@ def test_fixed_point_takes_formats_that_hold_the_errors(run):
             f"simulate euler {MOTION} --step 0.02 --specific-force 0,0,1",
             "--specific-force goes with a described",
         ),
+        (f"{VIBRATION} --gyro-bandwidth-hz 80,60,40 --gyro-damping 1", "one number or two with a comma"),
+        (f"{VIBRATION} --gyro-bandwidth-hz 80,0 --gyro-damping 1", "gyro-bandwidth-hz is 0"),
         ("simulate euler --increments-csv inc.csv --errors force.toml", "no velocity increments"),
         (
             f"simulate euler {MOTION} --step 0.02 --errors bias.toml --out bias.toml",

@@ -36,6 +36,7 @@ from strapgen.cli.commands import (
     study_output_filter,
     study_pulse_torque,
     study_redundancy,
+    study_sensor_errors,
     study_system,
     study_velocity_position,
     system,
@@ -106,6 +107,7 @@ study.app.command("output-filter", cls=PlainCommand)(study_output_filter.study_o
 study.app.command("redundancy", cls=PlainCommand)(study_redundancy.study_redundancy)
 study.app.command("calibration", cls=PlainCommand)(study_calibration.study_calibration)
 study.app.command("pulse-torque", cls=PlainCommand)(study_pulse_torque.study_pulse_torque)
+study.app.command("sensor-errors", cls=PlainCommand)(study_sensor_errors.study_sensor_errors)
 study.app.command("loops", cls=PlainCommand)(study_loops.study_loops)
 study.app.command("velocity-position", cls=PlainCommand)(study_velocity_position.study_velocity_position)
 

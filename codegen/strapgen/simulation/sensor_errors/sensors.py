@@ -247,16 +247,17 @@ class _Loss:
     def __init__(self, errors: InstrumentErrors, streams: Streams) -> None:
         self._sampling, self._streams = errors.sampling, streams
         self._late = np.zeros(6)
-        self._last = np.zeros(6)
+        self._last: Array | None = None
 
     def __call__(self, angle: Array, velocity: Array) -> tuple[Array, Array]:
         row = np.concatenate([angle, velocity], axis=1)
+        last = row[0] if self._last is None else self._last
         lost = self._streams.uniform("lost samples", len(row), 1)[:, 0] < self._sampling.lost
         result = np.where(lost[:, None], 0.0, row)
         places = np.arange(len(row))
         before = np.maximum.accumulate(np.where(lost, -1, places))  # the last that arrived; -1 for none
         if self._sampling.lost_as == "repeat":
-            result = np.where((before < 0)[:, None], self._last, row[before])
+            result = np.where((before < 0)[:, None], last, row[before])
         elif self._sampling.lost_as == "late":
             self._add_late(row, lost, result)
         self._last = result[-1]
