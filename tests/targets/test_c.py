@@ -368,7 +368,7 @@ def test_loops_without_extensions_of_the_compiler_have_the_same_bits(tmp_path, p
     for name, text in sources.files.items():
         (tmp_path / name).write_text(text.replace("defined(__GNUC__)", "0"))
     names = [name for name in sources.files if name.endswith(".c")]
-    command = [needed("gcc"), *C_FLAGS, "-shared", "-fPIC", *names, "-o", "plain.so", "-lm"]
+    command = [needed("gcc"), *C_FLAGS, *STRICT, "-shared", "-fPIC", *names, "-o", "plain.so", "-lm"]
     subprocess.run(command, cwd=tmp_path, check=True)
     plain = ctypes.CDLL(str(tmp_path / "plain.so"))[f"{sources.function.name}_propagate"]
     runs, steps = 37, 5

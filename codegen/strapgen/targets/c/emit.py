@@ -224,11 +224,14 @@ def _code(
     }
 
 
-#: Bytes of the vectors in which several steps of one run are prepared together, which every x86-64 has.
+#: Bytes of the vectors in which several steps of one run are prepared together, which every x86-64 has. Those of AVX2
+#: are twice as long.
 _VECTOR = 16
 #: Bytes of the numbers of all runs that go side by side, an element of the state: whole vectors of any processor, and
 #: as many rows of memory as it reads ahead.
 _ABREAST = 64
+#: Bytes of a run's samples by which memory is fetched ahead: its latency is that of some steps of all runs.
+_FETCHED = 512
 #: Operations that C compilers know on vectors.
 _OF_VECTORS = frozenset(("add", "subtract", "multiply", "divide", "negate"))
 
@@ -243,18 +246,22 @@ def _loop(program: Program, printer: CPrinter, name: str) -> dict[str, object]:
     rows = [(signal, constant, number) for signal, constant in signals for number in range(signal.size)]
     real = printer.real
     lanes, abreast = _VECTOR // real.bytes, _ABREAST // real.bytes
-    lanes_of = {
-        increments.name: f"{name.upper()}_LANES_OF_({increments.name}, {{}})",
-        "prepared": "prepared[{}].all",
-    }
+
+    def in_lanes(wide: str) -> dict[str, object]:
+        load = f"{name}{wide}_LANES_OF_".upper() + f"({increments.name}, {{}})"
+        places = {increments.name: load, "prepared": "prepared[{}].all"}
+        return _code(ahead, printer, places, number_type=f"{name}{wide}_lanes_")
+
     states = {state.name: "own[{}][k]", result.name: "own[{}][k]"}
     return {
         "vectors": _in_vectors(ahead),
         "lanes": lanes,
         "abreast": abreast,
+        "fetched": max(1, _FETCHED // (increments.size * real.bytes)),
         "prepared": prepared.signal.size,
-        "stack": max(2 * _VECTOR * prepared.signal.size, _ABREAST * state.size),
-        "ahead": _code(ahead, printer, lanes_of, number_type=f"{name}_lanes_"),
+        "stack": max(4 * _VECTOR * prepared.signal.size, _ABREAST * state.size),
+        "ahead": in_lanes(""),
+        "wide_ahead": in_lanes("_wide"),
         "behind": _code(behind, printer, {"prepared": "prepared[{}].one[k]"}),
         "abreast_step": _code(
             program, printer, states | {increments.name: f"{increments.name}[apart * k + {{}}]"}, 2
