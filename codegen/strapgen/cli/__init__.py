@@ -48,6 +48,7 @@ from strapgen.cli.commands import (
 )
 from strapgen.cli.help import PlainCommand, PlainGroup, explanation
 from strapgen.support.exceptions import StrapgenError
+from strapgen.support.processes import prepare_for_derivations
 
 #: Headings of ``strapgen --help``, and the commands below each.
 COMMANDS: dict[str, dict[str, Any]] = {
@@ -129,6 +130,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:  # closed by whoever started us
             setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115, PTH123
+    prepare_for_derivations()
     words = _spread_settings(list(sys.argv[1:] if arguments is None else arguments)) or ["--help"]
     try:
         status = app(words, prog_name="strapgen", standalone_mode=False)
