@@ -33,6 +33,7 @@ from strapgen.cli.commands import (
     study_attitude_form,
     study_calibration,
     study_loops,
+    study_monte_carlo,
     study_output_filter,
     study_pulse_torque,
     study_redundancy,
@@ -107,6 +108,7 @@ study.app.command("redundancy", cls=PlainCommand)(study_redundancy.study_redunda
 study.app.command("calibration", cls=PlainCommand)(study_calibration.study_calibration)
 study.app.command("pulse-torque", cls=PlainCommand)(study_pulse_torque.study_pulse_torque)
 study.app.command("loops", cls=PlainCommand)(study_loops.study_loops)
+study.app.command("monte-carlo", cls=PlainCommand)(study_monte_carlo.study_monte_carlo)
 
 app = typer.Typer(
     name="strapgen",
