@@ -74,6 +74,8 @@ class Flight:
         Sampling rate in Hz, and duration in s.
     backend : str
         A key of `BACKENDS`.
+    carry : str
+        Error feedback of the attitude in fixed point.
     """
 
     motion: Motion
@@ -81,6 +83,7 @@ class Flight:
     sample_hz: Fraction
     duration: Fraction
     backend: str = "numpy"
+    carry: str = "none"
 
     @property
     def count(self) -> int:
@@ -189,7 +192,9 @@ def _settings(one: Candidate, flight: Flight) -> tuple[Settings, Settings]:
         )
     ]
     settings = Settings().fitted(largest[0])
-    return settings, replace(settings, ranges={"velocity_increments": Fraction(largest[1]) * _ROOM})
+    return replace(settings, carry=flight.carry), replace(
+        settings, ranges={"velocity_increments": Fraction(largest[1]) * _ROOM}
+    )
 
 
 def _recursion(one: Candidate, flight: Flight, truth: tuple[Array, Array]) -> Translation:
