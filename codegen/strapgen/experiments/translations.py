@@ -43,7 +43,7 @@ _ROOM = Fraction(9, 8)
 
 
 @dataclass(frozen=True)
-class Standing:
+class TranslationStanding:
     """What an algorithm costs, and how far its velocity and position are from the true ones.
 
     Parameters
@@ -122,7 +122,7 @@ def candidates(names: Iterable[str]) -> list[Candidate]:
     return several
 
 
-def study(several: Sequence[Candidate], flight: Flight) -> Iterator[Standing]:
+def study(several: Sequence[Candidate], flight: Flight) -> Iterator[TranslationStanding]:
     """Run algorithms along a flight, and yield what each costs and leads to.
 
     Parameters
@@ -132,7 +132,7 @@ def study(several: Sequence[Candidate], flight: Flight) -> Iterator[Standing]:
 
     Yields
     ------
-    Standing
+    TranslationStanding
 
     Raises
     ------
@@ -143,7 +143,7 @@ def study(several: Sequence[Candidate], flight: Flight) -> Iterator[Standing]:
     for one in several:
         run = _recursion(one, flight, truth) if one.method == TWO_SPEED else _steps(one, flight, truth)
         operations = _operations(one)
-        yield Standing(
+        yield TranslationStanding(
             one.name, operations["multiply"], operations["add"], run.velocity_error, run.position_error
         )
 
