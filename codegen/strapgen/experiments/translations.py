@@ -43,7 +43,7 @@ _ROOM = Fraction(9, 8)
 
 
 @dataclass(frozen=True)
-class Standing:
+class TranslationStanding:
     """What an algorithm costs, and how far its velocity and position are from the true ones.
 
     Parameters
@@ -74,6 +74,8 @@ class Flight:
         Sampling rate in Hz, and duration in s.
     backend : str
         A key of `BACKENDS`.
+    carry : str
+        Error feedback of the attitude in fixed point.
     """
 
     motion: Motion
@@ -81,6 +83,7 @@ class Flight:
     sample_hz: Fraction
     duration: Fraction
     backend: str = "numpy"
+    carry: str = "none"
 
     @property
     def count(self) -> int:
@@ -119,7 +122,7 @@ def candidates(names: Iterable[str]) -> list[Candidate]:
     return several
 
 
-def study(several: Sequence[Candidate], flight: Flight) -> Iterator[Standing]:
+def study(several: Sequence[Candidate], flight: Flight) -> Iterator[TranslationStanding]:
     """Run algorithms along a flight, and yield what each costs and leads to.
 
     Parameters
@@ -129,7 +132,7 @@ def study(several: Sequence[Candidate], flight: Flight) -> Iterator[Standing]:
 
     Yields
     ------
-    Standing
+    TranslationStanding
 
     Raises
     ------
@@ -140,7 +143,7 @@ def study(several: Sequence[Candidate], flight: Flight) -> Iterator[Standing]:
     for one in several:
         run = _recursion(one, flight, truth) if one.method == TWO_SPEED else _steps(one, flight, truth)
         operations = _operations(one)
-        yield Standing(
+        yield TranslationStanding(
             one.name, operations["multiply"], operations["add"], run.velocity_error, run.position_error
         )
 
@@ -189,7 +192,9 @@ def _settings(one: Candidate, flight: Flight) -> tuple[Settings, Settings]:
         )
     ]
     settings = Settings().fitted(largest[0])
-    return settings, replace(settings, ranges={"velocity_increments": Fraction(largest[1]) * _ROOM})
+    return replace(settings, carry=flight.carry), replace(
+        settings, ranges={"velocity_increments": Fraction(largest[1]) * _ROOM}
+    )
 
 
 def _recursion(one: Candidate, flight: Flight, truth: tuple[Array, Array]) -> Translation:

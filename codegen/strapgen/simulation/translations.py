@@ -110,10 +110,10 @@ def translate(
     row = force.velocity_increments(motion, interval, -previous, steps * samples + ahead)
     states = attitude.propagate(angles)
     changes = change(angles, windows(row, samples, previous + ahead))
-    velocity, position = _summed(attitude, states, changes, float(h), np.array(gravity))
-    time = np.arange(steps + 1, dtype=np.float64) * float(h)
-    if not np.isfinite(position).all():
+    if not all(np.isfinite(part).all() for part in (states, *changes)):
         raise InputError("velocity or position is not finite: the increments are too large for the method")
+    velocity, position = _summed(states, changes, float(h), np.array(gravity, float))
+    time = np.arange(steps + 1, dtype=np.float64) * float(h)
     velocities, positions = truth or force.translation(motion, interval, steps * samples)
     true_velocity, true_position = velocities[::samples], positions[::samples]
     true_velocity = true_velocity + np.outer(time, gravity)
@@ -122,7 +122,7 @@ def translate(
 
 
 def _summed(
-    attitude: Backend, states: NDArray[np.generic], changes: tuple[Array, Array], step: float, gravity: Array
+    states: NDArray[np.generic], changes: tuple[Array, Array], step: float, gravity: Array
 ) -> tuple[Array, Array]:
     """Return velocity and position after every step, by the kernel of the attitude's algorithm, in double."""
     kernel = evaluator("dcm-translation" if states.ndim == 3 else "euler-translation")

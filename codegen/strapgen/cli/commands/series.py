@@ -216,7 +216,7 @@ def _of_velocity(
     """Deliver the series of velocity and position, which hold for any smooth motion and specific force."""
     if motion != "general" or versus.versus is not None or output.plot is not None:
         raise InputError(
-            f"{VELOCITY_POSITION} has series for any motion; --motion, --versus and --plot need an attitude"
+            f"series of {VELOCITY_POSITION} hold for any motion; --motion, --versus and --plot go with an attitude"
         )
     from strapgen.analysis import velocity_series
     from strapgen.reports.error_analysis.velocity_series import velocity_series_report

@@ -11,6 +11,7 @@ from strapgen.cli.output import Output
 from strapgen.cli.progress import track
 from strapgen.cli.sample_source import MOTION_FILE, RUN_MOTION_NAMES, check_motion, pairs
 from strapgen.support import checks
+from strapgen.support.exceptions import InputError
 
 
 @dataclass(frozen=True)
@@ -84,6 +85,15 @@ def study_velocity_position(
             panel="Algorithm",
         ),
     ] = "numpy",
+    carry: Annotated[
+        str,
+        option(
+            "--carry",
+            metavar="NAME",
+            help="Error feedback of the attitude in fixed point: none, state, full.",
+            panel="Algorithm",
+        ),
+    ] = "none",
     flight: FlightOptions,
     output: Output,
 ) -> None:
@@ -117,7 +127,10 @@ def study_velocity_position(
         checks.number("sample-hz", flight.sample_hz, positive=True),
         checks.number("duration", flight.duration, positive=True),
         backend,
+        checks.choice("carry", carry, ("none", "state", "full")),
     )
+    if carry != "none" and not BACKENDS[backend].fixed:
+        raise InputError(f"--carry goes with a back end of fixed point, not with {backend}")
     standings = list(track(experiment.study(several, course), "running", len(several)))
     output.report(
         translation_report(standings, course, flight.described()),

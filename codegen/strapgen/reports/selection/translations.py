@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from strapgen.experiments.translations import Flight, Standing
+from strapgen.experiments.translations import Flight, TranslationStanding
 from strapgen.reports.plots import figures
 from strapgen.reports.report import Report
 from strapgen.reports.table import Column, TextTable
@@ -21,12 +21,12 @@ _COLUMNS = (
 )
 
 
-def translation_report(standings: Sequence[Standing], flight: Flight, described: str) -> Report:
+def translation_report(standings: Sequence[TranslationStanding], flight: Flight, described: str) -> Report:
     """Return the standings of a study as a report.
 
     Parameters
     ----------
-    standings : sequence of Standing
+    standings : sequence of TranslationStanding
     flight : Flight
     described : str
         The motion and the force in words.
@@ -70,12 +70,12 @@ def translation_report(standings: Sequence[Standing], flight: Flight, described:
     return Report(text, data, table)
 
 
-def translation_image(standings: Sequence[Standing], described: str, path: str | Path) -> bytes:
+def translation_image(standings: Sequence[TranslationStanding], described: str, path: str | Path) -> bytes:
     """Return the errors of velocity and position over the multiplications for each sample.
 
     Parameters
     ----------
-    standings : sequence of Standing
+    standings : sequence of TranslationStanding
     described : str
         The motion and the force in words, for the title.
     path : path
