@@ -15,7 +15,7 @@ from strapgen import pipeline
 from strapgen.catalogue.methods.coning_coefficients import Design
 from strapgen.experiments.conformance import ORDER_WITHIN, Finding
 from strapgen.experiments.convergence import MOST_ERROR, Convergence, fitted
-from strapgen.experiments.foreign import causes as causes
+from strapgen.experiments.foreign import causes
 from strapgen.experiments.foreign.cone import (
     SAMPLES,
     SAMPLING,
