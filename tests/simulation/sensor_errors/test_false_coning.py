@@ -15,7 +15,7 @@ from strapgen.simulation.rate_profiles import CosineSum
 from strapgen.simulation.reference_attitudes import ReferenceAttitude
 from strapgen.simulation.runs import drift_between, simulate
 from strapgen.simulation.sensor_errors.instruments import InstrumentErrors, TriadErrors
-from strapgen.simulation.sensor_errors.measured import measured
+from strapgen.simulation.sensor_errors.measured_motions import measured
 from strapgen.vibration import of, through_gyro, through_gyros
 
 

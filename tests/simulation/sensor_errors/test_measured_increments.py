@@ -23,7 +23,7 @@ from strapgen.simulation.sensor_errors.instruments import (
     TriadErrors,
     WarmUp,
 )
-from strapgen.simulation.sensor_errors.measured import measured, measured_recording
+from strapgen.simulation.sensor_errors.measured_motions import measured, measured_recording
 from strapgen.simulation.sensor_errors.response import bounded_noise, second_order
 from strapgen.simulation.sensor_errors.sensors import MeasurementUnit
 
