@@ -366,14 +366,14 @@ def check_motion(name: str | None, further: Mapping[str, Any] | None = None) -> 
         checks.choice("motion", name, {**MOTIONS, **(further or {})})
 
 
-def pairs(settings: list[str]) -> dict[str, str]:
+def pairs(settings: list[str], option: str = "--set") -> dict[str, str]:
     """Read settings of the form key=value."""
     values: dict[str, str] = {}
     for setting in settings:
         key, equals, value = setting.partition("=")
         if not equals or not key:
-            raise InputError(f"--set {setting!r} is no setting; key=value is needed")
+            raise InputError(f"{option} {setting!r} is no setting; key=value is needed")
         if key in values:
-            raise InputError(f"--set {key} is given twice")
+            raise InputError(f"{option} {key} is given twice")
         values[key] = value
     return values

@@ -14,7 +14,6 @@ from typing import Any
 
 import mpmath
 
-from strapgen import pipeline
 from strapgen.analysis.quantization_noise import quantization_noise
 from strapgen.backends import exact
 from strapgen.catalogue import Choice
@@ -166,7 +165,7 @@ def _least_without_feedback(choice: Choice, brief: DesignBrief) -> float:
 
 def _certified(choice: Choice, brief: DesignBrief, carry: str) -> Rounding:
     """Return the certified drift with some error feedback."""
-    fixed = pipeline.quantize(generated_sources.program(choice), settings(choice, brief, carry))
+    fixed = generated_sources.fixed_program(choice, settings(choice, brief, carry))
     angles = fixed.interface.angle_accumulation
     if angles is None:
         return Rounding(None, carry, "no bound of a run is known")
