@@ -240,6 +240,12 @@ def test_a_delay_holds_the_angle_back_by_its_time(row):
         assert not lag[:, 2].any()
 
 
+def test_a_delay_that_no_memory_holds_is_refused(row):
+    errors = InstrumentErrors(gyro=TriadErrors(delay=np.full(3, 10.0)))
+    with pytest.raises(strapgen.InputError, match="2e\\+06 sampling intervals late"):
+        MeasurementUnit(errors, 5e-6)
+
+
 def test_jitter_moves_the_angle_by_rate_times_time():
     steady = np.tile([0.01, -0.02, 0.0], (20_000, 1))
     errors = InstrumentErrors(sampling=Sampling(jitter=1e-4))
