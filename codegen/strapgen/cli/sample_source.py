@@ -199,7 +199,7 @@ class SampleSource:
         errors = self.sensor_errors()
         if errors is None:
             return true
-        from strapgen.simulation.sensor_errors.measured import measured
+        from strapgen.simulation.sensor_errors.measured_motions import measured
 
         force = None if self.specific_force is None else force_of(self.specific_force)
         return measured(true, errors, force=force, start=start)
@@ -322,7 +322,7 @@ def with_errors(data: Recorded, errors: InstrumentErrors | None) -> Recorded:
     """Return a recording as sensors with errors measure what it holds."""
     if errors is None:
         return data
-    from strapgen.simulation.sensor_errors.measured import measured_recording
+    from strapgen.simulation.sensor_errors.measured_motions import measured_recording
 
     return measured_recording(data, errors)
 

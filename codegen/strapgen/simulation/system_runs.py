@@ -16,7 +16,7 @@ from strapgen.ir.system import Cell, DescribedSystem
 from strapgen.simulation.motions import Motion
 from strapgen.simulation.recording import History, Recording
 from strapgen.simulation.runs import Run
-from strapgen.simulation.sensor_errors.measured import both_increments
+from strapgen.simulation.sensor_errors.measured_motions import both_increments
 from strapgen.simulation.system_inputs import cycles_of, samples
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError

@@ -15,7 +15,7 @@ from strapgen.simulation.rate_profiles import CosineSum
 from strapgen.simulation.reference_attitudes import ReferenceAttitude
 from strapgen.simulation.runs import drift_between, simulate
 from strapgen.simulation.sensor_errors.instruments import InstrumentErrors, TriadErrors
-from strapgen.simulation.sensor_errors.measured import measured
+from strapgen.simulation.sensor_errors.measured_motions import measured
 from strapgen.vibration import of, through_gyro, through_gyros
 
 
@@ -63,6 +63,7 @@ def test_jinking_through_scale_factors_has_the_printed_rate():
     assert math.degrees(seen - true) * 3600 == pytest.approx(-19.4423, abs=5e-5)
 
 
+@pytest.mark.long
 def test_jinking_in_the_simulator_follows_the_formula_for_small_angles():
     # The formula is of second order: a tenth of the printed amplitudes leaves about 0.05 % of fourth order.
     scale = np.array([200e-6, 300e-6, 0.0])

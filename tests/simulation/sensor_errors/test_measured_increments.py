@@ -23,7 +23,7 @@ from strapgen.simulation.sensor_errors.instruments import (
     TriadErrors,
     WarmUp,
 )
-from strapgen.simulation.sensor_errors.measured import measured, measured_recording
+from strapgen.simulation.sensor_errors.measured_motions import measured, measured_recording
 from strapgen.simulation.sensor_errors.response import bounded_noise, second_order
 from strapgen.simulation.sensor_errors.sensors import MeasurementUnit
 
@@ -238,6 +238,12 @@ def test_a_delay_holds_the_angle_back_by_its_time(row):
         past = delay * (rate - rate[0])[:, :2]
         assert np.abs(lag[:, :2] - lag[0, :2] - past).max() < 2 * allowed
         assert not lag[:, 2].any()
+
+
+def test_a_delay_that_no_memory_holds_is_refused(row):
+    errors = InstrumentErrors(gyro=TriadErrors(delay=np.full(3, 10.0)))
+    with pytest.raises(strapgen.InputError, match="2e\\+06 sampling intervals late"):
+        MeasurementUnit(errors, 5e-6)
 
 
 def test_jitter_moves_the_angle_by_rate_times_time():

@@ -53,7 +53,7 @@ def _inputs(name: str, source: SampleSource) -> tuple[Description, dict[str, NDA
     """Return the system, the samples of its inputs, and where they come from in words."""
     import numpy as np
 
-    from strapgen.simulation.sensor_errors.measured import both_increments
+    from strapgen.simulation.sensor_errors.measured_motions import both_increments
     from strapgen.simulation.system_inputs import cycles_of, samples
 
     if source.motion is None:

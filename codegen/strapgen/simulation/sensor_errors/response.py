@@ -8,12 +8,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from strapgen.support.exceptions import InputError
+
 Array = NDArray[np.float64]
 
 #: Samples that a linear recursion takes together.
 _BLOCK = 128
 #: Standard deviations that no instant of a sample departs by.
 _FARTHEST = 10.0
+#: Most sampling intervals by which a sample is late.
+_MOST_LATE = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -141,7 +145,13 @@ class SampleTimes:
 
     def __init__(self, delay: Array, jitter: float, interval: float) -> None:
         self._delay, self._jitter = delay / interval, jitter / interval
-        self._depth = int(np.ceil(self._delay.max() + _FARTHEST * self._jitter)) + 2
+        latest = float(self._delay.max()) + _FARTHEST * self._jitter
+        if latest > _MOST_LATE:
+            raise InputError(
+                f"a sample is up to {latest:.6g} sampling intervals late by delay and jitter; up to {_MOST_LATE} are "
+                "possible"
+            )
+        self._depth = int(np.ceil(latest)) + 2
         self._history: Array | None = None
         self._before = self._delay[None]  # how late the sample before is, in intervals
 
