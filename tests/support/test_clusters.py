@@ -117,19 +117,25 @@ def machines(tmp_path):
     several.end()
 
 
+def client(*more):
+    words = [*STUDY, "--format", "json", *more]
+    return subprocess.Popen(
+        [sys.executable, "-m", "strapgen", *words],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+@pytest.fixture(scope="module")
+def here():
+    """Return what the study prints without a cluster."""
+    return client("--jobs", "1").communicate()[0]
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("killed", ["worker-1", "scheduler", "client"])
-def test_a_study_is_completed_whatever_is_killed(tmp_path, machines, killed):
-    def client(*more):
-        words = [*STUDY, "--format", "json", *more]
-        return subprocess.Popen(
-            [sys.executable, "-m", "strapgen", *words],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-
-    here, _ = client("--jobs", "1").communicate()
+def test_a_study_is_completed_whatever_is_killed(tmp_path, machines, here, killed):
     where = ["--scheduler", machines.address, "--results", str(tmp_path / "results.jsonl")]
     first = client(*where)
     results = tmp_path / "results.jsonl"
