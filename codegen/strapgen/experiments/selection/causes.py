@@ -158,7 +158,7 @@ def pulse_drift(noise: QuantizationNoise, brief: DesignBrief, step: Fraction) ->
     pulse = float(brief.gyro.pulse_arcsec) * _ARCSEC
     turn = math.radians(float(brief.max_rate_deg_s)) * float(step)
     steps = round(float(brief.budget.over_s) / float(step))
-    return math.degrees(math.sqrt(noise.mean_square(pulse, turn**2, steps))) / _hours(brief)
+    return math.degrees(math.sqrt(noise.mean_square(pulse, steps * turn**2, steps))) / _hours(brief)
 
 
 def noise(brief: DesignBrief) -> float:
