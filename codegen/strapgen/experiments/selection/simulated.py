@@ -31,7 +31,7 @@ _FEWEST_RECORDS = 100
 _SUBSTEPS = 24
 _AXES = 3
 #: Random runs, the steps of each, and where their random numbers begin.
-_RANDOM_RUNS, _RANDOM_STEPS, _SEED = 1000, 200, 1984
+RANDOM_RUNS, _RANDOM_STEPS, _SEED = 2000, 200, 0
 
 
 class RandomDrift(NamedTuple):
@@ -165,7 +165,8 @@ def run(brief: DesignBrief, judgement: Judgement, algorithm: Algorithm, jobs: in
     coning = None
     if brief.environment is not None:
         shaken = vibration(brief.environment.lines(), brief)
-        coning = _slope(algorithm.run(shaken, steps, _record(step, steps)))
+        record = _record(step, steps)
+        coning = _slope(algorithm.run(shaken, steps - steps % int(record / step), record))
     return Simulated(
         _slope(algorithm.run(turn, steps)),
         coning,
@@ -207,7 +208,7 @@ def _turn(brief: DesignBrief) -> float:
 
 def _random(brief: DesignBrief, algorithm: Algorithm, errors: Errors, jobs: int | None) -> MeanSquare:
     """Return the squared angle at the end of random runs."""
-    runs = SteadyRuns(algorithm.steady(), errors, _RANDOM_STEPS, _RANDOM_RUNS, (_SEED,))
+    runs = SteadyRuns(algorithm.steady(), errors, _RANDOM_STEPS, RANDOM_RUNS, (_SEED,))
     return sum(random_runs(runs, jobs=jobs), MeanSquare())
 
 

@@ -8,7 +8,7 @@ from typing import Any
 from strapgen.experiments.selection.answer import verdicts
 from strapgen.experiments.selection.brief import DesignBrief
 from strapgen.experiments.selection.judgement import CAUSES, Judgement
-from strapgen.experiments.selection.simulated import RandomDrift, Simulated
+from strapgen.experiments.selection.simulated import RANDOM_RUNS, RandomDrift, Simulated
 from strapgen.reports.report import Report
 from strapgen.reports.table import Column, TextTable
 
@@ -110,7 +110,7 @@ def _text(brief: DesignBrief, ordered: Sequence[Judgement], simulated: Mapping[s
     if simulated:
         lines += [
             "",
-            "drift in deg/h, predicted and in a time simulation; of random causes the 95 % interval of 1000 runs",
+            f"drift in deg/h, predicted and in a time simulation; of random causes the 95 % interval of {RANDOM_RUNS} runs",
             "",
             *_simulated(accepted, simulated),
         ]
