@@ -68,6 +68,15 @@ def test_a_quotient_is_as_fine_as_the_numerator_has_room():
         quotient(wide, Quotient("a", "b"), lambda a, b: a / b, forced={"y": 2})
 
 
+def test_half_of_a_wide_divisor_has_room_beside_the_numerator():
+    # One place more would make 20,000 of the numerator, to which half of 15,010 is added: both have 15 bits together.
+    known = {"a": Known(4, 9_990, 10_000, wide=True), "b": Known(4, 15_000, 15_010, wide=True)}
+    value, measured = quotient(known, Quotient("a", "b"), lambda a, b: a / b)
+    assert (value.fraction, value.peak, measured.peak) == (0, 10_000, 10_000)
+    with pytest.raises(InputError, match="too short for y"):
+        quotient(known, Quotient("a", "b"), lambda a, b: a / b, forced={"y": 1})
+
+
 def root_of(value: Fraction) -> Fraction:
     """Return a square root to 100 binary places."""
     return Fraction(math.isqrt(value.numerator * value.denominator << 200), value.denominator << 100)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ctypes
 import math
+import platform
 import re
 import shutil
 import subprocess
@@ -128,10 +130,11 @@ def test_objects_have_no_state_of_their_own(objects):
         *_, kind, name = line.split()
         kinds.setdefault(kind, set()).add(name)
     assert kinds["T"] >= {"euler_rk4_2", "euler_rk4_2_float_propagate"}
-    # Code and read-only data; functions of the C library. No data (d), no zeroed data (b), nothing common (c).
+    # Code and read-only data; functions of the C library, and what the compiler knows of the processor. No data (d),
+    # no zeroed data (b), nothing common (c).
     assert set(kinds) <= set("TtrRU")
     library = {name.removesuffix("f") for name in kinds["U"] - kinds["T"]} - {"_GLOBAL_OFFSET_TABLE_"}
-    assert library <= {"sqrt", "sin", "cos", "atan2", "fmax", "memcpy", "memmove", "sincos"}
+    assert library <= {*("sqrt", "sin", "cos", "atan2", "fmax", "memcpy", "memmove", "sincos", "__cpu_model")}
 
 
 @each("target", TARGETS)
@@ -319,8 +322,8 @@ def test_propagation_is_the_step_repeated_bit_for_bit(propagate):
         assert record.tobytes() == state.tobytes()
 
 
-@each("steps", [1, 15, 16, 17])
-def test_blocks_of_prepared_steps_join_without_a_seam(propagate, steps):
+@each("steps", [1, 2, 3, 4, 5, 7, 8, 9, 19])
+def test_groups_of_prepared_steps_join_without_a_seam(propagate, steps):
     _, whole = propagate(propagate.increments[0], 1, 7, function=propagate.normalize)
     status, part = propagate(propagate.increments[0], 1, 7, steps=steps, function=propagate.normalize)
     assert status == 0
@@ -329,19 +332,53 @@ def test_blocks_of_prepared_steps_join_without_a_seam(propagate, steps):
 
 @pytest.mark.parametrize("step", STEPS)
 @pytest.mark.parametrize("target", TARGETS)
-def test_gcc_takes_several_steps_and_runs_at_once(step, target, folder, tmp_path):
+def test_gcc_takes_several_runs_at_once(step, target, folder, tmp_path):
     source = next(name for name in generated(step, target).runs if name.endswith(".c"))
     report = ["-fPIC", "-fopt-info-vec-optimized", "-c", source, "-o", str(tmp_path / "step.o")]
     command = [needed("gcc"), *C_FLAGS, *report]
     said = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True).stderr
     lines = (folder / source).read_text().splitlines()
-    for loop in ("count", "runs"):
+    for loop in (f"{generated(step, target).function.name}_ABREAST".upper(), "runs"):
         (number,) = (
             k for k, line in enumerate(lines, 1) if line == f"    for (size_t k = 0; k < {loop}; ++k) {{"
         )
         assert re.search(rf":{number}:\d+: optimized: loop vectorized", said), said
         # The promise of separate arrays is believed: no second version of the loop for arrays that overlap.
         assert not re.search(rf":{number}:\d+: optimized:\s+loop versioned", said), said
+
+
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+@pytest.mark.parametrize("target", TARGETS)
+def test_several_steps_of_one_run_are_prepared_in_vectors(compiler, target, folder, tmp_path):
+    multiply = {"c": "mulpd", "c-float": "mulps"}[target]
+    (source,) = (name for name in generated("euler-rk4-2", target).runs if name.endswith(".c"))
+    if platform.machine() != "x86_64":
+        pytest.skip("the instructions are those of x86-64")
+    command = [needed(compiler), *C_FLAGS, "-O0", "-S", source, "-o", str(tmp_path / "step.s")]
+    subprocess.run(command, cwd=folder, check=True)
+    function = f"{generated('euler-rk4-2', target).function.name}_ahead_"
+    body = (tmp_path / "step.s").read_text().split(f"\n{function}:")[1].split(".cfi_endproc")[0]
+    # What does not wait for the state takes 22 products.
+    assert len(re.findall(rf"\b{multiply}\b", body)) == 22
+    assert not re.search(r"\bmuls[sd]\b", body)
+
+
+def test_loops_without_extensions_of_the_compiler_have_the_same_bits(tmp_path, propagate, rng):
+    sources = propagate.sources
+    for name, text in sources.files.items():
+        (tmp_path / name).write_text(text.replace("defined(__GNUC__)", "0"))
+    names = [name for name in sources.files if name.endswith(".c")]
+    command = [needed("gcc"), *C_FLAGS, *STRICT, "-shared", "-fPIC", *names, "-o", "plain.so", "-lm"]
+    subprocess.run(command, cwd=tmp_path, check=True)
+    plain = ctypes.CDLL(str(tmp_path / "plain.so"))[f"{sources.function.name}_propagate"]
+    runs, steps = 37, 5
+    increments = rng.normal(scale=0.05, size=(runs, steps, 6)).astype(propagate.dtype)
+    initial = np.tile(propagate.identity, (runs, 1))
+    history = np.empty((runs, 1 + steps, propagate.size), propagate.dtype)
+    counts = [ctypes.c_size_t(count) for count in (runs, steps, 1, 0)]
+    pointers = [ctypes.c_void_p(array.ctypes.data) for array in (initial, increments, history)]
+    assert plain(*counts, None, *pointers) == 0
+    assert propagate(increments, runs=runs, steps=steps)[1].tobytes() == history.tobytes()
 
 
 @pytest.mark.parametrize("runs", [0, 1, 7, 64])
@@ -375,13 +412,16 @@ def test_propagation_orthonormalizes_before_it_records(propagate, every):
             assert history[0, number // 2].tobytes() == state.tobytes()
 
 
-def test_several_runs_equal_single_runs_bit_for_bit(propagate):
-    arguments = {"record_every": 3, "orthonormalize_every": 4, "function": propagate.normalize}
-    starts = np.ascontiguousarray(propagate(propagate.increments[0], 6)[1][0, :3])
-    status, together = propagate(propagate.increments, runs=3, initial=starts, **arguments)
+@each("runs", [1, 2, 7, 8, 9, 15, 16, 17, 33])
+@each("record_every", [1, 3, 20])
+def test_many_runs_equal_single_runs_bit_for_bit(propagate, runs, record_every):
+    arguments = {"record_every": record_every, "orthonormalize_every": 4, "function": propagate.normalize}
+    increments = np.concatenate([propagate.increments * k for k in range(1, 12)])[:runs]
+    starts = np.ascontiguousarray(np.tile(propagate(propagate.increments[0])[1][0], (2, 1))[:runs])
+    status, together = propagate(increments, runs=runs, initial=starts, **arguments)
     assert status == 0
-    for run in range(3):
-        _, alone = propagate(propagate.increments[run], initial=starts[run : run + 1], **arguments)
+    for run in range(runs):
+        _, alone = propagate(increments[run], initial=starts[run : run + 1], **arguments)
         assert alone[0].tobytes() == together[run].tobytes()
 
 

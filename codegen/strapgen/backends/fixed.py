@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from strapgen.backends.evaluators import Array, Evaluator
-from strapgen.backends.fixed_numbers import Memory, integers, numbers
+from strapgen.backends.fixed_numbers import Memory, fresh_feedback, integers, numbers
 from strapgen.backends.protocol import Backend
 from strapgen.backends.step_sources import StepSources
 from strapgen.ir.fixed_interface import Argument, Interface
@@ -86,8 +86,7 @@ class FixedEvaluator(Evaluator):
 
     def fresh(self, count: int) -> Array:
         """Return the error feedback with which `count` independent runs begin, (count, number of words)."""
-        words = np.array([feedback.fresh for feedback in self.interface.residuals], self.integer_type)
-        return np.tile(words, (count, 1))
+        return fresh_feedback(self.interface, count)
 
     @abstractmethod
     def run(self, inputs: Sequence[Array], feedback: Array) -> tuple[tuple[Array, ...], Array]:

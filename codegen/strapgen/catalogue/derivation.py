@@ -8,12 +8,13 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from strapgen.catalogue.choice import AnyMethod, Choice
+from strapgen.catalogue.method_names import INTEGRATORS, VECTORS
 from strapgen.catalogue.methods.shaped_coning import named_shape
 from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.catalogue.methods.window import Window
 from strapgen.catalogue.methods.windows import named_window
-from strapgen.catalogue.names import INTEGRATORS, KERNELS, LAYOUT_KERNELS, MOST_INCREMENTS, VECTORS
+from strapgen.catalogue.names import KERNELS, LAYOUT_KERNELS, MOST_INCREMENTS
 
 if TYPE_CHECKING:
     from strapgen.catalogue.methods.coefficients import Number

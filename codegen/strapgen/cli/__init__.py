@@ -37,7 +37,9 @@ from strapgen.cli.commands import (
     study_output_filter,
     study_pulse_torque,
     study_redundancy,
+    study_sensor_errors,
     study_system,
+    study_velocity_position,
     system,
     tableau,
     tables,
@@ -107,7 +109,9 @@ study.app.command("output-filter", cls=PlainCommand)(study_output_filter.study_o
 study.app.command("redundancy", cls=PlainCommand)(study_redundancy.study_redundancy)
 study.app.command("calibration", cls=PlainCommand)(study_calibration.study_calibration)
 study.app.command("pulse-torque", cls=PlainCommand)(study_pulse_torque.study_pulse_torque)
+study.app.command("sensor-errors", cls=PlainCommand)(study_sensor_errors.study_sensor_errors)
 study.app.command("loops", cls=PlainCommand)(study_loops.study_loops)
+study.app.command("velocity-position", cls=PlainCommand)(study_velocity_position.study_velocity_position)
 study.app.command("monte-carlo", cls=PlainCommand)(study_monte_carlo.study_monte_carlo)
 
 app = typer.Typer(
@@ -172,13 +176,14 @@ def _fail(message: str) -> None:
 
 
 def _spread_settings(words: list[str]) -> list[str]:
-    """Let one --set take several settings: ``--set a=1 b=2`` becomes ``--set a=1 --set b=2``."""
+    """Let one --set take several settings: ``--set a=1 b=2`` becomes ``--set a=1 --set b=2``; --force-set likewise."""
     spread: list[str] = []
-    inside = False
+    inside = ""
     for word in words:
-        if inside and "=" in word and not word.startswith("-") and spread[-1] != "--set":
-            spread.append("--set")
+        if inside and "=" in word and not word.startswith("-") and spread[-1] != inside:
+            spread.append(inside)
         elif word.startswith("-"):
-            inside = word == "--set" or word.startswith("--set=")
+            name = word.partition("=")[0]
+            inside = name if name in ("--set", "--force-set") else ""
         spread.append(word)
     return spread

@@ -8,7 +8,7 @@ from fractions import Fraction
 import numpy as np
 
 from strapgen.ir.float_interface import RoundingBounds
-from strapgen.ir.program import Operation, Program, walk
+from strapgen.ir.program import Operation, Program, names_in, walk
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Function, Sources
 from strapgen.rounding import rounding_bounds
@@ -170,7 +170,7 @@ def _files(program: Program, name: str, target: str, rounding: RoundingBounds) -
         "calls": _calls(program),
         "unused": [s.name for s in program.inputs if not program.used() & set(s.elements)],
         "code": _code(program, printer),
-        "propagation": _loop(program, CPrinter(real, f"{name}_runs")) if program.companions else None,
+        "propagation": _loop(program, CPrinter(real, f"{name}_runs"), name) if program.companions else None,
         "uses_math": any(
             node.kind in _FUNCTIONS and node.kind not in ("at_least", "select", "wrap") for node in nodes
         ),
@@ -181,21 +181,25 @@ def _files(program: Program, name: str, target: str, rounding: RoundingBounds) -
 
 
 def _code(
-    program: Program, printer: CPrinter, indices: dict[str, str] | None = None, depth: int = 1
+    program: Program,
+    printer: CPrinter,
+    places: dict[str, str] | None = None,
+    depth: int = 1,
+    number_type: str | None = None,
 ) -> dict[str, object]:
     """Return the statements of a program: loads, assignments, stores.
 
-    `indices` has the index of an element by the signal's name, if it is not ``[{}]``; `depth` is the number of blocks
-    around the statements.
+    `places` has where the element of a number stands by the signal's name, if that is not ``name[{}]``; `depth` is the
+    number of blocks around the statements, and `number_type` the type of their numbers, if it is not the printer's.
     """
-    real, used, indices = printer.real.name, program.used(program.outputs), indices or {}
+    kind, used, places = number_type or printer.real.name, program.used(program.outputs), places or {}
 
     def place(signal: Signal, number: int) -> str:
-        return signal.name + indices.get(signal.name, "[{}]").format(number)
+        return places.get(signal.name, f"{signal.name}[{{}}]").format(number)
 
     return {
         "loads": [
-            f"const {real} {element} = {place(signal, number)};"
+            f"const {kind} {element} = {place(signal, number)};"
             for signal in program.inputs
             if signal.shape
             for number, element in enumerate(signal.elements)
@@ -204,7 +208,7 @@ def _code(
         "body": [
             {
                 "text": fill_expression(
-                    f"const {real} {a.name} = {printer.text(a.value)};",
+                    f"const {kind} {a.name} = {printer.text(a.value)};",
                     " " * 4 * (depth + 1),
                     99 - 4 * depth,
                 ),
@@ -220,28 +224,60 @@ def _code(
     }
 
 
-#: Number of steps whose part without the state is computed together; the compiler vectorizes such a block.
-_BLOCK = 16
+#: Bytes of the vectors in which several steps of one run are prepared together, which every x86-64 has. Those of AVX2
+#: are twice as long.
+_VECTOR = 16
+#: Bytes of the numbers of all runs that go side by side, an element of the state: whole vectors of any processor, and
+#: as many rows of memory as it reads ahead.
+_ABREAST = 64
+#: Bytes of a run's samples by which memory is fetched ahead: its latency is that of some steps of all runs.
+_FETCHED = 512
+#: Operations that C compilers know on vectors.
+_OF_VECTORS = frozenset(("add", "subtract", "multiply", "divide", "negate"))
 
 
-def _loop(program: Program, printer: CPrinter) -> dict[str, object]:
-    """Return the statements of a step in a loop, in two parts: without the state, and with it."""
+def _loop(program: Program, printer: CPrinter, name: str) -> dict[str, object]:
+    """Return the statements of a step in a loop: in two parts, without the state and with it, and for many runs."""
     ahead, behind = program.split()
     (increments,), (prepared,) = ahead.inputs, ahead.outputs
+    state, result = program.inputs[0], program.outputs[0].signal
     signals = [(signal, "const ") for signal in program.inputs]
     signals += [(result.signal, "") for result in program.outputs]
     rows = [(signal, constant, number) for signal, constant in signals for number in range(signal.size)]
-    name = printer.real.name
+    real = printer.real
+    lanes, abreast = _VECTOR // real.bytes, _ABREAST // real.bytes
+
+    def in_lanes(wide: str) -> dict[str, object]:
+        load = f"{name}{wide}_LANES_OF_".upper() + f"({increments.name}, {{}})"
+        places = {increments.name: load, "prepared": "prepared[{}].all"}
+        return _code(ahead, printer, places, number_type=f"{name}{wide}_lanes_")
+
+    states = {state.name: "own[{}][k]", result.name: "own[{}][k]"}
     return {
-        "block": _BLOCK,
+        "vectors": _in_vectors(ahead),
+        "lanes": lanes,
+        "abreast": abreast,
+        "fetched": max(1, _FETCHED // (increments.size * real.bytes)),
         "prepared": prepared.signal.size,
-        "stack": _BLOCK * (prepared.signal.size + increments.size) * printer.real.bytes,
-        "ahead": _code(ahead, printer, {increments.name: "_by_element[{}][k]", "prepared": "[{}][k]"}, 2),
-        "behind": _code(behind, printer, {"prepared": "[{}][k]"}),
-        "rows": ", ".join(f"{constant}{name} *restrict {s.name}_{k}" for s, constant, k in rows),
+        "stack": max(4 * _VECTOR * prepared.signal.size, _ABREAST * state.size),
+        "ahead": in_lanes(""),
+        "wide_ahead": in_lanes("_wide"),
+        "behind": _code(behind, printer, {"prepared": "prepared[{}].one[k]"}),
+        "abreast_step": _code(
+            program, printer, states | {increments.name: f"{increments.name}[apart * k + {{}}]"}, 2
+        ),
+        "rows": ", ".join(f"{constant}{real.name} *restrict {s.name}_{k}" for s, constant, k in rows),
         "row_arguments": ", ".join(f"{s.name} + {k} * runs" for s, _, k in rows),
-        "batch": _code(program, printer, {signal.name: "_{}[k]" for signal, _ in signals}, 2),
+        "batch": _code(program, printer, {signal.name: f"{signal.name}_{{}}[k]" for signal, _ in signals}, 2),
     }
+
+
+def _in_vectors(program: Program) -> bool:
+    """Return whether each value and output of a program can be a vector of several samples."""
+    values = [a.value for a in program.body] + [node for result in program.outputs for node in result.nodes]
+    return all(names_in(value) for value in values) and all(
+        node.kind in _OF_VECTORS for value in values for node in walk(value) if isinstance(node, Operation)
+    )
 
 
 def _parameters(program: Program, real: Real) -> list[str]:

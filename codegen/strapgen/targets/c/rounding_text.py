@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from fractions import Fraction
 
@@ -20,24 +19,25 @@ def with_names(bounds: RoundingBounds, program: Program, named: Program) -> Roun
     program, named : Program
         The program that they are of, and the same with the printed names.
     """
-    names = dict(zip(_names(program), _names(named), strict=True))
+    # A value on the way may have the name of an input or of an output.
+    inputs = _renamed([s.name for s in program.inputs], [s.name for s in named.inputs])
+    values = _renamed([a.name for a in program.body], [a.name for a in named.body])
+    outputs = _renamed([r.signal.name for r in program.outputs], [r.signal.name for r in named.outputs])
 
-    def renamed(condition: Condition) -> Condition:
+    def renamed(condition: Condition, names: dict[str, str]) -> Condition:
         words, space, name = condition.value.rpartition(" ")
         return replace(condition, value=words + space + names[name])
 
     return replace(
         bounds,
-        inputs=tuple(map(renamed, bounds.inputs)),
-        conditions=tuple(map(renamed, bounds.conditions)),
-        errors={names[name]: errors for name, errors in bounds.errors.items()},
+        inputs=tuple(renamed(condition, inputs) for condition in bounds.inputs),
+        conditions=tuple(renamed(c, outputs | inputs | values) for c in bounds.conditions),
+        errors={outputs[name]: errors for name, errors in bounds.errors.items()},
     )
 
 
-def _names(program: Program) -> Iterator[str]:
-    yield from (signal.name for signal in program.inputs)
-    yield from (assignment.name for assignment in program.body)
-    yield from (result.signal.name for result in program.outputs)
+def _renamed(names: list[str], printed: list[str]) -> dict[str, str]:
+    return dict(zip(names, printed, strict=True))
 
 
 def rounding_text(bounds: RoundingBounds, program: Program) -> str:
