@@ -17,7 +17,7 @@ from strapgen.experiments.selection.brief import read_brief
 from strapgen.experiments.selection.candidates import STATES, contenders
 from strapgen.experiments.selection.environment import RecordedEnvironment
 from strapgen.experiments.selection.judgement import CAUSES, Question, judged
-from strapgen.experiments.selection.simulated import choice_of, run, vibration
+from strapgen.experiments.selection.simulated import algorithm_named, run, vibration
 
 BRIEFS = Path(__file__).resolve().parents[3] / "examples" / "briefs"
 #: What a deterministic cause may differ by from a time simulation: a part of it, or this in deg/h, whichever is more.
@@ -30,7 +30,7 @@ def answer(path, names):
 
 
 def assert_as_simulated(brief, path, one):
-    simulated = run(brief, one, choice_of(one, path))
+    simulated = run(brief, one, algorithm_named(one, brief, path))
     for cause in ("truncation", "coning"):
         predicted, seen = one.drift_deg_h[cause], getattr(simulated, cause)
         assert predicted == pytest.approx(seen, rel=PART, abs=LEAST), (one.name, cause)
