@@ -32,7 +32,7 @@ _QUANTILE = 1.959963984540054
 ALL = "all"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SensorScatter:
     """The error of the attitude that sensors cause, over many runs.
 
