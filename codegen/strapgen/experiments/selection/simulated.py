@@ -13,9 +13,10 @@ import numpy as np
 
 from strapgen.experiments.random_runs import Errors, MeanSquare, SteadyRuns, random_runs
 from strapgen.experiments.selection import causes
-from strapgen.experiments.selection.algorithm import Algorithm, algorithm_of
+from strapgen.experiments.selection.algorithm import Algorithm
 from strapgen.experiments.selection.brief import DesignBrief
 from strapgen.experiments.selection.candidates import Contender
+from strapgen.experiments.selection.choosing import algorithm_of
 from strapgen.experiments.selection.environment import Line
 from strapgen.experiments.selection.judgement import Judgement
 from strapgen.simulation.motions import Motion, motion
