@@ -64,7 +64,7 @@ def test_the_number_of_processes_changes_nothing(tmp_path):
 def test_ten_thousand_runs_of_ten_thousand_steps(capsys):
     drifts = []
     for words in ("--jobs 1", "--jobs 2"):
-        command = f"study monte-carlo euler --runs 10000 --steps 10000 --format json {words}"
+        command = f"study monte-carlo euler --runs 10000 --length 10000 --format json {words}"
         with pytest.raises(SystemExit) as stop:
             main(command.split())
         assert stop.value.code in (0, None)
@@ -79,7 +79,7 @@ def test_ten_thousand_runs_of_ten_thousand_steps(capsys):
     ("options", "said"),
     [
         ("--runs 0", "runs is 0"),
-        ("--steps many", "steps is 'many'; a whole number is needed"),
+        ("--length many", "length is 'many'; a whole number is needed"),
         ("--pulse-arcsec -1", "pulse-arcsec is -1; 0 for none"),
         ("--noise-deg-sqrt-h 0", "are both 0"),
         ("--sample-hz 0", "sample-hz is 0"),
@@ -108,7 +108,7 @@ def test_the_command_shows_the_drift_beside_the_closed_forms(capsys):
                 "euler",
                 "--runs",
                 "500",
-                "--steps",
+                "--length",
                 "100",
                 "--backend",
                 "numpy",
