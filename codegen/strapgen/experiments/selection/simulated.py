@@ -210,7 +210,7 @@ def _turn(brief: DesignBrief) -> float:
 def _random(brief: DesignBrief, algorithm: Algorithm, errors: Errors, jobs: int | None) -> MeanSquare:
     """Return the squared angle at the end of random runs."""
     runs = SteadyRuns(algorithm.steady(), errors, _RANDOM_STEPS, RANDOM_RUNS, (_SEED,))
-    return sum(random_runs(runs, jobs=jobs), MeanSquare())
+    return MeanSquare.of(random_runs(runs, jobs=jobs))
 
 
 def _drift(outcome: MeanSquare, seconds: float, factor: float) -> RandomDrift:
