@@ -80,7 +80,7 @@ def derive(choice: Choice) -> Kernel:
 def _derived(choice: Choice) -> Kernel:
     """Return the kernel of a choice with all its inputs."""
     if choice.user_kernel is not None:
-        return choice.user_kernel
+        return choice.user_kernel.kernel
     if choice.method is None:
         described = choice.layout is not None
         recipe = LAYOUT_KERNELS[choice.name] if described else KERNELS[choice.name]
